@@ -1,0 +1,7 @@
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+//! Core of raywake.
+
+pub mod pose;
+pub mod sweep;

@@ -1,0 +1,70 @@
+//! What a source hands over: one sweep of returns, and the rig that made it.
+
+use crate::pose::{Pose, Twist};
+
+/// One return.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Position in the vehicle frame, m.
+    pub position: [f32; 3],
+    /// 0..1 where the source has it.
+    pub intensity: f32,
+    /// Time of the return after the sweep's stamp, s (may be negative); 0 where unknown.
+    pub offset_s: f32,
+    /// Index of the sensor in [`Rig::sensors`].
+    pub sensor: u32,
+}
+
+/// One sweep as received.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep<'a> {
+    /// Time of the stamp, s.
+    pub stamp_s: f64,
+    /// Returns in the source's order.
+    pub points: &'a [Point],
+    /// Pose of the vehicle at the stamp.
+    pub world_from_vehicle: Pose,
+    /// Velocity of the vehicle at the stamp.
+    pub twist: Twist,
+}
+
+/// Sensors a rig may have.
+pub const SENSORS_MAX: usize = 8;
+
+/// Where a return's time within the sweep comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Timing {
+    /// Unknown: every return is taken at the stamp.
+    AtStamp,
+    /// [`Point::offset_s`]; the sweep spans from `from_s` to `from_s + span_s` around the stamp.
+    Offset {
+        /// Earliest offset, s.
+        from_s: f64,
+        /// Duration of the sweep, s.
+        span_s: f64,
+    },
+    /// A sensor that spins clockwise seen from above, starts and ends at the rear, and is stamped
+    /// when it looks forward (KITTI's HDL-64E): the azimuth tells the time.
+    Azimuth {
+        /// Duration of one turn, s.
+        span_s: f64,
+    },
+}
+
+/// What is fixed about a source of sweeps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// `vehicle_from_sensor` of every sensor, at most [`SENSORS_MAX`].
+    pub sensors: heapless::Vec<Pose, SENSORS_MAX>,
+    /// Where a return's time comes from.
+    pub timing: Timing,
+    /// Whether returns are still distorted by the vehicle's motion, so that each is to be moved to
+    /// the stamp by its time. A declared property of the source: Argoverse 2 has times and is
+    /// already compensated, KITTI has none and is not.
+    pub distorted: bool,
+    /// Height of the ground under the vehicle in the vehicle frame, m.
+    pub ground_m: f64,
+    /// Returns from the own vehicle lie in this box of the vehicle frame: (x, y) minimum and
+    /// maximum, m, at any height.
+    pub own_vehicle: Option<[[f32; 2]; 2]>,
+}
