@@ -3,5 +3,6 @@
 #![warn(missing_docs)]
 //! Core of raywake.
 
+pub mod output;
 pub mod pose;
 pub mod sweep;

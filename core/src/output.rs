@@ -1,0 +1,82 @@
+//! What one step hands back: records of plain numbers, one per column, point and tracklet.
+//!
+//! Vehicle frame: of the pair's first sweep for columns and points, of its second sweep for
+//! tracklets. World frame: the frame of the poses. "World velocity" is over ground; "ego velocity"
+//! is relative to the moving vehicle, along the vehicle's axes (section 3.7).
+
+/// What is known of a column's flow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Origin {
+    /// Not foreground: the flow follows from odometry (section 3.4.2).
+    #[default]
+    Background = 0,
+    /// Foreground, but the energy minimisation left no valid match; velocity is that of odometry.
+    Unmatched = 1,
+    /// Foreground with a valid match (section 3.5.2).
+    Matched = 2,
+}
+
+/// Flow of one solid column of the pair's first sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ColumnFlow {
+    /// Index of the column in the lattice, counted from the world origin (`dissertation` preset:
+    /// from the sensor).
+    pub cell: [i32; 2],
+    /// Centre of the column in the world, m.
+    pub position_world_m: [f64; 2],
+    /// Centre of the column in the vehicle frame, m.
+    pub position_vehicle_m: [f32; 2],
+    /// Raw displacement in cells (3.14); meaningful where matched.
+    pub displacement_cells: [i32; 2],
+    /// Energy of the match in thousandths of a nat; meaningful where matched.
+    pub energy: i32,
+    /// Velocity over ground along world axes, m/s.
+    pub velocity_world_mps: [f32; 2],
+    /// Velocity relative to the vehicle along vehicle axes, m/s.
+    pub velocity_ego_mps: [f32; 2],
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where not matched.
+    pub covariance: [f32; 3],
+    /// Observations of the tracklet after its birth (section 3.6.2).
+    pub age: u32,
+    /// Where the flow comes from.
+    pub origin: Origin,
+}
+
+/// Flow of one return of the pair's first sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointFlow {
+    /// Velocity over ground along world axes, m/s.
+    pub velocity_world_mps: [f32; 2],
+    /// Velocity relative to the vehicle along vehicle axes, m/s.
+    pub velocity_ego_mps: [f32; 3],
+    /// Age of the column's tracklet.
+    pub age: u32,
+    /// Where the flow comes from; returns outside the window are background.
+    pub origin: Origin,
+}
+
+/// A flow tracklet after the step (section 3.6), at the time of the pair's second sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrackletState {
+    /// Cell it lies in, counted as in [`ColumnFlow::cell`].
+    pub cell: [i32; 2],
+    /// Position in the world, m.
+    pub position_world_m: [f64; 2],
+    /// Position in the vehicle frame, m.
+    pub position_vehicle_m: [f32; 2],
+    /// Heading of motion in the world, rad.
+    pub heading_rad: f32,
+    /// Speed over ground along the heading, m/s (may be negative: the state of 3.15 is signed).
+    pub speed_mps: f32,
+    /// Turning rate, rad/s.
+    pub turn_rate_radps: f32,
+    /// Velocity over ground along world axes, m/s.
+    pub velocity_world_mps: [f32; 2],
+    /// Velocity relative to the vehicle along vehicle axes, m/s.
+    pub velocity_ego_mps: [f32; 2],
+    /// Covariance of (x, y, heading, speed, turn rate), row-major.
+    pub covariance: [[f32; 5]; 5],
+    /// Observations after birth.
+    pub age: u32,
+}
