@@ -1,8 +1,23 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
-//! Core of raywake.
+//! Temporal scene flow from LIDAR (Ushani 2018, chapter 3 and appendix B) as scalar functions over
+//! caller-owned storage: no allocation, no operating system, no unsafe code.
 
+pub mod background_filter;
+pub mod compact;
+pub mod digest;
+pub mod flow;
+pub mod grid;
+pub mod layout;
+pub mod motion_compensation;
+pub mod occupancy_constancy;
 pub mod output;
+pub mod params;
+pub mod pipeline;
 pub mod pose;
+pub mod prepare;
+pub mod record;
 pub mod sweep;
+pub mod tracklet;
+pub mod weights;

@@ -1,0 +1,137 @@
+//! Every buffer of the flow pipeline, declared once: what a device allocates, what the scalar
+//! backend allocates, what the kernels bind and what `memory-layout.md` lists.
+
+use crate::background_filter::TABLE_WORDS;
+use crate::occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
+use crate::params::{
+    FOREGROUND_MAX, MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile, ROW_WORDS,
+};
+use crate::record::Step;
+
+/// Where a buffer lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heap {
+    /// Written by the host, read by copies.
+    Upload,
+    /// The device's own.
+    Device,
+    /// Written by copies, read by the host.
+    Readback,
+}
+
+/// One buffer.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Name, the same in the kernels.
+    pub name: &'static str,
+    /// Heap.
+    pub heap: Heap,
+    /// Element, as the kernels see it.
+    pub element: &'static str,
+    /// Words (of 32 bits) of an element.
+    pub words: usize,
+    /// Elements for a profile.
+    pub count: fn(&Profile) -> usize,
+    /// What it holds.
+    pub doc: &'static str,
+}
+
+impl Row {
+    /// Bytes for a profile.
+    pub fn bytes(&self, profile: &Profile) -> usize {
+        4 * self.words * (self.count)(profile)
+    }
+}
+
+macro_rules! buffers {
+    ($(#[$m:meta])* $enum:ident, $table:ident: $( $id:ident $name:literal $heap:ident $element:literal * $words:expr, |$p:ident| $count:expr, $doc:literal; )*) => {
+        $(#[$m])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $enum { $( #[doc = $doc] $id ),* }
+
+        impl $enum {
+            /// The row of this buffer.
+            pub fn row(self) -> &'static Row { &$table[self as usize] }
+        }
+
+        /// The table, in the order of the enumeration.
+        pub const $table: &[Row] = &[ $( Row {
+            name: $name, heap: Heap::$heap, element: $element, words: $words,
+            count: |$p| $count, doc: $doc,
+        } ),* ];
+    };
+}
+pub(crate) use buffers;
+
+buffers! {
+    /// Buffers of the flow pipeline.
+    Buffer, BUFFERS:
+    StepIn "step_in" Upload "u32" * 1, |_p| Step::WORDS, "record `Step` of the sweep";
+    OriginsIn "origins_in" Upload "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
+    RaysIn "rays_in" Upload "vec2<u32>" * 2, |_p| POINTS_MAX, "rays of the sweep";
+    FilterIn "filter_in" Upload "i32" * 1, |_p| TABLE_WORDS, "background filter, once at start";
+    WeightsIn "weights_in" Upload "i32" * 1, |_p| WEIGHT_WORDS, "constancy weights, once at start";
+    CostsIn "costs_in" Upload "u32" * 1, |_p| SCORES_MAX, "costs of scores, once at start";
+    StepNow "step" Device "u32" * 1, |_p| Step::WORDS, "record `Step`";
+    Origins "origins" Device "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
+    Rays "rays" Device "vec2<u32>" * 2, |_p| POINTS_MAX, "rays";
+    Filter "filter_table" Device "i32" * 1, |_p| TABLE_WORDS, "background filter by mask byte";
+    Weights "constancy_weights" Device "i32" * 1, |_p| WEIGHT_WORDS, "constancy weights by level";
+    Costs "constancy_costs" Device "u32" * 1, |_p| SCORES_MAX, "cost of each score, 1/1000 nat";
+    Slots "slots" Device "atomic<u32>" * 1, |_p| MERGE_SLOTS, "distinct rays: 1 + index of one";
+    RayWeights "ray_weights" Device "atomic<u32>" * 1, |_p| MERGE_SLOTS, "distinct rays: how many";
+    Distinct "distinct" Device "u32" * 1, |_p| POINTS_MAX, "used slots";
+    Counters "counters" Device "atomic<u32>" * 1, |_p| COUNTERS, "counts and indirect group counts";
+    LogOdds "log_odds" Device "atomic<i32>" * 1, |p| p.voxels(), "log-odds of every voxel, tenths";
+    Now "columns_now" Device "vec2<u32>" * 2, |p| p.columns(), "columns of this sweep";
+    Before "columns_before" Device "vec2<u32>" * 2, |p| p.columns(), "columns of the sweep before, in this window";
+    Marks "marks" Device "u32" * 1, |p| p.columns(), "1 where a column is foreground";
+    Tiles "tiles" Device "u32" * 1, |_p| crate::params::TILE, "sums of the tiles of the prefix sum";
+    Rank "rank" Device "u32" * 1, |p| p.columns(), "position of a column in the foreground";
+    Foreground "foreground" Device "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns, ascending";
+    Cost "cost" Device "u32" * 1, |_p| FOREGROUND_MAX * ROW_WORDS, "costs of pairs of columns, two 16-bit values a word";
+    Matching "matching" Device "u32" * 1, |_p| FOREGROUND_MAX * ROW_WORDS, "costs summed over the 3x3 window (T, 3.13)";
+    State "state" Device "u32" * 1, |p| p.columns(), "flow of every column";
+    TargetEnergy "target_energy" Device "atomic<u32>" * 1, |p| p.columns(), "energy of the winner at every target";
+    TargetRank "target_rank" Device "atomic<u32>" * 1, |p| p.columns(), "rank of the winner at every target";
+    Proposal "proposal" Device "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "flow and energy each foreground column proposes";
+    Bound "bound" Device "u32" * 1, |_p| FOREGROUND_MAX, "least a foreground column can pay";
+    CountersOut "counters_out" Readback "u32" * 1, |_p| COUNTERS, "counts";
+    BeforeOut "columns_before_out" Readback "vec2<u32>" * 2, |p| p.columns(), "columns of the sweep before";
+    ForegroundOut "foreground_out" Readback "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns";
+    StateOut "state_out" Readback "u32" * 1, |p| p.columns(), "flow of every column";
+    ProposalOut "proposal_out" Readback "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "last proposals";
+}
+
+/// Words of the counters: distinct rays, foreground listed, foreground marked, spare; then three
+/// group counts and a spare for each indirect dispatch.
+pub const COUNTERS: usize = 16;
+/// Word of the number of distinct rays.
+pub const DISTINCT_COUNT: usize = 0;
+/// Word of the number of foreground columns listed.
+pub const FOREGROUND_COUNT: usize = 1;
+/// Word of the number of foreground columns marked.
+pub const FOREGROUND_MARKED: usize = 2;
+/// First word of the group counts, one thread per distinct ray.
+pub const GROUPS_DISTINCT: usize = 4;
+/// First word of the group counts, one thread per foreground column.
+pub const GROUPS_FOREGROUND: usize = 8;
+/// First word of the group counts, one group per foreground column.
+pub const GROUPS_ROWS: usize = 12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_fit_their_profiles() {
+        assert_eq!(Buffer::Bound.row().name, "bound");
+        assert_eq!(Buffer::StepIn.row().name, "step_in");
+        for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
+            // 128 MiB is the least a Vulkan device must let a shader bind.
+            assert!(BUFFERS.iter().all(|b| b.bytes(&profile) <= 128 << 20));
+        }
+        let total: usize = BUFFERS.iter().map(|b| b.bytes(&Profile::hdl64())).sum();
+        assert!(total <= 64 << 20, "{total} bytes");
+    }
+}

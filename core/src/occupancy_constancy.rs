@@ -1,0 +1,251 @@
+//! Occupancy constancy (section 3.5.1): how well two columns agree.
+//!
+//! Three binary features per level say whether both columns are free, both occupied, or one of
+//! each (3.8-3.10); a logistic classifier weighs them (3.11, 3.12). Free and occupied exclude each
+//! other, so with the source fixed the score is linear in the target's mask bits: four byte
+//! lookups score a pair. Costs are negative log-probabilities in thousandths of a nat, so that
+//! sums over the window (3.13) and energies are integers on every machine.
+
+use crate::background_filter::fill_byte_table;
+use crate::params::{COST_UNKNOWN, DISPLACEMENTS, LEVELS_MAX, REACH, ROW_WORDS, SIDE};
+use crate::record::{Column, NONE, Step};
+use crate::weights::{Weights, WeightsError};
+
+/// Entries the table of log-sigmoids may have: sums of weights, bias included.
+pub const SCORES_MAX: usize = 8192;
+/// Elements of a row of costs: two per word.
+pub const ROW: usize = 2 * ROW_WORDS;
+/// Words of the weights on the device: free, occupied, mixed per level, then the bias.
+pub const WEIGHT_WORDS: usize = 3 * LEVELS_MAX + 1;
+/// Largest cost of a pair: nine of them fit 16 bits.
+pub const COST_MAX: u32 = u16::MAX as u32 / 9;
+
+/// The classifier, ready for use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Scores {
+    /// Least sum of weights.
+    pub min: i32,
+    /// Number of possible sums.
+    pub count: i32,
+}
+
+/// Reads a weights file of kind `constancy`, shape (3 for free, occupied, mixed; levels).
+///
+/// `weights` must hold [`WEIGHT_WORDS`] elements, `costs` [`SCORES_MAX`]; `costs[s - min]` becomes
+/// the cost of score `s`.
+pub fn load(
+    text: &str,
+    levels: usize,
+    weights: &mut [i32],
+    costs: &mut [u32],
+) -> Result<Scores, WeightsError> {
+    assert!(weights.len() == WEIGHT_WORDS && costs.len() == SCORES_MAX && levels <= LEVELS_MAX);
+    let file = Weights::parse(text, "constancy", &[3, levels])?;
+    weights.fill(0);
+    for (n, value) in file.values().enumerate() {
+        let at = if n < 3 * levels { n / levels * LEVELS_MAX + n % levels } else { 3 * LEVELS_MAX };
+        weights[at] = value;
+    }
+    let bias = weights[3 * LEVELS_MAX];
+    // A level contributes one of its three weights or nothing.
+    let (mut low, mut high) = (bias, bias);
+    for k in 0..LEVELS_MAX {
+        let of_level = [weights[k], weights[LEVELS_MAX + k], weights[2 * LEVELS_MAX + k]];
+        low += of_level.into_iter().min().unwrap_or(0).min(0);
+        high += of_level.into_iter().max().unwrap_or(0).max(0);
+    }
+    let count = high - low + 1;
+    if count as usize > SCORES_MAX {
+        return Err(WeightsError::Header("scale"));
+    }
+    for (n, cost) in costs.iter_mut().enumerate() {
+        let x = (low + n as i32) as f64 / file.scale as f64;
+        // -log sigmoid(x) = log(1 + exp(-x))
+        let nats = libm::log1p(libm::exp(-x));
+        *cost = (libm::floor(nats * 1000.0 + 0.5) as u32).min(COST_MAX);
+    }
+    Ok(Scores { min: low, count })
+}
+
+/// What each mask bit of a target adds to the score of `source`: free in the low half, occupied in
+/// the high half.
+pub fn bit_weights(source: Column, weights: &[i32]) -> [i32; 32] {
+    let mut bits = [0; 32];
+    for k in 0..LEVELS_MAX {
+        let (free, occupied, mixed) =
+            (weights[k], weights[LEVELS_MAX + k], weights[2 * LEVELS_MAX + k]);
+        if source[0] >> k & 1 == 1 {
+            (bits[k], bits[16 + k]) = (free, mixed);
+        } else if source[0] >> (16 + k) & 1 == 1 {
+            (bits[k], bits[16 + k]) = (mixed, occupied);
+        }
+    }
+    bits
+}
+
+/// Costs of every foreground column at every displacement: row `n` of `cost` belongs to
+/// `foreground[n]`, element `(du + REACH) * SIDE + dv + REACH` to displacement `(du, dv)`. A target
+/// outside the window is unknown. `cost` must hold [`ROW`] elements per foreground column.
+pub fn occupancy_constancy(
+    step: &Step,
+    weights: &[i32],
+    costs: &[u32],
+    foreground: &[u32],
+    before: &[Column],
+    now: &[Column],
+    cost: &mut [u16],
+) {
+    let side = step.side;
+    let offset = weights[3 * LEVELS_MAX] - step.score_min;
+    let unknown = costs[offset as usize] as u16;
+    let mut bytes = [[0; 256]; 4];
+    for (&source, row) in foreground.iter().zip(cost.chunks_exact_mut(ROW)) {
+        let bits = bit_weights(before[source as usize], weights);
+        for (bits, bytes) in bits.chunks_exact(8).zip(&mut bytes) {
+            fill_byte_table(bits, bytes);
+        }
+        let (i, j) = (source as i32 / side, source as i32 % side);
+        for (du, row) in (-REACH..).zip(row[..DISPLACEMENTS].chunks_exact_mut(SIDE)) {
+            row.fill(unknown);
+            if !(0..side).contains(&(i + du)) {
+                continue;
+            }
+            let (from, to) = ((j - REACH).max(0), (j + REACH).min(side - 1));
+            let line = (i + du) * side;
+            let targets = &now[(line + from) as usize..=(line + to) as usize];
+            for (target, cost) in targets.iter().zip(&mut row[(from - j + REACH) as usize..]) {
+                let [a, b, c, d] = target[0].to_le_bytes().map(usize::from);
+                let score = bytes[0][a] + bytes[1][b] + bytes[2][c] + bytes[3][d];
+                *cost = costs[(score + offset) as usize] as u16;
+            }
+        }
+    }
+}
+
+/// Sums costs over the 3x3 window that moves with the source (3.13, as the author programmed it):
+/// row `n` of `matching` becomes the sum of the rows of the foreground neighbours of
+/// `foreground[n]`, itself included, plus [`COST_UNKNOWN`] for each neighbour inside the window
+/// that is empty or filtered. Neighbours outside are [`outside_cost`], a constant of the column.
+pub fn window(step: &Step, foreground: &[u32], rank: &[u32], cost: &[u16], matching: &mut [u16]) {
+    for (&source, sum) in foreground.iter().zip(matching.chunks_exact_mut(ROW)) {
+        sum.fill(0);
+        let mut unknown = 0;
+        for neighbour in neighbours(step, source as usize).into_iter().flatten() {
+            match rank[neighbour] {
+                NONE => unknown += COST_UNKNOWN as u16,
+                n => {
+                    let row = &cost[n as usize * ROW..][..ROW];
+                    sum.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
+                }
+            }
+        }
+        sum.iter_mut().for_each(|sum| *sum += unknown);
+    }
+}
+
+/// Cost of the window neighbours of a column that lie outside the grid.
+pub fn outside_cost(step: &Step, column: usize) -> i32 {
+    let missing = neighbours(step, column).iter().filter(|n| n.is_none()).count();
+    missing as i32 * step.outside_cost
+}
+
+/// The 3x3 columns around one, [`None`] outside the window.
+fn neighbours(step: &Step, column: usize) -> [Option<usize>; 9] {
+    let side = step.side;
+    let (i, j) = (column as i32 / side, column as i32 % side);
+    core::array::from_fn(|n| {
+        let (i, j) = (i + n as i32 / 3 - 1, j + n as i32 % 3 - 1);
+        let inside = (0..side).contains(&i) && (0..side).contains(&j);
+        inside.then_some((i * side + j) as usize)
+    })
+}
+
+/// The classifier shipped with the program: see the file's provenance.
+pub const SHIPPED: &str = include_str!("../weights/constancy.txt");
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    fn toy() -> (Step, Vec<Column>, Vec<Column>) {
+        let random = |n: u32, s: u32| (n.wrapping_mul(2654435761) ^ s).wrapping_mul(0x2c1b_3c6d) >> 16;
+        let make = |s: u32| -> Vec<Column> {
+            (0..33 * 33)
+                .map(|n| {
+                    let (a, b) = (random(n, s), random(n, s + 1));
+                    let free = a & 0x3fff;
+                    [free | (b & !free & 0x3fff) << 16, (n % 4 != 0) as u32]
+                })
+                .collect()
+        };
+        (Step { side: 33, levels: 14, outside_cost: 693, ..Default::default() }, make(1), make(7))
+    }
+
+    #[test]
+    fn costs_equal_the_classifier_in_floating_point() {
+        let (mut step, before, now) = toy();
+        let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
+        let scores = load(SHIPPED, 14, &mut weights, &mut costs).unwrap();
+        step.score_min = scores.min;
+        let foreground = [0, 17, 33 * 16 + 16, 33 * 33 - 1];
+        let mut cost = vec![0; 4 * ROW];
+        occupancy_constancy(&step, &weights, &costs, &foreground, &before, &now, &mut cost);
+        for (n, source) in foreground.iter().enumerate() {
+            let (i, j) = (*source as i32 / 33, *source as i32 % 33);
+            for du in -REACH..=REACH {
+                for dv in -REACH..=REACH {
+                    let (ti, tj) = (i + du, j + dv);
+                    let target = if (0..33).contains(&ti) && (0..33).contains(&tj) {
+                        now[(ti * 33 + tj) as usize][0]
+                    } else {
+                        0
+                    };
+                    // (3.8)-(3.12) to the letter.
+                    let s = before[*source as usize][0];
+                    let mut x = weights[48] as f64 / 100.0;
+                    for k in 0..14 {
+                        let (f1, o1) = (s >> k & 1 == 1, s >> (16 + k) & 1 == 1);
+                        let (f2, o2) = (target >> k & 1 == 1, target >> (16 + k) & 1 == 1);
+                        x += (f1 && f2) as i32 as f64 * weights[k] as f64 / 100.0;
+                        x += (o1 && o2) as i32 as f64 * weights[16 + k] as f64 / 100.0;
+                        let mixed = o1 && f2 || f1 && o2;
+                        x += mixed as i32 as f64 * weights[32 + k] as f64 / 100.0;
+                    }
+                    let nats = (1.0 + (-x).exp()).ln();
+                    let found = cost[n * ROW + ((du + 15) * 31 + dv + 15) as usize];
+                    assert!((found as f64 - 1000.0 * nats).abs() <= 0.5 + 1e-6);
+                }
+            }
+        }
+        // The figures published beside the constants: scores of -537 to 2052.
+        assert_eq!((scores.min, scores.min + scores.count - 1), (-537, 2052));
+    }
+
+    #[test]
+    fn the_window_adds_what_each_neighbour_says() {
+        let (step, before, _) = toy();
+        let foreground: Vec<u32> = (0..33 * 33).filter(|n| before[*n as usize][1] != 0).collect();
+        let mut rank = vec![NONE; 33 * 33];
+        foreground.iter().enumerate().for_each(|(n, c)| rank[*c as usize] = n as u32);
+        let cost: Vec<u16> = (0..foreground.len() * ROW).map(|n| (n * 31 % 5379) as u16).collect();
+        let mut matching = vec![0; foreground.len() * ROW];
+        window(&step, &foreground, &rank, &cost, &mut matching);
+        for (n, source) in foreground.iter().enumerate().step_by(7) {
+            let (i, j) = (*source as i32 / 33, *source as i32 % 33);
+            for d in [0, 480, 960] {
+                let mut sum = 0;
+                for w in 0..9 {
+                    let (i, j) = (i + w / 3 - 1, j + w % 3 - 1);
+                    let inside = (0..33).contains(&i) && (0..33).contains(&j);
+                    let r = if inside { rank[(i * 33 + j) as usize] } else { NONE };
+                    sum += if r == NONE { 693 } else { cost[r as usize * ROW + d] as u32 };
+                }
+                let outside = outside_cost(&step, *source as usize) as u32;
+                assert_eq!(matching[n * ROW + d] as u32 + outside, sum);
+            }
+        }
+    }
+}

@@ -1,0 +1,488 @@
+//! Figure 3.1, a sweep at a time.
+//!
+//! ```text
+//! sweep, pose -> [prepare] -> rays -> [perceive] -> flow of columns -> [follow] -> velocities
+//!                             ray_merge, ray_trace, columns, shift,
+//!                             background_filter, compact, occupancy_constancy,
+//!                             window, expectation / maximisation x n_em
+//! ```
+//! [`Pipeline::prepare`] and [`Pipeline::follow`] run on the CPU. What lies between is integers and
+//! bits: [`perceive`] does it here, the kernels do the same on a device, with the same result.
+
+use crate::background_filter::{self, background_filter};
+use crate::compact::compact;
+use crate::flow::Em;
+use crate::grid::columns::{columns, shift};
+use crate::grid::ray_merge::ray_merge;
+use crate::grid::ray_trace::ray_trace;
+use crate::motion_compensation::EgoMotion;
+use crate::occupancy_constancy::{self, Scores, occupancy_constancy, window};
+use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
+use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
+use crate::pose::{Pose, Twist};
+use crate::prepare::{Dropped, Preparation, Window, place};
+use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
+use crate::sweep::{Point, Rig, Sweep};
+use crate::tracklet::{Tracklets, Turnover};
+use glam::DVec3;
+
+/// Storage of the scalar backend, one slice per buffer of the layout, and the learned tables.
+pub struct Storage<'a> {
+    /// Table of the background filter, see [`background_filter::load`].
+    pub filter_table: &'a [i32],
+    /// Weights of the constancy classifier, see [`occupancy_constancy::load`].
+    pub constancy_weights: &'a [i32],
+    /// Its table of costs.
+    pub constancy_costs: &'a [u32],
+    /// [`crate::params::MERGE_SLOTS`] elements.
+    pub slots: &'a mut [u32],
+    /// [`crate::params::MERGE_SLOTS`] elements.
+    pub weights: &'a mut [u32],
+    /// [`POINTS_MAX`] elements.
+    pub distinct: &'a mut [u32],
+    /// One element per voxel.
+    pub log_odds: &'a mut [i32],
+    /// One element per column, kept from sweep to sweep.
+    pub now: &'a mut [Column],
+    /// One element per column.
+    pub before: &'a mut [Column],
+    /// One element per column.
+    pub marks: &'a mut [u32],
+    /// One element per column.
+    pub rank: &'a mut [u32],
+    /// [`FOREGROUND_MAX`] elements.
+    pub foreground: &'a mut [u32],
+    /// [`occupancy_constancy::ROW`] elements per foreground column.
+    pub cost: &'a mut [u16],
+    /// As many.
+    pub matching: &'a mut [u16],
+    /// State of the energy minimisation.
+    pub em: Em<'a>,
+}
+
+/// What perception finds in a pair of sweeps.
+#[derive(Clone, Copy, Debug)]
+pub struct Perceived<'a> {
+    /// Columns of the sweep before, in the new window.
+    pub before: &'a [Column],
+    /// Foreground columns, ascending.
+    pub foreground: &'a [u32],
+    /// Foreground columns found, those beyond the capacity included.
+    pub marked: usize,
+    /// Distinct rays traced.
+    pub rays: usize,
+    /// Flow of every column.
+    pub state: &'a [Flow],
+    /// Last proposal of every foreground column: the energy of its flow.
+    pub proposal: &'a [Proposal],
+}
+
+/// From rays to flow. `lap` is called with the name of each stage when it is done.
+pub fn perceive<'s>(
+    s: &'s mut Storage<'_>,
+    step: &Step,
+    rounds: u32,
+    rays: &[Ray],
+    origins: &[[i32; 4]],
+    lap: &mut dyn FnMut(&'static str),
+) -> Perceived<'s> {
+    shift(step, s.now, s.before);
+    s.slots.fill(0);
+    s.weights.fill(0);
+    let used = ray_merge(rays, s.slots, s.weights, s.distinct);
+    lap("ray_merge");
+    s.log_odds.fill(0);
+    ray_trace(step, origins, rays, s.slots, s.weights, &s.distinct[..used], s.log_odds);
+    lap("ray_trace");
+    columns(step, s.log_odds, s.now);
+    lap("columns");
+    background_filter(step, s.filter_table, s.before, s.marks);
+    lap("background_filter");
+    let (count, marked) = compact(s.marks, s.rank, s.foreground);
+    let foreground = &s.foreground[..count];
+    lap("compact");
+    occupancy_constancy(
+        step, s.constancy_weights, s.constancy_costs, foreground, s.before, s.now, s.cost,
+    );
+    lap("occupancy_constancy");
+    window(step, foreground, s.rank, s.cost, s.matching);
+    lap("window");
+    s.em.run(step, rounds, foreground, s.matching);
+    lap("flow");
+    Perceived {
+        before: s.before,
+        foreground,
+        marked,
+        rays: used,
+        state: s.em.state,
+        proposal: &s.em.proposal[..count],
+    }
+}
+
+/// One sweep's side of a pair.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    window: Window,
+    pose: Pose,
+    twist: Twist,
+    stamp_s: f64,
+    points: usize,
+}
+
+/// Why tracklets were dropped and no flow was computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reset {
+    /// The first sweep.
+    First,
+    /// Time stood still or went backwards by this much, s.
+    Backwards(f64),
+    /// More time than the profile's `gap_s` passed, s.
+    Gap(f64),
+    /// The poses differ by more than the profile's `jump_mps`, m/s.
+    Jump(f64),
+}
+
+/// What [`Pipeline::prepare`] hands to perception.
+#[derive(Clone, Copy, Debug)]
+pub struct Prepared {
+    /// Sizes, shift and costs.
+    pub step: Step,
+    /// Returns left out.
+    pub dropped: Dropped,
+    /// Set where this sweep has no usable predecessor.
+    pub reset: Option<Reset>,
+}
+
+/// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
+#[derive(Clone, Copy, Debug)]
+pub struct Flows<'a> {
+    /// Solid columns of the first sweep.
+    pub columns: &'a [ColumnFlow],
+    /// Points of the first sweep, in the source's order.
+    pub points: &'a [PointFlow],
+    /// Time between the sweeps, s.
+    pub dt_s: f64,
+    /// What happened to tracklets.
+    pub turnover: Turnover,
+    /// Matched columns.
+    pub valid: usize,
+    /// Solid columns beyond the capacity for foreground, which count as background.
+    pub foreground_dropped: usize,
+}
+
+/// The CPU's part of the pipeline and its state between sweeps. Large (see `memory-layout.md`):
+/// keep it in a box or a static.
+pub struct Pipeline {
+    profile: Profile,
+    rig: Rig,
+    unfiltered: bool,
+    scores: Scores,
+    preparation: Preparation,
+    lattice_origin: Option<DVec3>,
+    before: Option<Side>,
+    current: Option<Side>,
+    tracklets: Tracklets,
+    slot_of_source: [u32; FOREGROUND_MAX],
+    column_of_point: [[u32; POINTS_MAX]; 2],
+    flow_of_column: [u32; COLUMNS_MAX],
+}
+
+/// Caller-owned output of [`Pipeline::follow`].
+pub struct Output<'a> {
+    /// [`COLUMNS_MAX`] elements (as many as the profile has columns suffice).
+    pub columns: &'a mut [ColumnFlow],
+    /// [`POINTS_MAX`] elements.
+    pub points: &'a mut [PointFlow],
+}
+
+impl Pipeline {
+    /// A pipeline at rest. The profile must pass [`Profile::check`]; `unfiltered` makes every
+    /// solid column foreground.
+    pub fn new(profile: Profile, rig: Rig, scores: Scores, unfiltered: bool) -> Pipeline {
+        Pipeline {
+            profile,
+            rig,
+            unfiltered,
+            scores,
+            preparation: Preparation::new(),
+            lattice_origin: None,
+            before: None,
+            current: None,
+            tracklets: Tracklets::new(),
+            slot_of_source: [NONE; FOREGROUND_MAX],
+            column_of_point: [[NONE; POINTS_MAX]; 2],
+            flow_of_column: [NONE; COLUMNS_MAX],
+        }
+    }
+
+    /// The profile it runs.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// Turns a sweep into rays: `rays` must hold [`POINTS_MAX`] elements, `origins`
+    /// [`crate::params::ORIGINS_MAX`].
+    pub fn prepare(
+        &mut self,
+        sweep: &Sweep,
+        rays: &mut [Ray],
+        origins: &mut [[i32; 4]],
+    ) -> Prepared {
+        self.before = self.current.take();
+        let reset = self.check_continuity(sweep);
+        if reset.is_some() {
+            self.tracklets.clear();
+            self.before = None;
+        }
+        let window = place(&self.profile, &self.rig, &sweep.world_from_vehicle, self.lattice_origin);
+        if self.lattice_origin.is_none() {
+            self.lattice_origin = Some(window.lattice_origin);
+        }
+        self.column_of_point.swap(0, 1);
+        let (count, dropped) = self.preparation.prepare(
+            &self.profile, &self.rig, &window, sweep, rays, &mut self.column_of_point[0], origins,
+        );
+        self.current = Some(Side {
+            window,
+            pose: sweep.world_from_vehicle,
+            twist: sweep.twist,
+            stamp_s: sweep.stamp_s,
+            points: sweep.points.len().min(POINTS_MAX),
+        });
+        let side = self.profile.side as i32;
+        let shift = match (&self.before, self.profile.frame) {
+            (Some(b), Frame::Lattice) => {
+                core::array::from_fn(|a| window.corner[a].saturating_sub(b.window.corner[a]).clamp(-side, side))
+            }
+            (Some(_), Frame::Sensor) => [0; 3],
+            // Nothing of what was before comes into view.
+            (None, _) => [side, 0, 0],
+        };
+        let step = Step {
+            side,
+            levels: self.profile.levels as i32,
+            rays: count as i32,
+            range_steps: self.profile.range_steps(),
+            shift_x: shift[0],
+            shift_y: shift[1],
+            shift_z: shift[2],
+            unfiltered: self.unfiltered as i32,
+            smoothing: self.profile.smoothing as i32,
+            displacement_cost: self.profile.displacement_cost as i32,
+            outside_cost: self.profile.outside_cost as i32,
+            score_min: self.scores.min,
+            score_count: self.scores.count,
+            ..Step::default()
+        };
+        Prepared { step, dropped, reset }
+    }
+
+    /// Whether the sweep continues the one before.
+    fn check_continuity(&self, sweep: &Sweep) -> Option<Reset> {
+        let Some(before) = &self.before else {
+            return Some(Reset::First);
+        };
+        let dt = sweep.stamp_s - before.stamp_s;
+        // A NaN is not above zero either.
+        if !(dt > 0.0) {
+            return Some(Reset::Backwards(dt));
+        }
+        if dt > self.profile.gap_s {
+            return Some(Reset::Gap(dt));
+        }
+        let moved = (sweep.world_from_vehicle.translation - before.pose.translation).length() / dt;
+        (!(moved <= self.profile.jump_mps)).then_some(Reset::Jump(moved))
+    }
+
+    /// From the flow of columns to velocities: tracklets, motion compensation, columns and points.
+    /// `points` are those of the pair's first sweep, `output` must hold one element per solid
+    /// column and per point. After a reset there is no pair and nothing comes back.
+    pub fn follow<'o>(
+        &mut self,
+        step: &Step,
+        perceived: &Perceived,
+        points: &[Point],
+        output: &'o mut Output,
+    ) -> Option<Flows<'o>> {
+        let (before, current) = (self.before?, self.current?);
+        let dt = current.stamp_s - before.stamp_s;
+        let turned = (before.pose.inverse() * current.pose).yaw_rad();
+        let turnover = self.tracklets.update(
+            &self.profile, step, dt as f32, turned as f32, perceived.foreground, perceived.state,
+            &mut self.slot_of_source,
+        );
+        let ego = EgoMotion::new(&before.pose, &before.twist);
+        let (count, valid) =
+            self.flow_of_columns(step, perceived, &before, &current, &ego, dt as f32, output.columns);
+        self.flow_of_points(step, points, &ego, &output.columns[..count], output.points);
+        Some(Flows {
+            columns: &output.columns[..count],
+            points: &output.points[..before.points],
+            dt_s: dt,
+            turnover,
+            valid,
+            foreground_dropped: perceived.marked - perceived.foreground.len(),
+        })
+    }
+
+    /// Writes one record per solid column of the first sweep; returns how many, and how many of
+    /// them are matched.
+    fn flow_of_columns(
+        &mut self,
+        step: &Step,
+        perceived: &Perceived,
+        before: &Side,
+        current: &Side,
+        ego: &EgoMotion,
+        dt: f32,
+        out: &mut [ColumnFlow],
+    ) -> (usize, usize) {
+        // The first sweep's vehicle in the second's window: the corners differ by whole cells.
+        let moved = core::array::from_fn(|a| {
+            (before.window.corner[a] - current.window.corner[a]) as f64 * self.profile.voxel_m
+        });
+        let mut grid_from_vehicle = before.window.grid_from_vehicle;
+        grid_from_vehicle.translation += DVec3::from_array(moved);
+        let vehicle_from_grid = grid_from_vehicle.inverse();
+        let mut foreground = perceived.foreground.iter().enumerate().peekable();
+        let (mut count, mut valid) = (0, 0);
+        for (column, record) in perceived.before.iter().enumerate() {
+            let rank = foreground.next_if(|(_, c)| **c as usize == column).map(|(n, _)| n);
+            self.flow_of_column[column] = NONE;
+            if record[1] == 0 {
+                continue;
+            }
+            let (i, j) = (column as i32 / step.side, column as i32 % step.side);
+            let centre = DVec3::new(i as f64, j as f64, (step.levels / 2) as f64) * self.profile.voxel_m;
+            let at = vehicle_from_grid.transform(centre);
+            let world = before.pose.transform(at);
+            let mut flow = ColumnFlow {
+                cell: [current.window.corner[0] + i, current.window.corner[1] + j],
+                position_world_m: [world.x, world.y],
+                position_vehicle_m: [at.x as f32, at.y as f32],
+                ..Default::default()
+            };
+            if let Some(rank) = rank {
+                flow.origin = Origin::Unmatched;
+                if perceived.state[column] & VALID != 0 {
+                    valid += 1;
+                    flow.origin = Origin::Matched;
+                    flow.displacement_cells = flow_displacement(perceived.state[column]);
+                    flow.energy = perceived.proposal[rank][1] as i32;
+                    self.set_velocity(&mut flow, rank, dt);
+                }
+            }
+            let planar = DVec3::new(at.x, at.y, 0.0);
+            if flow.origin == Origin::Matched && self.profile.frame == Frame::Sensor {
+                let relative = flow.velocity_ego_mps;
+                flow.velocity_world_mps = ego.world_from_ego(planar, relative);
+                flow.covariance = ego.turn_covariance(flow.covariance);
+            } else {
+                let [x, y, _] = ego.ego_from_world(planar, flow.velocity_world_mps);
+                flow.velocity_ego_mps = [x, y];
+            }
+            self.flow_of_column[column] = count as u32;
+            out[count] = flow;
+            count += 1;
+        }
+        (count, valid)
+    }
+
+    /// Velocity along the grid's axes of a matched column: its tracklet's, or, where the gate
+    /// ended that, the raw flow's with the covariance of two measured positions.
+    fn set_velocity(&self, flow: &mut ColumnFlow, rank: usize, dt: f32) {
+        let r = self.profile.voxel_m as f32;
+        let (velocity, covariance) = match self.slot_of_source[rank] {
+            NONE => {
+                let deviation = self.profile.tracklet.measurement_cells * r / dt;
+                let variance = 2.0 * deviation * deviation;
+                (flow.displacement_cells.map(|c| c as f32 * r / dt), [variance, 0.0, variance])
+            }
+            slot => {
+                let t = &self.tracklets.all()[slot as usize];
+                flow.age = t.age;
+                t.ekf.velocity()
+            }
+        };
+        flow.covariance = covariance;
+        match self.profile.frame {
+            Frame::Lattice => flow.velocity_world_mps = velocity,
+            Frame::Sensor => flow.velocity_ego_mps = velocity,
+        }
+    }
+
+    /// Every point moves with its column; outside the window, and where nothing is solid, with the
+    /// ground.
+    fn flow_of_points(
+        &self,
+        step: &Step,
+        points: &[Point],
+        ego: &EgoMotion,
+        columns: &[ColumnFlow],
+        out: &mut [PointFlow],
+    ) {
+        let side = step.side;
+        for ((&column, point), out) in self.column_of_point[1].iter().zip(points).zip(out) {
+            let i = (column / side as u32) as i32 - step.shift_x;
+            let j = (column % side as u32) as i32 - step.shift_y;
+            let seen = column != NONE && (0..side).contains(&i) && (0..side).contains(&j);
+            let flow = if seen { self.flow_of_column[(i * side + j) as usize] } else { NONE };
+            *out = PointFlow::default();
+            if let Some(flow) = columns.get(flow as usize) {
+                out.velocity_world_mps = flow.velocity_world_mps;
+                out.age = flow.age;
+                out.origin = flow.origin;
+            }
+            let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });
+            out.velocity_ego_mps = ego.ego_from_world(DVec3::new(x, y, z), out.velocity_world_mps);
+        }
+    }
+
+    /// The tracklets after the last step, at the time of its second sweep.
+    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
+        let current = self.current;
+        self.tracklets.all().iter().filter_map(move |t| Some(self.state_of(t, &current?)))
+    }
+
+    fn state_of(&self, t: &crate::tracklet::Tracklet, current: &Side) -> TrackletState {
+        let side = self.profile.side as i32;
+        let (i, j) = (t.column as i32 / side, t.column as i32 % side);
+        let r = self.profile.voxel_m;
+        let level = (self.profile.levels / 2) as f64;
+        let centre = DVec3::new(i as f64, j as f64, level) * r;
+        let grid = centre + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
+        let at = current.window.grid_from_vehicle.inverse().transform(grid);
+        let world = current.pose.transform(at);
+        let ego = EgoMotion::new(&current.pose, &current.twist);
+        let planar = DVec3::new(at.x, at.y, 0.0);
+        let (v, _) = t.ekf.velocity();
+        let (heading, world_velocity, ego_velocity) = match self.profile.frame {
+            Frame::Lattice => {
+                let [x, y, _] = ego.ego_from_world(planar, v);
+                (t.ekf.mean[2], v, [x, y])
+            }
+            Frame::Sensor => {
+                let w = ego.world_from_ego(planar, v);
+                (libm::atan2f(w[1], w[0]), w, v)
+            }
+        };
+        let speed = match self.profile.frame {
+            Frame::Lattice => t.ekf.mean[3],
+            Frame::Sensor => libm::sqrtf(
+                world_velocity[0] * world_velocity[0] + world_velocity[1] * world_velocity[1],
+            ),
+        };
+        TrackletState {
+            cell: [current.window.corner[0] + i, current.window.corner[1] + j],
+            position_world_m: [world.x, world.y],
+            position_vehicle_m: [at.x as f32, at.y as f32],
+            heading_rad: heading,
+            speed_mps: speed,
+            turn_rate_radps: t.ekf.mean[4],
+            velocity_world_mps: world_velocity,
+            velocity_ego_mps: ego_velocity,
+            covariance: core::array::from_fn(|a| core::array::from_fn(|b| t.ekf.covariance[(a, b)])),
+            age: t.age,
+        }
+    }
+}

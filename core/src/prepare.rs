@@ -1,0 +1,389 @@
+//! Sweep preparation: returns to rays in the grid's frame (B.2.2), time and motion included.
+
+use crate::params::{
+    ANCHOR_ABOVE_GROUND_M, EXTENT_VOXELS, Frame, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS,
+};
+use crate::pose::Pose;
+use crate::record::{NONE, Ray, ray};
+use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
+use glam::DVec3;
+
+/// Where the window lies in one sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// From vehicle coordinates to metres from the centre of the window's first voxel.
+    pub grid_from_vehicle: Pose,
+    /// Lattice index of the window's first voxel.
+    pub corner: [i32; 3],
+    /// World position of the centre of lattice cell (0, 0, 0), m (`Frame::Sensor`: the vehicle's).
+    pub lattice_origin: DVec3,
+}
+
+/// Level whose centre lies [`ANCHOR_ABOVE_GROUND_M`] above the ground.
+fn anchor_level(profile: &Profile) -> i32 {
+    profile.levels as i32 / 2
+}
+
+/// Places the window. `lattice_origin` is that of the drive, or `None` on its first sweep: the
+/// lattice then has a cell centre at the anchor, the point of the vehicle's axis
+/// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
+pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
+    let half = profile.side as i32 / 2;
+    let below = [half, half, anchor_level(profile)];
+    let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
+    let r = profile.voxel_m;
+    let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
+    match profile.frame {
+        Frame::Sensor => Window {
+            grid_from_vehicle: Pose {
+                translation: metres(below) - anchor,
+                ..Pose::IDENTITY
+            },
+            corner: below.map(|b| -b),
+            lattice_origin: pose.translation,
+        },
+        Frame::Lattice => {
+            let at = pose.transform(anchor);
+            let origin = lattice_origin.unwrap_or(at);
+            let cell = ((at - origin) / r).to_array().map(|c| libm::floor(c + 0.5) as i32);
+            let corner = [cell[0] - below[0], cell[1] - below[1], cell[2] - below[2]];
+            Window {
+                grid_from_vehicle: Pose {
+                    rotation: pose.rotation,
+                    translation: pose.translation - origin - metres(corner),
+                },
+                corner,
+                lattice_origin: origin,
+            }
+        }
+    }
+}
+
+/// What preparation left out, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Returns after the first [`POINTS_MAX`].
+    pub over_capacity: u64,
+    /// Returns with a NaN or an infinity.
+    pub not_finite: u64,
+    /// Returns at exactly (0, 0, 0): a sensor's way to say that nothing came back.
+    pub no_return: u64,
+    /// Returns more than [`EXTENT_VOXELS`] voxels from the window's corner along an axis.
+    pub too_far: u64,
+    /// Returns of a sensor the rig does not have.
+    pub unknown_sensor: u64,
+    /// Returns on the own vehicle: their rays count as free space, without an end.
+    pub own_vehicle: u64,
+}
+
+/// Entries of the table from direction to slot.
+const AZIMUTHS: usize = 1024;
+
+/// Turns sweeps into rays. Holds only tables that do not change.
+pub struct Preparation {
+    slot_of_azimuth: [u8; AZIMUTHS],
+}
+
+/// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
+type ToVoxel = [[f32; 4]; 3];
+
+impl Default for Preparation {
+    fn default() -> Self {
+        Preparation::new()
+    }
+}
+
+impl Preparation {
+    /// Makes the tables.
+    pub fn new() -> Preparation {
+        let mut slot_of_azimuth = [0; AZIMUTHS];
+        for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
+            // The inverse of `pseudo_angle` at the middle of the entry.
+            let p = (n as f64 + 0.5) * 4.0 / AZIMUTHS as f64;
+            let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
+            let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
+            let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
+            *slot = (turn * SLOTS as f64) as u8;
+        }
+        Preparation { slot_of_azimuth }
+    }
+
+    /// Rays of a sweep.
+    ///
+    /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
+    /// the number of rays and what was left out. `columns[p]` becomes the column in which point
+    /// `p` of the sweep lies, or [`NONE`]; `origins` the voxel of every ray origin.
+    pub fn prepare(
+        &self,
+        profile: &Profile,
+        rig: &Rig,
+        window: &Window,
+        sweep: &Sweep,
+        rays: &mut [Ray],
+        columns: &mut [u32],
+        origins: &mut [[i32; 4]],
+    ) -> (usize, Dropped) {
+        assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
+        let deskew = profile.deskew && rig.distorted;
+        let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
+        let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
+        let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
+        place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
+        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
+            let moved = if deskew && moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
+        }
+
+        let (side, levels) = (profile.side, profile.levels);
+        let mut dropped = Dropped::default();
+        let taken = sweep.points.len().min(POINTS_MAX);
+        dropped.over_capacity = (sweep.points.len() - taken) as u64;
+        let mut count = 0;
+        for (point, column) in sweep.points[..taken].iter().zip(columns.iter_mut()) {
+            *column = NONE;
+            let p = point.position;
+            if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
+                dropped.not_finite += 1;
+                continue;
+            }
+            if p == [0.0; 3] {
+                dropped.no_return += 1;
+                continue;
+            }
+            let sensor = point.sensor as usize;
+            if sensor >= rig.sensors.len() {
+                dropped.unknown_sensor += 1;
+                continue;
+            }
+            let slot = if moving { self.slot(rig, point) } else { 0 };
+            let end = voxel(&to_voxel[slot], p);
+            if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
+                dropped.too_far += 1;
+                continue;
+            }
+            let own = rig.own_vehicle.is_some_and(|[low, high]| {
+                p[0] > low[0] && p[0] < high[0] && p[1] > low[1] && p[1] < high[1]
+            });
+            dropped.own_vehicle += own as u64;
+            let [i, j, k] = end.map(|v| v as u32);
+            if i < side && j < side && k < levels && !own {
+                *column = i * side + j;
+            }
+            rays[count] = ray(end, origin_ids[sensor][slot], own);
+            count += 1;
+        }
+        (count, dropped)
+    }
+
+    /// Time slot of a return.
+    #[inline]
+    fn slot(&self, rig: &Rig, point: &Point) -> usize {
+        let last = (SLOTS - 1) as f32;
+        match rig.timing {
+            Timing::AtStamp => 0,
+            Timing::Offset { from_s, span_s } => {
+                let turn = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
+                turn.clamp(0.0, last) as usize
+            }
+            Timing::Azimuth { .. } => {
+                let p = pseudo_angle(point.position[0], point.position[1]);
+                let n = (p * (AZIMUTHS as f32 / 4.0)) as usize;
+                self.slot_of_azimuth[n.min(AZIMUTHS - 1)] as usize
+            }
+        }
+    }
+}
+
+/// A stand-in for the angle that needs no trigonometry: 0 at the rear, 1 to the left, 2 in front,
+/// 3 to the right, towards 4 at the rear.
+#[inline]
+fn pseudo_angle(x: f32, y: f32) -> f32 {
+    let sum = x.abs() + y.abs();
+    if sum == 0.0 {
+        return 2.0;
+    }
+    let c = x / sum;
+    if y >= 0.0 { 1.0 + c } else { 3.0 - c }
+}
+
+/// Middle of a slot, s after the stamp.
+fn slot_time(rig: &Rig, slot: usize) -> f64 {
+    let turn = (slot as f64 + 0.5) / SLOTS as f64;
+    match rig.timing {
+        Timing::AtStamp => 0.0,
+        Timing::Offset { from_s, span_s } => from_s + turn * span_s,
+        Timing::Azimuth { span_s } => (turn - 0.5) * span_s,
+    }
+}
+
+fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
+    let inverse = 1.0 / profile.voxel_m;
+    let m = grid_from_point.matrix();
+    let t = grid_from_point.translation * inverse;
+    [0, 1, 2].map(|a| {
+        let r = m.row(a) * inverse;
+        [r.x as f32, r.y as f32, r.z as f32, (t[a] + 0.5) as f32]
+    })
+}
+
+/// Voxel of a point. Values beyond 32 bits saturate and are then too far.
+#[inline]
+fn voxel(m: &ToVoxel, p: [f32; 3]) -> [i32; 3] {
+    [0, 1, 2].map(|a| {
+        let v = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
+        let v = v.clamp(-1e6, 1e6);
+        let cut = v as i32;
+        // Truncation rounds up below zero.
+        cut - ((cut as f32) > v) as i32
+    })
+}
+
+/// Voxels of the ray origins, and which of them each sensor and slot has. Slots whose origins
+/// share a voxel share an entry, so that equal rays can be recognised.
+fn place_origins(
+    profile: &Profile,
+    rig: &Rig,
+    window: &Window,
+    sweep: &Sweep,
+    moving: bool,
+    origins: &mut [[i32; 4]],
+    ids: &mut [[u32; SLOTS]; SENSORS_MAX],
+) {
+    assert!(origins.len() == ORIGINS_MAX);
+    let mut count = 0;
+    let slots = if moving { SLOTS } else { 1 };
+    for (sensor, mounted) in rig.sensors.iter().enumerate() {
+        for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
+            let moved = if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            let at = (window.grid_from_vehicle * moved * *mounted).translation;
+            let v = (at / profile.voxel_m).to_array().map(|c| libm::floor(c + 0.5) as i32);
+            let v = [v[0], v[1], v[2], 0];
+            let known = origins[..count].iter().position(|o| *o == v);
+            *id = known.unwrap_or(count) as u32;
+            if known.is_none() {
+                origins[count] = v;
+                count += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::pose::Twist;
+    use crate::record::{NO_END, ray_end, ray_origin};
+    use std::vec;
+    use std::vec::Vec;
+
+    fn rig(timing: Timing) -> Rig {
+        let mut sensors = heapless::Vec::new();
+        sensors.push(Pose::IDENTITY).unwrap();
+        Rig {
+            sensors,
+            timing,
+            distorted: true,
+            ground_m: -1.73,
+            own_vehicle: Some([[-1.5, -1.75], [4.5, 1.75]]),
+        }
+    }
+
+    fn at(x: f32, y: f32, z: f32) -> Point {
+        Point { position: [x, y, z], ..Default::default() }
+    }
+
+    struct Out {
+        rays: Vec<Ray>,
+        columns: Vec<u32>,
+        origins: Vec<[i32; 4]>,
+        dropped: Dropped,
+        window: Window,
+    }
+
+    fn run(profile: &Profile, rig: &Rig, pose: Pose, twist: Twist, points: &[Point]) -> Out {
+        let window = place(profile, rig, &pose, Some(DVec3::ZERO));
+        let sweep = Sweep { stamp_s: 0.0, points, world_from_vehicle: pose, twist };
+        let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
+        let mut origins = vec![[0; 4]; ORIGINS_MAX];
+        let (count, dropped) = Preparation::new().prepare(
+            profile, rig, &window, &sweep, &mut rays, &mut columns, &mut origins,
+        );
+        rays.truncate(count);
+        columns.truncate(points.len());
+        Out { rays, columns, origins, dropped, window }
+    }
+
+    #[test]
+    fn every_bad_return_is_counted() {
+        let profile = Profile::hdl64();
+        let mut points = vec![
+            at(f32::NAN, 0.0, 0.0),
+            at(0.0, f32::INFINITY, 0.0),
+            at(0.0, 0.0, 0.0),
+            at(1e30, 0.0, 0.0),
+            at(-5000.0, 0.0, 0.0),
+            at(1.0, 0.0, -1.0),
+            at(10.0, 0.0, 0.0),
+            Point { sensor: 3, ..at(10.0, 0.0, 0.0) },
+        ];
+        let out = run(&profile, &rig(Timing::AtStamp), Pose::IDENTITY, Twist::ZERO, &points);
+        let d = out.dropped;
+        assert_eq!((d.not_finite, d.no_return, d.too_far), (2, 1, 2));
+        assert_eq!((d.own_vehicle, d.unknown_sensor, d.over_capacity), (1, 1, 0));
+        assert_eq!(out.rays.len(), 2);
+        assert_eq!(out.rays[0][1] & NO_END, NO_END);
+        assert_eq!(out.columns.iter().filter(|c| **c != NONE).count(), 1);
+        points.resize(POINTS_MAX + 5, at(10.0, 0.0, 0.0));
+        let out = run(&profile, &rig(Timing::AtStamp), Pose::IDENTITY, Twist::ZERO, &points);
+        assert_eq!(out.dropped.over_capacity, 5);
+    }
+
+    #[test]
+    fn static_points_keep_their_lattice_cell() {
+        // A wall seen from two poses: the same lattice cells, whatever the window.
+        let profile = Profile::hdl64();
+        let rig = rig(Timing::AtStamp);
+        let wall: Vec<DVec3> =
+            (0..40).map(|n| DVec3::new(10.17, n as f64 * 0.3 - 6.0, 0.3)).collect();
+        let cells = |pose: Pose| -> Vec<[i32; 3]> {
+            let points: Vec<Point> = wall
+                .iter()
+                .map(|w| {
+                    let p = pose.inverse().transform(*w);
+                    at(p.x as f32, p.y as f32, p.z as f32)
+                })
+                .collect();
+            let out = run(&profile, &rig, pose, Twist::ZERO, &points);
+            let corner = out.window.corner;
+            out.rays
+                .iter()
+                .map(|r| {
+                    let e = ray_end(*r);
+                    [e[0] + corner[0], e[1] + corner[1], e[2] + corner[2]]
+                })
+                .collect()
+        };
+        let first = cells(Pose::IDENTITY);
+        assert_eq!(first, cells(Pose::planar(2.77, -1.3, 0.2, 0.4)));
+        assert_eq!(first[20], [34, 0, 1]);
+    }
+
+    #[test]
+    fn azimuth_moves_points_and_origins() {
+        let profile = Profile::hdl64();
+        let rig = rig(Timing::Azimuth { span_s: 0.1 });
+        let twist = Twist { linear: DVec3::new(12.0, 0.0, 0.0), angular: DVec3::ZERO };
+        // Just left of the rear: the start of the turn, 50 ms before the stamp.
+        let points = [at(-20.0, 0.05, 0.0), at(20.0, 0.0, 0.0), at(-20.0, -0.05, 0.0)];
+        let out = run(&profile, &rig, Pose::IDENTITY, twist, &points);
+        let x = |n: usize| ray_end(out.rays[n])[0] - 83;
+        assert_eq!([x(0), x(1), x(2)], [-69, 67, -65]);
+        let o = |n: usize| out.origins[ray_origin(out.rays[n])][0] - 83;
+        assert_eq!([o(0), o(1), o(2)], [-2, 0, 2]);
+        // Without deskew, as in the dissertation, everything happens at the stamp.
+        let out = run(&Profile::dissertation(), &rig, Pose::IDENTITY, twist, &points);
+        assert!((0..3).all(|n| out.origins[ray_origin(out.rays[n])][0] == 83));
+        assert_eq!(ray_end(out.rays[0])[0] - 83, -67);
+    }
+}

@@ -1,0 +1,130 @@
+//! Records that cross to the device, each declared once: the Rust struct, its words and its WGSL
+//! text come from the same line. Everything else that crosses is a plain array of 32-bit words.
+
+macro_rules! record {
+    ($(#[$m:meta])* $name:ident { $( $(#[$fm:meta])* $f:ident ),* $(,)? }) => {
+        $(#[$m])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct $name { $( $(#[$fm])* pub $f: i32 ),* }
+
+        impl $name {
+            /// Field names in order; field `n` is word `n`.
+            pub const FIELDS: &'static [&'static str] = &[ $( stringify!($f) ),* ];
+            /// Words of the record.
+            pub const WORDS: usize = Self::FIELDS.len();
+            /// Writes the record; `words` must hold [`Self::WORDS`] elements.
+            pub fn write(&self, words: &mut [u32]) {
+                let values = [ $( self.$f ),* ];
+                for (word, value) in words.iter_mut().zip(values) {
+                    *word = value as u32;
+                }
+            }
+        }
+    };
+}
+
+record! {
+    /// What the kernels need to know of a sweep besides its rays: sizes, shift and costs.
+    Step {
+        /// Columns of the window along x, and along y.
+        side,
+        /// Levels of a column.
+        levels,
+        /// Rays of the sweep.
+        rays,
+        /// Voxels a ray is traced for at most.
+        range_steps,
+        /// Window corner of this sweep minus that of the sweep before, cells along x.
+        shift_x,
+        /// Along y.
+        shift_y,
+        /// Along z.
+        shift_z,
+        /// 1: every solid column is foreground.
+        unfiltered,
+        /// w_p, thousandths of a nat per cell².
+        smoothing,
+        /// Cost of displacement, thousandths of a nat per cell².
+        displacement_cost,
+        /// Cost of a window neighbour outside the grid, thousandths of a nat.
+        outside_cost,
+        /// Least sum of the constancy weights: entry 0 of the table of log-sigmoids.
+        score_min,
+        /// Entries of that table.
+        score_count,
+        /// Sparse map: first key of the band.
+        band_from,
+        /// Sparse map: key after the band's last.
+        band_to,
+        /// Spare word that keeps the record a multiple of 16 bytes.
+        reserved,
+    }
+}
+
+/// A ray: `[i | j << 16, k | origin << 16 | no_end << 31]` with `i, j, k` the signed 16-bit voxel
+/// of its end counted from the window's corner, `origin` an index of the table of origins, and
+/// `no_end` set where nothing is hit there.
+pub type Ray = [u32; 2];
+
+/// Flag of [`Ray`]: free space only.
+pub const NO_END: u32 = 1 << 31;
+
+/// Packs a ray.
+pub fn ray(end: [i32; 3], origin: u32, no_end: bool) -> Ray {
+    let [i, j, k] = end.map(|v| v as u32 & 0xffff);
+    [i | j << 16, k | origin << 16 | (no_end as u32) << 31]
+}
+
+/// End voxel of a ray.
+pub fn ray_end(r: Ray) -> [i32; 3] {
+    [r[0] as i16 as i32, (r[0] >> 16) as i16 as i32, r[1] as i16 as i32]
+}
+
+/// Origin index of a ray.
+pub fn ray_origin(r: Ray) -> usize {
+    (r[1] >> 16 & 0x7fff) as usize
+}
+
+/// A column of voxels: `[free | occupied << 16, solid]`, one bit a level (3.4, 3.5, epsilon = 0).
+pub type Column = [u32; 2];
+
+/// A column's current flow: [`VALID`] with both components plus [`crate::params::REACH`] in the
+/// low bytes, or 0.
+pub type Flow = u32;
+
+/// Flag of [`Flow`].
+pub const VALID: u32 = 1 << 31;
+
+/// Packs a valid displacement, cells.
+pub fn flow(d: [i32; 2]) -> Flow {
+    let reach = crate::params::REACH;
+    VALID | ((d[0] + reach) as u32) << 8 | (d[1] + reach) as u32
+}
+
+/// The displacement of a valid flow, cells.
+pub fn flow_displacement(f: Flow) -> [i32; 2] {
+    let reach = crate::params::REACH;
+    [(f >> 8 & 0xff) as i32 - reach, (f & 0xff) as i32 - reach]
+}
+
+/// Proposal of one round of expectation: `[flow, cost]`; flow 0 where no target is feasible.
+pub type Proposal = [u32; 2];
+
+/// No index, no cost yet.
+pub const NONE: u32 = u32::MAX;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packing_is_reversible() {
+        let r = ray([-5, 4095, -4095], 511, true);
+        assert_eq!(ray_end(r), [-5, 4095, -4095]);
+        assert_eq!((ray_origin(r), r[1] & NO_END), (511, NO_END));
+        for d in [[-15, 15], [0, 0], [7, -3]] {
+            assert_eq!(flow_displacement(flow(d)), d);
+        }
+        assert_eq!(Step::WORDS % 4, 0);
+    }
+}
