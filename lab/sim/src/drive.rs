@@ -1,0 +1,195 @@
+//! A drive through a scene, sweep by sweep.
+
+use crate::cast::{Caster, Truth};
+use crate::ego::Ego;
+use crate::path::Path;
+use crate::rng::Rng;
+use crate::scene::{ObjectState, Scene};
+use crate::sensor::Sensor;
+use glam::{DQuat, DVec3};
+use raywake_core::pose::{Pose, Twist};
+use raywake_core::sweep::{Point, Rig, Timing};
+
+/// Sweeps per second.
+const RATE_HZ: f64 = 10.0;
+
+/// What a drive is to be like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Sweeps, 10 a second.
+    pub sweeps: usize,
+    /// What the vehicle does.
+    pub ego: Ego,
+    /// Amount of traffic; 1 is a busy street, 0 an empty one.
+    pub density: f64,
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Threads that cast rays; 0: as many as the machine runs at once. The sweeps are the same
+    /// whatever the number.
+    pub threads: usize,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            sweeps: 30,
+            ego: Ego::Any,
+            density: 1.0,
+            sensor: Sensor::hdl64(),
+            threads: 0,
+        }
+    }
+}
+
+/// One simulated sweep with its truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimSweep {
+    /// Time of the stamp, when the sensor looks forward, s from 0.
+    pub stamp_s: f64,
+    /// Returns in the order of their times, each in the vehicle frame at its own time (distorted
+    /// by the vehicle's motion), `offset_s` after the stamp.
+    pub points: Vec<Point>,
+    /// What every return really comes from.
+    pub truth: Vec<Truth>,
+    /// Pose of the vehicle at the stamp.
+    pub world_from_vehicle: Pose,
+    /// Velocity of the vehicle at the stamp, in its frame.
+    pub twist: Twist,
+}
+
+/// A drive: iterate it for its sweeps, or ask for one of them.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    scene: Scene,
+    path: Path,
+    options: Options,
+    seed: u64,
+    next: usize,
+}
+
+impl Drive {
+    /// A drive down a street that the seed draws.
+    pub fn new(seed: u64, options: Options) -> Drive {
+        let duration_s = options.sweeps as f64 / RATE_HZ;
+        let plan = options.ego.plan(seed, duration_s);
+        let scene = Scene::around(seed, &plan, duration_s, options.density);
+        Drive {
+            scene,
+            path: plan.path,
+            options,
+            seed,
+            next: 0,
+        }
+    }
+
+    /// A drive along a path (street frame) through a given scene; the seed draws the noise, and
+    /// the options' ego and density do not count.
+    pub fn through(scene: Scene, path: Path, seed: u64, options: Options) -> Drive {
+        Drive {
+            scene,
+            path,
+            options,
+            seed,
+            next: 0,
+        }
+    }
+
+    /// What is driven through.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Sweeps of the drive.
+    pub fn sweeps(&self) -> usize {
+        self.options.sweeps
+    }
+
+    /// What is fixed about the sensor: the vehicle frame is the sensor's.
+    pub fn rig(&self) -> Rig {
+        let span_s = self.options.sensor.turn_s;
+        Rig {
+            sensors: [Pose::IDENTITY].into_iter().collect(),
+            timing: Timing::Offset {
+                from_s: -0.5 * span_s,
+                span_s,
+            },
+            distorted: true,
+            ground_m: -self.options.sensor.height,
+            own_vehicle: None,
+        }
+    }
+
+    /// The objects at a time, s, in the world frame.
+    pub fn objects(&self, t: f64) -> Vec<ObjectState> {
+        self.scene.states(t)
+    }
+
+    /// Pose of the vehicle (its frame lies in the sensor) at a time, s.
+    pub fn world_from_vehicle(&self, t: f64) -> Pose {
+        self.scene.world_from_street * self.street_from_vehicle(t)
+    }
+
+    fn street_from_vehicle(&self, t: f64) -> Pose {
+        let state = self.path.at(t);
+        let foot = self
+            .scene
+            .ground
+            .stand(state.x, state.y, state.yaw, [2.7, 1.5]);
+        // The body nods and rolls a little on its springs once it moves.
+        let swing = 0.003 * (state.speed.abs() / 8.0).min(1.0);
+        let nod = DQuat::from_rotation_y(swing * (7.3 * t + 0.4).sin());
+        let roll = DQuat::from_rotation_x(0.6 * swing * (9.1 * t).sin());
+        foot * Pose::new(nod * roll, DVec3::new(0.0, 0.0, self.options.sensor.height))
+    }
+
+    fn twist(&self, t: f64) -> Twist {
+        const STEP_S: f64 = 1e-3;
+        let here = self.street_from_vehicle(t).inverse();
+        let [back, on] =
+            [-STEP_S, STEP_S].map(|s| (here * self.street_from_vehicle(t + s)).twist(s));
+        Twist {
+            linear: 0.5 * (back.linear + on.linear),
+            angular: 0.5 * (back.angular + on.angular),
+        }
+    }
+
+    fn threads(&self) -> usize {
+        match self.options.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        }
+    }
+
+    /// Sweep `index`, whichever sweeps were cast before.
+    pub fn sweep(&self, index: usize) -> SimSweep {
+        let stamp_s = index as f64 / RATE_HZ;
+        let caster = Caster::new(&self.scene, &self.options.sensor);
+        let seed = Rng::split(self.seed, 16 + index as u64).bits();
+        let ego = |t: f64| self.street_from_vehicle(t);
+        let (points, truth) = caster.sweep(&ego, stamp_s, seed, self.threads());
+        SimSweep {
+            stamp_s,
+            points,
+            truth,
+            world_from_vehicle: self.world_from_vehicle(stamp_s),
+            twist: self.twist(stamp_s),
+        }
+    }
+}
+
+impl Iterator for Drive {
+    type Item = SimSweep;
+
+    fn next(&mut self) -> Option<SimSweep> {
+        let index = self.next;
+        (index < self.options.sweeps).then(|| {
+            self.next += 1;
+            self.sweep(index)
+        })
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.options.sweeps - self.next.min(self.options.sweeps);
+        (left, Some(left))
+    }
+}

@@ -1,0 +1,123 @@
+//! How the vehicle that carries the sensor drives.
+
+use crate::path::{Path, State};
+use crate::rng::Rng;
+use std::f64::consts::FRAC_PI_2;
+
+/// Distance of a lane's middle from the road's centre line, m.
+pub(crate) const LANE: f64 = 1.75;
+
+/// What the vehicle does during a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Ego {
+    /// One of the others, chosen by the seed.
+    #[default]
+    Any,
+    /// Stands in the right lane.
+    Standing,
+    /// Goes straight on at constant speed.
+    Straight {
+        /// m/s, up to 14.
+        speed: f64,
+    },
+    /// Goes straight on, brakes to a stop, waits a second and starts again.
+    StopAndGo {
+        /// m/s before and after the stop, > 0.
+        speed: f64,
+    },
+    /// Turns into the crossing road after about a second.
+    Turn {
+        /// To the left, across the oncoming lane.
+        left: bool,
+        /// m/s, > 0; 5 is what drivers do.
+        speed: f64,
+    },
+}
+
+/// A planned drive.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Plan {
+    /// Of the vehicle, street frame.
+    pub(crate) path: Path,
+    /// x of the crossing road's centre line, m.
+    pub(crate) crossing: f64,
+}
+
+impl Ego {
+    /// Lays the path, from the street frame's x = 0 at time 0, and the crossing road where the
+    /// path needs it.
+    pub(crate) fn plan(self, seed: u64, duration_s: f64) -> Plan {
+        let mut rng = Rng::split(seed, 0);
+        let crossing = rng.sign() * rng.range(18.0, 60.0);
+        let start = |speed: f64| {
+            Path::from(State {
+                x: 0.0,
+                y: -LANE,
+                yaw: 0.0,
+                speed,
+            })
+        };
+        match self {
+            Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
+            Ego::Standing => Plan {
+                path: Path::standing(0.0, -LANE, 0.0),
+                crossing,
+            },
+            Ego::Straight { speed } => Plan {
+                path: start(speed),
+                crossing,
+            },
+            Ego::StopAndGo { speed } => {
+                let path = start(speed)
+                    .then(0.1 * duration_s, 0.0, 0.0)
+                    .then_to_speed(0.0, 3.0);
+                let path = path.then(1.0, 0.0, 0.0).then_to_speed(speed, 2.0);
+                Plan { path, crossing }
+            }
+            Ego::Turn { left, speed } => {
+                let before = (0.25 * duration_s).min(1.0);
+                let (radius, angle) = if left {
+                    (11.0, FRAC_PI_2)
+                } else {
+                    (8.0, -FRAC_PI_2)
+                };
+                let path = start(speed).then(before, 0.0, 0.0).then_turn(angle, radius);
+                // The turn ends in the right lane of the crossing road.
+                let crossing = path.end().x - LANE.copysign(angle);
+                Plan { path, crossing }
+            }
+        }
+    }
+
+    fn drawn(rng: &mut Rng) -> Ego {
+        match (rng.unit() * 8.0) as u32 {
+            0 => Ego::Standing,
+            1..4 => Ego::Straight {
+                speed: rng.range(2.0, 14.0),
+            },
+            4 => Ego::StopAndGo {
+                speed: rng.range(4.0, 10.0),
+            },
+            _ => Ego::Turn {
+                left: rng.chance(0.5),
+                speed: rng.range(3.5, 6.0),
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_end_in_the_right_lane() {
+        for (left, yaw) in [(true, FRAC_PI_2), (false, -FRAC_PI_2)] {
+            let plan = Ego::Turn { left, speed: 5.0 }.plan(3, 6.0);
+            let end = plan.path.end();
+            // Right of the direction of travel: +x when heading to +y.
+            assert!((end.x - plan.crossing - if left { LANE } else { -LANE }).abs() < 1e-9);
+            assert!((end.yaw - yaw).abs() < 1e-9);
+        }
+    }
+}

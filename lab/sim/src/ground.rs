@@ -1,0 +1,232 @@
+//! The ground: two gently sloped planes that meet in a valley or a crest, and sidewalks raised by
+//! a kerb beside two roads that cross.
+//!
+//! Street frame: x along the main road, y left, z up.
+
+use glam::{DMat3, DQuat, DVec3};
+use raywake_core::pose::Pose;
+
+/// Half width of the main road (a lane and a parking strip on either side), m.
+pub const ROAD_HALF: f64 = 5.7;
+/// Half width of the crossing road, m.
+pub const CROSS_HALF: f64 = 4.5;
+/// Width over which a walker's feet climb the kerb, m.
+const RAMP: f64 = 0.3;
+
+/// The surface everything stands on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// z = p.x x + p.y y + p.z of both planes.
+    planes: [DVec3; 2],
+    /// The higher plane counts (a valley) rather than the lower (a crest).
+    valley: bool,
+    /// x of the crossing road's centre line, m; none: no roads, no kerbs.
+    crossing: Option<f64>,
+    /// Height of the sidewalks above the road, m.
+    kerb: f64,
+}
+
+/// Where a ray meets the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Distance along the ray, m.
+    pub range: f64,
+    /// Cosine of the angle between ray and normal.
+    pub cosine: f64,
+}
+
+impl Ground {
+    /// The plane z = 0.
+    pub fn flat() -> Ground {
+        Ground {
+            planes: [DVec3::ZERO; 2],
+            valley: true,
+            crossing: None,
+            kerb: 0.0,
+        }
+    }
+
+    /// A street whose slope changes at `bend_m` from `slopes[0]` to `slopes[1]` (rise over run
+    /// along x) with the slope `across` to the left; the roads cross at `crossing_m`.
+    pub fn street(
+        slopes: [f64; 2],
+        across: f64,
+        bend_m: f64,
+        crossing_m: f64,
+        kerb_m: f64,
+    ) -> Ground {
+        let after = (slopes[0] - slopes[1]) * bend_m;
+        Ground {
+            planes: [
+                DVec3::new(slopes[0], across, 0.0),
+                DVec3::new(slopes[1], across, after),
+            ],
+            valley: slopes[1] >= slopes[0],
+            crossing: Some(crossing_m),
+            kerb: kerb_m,
+        }
+    }
+
+    /// Distance into the sidewalk from its kerb, m; negative on the road.
+    fn beyond_kerb(&self, x: f64, y: f64) -> f64 {
+        match self.crossing {
+            Some(c) => (y.abs() - ROAD_HALF).min((x - c).abs() - CROSS_HALF),
+            None => -1.0,
+        }
+    }
+
+    /// Height as a foot or wheel finds it, m: the road, or the sidewalk with its kerb smoothed to
+    /// a ramp so that whoever climbs it has a velocity.
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        let [a, b] = self.planes.map(|p| p.x * x + p.y * y + p.z);
+        let road = if self.valley { a.max(b) } else { a.min(b) };
+        let u = (0.5 + self.beyond_kerb(x, y) / RAMP).clamp(0.0, 1.0);
+        road + self.kerb * u * u * (3.0 - 2.0 * u)
+    }
+
+    /// Where a ray reaches the surface raised by `lift`; infinity where it never does.
+    fn reach(&self, o: DVec3, d: DVec3, lift: f64) -> f64 {
+        let [a, b] = self.planes.map(|p| {
+            let above = o.z - (p.x * o.x + p.y * o.y + p.z + lift);
+            let sink = d.z - (p.x * d.x + p.y * d.y);
+            if sink < -1e-9 {
+                (-above / sink).max(0.0)
+            } else {
+                f64::INFINITY
+            }
+        });
+        // Above a valley is above both planes, above a crest is above either.
+        if self.valley { a.min(b) } else { a.max(b) }
+    }
+
+    /// Where the ray from `o` (above the ground) along the unit vector `d` meets the ground.
+    pub fn contact(&self, o: DVec3, d: DVec3) -> Option<Contact> {
+        let level = |range: f64| {
+            (range > 0.0 && range.is_finite()).then(|| Contact {
+                range,
+                cosine: self.cosine(d),
+            })
+        };
+        let low = self.reach(o, d, 0.0);
+        if self.crossing.is_none() {
+            return level(low);
+        }
+        let raised = |t: f64| self.beyond_kerb(o.x + t * d.x, o.y + t * d.y) > 0.0;
+        let high = self.reach(o, d, self.kerb);
+        if high.is_finite() && raised(high) {
+            return level(high);
+        }
+        if !low.is_finite() || !raised(low) {
+            return level(low);
+        }
+        // Over the road at the sidewalk's height, beneath the sidewalk at the road's: between the
+        // two lies the kerb's face.
+        let (mut before, mut after) = (high, low);
+        for _ in 0..24 {
+            let middle = 0.5 * (before + after);
+            *(if raised(middle) {
+                &mut after
+            } else {
+                &mut before
+            }) = middle;
+        }
+        let at = o + d * after;
+        let along_x =
+            at.y.abs() - ROAD_HALF < (at.x - self.crossing.unwrap_or(0.0)).abs() - CROSS_HALF;
+        Some(Contact {
+            range: after,
+            cosine: if along_x { d.y.abs() } else { d.x.abs() },
+        })
+    }
+
+    /// Cosine of incidence; the planes differ too little for it to matter which one is met.
+    fn cosine(&self, d: DVec3) -> f64 {
+        let normal = DVec3::new(-self.planes[0].x, -self.planes[0].y, 1.0);
+        d.dot(normal).abs() / normal.dot(normal).sqrt()
+    }
+
+    /// Pose of something that stands at (x, y) facing `yaw` on four feet `base` apart (length,
+    /// width, m); upright where `base` is nothing.
+    pub fn stand(&self, x: f64, y: f64, yaw: f64, base: [f64; 2]) -> Pose {
+        if base[0] == 0.0 {
+            return Pose::planar(x, y, self.height(x, y), yaw);
+        }
+        let (s, c) = yaw.sin_cos();
+        let (l, w) = (0.5 * base[0], 0.5 * base[1]);
+        let [front, rear] = [l, -l].map(|u| self.height(x + u * c, y + u * s));
+        let [left, right] = [w, -w].map(|u| self.height(x - u * s, y + u * c));
+        let forward = DVec3::new(c * base[0], s * base[0], front - rear).normalize();
+        let side = DVec3::new(-s * base[1], c * base[1], left - right);
+        let up = forward.cross(side).normalize();
+        let rotation = DMat3::from_cols(forward, up.cross(forward), up);
+        Pose::new(
+            DQuat::from_mat3(&rotation),
+            DVec3::new(x, y, 0.5 * (front + rear)),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn down(x: f64, y: f64, z: f64) -> DVec3 {
+        DVec3::new(x, y, z).normalize()
+    }
+
+    #[test]
+    fn plane_in_closed_form() {
+        let o = DVec3::new(0.0, 0.0, 1.73);
+        let c = Ground::flat().contact(o, down(1.0, 0.0, -0.5)).unwrap();
+        assert!((c.range - 1.73 * 5f64.sqrt()).abs() < 1e-12);
+        assert!((c.cosine - 1.0 / 5f64.sqrt()).abs() < 1e-12);
+        assert!(Ground::flat().contact(o, DVec3::X).is_none());
+        // Uphill 2 %: the horizontal ray meets the ground after 1.73 / 0.02 m.
+        let hill = Ground::street([0.02, 0.02], 0.0, 0.0, 1e6, 0.0);
+        assert!((hill.contact(o, DVec3::X).unwrap().range - 86.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bends_both_ways() {
+        let o = DVec3::new(0.0, 0.0, 2.0);
+        let d = down(1.0, 0.0, -0.05);
+        for after in [0.01, -0.01] {
+            let g = Ground::street([0.0, after], 0.0, 20.0, 1e6, 0.0);
+            let at = o + d * g.contact(o, d).unwrap().range;
+            // 2 - 0.05 x = after (x - 20)
+            assert!((at.x - (2.0 + 20.0 * after) / (0.05 + after)).abs() < 1e-9);
+            assert!((g.height(at.x, at.y) - at.z).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn kerb_road_and_sidewalk() {
+        let g = Ground::street([0.0, 0.0], 0.0, 0.0, 100.0, 0.15);
+        let o = DVec3::new(0.0, 0.0, 1.5);
+        let at = |d: DVec3| o + d * g.contact(o, d).unwrap().range;
+        assert!(at(down(0.0, 3.0, -1.5)).z.abs() < 1e-9, "road");
+        assert!(
+            (at(down(0.0, 8.0, -1.35)).z - 0.15).abs() < 1e-9,
+            "sidewalk"
+        );
+        let face = at(down(0.0, ROAD_HALF, -1.43));
+        assert!(
+            (face.y - ROAD_HALF).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4,
+            "face"
+        );
+        assert_eq!(g.height(0.0, 0.0), 0.0);
+        assert_eq!(g.height(0.0, 7.0), 0.15);
+    }
+
+    #[test]
+    fn vehicles_lie_in_the_slope() {
+        let g = Ground::street([0.03, 0.03], 0.01, 0.0, 100.0, 0.0);
+        let p = g.stand(1.0, 2.0, 0.7, [2.8, 1.6]);
+        let up = p.rotation * DVec3::Z;
+        let normal = DVec3::new(-0.03, -0.01, 1.0).normalize();
+        assert!((up - normal).length() < 1e-9);
+        let forward = p.rotation * DVec3::X;
+        assert!((forward.y.atan2(forward.x) - 0.7).abs() < 1e-9);
+        assert!((p.translation.z - 0.05).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,292 @@
+//! Whole sweeps against what is known exactly.
+
+use glam::DVec3;
+use raywake_core::sweep::Timing;
+use raywake_sim::{Class, Drive, Ego, Options, Path, Scene, Sensor, SimSweep, State, Surface};
+use raywake_sim::{Shape, models};
+use std::collections::BTreeSet;
+
+fn options(ego: Ego, sweeps: usize) -> Options {
+    Options {
+        ego,
+        sweeps,
+        ..Options::default()
+    }
+}
+
+/// A drive without noise through a given scene.
+fn ideal(scene: Scene, path: Path) -> Drive {
+    Drive::through(
+        scene,
+        path,
+        1,
+        Options {
+            sensor: Sensor::ideal(),
+            ..Options::default()
+        },
+    )
+}
+
+fn vector(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+/// Returns in the world, each from the pose at its own time.
+fn in_world<'a>(drive: &'a Drive, sweep: &'a SimSweep) -> impl Iterator<Item = (DVec3, f64)> + 'a {
+    sweep.points.iter().map(|p| {
+        let t = sweep.stamp_s + f64::from(p.offset_s);
+        (drive.world_from_vehicle(t).transform(vector(p.position)), t)
+    })
+}
+
+#[test]
+fn threads_do_not_show() {
+    let make = |threads: usize| {
+        let options = Options {
+            threads,
+            ..options(Ego::Any, 2)
+        };
+        Drive::new(11, options).collect::<Vec<_>>()
+    };
+    let (one, two, three) = (make(1), make(2), make(3));
+    assert_eq!(one, two);
+    assert_eq!(one, three);
+    let bits = |s: &SimSweep| {
+        s.points
+            .iter()
+            .flat_map(|p| p.position.map(f32::to_bits))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&one[1]), bits(&two[1]));
+    assert_ne!(one[0].points, one[1].points);
+    assert_ne!(
+        Drive::new(12, options(Ego::Any, 2)).sweep(0).points,
+        one[0].points
+    );
+    assert_eq!(
+        Drive::new(11, options(Ego::Any, 2)).sweep(1),
+        one[1],
+        "any sweep on its own"
+    );
+}
+
+#[test]
+fn amounts() {
+    for seed in 0..6 {
+        let drive = Drive::new(seed, options(Ego::Any, 20));
+        let (mut moving, mut classes) = (BTreeSet::new(), BTreeSet::new());
+        for index in [0, 10, 19] {
+            let sweep = drive.sweep(index);
+            assert_eq!(sweep.points.len(), sweep.truth.len());
+            let n = sweep.points.len();
+            assert!((60_000..=131_072).contains(&n), "seed {seed}: {n} returns");
+            for t in &sweep.truth {
+                assert_eq!(t.object > 0, t.class.is_foreground());
+                classes.insert(t.class);
+                if vector(t.velocity_world).length() > 0.5 {
+                    moving.insert(t.object);
+                }
+            }
+        }
+        assert!(
+            moving.len() >= 12,
+            "seed {seed}: {} moving objects seen",
+            moving.len()
+        );
+        assert!(classes.len() >= 8, "seed {seed}: {classes:?}");
+    }
+}
+
+#[test]
+fn rig_and_time() {
+    let drive = Drive::new(5, options(Ego::Straight { speed: 10.0 }, 3));
+    let rig = drive.rig();
+    assert_eq!(
+        rig.timing,
+        Timing::Offset {
+            from_s: -0.05,
+            span_s: 0.1
+        }
+    );
+    assert!(rig.distorted && rig.sensors.len() == 1 && rig.ground_m == -1.73);
+    let sweep = drive.sweep(1);
+    assert_eq!(sweep.stamp_s, 0.1);
+    assert!((sweep.twist.linear.x - 10.0).abs() < 0.1 && sweep.twist.linear.y.abs() < 0.1);
+    let (first, last) = (sweep.points[0], sweep.points[sweep.points.len() - 1]);
+    assert!(
+        first.position[0] < 0.0 && first.position[1] > 0.0,
+        "starts at the rear left"
+    );
+    assert!(
+        last.position[0] < 0.0 && last.position[1] < 0.0,
+        "ends at the rear right"
+    );
+    let mut before = -0.05;
+    for p in &sweep.points {
+        assert!(p.offset_s >= before && p.offset_s < 0.05);
+        before = p.offset_s;
+        // Clockwise, forward at the stamp: the azimuth tells the time.
+        let azimuth = f64::from(p.position[1]).atan2(f64::from(p.position[0]));
+        let off = (azimuth + f64::from(p.offset_s) / 0.1 * std::f64::consts::TAU).abs();
+        let off = off.min((std::f64::consts::TAU - off).abs());
+        assert!(off < 0.002, "{p:?}: {off}");
+    }
+}
+
+#[test]
+fn ground_and_wall_are_planes() {
+    let mut scene = Scene::empty();
+    let pose = raywake_core::pose::Pose::planar(20.0, 0.0, 2.0, 0.0);
+    scene.put(
+        Class::Building,
+        Shape::cuboid(2.0, 60.0, 4.0),
+        pose,
+        Surface::matt(0.5),
+    );
+    let start = State {
+        speed: 12.0,
+        yaw: 0.3,
+        ..State::default()
+    };
+    let drive = ideal(scene, Path::from(start).then(5.0, 0.0, 0.05));
+    let sweep = drive.sweep(2);
+    let (mut ground, mut wall) = (0, 0);
+    for ((p, _), truth) in in_world(&drive, &sweep).zip(&sweep.truth) {
+        assert_eq!((truth.object, truth.velocity_world), (0, [0.0; 3]));
+        if truth.class == Class::Ground {
+            assert!(p.z.abs() < 1e-4, "{p}");
+            ground += 1;
+        } else if p.z < 3.9999 {
+            let off = (p.x - 19.0).abs().min((p.y.abs() - 30.0).abs());
+            assert!(off < 1e-4, "{p}");
+            wall += 1;
+        }
+    }
+    assert!(ground > 50_000 && wall > 2_000, "{ground} {wall}");
+}
+
+#[test]
+fn no_ray_is_missed() {
+    let (centre, radius) = (DVec3::new(-6.0, 4.0, 1.4), 0.7);
+    let mut scene = Scene::empty();
+    let pose = raywake_core::pose::Pose::new(glam::DQuat::IDENTITY, centre);
+    let ball = Shape::ellipsoid(radius, radius, radius);
+    scene.put(Class::Fixture, ball, pose, Surface::matt(0.5));
+    let drive = ideal(scene, Path::standing(0.0, 0.0, 0.0));
+    let sensor = Sensor::ideal();
+    let eye = DVec3::new(0.0, 0.0, sensor.height);
+    let rays = (0..sensor.columns).flat_map(|c| sensor.beams.iter().map(move |b| (c, b)));
+    let expected = rays.filter(|&(column, beam)| {
+        let ((sa, ca), (se, ce)) = (
+            (sensor.azimuth(column) + beam.azimuth).sin_cos(),
+            beam.elevation.sin_cos(),
+        );
+        let ray = DVec3::new(ce * ca, ce * sa, se);
+        (centre - eye).cross(ray).length() < radius && ray.dot(centre - eye) > 0.0
+    });
+    let sweep = drive.sweep(0);
+    let seen = sweep.truth.iter().filter(|t| t.class == Class::Fixture);
+    let (expected, seen) = (expected.count(), seen.count());
+    assert!(seen > 500);
+    assert_eq!(seen, expected);
+}
+
+/// Scene with one of each in motion, one of them turning.
+fn movers() -> Scene {
+    let mut scene = Scene::empty();
+    let at = |x: f64, y: f64, yaw: f64, speed: f64| State { x, y, yaw, speed };
+    scene.add_car(Path::from(at(8.0, 4.0, 0.4, 9.0)).then(5.0, 1.5, 0.08), 1);
+    scene.add(models::van, Path::from(at(14.0, -6.0, 3.0, 6.0)), 2);
+    scene.add(models::cyclist, Path::from(at(-7.0, 3.0, 0.0, 4.0)), 3);
+    scene.add(models::pedestrian, Path::from(at(5.0, -4.0, 1.0, 1.4)), 4);
+    scene.add_car(Path::standing(-8.0, -5.0, 0.2), 5);
+    scene
+}
+
+#[test]
+fn velocity_is_the_pose_s_derivative() {
+    let drive = ideal(
+        movers(),
+        Path::from(State {
+            speed: 5.0,
+            ..State::default()
+        }),
+    );
+    let sweep = drive.sweep(3);
+    let mut seen = BTreeSet::new();
+    for ((p, t), truth) in in_world(&drive, &sweep).zip(&sweep.truth) {
+        if truth.object == 0 {
+            continue;
+        }
+        seen.insert(truth.object);
+        let index = truth.object as usize - 1;
+        let state = |t: f64| drive.objects(t)[index];
+        let h = 1e-3;
+        let fixed = state(t).world_from_object.inverse().transform(p);
+        let at = |t: f64| state(t).world_from_object.transform(fixed);
+        let expected = (at(t + h) - at(t - h)) / (2.0 * h);
+        let off = (vector(truth.velocity_world) - expected).length();
+        // Limbs swing besides: up to their length times amplitude times rate.
+        let limit = if state(t).class.max(Class::Van) > Class::Van {
+            2.5
+        } else {
+            1e-3
+        };
+        assert!(off < limit, "{:?}: {off} m/s", state(t).class);
+        let [l, w, height] = state(t).size.map(|v| 0.5 * v);
+        if state(t).class <= Class::Van {
+            let inside = fixed.x.abs() < l + 0.02
+                && fixed.y.abs() < w + 0.02
+                && fixed.z.abs() < height + 0.02;
+            assert!(inside, "{fixed} outside the box");
+        }
+        if index == 4 {
+            assert_eq!(truth.velocity_world, [0.0; 3], "parked");
+        }
+    }
+    assert_eq!(seen.len(), 5);
+    let torso: Vec<_> = sweep.truth.iter().filter(|t| t.object == 4).collect();
+    let exact = |t: &&&raywake_sim::Truth| (vector(t.velocity_world).length() - 1.4).abs() < 1e-4;
+    let steady = torso.iter().filter(exact).count();
+    assert!(
+        steady > 20 && steady < torso.len(),
+        "{steady} of {} on the torso",
+        torso.len()
+    );
+}
+
+#[test]
+fn states_move_at_their_velocity() {
+    let drive = Drive::new(21, options(Ego::Standing, 40));
+    let (t, h) = (1.37, 0.01);
+    let states = drive.objects(t);
+    assert!(states.len() > 40);
+    for (i, s) in states.iter().enumerate() {
+        assert_eq!(s.id as usize, i + 1);
+        assert!(s.class.is_foreground());
+        let [a, b] = [t - h, t + h].map(|t| drive.objects(t)[i].world_from_object.translation);
+        assert!(
+            ((b - a) / (2.0 * h) - s.velocity_world).length() < 0.1,
+            "{s:?}"
+        );
+    }
+    let parked = states
+        .iter()
+        .filter(|s| s.velocity_world == DVec3::ZERO && s.class <= Class::Van);
+    assert!(parked.count() > 10);
+}
+
+#[test]
+fn traffic_keeps_clear() {
+    for seed in 0..8 {
+        let drive = Drive::new(seed, options(Ego::Any, 40));
+        for step in 0..40 {
+            let t = f64::from(step) * 0.1;
+            let ego = drive.world_from_vehicle(t).translation;
+            for s in drive.objects(t) {
+                let apart = (s.world_from_object.translation - ego).truncate().length();
+                assert!(apart > 1.0, "seed {seed}, {t} s: {s:?} at {apart} m");
+            }
+        }
+    }
+}
