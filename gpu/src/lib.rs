@@ -1,1 +1,192 @@
-//! Vulkan.
+//! Executes fixed schedules over preallocated buffers on raw Vulkan.
+//!
+//! The caller hands over a table of [`Buffer`]s and a few [`Program`]s, lists of fills, copies and
+//! kernel dispatches; [`Executor::new`] makes everything these need: memory, pipelines, descriptor
+//! sets, recorded command buffers. After that a frame is: write [`Executor::upload`], call
+//! [`Executor::run`], read [`Executor::readback`].
+//!
+//! # Contract
+//!
+//! - **Who allocates.** `Executor::new` alone, at most one device memory block per [`Heap`].
+//!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host and create, record or
+//!   update nothing on the device; [`Executor::census`] counts what would break that promise.
+//!   What a driver allocates inside a submit is its own affair.
+//! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]. Programs never overlap,
+//!   so nothing needs ordering between two runs.
+//! - **Who orders.** Within a program a barrier stands exactly where declared accesses conflict
+//!   ([`Binding::reads`], [`Binding::writes`]): a kernel that touches what it does not declare is
+//!   not ordered. Every recording is checked a second time, pair by pair, before it is accepted.
+//! - **Contents.** Mapped buffers start as zeros; [`Heap::Device`] buffers start undefined, so a
+//!   program has to fill or write what it reads. All contents stay from one run to the next.
+//! - **What is trusted.** The SPIR-V: it must be valid, stay within its bindings and use no
+//!   optional feature. Indirect group counts cannot be seen here either: the kernel that writes
+//!   them keeps them within [`Limits::workgroups`]. [`Validation`] finds most violations.
+//! - **After a failure.** A lost device or a missed deadline is final: every later run returns the
+//!   same error at once. What is still running is left alone, its objects leaked, never destroyed
+//!   in use.
+//!
+//! This is the only crate of the project that contains `unsafe`.
+#![warn(missing_docs)]
+
+mod arena;
+mod check;
+mod device;
+mod error;
+mod executor;
+pub mod guard;
+mod instance;
+mod messages;
+mod order;
+mod owner;
+mod program;
+mod recorder;
+mod timer;
+
+pub use device::{DeviceInfo, DeviceKind, Limits, devices};
+pub use error::{During, GpuError};
+pub use executor::Executor;
+pub use owner::Census;
+
+use std::time::Duration;
+
+/// The kind of memory a buffer lives in, by who touches it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heap {
+    /// Written by the host through a mapping, only read by the device.
+    Upload,
+    /// Touched by the device alone.
+    Device,
+    /// Written by the device, read by the host through a mapping.
+    Readback,
+}
+
+/// One row of the caller's buffer table. Buffers are named by their row from then on.
+#[derive(Clone, Copy, Debug)]
+pub struct Buffer {
+    /// For messages.
+    pub name: &'static str,
+    /// Where it lives.
+    pub heap: Heap,
+    /// Size; a multiple of four, not zero.
+    pub bytes: u64,
+}
+
+/// One storage buffer of a kernel: what the kernel does with it. Barriers derive from this.
+#[derive(Clone, Copy, Debug)]
+pub struct Binding {
+    /// For messages.
+    pub name: &'static str,
+    /// The kernel may read it.
+    pub reads: bool,
+    /// The kernel may write it; atomics read and write.
+    pub writes: bool,
+}
+
+/// A compiled compute shader. Kernels are the same if their name and entry are.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel {
+    /// For messages and identity.
+    pub name: &'static str,
+    /// The entry point's name in the module.
+    pub entry: &'static str,
+    /// SPIR-V words, valid for Vulkan 1.1 (SPIR-V 1.3 or older).
+    pub spirv: &'static [u32],
+    /// Invocations per workgroup, as compiled in.
+    pub workgroup: [u32; 3],
+    /// Storage buffers of set 0; the binding number is the index.
+    pub bindings: &'static [Binding],
+}
+
+/// How many workgroups a dispatch runs.
+#[derive(Clone, Copy, Debug)]
+pub enum Groups {
+    /// Known when the schedule is made.
+    Fixed([u32; 3]),
+    /// Three `u32` in a buffer, read by the device when the dispatch starts.
+    Indirect {
+        /// Row of the buffer table.
+        buffer: usize,
+        /// Where the three words start; a multiple of four.
+        offset_bytes: u64,
+    },
+}
+
+/// One step of a program.
+#[derive(Clone, Debug)]
+pub enum Op {
+    /// Sets every word of a buffer.
+    Fill {
+        /// Row of the buffer table.
+        buffer: usize,
+        /// The word.
+        value: u32,
+    },
+    /// Copies a whole buffer to another one of the same size.
+    Copy {
+        /// Row of the buffer table.
+        from: usize,
+        /// Row of the buffer table.
+        to: usize,
+    },
+    /// Runs a kernel.
+    Dispatch {
+        /// For times and messages; one kernel may serve several dispatches.
+        name: &'static str,
+        /// What to run.
+        kernel: &'static Kernel,
+        /// Rows of the buffer table, one per binding of the kernel.
+        buffers: Vec<usize>,
+        /// How many workgroups.
+        groups: Groups,
+    },
+}
+
+impl Op {
+    /// The dispatch's name, or what else it is.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Op::Fill { .. } => "fill",
+            Op::Copy { .. } => "copy",
+            Op::Dispatch { name, .. } => name,
+        }
+    }
+}
+
+/// A list of steps, recorded into one command buffer once and run as a whole.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// For messages.
+    pub name: &'static str,
+    /// What it does, in order.
+    pub ops: Vec<Op>,
+}
+
+/// A run-time check by the Khronos validation layer; slow, for tests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Validation {
+    /// Core checks and synchronisation hazards.
+    Sync,
+    /// Core checks and instrumented shaders: out-of-bounds accesses.
+    GpuAssisted,
+}
+
+/// Which device, and how to run it.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Index in [`devices()`]; if none, the first of the fastest kind that lacks nothing.
+    pub device: Option<usize>,
+    /// Run under the validation layer.
+    pub validation: Option<Validation>,
+    /// The longest a single run may take. Software devices compile kernels in their first run.
+    pub timeout: Duration,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            device: None,
+            validation: None,
+            timeout: Duration::from_secs(10),
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Set-up, the frame, and the end.
+
+use crate::arena::{self, Slot};
+use crate::error::failed;
+use crate::instance::Instance;
+use crate::owner::{Census, Gpu};
+use crate::program::Pipelines;
+use crate::recorder::{Recorded, record};
+use crate::{Buffer, DeviceInfo, DeviceKind, During, GpuError, Heap, Options, Program};
+use crate::{check, device};
+use ash::vk;
+use std::mem::ManuallyDrop;
+use std::time::Duration;
+
+/// What merely missed its deadline gets this long to end before its objects are leaked.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// A device with its buffers and recorded programs; see the [crate] for the contract.
+///
+/// Buffers and programs are named by their index in the tables given to [`Executor::new`]; an
+/// index out of range, or a buffer of the wrong heap, panics.
+pub struct Executor {
+    gpu: ManuallyDrop<Gpu>,
+    slots: Vec<Slot>,
+    programs: Vec<Recorded>,
+    fence: vk::Fence,
+    timeout: Duration,
+    in_flight: bool,
+    failure: Option<GpuError>,
+}
+
+impl Executor {
+    /// Checks the schedule, then allocates, creates and records everything.
+    ///
+    /// # Errors
+    /// `NoLoader`, `NoDevice`, `Unsupported` if there is nothing to run on; `Schedule` if the
+    /// tables contradict themselves or the device's limits; `OutOfMemory` if the buffers of a heap
+    /// exceed it; `Vulkan`. Nothing is left behind.
+    pub fn new(
+        options: &Options,
+        buffers: &[Buffer],
+        programs: &[Program],
+    ) -> Result<Self, GpuError> {
+        let instance = Instance::new(options.validation)?;
+        let physical = device::select(&instance, options.device)?;
+        check::schedule(&physical.info.limits, buffers, programs)?;
+        let mut gpu = Gpu::new(instance, physical)?;
+        let slots = arena::allocate(&mut gpu, buffers)?;
+        let pipelines = Pipelines::new(&mut gpu, &slots, programs)?;
+        let commands = gpu.command_buffers(programs.len() as u32)?;
+        let recorded = programs.iter().zip(commands);
+        let recorded = recorded
+            .map(|(program, commands)| record(&mut gpu, commands, program, &slots, &pipelines))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            fence: gpu.fence()?,
+            gpu: ManuallyDrop::new(gpu),
+            slots,
+            programs: recorded,
+            timeout: options.timeout,
+            in_flight: false,
+            failure: None,
+        })
+    }
+
+    /// Declares set-up finished: [`Census::after_seal`] counts from here.
+    pub fn seal(&mut self) {
+        self.gpu.seal();
+    }
+
+    /// The words of a [`Heap::Upload`] buffer. The device reads them in later runs, as they are.
+    pub fn upload(&mut self, buffer: usize) -> &mut [u32] {
+        let slot = &mut self.slots[buffer];
+        assert_eq!(slot.row.heap, Heap::Upload, "{}", slot.row.name);
+        slot.mapped_mut().expect("upload buffers are mapped")
+    }
+
+    /// The words of a [`Heap::Readback`] buffer, as the last run left them.
+    ///
+    /// Empty once a run has failed, because the device may still be writing there.
+    pub fn readback(&self, buffer: usize) -> &[u32] {
+        let slot = &self.slots[buffer];
+        assert_eq!(slot.row.heap, Heap::Readback, "{}", slot.row.name);
+        if self.failure.is_some() {
+            return &[];
+        }
+        slot.mapped().expect("readback buffers are mapped")
+    }
+
+    /// Runs a program to its end. Allocates nothing.
+    ///
+    /// # Errors
+    /// `Timeout` after [`Options::timeout`], `DeviceLost`, `Vulkan`. Once one of them has been
+    /// returned, every later run returns it again at once.
+    pub fn run(&mut self, program: usize) -> Result<(), GpuError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        let outcome = self.submit_and_wait(program);
+        self.failure = outcome.clone().err();
+        outcome
+    }
+
+    fn submit_and_wait(&mut self, program: usize) -> Result<(), GpuError> {
+        let commands = self.programs[program].commands;
+        let submitted = self.gpu.submit(commands, self.fence);
+        submitted.map_err(|result| self.fault("vkQueueSubmit", result, program))?;
+        self.in_flight = true;
+        let waited = self.gpu.wait(self.fence, self.timeout);
+        let finished = waited.map_err(|result| self.fault("vkWaitForFences", result, program))?;
+        if !finished {
+            return Err(GpuError::Timeout {
+                during: self.during(program),
+                after: self.timeout,
+            });
+        }
+        self.in_flight = false;
+        self.programs[program].timer.read(&self.gpu);
+        Ok(())
+    }
+
+    fn fault(&mut self, call: &'static str, result: vk::Result, program: usize) -> GpuError {
+        if result != vk::Result::ERROR_DEVICE_LOST {
+            return failed(call)(result);
+        }
+        // What a lost device was doing counts as finished; its objects may be destroyed.
+        self.in_flight = false;
+        GpuError::DeviceLost {
+            during: self.during(program),
+        }
+    }
+
+    fn during(&mut self, program: usize) -> During {
+        let Recorded { name, timer, .. } = &mut self.programs[program];
+        // Software drivers answer this question only when they are idle.
+        let last = match self.gpu.info().kind {
+            DeviceKind::Cpu => None,
+            _ => timer.last_finished(&self.gpu),
+        };
+        During {
+            program: name,
+            last,
+        }
+    }
+
+    /// Name and duration in milliseconds of each step of the program's last run, in order.
+    ///
+    /// A step's time runs from the end of all steps before it to its own end. Steps without a
+    /// barrier between them may overlap, so the sum is meaningful and a single time only roughly.
+    /// Yields nothing before the first run, and on devices without timestamps. Allocates nothing.
+    pub fn times(&self, program: usize) -> impl Iterator<Item = (&'static str, f64)> {
+        self.programs[program].timer.times(&self.gpu)
+    }
+
+    /// What has been created so far.
+    pub fn census(&self) -> Census {
+        self.gpu.census
+    }
+
+    /// How many warnings and errors the validation layer has reported; zero without it.
+    pub fn messages(&self) -> u64 {
+        self.gpu.instance.messages().map_or(0, |m| m.count())
+    }
+
+    /// The first few of these messages.
+    pub fn message_texts(&self) -> Vec<String> {
+        let messages = self.gpu.instance.messages();
+        messages.map_or_else(Vec::new, |m| m.texts())
+    }
+
+    /// The device this runs on.
+    pub fn info(&self) -> &DeviceInfo {
+        self.gpu.info()
+    }
+}
+
+impl Drop for Executor {
+    fn drop(&mut self) {
+        let idle = !self.in_flight
+            || match self.gpu.wait(self.fence, self.timeout.max(GRACE)) {
+                Ok(finished) => finished,
+                Err(result) => result == vk::Result::ERROR_DEVICE_LOST,
+            };
+        // What still runs uses the objects, and might never end: they are leaked, device and all.
+        if idle {
+            // SAFETY: dropped here only, and never used again.
+            unsafe { ManuallyDrop::drop(&mut self.gpu) };
+        }
+    }
+}

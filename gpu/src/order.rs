@@ -1,0 +1,246 @@
+//! Which steps have to be ordered: the conflict rule, free of Vulkan.
+
+use crate::{Groups, Op};
+
+/// What one step does to one buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Access {
+    pub buffer: usize,
+    pub reads: bool,
+    pub writes: bool,
+}
+
+impl Access {
+    pub fn read(buffer: usize) -> Self {
+        Self {
+            buffer,
+            reads: true,
+            writes: false,
+        }
+    }
+
+    pub fn write(buffer: usize) -> Self {
+        Self {
+            buffer,
+            reads: false,
+            writes: true,
+        }
+    }
+}
+
+/// Everything a step touches. An indirect dispatch also reads its group counts.
+pub(crate) fn accesses(op: &Op) -> Vec<Access> {
+    match op {
+        Op::Fill { buffer, .. } => vec![Access::write(*buffer)],
+        Op::Copy { from, to } => vec![Access::read(*from), Access::write(*to)],
+        Op::Dispatch {
+            kernel,
+            buffers,
+            groups,
+            ..
+        } => {
+            let bound = buffers.iter().zip(kernel.bindings);
+            let mut touched: Vec<_> = bound
+                .map(|(&buffer, binding)| Access {
+                    buffer,
+                    reads: binding.reads,
+                    writes: binding.writes,
+                })
+                .collect();
+            if let Groups::Indirect { buffer, .. } = groups {
+                touched.push(Access::read(*buffer));
+            }
+            touched
+        }
+    }
+}
+
+/// What was read and written since the last barrier.
+pub(crate) struct Hazards {
+    read: Vec<bool>,
+    written: Vec<bool>,
+}
+
+impl Hazards {
+    pub fn new(buffers: usize) -> Self {
+        Self {
+            read: vec![false; buffers],
+            written: vec![false; buffers],
+        }
+    }
+
+    /// Takes up the next step, and says whether a barrier has to stand before it.
+    pub fn admit(&mut self, step: &[Access]) -> bool {
+        let barrier = step.iter().any(|a| {
+            let (read, written) = (self.read[a.buffer], self.written[a.buffer]);
+            (a.reads && written) || (a.writes && (read || written))
+        });
+        if barrier {
+            self.read.fill(false);
+            self.written.fill(false);
+        }
+        for a in step {
+            self.read[a.buffer] |= a.reads;
+            self.written[a.buffer] |= a.writes;
+        }
+        barrier
+    }
+}
+
+/// What a recording consists of, as far as order goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    Op(Vec<Access>),
+    Barrier,
+}
+
+/// The first two steps that conflict without a barrier between them, by index among the
+/// operations. Deliberately not built on [`Hazards`]: it compares every pair, so that one can
+/// find the other wrong.
+pub(crate) fn unordered(steps: &[Step]) -> Option<(usize, usize)> {
+    let mut epoch = 0;
+    let mut earlier: Vec<(usize, &[Access])> = Vec::new();
+    for step in steps {
+        let Step::Op(later) = step else {
+            epoch += 1;
+            continue;
+        };
+        let conflicting = |(e, first): &(usize, &[Access])| *e == epoch && conflict(first, later);
+        if let Some(i) = earlier.iter().position(conflicting) {
+            return Some((i, earlier.len()));
+        }
+        earlier.push((epoch, later));
+    }
+    None
+}
+
+fn conflict(first: &[Access], second: &[Access]) -> bool {
+    let pairs = first
+        .iter()
+        .flat_map(|a| second.iter().map(move |b| (a, b)));
+    pairs
+        .filter(|(a, b)| a.buffer == b.buffer)
+        .any(|(a, b)| (a.writes && (b.reads || b.writes)) || (a.reads && b.writes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Binding, Kernel};
+
+    fn barriers(steps: &[Vec<Access>]) -> Vec<bool> {
+        let mut hazards = Hazards::new(4);
+        steps.iter().map(|step| hazards.admit(step)).collect()
+    }
+
+    #[test]
+    fn a_barrier_stands_where_accesses_conflict_and_nowhere_else() {
+        let (r, w) = (vec![Access::read(0)], vec![Access::write(0)]);
+        let elsewhere = vec![Access::write(1)];
+        assert_eq!(barriers(&[r.clone(), r.clone()]), [false, false]);
+        assert_eq!(barriers(&[w.clone(), elsewhere]), [false, false]);
+        assert_eq!(barriers(&[w.clone(), r.clone()]), [false, true]);
+        assert_eq!(barriers(&[r.clone(), w.clone()]), [false, true]);
+        assert_eq!(barriers(&[w.clone(), w.clone()]), [false, true]);
+    }
+
+    #[test]
+    fn a_barrier_orders_everything_before_it() {
+        let both = vec![Access::write(0), Access::write(1)];
+        let steps = [both, vec![Access::read(0)], vec![Access::read(1)]];
+        assert_eq!(barriers(&steps), [false, true, false]);
+        let again = [steps.to_vec(), vec![vec![Access::write(0)]]].concat();
+        assert_eq!(barriers(&again), [false, true, false, true]);
+    }
+
+    #[test]
+    fn fills_write_copies_read_and_write_indirect_counts_are_read() {
+        static KERNEL: Kernel = Kernel {
+            name: "k",
+            entry: "k",
+            spirv: &[],
+            workgroup: [1; 3],
+            bindings: &[Binding {
+                name: "b",
+                reads: true,
+                writes: true,
+            }],
+        };
+        let fill = Op::Fill {
+            buffer: 2,
+            value: 0,
+        };
+        let indirect = Op::Dispatch {
+            name: "d",
+            kernel: &KERNEL,
+            buffers: vec![1],
+            groups: Groups::Indirect {
+                buffer: 2,
+                offset_bytes: 0,
+            },
+        };
+        let changed = Access {
+            buffer: 1,
+            reads: true,
+            writes: true,
+        };
+        assert_eq!(accesses(&fill), [Access::write(2)]);
+        assert_eq!(
+            accesses(&Op::Copy { from: 0, to: 1 }),
+            [Access::read(0), Access::write(1)]
+        );
+        assert_eq!(accesses(&indirect), [changed, Access::read(2)]);
+        let steps = [accesses(&fill), accesses(&indirect)];
+        assert_eq!(barriers(&steps), [false, true]);
+    }
+
+    #[test]
+    fn a_missing_barrier_is_found() {
+        let (r, w) = (
+            Step::Op(vec![Access::read(0)]),
+            Step::Op(vec![Access::write(0)]),
+        );
+        let other = Step::Op(vec![Access::write(1)]);
+        let missing = |steps: &[&Step]| {
+            let steps: Vec<_> = steps.iter().map(|&s| s.clone()).collect();
+            unordered(&steps)
+        };
+        assert_eq!(missing(&[&r, &r, &other]), None);
+        assert_eq!(missing(&[&w, &other, &r]), Some((0, 2)));
+        assert_eq!(missing(&[&r, &w]), Some((0, 1)));
+        assert_eq!(missing(&[&w, &Step::Barrier, &w]), None);
+        assert_eq!(missing(&[&w, &Step::Barrier, &r, &w]), Some((1, 2)));
+    }
+
+    /// Random schedules: what the recorder's rule lets pass, the pairwise check must accept, and
+    /// no barrier may be superfluous.
+    #[test]
+    fn the_rule_and_the_check_agree() {
+        let mut state = 1u32;
+        let mut next = |n: u32| {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 16) % n
+        };
+        for _ in 0..200 {
+            let mut hazards = Hazards::new(4);
+            let mut steps = Vec::new();
+            for _ in 0..12 {
+                let step: Vec<_> = (0..1 + next(2))
+                    .map(|_| Access {
+                        buffer: next(4) as usize,
+                        reads: next(2) == 0,
+                        writes: next(3) == 0,
+                    })
+                    .collect();
+                if hazards.admit(&step) {
+                    let mut without = steps.clone();
+                    without.push(Step::Op(step.clone()));
+                    assert!(unordered(&without).is_some());
+                    steps.push(Step::Barrier);
+                }
+                steps.push(Step::Op(step));
+            }
+            assert_eq!(unordered(&steps), None);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The logical device and everything created from it.
+//!
+//! Every create, allocate, record and update call of the crate goes through [`Gpu`], which counts
+//! it and remembers what has to be destroyed: the census and the clean-up are complete because
+//! there is no other way to the device.
+
+mod create;
+
+use crate::GpuError;
+use crate::device::{DeviceInfo, Physical};
+use crate::error::failed;
+use crate::instance::Instance;
+use ash::vk;
+use std::time::Duration;
+
+/// What an executor has created so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// Calls of `vkAllocateMemory`; at most three.
+    pub memory_allocations: u64,
+    /// Bytes allocated in [`crate::Heap::Upload`].
+    pub upload_bytes: u64,
+    /// Bytes allocated in [`crate::Heap::Device`].
+    pub device_bytes: u64,
+    /// Bytes allocated in [`crate::Heap::Readback`].
+    pub readback_bytes: u64,
+    /// Vulkan objects created, memory included.
+    pub objects: u64,
+    /// Barriers recorded between the steps of all programs.
+    pub barriers: u64,
+    /// Objects created, memory allocated, commands recorded or descriptors updated since
+    /// [`crate::Executor::seal`]. Stays zero.
+    pub after_seal: u64,
+}
+
+enum Object {
+    Buffer(vk::Buffer),
+    Memory(vk::DeviceMemory),
+    Shader(vk::ShaderModule),
+    SetLayout(vk::DescriptorSetLayout),
+    PipelineLayout(vk::PipelineLayout),
+    Pipeline(vk::Pipeline),
+    DescriptorPool(vk::DescriptorPool),
+    CommandPool(vk::CommandPool),
+    QueryPool(vk::QueryPool),
+    Fence(vk::Fence),
+}
+
+/// A logical device with one queue. Dropping it destroys everything it created, so nothing may be
+/// running by then.
+pub(crate) struct Gpu {
+    raw: ash::Device,
+    queue: vk::Queue,
+    owned: Vec<Object>,
+    pub census: Census,
+    sealed: bool,
+    pub physical: Physical,
+    // Last, because fields are dropped in order.
+    pub instance: Instance,
+}
+
+impl Gpu {
+    pub fn new(instance: Instance, physical: Physical) -> Result<Self, GpuError> {
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(physical.queue_family)
+            .queue_priorities(&[1.0])];
+        let features = match instance.messages() {
+            Some(_) => instrumentation(&instance, &physical),
+            None => vk::PhysicalDeviceFeatures::default(),
+        };
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_features(&features);
+        // SAFETY: the physical device is of this instance, and offers the family and features.
+        let raw = unsafe { instance.raw().create_device(physical.handle, &info, None) }
+            .map_err(failed("vkCreateDevice"))?;
+        // SAFETY: one queue of this family was just requested.
+        let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
+        Ok(Self {
+            raw,
+            queue,
+            owned: Vec::new(),
+            census: Census::default(),
+            sealed: false,
+            physical,
+            instance,
+        })
+    }
+
+    pub fn info(&self) -> &DeviceInfo {
+        &self.physical.info
+    }
+
+    pub fn seal(&mut self) {
+        self.sealed = true;
+    }
+
+    fn count(&mut self) {
+        self.census.after_seal += u64::from(self.sealed);
+    }
+
+    fn own<T: Copy>(&mut self, handle: T, object: fn(T) -> Object) -> T {
+        self.count();
+        self.census.objects += 1;
+        self.owned.push(object(handle));
+        handle
+    }
+
+    /// Begins `commands`, lets `record` fill it, and ends it.
+    pub fn record<R>(
+        &mut self,
+        commands: vk::CommandBuffer,
+        record: impl FnOnce(&ash::Device) -> R,
+    ) -> Result<R, GpuError> {
+        self.count();
+        // SAFETY: the command buffer is of this device and was not begun before.
+        unsafe { self.raw.begin_command_buffer(commands, &Default::default()) }
+            .map_err(failed("vkBeginCommandBuffer"))?;
+        let result = record(&self.raw);
+        // SAFETY: it is in the recording state.
+        unsafe { self.raw.end_command_buffer(commands) }.map_err(failed("vkEndCommandBuffer"))?;
+        Ok(result)
+    }
+
+    /// Starts recorded commands. Nothing else is running.
+    pub fn submit(&self, commands: vk::CommandBuffer, fence: vk::Fence) -> Result<(), vk::Result> {
+        let commands = [commands];
+        let submit = [vk::SubmitInfo::default().command_buffers(&commands)];
+        // SAFETY: the executor runs one program at a time, so fence and commands are idle; all
+        // that the commands refer to lives as long as `self`.
+        unsafe {
+            self.raw.reset_fences(&[fence])?;
+            self.raw.queue_submit(self.queue, &submit, fence)
+        }
+    }
+
+    /// Whether the submitted commands finished in time.
+    pub fn wait(&self, fence: vk::Fence, timeout: Duration) -> Result<bool, vk::Result> {
+        let ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+        // SAFETY: the fence is of this device.
+        match unsafe { self.raw.wait_for_fences(&[fence], true, ns) } {
+            Ok(()) => Ok(true),
+            Err(vk::Result::TIMEOUT) => Ok(false),
+            Err(result) => Err(result),
+        }
+    }
+
+    /// Reads timestamps as (ticks, available), without waiting for any.
+    pub fn timestamps(&self, pool: vk::QueryPool, ticks: &mut [[u64; 2]]) {
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
+        // SAFETY: `ticks` has one element per query of the pool, of the size the flags imply.
+        // An error (some not available yet) shows in the elements.
+        let _ = unsafe { self.raw.get_query_pool_results(pool, 0, ticks, flags) };
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        while let Some(object) = self.owned.pop() {
+            // SAFETY: nothing runs any more, and what was created later is already destroyed.
+            unsafe { destroy(&self.raw, object) };
+        }
+        // SAFETY: all that was made from the device is destroyed.
+        unsafe { self.raw.destroy_device(None) };
+    }
+}
+
+/// # Safety
+/// The object is of this device, not in use, and not used again.
+unsafe fn destroy(device: &ash::Device, object: Object) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        match object {
+            Object::Buffer(it) => device.destroy_buffer(it, None),
+            Object::Memory(it) => device.free_memory(it, None),
+            Object::Shader(it) => device.destroy_shader_module(it, None),
+            Object::SetLayout(it) => device.destroy_descriptor_set_layout(it, None),
+            Object::PipelineLayout(it) => device.destroy_pipeline_layout(it, None),
+            Object::Pipeline(it) => device.destroy_pipeline(it, None),
+            Object::DescriptorPool(it) => device.destroy_descriptor_pool(it, None),
+            Object::CommandPool(it) => device.destroy_command_pool(it, None),
+            Object::QueryPool(it) => device.destroy_query_pool(it, None),
+            Object::Fence(it) => device.destroy_fence(it, None),
+        }
+    }
+}
+
+/// What shader instrumentation writes its findings with, where the device has it.
+fn instrumentation(instance: &Instance, physical: &Physical) -> vk::PhysicalDeviceFeatures {
+    // SAFETY: the physical device is of this instance.
+    let offered = unsafe { instance.raw().get_physical_device_features(physical.handle) };
+    vk::PhysicalDeviceFeatures {
+        fragment_stores_and_atomics: offered.fragment_stores_and_atomics,
+        vertex_pipeline_stores_and_atomics: offered.vertex_pipeline_stores_and_atomics,
+        ..Default::default()
+    }
+}

@@ -1,0 +1,117 @@
+//! Pipelines and descriptor sets: one pipeline per kernel, one set per kernel and buffer list.
+
+use crate::arena::Slot;
+use crate::error::failed;
+use crate::owner::Gpu;
+use crate::{GpuError, Kernel, Op, Program};
+use ash::vk;
+use std::ffi::CString;
+
+struct Pipeline {
+    kernel: &'static Kernel,
+    set_layout: vk::DescriptorSetLayout,
+    layout: vk::PipelineLayout,
+    handle: vk::Pipeline,
+}
+
+struct Set {
+    pipeline: usize,
+    buffers: Vec<usize>,
+    handle: vk::DescriptorSet,
+}
+
+/// What a dispatch binds before it starts.
+#[derive(Clone, Copy)]
+pub(crate) struct Bound {
+    pub pipeline: vk::Pipeline,
+    pub layout: vk::PipelineLayout,
+    pub set: vk::DescriptorSet,
+}
+
+/// All that the dispatches of all programs bind.
+pub(crate) struct Pipelines {
+    pipelines: Vec<Pipeline>,
+    sets: Vec<Set>,
+}
+
+impl Pipelines {
+    pub fn new(gpu: &mut Gpu, slots: &[Slot], programs: &[Program]) -> Result<Self, GpuError> {
+        let mut all = Self {
+            pipelines: Vec::new(),
+            sets: Vec::new(),
+        };
+        let mut wanted: Vec<(usize, &[usize])> = Vec::new();
+        for (kernel, buffers) in dispatches(programs) {
+            let pipeline = all.pipeline(gpu, kernel)?;
+            if !wanted.contains(&(pipeline, buffers)) {
+                wanted.push((pipeline, buffers));
+            }
+        }
+        let descriptors: usize = wanted.iter().map(|(_, buffers)| buffers.len()).sum();
+        let pool = gpu.descriptor_pool(wanted.len() as u32, descriptors as u32)?;
+        for (pipeline, buffers) in wanted {
+            let handles: Vec<_> = buffers.iter().map(|&b| slots[b].handle).collect();
+            let layout = all.pipelines[pipeline].set_layout;
+            all.sets.push(Set {
+                pipeline,
+                buffers: buffers.to_vec(),
+                handle: gpu.descriptor_set(pool, layout, &handles)?,
+            });
+        }
+        Ok(all)
+    }
+
+    /// For a dispatch of one of the programs given to `new`.
+    pub fn bound(&self, kernel: &Kernel, buffers: &[usize]) -> Option<Bound> {
+        let set = self
+            .sets
+            .iter()
+            .find(|s| same(self.pipelines[s.pipeline].kernel, kernel) && s.buffers == buffers)?;
+        let pipeline = &self.pipelines[set.pipeline];
+        Some(Bound {
+            pipeline: pipeline.handle,
+            layout: pipeline.layout,
+            set: set.handle,
+        })
+    }
+
+    /// The kernel's pipeline, made if there is none yet.
+    fn pipeline(&mut self, gpu: &mut Gpu, kernel: &'static Kernel) -> Result<usize, GpuError> {
+        let known = self.pipelines.iter().position(|p| same(p.kernel, kernel));
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let bindings = (0..kernel.bindings.len() as u32).map(|binding| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(binding)
+                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                .descriptor_count(1)
+                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+        });
+        let set_layout = gpu.set_layout(&bindings.collect::<Vec<_>>())?;
+        let layout = gpu.pipeline_layout(set_layout)?;
+        let entry = CString::new(kernel.entry)
+            .map_err(|_| failed("the kernel's entry")(vk::Result::ERROR_UNKNOWN))?;
+        self.pipelines.push(Pipeline {
+            kernel,
+            set_layout,
+            layout,
+            handle: gpu.pipeline(kernel.spirv, &entry, layout)?,
+        });
+        Ok(self.pipelines.len() - 1)
+    }
+}
+
+fn same(a: &Kernel, b: &Kernel) -> bool {
+    (a.name, a.entry) == (b.name, b.entry)
+}
+
+fn dispatches(programs: &[Program]) -> impl Iterator<Item = (&'static Kernel, &[usize])> {
+    let ops = programs.iter().flat_map(|program| &program.ops);
+    ops.filter_map(|op| match op {
+        Op::Dispatch {
+            kernel, buffers, ..
+        } => Some((*kernel, buffers.as_slice())),
+        _ => None,
+    })
+}

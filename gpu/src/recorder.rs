@@ -1,0 +1,183 @@
+//! Turns a program into a command buffer, with a barrier exactly where accesses conflict.
+
+use crate::arena::Slot;
+use crate::order::{Access, Hazards, Step, accesses, unordered};
+use crate::owner::Gpu;
+use crate::program::{Bound, Pipelines};
+use crate::timer::Timer;
+use crate::{GpuError, Groups, Heap, Op, Program};
+use ash::vk;
+use vk::{AccessFlags as Touch, PipelineStageFlags as Stage};
+
+/// A program ready to run.
+pub(crate) struct Recorded {
+    pub name: &'static str,
+    pub commands: vk::CommandBuffer,
+    pub timer: Timer,
+}
+
+/// Records `program` and checks the result pair by pair.
+pub(crate) fn record(
+    gpu: &mut Gpu,
+    commands: vk::CommandBuffer,
+    program: &Program,
+    slots: &[Slot],
+    pipelines: &Pipelines,
+) -> Result<Recorded, GpuError> {
+    let timer = Timer::new(gpu, program.ops.iter().map(Op::name).collect())?;
+    let steps = gpu.record(commands, |device| {
+        let recorder = Recorder {
+            device,
+            commands,
+            slots,
+            pipelines,
+        };
+        recorder.program(program, timer.pool)
+    })?;
+    let barriers = steps.iter().filter(|s| **s == Step::Barrier).count();
+    gpu.census.barriers += barriers as u64;
+    if let Some((first, second)) = unordered(&steps) {
+        return Err(GpuError::Schedule {
+            program: program.name,
+            dispatch: program.ops[second].name(),
+            what: format!("not ordered after step {first}: a defect of the recorder"),
+        });
+    }
+    Ok(Recorded {
+        name: program.name,
+        commands,
+        timer,
+    })
+}
+
+struct Recorder<'a> {
+    device: &'a ash::Device,
+    commands: vk::CommandBuffer,
+    slots: &'a [Slot],
+    pipelines: &'a Pipelines,
+}
+
+impl Recorder<'_> {
+    fn program(&self, program: &Program, queries: Option<vk::QueryPool>) -> Vec<Step> {
+        let mut hazards = Hazards::new(self.slots.len());
+        let mut steps = Vec::new();
+        if let Some(pool) = queries {
+            let count = program.ops.len() as u32 + 1;
+            // SAFETY: recording; the pool has this many queries.
+            unsafe {
+                self.device
+                    .cmd_reset_query_pool(self.commands, pool, 0, count)
+            };
+            self.timestamp(pool, 0);
+        }
+        for (i, op) in program.ops.iter().enumerate() {
+            let touched = accesses(op);
+            if hazards.admit(&touched) {
+                self.barrier();
+                steps.push(Step::Barrier);
+            }
+            self.op(op);
+            if let Some(pool) = queries {
+                self.timestamp(pool, i as u32 + 1);
+            }
+            steps.push(Step::Op(touched));
+        }
+        if steps.iter().any(|step| self.reaches_host(step)) {
+            self.hand_to_host();
+        }
+        steps
+    }
+
+    fn reaches_host(&self, step: &Step) -> bool {
+        let readback = |a: &Access| a.writes && self.slots[a.buffer].row.heap == Heap::Readback;
+        matches!(step, Step::Op(touched) if touched.iter().any(readback))
+    }
+
+    fn op(&self, op: &Op) {
+        match op {
+            &Op::Fill { buffer, value } => {
+                let (whole, to) = (vk::WHOLE_SIZE, self.slots[buffer].handle);
+                // SAFETY: recording; the buffer is a transfer target of whole words.
+                unsafe {
+                    self.device
+                        .cmd_fill_buffer(self.commands, to, 0, whole, value)
+                }
+            }
+            &Op::Copy { from, to } => {
+                let (from, to) = (&self.slots[from], &self.slots[to]);
+                let whole = [vk::BufferCopy::default().size(from.row.bytes)];
+                let (from, to) = (from.handle, to.handle);
+                // SAFETY: recording; the check saw two different buffers of equal size.
+                unsafe { self.device.cmd_copy_buffer(self.commands, from, to, &whole) }
+            }
+            Op::Dispatch {
+                kernel,
+                buffers,
+                groups,
+                ..
+            } => {
+                let bound = self.pipelines.bound(kernel, buffers);
+                self.dispatch(bound.expect("made from the same programs"), *groups);
+            }
+        }
+    }
+
+    fn dispatch(&self, bound: Bound, groups: Groups) {
+        let (device, commands) = (self.device, self.commands);
+        let compute = vk::PipelineBindPoint::COMPUTE;
+        let sets = [bound.set];
+        // SAFETY: recording; the set was allocated with the layout the pipeline was made with, and
+        // the check saw the counts within limits or their place within the buffer.
+        unsafe {
+            device.cmd_bind_pipeline(commands, compute, bound.pipeline);
+            device.cmd_bind_descriptor_sets(commands, compute, bound.layout, 0, &sets, &[]);
+            match groups {
+                Groups::Fixed([x, y, z]) => device.cmd_dispatch(commands, x, y, z),
+                Groups::Indirect {
+                    buffer,
+                    offset_bytes,
+                } => {
+                    let counts = self.slots[buffer].handle;
+                    device.cmd_dispatch_indirect(commands, counts, offset_bytes);
+                }
+            }
+        }
+    }
+
+    /// Orders all that came before against all that follows.
+    fn barrier(&self) {
+        let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER | Stage::DRAW_INDIRECT;
+        let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
+        let read = Touch::TRANSFER_READ | Touch::SHADER_READ | Touch::INDIRECT_COMMAND_READ;
+        self.memory_barrier(stages, written, stages, read | written);
+    }
+
+    /// Makes what was written visible through the host's mappings once the fence is signalled.
+    fn hand_to_host(&self) {
+        let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER;
+        let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
+        self.memory_barrier(stages, written, Stage::HOST, Touch::HOST_READ);
+    }
+
+    fn memory_barrier(&self, from: Stage, written: Touch, to: Stage, touched: Touch) {
+        let barriers = [vk::MemoryBarrier::default()
+            .src_access_mask(written)
+            .dst_access_mask(touched)];
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: recording; the stages exist on a compute queue and match the accesses.
+        unsafe {
+            self.device
+                .cmd_pipeline_barrier(self.commands, from, to, none, &barriers, &[], &[]);
+        }
+    }
+
+    /// Written when everything recorded so far has finished.
+    fn timestamp(&self, pool: vk::QueryPool, query: u32) {
+        let stage = Stage::BOTTOM_OF_PIPE;
+        // SAFETY: recording; the query is in the pool and was reset at the start.
+        unsafe {
+            self.device
+                .cmd_write_timestamp(self.commands, stage, pool, query)
+        };
+    }
+}

@@ -1,0 +1,84 @@
+//! Tiny kernels, compiled on the spot, and what to do without a device.
+
+// No test uses all of it.
+#![allow(dead_code)]
+
+use naga::back::spv;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use raywake_gpu::{
+    Binding, Buffer, Executor, GpuError, Groups, Heap, Kernel, Op, Options, Program,
+};
+
+pub const READ: Binding = binding(true, false);
+pub const WRITE: Binding = binding(false, true);
+pub const CHANGE: Binding = binding(true, true);
+
+const fn binding(reads: bool, writes: bool) -> Binding {
+    Binding {
+        name: "d",
+        reads,
+        writes,
+    }
+}
+
+/// What the kernels below are written in terms of.
+const PRELUDE: &str = "
+struct Words { d: array<u32> }
+struct Counts { d: array<atomic<u32>> }
+";
+
+/// A kernel of 64 invocations with the entry point `main`.
+pub fn kernel(name: &'static str, wgsl: &str, bindings: &'static [Binding]) -> &'static Kernel {
+    let module = naga::front::wgsl::parse_str(&format!("{PRELUDE}{wgsl}")).expect(name);
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let info = validator.validate(&module).expect(name);
+    let options = spv::Options {
+        lang_version: (1, 3),
+        flags: spv::WriterFlags::empty(),
+        fake_missing_bindings: true,
+        zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
+        force_loop_bounding: false,
+        bounds_check_policies: Default::default(),
+        ..Default::default()
+    };
+    let spirv = spv::write_vec(&module, &info, &options, None).expect(name);
+    Box::leak(Box::new(Kernel {
+        name,
+        entry: "main",
+        spirv: spirv.leak(),
+        workgroup: [64, 1, 1],
+        bindings,
+    }))
+}
+
+pub fn row(name: &'static str, heap: Heap, words: u64) -> Buffer {
+    let bytes = words * 4;
+    Buffer { name, heap, bytes }
+}
+
+pub fn dispatch(kernel: &'static Kernel, buffers: &[usize], groups: u32) -> Op {
+    Op::Dispatch {
+        name: kernel.name,
+        kernel,
+        buffers: buffers.to_vec(),
+        groups: Groups::Fixed([groups, 1, 1]),
+    }
+}
+
+/// None, with a remark, where there is no device; `RAYWAKE_VULKAN=required` makes that a failure.
+pub fn executor(options: &Options, table: &[Buffer], ops: Vec<Op>) -> Option<Executor> {
+    let program = Program { name: "test", ops };
+    present(Executor::new(options, table, &[program])).map(|e| e.expect("set-up"))
+}
+
+/// The result, unless it says that there is nothing to run on.
+pub fn present<T>(result: Result<T, GpuError>) -> Option<Result<T, GpuError>> {
+    let required = std::env::var("RAYWAKE_VULKAN").is_ok_and(|v| v == "required");
+    match result {
+        Err(GpuError::NoLoader | GpuError::NoDevice) if !required => {
+            eprintln!("skipped: no Vulkan device");
+            None
+        }
+        other => Some(other),
+    }
+}
