@@ -1,6 +1,8 @@
 //! A digest of results: 64-bit FNV-1a over little-endian bytes. It tells whether two runs put out
 //! the same bits; it is no protection against anybody.
 
+use crate::output::{ColumnFlow, TrackletState};
+
 /// A running digest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Digest(u64);
@@ -36,6 +38,28 @@ impl Digest {
     #[inline]
     pub fn float(&mut self, v: f32) {
         self.word((v + 0.0).to_bits());
+    }
+
+    /// Adds a column's flow: cell, origin, displacement, energy, velocity over ground, velocity
+    /// relative to the vehicle, covariance, age.
+    pub fn column(&mut self, c: &ColumnFlow) {
+        c.cell.iter().for_each(|v| self.word(*v as u32));
+        self.word(c.origin as u32);
+        c.displacement_cells.iter().for_each(|v| self.word(*v as u32));
+        self.word(c.energy as u32);
+        c.velocity_world_mps.iter().for_each(|v| self.float(*v));
+        c.velocity_ego_mps.iter().for_each(|v| self.float(*v));
+        c.covariance.iter().for_each(|v| self.float(*v));
+        self.word(c.age);
+    }
+
+    /// Adds a tracklet: cell, position, heading, speed, turning rate, covariance, age.
+    pub fn tracklet(&mut self, t: &TrackletState) {
+        t.cell.iter().for_each(|v| self.word(*v as u32));
+        t.position_vehicle_m.iter().for_each(|v| self.float(*v));
+        [t.heading_rad, t.speed_mps, t.turn_rate_radps].iter().for_each(|v| self.float(*v));
+        t.covariance.iter().flatten().for_each(|v| self.float(*v));
+        self.word(t.age);
     }
 
     /// The digest so far.

@@ -61,7 +61,6 @@ macro_rules! buffers {
         } ),* ];
     };
 }
-pub(crate) use buffers;
 
 buffers! {
     /// Buffers of the flow pipeline.

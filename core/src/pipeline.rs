@@ -9,14 +9,14 @@
 //! [`Pipeline::prepare`] and [`Pipeline::follow`] run on the CPU. What lies between is integers and
 //! bits: [`perceive`] does it here, the kernels do the same on a device, with the same result.
 
-use crate::background_filter::{self, background_filter};
+use crate::background_filter::background_filter;
 use crate::compact::compact;
 use crate::flow::Em;
 use crate::grid::columns::{columns, shift};
 use crate::grid::ray_merge::ray_merge;
 use crate::grid::ray_trace::ray_trace;
 use crate::motion_compensation::EgoMotion;
-use crate::occupancy_constancy::{self, Scores, occupancy_constancy, window};
+use crate::occupancy_constancy::{Scores, occupancy_constancy, window};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
@@ -28,9 +28,9 @@ use glam::DVec3;
 
 /// Storage of the scalar backend, one slice per buffer of the layout, and the learned tables.
 pub struct Storage<'a> {
-    /// Table of the background filter, see [`background_filter::load`].
+    /// Table of the background filter, see [`crate::background_filter::load`].
     pub filter_table: &'a [i32],
-    /// Weights of the constancy classifier, see [`occupancy_constancy::load`].
+    /// Weights of the constancy classifier, see [`crate::occupancy_constancy::load`].
     pub constancy_weights: &'a [i32],
     /// Its table of costs.
     pub constancy_costs: &'a [u32],
@@ -52,7 +52,7 @@ pub struct Storage<'a> {
     pub rank: &'a mut [u32],
     /// [`FOREGROUND_MAX`] elements.
     pub foreground: &'a mut [u32],
-    /// [`occupancy_constancy::ROW`] elements per foreground column.
+    /// [`crate::occupancy_constancy::ROW`] elements per foreground column.
     pub cost: &'a mut [u16],
     /// As many.
     pub matching: &'a mut [u16],
@@ -78,14 +78,14 @@ pub struct Perceived<'a> {
 }
 
 /// From rays to flow. `lap` is called with the name of each stage when it is done.
-pub fn perceive<'s>(
-    s: &'s mut Storage<'_>,
+pub fn perceive<'a>(
+    mut s: Storage<'a>,
     step: &Step,
     rounds: u32,
     rays: &[Ray],
     origins: &[[i32; 4]],
     lap: &mut dyn FnMut(&'static str),
-) -> Perceived<'s> {
+) -> Perceived<'a> {
     shift(step, s.now, s.before);
     s.slots.fill(0);
     s.weights.fill(0);
@@ -302,7 +302,7 @@ impl Pipeline {
         step: &Step,
         perceived: &Perceived,
         points: &[Point],
-        output: &'o mut Output,
+        output: Output<'o>,
     ) -> Option<Flows<'o>> {
         let (before, current) = (self.before?, self.current?);
         let dt = current.stamp_s - before.stamp_s;

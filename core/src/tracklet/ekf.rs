@@ -184,7 +184,7 @@ mod tests {
         let noisy_model = turn.is_none();
         let mut truth = [0.0, 0.0, random.uniform() * 6.0 - 3.0, speed, turn.unwrap_or(drawn)];
         let sigma = 0.15;
-        let mut see = |t: &[f64; 5], r: &mut Random| {
+        let see = |t: &[f64; 5], r: &mut Random| {
             [t[0] + sigma * r.normal(), t[1] + sigma * r.normal()]
         };
         let advance = |t: &mut [f64; 5], r: &mut Random| {

@@ -1,0 +1,103 @@
+//! The heavy half of the pipeline, from rays to flow: on the CPU or on a Vulkan device.
+
+pub mod scalar;
+
+use raywake_core::background_filter::{self, TABLE_WORDS};
+use raywake_core::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
+use raywake_core::params::Profile;
+use raywake_core::pipeline::Perceived;
+use raywake_core::record::{Ray, Step};
+use raywake_gpu::GpuError;
+
+use crate::laps::Laps;
+
+/// The learned numbers in the form the kernels and their twins use.
+pub struct Tables {
+    /// See [`background_filter::load`]; empty of weight where every solid column passes.
+    pub filter: Vec<i32>,
+    /// See [`occupancy_constancy::load`].
+    pub constancy: Vec<i32>,
+    /// Its costs.
+    pub costs: Vec<u32>,
+    /// Its range of scores.
+    pub scores: Scores,
+    /// Where the filter comes from, or that there is none.
+    pub provenance: String,
+    /// Every solid column is foreground.
+    pub unfiltered: bool,
+}
+
+impl Tables {
+    /// Reads both weights files for a profile; without a filter every solid column is foreground.
+    /// The error names the file's kind.
+    pub fn load(
+        profile: &Profile,
+        filter: Option<&str>,
+        constancy: &str,
+    ) -> Result<Tables, String> {
+        let levels = profile.levels as usize;
+        let mut table = vec![0; TABLE_WORDS];
+        let mut provenance = "none: every solid column is foreground".to_string();
+        if let Some(text) = filter {
+            background_filter::load(text, levels, &mut table)
+                .map_err(|e| format!("background filter: {e}"))?;
+            provenance = text
+                .lines()
+                .find_map(|l| l.strip_prefix("provenance "))
+                .unwrap_or_default()
+                .to_string();
+        }
+        let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
+        let scores = occupancy_constancy::load(constancy, levels, &mut weights, &mut costs)
+            .map_err(|e| format!("occupancy constancy: {e}"))?;
+        Ok(Tables {
+            filter: table,
+            constancy: weights,
+            costs,
+            scores,
+            provenance,
+            unfiltered: filter.is_none(),
+        })
+    }
+}
+
+/// Either backend.
+pub enum Backend {
+    /// The core's twins on one thread.
+    Scalar(Box<scalar::Scalar>),
+}
+
+impl Backend {
+    /// Where the rays and origins of the next sweep go.
+    pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+        match self {
+            Backend::Scalar(b) => b.input(),
+        }
+    }
+
+    /// From rays to flow; the time of each stage goes to `laps`.
+    pub fn perceive(
+        &mut self,
+        step: &Step,
+        rounds: u32,
+        laps: &mut Laps,
+    ) -> Result<Perceived<'_>, GpuError> {
+        match self {
+            Backend::Scalar(b) => Ok(b.perceive(step, rounds, laps)),
+        }
+    }
+
+    /// `scalar` or `vulkan`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Backend::Scalar(_) => "scalar",
+        }
+    }
+
+    /// The device's name.
+    pub fn device(&self) -> &str {
+        match self {
+            Backend::Scalar(_) => "CPU, one thread",
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! One sweep through figure 3.1: the statements of `raywake_core::pipeline`, the heavy ones on the
+//! chosen backend. Nothing in here allocates.
+
+use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
+use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::pipeline::{Flows, Output, Pipeline, Prepared};
+use raywake_core::sweep::{Point, Rig, Sweep};
+use raywake_gpu::GpuError;
+use raywake_gpu::guard::guarded;
+
+use crate::backend::{Backend, Tables};
+use crate::laps::Laps;
+
+/// The pipeline with its backend and the storage of its results.
+pub struct Drive {
+    pipeline: Box<Pipeline>,
+    backend: Backend,
+    columns: Vec<ColumnFlow>,
+    points: Vec<PointFlow>,
+}
+
+/// What one sweep yields.
+pub struct Stepped<'a> {
+    /// Sizes, dropped returns, reset.
+    pub prepared: Prepared,
+    /// Flow of the pair that this sweep completes; none after a reset.
+    pub flows: Option<Flows<'a>>,
+    /// Foreground columns.
+    pub foreground: usize,
+    /// Distinct rays.
+    pub rays: usize,
+    /// Time of every stage.
+    pub laps: Laps,
+}
+
+impl Drive {
+    /// Allocates for a checked profile.
+    pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
+        Drive {
+            pipeline: Box::new(Pipeline::new(
+                profile.clone(),
+                rig.clone(),
+                tables.scores,
+                tables.unfiltered,
+            )),
+            backend,
+            columns: vec![ColumnFlow::default(); profile.columns()],
+            points: vec![PointFlow::default(); POINTS_MAX],
+        }
+    }
+
+    /// Bytes of host memory held for a profile, the backend's apart.
+    pub fn bytes(profile: &Profile) -> usize {
+        size_of::<Pipeline>()
+            + profile.columns() * size_of::<ColumnFlow>()
+            + POINTS_MAX * size_of::<PointFlow>()
+    }
+
+    /// The backend.
+    pub fn backend(&self) -> &Backend {
+        &self.backend
+    }
+
+    /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
+    pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, GpuError> {
+        guarded(|| {
+            let mut laps = Laps::start();
+            let (rays, origins) = self.backend.input();
+            let prepared = self.pipeline.prepare(sweep, rays, origins);
+            laps.lap("prepare");
+            let rounds = self.pipeline.profile().em_rounds;
+            let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps)?;
+            laps.skip();
+            let output = Output { columns: &mut self.columns, points: &mut self.points };
+            let flows = self.pipeline.follow(&prepared.step, &perceived, before, output);
+            laps.lap("follow");
+            let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
+            Ok(Stepped { prepared, flows, foreground, rays, laps })
+        })
+    }
+
+    /// Tracklets after the last step.
+    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
+        self.pipeline.tracklets()
+    }
+}

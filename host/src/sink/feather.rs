@@ -1,0 +1,163 @@
+//! Results as feather files (Arrow IPC), one table each, for pandas, polars, DuckDB and others.
+//!
+//! Every column is named with its unit; frames are those of [`raywake_core::output`]: `_world` is
+//! the frame of the poses, without it the vehicle's; `v` is over ground along world axes, `v_ego`
+//! relative to the moving vehicle along its axes. All functions fail with the system's reason when
+//! the file cannot be written, and with [`Error::Unsupported`] without the feature `arrow`.
+
+use std::path::Path;
+
+use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
+use raywake_core::sweep::Point;
+
+use super::Meta;
+use super::table::{Column, Table};
+use crate::error::Error;
+
+/// Names and places of the 15 upper entries of a tracklet's covariance; units are products of m, m,
+/// rad, m/s and rad/s.
+const COVARIANCE: [(&str, usize, usize); 15] = [
+    ("cov_x_x", 0, 0),
+    ("cov_x_y", 0, 1),
+    ("cov_x_heading", 0, 2),
+    ("cov_x_speed", 0, 3),
+    ("cov_x_turn", 0, 4),
+    ("cov_y_y", 1, 1),
+    ("cov_y_heading", 1, 2),
+    ("cov_y_speed", 1, 3),
+    ("cov_y_turn", 1, 4),
+    ("cov_heading_heading", 2, 2),
+    ("cov_heading_speed", 2, 3),
+    ("cov_heading_turn", 2, 4),
+    ("cov_speed_speed", 3, 3),
+    ("cov_speed_turn", 3, 4),
+    ("cov_turn_turn", 4, 4),
+];
+
+/// Writes the flow of columns, one row each.
+///
+/// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `vx_world_mps vy_world_mps`,
+/// `vx_ego_mps vy_ego_mps`, `cov_xx cov_xy cov_yy` ((m/s)^2, of the world velocity) float32;
+/// `displacement_i displacement_j` (cells), `energy_millinats` int32; `age` uint32; `foreground`
+/// (not explained by odometry) and `valid` (foreground with a match) bool.
+pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
+    let mut t = Table::default();
+    t.i32s("cell_i", columns, |c| c.cell[0]);
+    t.i32s("cell_j", columns, |c| c.cell[1]);
+    t.f64s("x_world_m", columns, |c| c.position_world_m[0]);
+    t.f64s("y_world_m", columns, |c| c.position_world_m[1]);
+    t.f32s("x_m", columns, |c| c.position_vehicle_m[0]);
+    t.f32s("y_m", columns, |c| c.position_vehicle_m[1]);
+    t.f32s("vx_world_mps", columns, |c| c.velocity_world_mps[0]);
+    t.f32s("vy_world_mps", columns, |c| c.velocity_world_mps[1]);
+    t.f32s("vx_ego_mps", columns, |c| c.velocity_ego_mps[0]);
+    t.f32s("vy_ego_mps", columns, |c| c.velocity_ego_mps[1]);
+    t.f32s("cov_xx", columns, |c| c.covariance[0]);
+    t.f32s("cov_xy", columns, |c| c.covariance[1]);
+    t.f32s("cov_yy", columns, |c| c.covariance[2]);
+    t.i32s("displacement_i", columns, |c| c.displacement_cells[0]);
+    t.i32s("displacement_j", columns, |c| c.displacement_cells[1]);
+    t.i32s("energy_millinats", columns, |c| c.energy);
+    t.u32s("age", columns, |c| c.age);
+    t.bools("foreground", columns, |c| c.origin != Origin::Background);
+    t.bools("valid", columns, |c| c.origin == Origin::Matched);
+    t.write(path, meta)
+}
+
+/// Writes the flow of returns, one row each in the sweep's order.
+///
+/// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps` float32; `age`
+/// uint32; `foreground`, `valid` bool. `points` and `flows` are of the same sweep; fails with
+/// [`Error::Usage`] where their lengths differ.
+pub fn write_points(
+    path: &Path,
+    points: &[Point],
+    flows: &[PointFlow],
+    meta: Meta<'_>,
+) -> Result<(), Error> {
+    same_length(path, &[points.len(), flows.len()])?;
+    let mut t = Table::default();
+    t.f32s("x_m", points, |p| p.position[0]);
+    t.f32s("y_m", points, |p| p.position[1]);
+    t.f32s("z_m", points, |p| p.position[2]);
+    t.f32s("vx_world_mps", flows, |f| f.velocity_world_mps[0]);
+    t.f32s("vy_world_mps", flows, |f| f.velocity_world_mps[1]);
+    t.f32s("vx_ego_mps", flows, |f| f.velocity_ego_mps[0]);
+    t.f32s("vy_ego_mps", flows, |f| f.velocity_ego_mps[1]);
+    t.f32s("vz_ego_mps", flows, |f| f.velocity_ego_mps[2]);
+    t.u32s("age", flows, |f| f.age);
+    t.bools("foreground", flows, |f| f.origin != Origin::Background);
+    t.bools("valid", flows, |f| f.origin == Origin::Matched);
+    t.write(path, meta)
+}
+
+/// Writes tracklets, one row each.
+///
+/// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `heading_world_rad`,
+/// `speed_mps`, `turn_rate_radps`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps` and the
+/// upper half of the covariance, `cov_x_x` to `cov_turn_turn`, float32; `age` uint32.
+pub fn write_tracklets(
+    path: &Path,
+    tracklets: &[TrackletState],
+    meta: Meta<'_>,
+) -> Result<(), Error> {
+    let mut t = Table::default();
+    t.i32s("cell_i", tracklets, |s| s.cell[0]);
+    t.i32s("cell_j", tracklets, |s| s.cell[1]);
+    t.f64s("x_world_m", tracklets, |s| s.position_world_m[0]);
+    t.f64s("y_world_m", tracklets, |s| s.position_world_m[1]);
+    t.f32s("x_m", tracklets, |s| s.position_vehicle_m[0]);
+    t.f32s("y_m", tracklets, |s| s.position_vehicle_m[1]);
+    t.f32s("heading_world_rad", tracklets, |s| s.heading_rad);
+    t.f32s("speed_mps", tracklets, |s| s.speed_mps);
+    t.f32s("turn_rate_radps", tracklets, |s| s.turn_rate_radps);
+    t.f32s("vx_world_mps", tracklets, |s| s.velocity_world_mps[0]);
+    t.f32s("vy_world_mps", tracklets, |s| s.velocity_world_mps[1]);
+    t.f32s("vx_ego_mps", tracklets, |s| s.velocity_ego_mps[0]);
+    t.f32s("vy_ego_mps", tracklets, |s| s.velocity_ego_mps[1]);
+    for (name, row, column) in COVARIANCE {
+        t.f32s(name, tracklets, |s| s.covariance[row][column]);
+    }
+    t.u32s("age", tracklets, |s| s.age);
+    t.write(path, meta)
+}
+
+/// Writes a map of occupancy, one row per voxel: `i j k` int32, `log_odds` float32 (nats, positive
+/// is occupied).
+///
+/// Voxel (i, j, k) spans from `origin_m + resolution_m * (i, j, k)` one resolution further along
+/// every axis of the world; both go to the metadata as `origin_x_m`, `origin_y_m`, `origin_z_m`,
+/// `resolution_m`. Fails with [`Error::Usage`] where lengths differ.
+pub fn write_map(
+    path: &Path,
+    i: &[i32],
+    j: &[i32],
+    k: &[i32],
+    log_odds_tenths: &[i32],
+    origin_m: [f64; 3],
+    resolution_m: f64,
+    meta: Meta<'_>,
+) -> Result<(), Error> {
+    same_length(path, &[i.len(), j.len(), k.len(), log_odds_tenths.len()])?;
+    let mut t = Table::default();
+    for (name, values) in [("i", i), ("j", j), ("k", k)] {
+        t.push(name, Column::I32(values.to_vec()));
+    }
+    t.f32s("log_odds", log_odds_tenths, |&v| v as f32 / 10.0);
+    let place = [
+        ("origin_x_m", origin_m[0].to_string()),
+        ("origin_y_m", origin_m[1].to_string()),
+        ("origin_z_m", origin_m[2].to_string()),
+        ("resolution_m", resolution_m.to_string()),
+    ];
+    t.write(path, &[meta, &place].concat())
+}
+
+/// Fails where the columns of a table would not be of one length.
+fn same_length(path: &Path, lengths: &[usize]) -> Result<(), Error> {
+    if lengths.iter().all(|n| *n == lengths[0]) {
+        return Ok(());
+    }
+    let what = format!("{}: columns of different lengths {lengths:?}", path.display());
+    Err(Error::Usage(what))
+}

@@ -1,0 +1,16 @@
+//! Where results go: feather files, Argoverse 2 submissions and pictures, each written whole or
+//! not at all.
+
+pub mod argoverse;
+pub mod atomic;
+mod canvas;
+pub mod feather;
+pub mod picture;
+mod table;
+
+#[cfg(test)]
+mod tests;
+
+/// What is written into a file's metadata besides the version of this program: keys and values,
+/// such as `("frame", "17")`, `("stamp_s", "1.72")`.
+pub type Meta<'a> = &'a [(&'a str, String)];

@@ -1,0 +1,127 @@
+//! Named columns as an Arrow IPC file.
+
+use std::path::Path;
+
+use super::Meta;
+use crate::error::Error;
+
+/// Values of one column.
+#[cfg_attr(not(feature = "arrow"), allow(dead_code))]
+pub(super) enum Column {
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+    I32(Vec<i32>),
+    U32(Vec<u32>),
+    Bool(Vec<bool>),
+}
+
+/// A table under construction.
+#[derive(Default)]
+pub(super) struct Table {
+    columns: Vec<(String, Column)>,
+}
+
+impl Table {
+    /// Adds a column; all must be of the same length.
+    pub fn push(&mut self, name: &str, column: Column) {
+        self.columns.push((name.to_owned(), column));
+    }
+
+    /// Adds a column of float32 made of every row.
+    pub fn f32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f32) {
+        self.push(name, Column::F32(rows.iter().map(value).collect()));
+    }
+
+    /// Adds a column of float64 made of every row.
+    pub fn f64s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f64) {
+        self.push(name, Column::F64(rows.iter().map(value).collect()));
+    }
+
+    /// Adds a column of int32 made of every row.
+    pub fn i32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> i32) {
+        self.push(name, Column::I32(rows.iter().map(value).collect()));
+    }
+
+    /// Adds a column of uint32 made of every row.
+    pub fn u32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> u32) {
+        self.push(name, Column::U32(rows.iter().map(value).collect()));
+    }
+
+    /// Adds a column of booleans made of every row.
+    pub fn bools<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> bool) {
+        self.push(name, Column::Bool(rows.iter().map(value).collect()));
+    }
+
+    /// Writes the table, uncompressed: a sweep's worth takes a millisecond then. The metadata goes
+    /// to the schema, with this program's version as `raywake`.
+    #[cfg(feature = "arrow")]
+    pub fn write(self, path: &Path, meta: Meta<'_>) -> Result<(), Error> {
+        let batch = arrow::batch(self.columns, meta)
+            .map_err(|e| Error::Write { path: path.to_path_buf(), source: arrow::reason(e) })?;
+        super::atomic::write(path, |out| arrow::write(&batch, out).map_err(arrow::reason))
+    }
+
+    /// Fails: this build has no feather files.
+    #[cfg(not(feature = "arrow"))]
+    pub fn write(self, path: &Path, _: Meta<'_>) -> Result<(), Error> {
+        let what = "this build lacks the feature `arrow` to write feather files";
+        Err(Error::Unsupported(format!("{}: {what}", path.display())))
+    }
+}
+
+#[cfg(feature = "arrow")]
+mod arrow {
+    use std::collections::HashMap;
+    use std::io::{self, Write};
+    use std::sync::Arc;
+
+    use arrow_array::{
+        ArrayRef, BooleanArray, Float32Array, Float64Array, Int32Array, RecordBatch, UInt32Array,
+    };
+    use arrow_ipc::writer::FileWriter;
+    use arrow_schema::{ArrowError, Field, Schema};
+
+    use super::{Column, Meta};
+
+    /// The columns with their metadata.
+    pub fn batch(
+        columns: Vec<(String, Column)>,
+        meta: Meta<'_>,
+    ) -> Result<RecordBatch, ArrowError> {
+        let arrays: Vec<(String, ArrayRef)> =
+            columns.into_iter().map(|(name, column)| (name, array(column))).collect();
+        let field = |(name, a): &(String, ArrayRef)| Field::new(name, a.data_type().clone(), false);
+        let fields: Vec<Field> = arrays.iter().map(field).collect();
+        let version = ("raywake", env!("CARGO_PKG_VERSION").to_owned());
+        let meta: HashMap<String, String> =
+            meta.iter().cloned().chain([version]).map(|(k, v)| (k.to_owned(), v)).collect();
+        let schema = Schema::new(fields).with_metadata(meta);
+        RecordBatch::try_new(Arc::new(schema), arrays.into_iter().map(|(_, a)| a).collect())
+    }
+
+    /// Takes over the memory of a column.
+    fn array(column: Column) -> ArrayRef {
+        match column {
+            Column::F32(v) => Arc::new(Float32Array::from(v)),
+            Column::F64(v) => Arc::new(Float64Array::from(v)),
+            Column::I32(v) => Arc::new(Int32Array::from(v)),
+            Column::U32(v) => Arc::new(UInt32Array::from(v)),
+            Column::Bool(v) => Arc::new(BooleanArray::from(v)),
+        }
+    }
+
+    /// One batch as a file.
+    pub fn write(batch: &RecordBatch, out: &mut impl Write) -> Result<(), ArrowError> {
+        let mut writer = FileWriter::try_new(out, &batch.schema())?;
+        writer.write(batch)?;
+        writer.finish()
+    }
+
+    /// The system's reason where there is one.
+    pub fn reason(e: ArrowError) -> io::Error {
+        match e {
+            ArrowError::IoError(_, e) => e,
+            other => io::Error::other(other),
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Columns of a feather file (an Arrow IPC file), in any number of record batches, compressed or
+//! not.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type, UInt8Type, UInt64Type,
+};
+use arrow_array::{Array, RecordBatch};
+use arrow_ipc::reader::FileReaderBuilder;
+use arrow_schema::{ArrowError, DataType};
+
+use super::feather_check;
+use crate::error::Error;
+
+/// The columns of a file that were asked for.
+pub(super) struct Table {
+    path: PathBuf,
+    batches: Vec<RecordBatch>,
+}
+
+impl Table {
+    /// Reads `columns`. Fails where the file is unreadable or damaged, or lacks one of them.
+    pub fn read(path: &Path, columns: &[&str]) -> Result<Table, Error> {
+        Table::parse(path, &fs::read(path).map_err(Error::reading(path))?, columns)
+    }
+
+    /// Takes `columns` from the content of the file at `path`.
+    pub fn parse(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<Table, Error> {
+        feather_check::check(bytes).map_err(|what| Error::input(path, "", what))?;
+        let damaged = |e: ArrowError| Error::input(path, "", format!("damaged: {e}"));
+        // Once for the schema, once with the columns: others may have types nobody here needs.
+        let all = FileReaderBuilder::new().build(Cursor::new(bytes)).map_err(damaged)?.schema();
+        let mut wanted = Vec::with_capacity(columns.len());
+        for name in columns {
+            let missing = |_| Error::input(path, "", format!("has no column `{name}`"));
+            wanted.push(all.index_of(name).map_err(missing)?);
+        }
+        let reader = FileReaderBuilder::new()
+            .with_projection(wanted)
+            .build(Cursor::new(bytes))
+            .map_err(damaged)?;
+        let batches = reader.collect::<Result<_, _>>().map_err(damaged)?;
+        Ok(Table { path: path.to_path_buf(), batches })
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// A column of floats of any width; null becomes NaN.
+    pub fn floats(&self, name: &str) -> Result<Vec<f64>, Error> {
+        self.gather(name, "floats", |column, out: &mut Vec<f64>| {
+            match column.data_type() {
+                DataType::Float16 => out.extend(
+                    column
+                        .as_primitive::<Float16Type>()
+                        .iter()
+                        .map(|v| v.map_or(f64::NAN, f64::from)),
+                ),
+                DataType::Float32 => out.extend(
+                    column
+                        .as_primitive::<Float32Type>()
+                        .iter()
+                        .map(|v| v.map_or(f64::NAN, f64::from)),
+                ),
+                DataType::Float64 => out.extend(
+                    column.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)),
+                ),
+                _ => return false,
+            }
+            true
+        })
+    }
+
+    /// A column of integers (u8, i32, i64, u64). Fails at a null or a value beyond i64.
+    pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
+        let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
+            match column.data_type() {
+                DataType::UInt8 => {
+                    out.extend(column.as_primitive::<UInt8Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::Int32 => {
+                    out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::Int64 => out.extend(column.as_primitive::<Int64Type>().iter()),
+                DataType::UInt64 => out
+                    .extend(column.as_primitive::<UInt64Type>().iter().map(|v| v?.try_into().ok())),
+                _ => return false,
+            }
+            true
+        })?;
+        let filled = |(row, v): (usize, Option<i64>)| {
+            let what = || format!("column `{name}` is null or out of range");
+            v.ok_or_else(|| Error::input(&self.path, format!("row {row}"), what()))
+        };
+        values.into_iter().enumerate().map(filled).collect()
+    }
+
+    /// A column of text; null becomes the empty string.
+    pub fn strings(&self, name: &str) -> Result<Vec<String>, Error> {
+        self.gather(name, "text", |column, out: &mut Vec<String>| {
+            let own = |v: Option<&str>| v.unwrap_or_default().to_owned();
+            match column.data_type() {
+                DataType::Utf8 => out.extend(column.as_string::<i32>().iter().map(own)),
+                DataType::LargeUtf8 => out.extend(column.as_string::<i64>().iter().map(own)),
+                DataType::Utf8View => out.extend(column.as_string_view().iter().map(own)),
+                _ => return false,
+            }
+            true
+        })
+    }
+
+    /// A column over all batches; `take` returns false for a type it cannot use.
+    fn gather<T>(
+        &self,
+        name: &str,
+        kind: &str,
+        take: impl Fn(&dyn Array, &mut Vec<T>) -> bool,
+    ) -> Result<Vec<T>, Error> {
+        let mut out = Vec::with_capacity(self.rows());
+        for batch in &self.batches {
+            let missing = || Error::input(&self.path, "", format!("has no column `{name}`"));
+            let column = batch.column_by_name(name).ok_or_else(missing)?;
+            if !take(column.as_ref(), &mut out) {
+                let what = format!("column `{name}` is {}, not {kind}", column.data_type());
+                return Err(Error::input(&self.path, "", what));
+            }
+        }
+        Ok(out)
+    }
+}

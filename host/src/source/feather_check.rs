@@ -1,0 +1,85 @@
+//! Whether the bytes of a feather file are whole, before the Arrow reader sees them: that reader
+//! takes offsets and lengths in the file on trust and stops the process on some wrong ones.
+
+use arrow_ipc::{Block, Message, MessageHeader, RecordBatch, root_as_footer, root_as_message};
+
+/// First and last bytes of a feather file.
+const MAGIC: &[u8] = b"ARROW1";
+
+/// Length of the footer and [`MAGIC`], at the end of the file.
+const TRAILER: usize = 10;
+
+/// Largest column that is unpacked, bytes: what a file claims is allocated before it is verified.
+const UNPACKED_MAX: i64 = 1 << 30;
+
+/// `Err` with what is wrong.
+pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
+    if !bytes.starts_with(MAGIC) {
+        return Err("is no feather file (it does not start with ARROW1)".into());
+    }
+    if bytes.len() < MAGIC.len() + TRAILER || !bytes.ends_with(MAGIC) {
+        let what = "truncated: the feather file does not end with ARROW1";
+        return Err(format!("{what} ({} bytes)", bytes.len()));
+    }
+    let body = &bytes[..bytes.len() - TRAILER];
+    let length = bytes[body.len()..].first_chunk().map_or(0, |b| u32::from_le_bytes(*b));
+    let start = body.len().checked_sub(length as usize);
+    let start = start.ok_or("damaged: the footer is longer than the file")?;
+    let footer = root_as_footer(&body[start..]).map_err(|e| format!("damaged footer: {e}"))?;
+    for block in footer.recordBatches().into_iter().flatten() {
+        check_block(&body[..start], block)?;
+    }
+    for block in footer.dictionaries().into_iter().flatten() {
+        check_block(&body[..start], block)?;
+    }
+    Ok(())
+}
+
+/// A block lies within the file and its message within the block.
+fn check_block(file: &[u8], block: &Block) -> Result<(), String> {
+    let outside = || format!("damaged: a record batch at byte {} is cut off", block.offset());
+    let size = |v: i64| usize::try_from(v).map_err(|_| outside());
+    let offset = size(block.offset())?;
+    let head = size(block.metaDataLength().into())?;
+    let length = size(block.bodyLength())?;
+    let rest = file.get(offset..).ok_or_else(outside)?;
+    let (head, rest) = rest.split_at_checked(head).ok_or_else(outside)?;
+    let body = rest.get(..length).ok_or_else(outside)?;
+    // A marker of four bytes, in files newer than 2019, and the length of the message.
+    let skip = if head.starts_with(&[0xff; 4]) { 8 } else { 4 };
+    let message = head.get(skip..).ok_or_else(outside)?;
+    let message = root_as_message(message)
+        .map_err(|e| format!("damaged message at byte {}: {e}", block.offset()))?;
+    batch_of(&message).map_or(Ok(()), |batch| check_batch(&batch, body))
+}
+
+/// The record batch in a message, plain or of a dictionary.
+fn batch_of<'a>(message: &Message<'a>) -> Option<RecordBatch<'a>> {
+    match message.header_type() {
+        MessageHeader::RecordBatch => message.header_as_record_batch(),
+        MessageHeader::DictionaryBatch => message.header_as_dictionary_batch()?.data(),
+        _ => None,
+    }
+}
+
+/// Every buffer of a batch lies within its body, and no length is absurd.
+fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<(), String> {
+    let sensible = |rows: i64| (0..=i64::from(i32::MAX)).contains(&rows);
+    let nodes = batch.nodes().into_iter().flatten();
+    let mut counts = nodes.flat_map(|n| [n.length(), n.null_count()]);
+    if !sensible(batch.length()) || !counts.all(sensible) {
+        return Err("damaged: a negative or absurd number of rows".into());
+    }
+    for buffer in batch.buffers().into_iter().flatten() {
+        let range =
+            usize::try_from(buffer.offset()).ok().zip(usize::try_from(buffer.length()).ok());
+        let bytes = range.and_then(|(from, n)| body.get(from..)?.get(..n));
+        let bytes = bytes.ok_or("damaged: a column reaches beyond its record batch")?;
+        let packed = batch.compression().is_some();
+        let unpacked = bytes.first_chunk().map_or(0, |b| i64::from_le_bytes(*b));
+        if packed && unpacked > UNPACKED_MAX {
+            return Err(format!("damaged: a column claims {unpacked} bytes"));
+        }
+    }
+    Ok(())
+}

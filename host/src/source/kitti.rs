@@ -1,0 +1,224 @@
+//! KITTI drives and odometry sequences, and folders of `.bin` clouds that look like them.
+//!
+//! The vehicle frame is that of the Velodyne HDL-64E.
+
+use std::path::{Path, PathBuf};
+
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Rig, Timing};
+
+use super::bins::Bins;
+use super::poses::{self, Track};
+use super::recognise::{note_gaps, numbered};
+use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
+use crate::error::Error;
+
+/// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
+/// own stamps in the raw drives.
+const TURN_S: f64 = 0.1036;
+
+/// Turns an HDL-64E can be set to, s (20 to 5 Hz). Stamps outside are not those of single turns.
+const TURN_LIMITS_S: [f64; 2] = [0.05, 0.2];
+
+/// Height of the ground under KITTI's Velodyne, m.
+const GROUND_M: f64 = -1.73;
+
+/// KITTI's recording vehicle around the Velodyne, m.
+const OWN_VEHICLE: [[f32; 2]; 2] = [[-1.5, -1.75], [4.5, 1.75]];
+
+/// Folder of clouds of a raw drive.
+const RAW_CLOUDS: &str = "velodyne_points/data";
+
+/// A KITTI raw drive. `poses.txt` (or the option `poses`) wins over `oxts`.
+pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Bins, Error> {
+    let mut opening = Opening::new(drive, &drive.join(RAW_CLOUDS), "KITTI raw drive")?;
+    opening.read_times(&["times.txt", "velodyne_points/timestamps.txt", "oxts/timestamps.txt"])?;
+    let own = drive.join("poses.txt");
+    match options.poses.as_ref().or(Some(&own).filter(|p| p.is_file())) {
+        Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
+        None if drive.join("oxts/data").is_dir() => opening.read_oxts()?,
+        None => return Err(no_poses(drive, "neither `poses.txt` nor `oxts/data`")),
+    }
+    Ok(opening.finish(options))
+}
+
+/// A KITTI odometry sequence. Its poses are in `poses.txt` or, as distributed, in
+/// `../../poses/NN.txt`.
+pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Bins, Error> {
+    let mut opening = Opening::new(sequence, &sequence.join("velodyne"), "KITTI odometry")?;
+    opening.read_times(&["times.txt"])?;
+    let apart = format!("../../poses/{}.txt", folder_name(sequence));
+    let own = [sequence.join("poses.txt"), sequence.join(apart)];
+    let path = options.poses.as_ref().or(own.iter().find(|p| p.is_file()));
+    let path = path.ok_or_else(|| no_poses(sequence, "no `poses.txt`"))?;
+    opening.read_poses(path, options, PosesFrame::Camera)?;
+    Ok(opening.finish(options))
+}
+
+/// A folder of `.bin` clouds; the option `poses` is needed.
+pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Bins, Error> {
+    let mut opening = Opening::new(folder, folder, "folder of clouds")?;
+    opening.read_times(&["times.txt"])?;
+    let path = options.poses.as_ref().ok_or_else(|| no_poses(folder, "clouds alone"))?;
+    opening.read_poses(path, options, PosesFrame::Vehicle)?;
+    opening.notes.push(
+        "sensor taken to be mounted and to spin as KITTI's HDL-64E (1.73 m above ground)".into(),
+    );
+    Ok(opening.finish(options))
+}
+
+/// The error of a recording whose motion is unknown.
+fn no_poses(path: &Path, found: &str) -> Error {
+    let what = format!("{found}: poses are needed; name a file of them with --poses");
+    Error::input(path, "", what)
+}
+
+/// A recording while it is being opened.
+struct Opening {
+    root: PathBuf,
+    kind: &'static str,
+    poses_from: String,
+    files: Vec<(u64, PathBuf)>,
+    track: Track,
+    /// Whether the stamps were read and not assumed.
+    timed: bool,
+    notes: Vec<String>,
+}
+
+impl Opening {
+    fn new(root: &Path, clouds: &Path, kind: &'static str) -> Result<Opening, Error> {
+        let (files, by_number) = numbered(clouds, "bin")?;
+        let mut notes = Vec::new();
+        if !by_number {
+            notes.push("names of sweeps are no numbers; counted from 0 in their order".into());
+        }
+        let frames: Vec<u64> = files.iter().map(|f| f.0).collect();
+        note_gaps(&frames, &mut notes);
+        let (root, track) = (root.to_path_buf(), Track::default());
+        Ok(Opening { root, kind, poses_from: String::new(), files, track, timed: false, notes })
+    }
+
+    fn frames(&self) -> Vec<u64> {
+        self.files.iter().map(|f| f.0).collect()
+    }
+
+    fn read_times(&mut self, candidates: &[&str]) -> Result<(), Error> {
+        let paths: Vec<_> = candidates.iter().map(|c| self.root.join(c)).collect();
+        let times = poses::read_times(&paths, &self.frames())?;
+        self.timed = times.path.is_some();
+        if !self.timed {
+            self.notes.push(format!("no {}: 10 Hz assumed", candidates[0]));
+        }
+        self.track.stamps_s = times.stamps_s;
+        Ok(())
+    }
+
+    fn read_poses(
+        &mut self,
+        path: &Path,
+        options: &OpenOptions,
+        usual: PosesFrame,
+    ) -> Result<(), Error> {
+        let mut rows = poses::read_rows(path, self.files.len())?;
+        if options.poses_frame.unwrap_or(usual) == PosesFrame::Camera {
+            let calib = self.root.join("calib.txt");
+            if !calib.is_file() {
+                let what = "poses of the camera need `calib.txt` beside the clouds; \
+                            or, if they are of the clouds' frame, --poses-frame vehicle";
+                return Err(Error::input(path, "", what));
+            }
+            poses::from_camera(&mut rows, poses::read_camera(&calib)?);
+        }
+        self.track.poses = rows;
+        self.poses_from = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(())
+    }
+
+    /// Poses from `oxts/data`, by frame number; sweeps without a packet are left out. The world is
+    /// the Velodyne frame of the first sweep that has one.
+    fn read_oxts(&mut self) -> Result<(), Error> {
+        let imu_from_velo = self.velo_from_imu()?.inverse();
+        let folder = self.root.join("oxts/data");
+        let (packets, _) = numbered(&folder, "txt")?;
+        let (mut files, mut track, mut first) = (Vec::new(), Track::default(), None);
+        for (sweep, &stamp_s) in self.files.iter().zip(&self.track.stamps_s) {
+            let Ok(i) = packets.binary_search_by_key(&sweep.0, |p| p.0) else { continue };
+            let packet = oxts::read_packet(&packets[i].1)?;
+            let (scale, first_from_earth) = *first.get_or_insert_with(|| {
+                let scale = oxts::scale(packet[0]);
+                (scale, (oxts::pose(&packet, scale) * imu_from_velo).inverse())
+            });
+            files.push(sweep.clone());
+            track.stamps_s.push(stamp_s);
+            track.poses.push(first_from_earth * oxts::pose(&packet, scale) * imu_from_velo);
+        }
+        let left_out = self.files.len() - files.len();
+        if files.is_empty() {
+            return Err(Error::input(&folder, "", "no packet has the number of a sweep"));
+        }
+        if left_out > 0 {
+            self.notes.push(format!("{left_out} sweeps left out: no packet in oxts/data"));
+        }
+        (self.files, self.track, self.poses_from) = (files, track, "oxts".into());
+        Ok(())
+    }
+
+    /// The drive's calibration, its day's, or KITTI's usual one with a note.
+    fn velo_from_imu(&mut self) -> Result<Pose, Error> {
+        let name = "calib_imu_to_velo.txt";
+        // Of the resolved path: a drive named `.` has a parent too.
+        let full = self.root.canonicalize().map_err(Error::reading(&self.root))?;
+        let places = [Some(full.as_path()), full.parent()];
+        let found = places.into_iter().flatten().map(|p| p.join(name)).find(|p| p.is_file());
+        if let Some(path) = found {
+            return oxts::read_calibration(&path);
+        }
+        self.notes.push(format!(
+            "no {name} in the drive or above it: IMU taken 0.81 m behind, 0.32 m beside and \
+             0.80 m below the Velodyne, axes parallel"
+        ));
+        Ok(oxts::default_velo_from_imu())
+    }
+
+    fn finish(self, options: &OpenOptions) -> Bins {
+        let frames = self.frames();
+        let mut rig = Rig {
+            sensors: core::iter::once(Pose::IDENTITY).collect(),
+            timing: Timing::Azimuth { span_s: self.turn_s(&frames) },
+            distorted: true,
+            ground_m: GROUND_M,
+            own_vehicle: Some(OWN_VEHICLE),
+        };
+        apply(options, &mut rig);
+        Bins {
+            name: folder_name(&self.root),
+            kind: format!("{} {}", self.kind, self.root.display()),
+            poses_from: self.poses_from,
+            files: self.files,
+            track: self.track,
+            rig,
+            notes: self.notes,
+        }
+    }
+
+    /// Duration of one turn: the scanner is stamped once a turn, so it is the mean time between
+    /// sweeps of neighbouring numbers, without those far from the median, where a turn is missing.
+    /// The mean, because stamps from a clock of coarse steps have a median that is one of these.
+    fn turn_s(&self, frames: &[u64]) -> f64 {
+        let stamps = self.track.stamps_s.windows(2);
+        let mut steps: Vec<f64> = frames
+            .windows(2)
+            .zip(stamps)
+            .filter(|(f, _)| f[1] == f[0] + 1)
+            .map(|(_, s)| s[1] - s[0])
+            .collect();
+        if steps.is_empty() || !self.timed {
+            return TURN_S;
+        }
+        steps.sort_by(f64::total_cmp);
+        let median = steps[steps.len() / 2];
+        steps.retain(|s| (0.6 * median..1.6 * median).contains(s));
+        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+        mean.clamp(TURN_LIMITS_S[0], TURN_LIMITS_S[1])
+    }
+}

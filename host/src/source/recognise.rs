@@ -1,0 +1,127 @@
+//! Which format a folder holds.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::Format;
+use crate::error::Error;
+
+/// Levels of folders below the named one that are searched for a recording.
+const DEPTH: usize = 2;
+
+/// Format and folder of the recording at `path`, or of the only one up to two levels below.
+///
+/// Fails where there is none, where there are several, and where `path` is no readable folder.
+pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
+    let meta = fs::metadata(path).map_err(Error::reading(path))?;
+    if !meta.is_dir() {
+        let what = "is a file; name the folder of the recording";
+        return Err(Error::input(path, "", what));
+    }
+    if let Some(format) = format_of(path)? {
+        return Ok((format, path.to_path_buf()));
+    }
+    let mut found = below(path, DEPTH)?;
+    match found.len() {
+        1 => Ok(found.remove(0)),
+        0 => Err(Error::input(
+            path,
+            "",
+            "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
+             nor any `.bin` file",
+        )),
+        n => {
+            let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
+            let what = format!("holds {n} recordings; name one: {}", some.join(", "));
+            Err(Error::input(path, "", what))
+        }
+    }
+}
+
+/// Recordings in the folders below, sorted by path.
+fn below(path: &Path, depth: usize) -> Result<Vec<(Format, PathBuf)>, Error> {
+    let mut found = Vec::new();
+    if depth == 0 {
+        return Ok(found);
+    }
+    for folder in entries(path)?.into_iter().filter(|p| p.is_dir()) {
+        match format_of(&folder)? {
+            Some(format) => found.push((format, folder)),
+            None => found.extend(below(&folder, depth - 1)?),
+        }
+    }
+    Ok(found)
+}
+
+/// The format a folder has by the names in it.
+fn format_of(path: &Path) -> Result<Option<Format>, Error> {
+    let has = |folder: &str| path.join(folder).is_dir();
+    if has("velodyne_points/data") {
+        return Ok(Some(Format::KittiRaw));
+    }
+    if has("sensors/lidar") {
+        return Ok(Some(Format::Argoverse2));
+    }
+    if has("velodyne") {
+        return Ok(Some(Format::KittiOdometry));
+    }
+    let bins = entries(path)?.iter().any(|p| p.extension().is_some_and(|e| e == "bin"));
+    Ok(bins.then_some(Format::Bin))
+}
+
+/// Entries of a folder, sorted by name.
+pub(super) fn entries(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let listed = fs::read_dir(path).map_err(Error::reading(path))?;
+    let mut entries = Vec::new();
+    for entry in listed {
+        entries.push(entry.map_err(Error::reading(path))?.path());
+    }
+    entries.sort();
+    Ok(entries)
+}
+
+/// Files of a folder with this extension and their numbers (`0000000012.bin` is 12), in the order
+/// of the numbers; in the order of names and counted from 0 where a name is no number.
+///
+/// The second value is false in that case. Fails where there are none, or where two files have the
+/// same number.
+pub(super) fn numbered(path: &Path, extension: &str) -> Result<(Vec<(u64, PathBuf)>, bool), Error> {
+    let mut files = entries(path)?;
+    files.retain(|p| p.extension().is_some_and(|e| e == extension));
+    if files.is_empty() {
+        return Err(Error::input(path, "", format!("no sweeps: no `.{extension}` file")));
+    }
+    let number = |p: &PathBuf| p.file_stem()?.to_str()?.parse::<u64>().ok();
+    let numbers: Option<Vec<u64>> = files.iter().map(number).collect();
+    let Some(numbers) = numbers else {
+        return Ok(((0..).zip(files).collect(), false));
+    };
+    let mut files: Vec<_> = numbers.into_iter().zip(files).collect();
+    files.sort();
+    if let Some(pair) = files.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        let what = format!("has the same number as {}", pair[0].1.display());
+        return Err(Error::input(&pair[1].1, "", what));
+    }
+    Ok((files, true))
+}
+
+/// Adds a note on numbers that are missing from the sequence.
+pub(super) fn note_gaps(frames: &[u64], notes: &mut Vec<String>) {
+    let gaps: Vec<_> = frames.windows(2).filter(|w| w[1] > w[0] + 1).collect();
+    if gaps.is_empty() {
+        return;
+    }
+    let missing: u64 = gaps.iter().map(|w| w[1] - w[0] - 1).sum();
+    let mut text: Vec<_> = gaps
+        .iter()
+        .take(4)
+        .map(|w| match (w[0] + 1, w[1] - 1) {
+            (a, b) if a == b => a.to_string(),
+            (a, b) => format!("{a} to {b}"),
+        })
+        .collect();
+    if gaps.len() > text.len() {
+        text.push("…".into());
+    }
+    notes.push(format!("{missing} sweeps missing: frames {}", text.join(", ")));
+}

@@ -1,0 +1,75 @@
+//! Small text files of numbers, read with the place of every mistake.
+
+use std::fs;
+use std::path::Path;
+
+use crate::error::Error;
+
+/// A text file as a string.
+pub(super) fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(Error::reading(path))
+}
+
+/// The lines that hold something, each with its number counted from 1.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    numbered.filter(|(_, line)| !line.is_empty())
+}
+
+/// The numbers of one line, whatever their count.
+pub(super) fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, Error> {
+    text.split_ascii_whitespace()
+        .map(|word| {
+            word.parse().map_err(|_| {
+                Error::input(path, format!("line {line}"), format!("`{word}` is no number"))
+            })
+        })
+        .collect()
+}
+
+/// Exactly `N` numbers from one line.
+pub(super) fn exactly<const N: usize>(
+    path: &Path,
+    line: usize,
+    text: &str,
+) -> Result<[f64; N], Error> {
+    let found = numbers(path, line, text)?;
+    found.try_into().map_err(|found: Vec<f64>| {
+        let what = format!("{N} numbers expected, {} found", found.len());
+        Error::input(path, format!("line {line}"), what)
+    })
+}
+
+/// The `N` numbers after `key` at the start of a line (`Tr: 1 2 …`), with the line's number;
+/// `None` where no line starts so.
+pub(super) fn keyed<const N: usize>(
+    path: &Path,
+    text: &str,
+    key: &str,
+) -> Result<Option<(usize, [f64; N])>, Error> {
+    for (line, content) in lines(text) {
+        if let Some(rest) = content.strip_prefix(key).and_then(|r| r.strip_prefix(':')) {
+            return Ok(Some((line, exactly(path, line, rest)?)));
+        }
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_their_places() {
+        let path = Path::new("f.txt");
+        assert_eq!(exactly::<2>(path, 1, " 1 2e0 ").unwrap(), [1.0, 2.0]);
+        let e = exactly::<2>(path, 4, "1 2 3").unwrap_err().to_string();
+        assert_eq!(e, "f.txt, line 4: 2 numbers expected, 3 found");
+        let e = exactly::<1>(path, 5, "x1").unwrap_err().to_string();
+        assert_eq!(e, "f.txt, line 5: `x1` is no number");
+        let text = "P0: 1\n\nTr: 5 6\n";
+        assert_eq!(keyed::<2>(path, text, "Tr").unwrap(), Some((3, [5.0, 6.0])));
+        assert_eq!(keyed::<2>(path, text, "T").unwrap(), None);
+        assert_eq!(lines(text).count(), 2);
+    }
+}
