@@ -84,11 +84,15 @@ mod tests {
     fn lookups_equal_the_sum_over_voxels() {
         let levels = 14;
         let weight = |n: usize| (n * 7919 % 2001) as i32 - 1000;
-        let mut body = String::from("kind background\nshape 25 2 14\nscale 1000\nprovenance test\n");
+        let mut body =
+            String::from("kind background\nshape 25 2 14\nscale 1000\nprovenance test\n");
         for n in 0..25 * 2 * levels + 1 {
             writeln!(body, "{}", weight(n)).unwrap();
         }
-        let text = std::format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()));
+        let text = std::format!(
+            "raywake-weights 1\nchecksum {:016x}\n{body}",
+            Digest::of(body.as_bytes())
+        );
         let mut table = vec![0; TABLE_WORDS];
         load(&text, levels, &mut table).unwrap();
         let step = Step { side: 9, levels: 14, ..Default::default() };

@@ -3,9 +3,7 @@
 
 use crate::background_filter::TABLE_WORDS;
 use crate::occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
-use crate::params::{
-    FOREGROUND_MAX, MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile, ROW_WORDS,
-};
+use crate::params::{FOREGROUND_MAX, MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile, ROW_WORDS};
 use crate::record::Step;
 
 /// Where a buffer lives.
@@ -65,13 +63,13 @@ macro_rules! buffers {
 buffers! {
     /// Buffers of the flow pipeline.
     Buffer, BUFFERS:
-    StepIn "step_in" Upload "u32" * 1, |_p| Step::WORDS, "record `Step` of the sweep";
+    StepIn "params_in" Upload "u32" * 1, |_p| Step::WORDS, "record `Step` of the sweep";
     OriginsIn "origins_in" Upload "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
     RaysIn "rays_in" Upload "vec2<u32>" * 2, |_p| POINTS_MAX, "rays of the sweep";
     FilterIn "filter_in" Upload "i32" * 1, |_p| TABLE_WORDS, "background filter, once at start";
     WeightsIn "weights_in" Upload "i32" * 1, |_p| WEIGHT_WORDS, "constancy weights, once at start";
     CostsIn "costs_in" Upload "u32" * 1, |_p| SCORES_MAX, "costs of scores, once at start";
-    StepNow "step" Device "u32" * 1, |_p| Step::WORDS, "record `Step`";
+    StepNow "params" Device "u32" * 1, |_p| Step::WORDS, "record `Step`";
     Origins "origins" Device "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
     Rays "rays" Device "vec2<u32>" * 2, |_p| POINTS_MAX, "rays";
     Filter "filter_table" Device "i32" * 1, |_p| TABLE_WORDS, "background filter by mask byte";
@@ -125,7 +123,7 @@ mod tests {
     #[test]
     fn rows_fit_their_profiles() {
         assert_eq!(Buffer::Bound.row().name, "bound");
-        assert_eq!(Buffer::StepIn.row().name, "step_in");
+        assert_eq!(Buffer::StepIn.row().name, "params_in");
         for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
             // 128 MiB is the least a Vulkan device must let a shader bind.
             assert!(BUFFERS.iter().all(|b| b.bytes(&profile) <= 128 << 20));

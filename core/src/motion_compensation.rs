@@ -61,8 +61,10 @@ mod tests {
 
     #[test]
     fn a_turning_vehicle() {
-        let twist = Twist { linear: DVec3::new(10.0, 0.0, 0.0), angular: DVec3::new(0.0, 0.0, 0.5) };
-        let ego = EgoMotion::new(&Pose::planar(3.0, 4.0, 0.0, core::f64::consts::FRAC_PI_2), &twist);
+        let twist =
+            Twist { linear: DVec3::new(10.0, 0.0, 0.0), angular: DVec3::new(0.0, 0.0, 0.5) };
+        let ego =
+            EgoMotion::new(&Pose::planar(3.0, 4.0, 0.0, core::f64::consts::FRAC_PI_2), &twist);
         let at = DVec3::new(20.0, 5.0, 0.0);
         // v + w x r = (10 - 2.5, 10): a wall there seems to come the other way.
         let seen = ego.ego_from_world(at, [0.0, 0.0]);

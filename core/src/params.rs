@@ -224,7 +224,11 @@ impl Profile {
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
             ((0.05..=2.0).contains(&self.voxel_m), "voxel_m", "0.05 to 2.0"),
-            (self.range_m > 0.0 && self.range_steps() <= 2000, "range_m", "above 0, at most 2,000 voxels"),
+            (
+                self.range_m > 0.0 && self.range_steps() <= 2000,
+                "range_m",
+                "above 0, at most 2,000 voxels",
+            ),
             (self.em_rounds >= 1 && self.em_rounds <= 100, "em_rounds", "1 to 100"),
             (self.smoothing <= 10_000, "smoothing", "at most 10,000 (10 nats per cell²)"),
             (self.displacement_cost <= 1000, "displacement_cost", "at most 1,000"),

@@ -12,11 +12,12 @@
 use crate::background_filter::background_filter;
 use crate::compact::compact;
 use crate::flow::Em;
-use crate::grid::columns::{columns, shift};
+use crate::grid::columns::columns;
 use crate::grid::ray_merge::ray_merge;
 use crate::grid::ray_trace::ray_trace;
+use crate::grid::shift::shift;
 use crate::motion_compensation::EgoMotion;
-use crate::occupancy_constancy::{Scores, occupancy_constancy, window};
+use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
@@ -24,6 +25,7 @@ use crate::prepare::{Dropped, Preparation, Window, place};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::sweep::{Point, Rig, Sweep};
 use crate::tracklet::{Tracklets, Turnover};
+use crate::window::window;
 use glam::DVec3;
 
 /// Storage of the scalar backend, one slice per buffer of the layout, and the learned tables.
@@ -102,7 +104,13 @@ pub fn perceive<'a>(
     let foreground = &s.foreground[..count];
     lap("compact");
     occupancy_constancy(
-        step, s.constancy_weights, s.constancy_costs, foreground, s.before, s.now, s.cost,
+        step,
+        s.constancy_weights,
+        s.constancy_costs,
+        foreground,
+        s.before,
+        s.now,
+        s.cost,
     );
     lap("occupancy_constancy");
     window(step, foreground, s.rank, s.cost, s.matching);
@@ -234,13 +242,20 @@ impl Pipeline {
             self.tracklets.clear();
             self.before = None;
         }
-        let window = place(&self.profile, &self.rig, &sweep.world_from_vehicle, self.lattice_origin);
+        let window =
+            place(&self.profile, &self.rig, &sweep.world_from_vehicle, self.lattice_origin);
         if self.lattice_origin.is_none() {
             self.lattice_origin = Some(window.lattice_origin);
         }
         self.column_of_point.swap(0, 1);
         let (count, dropped) = self.preparation.prepare(
-            &self.profile, &self.rig, &window, sweep, rays, &mut self.column_of_point[0], origins,
+            &self.profile,
+            &self.rig,
+            &window,
+            sweep,
+            rays,
+            &mut self.column_of_point[0],
+            origins,
         );
         self.current = Some(Side {
             window,
@@ -251,9 +266,9 @@ impl Pipeline {
         });
         let side = self.profile.side as i32;
         let shift = match (&self.before, self.profile.frame) {
-            (Some(b), Frame::Lattice) => {
-                core::array::from_fn(|a| window.corner[a].saturating_sub(b.window.corner[a]).clamp(-side, side))
-            }
+            (Some(b), Frame::Lattice) => core::array::from_fn(|a| {
+                window.corner[a].saturating_sub(b.window.corner[a]).clamp(-side, side)
+            }),
             (Some(_), Frame::Sensor) => [0; 3],
             // Nothing of what was before comes into view.
             (None, _) => [side, 0, 0],
@@ -308,12 +323,24 @@ impl Pipeline {
         let dt = current.stamp_s - before.stamp_s;
         let turned = (before.pose.inverse() * current.pose).yaw_rad();
         let turnover = self.tracklets.update(
-            &self.profile, step, dt as f32, turned as f32, perceived.foreground, perceived.state,
+            &self.profile,
+            step,
+            dt as f32,
+            turned as f32,
+            perceived.foreground,
+            perceived.state,
             &mut self.slot_of_source,
         );
         let ego = EgoMotion::new(&before.pose, &before.twist);
-        let (count, valid) =
-            self.flow_of_columns(step, perceived, &before, &current, &ego, dt as f32, output.columns);
+        let (count, valid) = self.flow_of_columns(
+            step,
+            perceived,
+            &before,
+            &current,
+            &ego,
+            dt as f32,
+            output.columns,
+        );
         self.flow_of_points(step, points, &ego, &output.columns[..count], output.points);
         Some(Flows {
             columns: &output.columns[..count],
@@ -353,7 +380,8 @@ impl Pipeline {
                 continue;
             }
             let (i, j) = (column as i32 / step.side, column as i32 % step.side);
-            let centre = DVec3::new(i as f64, j as f64, (step.levels / 2) as f64) * self.profile.voxel_m;
+            let centre =
+                DVec3::new(i as f64, j as f64, (step.levels / 2) as f64) * self.profile.voxel_m;
             let at = vehicle_from_grid.transform(centre);
             let world = before.pose.transform(at);
             let mut flow = ColumnFlow {
@@ -481,7 +509,9 @@ impl Pipeline {
             turn_rate_radps: t.ekf.mean[4],
             velocity_world_mps: world_velocity,
             velocity_ego_mps: ego_velocity,
-            covariance: core::array::from_fn(|a| core::array::from_fn(|b| t.ekf.covariance[(a, b)])),
+            covariance: core::array::from_fn(|a| {
+                core::array::from_fn(|b| t.ekf.covariance[(a, b)])
+            }),
             age: t.age,
         }
     }

@@ -138,9 +138,8 @@ mod tests {
         let p = Pose::planar(1.0, 2.0, 3.0, 0.5);
         let m = p.matrix();
         let r = |i: usize| m.row(i);
-        let rows = [
-            r(0).x, r(0).y, r(0).z, 1.0, r(1).x, r(1).y, r(1).z, 2.0, r(2).x, r(2).y, r(2).z, 3.0,
-        ];
+        let rows =
+            [r(0).x, r(0).y, r(0).z, 1.0, r(1).x, r(1).y, r(1).z, 2.0, r(2).x, r(2).y, r(2).z, 3.0];
         let q = Pose::from_rows(&rows).unwrap();
         assert!((q.yaw_rad() - 0.5).abs() < 1e-12);
         let e = p * p.inverse();

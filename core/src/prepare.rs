@@ -35,10 +35,7 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
     let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
     match profile.frame {
         Frame::Sensor => Window {
-            grid_from_vehicle: Pose {
-                translation: metres(below) - anchor,
-                ..Pose::IDENTITY
-            },
+            grid_from_vehicle: Pose { translation: metres(below) - anchor, ..Pose::IDENTITY },
             corner: below.map(|b| -b),
             lattice_origin: pose.translation,
         },
@@ -130,7 +127,11 @@ impl Preparation {
         let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
         place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
         for (slot, matrix) in to_voxel.iter_mut().enumerate() {
-            let moved = if deskew && moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            let moved = if deskew && moving {
+                sweep.twist.over(slot_time(rig, slot))
+            } else {
+                Pose::IDENTITY
+            };
             *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
         }
 
@@ -254,7 +255,8 @@ fn place_origins(
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved = if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            let moved =
+                if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m).to_array().map(|c| libm::floor(c + 0.5) as i32);
             let v = [v[0], v[1], v[2], 0];
@@ -307,7 +309,13 @@ mod tests {
         let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
         let (count, dropped) = Preparation::new().prepare(
-            profile, rig, &window, &sweep, &mut rays, &mut columns, &mut origins,
+            profile,
+            rig,
+            &window,
+            &sweep,
+            &mut rays,
+            &mut columns,
+            &mut origins,
         );
         rays.truncate(count);
         columns.truncate(points.len());

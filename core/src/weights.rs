@@ -136,6 +136,9 @@ mod tests {
         assert_eq!(fails(&file(&body.replace("-3", "NaN"))), WeightsError::Value(2));
         assert_eq!(fails(&file(&body.replace("4 5", "4"))), WeightsError::Value(4));
         assert_eq!(fails(&file(&body.replace("4 5", "4 5 6"))), WeightsError::Surplus);
-        assert_eq!(fails(&file(&body.replace("scale 10", "scale 0"))), WeightsError::Header("scale"));
+        assert_eq!(
+            fails(&file(&body.replace("scale 10", "scale 0"))),
+            WeightsError::Header("scale")
+        );
     }
 }

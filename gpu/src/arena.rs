@@ -25,15 +25,13 @@ impl Slot {
     pub fn mapped(&self) -> Option<&[u32]> {
         // SAFETY: `allocate` mapped and zeroed this many words, which no other slot overlaps; they
         // stay mapped as long as the executor that owns the slot, and borrow from it.
-        self.mapped
-            .map(|p| unsafe { std::slice::from_raw_parts(p.as_ptr(), self.words()) })
+        self.mapped.map(|p| unsafe { std::slice::from_raw_parts(p.as_ptr(), self.words()) })
     }
 
     /// None in `Heap::Device`. The device must not be using the buffer.
     pub fn mapped_mut(&mut self) -> Option<&mut [u32]> {
         // SAFETY: as in `mapped`, and the borrow is exclusive.
-        self.mapped
-            .map(|p| unsafe { std::slice::from_raw_parts_mut(p.as_ptr(), self.words()) })
+        self.mapped.map(|p| unsafe { std::slice::from_raw_parts_mut(p.as_ptr(), self.words()) })
     }
 }
 
@@ -41,9 +39,7 @@ impl Slot {
 pub(crate) fn allocate(gpu: &mut Gpu, table: &[Buffer]) -> Result<Vec<Slot>, GpuError> {
     let mut slots: Vec<Option<Slot>> = table.iter().map(|_| None).collect();
     for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
-        let rows: Vec<usize> = (0..table.len())
-            .filter(|&i| table[i].heap == heap)
-            .collect();
+        let rows: Vec<usize> = (0..table.len()).filter(|&i| table[i].heap == heap).collect();
         if !rows.is_empty() {
             allocate_heap(gpu, heap, table, &rows, &mut slots)?;
         }
@@ -59,18 +55,14 @@ fn allocate_heap(
     rows: &[usize],
     slots: &mut [Option<Slot>],
 ) -> Result<(), GpuError> {
-    let least = rows
-        .iter()
-        .fold(0u64, |sum, &row| sum.saturating_add(table[row].bytes));
+    let least = rows.iter().fold(0u64, |sum, &row| sum.saturating_add(table[row].bytes));
     let properties = gpu.memory_properties();
     let largest = properties.memory_heaps_as_slice().iter().map(|h| h.size);
     fits(gpu, heap, least, largest.max().unwrap_or(0))?;
 
     let handles = rows.iter().map(|&row| gpu.buffer(table[row].bytes));
     let handles: Vec<_> =
-        handles
-            .collect::<Result<_, _>>()
-            .map_err(exhausted("vkCreateBuffer", heap, least))?;
+        handles.collect::<Result<_, _>>().map_err(exhausted("vkCreateBuffer", heap, least))?;
     let needs: Vec<_> = handles.iter().map(|&h| gpu.requirements(h)).collect();
     let (offsets, bytes) = place(&needs, gpu.info().limits.storage_alignment_bytes);
     let usable = needs.iter().fold(!0, |bits, n| bits & n.memory_type_bits);
@@ -83,8 +75,7 @@ fn allocate_heap(
     fits(gpu, heap, bytes, available)?;
 
     let memory =
-        gpu.memory(heap, bytes, kind)
-            .map_err(exhausted("vkAllocateMemory", heap, bytes))?;
+        gpu.memory(heap, bytes, kind).map_err(exhausted("vkAllocateMemory", heap, bytes))?;
     let base = match heap {
         Heap::Device => None,
         Heap::Upload | Heap::Readback => Some(mapped_zeros(gpu, memory, bytes)?),
@@ -93,11 +84,7 @@ fn allocate_heap(
         gpu.bind(handle, memory, offset)?;
         // SAFETY: `place` keeps every buffer within the block, at a multiple of four.
         let mapped = base.map(|base| unsafe { base.add(offset as usize).cast() });
-        slots[row] = Some(Slot {
-            row: table[row],
-            handle,
-            mapped,
-        });
+        slots[row] = Some(Slot { row: table[row], handle, mapped });
     }
     Ok(())
 }
@@ -167,11 +154,7 @@ mod tests {
     use vk::MemoryPropertyFlags as Flags;
 
     fn need(size: u64, alignment: u64) -> vk::MemoryRequirements {
-        vk::MemoryRequirements {
-            size,
-            alignment,
-            memory_type_bits: 1,
-        }
+        vk::MemoryRequirements { size, alignment, memory_type_bits: 1 }
     }
 
     #[test]
@@ -184,10 +167,8 @@ mod tests {
 
     #[test]
     fn readback_prefers_cached_memory() {
-        let mut properties = vk::PhysicalDeviceMemoryProperties {
-            memory_type_count: 3,
-            ..Default::default()
-        };
+        let mut properties =
+            vk::PhysicalDeviceMemoryProperties { memory_type_count: 3, ..Default::default() };
         let host = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
         let kinds = [Flags::DEVICE_LOCAL, host, host | Flags::HOST_CACHED];
         for (to, flags) in properties.memory_types.iter_mut().zip(kinds) {

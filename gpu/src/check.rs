@@ -26,11 +26,7 @@ pub(crate) fn schedule(
 }
 
 fn at(program: &'static str, dispatch: &'static str) -> impl Fn(String) -> GpuError {
-    move |what| GpuError::Schedule {
-        program,
-        dispatch,
-        what,
-    }
+    move |what| GpuError::Schedule { program, dispatch, what }
 }
 
 /// Reads as: this holds, or else here is what is wrong.
@@ -56,12 +52,7 @@ fn step(limits: &Limits, table: &[Buffer], op: &Op) -> Result<(), String> {
             })?;
             written(target)
         }
-        Op::Dispatch {
-            kernel,
-            buffers,
-            groups,
-            ..
-        } => {
+        Op::Dispatch { kernel, buffers, groups, .. } => {
             shader(limits, kernel)?;
             bound(limits, table, kernel, buffers)?;
             counts(limits, table, groups)
@@ -102,12 +93,8 @@ fn bound(
     let (name, given, expected) = (kernel.name, buffers.len(), kernel.bindings.len());
     (given == expected)
         .or_else(|| format!("kernel {name} has {expected} bindings, {given} buffers are given"))?;
-    (expected <= limits.storage_buffers as usize).or_else(|| {
-        format!(
-            "binds {expected} buffers of {} allowed",
-            limits.storage_buffers
-        )
-    })?;
+    (expected <= limits.storage_buffers as usize)
+        .or_else(|| format!("binds {expected} buffers of {} allowed", limits.storage_buffers))?;
     for (i, (&buffer, binding)) in buffers.iter().zip(kernel.bindings).enumerate() {
         let row = find(table, buffer)?;
         let most = limits.storage_buffer_bytes;
@@ -127,16 +114,10 @@ fn bound(
 fn counts(limits: &Limits, table: &[Buffer], groups: &Groups) -> Result<(), String> {
     match *groups {
         Groups::Fixed(counts) => {
-            let fits = counts
-                .iter()
-                .zip(&limits.workgroups)
-                .all(|(n, max)| n <= max);
+            let fits = counts.iter().zip(&limits.workgroups).all(|(n, max)| n <= max);
             fits.or_else(|| format!("{counts:?} groups of {:?} allowed", limits.workgroups))
         }
-        Groups::Indirect {
-            buffer,
-            offset_bytes: offset,
-        } => {
+        Groups::Indirect { buffer, offset_bytes: offset } => {
             let row = find(table, buffer)?;
             let inside = offset.checked_add(INDIRECT_BYTES);
             let inside = inside.is_some_and(|end| end <= row.bytes);

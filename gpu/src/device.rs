@@ -92,10 +92,7 @@ pub(crate) fn select(instance: &Instance, index: Option<usize>) -> Result<Physic
     if chosen.info.missing.is_empty() {
         return Ok(chosen);
     }
-    Err(GpuError::Unsupported {
-        device: chosen.info.name,
-        what: chosen.info.missing.join(", "),
-    })
+    Err(GpuError::Unsupported { device: chosen.info.name, what: chosen.info.missing.join(", ") })
 }
 
 fn enumerate(instance: &Instance) -> Result<Vec<Physical>, GpuError> {
@@ -103,9 +100,7 @@ fn enumerate(instance: &Instance) -> Result<Vec<Physical>, GpuError> {
     let handles = unsafe { instance.raw().enumerate_physical_devices() }
         .map_err(failed("vkEnumeratePhysicalDevices"))?;
     let described = handles.into_iter().enumerate();
-    Ok(described
-        .map(|(i, h)| describe(instance.raw(), i, h))
-        .collect())
+    Ok(described.map(|(i, h)| describe(instance.raw(), i, h)).collect())
 }
 
 fn describe(instance: &ash::Instance, index: usize, handle: vk::PhysicalDevice) -> Physical {
@@ -127,11 +122,7 @@ fn describe(instance: &ash::Instance, index: usize, handle: vk::PhysicalDevice) 
         missing.push("a compute queue".to_owned());
     }
     let bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
-    let allocation_bytes = if supported {
-        allocation_limit(instance, handle)
-    } else {
-        0
-    };
+    let allocation_bytes = if supported { allocation_limit(instance, handle) } else { 0 };
     let version = base.api_version;
     let info = DeviceInfo {
         index,
@@ -146,11 +137,7 @@ fn describe(instance: &ash::Instance, index: usize, handle: vk::PhysicalDevice) 
         limits: limits(&base.limits, allocation_bytes, bits),
         missing,
     };
-    Physical {
-        handle,
-        queue_family: family.unwrap_or(0) as u32,
-        info,
-    }
+    Physical { handle, queue_family: family.unwrap_or(0) as u32, info }
 }
 
 fn allocation_limit(instance: &ash::Instance, handle: vk::PhysicalDevice) -> u64 {
@@ -189,11 +176,7 @@ fn limits(from: &vk::PhysicalDeviceLimits, allocation_bytes: u64, timestamp_bits
         workgroup: from.max_compute_work_group_size,
         workgroups: from.max_compute_work_group_count,
         shared_bytes: from.max_compute_shared_memory_size,
-        timestamp_ns: if timestamp_bits == 0 {
-            0.0
-        } else {
-            from.timestamp_period
-        },
+        timestamp_ns: if timestamp_bits == 0 { 0.0 } else { from.timestamp_period },
         timestamp_bits,
     }
 }

@@ -88,11 +88,9 @@ impl fmt::Display for GpuError {
             Self::Timeout { during, after } => {
                 write!(f, "no end of {during} within {after:?}")
             }
-            Self::Schedule {
-                program,
-                dispatch,
-                what,
-            } => write!(f, "`{dispatch}` of `{program}`: {what}"),
+            Self::Schedule { program, dispatch, what } => {
+                write!(f, "`{dispatch}` of `{program}`: {what}")
+            }
             Self::Vulkan { call, result } => write!(f, "{call} failed: {result}"),
         }
     }

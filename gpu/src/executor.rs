@@ -109,10 +109,7 @@ impl Executor {
         let waited = self.gpu.wait(self.fence, self.timeout);
         let finished = waited.map_err(|result| self.fault("vkWaitForFences", result, program))?;
         if !finished {
-            return Err(GpuError::Timeout {
-                during: self.during(program),
-                after: self.timeout,
-            });
+            return Err(GpuError::Timeout { during: self.during(program), after: self.timeout });
         }
         self.in_flight = false;
         self.programs[program].timer.read(&self.gpu);
@@ -125,9 +122,7 @@ impl Executor {
         }
         // What a lost device was doing counts as finished; its objects may be destroyed.
         self.in_flight = false;
-        GpuError::DeviceLost {
-            during: self.during(program),
-        }
+        GpuError::DeviceLost { during: self.during(program) }
     }
 
     fn during(&mut self, program: usize) -> During {
@@ -137,10 +132,7 @@ impl Executor {
             DeviceKind::Cpu => None,
             _ => timer.last_finished(&self.gpu),
         };
-        During {
-            program: name,
-            last,
-        }
+        During { program: name, last }
     }
 
     /// Name and duration in milliseconds of each step of the program's last run, in order.

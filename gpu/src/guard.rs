@@ -64,10 +64,7 @@ fn witness(bytes: usize) {
     if ABORT.load(Ordering::Relaxed) {
         INSIDE.set(false);
         // Not `eprintln`: a test harness may capture it into a growing buffer.
-        let _ = writeln!(
-            std::io::stderr(),
-            "allocation of {bytes} bytes in a guarded section"
-        );
+        let _ = writeln!(std::io::stderr(), "allocation of {bytes} bytes in a guarded section");
         std::process::abort();
     }
 }

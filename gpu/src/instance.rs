@@ -41,10 +41,7 @@ impl Instance {
         }
         let raw = create(entry, validation)?;
         // From here on `raw` is destroyed on every path.
-        let mut instance = Self {
-            raw,
-            messenger: None,
-        };
+        let mut instance = Self { raw, messenger: None };
         if validation.is_some() {
             instance.listen(entry)?;
         }
@@ -66,11 +63,7 @@ impl Instance {
         // SAFETY: the extension is enabled; `messages` is boxed and dropped after the messenger.
         let handle = unsafe { functions.create_debug_utils_messenger(&messenger(&messages), None) }
             .map_err(failed("vkCreateDebugUtilsMessengerEXT"))?;
-        self.messenger = Some(Messenger {
-            functions,
-            handle,
-            messages,
-        });
+        self.messenger = Some(Messenger { functions, handle, messages });
         Ok(())
     }
 }
@@ -111,10 +104,9 @@ fn create(entry: &Entry, validation: Option<Validation>) -> Result<ash::Instance
     let layers = [LAYER.as_ptr()];
     let extensions = EXTENSIONS.map(CStr::as_ptr);
     let enabled: &[Enable] = match validation {
-        Some(Validation::GpuAssisted) => &[
-            Enable::GPU_ASSISTED,
-            Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT,
-        ],
+        Some(Validation::GpuAssisted) => {
+            &[Enable::GPU_ASSISTED, Enable::GPU_ASSISTED_RESERVE_BINDING_SLOT]
+        }
         _ => &[Enable::SYNCHRONIZATION_VALIDATION],
     };
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(enabled);

@@ -183,10 +183,6 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            device: None,
-            validation: None,
-            timeout: Duration::from_secs(10),
-        }
+        Self { device: None, validation: None, timeout: Duration::from_secs(10) }
     }
 }

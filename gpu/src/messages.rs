@@ -17,10 +17,7 @@ pub(crate) struct Messages {
 impl Messages {
     pub fn new() -> Self {
         let texts = (0..KEPT).map(|_| String::with_capacity(KEPT_BYTES));
-        Self {
-            count: AtomicU64::new(0),
-            texts: Mutex::new(texts.collect()),
-        }
+        Self { count: AtomicU64::new(0), texts: Mutex::new(texts.collect()) }
     }
 
     pub fn count(&self) -> u64 {
@@ -108,10 +105,6 @@ mod tests {
         assert_eq!(messages.count(), KEPT as u64 + 1);
         let texts = messages.texts();
         assert_eq!(texts.len(), KEPT);
-        assert!(
-            texts
-                .iter()
-                .all(|t| t.len() == KEPT_BYTES && t.capacity() == KEPT_BYTES)
-        );
+        assert!(texts.iter().all(|t| t.len() == KEPT_BYTES && t.capacity() == KEPT_BYTES));
     }
 }

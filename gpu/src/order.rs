@@ -12,19 +12,11 @@ pub(crate) struct Access {
 
 impl Access {
     pub fn read(buffer: usize) -> Self {
-        Self {
-            buffer,
-            reads: true,
-            writes: false,
-        }
+        Self { buffer, reads: true, writes: false }
     }
 
     pub fn write(buffer: usize) -> Self {
-        Self {
-            buffer,
-            reads: false,
-            writes: true,
-        }
+        Self { buffer, reads: false, writes: true }
     }
 }
 
@@ -33,12 +25,7 @@ pub(crate) fn accesses(op: &Op) -> Vec<Access> {
     match op {
         Op::Fill { buffer, .. } => vec![Access::write(*buffer)],
         Op::Copy { from, to } => vec![Access::read(*from), Access::write(*to)],
-        Op::Dispatch {
-            kernel,
-            buffers,
-            groups,
-            ..
-        } => {
+        Op::Dispatch { kernel, buffers, groups, .. } => {
             let bound = buffers.iter().zip(kernel.bindings);
             let mut touched: Vec<_> = bound
                 .map(|(&buffer, binding)| Access {
@@ -63,10 +50,7 @@ pub(crate) struct Hazards {
 
 impl Hazards {
     pub fn new(buffers: usize) -> Self {
-        Self {
-            read: vec![false; buffers],
-            written: vec![false; buffers],
-        }
+        Self { read: vec![false; buffers], written: vec![false; buffers] }
     }
 
     /// Takes up the next step, and says whether a barrier has to stand before it.
@@ -115,9 +99,7 @@ pub(crate) fn unordered(steps: &[Step]) -> Option<(usize, usize)> {
 }
 
 fn conflict(first: &[Access], second: &[Access]) -> bool {
-    let pairs = first
-        .iter()
-        .flat_map(|a| second.iter().map(move |b| (a, b)));
+    let pairs = first.iter().flat_map(|a| second.iter().map(move |b| (a, b)));
     pairs
         .filter(|(a, b)| a.buffer == b.buffer)
         .any(|(a, b)| (a.writes && (b.reads || b.writes)) || (a.reads && b.writes))
@@ -160,35 +142,18 @@ mod tests {
             entry: "k",
             spirv: &[],
             workgroup: [1; 3],
-            bindings: &[Binding {
-                name: "b",
-                reads: true,
-                writes: true,
-            }],
+            bindings: &[Binding { name: "b", reads: true, writes: true }],
         };
-        let fill = Op::Fill {
-            buffer: 2,
-            value: 0,
-        };
+        let fill = Op::Fill { buffer: 2, value: 0 };
         let indirect = Op::Dispatch {
             name: "d",
             kernel: &KERNEL,
             buffers: vec![1],
-            groups: Groups::Indirect {
-                buffer: 2,
-                offset_bytes: 0,
-            },
+            groups: Groups::Indirect { buffer: 2, offset_bytes: 0 },
         };
-        let changed = Access {
-            buffer: 1,
-            reads: true,
-            writes: true,
-        };
+        let changed = Access { buffer: 1, reads: true, writes: true };
         assert_eq!(accesses(&fill), [Access::write(2)]);
-        assert_eq!(
-            accesses(&Op::Copy { from: 0, to: 1 }),
-            [Access::read(0), Access::write(1)]
-        );
+        assert_eq!(accesses(&Op::Copy { from: 0, to: 1 }), [Access::read(0), Access::write(1)]);
         assert_eq!(accesses(&indirect), [changed, Access::read(2)]);
         let steps = [accesses(&fill), accesses(&indirect)];
         assert_eq!(barriers(&steps), [false, true]);
@@ -196,10 +161,7 @@ mod tests {
 
     #[test]
     fn a_missing_barrier_is_found() {
-        let (r, w) = (
-            Step::Op(vec![Access::read(0)]),
-            Step::Op(vec![Access::write(0)]),
-        );
+        let (r, w) = (Step::Op(vec![Access::read(0)]), Step::Op(vec![Access::write(0)]));
         let other = Step::Op(vec![Access::write(1)]);
         let missing = |steps: &[&Step]| {
             let steps: Vec<_> = steps.iter().map(|&s| s.clone()).collect();

@@ -68,9 +68,8 @@ impl Gpu {
             Some(_) => instrumentation(&instance, &physical),
             None => vk::PhysicalDeviceFeatures::default(),
         };
-        let info = vk::DeviceCreateInfo::default()
-            .queue_create_infos(&queues)
-            .enabled_features(&features);
+        let info =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
         // SAFETY: the physical device is of this instance, and offers the family and features.
         let raw = unsafe { instance.raw().create_device(physical.handle, &info, None) }
             .map_err(failed("vkCreateDevice"))?;

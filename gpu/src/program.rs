@@ -36,10 +36,7 @@ pub(crate) struct Pipelines {
 
 impl Pipelines {
     pub fn new(gpu: &mut Gpu, slots: &[Slot], programs: &[Program]) -> Result<Self, GpuError> {
-        let mut all = Self {
-            pipelines: Vec::new(),
-            sets: Vec::new(),
-        };
+        let mut all = Self { pipelines: Vec::new(), sets: Vec::new() };
         let mut wanted: Vec<(usize, &[usize])> = Vec::new();
         for (kernel, buffers) in dispatches(programs) {
             let pipeline = all.pipeline(gpu, kernel)?;
@@ -68,11 +65,7 @@ impl Pipelines {
             .iter()
             .find(|s| same(self.pipelines[s.pipeline].kernel, kernel) && s.buffers == buffers)?;
         let pipeline = &self.pipelines[set.pipeline];
-        Some(Bound {
-            pipeline: pipeline.handle,
-            layout: pipeline.layout,
-            set: set.handle,
-        })
+        Some(Bound { pipeline: pipeline.handle, layout: pipeline.layout, set: set.handle })
     }
 
     /// The kernel's pipeline, made if there is none yet.
@@ -109,9 +102,7 @@ fn same(a: &Kernel, b: &Kernel) -> bool {
 fn dispatches(programs: &[Program]) -> impl Iterator<Item = (&'static Kernel, &[usize])> {
     let ops = programs.iter().flat_map(|program| &program.ops);
     ops.filter_map(|op| match op {
-        Op::Dispatch {
-            kernel, buffers, ..
-        } => Some((*kernel, buffers.as_slice())),
+        Op::Dispatch { kernel, buffers, .. } => Some((*kernel, buffers.as_slice())),
         _ => None,
     })
 }

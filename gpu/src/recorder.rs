@@ -26,12 +26,7 @@ pub(crate) fn record(
 ) -> Result<Recorded, GpuError> {
     let timer = Timer::new(gpu, program.ops.iter().map(Op::name).collect())?;
     let steps = gpu.record(commands, |device| {
-        let recorder = Recorder {
-            device,
-            commands,
-            slots,
-            pipelines,
-        };
+        let recorder = Recorder { device, commands, slots, pipelines };
         recorder.program(program, timer.pool)
     })?;
     let barriers = steps.iter().filter(|s| **s == Step::Barrier).count();
@@ -43,11 +38,7 @@ pub(crate) fn record(
             what: format!("not ordered after step {first}: a defect of the recorder"),
         });
     }
-    Ok(Recorded {
-        name: program.name,
-        commands,
-        timer,
-    })
+    Ok(Recorded { name: program.name, commands, timer })
 }
 
 struct Recorder<'a> {
@@ -64,10 +55,7 @@ impl Recorder<'_> {
         if let Some(pool) = queries {
             let count = program.ops.len() as u32 + 1;
             // SAFETY: recording; the pool has this many queries.
-            unsafe {
-                self.device
-                    .cmd_reset_query_pool(self.commands, pool, 0, count)
-            };
+            unsafe { self.device.cmd_reset_query_pool(self.commands, pool, 0, count) };
             self.timestamp(pool, 0);
         }
         for (i, op) in program.ops.iter().enumerate() {
@@ -98,10 +86,7 @@ impl Recorder<'_> {
             &Op::Fill { buffer, value } => {
                 let (whole, to) = (vk::WHOLE_SIZE, self.slots[buffer].handle);
                 // SAFETY: recording; the buffer is a transfer target of whole words.
-                unsafe {
-                    self.device
-                        .cmd_fill_buffer(self.commands, to, 0, whole, value)
-                }
+                unsafe { self.device.cmd_fill_buffer(self.commands, to, 0, whole, value) }
             }
             &Op::Copy { from, to } => {
                 let (from, to) = (&self.slots[from], &self.slots[to]);
@@ -110,12 +95,7 @@ impl Recorder<'_> {
                 // SAFETY: recording; the check saw two different buffers of equal size.
                 unsafe { self.device.cmd_copy_buffer(self.commands, from, to, &whole) }
             }
-            Op::Dispatch {
-                kernel,
-                buffers,
-                groups,
-                ..
-            } => {
+            Op::Dispatch { kernel, buffers, groups, .. } => {
                 let bound = self.pipelines.bound(kernel, buffers);
                 self.dispatch(bound.expect("made from the same programs"), *groups);
             }
@@ -133,10 +113,7 @@ impl Recorder<'_> {
             device.cmd_bind_descriptor_sets(commands, compute, bound.layout, 0, &sets, &[]);
             match groups {
                 Groups::Fixed([x, y, z]) => device.cmd_dispatch(commands, x, y, z),
-                Groups::Indirect {
-                    buffer,
-                    offset_bytes,
-                } => {
+                Groups::Indirect { buffer, offset_bytes } => {
                     let counts = self.slots[buffer].handle;
                     device.cmd_dispatch_indirect(commands, counts, offset_bytes);
                 }
@@ -160,14 +137,12 @@ impl Recorder<'_> {
     }
 
     fn memory_barrier(&self, from: Stage, written: Touch, to: Stage, touched: Touch) {
-        let barriers = [vk::MemoryBarrier::default()
-            .src_access_mask(written)
-            .dst_access_mask(touched)];
+        let barriers =
+            [vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(touched)];
         let none = vk::DependencyFlags::empty();
         // SAFETY: recording; the stages exist on a compute queue and match the accesses.
         unsafe {
-            self.device
-                .cmd_pipeline_barrier(self.commands, from, to, none, &barriers, &[], &[]);
+            self.device.cmd_pipeline_barrier(self.commands, from, to, none, &barriers, &[], &[]);
         }
     }
 
@@ -175,9 +150,6 @@ impl Recorder<'_> {
     fn timestamp(&self, pool: vk::QueryPool, query: u32) {
         let stage = Stage::BOTTOM_OF_PIPE;
         // SAFETY: recording; the query is in the pool and was reset at the start.
-        unsafe {
-            self.device
-                .cmd_write_timestamp(self.commands, stage, pool, query)
-        };
+        unsafe { self.device.cmd_write_timestamp(self.commands, stage, pool, query) };
     }
 }

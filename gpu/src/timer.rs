@@ -21,12 +21,7 @@ impl Timer {
             0 => None,
             _ => Some(gpu.query_pool(queries as u32)?),
         };
-        Ok(Self {
-            pool,
-            names,
-            ticks: vec![[0; 2]; queries],
-            probe: vec![[0; 2]; queries],
-        })
+        Ok(Self { pool, names, ticks: vec![[0; 2]; queries], probe: vec![[0; 2]; queries] })
     }
 
     /// Fetches the timestamps of a run that has finished.
@@ -55,10 +50,7 @@ impl Timer {
         // start of the command buffer may not have been reached.
         let news = self.probe.iter().zip(&self.ticks).skip(1);
         let fresh = |(now, before): (&[u64; 2], &[u64; 2])| now[1] != 0 && now != before;
-        let last = news
-            .take_while(|&pair| fresh(pair))
-            .count()
-            .checked_sub(1)?;
+        let last = news.take_while(|&pair| fresh(pair)).count().checked_sub(1)?;
         Some((last, self.names[last]))
     }
 }

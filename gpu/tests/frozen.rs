@@ -40,11 +40,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) { words.d[id.x] += id.x; }",
         row("words", Heap::Device, 64),
         row("out", Heap::Readback, 64),
     ];
-    let ops = vec![
-        Op::Copy { from: 0, to: 1 },
-        dispatch(add, &[1], 1),
-        Op::Copy { from: 1, to: 2 },
-    ];
+    let ops =
+        vec![Op::Copy { from: 0, to: 1 }, dispatch(add, &[1], 1), Op::Copy { from: 1, to: 2 }];
     let Some(mut gpu) = executor(&Options::default(), &table, ops) else {
         return;
     };

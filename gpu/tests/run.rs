@@ -76,10 +76,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         name: "indirect",
         kernel: double(),
         buffers: vec![1, 2],
-        groups: Groups::Indirect {
-            buffer: 0,
-            offset_bytes: 4,
-        },
+        groups: Groups::Indirect { buffer: 0, offset_bytes: 4 },
     };
     let fill = |buffer, value| Op::Fill { buffer, value };
     let ops = vec![fill(1, 20), fill(2, 7), dispatch(plan, &[0], 1), indirect];
@@ -111,20 +108,11 @@ fn main() { atomicAdd(&counts.d[0], 1u); }",
         row("out", Heap::Readback, 1),
         row("unused", Heap::Upload, 3),
     ];
-    let clear = Op::Fill {
-        buffer: 0,
-        value: 5,
-    };
+    let clear = Op::Fill { buffer: 0, value: 5 };
     let add = dispatch(count, &[0], 10);
     let programs = [
-        Program {
-            name: "clear",
-            ops: vec![clear],
-        },
-        Program {
-            name: "add",
-            ops: vec![add.clone(), add, Op::Copy { from: 0, to: 1 }],
-        },
+        Program { name: "clear", ops: vec![clear] },
+        Program { name: "add", ops: vec![add.clone(), add, Op::Copy { from: 0, to: 1 }] },
     ];
     let Some(gpu) = present(Executor::new(&Options::default(), &table, &programs)) else {
         return;
@@ -149,10 +137,7 @@ fn main() { atomicAdd(&counts.d[0], 1u); }",
 fn wrong_schedules_are_refused() {
     let table = [row("a", Heap::Device, 4), row("b", Heap::Device, 5)];
     let copy = Op::Copy { from: 0, to: 1 };
-    let program = Program {
-        name: "wrong",
-        ops: vec![copy],
-    };
+    let program = Program { name: "wrong", ops: vec![copy] };
     let Some(result) = present(Executor::new(&Options::default(), &table, &[program])) else {
         return;
     };
@@ -181,19 +166,13 @@ fn devices_are_listed_and_chosen_by_index() {
     let listed = listed.unwrap();
     for (i, device) in listed.iter().enumerate() {
         assert_eq!(device.index, i);
-        let options = Options {
-            device: Some(i),
-            ..Options::default()
-        };
+        let options = Options { device: Some(i), ..Options::default() };
         match Executor::new(&options, &[], &[]) {
             Ok(gpu) => assert_eq!(gpu.info(), device),
             Err(error) => assert!(matches!(error, GpuError::Unsupported { .. }), "{error}"),
         }
     }
-    let options = Options {
-        device: Some(listed.len()),
-        ..Options::default()
-    };
+    let options = Options { device: Some(listed.len()), ..Options::default() };
     let beyond = Executor::new(&options, &[], &[]);
     assert_eq!(beyond.err(), Some(GpuError::NoDevice));
 }

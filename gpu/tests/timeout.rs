@@ -20,14 +20,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }",
         &[CHANGE],
     );
-    let table = [
-        row("words", Heap::Device, u64::from(groups) * 64),
-        row("out", Heap::Readback, 16),
-    ];
-    let options = Options {
-        timeout: Duration::from_micros(100),
-        ..Options::default()
-    };
+    let table =
+        [row("words", Heap::Device, u64::from(groups) * 64), row("out", Heap::Readback, 16)];
+    let options = Options { timeout: Duration::from_micros(100), ..Options::default() };
     executor(&options, &table, vec![dispatch(spin, &[0], groups)])
 }
 
@@ -40,9 +35,7 @@ fn give_up(groups: u32) -> Option<Duration> {
     }
     let begin = Instant::now();
     let error = gpu.run(0).unwrap_err();
-    let GpuError::Timeout { during, after } = &error else {
-        panic!("{error}")
-    };
+    let GpuError::Timeout { during, after } = &error else { panic!("{error}") };
     assert_eq!((during.program, after.as_micros()), ("test", 100));
     assert_eq!(gpu.run(0), Err(error));
     assert!(gpu.readback(1).is_empty());

@@ -9,10 +9,7 @@ use raywake_gpu::{Binding, Executor, GpuError, Groups, Heap, Kernel, Op, Options
 const WORDS: u64 = 256;
 
 fn options(validation: Validation) -> Options {
-    Options {
-        validation: Some(validation),
-        ..Options::default()
-    }
+    Options { validation: Some(validation), ..Options::default() }
 }
 
 /// Whether the layer is there to be asked.
@@ -50,10 +47,7 @@ fn everything(copy: &'static Kernel) -> Vec<Op> {
         name: "indirect",
         kernel: copy,
         buffers: vec![1, 2],
-        groups: Groups::Indirect {
-            buffer: 4,
-            offset_bytes: 0,
-        },
+        groups: Groups::Indirect { buffer: 4, offset_bytes: 0 },
     };
     vec![
         Op::Copy { from: 0, to: 1 },
@@ -114,9 +108,6 @@ fn an_access_out_of_bounds_is_found() {
     if layer(Validation::GpuAssisted) {
         let beyond = shift("beyond", 1 << 20, &[READ, CHANGE]);
         let said = said(Validation::GpuAssisted, vec![dispatch(beyond, &[1, 2], 4)]);
-        assert!(
-            said.iter().any(|text| text.contains("out of bounds")),
-            "{said:?}"
-        );
+        assert!(said.iter().any(|text| text.contains("out of bounds")), "{said:?}");
     }
 }

@@ -9,7 +9,12 @@ fn main() {
     println!("{}", source.describe());
     let profile = Profile::hdl64();
     let t = || Tables::load(&profile, None, raywake_core::occupancy_constancy::SHIPPED).unwrap();
-    let mut drive = Drive::new(&profile, source.rig(), &t(), Backend::Scalar(Box::new(Scalar::new(&profile, t()))));
+    let mut drive = Drive::new(
+        &profile,
+        source.rig(),
+        &t(),
+        Backend::Scalar(Box::new(Scalar::new(&profile, t()))),
+    );
     let (mut now, mut before) = (SweepData::default(), SweepData::default());
     let mut digest = Digest::default();
     for n in 0..source.len() {
@@ -18,9 +23,20 @@ fn main() {
         if let Some(f) = &s.flows {
             f.columns.iter().for_each(|c| digest.column(c));
             if n % 20 == 1 {
-            println!("{n} {} pts {} rays, {} solid, {} fg, {} valid {:?} {:?}", now.points.len(), s.rays, f.columns.len(), s.foreground, f.valid, f.turnover, s.prepared.dropped);
-            for (n, ms) in s.laps.stages() { print!("{n} {ms:.2}  "); }
-            println!("total {:.2}", s.laps.stages().map(|s| s.1).sum::<f64>());
+                println!(
+                    "{n} {} pts {} rays, {} solid, {} fg, {} valid {:?} {:?}",
+                    now.points.len(),
+                    s.rays,
+                    f.columns.len(),
+                    s.foreground,
+                    f.valid,
+                    f.turnover,
+                    s.prepared.dropped
+                );
+                for (n, ms) in s.laps.stages() {
+                    print!("{n} {ms:.2}  ");
+                }
+                println!("total {:.2}", s.laps.stages().map(|s| s.1).sum::<f64>());
             }
         }
         drive.tracklets().for_each(|t| digest.tracklet(&t));

@@ -6,9 +6,10 @@
 //! neighbours, that bound plus the smoothing term, a paraboloid around their mean, excludes all but
 //! a few: rings around the rounded mean are visited until no farther ring can win or tie.
 
-use crate::occupancy_constancy::{ROW, outside_cost};
+use crate::occupancy_constancy::ROW;
 use crate::params::{DISPLACEMENTS, REACH, SIDE};
 use crate::record::{Flow, NONE, Proposal, Step, VALID, flow, flow_displacement};
+use crate::window::outside_cost;
 
 /// Best found so far; ties go to the lower index in scan order.
 struct Best {

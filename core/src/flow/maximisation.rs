@@ -45,8 +45,8 @@ pub fn settle(
     state: &mut [Flow],
 ) {
     for (n, (&column, &[flow, _])) in foreground.iter().zip(proposal).enumerate() {
-        let won = flow != 0
-            && target_rank[target(step, column, flow_displacement(flow))] == n as u32;
+        let won =
+            flow != 0 && target_rank[target(step, column, flow_displacement(flow))] == n as u32;
         state[column as usize] = if won { flow } else { 0 };
     }
 }

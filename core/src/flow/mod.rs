@@ -35,7 +35,12 @@ impl Em<'_> {
         self.target_energy.fill(NONE);
         for _ in 0..rounds {
             expectation::expectation(
-                step, foreground, matching, self.state, self.target_energy, self.bound,
+                step,
+                foreground,
+                matching,
+                self.state,
+                self.target_energy,
+                self.bound,
                 self.proposal,
             );
             self.target_energy.fill(NONE);
@@ -59,9 +64,10 @@ pub(crate) fn target(step: &Step, column: u32, d: [i32; 2]) -> usize {
 mod tests {
     extern crate std;
     use super::*;
-    use crate::occupancy_constancy::{ROW, outside_cost};
+    use crate::occupancy_constancy::ROW;
     use crate::params::{DISPLACEMENTS, REACH, SIDE};
     use crate::record::{VALID, flow, flow_displacement};
+    use crate::window::outside_cost;
     use std::vec;
     use std::vec::Vec;
 
@@ -86,7 +92,9 @@ mod tests {
                         + (step.displacement_cost * (d[0] * d[0] + d[1] * d[1])) as i64;
                     for pi in (i - 2).max(0)..=(i + 2).min(side - 1) {
                         for pj in (j - 2).max(0)..=(j + 2).min(side - 1) {
-                            if let (true, Some(s)) = ((pi, pj) != (i, j), flows[(pi * side + pj) as usize]) {
+                            if let (true, Some(s)) =
+                                ((pi, pj) != (i, j), flows[(pi * side + pj) as usize])
+                            {
                                 let q = (d[0] - s[0]).pow(2) + (d[1] - s[1]).pow(2);
                                 e += (step.smoothing * q) as i64;
                             }

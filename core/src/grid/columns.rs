@@ -19,44 +19,17 @@ pub fn columns(step: &Step, log_odds: &[i32], now: &mut [Column]) {
     }
 }
 
-/// The columns of the sweep before, seen from the new window: cell `(i, j)` held what was
-/// `(i + shift_x, j + shift_y)`, its levels moved by `shift_z`. What comes into view is unknown.
-pub fn shift(step: &Step, now: &[Column], before: &mut [Column]) {
-    let side = step.side;
-    let mask = (1u32 << step.levels) - 1;
-    for (index, column) in before.iter_mut().enumerate() {
-        let i = index as i32 / side + step.shift_x;
-        let j = index as i32 % side + step.shift_y;
-        *column = [0, 0];
-        if (0..side).contains(&i) && (0..side).contains(&j) && step.shift_z.abs() < step.levels {
-            let [state, solid] = now[(i * side + j) as usize];
-            let moved = |m: u32| {
-                (if step.shift_z >= 0 { m >> step.shift_z } else { m << -step.shift_z }) & mask
-            };
-            *column = [moved(state & 0xffff) | moved(state >> 16) << 16, moved(solid)];
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn masks_and_shifts() {
-        let step = Step { side: 3, levels: 4, shift_x: 1, shift_z: 1, ..Default::default() };
+    fn masks() {
+        let step = Step { side: 3, levels: 4, ..Default::default() };
         let mut log_odds = [0; 36];
         log_odds[8 * 4..].copy_from_slice(&[-1, 4, 5, 0]);
         let mut now = [[0; 2]; 9];
         columns(&step, &log_odds, &mut now);
         assert_eq!(now[8], [0b0001 | 0b0110 << 16, 0b0100]);
-        let mut before = [[7; 2]; 9];
-        shift(&step, &now, &mut before);
-        // (2, 2) is seen at (1, 2), one level lower.
-        assert_eq!(before[5], [0b0011 << 16, 0b0010]);
-        assert!(before.iter().enumerate().all(|(n, c)| n == 5 || *c == [0, 0]));
-        let up = Step { shift_x: 0, shift_z: -2, ..step };
-        shift(&up, &now, &mut before);
-        assert_eq!(before[8], [0b0100 | 0b1000 << 16, 0]);
     }
 }

@@ -7,6 +7,7 @@
 pub mod columns;
 pub mod ray_merge;
 pub mod ray_trace;
+pub mod shift;
 
 use crate::params::LOG_ODDS_CLIP;
 
@@ -16,8 +17,8 @@ pub fn probability(log_odds: i32) -> f32 {
     1.0 / (1.0 + libm::expf(-l))
 }
 
-/// The voxels a ray passes, start included and end excluded: Bresenham's walk in three dimensions
-/// along the axis of the (first) longest extent, in integers.
+/// The voxels a ray passes, start included and end excluded: Bresenham's walk in three dimensions,
+/// in integers. The axis of the longest extent steps every time, the others when their error says.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
     /// Voxel about to be visited.
@@ -25,7 +26,7 @@ pub struct Walk {
     step: [i32; 3],
     rise: [i32; 3],
     error: [i32; 3],
-    axis: usize,
+    fall: i32,
     left: i32,
 }
 
@@ -34,25 +35,18 @@ impl Walk {
     pub fn new(start: [i32; 3], end: [i32; 3], limit: i32) -> Walk {
         let delta = [end[0] - start[0], end[1] - start[1], end[2] - start[2]];
         let extent = delta.map(i32::abs);
-        let axis = if extent[0] >= extent[1] && extent[0] >= extent[2] {
-            0
-        } else if extent[1] >= extent[2] {
-            1
-        } else {
-            2
-        };
-        let length = extent[axis];
+        let length = extent[0].max(extent[1]).max(extent[2]);
         Walk {
             voxel: start,
             step: delta.map(i32::signum),
             rise: extent.map(|e| 2 * e),
             error: extent.map(|e| 2 * e - length),
-            axis,
+            fall: 2 * length,
             left: length.min(limit),
         }
     }
 
-    /// Whether the walk towards its end was cut short by the limit, so that nothing ends there.
+    /// Whether the walk towards its end is cut short by the limit, so that nothing ends there.
     pub fn beyond(start: [i32; 3], end: [i32; 3], limit: i32) -> bool {
         (0..3).any(|a| (end[a] - start[a]).abs() > limit)
     }
@@ -69,15 +63,11 @@ impl Iterator for Walk {
         self.left -= 1;
         let here = self.voxel;
         for a in 0..3 {
-            if a == self.axis {
+            if self.error[a] >= 0 {
                 self.voxel[a] += self.step[a];
-            } else {
-                if self.error[a] >= 0 {
-                    self.voxel[a] += self.step[a];
-                    self.error[a] -= self.rise[self.axis];
-                }
-                self.error[a] += self.rise[a];
+                self.error[a] -= self.fall;
             }
+            self.error[a] += self.rise[a];
         }
         Some(here)
     }

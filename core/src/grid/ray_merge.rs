@@ -11,7 +11,12 @@ use crate::record::Ray;
 /// `rays.len()` elements and receives the used slots in an order of no meaning. Returns how many
 /// are used. A ray that finds no place within [`MERGE_PROBES`] is appended as
 /// `MERGE_SLOTS + index` and counts once: which rays that meets changes no sum.
-pub fn ray_merge(rays: &[Ray], slots: &mut [u32], weights: &mut [u32], distinct: &mut [u32]) -> usize {
+pub fn ray_merge(
+    rays: &[Ray],
+    slots: &mut [u32],
+    weights: &mut [u32],
+    distinct: &mut [u32],
+) -> usize {
     assert!(slots.len() == MERGE_SLOTS && weights.len() == MERGE_SLOTS);
     assert!(distinct.len() >= rays.len());
     let mut used = 0;

@@ -86,7 +86,9 @@ mod tests {
         // One origin inside the window, one outside it.
         for origin in [[15, 15, 4], [-3, 15, 4]] {
             let rays: Vec<Ray> = (0..4000)
-                .map(|_| ray([random(60) - 15, random(60) - 15, random(16) - 4], 0, random(20) == 0))
+                .map(|_| {
+                    ray([random(60) - 15, random(60) - 15, random(16) - 4], 0, random(20) == 0)
+                })
                 .collect();
             let (mut slots, mut weights) = (vec![0; MERGE_SLOTS], vec![0; MERGE_SLOTS]);
             let mut distinct = vec![0; rays.len()];

@@ -46,7 +46,8 @@ impl Ekf {
                     (1.0, 0.0)
                 };
                 let of_speed = 2.0 * r / (dt * dt);
-                let of_heading = if speed > 0.0 { of_speed / (speed * speed) } else { HEADING_UNKNOWN };
+                let of_heading =
+                    if speed > 0.0 { of_speed / (speed * speed) } else { HEADING_UNKNOWN };
                 let known = of_heading < HEADING_UNKNOWN;
                 let (along, across) = (r / dt, if known { r / (dt * speed) } else { 0.0 });
                 p.set_diagonal(&Vector5::new(
@@ -184,9 +185,8 @@ mod tests {
         let noisy_model = turn.is_none();
         let mut truth = [0.0, 0.0, random.uniform() * 6.0 - 3.0, speed, turn.unwrap_or(drawn)];
         let sigma = 0.15;
-        let see = |t: &[f64; 5], r: &mut Random| {
-            [t[0] + sigma * r.normal(), t[1] + sigma * r.normal()]
-        };
+        let see =
+            |t: &[f64; 5], r: &mut Random| [t[0] + sigma * r.normal(), t[1] + sigma * r.normal()];
         let advance = |t: &mut [f64; 5], r: &mut Random| {
             t[0] += t[3] * t[2].cos() * 0.1;
             t[1] += t[3] * t[2].sin() * 0.1;
@@ -217,7 +217,11 @@ mod tests {
         let error = Vector5::new(
             ekf.mean[0] - (truth[0] - cell[0]) as f32,
             ekf.mean[1] - (truth[1] - cell[1]) as f32,
-            wrap(wrap(ekf.mean[2]) - ((truth[2] + 9.424_777_960_769_38).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI) as f32),
+            wrap(
+                wrap(ekf.mean[2])
+                    - ((truth[2] + 9.424_777_960_769_38).rem_euclid(std::f64::consts::TAU)
+                        - std::f64::consts::PI) as f32,
+            ),
             ekf.mean[3] - truth[3] as f32,
             ekf.mean[4] - truth[4] as f32,
         );
@@ -254,7 +258,8 @@ mod tests {
         let ours = Profile::hdl64().tracklet;
         let his = Profile::dissertation().tracklet;
         // Noise-free, 10 and 15 m/s straight ahead; his start is a step late.
-        for (params, speed, kept) in [(&ours, 15.0, true), (&his, 10.0, true), (&his, 15.0, false)] {
+        for (params, speed, kept) in [(&ours, 15.0, true), (&his, 10.0, true), (&his, 15.0, false)]
+        {
             let mut ekf = Ekf::birth(params, 0.3, [speed * DT, 0.0], DT);
             // The next match leads one step further: measured from the cell of birth.
             ekf.predict(params, DT);

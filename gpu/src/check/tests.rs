@@ -33,16 +33,8 @@ const fn kernel(spirv: &'static [u32], workgroup: [u32; 3]) -> Kernel {
         spirv,
         workgroup,
         bindings: &[
-            Binding {
-                name: "in",
-                reads: true,
-                writes: false,
-            },
-            Binding {
-                name: "out",
-                reads: false,
-                writes: true,
-            },
+            Binding { name: "in", reads: true, writes: false },
+            Binding { name: "out", reads: false, writes: true },
         ],
     }
 }
@@ -53,20 +45,12 @@ static GARBAGE: Kernel = kernel(&[1], [64, 1, 1]);
 static OTHER: Kernel = kernel(&[SPIRV_MAGIC, 0], [64, 1, 1]);
 
 fn dispatch(kernel: &'static Kernel, buffers: &[usize], groups: Groups) -> Op {
-    Op::Dispatch {
-        name: "d",
-        kernel,
-        buffers: buffers.to_vec(),
-        groups,
-    }
+    Op::Dispatch { name: "d", kernel, buffers: buffers.to_vec(), groups }
 }
 
 /// What is said against a program of these steps; nothing if they are fine.
 fn said(ops: &[Op]) -> String {
-    let program = Program {
-        name: "p",
-        ops: ops.to_vec(),
-    };
+    let program = Program { name: "p", ops: ops.to_vec() };
     match schedule(&LIMITS, &TABLE, &[program]) {
         Ok(()) => String::new(),
         Err(GpuError::Schedule { program, what, .. }) => {
@@ -80,15 +64,9 @@ fn said(ops: &[Op]) -> String {
 #[test]
 fn sound_programs_pass() {
     let one = Groups::Fixed([1; 3]);
-    let indirect = Groups::Indirect {
-        buffer: 3,
-        offset_bytes: 4,
-    };
+    let indirect = Groups::Indirect { buffer: 3, offset_bytes: 4 };
     let ops = [
-        Op::Fill {
-            buffer: 4,
-            value: 7,
-        },
+        Op::Fill { buffer: 4, value: 7 },
         Op::Copy { from: 0, to: 1 },
         dispatch(&GOOD, &[1, 2], one),
         dispatch(&GOOD, &[0, 1], indirect),
@@ -99,10 +77,7 @@ fn sound_programs_pass() {
 #[test]
 fn unsound_programs_are_refused_with_the_reason() {
     let one = Groups::Fixed([1; 3]);
-    let indirect = |offset_bytes| Groups::Indirect {
-        buffer: 3,
-        offset_bytes,
-    };
+    let indirect = |offset_bytes| Groups::Indirect { buffer: 3, offset_bytes };
     let cases = [
         (Op::Copy { from: 0, to: 9 }, "no buffer 9"),
         (Op::Copy { from: 1, to: 1 }, "onto itself"),
@@ -114,10 +89,7 @@ fn unsound_programs_are_refused_with_the_reason() {
         (dispatch(&GOOD, &[4, 1], one), "huge has 268435456 bytes"),
         (dispatch(&LARGE, &[1, 2], one), "workgroups of [64, 8, 1]"),
         (dispatch(&GARBAGE, &[1, 2], one), "not SPIR-V"),
-        (
-            dispatch(&GOOD, &[1, 2], Groups::Fixed([65536, 1, 1])),
-            "groups",
-        ),
+        (dispatch(&GOOD, &[1, 2], Groups::Fixed([65536, 1, 1])), "groups"),
         (dispatch(&GOOD, &[1, 2], indirect(8)), "at byte 8 of small"),
         (dispatch(&GOOD, &[1, 2], indirect(2)), "at byte 2 of small"),
         (dispatch(&GOOD, &[1, 2], indirect(u64::MAX - 3)), "of small"),
@@ -126,10 +98,7 @@ fn unsound_programs_are_refused_with_the_reason() {
         let said = said(std::slice::from_ref(&op));
         assert!(said.contains(reason), "{op:?}: {said:?}");
     }
-    let namesakes = [
-        dispatch(&GOOD, &[1, 2], one),
-        dispatch(&OTHER, &[1, 2], one),
-    ];
+    let namesakes = [dispatch(&GOOD, &[1, 2], one), dispatch(&OTHER, &[1, 2], one)];
     assert!(said(&namesakes).contains("two different kernels"));
 }
 
@@ -139,10 +108,7 @@ fn buffers_are_whole_words() {
         let table = [row("odd", Heap::Device, bytes)];
         assert!(matches!(
             schedule(&LIMITS, &table, &[]),
-            Err(GpuError::Schedule {
-                dispatch: "odd",
-                ..
-            })
+            Err(GpuError::Schedule { dispatch: "odd", .. })
         ));
     }
 }

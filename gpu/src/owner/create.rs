@@ -37,9 +37,7 @@ impl Gpu {
         bytes: u64,
         kind: u32,
     ) -> Result<vk::DeviceMemory, vk::Result> {
-        let info = vk::MemoryAllocateInfo::default()
-            .allocation_size(bytes)
-            .memory_type_index(kind);
+        let info = vk::MemoryAllocateInfo::default().allocation_size(bytes).memory_type_index(kind);
         // SAFETY: `kind` is a memory type of this device and `bytes` within its heap.
         let memory = unsafe { self.raw.allocate_memory(&info, None) }?;
         self.census.memory_allocations += 1;
@@ -109,9 +107,7 @@ impl Gpu {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module)
             .name(entry);
-        let info = [vk::ComputePipelineCreateInfo::default()
-            .stage(stage)
-            .layout(layout)];
+        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         let cache = vk::PipelineCache::null();
         // SAFETY: module and layout are of this device; the kernel's bindings describe the module.
         let made = unsafe { self.raw.create_compute_pipelines(cache, &info, None) };
@@ -129,9 +125,7 @@ impl Gpu {
         let sizes = [vk::DescriptorPoolSize::default()
             .ty(vk::DescriptorType::STORAGE_BUFFER)
             .descriptor_count(buffers.max(1))];
-        let info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(sets.max(1))
-            .pool_sizes(&sizes);
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets.max(1)).pool_sizes(&sizes);
         // SAFETY: the create info is valid and lives through the call.
         let pool = unsafe { self.raw.create_descriptor_pool(&info, None) }
             .map_err(failed("vkCreateDescriptorPool"))?;
@@ -146,17 +140,14 @@ impl Gpu {
         buffers: &[vk::Buffer],
     ) -> Result<vk::DescriptorSet, GpuError> {
         let layouts = [layout];
-        let info = vk::DescriptorSetAllocateInfo::default()
-            .descriptor_pool(pool)
-            .set_layouts(&layouts);
+        let info =
+            vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
         // SAFETY: pool and layout are of this device, and only this thread uses the pool.
         let set = unsafe { self.raw.allocate_descriptor_sets(&info) }
             .map_err(failed("vkAllocateDescriptorSets"))?[0];
         self.count();
         let whole = |&buffer: &vk::Buffer| {
-            [vk::DescriptorBufferInfo::default()
-                .buffer(buffer)
-                .range(vk::WHOLE_SIZE)]
+            [vk::DescriptorBufferInfo::default().buffer(buffer).range(vk::WHOLE_SIZE)]
         };
         let infos: Vec<_> = buffers.iter().map(whole).collect();
         let write = |(binding, info)| {
@@ -166,11 +157,7 @@ impl Gpu {
                 .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
                 .buffer_info(info)
         };
-        let writes: Vec<_> = infos
-            .iter()
-            .enumerate()
-            .map(|(i, b)| write((i, b)))
-            .collect();
+        let writes: Vec<_> = infos.iter().enumerate().map(|(i, b)| write((i, b))).collect();
         // SAFETY: the set is new and in no command buffer yet; the buffers are of this device.
         unsafe { self.raw.update_descriptor_sets(&writes, &[]) };
         self.count();
@@ -205,9 +192,8 @@ impl Gpu {
         let pool = unsafe { self.raw.create_command_pool(&info, None) }
             .map_err(failed("vkCreateCommandPool"))?;
         self.own(pool, Object::CommandPool);
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .command_buffer_count(count);
+        let info =
+            vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(count);
         // SAFETY: the pool is of this device, and only this thread uses it.
         let buffers = unsafe { self.raw.allocate_command_buffers(&info) }
             .map_err(failed("vkAllocateCommandBuffers"))?;

@@ -14,11 +14,7 @@ pub const WRITE: Binding = binding(false, true);
 pub const CHANGE: Binding = binding(true, true);
 
 const fn binding(reads: bool, writes: bool) -> Binding {
-    Binding {
-        name: "d",
-        reads,
-        writes,
-    }
+    Binding { name: "d", reads, writes }
 }
 
 /// What the kernels below are written in terms of.

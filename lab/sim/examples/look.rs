@@ -25,10 +25,7 @@ fn from_above(sweep: &SimSweep) -> Vec<u8> {
     let mut image = vec![0u8; SIDE * SIDE * 3];
     for (p, t) in sweep.points.iter().zip(&sweep.truth) {
         let [x, y, _] = p.position;
-        let (u, v) = (
-            0.5 * SIDE as f32 - y * PIXELS_PER_M,
-            0.5 * SIDE as f32 - x * PIXELS_PER_M,
-        );
+        let (u, v) = (0.5 * SIDE as f32 - y * PIXELS_PER_M, 0.5 * SIDE as f32 - x * PIXELS_PER_M);
         if u < 0.0 || v < 0.0 || u >= SIDE as f32 || v >= SIDE as f32 {
             continue;
         }
@@ -45,11 +42,7 @@ fn as_seen(sweep: &SimSweep) -> Vec<u8> {
         let [x, y, z] = p.position;
         let column = ((p.offset_s + 0.05) / 0.1 * WIDE as f32) as usize;
         let down = 2.0 - z.atan2(x.hypot(y)).to_degrees();
-        let beam = if down < 10.58 {
-            down * 31.0 / 10.33
-        } else {
-            32.0 + (down - 10.83) * 2.0
-        };
+        let beam = if down < 10.58 { down * 31.0 / 10.33 } else { 32.0 + (down - 10.83) * 2.0 };
         let beam = (beam.round().max(0.0) as usize).min(63);
         let shade = 0.35 + 0.65 * (-x.hypot(y) / 30.0).exp();
         let fast = t.velocity_world.iter().map(|v| v * v).sum::<f32>() > 0.04;
@@ -75,11 +68,7 @@ fn main() -> std::io::Result<()> {
     let drive = Drive::new(number(0), Options::default());
     let begin = std::time::Instant::now();
     let sweep = drive.sweep(number(1) as usize);
-    println!(
-        "{} returns in {:.0} ms",
-        sweep.points.len(),
-        1e3 * begin.elapsed().as_secs_f64()
-    );
+    println!("{} returns in {:.0} ms", sweep.points.len(), 1e3 * begin.elapsed().as_secs_f64());
     write(&format!("{folder}/above.ppm"), SIDE, &from_above(&sweep))?;
     write(&format!("{folder}/seen.ppm"), WIDE, &as_seen(&sweep))
 }

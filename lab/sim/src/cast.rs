@@ -68,13 +68,7 @@ impl<'a> Caster<'a> {
             let ((se, ce), (sa, ca)) = (b.elevation.sin_cos(), b.azimuth.sin_cos());
             DVec3::new(ce * ca, ce * sa, se)
         });
-        Caster {
-            scene,
-            sensor,
-            still,
-            movers,
-            beams: beams.collect(),
-        }
+        Caster { scene, sensor, still, movers, beams: beams.collect() }
     }
 
     /// The sweep stamped `stamp_s`, `ego` being `street_from_sensor` over time; cast by `threads`
@@ -89,11 +83,8 @@ impl<'a> Caster<'a> {
         let here = ego(stamp_s).translation;
         // The vehicle moves a few metres at most in half a turn.
         let range = self.sensor.range[1] + 5.0;
-        let near: Vec<&Target> = self
-            .still
-            .iter()
-            .filter(|t| (t.centre - here).length() < range + t.reach)
-            .collect();
+        let near: Vec<&Target> =
+            self.still.iter().filter(|t| (t.centre - here).length() < range + t.reach).collect();
         let columns = self.sensor.columns;
         let share = columns.div_ceil(threads.max(1)).max(1);
         let cast = |first: usize| {
@@ -135,17 +126,10 @@ impl<'a> Caster<'a> {
         let (s, c) = self.sensor.azimuth(column).sin_cos();
         let turn = ego.matrix();
         let across = turn * DVec3::new(-s, c, 0.0);
-        let fan = Fan {
-            origin: ego.translation,
-            forward: turn * DVec3::new(c, s, 0.0),
-            across,
-        };
+        let fan = Fan { origin: ego.translation, forward: turn * DVec3::new(c, s, 0.0), across };
         let range = self.sensor.range[1];
         let moving = self.moving_targets(&fan, t);
-        let still = near
-            .iter()
-            .copied()
-            .filter(|x| fan.meets(x.centre, x.reach, range));
+        let still = near.iter().copied().filter(|x| fan.meets(x.centre, x.reach, range));
         let targets: Vec<&Target> = still.chain(&moving).collect();
         for beam in &self.beams {
             let nominal = DVec3::new(beam.x * c - beam.y * s, beam.x * s + beam.y * c, beam.z);
@@ -207,22 +191,12 @@ impl<'a> Caster<'a> {
         targets: &[&'t Target],
         rng: &mut Rng,
     ) -> Option<Hit<'t>> {
-        let mut best = Hit {
-            range: self.sensor.range[1],
-            cosine: 0.0,
-            target: None,
-        };
+        let mut best = Hit { range: self.sensor.range[1], cosine: 0.0, target: None };
         if let Some(c) = self.scene.ground.contact(o, d) {
-            best = Hit {
-                range: c.range,
-                cosine: c.cosine,
-                target: None,
-            };
+            best = Hit { range: c.range, cosine: c.cosine, target: None };
         }
         for &target in targets {
-            let Some(c) = target
-                .shape
-                .cross(target.turn * (o - target.centre), target.turn * d)
+            let Some(c) = target.shape.cross(target.turn * (o - target.centre), target.turn * d)
             else {
                 continue;
             };
@@ -236,11 +210,7 @@ impl<'a> Caster<'a> {
                 range += 0.6 * u * u * (c.far - c.near);
             }
             if range < best.range {
-                best = Hit {
-                    range,
-                    cosine: c.cosine,
-                    target: Some(target),
-                };
+                best = Hit { range, cosine: c.cosine, target: Some(target) };
             }
         }
         (best.cosine > 0.0 && best.range < self.sensor.range[1]).then_some(best)
@@ -274,10 +244,6 @@ impl<'a> Caster<'a> {
             self.scene.world_from_street.rotation * (moved / (2.0 * STEP_S))
         });
         let velocity_world = velocity.as_vec3().to_array();
-        Truth {
-            object: target.object,
-            class: target.class,
-            velocity_world,
-        }
+        Truth { object: target.object, class: target.class, velocity_world }
     }
 }

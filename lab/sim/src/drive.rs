@@ -31,13 +31,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options {
-            sweeps: 30,
-            ego: Ego::Any,
-            density: 1.0,
-            sensor: Sensor::hdl64(),
-            threads: 0,
-        }
+        Options { sweeps: 30, ego: Ego::Any, density: 1.0, sensor: Sensor::hdl64(), threads: 0 }
     }
 }
 
@@ -73,25 +67,13 @@ impl Drive {
         let duration_s = options.sweeps as f64 / RATE_HZ;
         let plan = options.ego.plan(seed, duration_s);
         let scene = Scene::around(seed, &plan, duration_s, options.density);
-        Drive {
-            scene,
-            path: plan.path,
-            options,
-            seed,
-            next: 0,
-        }
+        Drive { scene, path: plan.path, options, seed, next: 0 }
     }
 
     /// A drive along a path (street frame) through a given scene; the seed draws the noise, and
     /// the options' ego and density do not count.
     pub fn through(scene: Scene, path: Path, seed: u64, options: Options) -> Drive {
-        Drive {
-            scene,
-            path,
-            options,
-            seed,
-            next: 0,
-        }
+        Drive { scene, path, options, seed, next: 0 }
     }
 
     /// What is driven through.
@@ -109,10 +91,7 @@ impl Drive {
         let span_s = self.options.sensor.turn_s;
         Rig {
             sensors: [Pose::IDENTITY].into_iter().collect(),
-            timing: Timing::Offset {
-                from_s: -0.5 * span_s,
-                span_s,
-            },
+            timing: Timing::Offset { from_s: -0.5 * span_s, span_s },
             distorted: true,
             ground_m: -self.options.sensor.height,
             own_vehicle: None,
@@ -131,10 +110,7 @@ impl Drive {
 
     fn street_from_vehicle(&self, t: f64) -> Pose {
         let state = self.path.at(t);
-        let foot = self
-            .scene
-            .ground
-            .stand(state.x, state.y, state.yaw, [2.7, 1.5]);
+        let foot = self.scene.ground.stand(state.x, state.y, state.yaw, [2.7, 1.5]);
         // The body nods and rolls a little on its springs once it moves.
         let swing = 0.003 * (state.speed.abs() / 8.0).min(1.0);
         let nod = DQuat::from_rotation_y(swing * (7.3 * t + 0.4).sin());

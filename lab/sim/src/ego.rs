@@ -49,38 +49,19 @@ impl Ego {
     pub(crate) fn plan(self, seed: u64, duration_s: f64) -> Plan {
         let mut rng = Rng::split(seed, 0);
         let crossing = rng.sign() * rng.range(18.0, 60.0);
-        let start = |speed: f64| {
-            Path::from(State {
-                x: 0.0,
-                y: -LANE,
-                yaw: 0.0,
-                speed,
-            })
-        };
+        let start = |speed: f64| Path::from(State { x: 0.0, y: -LANE, yaw: 0.0, speed });
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
-            Ego::Standing => Plan {
-                path: Path::standing(0.0, -LANE, 0.0),
-                crossing,
-            },
-            Ego::Straight { speed } => Plan {
-                path: start(speed),
-                crossing,
-            },
+            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing },
+            Ego::Straight { speed } => Plan { path: start(speed), crossing },
             Ego::StopAndGo { speed } => {
-                let path = start(speed)
-                    .then(0.1 * duration_s, 0.0, 0.0)
-                    .then_to_speed(0.0, 3.0);
+                let path = start(speed).then(0.1 * duration_s, 0.0, 0.0).then_to_speed(0.0, 3.0);
                 let path = path.then(1.0, 0.0, 0.0).then_to_speed(speed, 2.0);
                 Plan { path, crossing }
             }
             Ego::Turn { left, speed } => {
                 let before = (0.25 * duration_s).min(1.0);
-                let (radius, angle) = if left {
-                    (11.0, FRAC_PI_2)
-                } else {
-                    (8.0, -FRAC_PI_2)
-                };
+                let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
                 let path = start(speed).then(before, 0.0, 0.0).then_turn(angle, radius);
                 // The turn ends in the right lane of the crossing road.
                 let crossing = path.end().x - LANE.copysign(angle);
@@ -92,16 +73,9 @@ impl Ego {
     fn drawn(rng: &mut Rng) -> Ego {
         match (rng.unit() * 8.0) as u32 {
             0 => Ego::Standing,
-            1..4 => Ego::Straight {
-                speed: rng.range(2.0, 14.0),
-            },
-            4 => Ego::StopAndGo {
-                speed: rng.range(4.0, 10.0),
-            },
-            _ => Ego::Turn {
-                left: rng.chance(0.5),
-                speed: rng.range(3.5, 6.0),
-            },
+            1..4 => Ego::Straight { speed: rng.range(2.0, 14.0) },
+            4 => Ego::StopAndGo { speed: rng.range(4.0, 10.0) },
+            _ => Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) },
         }
     }
 }

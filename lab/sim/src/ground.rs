@@ -38,12 +38,7 @@ pub struct Contact {
 impl Ground {
     /// The plane z = 0.
     pub fn flat() -> Ground {
-        Ground {
-            planes: [DVec3::ZERO; 2],
-            valley: true,
-            crossing: None,
-            kerb: 0.0,
-        }
+        Ground { planes: [DVec3::ZERO; 2], valley: true, crossing: None, kerb: 0.0 }
     }
 
     /// A street whose slope changes at `bend_m` from `slopes[0]` to `slopes[1]` (rise over run
@@ -57,10 +52,7 @@ impl Ground {
     ) -> Ground {
         let after = (slopes[0] - slopes[1]) * bend_m;
         Ground {
-            planes: [
-                DVec3::new(slopes[0], across, 0.0),
-                DVec3::new(slopes[1], across, after),
-            ],
+            planes: [DVec3::new(slopes[0], across, 0.0), DVec3::new(slopes[1], across, after)],
             valley: slopes[1] >= slopes[0],
             crossing: Some(crossing_m),
             kerb: kerb_m,
@@ -89,11 +81,7 @@ impl Ground {
         let [a, b] = self.planes.map(|p| {
             let above = o.z - (p.x * o.x + p.y * o.y + p.z + lift);
             let sink = d.z - (p.x * d.x + p.y * d.y);
-            if sink < -1e-9 {
-                (-above / sink).max(0.0)
-            } else {
-                f64::INFINITY
-            }
+            if sink < -1e-9 { (-above / sink).max(0.0) } else { f64::INFINITY }
         });
         // Above a valley is above both planes, above a crest is above either.
         if self.valley { a.min(b) } else { a.max(b) }
@@ -102,10 +90,7 @@ impl Ground {
     /// Where the ray from `o` (above the ground) along the unit vector `d` meets the ground.
     pub fn contact(&self, o: DVec3, d: DVec3) -> Option<Contact> {
         let level = |range: f64| {
-            (range > 0.0 && range.is_finite()).then(|| Contact {
-                range,
-                cosine: self.cosine(d),
-            })
+            (range > 0.0 && range.is_finite()).then(|| Contact { range, cosine: self.cosine(d) })
         };
         let low = self.reach(o, d, 0.0);
         if self.crossing.is_none() {
@@ -124,19 +109,12 @@ impl Ground {
         let (mut before, mut after) = (high, low);
         for _ in 0..24 {
             let middle = 0.5 * (before + after);
-            *(if raised(middle) {
-                &mut after
-            } else {
-                &mut before
-            }) = middle;
+            *(if raised(middle) { &mut after } else { &mut before }) = middle;
         }
         let at = o + d * after;
         let along_x =
             at.y.abs() - ROAD_HALF < (at.x - self.crossing.unwrap_or(0.0)).abs() - CROSS_HALF;
-        Some(Contact {
-            range: after,
-            cosine: if along_x { d.y.abs() } else { d.x.abs() },
-        })
+        Some(Contact { range: after, cosine: if along_x { d.y.abs() } else { d.x.abs() } })
     }
 
     /// Cosine of incidence; the planes differ too little for it to matter which one is met.
@@ -159,10 +137,7 @@ impl Ground {
         let side = DVec3::new(-s * base[1], c * base[1], left - right);
         let up = forward.cross(side).normalize();
         let rotation = DMat3::from_cols(forward, up.cross(forward), up);
-        Pose::new(
-            DQuat::from_mat3(&rotation),
-            DVec3::new(x, y, 0.5 * (front + rear)),
-        )
+        Pose::new(DQuat::from_mat3(&rotation), DVec3::new(x, y, 0.5 * (front + rear)))
     }
 }
 
@@ -205,15 +180,9 @@ mod tests {
         let o = DVec3::new(0.0, 0.0, 1.5);
         let at = |d: DVec3| o + d * g.contact(o, d).unwrap().range;
         assert!(at(down(0.0, 3.0, -1.5)).z.abs() < 1e-9, "road");
-        assert!(
-            (at(down(0.0, 8.0, -1.35)).z - 0.15).abs() < 1e-9,
-            "sidewalk"
-        );
+        assert!((at(down(0.0, 8.0, -1.35)).z - 0.15).abs() < 1e-9, "sidewalk");
         let face = at(down(0.0, ROAD_HALF, -1.43));
-        assert!(
-            (face.y - ROAD_HALF).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4,
-            "face"
-        );
+        assert!((face.y - ROAD_HALF).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4, "face");
         assert_eq!(g.height(0.0, 0.0), 0.0);
         assert_eq!(g.height(0.0, 7.0), 0.15);
     }

@@ -52,29 +52,17 @@ pub struct Surface {
 impl Surface {
     /// A solid, opaque surface.
     pub fn matt(reflectivity: f64) -> Surface {
-        Surface {
-            reflectivity,
-            loss: 0.0,
-            porosity: 0.0,
-        }
+        Surface { reflectivity, loss: 0.0, porosity: 0.0 }
     }
 
     /// Windows: most rays go through or glance off and never come back.
     pub fn glass(reflectivity: f64) -> Surface {
-        Surface {
-            reflectivity,
-            loss: 0.55,
-            porosity: 0.0,
-        }
+        Surface { reflectivity, loss: 0.55, porosity: 0.0 }
     }
 
     /// Leaves or wire.
     pub fn porous(reflectivity: f64, porosity: f64) -> Surface {
-        Surface {
-            reflectivity,
-            loss: 0.0,
-            porosity,
-        }
+        Surface { reflectivity, loss: 0.0, porosity }
     }
 }
 

@@ -35,11 +35,7 @@ impl Leg {
         let turned = self.curvature * along;
         // Chord of the arc: sin(a/2)/(a/2) long, half way between the headings.
         let half = 0.5 * turned;
-        let chord = if half.abs() < 1e-9 {
-            along
-        } else {
-            along * half.sin() / half
-        };
+        let chord = if half.abs() < 1e-9 { along } else { along * half.sin() / half };
         let (s, c) = (self.from.yaw + half).sin_cos();
         State {
             x: self.from.x + chord * c,
@@ -53,24 +49,12 @@ impl Leg {
 impl Path {
     /// Straight on for ever, from this state at time 0.
     pub fn from(state: State) -> Path {
-        Path {
-            legs: vec![Leg {
-                start_s: 0.0,
-                from: state,
-                acceleration: 0.0,
-                curvature: 0.0,
-            }],
-        }
+        Path { legs: vec![Leg { start_s: 0.0, from: state, acceleration: 0.0, curvature: 0.0 }] }
     }
 
     /// Standing still at this place.
     pub fn standing(x: f64, y: f64, yaw: f64) -> Path {
-        Path::from(State {
-            x,
-            y,
-            yaw,
-            speed: 0.0,
-        })
+        Path::from(State { x, y, yaw, speed: 0.0 })
     }
 
     /// Appends a leg of this duration (s), acceleration (m/s^2) and curvature (1/m, left
@@ -81,12 +65,7 @@ impl Path {
             leg.curvature = curvature;
             let start_s = leg.start_s + duration;
             let from = leg.at(start_s);
-            self.legs.push(Leg {
-                start_s,
-                from,
-                acceleration: 0.0,
-                curvature: 0.0,
-            });
+            self.legs.push(Leg { start_s, from, acceleration: 0.0, curvature: 0.0 });
         }
         self
     }
@@ -106,11 +85,7 @@ impl Path {
     /// must not be zero.
     pub fn then_turn(self, angle: f64, radius: f64) -> Path {
         let speed = self.end().speed;
-        self.then(
-            angle.abs() * radius / speed,
-            0.0,
-            1.0f64.copysign(angle) / radius,
-        )
+        self.then(angle.abs() * radius / speed, 0.0, 1.0f64.copysign(angle) / radius)
     }
 
     /// State when the last leg begins.
@@ -121,9 +96,7 @@ impl Path {
     /// State at a time, s.
     pub fn at(&self, t: f64) -> State {
         let later = self.legs.iter().rev().find(|leg| leg.start_s <= t);
-        later
-            .or(self.legs.first())
-            .map_or(State::default(), |leg| leg.at(t))
+        later.or(self.legs.first()).map_or(State::default(), |leg| leg.at(t))
     }
 
     /// The same path moved by (x, y), m.
@@ -137,9 +110,7 @@ impl Path {
 
     /// Whether it never moves.
     pub fn is_still(&self) -> bool {
-        self.legs
-            .iter()
-            .all(|leg| leg.from.speed == 0.0 && leg.acceleration == 0.0)
+        self.legs.iter().all(|leg| leg.from.speed == 0.0 && leg.acceleration == 0.0)
     }
 }
 
@@ -150,16 +121,9 @@ mod tests {
 
     #[test]
     fn brakes_turns_and_goes_on() {
-        let start = State {
-            x: 1.0,
-            y: 2.0,
-            yaw: 0.0,
-            speed: 10.0,
-        };
-        let path = Path::from(start)
-            .then(1.0, 0.0, 0.0)
-            .then_to_speed(5.0, 2.5)
-            .then_turn(FRAC_PI_2, 8.0);
+        let start = State { x: 1.0, y: 2.0, yaw: 0.0, speed: 10.0 };
+        let path =
+            Path::from(start).then(1.0, 0.0, 0.0).then_to_speed(5.0, 2.5).then_turn(FRAC_PI_2, 8.0);
         assert_eq!(path.at(-1.0).x, -9.0);
         assert_eq!(path.at(1.0).x, 11.0);
         // Braking from 10 to 5 m/s at 2.5 m/s^2 takes 2 s and 15 m.
@@ -171,10 +135,7 @@ mod tests {
 
     #[test]
     fn heading_and_speed_are_the_derivative() {
-        let start = State {
-            speed: 6.0,
-            ..State::default()
-        };
+        let start = State { speed: 6.0, ..State::default() };
         let path = Path::from(start).then(4.0, 1.0, -0.05);
         let (h, t) = (1e-5, 2.3);
         let (a, b, m) = (path.at(t - h), path.at(t + h), path.at(t));

@@ -17,9 +17,7 @@ fn scatter(mut z: u64) -> u64 {
 impl Rng {
     /// The stream of a seed.
     pub fn new(seed: u64) -> Rng {
-        Rng {
-            state: scatter(seed ^ 0x9E37_79B9_7F4A_7C15),
-        }
+        Rng { state: scatter(seed ^ 0x9E37_79B9_7F4A_7C15) }
     }
 
     /// A stream of its own for part `index` of a seed, so that what one part draws does not move

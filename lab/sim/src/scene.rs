@@ -71,39 +71,19 @@ impl Scene {
         let (across, bend) = (rng.range(-0.012, 0.012), rng.range(-20.0, 60.0));
         let ground = Ground::street(slopes, across, bend, plan.crossing, rng.range(0.08, 0.16));
         let heading = rng.range(-std::f64::consts::PI, std::f64::consts::PI);
-        let world_from_street = Pose::planar(
-            rng.range(-200.0, 200.0),
-            rng.range(-200.0, 200.0),
-            0.0,
-            heading,
-        );
-        let mut scene = Scene {
-            ground,
-            fixtures: Vec::new(),
-            objects: Vec::new(),
-            world_from_street,
-        };
+        let world_from_street =
+            Pose::planar(rng.range(-200.0, 200.0), rng.range(-200.0, 200.0), 0.0, heading);
+        let mut scene =
+            Scene { ground, fixtures: Vec::new(), objects: Vec::new(), world_from_street };
         let extent = street::Extent::around(&plan.path, duration_s);
         street::build(&mut scene, extent, plan.crossing, &mut Rng::split(seed, 2));
-        traffic::fill(
-            &mut scene,
-            extent,
-            plan,
-            duration_s,
-            density,
-            &mut Rng::split(seed, 3),
-        );
+        traffic::fill(&mut scene, extent, plan, duration_s, density, &mut Rng::split(seed, 3));
         scene
     }
 
     /// Puts up something of the background; `pose` is `street_from_shape`.
     pub fn put(&mut self, class: Class, shape: Shape, pose: Pose, surface: Surface) {
-        self.fixtures.push(Fixture {
-            class,
-            shape,
-            pose,
-            surface,
-        });
+        self.fixtures.push(Fixture { class, shape, pose, surface });
     }
 
     /// Adds an object and returns its id. `model` is one of [`crate::models`]; `seed` chooses its
@@ -121,10 +101,7 @@ impl Scene {
 
     /// The objects at a time, s, in the order of their ids.
     pub fn states(&self, t: f64) -> Vec<ObjectState> {
-        self.objects
-            .iter()
-            .map(|object| self.state(object, t))
-            .collect()
+        self.objects.iter().map(|object| self.state(object, t)).collect()
     }
 
     fn state(&self, object: &Object, t: f64) -> ObjectState {

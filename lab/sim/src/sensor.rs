@@ -68,13 +68,7 @@ impl Sensor {
     /// The same sensor without noise and dropout, for comparison with closed forms.
     pub fn ideal() -> Sensor {
         let signal = f64::INFINITY;
-        Sensor {
-            range_noise: 0.0,
-            angle_noise: 0.0,
-            dropout: 0.0,
-            signal,
-            ..Sensor::hdl64()
-        }
+        Sensor { range_noise: 0.0, angle_noise: 0.0, dropout: 0.0, signal, ..Sensor::hdl64() }
     }
 
     /// Azimuth of a column in the sensor's frame, rad in (-pi, pi): from the rear through left,

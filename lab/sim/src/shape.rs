@@ -38,24 +38,17 @@ pub struct Crossing {
 impl Shape {
     /// A box of these full extents.
     pub fn cuboid(length: f64, width: f64, height: f64) -> Shape {
-        Shape::Cuboid {
-            half: DVec3::new(length, width, height) * 0.5,
-        }
+        Shape::Cuboid { half: DVec3::new(length, width, height) * 0.5 }
     }
 
     /// A cylinder of this radius and full height.
     pub fn cylinder(radius: f64, height: f64) -> Shape {
-        Shape::Cylinder {
-            radius,
-            half: 0.5 * height,
-        }
+        Shape::Cylinder { radius, half: 0.5 * height }
     }
 
     /// An ellipsoid of these half axes.
     pub fn ellipsoid(x: f64, y: f64, z: f64) -> Shape {
-        Shape::Ellipsoid {
-            radii: DVec3::new(x, y, z),
-        }
+        Shape::Ellipsoid { radii: DVec3::new(x, y, z) }
     }
 
     /// Radius of the sphere about the origin that holds the solid, m.
@@ -142,11 +135,7 @@ fn cross_ellipsoid(radii: DVec3, o: DVec3, d: DVec3) -> Option<Crossing> {
     let near = (-b - root) / a;
     let normal = (p + q * near) / radii;
     let cosine = d.dot(normal).abs() / normal.dot(normal).sqrt();
-    Some(Crossing {
-        near,
-        far: (-b + root) / a,
-        cosine,
-    })
+    Some(Crossing { near, far: (-b + root) / a, cosine })
 }
 
 #[cfg(test)]
@@ -168,10 +157,7 @@ mod tests {
         assert!(close(c.near, 4.0 * 2f64.sqrt()) && close(c.far, 5.5 * 2f64.sqrt()));
         assert!(close(c.cosine, 0.5f64.sqrt()));
         assert!(s.cross(DVec3::new(-10.0, 1.1, 0.0), DVec3::X).is_none());
-        assert!(
-            s.cross(DVec3::new(10.0, 0.0, 0.0), DVec3::X).is_none(),
-            "behind"
-        );
+        assert!(s.cross(DVec3::new(10.0, 0.0, 0.0), DVec3::X).is_none(), "behind");
         assert!(s.cross(DVec3::ZERO, DVec3::X).is_none(), "inside");
     }
 

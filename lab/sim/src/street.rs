@@ -23,10 +23,7 @@ pub(crate) struct Extent {
 
 impl Extent {
     pub(crate) fn around(path: &Path, duration_s: f64) -> Extent {
-        let mut extent = Extent {
-            x: [0.0; 2],
-            y: [0.0; 2],
-        };
+        let mut extent = Extent { x: [0.0; 2], y: [0.0; 2] };
         let steps = (duration_s * 4.0).ceil() as u32;
         for i in 0..=steps {
             let s = path.at(f64::from(i) * 0.25);
@@ -34,20 +31,13 @@ impl Extent {
             extent.y = [extent.y[0].min(s.y), extent.y[1].max(s.y)];
         }
         let widen = |v: [f64; 2]| [v[0] - VIEW, v[1] + VIEW];
-        Extent {
-            x: widen(extent.x),
-            y: widen(extent.y),
-        }
+        Extent { x: widen(extent.x), y: widen(extent.y) }
     }
 }
 
 /// Builds the background into the scene.
 pub(crate) fn build(scene: &mut Scene, extent: Extent, crossing: f64, rng: &mut Rng) {
-    let mut yard = Yard {
-        scene,
-        crossing,
-        rng,
-    };
+    let mut yard = Yard { scene, crossing, rng };
     for side in [-1.0, 1.0] {
         yard.houses_along_road(extent.x, side);
         yard.houses_along_crossing(extent.y, side);
@@ -74,8 +64,7 @@ impl Yard<'_> {
         surface: Surface,
     ) {
         let z = self.scene.ground.height(at[0], at[1]) + at[2] + 0.5 * height;
-        self.scene
-            .put(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
+        self.scene.put(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
     }
 
     fn cuboid(&mut self, class: Class, at: [f64; 2], size: [f64; 3], yaw: f64, surface: Surface) {
@@ -110,13 +99,7 @@ impl Yard<'_> {
             let depth = self.rng.range(8.0, 13.0);
             let size = [length, depth, self.rng.range(4.0, 18.0)];
             let wall = Surface::matt(self.rng.range(0.25, 0.6));
-            self.cuboid(
-                Class::Building,
-                [middle, side * (front + 0.5 * depth)],
-                size,
-                0.0,
-                wall,
-            );
+            self.cuboid(Class::Building, [middle, side * (front + 0.5 * depth)], size, 0.0, wall);
             self.front(middle, side, front, length, wall);
         }
     }
@@ -127,11 +110,7 @@ impl Yard<'_> {
         for _ in 0..count {
             let x = middle + self.rng.range(-0.42, 0.42) * length;
             let out = self.rng.range(0.15, 0.6);
-            let size = [
-                self.rng.range(0.8, 3.0),
-                2.0 * out,
-                self.rng.range(0.4, 4.0),
-            ];
+            let size = [self.rng.range(0.8, 3.0), 2.0 * out, self.rng.range(0.4, 4.0)];
             self.cuboid(Class::Building, [x, side * front], size, 0.0, wall);
         }
     }
@@ -143,11 +122,8 @@ impl Yard<'_> {
             self.tree(x + aside, y);
         }
         if self.rng.chance(0.6) {
-            let size = [
-                self.rng.range(8.0, 20.0),
-                self.rng.range(6.0, 12.0),
-                self.rng.range(3.0, 10.0),
-            ];
+            let size =
+                [self.rng.range(8.0, 20.0), self.rng.range(6.0, 12.0), self.rng.range(3.0, 10.0)];
             let yaw = self.rng.range(-0.5, 0.5);
             let back = y + y.signum() * self.rng.range(22.0, 40.0);
             self.cuboid(Class::Building, [x, back], size, yaw, Surface::matt(0.4));
@@ -162,18 +138,11 @@ impl Yard<'_> {
                 let front = CROSS_HALF + 3.0 + self.rng.range(0.0, 3.0);
                 let depth = self.rng.range(8.0, 12.0);
                 let size = [depth, length, self.rng.range(4.0, 16.0)];
-                let place = [
-                    self.crossing + side * (front + 0.5 * depth),
-                    sign * (at + 0.5 * length),
-                ];
+                let place =
+                    [self.crossing + side * (front + 0.5 * depth), sign * (at + 0.5 * length)];
                 let wall = Surface::matt(self.rng.range(0.25, 0.6));
                 self.cuboid(Class::Building, place, size, 0.0, wall);
-                at += length
-                    + if self.rng.chance(0.3) {
-                        self.rng.range(3.0, 9.0)
-                    } else {
-                        0.0
-                    };
+                at += length + if self.rng.chance(0.3) { self.rng.range(3.0, 9.0) } else { 0.0 };
             }
         }
     }
@@ -203,28 +172,14 @@ impl Yard<'_> {
 
     fn pole(&mut self, x: f64, y: f64, radius: f64, height: f64) {
         let shape = Shape::cylinder(radius, height + 0.2);
-        self.put(
-            Class::Pole,
-            shape,
-            [x, y, -0.2],
-            height + 0.2,
-            0.0,
-            Surface::matt(0.4),
-        );
+        self.put(Class::Pole, shape, [x, y, -0.2], height + 0.2, 0.0, Surface::matt(0.4));
     }
 
     fn sign(&mut self, x: f64, y: f64) {
         let (height, yaw) = (self.rng.range(2.2, 3.0), self.rng.range(-0.2, 0.2));
         self.pole(x, y, 0.035, height);
         let face = Surface::matt(1.0);
-        self.put(
-            Class::Pole,
-            Shape::cuboid(0.04, 0.6, 0.6),
-            [x, y, height - 0.6],
-            0.6,
-            yaw,
-            face,
-        );
+        self.put(Class::Pole, Shape::cuboid(0.04, 0.6, 0.6), [x, y, height - 0.6], 0.6, yaw, face);
     }
 
     fn bin(&mut self, x: f64, y: f64) {
@@ -302,7 +257,6 @@ impl Yard<'_> {
         let z = self.scene.ground.height(x, y) + 0.4 * h;
         let pose = Pose::new(tilt, DVec3::new(x, y, z));
         let shape = Shape::ellipsoid(1.2 * r, r, 0.5 * h);
-        self.scene
-            .put(Class::Vegetation, shape, pose, Surface::porous(0.45, 0.3));
+        self.scene.put(Class::Vegetation, shape, pose, Surface::porous(0.45, 0.3));
     }
 }

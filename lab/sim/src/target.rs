@@ -43,16 +43,7 @@ impl Target {
     pub(crate) fn solid(shape: Shape, pose: Pose, surface: Surface, class: Class) -> Target {
         let turn = pose.matrix().transpose();
         let (centre, reach) = (pose.translation, shape.reach());
-        Target {
-            shape,
-            turn,
-            centre,
-            reach,
-            surface,
-            class,
-            object: 0,
-            mover: None,
-        }
+        Target { shape, turn, centre, reach, surface, class, object: 0, mover: None }
     }
 }
 

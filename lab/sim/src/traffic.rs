@@ -29,28 +29,13 @@ pub(crate) fn fill(
     rng: &mut Rng,
 ) {
     let mut taken = vec![Footprint::new(&plan.path, 4.6, 1.9, duration_s)];
-    taken.extend(
-        scene
-            .fixtures
-            .iter()
-            .filter_map(|fixture| obstacle(fixture, duration_s)),
-    );
-    let mut fill = Fill {
-        scene,
-        plan,
-        duration_s,
-        taken,
-        rng,
-    };
+    taken.extend(scene.fixtures.iter().filter_map(|fixture| obstacle(fixture, duration_s)));
+    let mut fill = Fill { scene, plan, duration_s, taken, rng };
     fill.park(extent.x, density);
     let amount =
         |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
     for _ in 0..amount(12.0, 0.7) {
-        let model: Model = if fill.rng.chance(0.75) {
-            models::car
-        } else {
-            models::van
-        };
+        let model: Model = if fill.rng.chance(0.75) { models::car } else { models::van };
         fill.mover(model, Fill::driver);
     }
     for _ in 0..amount(4.0, 0.2) {
@@ -69,18 +54,9 @@ fn obstacle(fixture: &Fixture, duration_s: f64) -> Option<Footprint> {
         Shape::Cuboid { half } if half.x < 1.0 => 2.0 * half.y,
         _ => return None,
     };
-    let length = if let Shape::Cuboid { half } = fixture.shape {
-        2.0 * half.x
-    } else {
-        width
-    };
+    let length = if let Shape::Cuboid { half } = fixture.shape { 2.0 * half.x } else { width };
     let at = fixture.pose.translation;
-    Some(Footprint::new(
-        &Path::standing(at.x, at.y, 0.0),
-        length,
-        width,
-        duration_s,
-    ))
+    Some(Footprint::new(&Path::standing(at.x, at.y, 0.0), length, width, duration_s))
 }
 
 /// Discs that cover an object over time.
@@ -97,16 +73,11 @@ impl Footprint {
             let state = path.at(t);
             let (s, c) = state.yaw.sin_cos();
             let along = |i: u32| (f64::from(i) + 0.5) / count * length - 0.5 * length;
-            (0..count as u32)
-                .map(|i| [state.x + c * along(i), state.y + s * along(i)])
-                .collect()
+            (0..count as u32).map(|i| [state.x + c * along(i), state.y + s * along(i)]).collect()
         };
         let steps = (duration_s / CHECK_S).ceil() as u32 + 1;
         let centres = (0..steps).map(|i| discs(f64::from(i) * CHECK_S)).collect();
-        Footprint {
-            centres,
-            radius: 0.5 * width + 0.15,
-        }
+        Footprint { centres, radius: 0.5 * width + 0.15 }
     }
 
     fn touches(&self, other: &Footprint) -> bool {
@@ -130,12 +101,8 @@ impl Fill<'_> {
     /// Adds the object if its path is clear.
     fn offer(&mut self, model: Model, path: Path) -> bool {
         let object = model(self.scene.objects.len() as u32 + 1, path, self.rng);
-        let footprint = Footprint::new(
-            &object.path,
-            object.size[0],
-            object.size[1],
-            self.duration_s,
-        );
+        let footprint =
+            Footprint::new(&object.path, object.size[0], object.size[1], self.duration_s);
         if self.taken.iter().any(|other| footprint.touches(other)) {
             return false;
         }
@@ -167,11 +134,7 @@ impl Fill<'_> {
                 let against = if self.rng.chance(0.15) { PI } else { 0.0 };
                 let yaw = if side < 0.0 { 0.0 } else { PI } + against + 0.03 * self.rng.bell();
                 let y = side * (ROAD_HALF - 1.1 + self.rng.range(-0.08, 0.08));
-                let model: Model = if self.rng.chance(0.8) {
-                    models::car
-                } else {
-                    models::van
-                };
+                let model: Model = if self.rng.chance(0.8) { models::car } else { models::van };
                 self.offer(model, Path::standing(at, y, yaw));
             }
         }
@@ -195,21 +158,14 @@ impl Fill<'_> {
     }
 
     fn rider(&mut self) -> Path {
-        if self.rng.chance(0.75) {
-            self.along(3.1, 3.0, 6.0)
-        } else {
-            self.crossing(3.2, 3.0, 6.0)
-        }
+        if self.rng.chance(0.75) { self.along(3.1, 3.0, 6.0) } else { self.crossing(3.2, 3.0, 6.0) }
     }
 
     /// Straight along the main road, `beside` its centre line.
     fn along(&mut self, beside: f64, slow: f64, fast: f64) -> Path {
         let (t, x) = self.meeting();
         let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
-        Path::from(State {
-            x: x - way * speed * t,
-            ..lane(way, beside, speed)
-        })
+        Path::from(State { x: x - way * speed * t, ..lane(way, beside, speed) })
     }
 
     /// Brakes or speeds up, beginning when it meets the vehicle.
@@ -222,10 +178,7 @@ impl Fill<'_> {
             self.rng.range(speed, 15.0f64.max(speed))
         };
         let rate = self.rng.range(1.0, 4.0);
-        let start = State {
-            x: x - way * speed * t,
-            ..lane(way, LANE, speed)
-        };
+        let start = State { x: x - way * speed * t, ..lane(way, LANE, speed) };
         // Half begin before the drive does.
         let begin = (t - self.rng.range(0.0, 2.0)).max(0.0);
         let path = Path::from(start).then(begin, 0.0, 0.0);
@@ -236,23 +189,14 @@ impl Fill<'_> {
     fn turning(&mut self) -> Path {
         let (way, speed) = (self.rng.sign(), self.rng.range(3.5, 6.5));
         let left = self.rng.chance(0.4);
-        let (radius, angle) = if left {
-            (11.0, FRAC_PI_2)
-        } else {
-            (8.0, -FRAC_PI_2)
-        };
+        let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
         let before = self.rng.range(0.0, self.duration_s.max(2.0));
         // Relative to the crossing and along the way: where the turn begins so that it ends in
         // the right lane.
         let begin = if left { LANE - radius } else { -LANE - radius };
         let x = self.plan.crossing + way * (begin - speed * before);
-        let start = State {
-            x,
-            ..lane(way, LANE, speed)
-        };
-        Path::from(start)
-            .then(before, 0.0, 0.0)
-            .then_turn(angle, radius)
+        let start = State { x, ..lane(way, LANE, speed) };
+        Path::from(start).then(before, 0.0, 0.0).then_turn(angle, radius)
     }
 
     /// Along the crossing road.
@@ -279,36 +223,19 @@ impl Fill<'_> {
             0 => Path::standing(x, y, self.rng.range(-PI, PI)),
             1..4 => {
                 let before = t * self.rng.unit();
-                let start = State {
-                    x: x - way * speed * before,
-                    y,
-                    yaw,
-                    speed,
-                };
+                let start = State { x: x - way * speed * before, y, yaw, speed };
                 // Left or right by a quarter onto the road, back along the other sidewalk.
                 let quarter = -side * way * FRAC_PI_2;
-                let path = Path::from(start)
-                    .then(before, 0.0, 0.0)
-                    .then_turn(quarter, 0.8);
+                let path = Path::from(start).then(before, 0.0, 0.0).then_turn(quarter, 0.8);
                 let over = 2.0 * (y.abs() - 0.8);
                 path.then(over / speed, 0.0, 0.0).then_turn(-quarter, 0.8)
             }
-            _ => Path::from(State {
-                x: x - way * speed * t,
-                y,
-                yaw,
-                speed,
-            }),
+            _ => Path::from(State { x: x - way * speed * t, y, yaw, speed }),
         }
     }
 }
 
 /// Start in a lane of the main road, heading along +x or -x, on the right side of it.
 fn lane(way: f64, beside: f64, speed: f64) -> State {
-    State {
-        x: 0.0,
-        y: -way * beside,
-        yaw: if way > 0.0 { 0.0 } else { PI },
-        speed,
-    }
+    State { x: 0.0, y: -way * beside, yaw: if way > 0.0 { 0.0 } else { PI }, speed }
 }

@@ -7,24 +7,12 @@ use raywake_sim::{Shape, models};
 use std::collections::BTreeSet;
 
 fn options(ego: Ego, sweeps: usize) -> Options {
-    Options {
-        ego,
-        sweeps,
-        ..Options::default()
-    }
+    Options { ego, sweeps, ..Options::default() }
 }
 
 /// A drive without noise through a given scene.
 fn ideal(scene: Scene, path: Path) -> Drive {
-    Drive::through(
-        scene,
-        path,
-        1,
-        Options {
-            sensor: Sensor::ideal(),
-            ..Options::default()
-        },
-    )
+    Drive::through(scene, path, 1, Options { sensor: Sensor::ideal(), ..Options::default() })
 }
 
 fn vector(p: [f32; 3]) -> DVec3 {
@@ -42,32 +30,19 @@ fn in_world<'a>(drive: &'a Drive, sweep: &'a SimSweep) -> impl Iterator<Item = (
 #[test]
 fn threads_do_not_show() {
     let make = |threads: usize| {
-        let options = Options {
-            threads,
-            ..options(Ego::Any, 2)
-        };
+        let options = Options { threads, ..options(Ego::Any, 2) };
         Drive::new(11, options).collect::<Vec<_>>()
     };
     let (one, two, three) = (make(1), make(2), make(3));
     assert_eq!(one, two);
     assert_eq!(one, three);
     let bits = |s: &SimSweep| {
-        s.points
-            .iter()
-            .flat_map(|p| p.position.map(f32::to_bits))
-            .collect::<Vec<_>>()
+        s.points.iter().flat_map(|p| p.position.map(f32::to_bits)).collect::<Vec<_>>()
     };
     assert_eq!(bits(&one[1]), bits(&two[1]));
     assert_ne!(one[0].points, one[1].points);
-    assert_ne!(
-        Drive::new(12, options(Ego::Any, 2)).sweep(0).points,
-        one[0].points
-    );
-    assert_eq!(
-        Drive::new(11, options(Ego::Any, 2)).sweep(1),
-        one[1],
-        "any sweep on its own"
-    );
+    assert_ne!(Drive::new(12, options(Ego::Any, 2)).sweep(0).points, one[0].points);
+    assert_eq!(Drive::new(11, options(Ego::Any, 2)).sweep(1), one[1], "any sweep on its own");
 }
 
 #[test]
@@ -88,11 +63,7 @@ fn amounts() {
                 }
             }
         }
-        assert!(
-            moving.len() >= 12,
-            "seed {seed}: {} moving objects seen",
-            moving.len()
-        );
+        assert!(moving.len() >= 12, "seed {seed}: {} moving objects seen", moving.len());
         assert!(classes.len() >= 8, "seed {seed}: {classes:?}");
     }
 }
@@ -101,26 +72,14 @@ fn amounts() {
 fn rig_and_time() {
     let drive = Drive::new(5, options(Ego::Straight { speed: 10.0 }, 3));
     let rig = drive.rig();
-    assert_eq!(
-        rig.timing,
-        Timing::Offset {
-            from_s: -0.05,
-            span_s: 0.1
-        }
-    );
+    assert_eq!(rig.timing, Timing::Offset { from_s: -0.05, span_s: 0.1 });
     assert!(rig.distorted && rig.sensors.len() == 1 && rig.ground_m == -1.73);
     let sweep = drive.sweep(1);
     assert_eq!(sweep.stamp_s, 0.1);
     assert!((sweep.twist.linear.x - 10.0).abs() < 0.1 && sweep.twist.linear.y.abs() < 0.1);
     let (first, last) = (sweep.points[0], sweep.points[sweep.points.len() - 1]);
-    assert!(
-        first.position[0] < 0.0 && first.position[1] > 0.0,
-        "starts at the rear left"
-    );
-    assert!(
-        last.position[0] < 0.0 && last.position[1] < 0.0,
-        "ends at the rear right"
-    );
+    assert!(first.position[0] < 0.0 && first.position[1] > 0.0, "starts at the rear left");
+    assert!(last.position[0] < 0.0 && last.position[1] < 0.0, "ends at the rear right");
     let mut before = -0.05;
     for p in &sweep.points {
         assert!(p.offset_s >= before && p.offset_s < 0.05);
@@ -137,17 +96,8 @@ fn rig_and_time() {
 fn ground_and_wall_are_planes() {
     let mut scene = Scene::empty();
     let pose = raywake_core::pose::Pose::planar(20.0, 0.0, 2.0, 0.0);
-    scene.put(
-        Class::Building,
-        Shape::cuboid(2.0, 60.0, 4.0),
-        pose,
-        Surface::matt(0.5),
-    );
-    let start = State {
-        speed: 12.0,
-        yaw: 0.3,
-        ..State::default()
-    };
+    scene.put(Class::Building, Shape::cuboid(2.0, 60.0, 4.0), pose, Surface::matt(0.5));
+    let start = State { speed: 12.0, yaw: 0.3, ..State::default() };
     let drive = ideal(scene, Path::from(start).then(5.0, 0.0, 0.05));
     let sweep = drive.sweep(2);
     let (mut ground, mut wall) = (0, 0);
@@ -177,10 +127,8 @@ fn no_ray_is_missed() {
     let eye = DVec3::new(0.0, 0.0, sensor.height);
     let rays = (0..sensor.columns).flat_map(|c| sensor.beams.iter().map(move |b| (c, b)));
     let expected = rays.filter(|&(column, beam)| {
-        let ((sa, ca), (se, ce)) = (
-            (sensor.azimuth(column) + beam.azimuth).sin_cos(),
-            beam.elevation.sin_cos(),
-        );
+        let ((sa, ca), (se, ce)) =
+            ((sensor.azimuth(column) + beam.azimuth).sin_cos(), beam.elevation.sin_cos());
         let ray = DVec3::new(ce * ca, ce * sa, se);
         (centre - eye).cross(ray).length() < radius && ray.dot(centre - eye) > 0.0
     });
@@ -205,13 +153,7 @@ fn movers() -> Scene {
 
 #[test]
 fn velocity_is_the_pose_s_derivative() {
-    let drive = ideal(
-        movers(),
-        Path::from(State {
-            speed: 5.0,
-            ..State::default()
-        }),
-    );
+    let drive = ideal(movers(), Path::from(State { speed: 5.0, ..State::default() }));
     let sweep = drive.sweep(3);
     let mut seen = BTreeSet::new();
     for ((p, t), truth) in in_world(&drive, &sweep).zip(&sweep.truth) {
@@ -227,11 +169,7 @@ fn velocity_is_the_pose_s_derivative() {
         let expected = (at(t + h) - at(t - h)) / (2.0 * h);
         let off = (vector(truth.velocity_world) - expected).length();
         // Limbs swing besides: up to their length times amplitude times rate.
-        let limit = if state(t).class.max(Class::Van) > Class::Van {
-            2.5
-        } else {
-            1e-3
-        };
+        let limit = if state(t).class.max(Class::Van) > Class::Van { 2.5 } else { 1e-3 };
         assert!(off < limit, "{:?}: {off} m/s", state(t).class);
         let [l, w, height] = state(t).size.map(|v| 0.5 * v);
         if state(t).class <= Class::Van {
@@ -248,11 +186,7 @@ fn velocity_is_the_pose_s_derivative() {
     let torso: Vec<_> = sweep.truth.iter().filter(|t| t.object == 4).collect();
     let exact = |t: &&&raywake_sim::Truth| (vector(t.velocity_world).length() - 1.4).abs() < 1e-4;
     let steady = torso.iter().filter(exact).count();
-    assert!(
-        steady > 20 && steady < torso.len(),
-        "{steady} of {} on the torso",
-        torso.len()
-    );
+    assert!(steady > 20 && steady < torso.len(), "{steady} of {} on the torso", torso.len());
 }
 
 #[test]
@@ -265,14 +199,9 @@ fn states_move_at_their_velocity() {
         assert_eq!(s.id as usize, i + 1);
         assert!(s.class.is_foreground());
         let [a, b] = [t - h, t + h].map(|t| drive.objects(t)[i].world_from_object.translation);
-        assert!(
-            ((b - a) / (2.0 * h) - s.velocity_world).length() < 0.1,
-            "{s:?}"
-        );
+        assert!(((b - a) / (2.0 * h) - s.velocity_world).length() < 0.1, "{s:?}");
     }
-    let parked = states
-        .iter()
-        .filter(|s| s.velocity_world == DVec3::ZERO && s.class <= Class::Van);
+    let parked = states.iter().filter(|s| s.velocity_world == DVec3::ZERO && s.class <= Class::Van);
     assert!(parked.count() > 10);
 }
 

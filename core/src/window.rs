@@ -1,0 +1,76 @@
+//! The window that promotes spatial smoothness (3.13).
+
+use crate::occupancy_constancy::ROW;
+use crate::params::COST_UNKNOWN;
+use crate::record::{NONE, Step};
+
+/// Sums costs over the 3x3 window that moves with the source (3.13, as the author programmed it):
+/// row `n` of `matching` becomes the sum of the rows of the foreground neighbours of
+/// `foreground[n]`, itself included, plus [`COST_UNKNOWN`] for each neighbour inside the window
+/// that is empty or filtered. Neighbours outside are [`outside_cost`], a constant of the column.
+pub fn window(step: &Step, foreground: &[u32], rank: &[u32], cost: &[u16], matching: &mut [u16]) {
+    for (&source, sum) in foreground.iter().zip(matching.chunks_exact_mut(ROW)) {
+        sum.fill(0);
+        let mut unknown = 0;
+        for neighbour in neighbours(step, source as usize).into_iter().flatten() {
+            match rank[neighbour] {
+                NONE => unknown += COST_UNKNOWN as u16,
+                n => {
+                    let row = &cost[n as usize * ROW..][..ROW];
+                    sum.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
+                }
+            }
+        }
+        sum.iter_mut().for_each(|sum| *sum += unknown);
+    }
+}
+
+/// Cost of the window neighbours of a column that lie outside the grid.
+pub fn outside_cost(step: &Step, column: usize) -> i32 {
+    let missing = neighbours(step, column).iter().filter(|n| n.is_none()).count();
+    missing as i32 * step.outside_cost
+}
+
+/// The 3x3 columns around one, [`None`] outside the window.
+fn neighbours(step: &Step, column: usize) -> [Option<usize>; 9] {
+    let side = step.side;
+    let (i, j) = (column as i32 / side, column as i32 % side);
+    core::array::from_fn(|n| {
+        let (i, j) = (i + n as i32 / 3 - 1, j + n as i32 % 3 - 1);
+        let inside = (0..side).contains(&i) && (0..side).contains(&j);
+        inside.then_some((i * side + j) as usize)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    #[test]
+    fn the_window_adds_what_each_neighbour_says() {
+        let step = Step { side: 33, outside_cost: 693, ..Default::default() };
+        let foreground: Vec<u32> = (0..33 * 33).filter(|n| n % 4 != 0).collect();
+        let mut rank = vec![NONE; 33 * 33];
+        foreground.iter().enumerate().for_each(|(n, c)| rank[*c as usize] = n as u32);
+        let cost: Vec<u16> = (0..foreground.len() * ROW).map(|n| (n * 31 % 5379) as u16).collect();
+        let mut matching = vec![0; foreground.len() * ROW];
+        window(&step, &foreground, &rank, &cost, &mut matching);
+        for (n, source) in foreground.iter().enumerate().step_by(7) {
+            let (i, j) = (*source as i32 / 33, *source as i32 % 33);
+            for d in [0, 480, 960] {
+                let mut sum = 0;
+                for w in 0..9 {
+                    let (i, j) = (i + w / 3 - 1, j + w % 3 - 1);
+                    let inside = (0..33).contains(&i) && (0..33).contains(&j);
+                    let r = if inside { rank[(i * 33 + j) as usize] } else { NONE };
+                    sum += if r == NONE { 693 } else { cost[r as usize * ROW + d] as u32 };
+                }
+                let outside = outside_cost(&step, *source as usize) as u32;
+                assert_eq!(matching[n * ROW + d] as u32 + outside, sum);
+            }
+        }
+    }
+}
