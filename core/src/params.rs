@@ -34,8 +34,8 @@ pub const EXTENT_VOXELS: i32 = 4095;
 pub const BAND_UPDATES: usize = 1 << 20;
 /// Threads of a workgroup of every one-dimensional kernel.
 pub const WORKGROUP: usize = 256;
-/// Threads of a workgroup that scores one foreground column.
-pub const SCORE_WORKGROUP: usize = 64;
+/// Threads of a workgroup where each handles a ray or a foreground column, or all of them one column.
+pub const ROW_WORKGROUP: usize = 64;
 /// Items a workgroup of the prefix sum and of the radix sort handles.
 pub const TILE: usize = 1024;
 /// Digit values of one radix pass (4 bits).

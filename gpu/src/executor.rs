@@ -75,6 +75,15 @@ impl Executor {
         slot.mapped_mut().expect("upload buffers are mapped")
     }
 
+    /// Several different [`Heap::Upload`] buffers at once.
+    pub fn uploads<const N: usize>(&mut self, buffers: [usize; N]) -> [&mut [u32]; N] {
+        let slots = self.slots.get_disjoint_mut(buffers).expect("different buffers of the table");
+        slots.map(|slot| {
+            assert_eq!(slot.row.heap, Heap::Upload, "{}", slot.row.name);
+            slot.mapped_mut().expect("upload buffers are mapped")
+        })
+    }
+
     /// The words of a [`Heap::Readback`] buffer, as the last run left them.
     ///
     /// Empty once a run has failed, because the device may still be writing there.

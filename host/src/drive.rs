@@ -70,7 +70,6 @@ impl Drive {
             laps.lap("prepare");
             let rounds = self.pipeline.profile().em_rounds;
             let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps)?;
-            laps.skip();
             let output = Output { columns: &mut self.columns, points: &mut self.points };
             let flows = self.pipeline.follow(&prepared.step, &perceived, before, output);
             laps.lap("follow");

@@ -41,9 +41,11 @@ impl Laps {
         self.count = self.count.max(at + 1);
     }
 
-    /// Restarts the clock without booking anything.
-    pub fn skip(&mut self) {
-        self.last = Instant::now();
+    /// Books to `name` what has passed since the last lap beyond `booked` milliseconds.
+    pub fn rest(&mut self, name: &'static str, booked: f64) {
+        let now = Instant::now();
+        self.add(name, ((now - self.last).as_secs_f64() * 1e3 - booked).max(0.0));
+        self.last = now;
     }
 
     /// Names and milliseconds.

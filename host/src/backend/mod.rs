@@ -1,5 +1,6 @@
 //! The heavy half of the pipeline, from rays to flow: on the CPU or on a Vulkan device.
 
+pub mod device;
 pub mod scalar;
 
 use raywake_core::background_filter::{self, TABLE_WORDS};
@@ -7,7 +8,7 @@ use raywake_core::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Perceived;
 use raywake_core::record::{Ray, Step};
-use raywake_gpu::GpuError;
+use raywake_gpu::{Census, GpuError};
 
 use crate::laps::Laps;
 
@@ -65,6 +66,8 @@ impl Tables {
 pub enum Backend {
     /// The core's twins on one thread.
     Scalar(Box<scalar::Scalar>),
+    /// The kernels on a Vulkan device.
+    Device(Box<device::Device>),
 }
 
 impl Backend {
@@ -72,6 +75,7 @@ impl Backend {
     pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
         match self {
             Backend::Scalar(b) => b.input(),
+            Backend::Device(b) => b.input(),
         }
     }
 
@@ -84,6 +88,7 @@ impl Backend {
     ) -> Result<Perceived<'_>, GpuError> {
         match self {
             Backend::Scalar(b) => Ok(b.perceive(step, rounds, laps)),
+            Backend::Device(b) => b.perceive(step, laps),
         }
     }
 
@@ -91,6 +96,7 @@ impl Backend {
     pub fn name(&self) -> &'static str {
         match self {
             Backend::Scalar(_) => "scalar",
+            Backend::Device(_) => "vulkan",
         }
     }
 
@@ -98,6 +104,30 @@ impl Backend {
     pub fn device(&self) -> &str {
         match self {
             Backend::Scalar(_) => "CPU, one thread",
+            Backend::Device(b) => b.name(),
+        }
+    }
+
+    /// From now on nothing may be allocated or created.
+    pub fn seal(&mut self) {
+        if let Backend::Device(b) = self {
+            b.seal();
+        }
+    }
+
+    /// What a device allocated and created.
+    pub fn census(&self) -> Option<Census> {
+        match self {
+            Backend::Scalar(_) => None,
+            Backend::Device(b) => Some(b.census()),
+        }
+    }
+
+    /// Messages of the validation layer, the first few.
+    pub fn messages(&self) -> Vec<String> {
+        match self {
+            Backend::Scalar(_) => Vec::new(),
+            Backend::Device(b) => b.messages(),
         }
     }
 }

@@ -1,0 +1,125 @@
+//! Limits every kernel keeps, so that it runs on the least of Vulkan devices.
+
+use crate::reflect::Bound;
+use naga::{AddressSpace, Block, EntryPoint, Module, Statement};
+use std::path::Path;
+
+/// Storage buffers of a kernel.
+const BUFFERS_MAX: usize = 8;
+/// Invocations of a workgroup.
+const INVOCATIONS_MAX: u32 = 256;
+/// Bytes of workgroup memory.
+const SHARED_BYTES_MAX: u32 = 16 << 10;
+/// Iterations of all loops of an invocation: a software device ends loops, silently, after 65,535.
+const ITERATIONS_MAX: u64 = 50_000;
+
+/// Checks an entry point.
+pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &[Bound]) {
+    let fail = |what: String| -> ! { panic!("{}, {}: {what}", file.display(), entry.name) };
+    if bindings.len() > BUFFERS_MAX {
+        fail(format!("{} storage buffers, {BUFFERS_MAX} allowed", bindings.len()));
+    }
+    if let Some(bare) = bindings.iter().find(|b| !b.is_struct) {
+        fail(format!("`{}` is no struct", bare.name));
+    }
+    let invocations: u32 = entry.workgroup_size.iter().product();
+    if invocations > INVOCATIONS_MAX {
+        fail(format!("{invocations} invocations, {INVOCATIONS_MAX} allowed"));
+    }
+    let mut layouter = naga::proc::Layouter::default();
+    layouter.update(module.to_ctx()).expect("a valid module");
+    let shared: u32 = module
+        .global_variables
+        .iter()
+        .filter(|(_, g)| g.space == AddressSpace::WorkGroup)
+        .map(|(_, g)| layouter[g.ty].size)
+        .sum();
+    if shared > SHARED_BYTES_MAX {
+        fail(format!("{shared} bytes of workgroup memory, {SHARED_BYTES_MAX} allowed"));
+    }
+    // A barrier some invocations do not reach is undefined, and the compiler does not look.
+    if has_conditional_barrier(&entry.function.body, false) {
+        fail("a barrier under a condition, or behind an early return".into());
+    }
+    for (_, function) in module.functions.iter() {
+        if has_conditional_barrier(&function.body, false) {
+            fail("a barrier under a condition in a function".into());
+        }
+    }
+}
+
+/// Whether a barrier stands inside an `if` or `switch`, or after a possible return. Loops may hold
+/// barriers: the bounds of those that do are constants.
+fn has_conditional_barrier(block: &Block, conditional: bool) -> bool {
+    let mut returned = false;
+    for statement in block.iter() {
+        let bad = match statement {
+            Statement::ControlBarrier(_) => conditional || returned,
+            Statement::If { condition: _, accept, reject } => {
+                // The exit of a loop is an `if` with nothing but a break in it.
+                returned |= returns(accept) || returns(reject);
+                has_conditional_barrier(accept, true) || has_conditional_barrier(reject, true)
+            }
+            Statement::Switch { cases, .. } => {
+                cases.iter().any(|c| has_conditional_barrier(&c.body, true))
+            }
+            Statement::Loop { body, continuing, .. } => {
+                has_conditional_barrier(body, conditional || returned)
+                    || has_conditional_barrier(continuing, conditional || returned)
+            }
+            Statement::Block(block) => has_conditional_barrier(block, conditional || returned),
+            _ => false,
+        };
+        if bad {
+            return true;
+        }
+    }
+    false
+}
+
+fn returns(block: &Block) -> bool {
+    block.iter().any(|s| match s {
+        Statement::Return { .. } => true,
+        Statement::If { accept, reject, .. } => returns(accept) || returns(reject),
+        Statement::Block(b) => returns(b),
+        Statement::Loop { body, .. } => returns(body),
+        _ => false,
+    })
+}
+
+/// Every loop states on its line how often it runs at most, `// <= N`; nested loops multiply, the
+/// loops of a file add up.
+pub fn check_loops(file: &Path, source: &str) {
+    let mut open: Vec<u64> = Vec::new();
+    let mut total = 0u64;
+    for (n, line) in source.lines().enumerate() {
+        let code = line.split("//").next().unwrap_or_default();
+        let word = code.trim_start().split([' ', '(', '{']).next().unwrap_or_default();
+        let mut factor = 1;
+        if ["for", "while", "loop"].contains(&word) {
+            let bound = line.split("// <= ").nth(1).and_then(bound_of);
+            factor = bound.unwrap_or_else(|| {
+                panic!("{}, line {}: a loop without `// <= N`", file.display(), n + 1)
+            });
+            total += open.iter().product::<u64>() * factor;
+        }
+        for c in code.chars() {
+            match c {
+                '{' => open.push(std::mem::replace(&mut factor, 1)),
+                '}' => drop(open.pop()),
+                _ => {}
+            }
+        }
+    }
+    assert!(total <= ITERATIONS_MAX, "{}: {total} loop iterations", file.display());
+}
+
+fn bound_of(text: &str) -> Option<u64> {
+    use raywake_core::params;
+    match text.trim() {
+        "DISPLACEMENTS" => Some(params::DISPLACEMENTS as u64),
+        "LEVELS_MAX" => Some(params::LEVELS_MAX as u64),
+        "MERGE_PROBES" => Some(params::MERGE_PROBES as u64),
+        number => number.parse().ok(),
+    }
+}

@@ -1,0 +1,153 @@
+// The feasible displacement of least energy for every foreground column.
+// Twin: core/src/flow/expectation.rs, which explains the search.
+@group(0) @binding(0) var<storage, read> params: Step;
+struct Words { d: array<u32> }
+@group(0) @binding(1) var<storage, read> counters: Words;
+@group(0) @binding(2) var<storage, read> foreground: Words;
+@group(0) @binding(3) var<storage, read> matching: Words;
+@group(0) @binding(4) var<storage, read> state: Words;
+@group(0) @binding(5) var<storage, read> target_energy: Words;
+@group(0) @binding(6) var<storage, read_write> bound: Words;
+struct Proposals { d: array<vec2<u32>> }
+@group(0) @binding(7) var<storage, read_write> proposal: Proposals;
+
+struct Best { energy: i32, index: i32 }
+
+fn inside(i: i32, j: i32) -> bool {
+    return i >= 0 && i < params.side && j >= 0 && j < params.side;
+}
+
+fn cost_of(rank: u32, index: i32) -> i32 {
+    let word = matching.d[rank * ROW_WORDS + u32(index) / 2u];
+    return i32((word >> (16u * (u32(index) & 1u))) & 0xffffu);
+}
+
+fn displacement(index: i32) -> vec2<i32> {
+    return vec2<i32>(index / i32(SIDE), index % i32(SIDE)) - vec2<i32>(REACH);
+}
+
+fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best {
+    if energy > best.energy || (energy == best.energy && index > best.index) {
+        return best;
+    }
+    let d = displacement(index);
+    let at = column + d.x * params.side + d.y;
+    if u32(energy) < target_energy.d[at] || own == pack_flow(d) {
+        return Best(energy, index);
+    }
+    return best;
+}
+
+// Cost of the window neighbours that lie outside the grid.
+fn outside_cost(i: i32, j: i32) -> i32 {
+    let rows = 3 - select(0, 1, i == 0) - select(0, 1, i == params.side - 1);
+    let lines = 3 - select(0, 1, j == 0) - select(0, 1, j == params.side - 1);
+    return (9 - rows * lines) * params.outside_cost;
+}
+
+// Every displacement, without smoothing; also learns the least energy, feasible or not.
+fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
+    var best = Best(I32_MAX, I32_MAX);
+    var least = I32_MAX;
+    for (var index = 0; index < i32(DISPLACEMENTS); index += 1) { // <= DISPLACEMENTS
+        let d = displacement(index);
+        if inside(i + d.x, j + d.y) {
+            let square = d.x * d.x + d.y * d.y;
+            let energy = cost_of(rank, index) + params.displacement_cost * square + outside;
+            least = min(least, energy);
+            if energy < best.energy {
+                best = consider(best, column, index, energy, own);
+            }
+        }
+    }
+    bound.d[rank] = u32(least);
+    return best;
+}
+
+// `a / n` to the nearest integer, halves upwards; `n` is positive.
+fn round_div(a: i32, n: i32) -> i32 {
+    let twice = 2 * a + n;
+    let quotient = twice / (2 * n);
+    return quotient - select(0, 1, quotient * 2 * n > twice);
+}
+
+// Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
+fn rings(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32, n: i32, s: vec2<i32>, squares: i32) -> Best {
+    var best = Best(I32_MAX, I32_MAX);
+    let floor_energy = i32(bound.d[rank]);
+    let mean = vec2<i32>(round_div(s.x, n), round_div(s.y, n));
+    let spread = (n * squares - s.x * s.x - s.y * s.y) / n;
+    for (var ring = 0; ring <= 2 * REACH; ring += 1) { // <= 31
+        let near = max(2 * ring - 1, 0);
+        if floor_energy + params.smoothing * (n * near * near / 4 + spread) > best.energy {
+            break;
+        }
+        // The ring's cells in order, 8 of them per unit of its radius, one in its middle.
+        let cells = max(8 * ring, 1);
+        for (var cell = 0; cell < cells; cell += 1) { // <= 120
+            let d = mean + on_ring(ring, cell);
+            if inside(i + d.x, j + d.y) && max(abs(d.x), abs(d.y)) <= REACH {
+                let square = d.x * d.x + d.y * d.y;
+                let smoothness = squares + n * square - 2 * (d.x * s.x + d.y * s.y);
+                let index = (d.x + REACH) * i32(SIDE) + d.y + REACH;
+                let energy = cost_of(rank, index) + outside
+                    + params.displacement_cost * square + params.smoothing * smoothness;
+                best = consider(best, column, index, energy, own);
+            }
+        }
+    }
+    return best;
+}
+
+// Cell `n` of a ring: two full lines, then the sides.
+fn on_ring(ring: i32, n: i32) -> vec2<i32> {
+    let line = 2 * ring + 1;
+    if n < line {
+        return vec2<i32>(-ring, n - ring);
+    }
+    if n < 2 * line {
+        return vec2<i32>(ring, n - line - ring);
+    }
+    let side = n - 2 * line;
+    return vec2<i32>(side / 2 - ring + 1, select(-ring, ring, (side & 1) == 1));
+}
+
+@compute @workgroup_size(ROW_WORKGROUP)
+fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
+    let rank = id.x;
+    if rank >= counters.d[FOREGROUND_COUNT] {
+        return;
+    }
+    let column = i32(foreground.d[rank]);
+    let i = column / params.side;
+    let j = column % params.side;
+    var count = 0;
+    var sum = vec2<i32>(0);
+    var squares = 0;
+    for (var n = 0; n < 25; n += 1) { // <= 25
+        let ni = i + n / 5 - 2;
+        let nj = j + n % 5 - 2;
+        if n != 12 && inside(ni, nj) {
+            let flow = state.d[ni * params.side + nj];
+            if (flow & VALID) != 0u {
+                let s = flow_displacement(flow);
+                count += 1;
+                sum += s;
+                squares += s.x * s.x + s.y * s.y;
+            }
+        }
+    }
+    let own = state.d[column];
+    let outside = outside_cost(i, j);
+    var best = Best(I32_MAX, I32_MAX);
+    if count == 0 {
+        best = everywhere(rank, column, i, j, outside, own);
+    } else {
+        best = rings(rank, column, i, j, outside, own, count, sum, squares);
+    }
+    if best.index == I32_MAX {
+        proposal.d[rank] = vec2<u32>(0u, NONE);
+    } else {
+        proposal.d[rank] = vec2<u32>(pack_flow(displacement(best.index)), u32(best.energy));
+    }
+}

@@ -1,0 +1,61 @@
+// Traces distinct rays with their weights into the window. Twin: core/src/grid/ray_trace.rs
+@group(0) @binding(0) var<storage, read> params: Step;
+struct Origins { d: array<vec4<i32>> }
+@group(0) @binding(1) var<storage, read> origins: Origins;
+struct Rays { d: array<vec2<u32>> }
+@group(0) @binding(2) var<storage, read> rays: Rays;
+struct Words { d: array<u32> }
+@group(0) @binding(3) var<storage, read> slots: Words;
+@group(0) @binding(4) var<storage, read> ray_weights: Words;
+@group(0) @binding(5) var<storage, read> distinct: Words;
+@group(0) @binding(6) var<storage, read> counters: Words;
+struct LogOdds { d: array<atomic<i32>> }
+@group(0) @binding(7) var<storage, read_write> log_odds: LogOdds;
+
+fn inside(v: vec3<i32>) -> bool {
+    return all(v >= vec3<i32>(0)) && v.x < params.side && v.y < params.side && v.z < params.levels;
+}
+
+fn index_of(v: vec3<i32>) -> i32 {
+    return (v.x * params.side + v.y) * params.levels + v.z;
+}
+
+@compute @workgroup_size(ROW_WORKGROUP)
+fn ray_trace(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= counters.d[DISTINCT_COUNT] {
+        return;
+    }
+    let entry = distinct.d[id.x];
+    var ray = vec2<u32>(0u);
+    var weight = 1;
+    if entry < MERGE_SLOTS {
+        ray = rays.d[slots.d[entry] - 1u];
+        weight = i32(ray_weights.d[entry]);
+    } else {
+        ray = rays.d[entry - MERGE_SLOTS];
+    }
+    var voxel = origins.d[ray_origin(ray)].xyz;
+    let end = ray_end(ray);
+    let extent = abs(end - voxel);
+    let length = max(extent.x, max(extent.y, extent.z));
+    let step_by = sign(end - voxel);
+    let rise = 2 * extent;
+    var error = rise - length;
+    var entered = false;
+    for (var left = min(length, params.range_steps); left > 0; left -= 1) { // <= 2000
+        if inside(voxel) {
+            entered = true;
+            atomicAdd(&log_odds.d[index_of(voxel)], LOG_ODDS_FREE * weight);
+        } else if entered {
+            // The window is convex: once left, it is never met again.
+            break;
+        }
+        let due = error >= vec3<i32>(0);
+        voxel += select(vec3<i32>(0), step_by, due);
+        error += rise - select(vec3<i32>(0), vec3<i32>(2 * length), due);
+    }
+    let hit = (ray.y & NO_END) == 0u && length <= params.range_steps;
+    if hit && inside(end) {
+        atomicAdd(&log_odds.d[index_of(end)], LOG_ODDS_OCCUPIED * weight);
+    }
+}

@@ -1,0 +1,86 @@
+// Exclusive prefix sum of a whole buffer: reduce, then scan. Twin: core/src/prefix_sum.rs
+//
+// `reduce` sums tiles of TILE values, `spine` scans the sums of up to TILE tiles in one workgroup,
+// `scan` scans within each tile and adds the tile's offset. Workgroup memory only: no subgroups, no
+// progress between workgroups assumed.
+struct Words { d: array<u32> }
+@group(0) @binding(0) var<storage, read> values: Words;
+@group(0) @binding(1) var<storage, read_write> tiles: Words;
+@group(0) @binding(2) var<storage, read_write> sums: Words;
+
+const EACH = TILE / WORKGROUP;
+var<workgroup> partial: array<u32, WORKGROUP>;
+
+fn value_at(index: u32) -> u32 {
+    if index < arrayLength(&values.d) {
+        return values.d[index];
+    }
+    return 0u;
+}
+
+// Exclusive prefix over the workgroup of one number per invocation; the last entry of `partial`
+// then holds the total of all.
+fn scan_workgroup(lane: u32, mine: u32) -> u32 {
+    partial[lane] = mine;
+    workgroupBarrier();
+    for (var reach = 1u; reach < WORKGROUP; reach *= 2u) { // <= 8
+        var from_left = 0u;
+        if lane >= reach {
+            from_left = partial[lane - reach];
+        }
+        workgroupBarrier();
+        partial[lane] += from_left;
+        workgroupBarrier();
+    }
+    return partial[lane] - mine;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn reduce(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    var sum = 0u;
+    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+        sum += value_at(group.x * TILE + lane * EACH + n);
+    }
+    let before = scan_workgroup(lane, sum);
+    if lane == WORKGROUP - 1u {
+        tiles.d[group.x] = before + sum;
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn spine(@builtin(local_invocation_index) lane: u32) {
+    let tiles_used = (arrayLength(&values.d) + TILE - 1u) / TILE;
+    var own: array<u32, EACH>;
+    var sum = 0u;
+    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+        let tile = lane * EACH + n;
+        own[n] = sum;
+        if tile < tiles_used {
+            sum += tiles.d[tile];
+        }
+    }
+    let before = scan_workgroup(lane, sum);
+    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+        let tile = lane * EACH + n;
+        if tile < tiles_used {
+            tiles.d[tile] = before + own[n];
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn scan(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    var own: array<u32, EACH>;
+    var sum = 0u;
+    let first = group.x * TILE + lane * EACH;
+    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+        own[n] = sum;
+        sum += value_at(first + n);
+    }
+    let before = tiles.d[group.x] + scan_workgroup(lane, sum);
+    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+        if first + n < arrayLength(&sums.d) {
+            sums.d[first + n] = before + own[n];
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! The columns of one sweep, by the core's own stages.
+
+use glam::DVec3;
+use raywake_core::grid::columns::columns;
+use raywake_core::grid::ray_merge::ray_merge;
+use raywake_core::grid::ray_trace::ray_trace;
+use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
+use raywake_core::prepare::{Preparation, Window, place};
+use raywake_core::record::{Column, Ray, Step};
+use raywake_core::sweep::{Rig, Sweep};
+
+/// What [`Grid::sweep`] works with and leaves behind.
+pub struct Grid {
+    profile: Profile,
+    preparation: Preparation,
+    lattice_origin: Option<DVec3>,
+    rays: Vec<Ray>,
+    origins: Vec<[i32; 4]>,
+    slots: Vec<u32>,
+    weights: Vec<u32>,
+    distinct: Vec<u32>,
+    log_odds: Vec<i32>,
+    /// Sizes of the window.
+    pub step: Step,
+    /// Columns of the window.
+    pub columns: Vec<Column>,
+    /// Column of every point of the sweep, [`raywake_core::record::NONE`] where it has none.
+    pub of_point: Vec<u32>,
+}
+
+impl Grid {
+    /// A grid at the start of a drive.
+    pub fn new(profile: Profile) -> Grid {
+        Grid {
+            preparation: Preparation::new(),
+            lattice_origin: None,
+            rays: vec![[0; 2]; POINTS_MAX],
+            origins: vec![[0; 4]; ORIGINS_MAX],
+            slots: vec![0; MERGE_SLOTS],
+            weights: vec![0; MERGE_SLOTS],
+            distinct: vec![0; POINTS_MAX],
+            log_odds: vec![0; profile.voxels()],
+            step: Step {
+                side: profile.side as i32,
+                levels: profile.levels as i32,
+                range_steps: profile.range_steps(),
+                ..Step::default()
+            },
+            columns: vec![[0; 2]; profile.columns()],
+            of_point: vec![0; POINTS_MAX],
+            profile,
+        }
+    }
+
+    /// Forgets where the lattice lies: another drive begins.
+    pub fn restart(&mut self) {
+        self.lattice_origin = None;
+    }
+
+    /// Fills `columns` and `of_point` from a sweep; returns where the window lies.
+    pub fn sweep(&mut self, rig: &Rig, sweep: &Sweep) -> Window {
+        let window = place(&self.profile, rig, &sweep.world_from_vehicle, self.lattice_origin);
+        self.lattice_origin = Some(window.lattice_origin);
+        let (count, _) = self.preparation.prepare(
+            &self.profile,
+            rig,
+            &window,
+            sweep,
+            &mut self.rays,
+            &mut self.of_point,
+            &mut self.origins,
+        );
+        self.step.rays = count as i32;
+        let rays = &self.rays[..count];
+        self.slots.fill(0);
+        self.weights.fill(0);
+        let used = ray_merge(rays, &mut self.slots, &mut self.weights, &mut self.distinct);
+        self.log_odds.fill(0);
+        ray_trace(
+            &self.step,
+            &self.origins,
+            rays,
+            &self.slots,
+            &self.weights,
+            &self.distinct[..used],
+            &mut self.log_odds,
+        );
+        columns(&self.step, &self.log_odds, &mut self.columns);
+        window
+    }
+
+    /// Indices of the solid columns.
+    pub fn solid(&self) -> impl Iterator<Item = usize> + use<'_> {
+        self.columns.iter().enumerate().filter(|(_, c)| c[1] != 0).map(|(n, _)| n)
+    }
+
+    /// Where a column's centre lies in the vehicle frame, m; the height is that of the anchor.
+    pub fn centre(&self, window: &Window, column: usize) -> DVec3 {
+        let (i, j) = (column as i32 / self.step.side, column as i32 % self.step.side);
+        let cell = DVec3::new(i as f64, j as f64, (self.step.levels / 2) as f64);
+        window.grid_from_vehicle.inverse().transform(cell * self.profile.voxel_m)
+    }
+}
