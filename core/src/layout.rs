@@ -86,8 +86,8 @@ buffers! {
     Tiles "tiles" Device "u32" * 1, |_p| crate::params::TILE, "sums of the tiles of the prefix sum";
     Rank "rank" Device "u32" * 1, |p| p.columns(), "position of a column in the foreground";
     Foreground "foreground" Device "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns, ascending";
-    Cost "cost" Device "u32" * 1, |_p| FOREGROUND_MAX * ROW_WORDS, "costs of pairs of columns, two 16-bit values a word";
-    Matching "matching" Device "u32" * 1, |_p| FOREGROUND_MAX * ROW_WORDS, "costs summed over the 3x3 window (T, 3.13)";
+    Cost "cost" Device "vec4<u32>" * 4, |_p| FOREGROUND_MAX * ROW_WORDS / 4, "costs of pairs of columns, two 16-bit values a word";
+    Matching "matching" Device "vec4<u32>" * 4, |_p| FOREGROUND_MAX * ROW_WORDS / 4, "costs summed over the 3x3 window (T, 3.13)";
     State "state" Device "u32" * 1, |p| p.columns(), "flow of every column";
     TargetEnergy "target_energy" Device "atomic<u32>" * 1, |p| p.columns(), "energy of the winner at every target";
     TargetRank "target_rank" Device "atomic<u32>" * 1, |p| p.columns(), "rank of the winner at every target";

@@ -7,14 +7,12 @@
 //! sums over the window (3.13) and energies are integers on every machine.
 
 use crate::background_filter::fill_byte_table;
-use crate::params::{DISPLACEMENTS, LEVELS_MAX, REACH, ROW_WORDS, SIDE};
+use crate::params::{LEVELS_MAX, LINE, REACH, ROW};
 use crate::record::{Column, Step};
 use crate::weights::{Weights, WeightsError};
 
 /// Entries the table of log-sigmoids may have: sums of weights, bias included.
 pub const SCORES_MAX: usize = 8192;
-/// Elements of a row of costs: two per word.
-pub const ROW: usize = 2 * ROW_WORDS;
 /// Words of the weights on the device: free, occupied, mixed per level, then the bias.
 pub const WEIGHT_WORDS: usize = 3 * LEVELS_MAX + 1;
 /// Largest cost of a pair: nine of them fit 16 bits.
@@ -84,8 +82,8 @@ pub fn bit_weights(source: Column, weights: &[i32]) -> [i32; 32] {
 }
 
 /// Costs of every foreground column at every displacement: row `n` of `cost` belongs to
-/// `foreground[n]`, element `(du + REACH) * SIDE + dv + REACH` to displacement `(du, dv)`. A target
-/// outside the window is unknown. `cost` must hold [`ROW`] elements per foreground column.
+/// `foreground[n]`, its elements are ordered as [`ROW`] says. A target outside the window, and the
+/// padding, is unknown. `cost` must hold [`ROW`] elements per foreground column.
 pub fn occupancy_constancy(
     step: &Step,
     weights: &[i32],
@@ -105,7 +103,7 @@ pub fn occupancy_constancy(
             fill_byte_table(bits, bytes);
         }
         let (i, j) = (source as i32 / side, source as i32 % side);
-        for (du, row) in (-REACH..).zip(row[..DISPLACEMENTS].chunks_exact_mut(SIDE)) {
+        for (du, row) in (-REACH..).zip(row.chunks_exact_mut(LINE)) {
             row.fill(unknown);
             if !(0..side).contains(&(i + du)) {
                 continue;
@@ -178,7 +176,7 @@ mod tests {
                         x += mixed as i32 as f64 * weights[32 + k] as f64 / 100.0;
                     }
                     let nats = (1.0 + (-x).exp()).ln();
-                    let found = cost[n * ROW + ((du + 15) * 31 + dv + 15) as usize];
+                    let found = cost[n * ROW + ((du + 15) * 32 + dv + 15) as usize];
                     assert!((found as f64 - 1000.0 * nats).abs() <= 0.5 + 1e-6);
                 }
             }

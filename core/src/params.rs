@@ -20,10 +20,14 @@ pub const ORIGINS_MAX: usize = crate::sweep::SENSORS_MAX * SLOTS;
 pub const REACH: i32 = 15;
 /// Width of the search, cells.
 pub const SIDE: usize = 2 * REACH as usize + 1;
-/// Displacements searched.
-pub const DISPLACEMENTS: usize = SIDE * SIDE;
-/// Words of a row of two 16-bit costs a word, one row per foreground column.
-pub const ROW_WORDS: usize = DISPLACEMENTS.div_ceil(2);
+/// Elements from one line of the search to the next: [`SIDE`] and one of padding, so that an index
+/// is two shifts away from its displacement.
+pub const LINE: usize = 32;
+/// Elements of a row of costs, one row per foreground column: displacement `(du, dv)` is element
+/// `(du + REACH) * LINE + dv + REACH`, the order in which ties are broken.
+pub const ROW: usize = SIDE * LINE;
+/// Words of a row: two 16-bit costs a word.
+pub const ROW_WORDS: usize = ROW / 2;
 /// Slots of the table that merges equal rays: twice the points, so that it is at most half full.
 pub const MERGE_SLOTS: usize = 2 * POINTS_MAX;
 /// Probes of that table before a ray is traced alone.
@@ -55,7 +59,7 @@ pub const COST_UNKNOWN: u32 = 693;
 /// learned weights of a level meet the same height on any vehicle.
 pub const ANCHOR_ABOVE_GROUND_M: f64 = 1.73;
 
-const _: () = assert!(ROW_WORDS * 2 >= DISPLACEMENTS);
+const _: () = assert!(SIDE < LINE && LINE.is_power_of_two() && ROW_WORDS.is_multiple_of(4));
 const _: () = assert!(MERGE_SLOTS.is_power_of_two());
 const _: () = assert!(BAND_UPDATES <= TILE * TILE);
 const _: () = assert!(COLUMNS_MAX <= TILE * TILE);

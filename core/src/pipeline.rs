@@ -54,7 +54,7 @@ pub struct Storage<'a> {
     pub rank: &'a mut [u32],
     /// [`FOREGROUND_MAX`] elements.
     pub foreground: &'a mut [u32],
-    /// [`crate::occupancy_constancy::ROW`] elements per foreground column.
+    /// [`crate::params::ROW`] elements per foreground column.
     pub cost: &'a mut [u16],
     /// As many.
     pub matching: &'a mut [u16],

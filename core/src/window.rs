@@ -1,7 +1,6 @@
 //! The window that promotes spatial smoothness (3.13).
 
-use crate::occupancy_constancy::ROW;
-use crate::params::COST_UNKNOWN;
+use crate::params::{COST_UNKNOWN, ROW};
 use crate::record::{NONE, Step};
 
 /// Sums costs over the 3x3 window that moves with the source (3.13, as the author programmed it):
@@ -60,7 +59,7 @@ mod tests {
         window(&step, &foreground, &rank, &cost, &mut matching);
         for (n, source) in foreground.iter().enumerate().step_by(7) {
             let (i, j) = (*source as i32 / 33, *source as i32 % 33);
-            for d in [0, 480, 960] {
+            for d in [0, 480, 990] {
                 let mut sum = 0;
                 for w in 0..9 {
                     let (i, j) = (i + w / 3 - 1, j + w % 3 - 1);

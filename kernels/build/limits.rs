@@ -117,7 +117,7 @@ pub fn check_loops(file: &Path, source: &str) {
 fn bound_of(text: &str) -> Option<u64> {
     use raywake_core::params;
     match text.trim() {
-        "DISPLACEMENTS" => Some(params::DISPLACEMENTS as u64),
+        "ROW" => Some(params::ROW as u64),
         "LEVELS_MAX" => Some(params::LEVELS_MAX as u64),
         "MERGE_PROBES" => Some(params::MERGE_PROBES as u64),
         number => number.parse().ok(),

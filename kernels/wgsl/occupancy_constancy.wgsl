@@ -12,7 +12,6 @@ struct Columns { d: array<vec2<u32>> }
 @group(0) @binding(6) var<storage, read_write> cost: Words;
 
 var<workgroup> bits: array<i32, 32>;
-var<workgroup> bytes: array<i32, 1024>;
 
 // What a mask bit of a target adds to the score of the source.
 fn bit_weight(source: u32, bit: u32) -> i32 {
@@ -29,18 +28,26 @@ fn bit_weight(source: u32, bit: u32) -> i32 {
     return 0;
 }
 
-fn cost_at(i: i32, j: i32, displacement: u32, offset: i32) -> u32 {
-    let ti = i + i32(displacement / SIDE) - REACH;
-    let tj = j + i32(displacement % SIDE) - REACH;
-    var state = 0u;
-    if ti >= 0 && ti < params.side && tj >= 0 && tj < params.side {
-        state = columns_now.d[ti * params.side + tj].x;
+fn four(first: u32) -> vec4<i32> {
+    return vec4<i32>(bits[first], bits[first + 1u], bits[first + 2u], bits[first + 3u]);
+}
+
+// Sum of the weights of the four lowest bits of `state` that are set.
+fn sum_of(state: u32, weights: vec4<i32>) -> i32 {
+    let chosen = (vec4<u32>(state) & vec4<u32>(1u, 2u, 4u, 8u)) != vec4<u32>(0u);
+    let w = select(vec4<i32>(0), weights, chosen);
+    return (w.x + w.y) + (w.z + w.w);
+}
+
+// Mask of the target at element `at` of the row; the padding is unknown, as a target outside the
+// window is.
+fn target_at(i: i32, j: i32, at: u32) -> u32 {
+    let ti = i + i32(at / LINE) - REACH;
+    let tj = j + i32(at % LINE) - REACH;
+    if at % LINE < SIDE && ti >= 0 && ti < params.side && tj >= 0 && tj < params.side {
+        return columns_now.d[ti * params.side + tj].x;
     }
-    let score = bytes[state & 0xffu]
-        + bytes[256u + ((state >> 8u) & 0xffu)]
-        + bytes[512u + ((state >> 16u) & 0xffu)]
-        + bytes[768u + (state >> 24u)];
-    return constancy_costs.d[score + offset];
+    return 0u;
 }
 
 @compute @workgroup_size(ROW_WORKGROUP)
@@ -53,24 +60,27 @@ fn occupancy_constancy(
         bits[lane] = bit_weight(columns_before.d[column].x, lane);
     }
     workgroupBarrier();
-    for (var n = lane; n < 1024u; n += ROW_WORKGROUP) { // <= 16
-        var sum = 0;
-        for (var b = 0u; b < 8u; b += 1u) { // <= 8
-            sum += select(0, bits[(n / 256u) * 8u + b], ((n >> b) & 1u) == 1u);
-        }
-        bytes[n] = sum;
-    }
-    workgroupBarrier();
+    let w0 = four(0u);
+    let w1 = four(4u);
+    let w2 = four(8u);
+    let w3 = four(12u);
+    let w4 = four(16u);
+    let w5 = four(20u);
+    let w6 = four(24u);
+    let w7 = four(28u);
     let i = column / params.side;
     let j = column % params.side;
     let offset = constancy_weights.d[3u * LEVELS_MAX] - params.score_min;
     for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= 8
-        let low = cost_at(i, j, 2u * word, offset);
-        // The last word has one displacement.
-        var high = 0u;
-        if 2u * word + 1u < DISPLACEMENTS {
-            high = cost_at(i, j, 2u * word + 1u, offset);
+        var packed = 0u;
+        for (var half = 0u; half < 2u; half += 1u) { // <= 2
+            let state = target_at(i, j, 2u * word + half);
+            let score = sum_of(state, w0) + sum_of(state >> 4u, w1)
+                + sum_of(state >> 8u, w2) + sum_of(state >> 12u, w3)
+                + sum_of(state >> 16u, w4) + sum_of(state >> 20u, w5)
+                + sum_of(state >> 24u, w6) + sum_of(state >> 28u, w7);
+            packed |= constancy_costs.d[score + offset] << (16u * half);
         }
-        cost.d[group.x * ROW_WORDS + word] = low | (high << 16u);
+        cost.d[group.x * ROW_WORDS + word] = packed;
     }
 }

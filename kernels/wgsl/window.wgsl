@@ -3,8 +3,11 @@
 struct Words { d: array<u32> }
 @group(0) @binding(1) var<storage, read> foreground: Words;
 @group(0) @binding(2) var<storage, read> rank: Words;
-@group(0) @binding(3) var<storage, read> cost: Words;
-@group(0) @binding(4) var<storage, read_write> matching: Words;
+struct Quads { d: array<vec4<u32>> }
+@group(0) @binding(3) var<storage, read> cost: Quads;
+@group(0) @binding(4) var<storage, read_write> matching: Quads;
+
+const ROW_QUADS = ROW_WORDS / 4u;
 
 var<workgroup> rows: array<u32, 9>;
 
@@ -28,17 +31,14 @@ fn window(
     for (var n = 0; n < 9; n += 1) { // <= 9
         unknown += select(0u, COST_UNKNOWN, rows[n] == NONE);
     }
-    for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= 8
-        // Both halves at once: nine costs of at most COST_MAX never carry.
-        var sum = unknown;
-        if 2u * word + 1u < DISPLACEMENTS {
-            sum |= unknown << 16u;
-        }
+    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= 2
+        // Eight costs at once: nine of at most COST_MAX never carry.
+        var sum = vec4<u32>(unknown | (unknown << 16u));
         for (var n = 0; n < 9; n += 1) { // <= 9
             if rows[n] < FOREGROUND_MAX {
-                sum += cost.d[rows[n] * ROW_WORDS + word];
+                sum += cost.d[rows[n] * ROW_QUADS + quad];
             }
         }
-        matching.d[group.x * ROW_WORDS + word] = sum;
+        matching.d[group.x * ROW_QUADS + quad] = sum;
     }
 }

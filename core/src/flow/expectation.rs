@@ -6,8 +6,7 @@
 //! neighbours, that bound plus the smoothing term, a paraboloid around their mean, excludes all but
 //! a few: rings around the rounded mean are visited until no farther ring can win or tie.
 
-use crate::occupancy_constancy::ROW;
-use crate::params::{DISPLACEMENTS, REACH, SIDE};
+use crate::params::{LINE, REACH, ROW};
 use crate::record::{Flow, NONE, Proposal, Step, VALID, flow, flow_displacement};
 use crate::window::outside_cost;
 
@@ -33,7 +32,7 @@ pub fn expectation(
         let around = Neighbours::of(step, state, column);
         let search = Search {
             step,
-            row: &matching[n * ROW..][..DISPLACEMENTS],
+            row: &matching[n * ROW..][..ROW],
             target_energy,
             own: state[column as usize],
             column,
@@ -57,7 +56,7 @@ pub fn expectation(
 /// Displacement at an index of a row.
 #[inline]
 fn displacement(index: i32) -> [i32; 2] {
-    [index / SIDE as i32 - REACH, index % SIDE as i32 - REACH]
+    [index / LINE as i32 - REACH, index % LINE as i32 - REACH]
 }
 
 /// Sums over the valid flows of the 24 columns around one.
@@ -124,7 +123,7 @@ impl Search<'_> {
         let cost = self.step.displacement_cost;
         let mut least = i32::MAX;
         for du in self.reach(self.i) {
-            let line = (du + REACH) * SIDE as i32 + REACH;
+            let line = (du + REACH) * LINE as i32 + REACH;
             let energy = |dv: i32| {
                 self.row[(line + dv) as usize] as i32 + cost * (du * du + dv * dv) + outside
             };
@@ -160,7 +159,7 @@ impl Search<'_> {
                     if self.reach(self.i).contains(&u) && self.reach(self.j).contains(&v) {
                         let square = u * u + v * v;
                         let smooth = around.squares + n * square - 2 * (u * su + v * sv);
-                        let index = (u + REACH) * SIDE as i32 + v + REACH;
+                        let index = (u + REACH) * LINE as i32 + v + REACH;
                         let energy = self.row[index as usize] as i32
                             + outside
                             + self.step.displacement_cost * square

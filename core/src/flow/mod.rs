@@ -64,8 +64,7 @@ pub(crate) fn target(step: &Step, column: u32, d: [i32; 2]) -> usize {
 mod tests {
     extern crate std;
     use super::*;
-    use crate::occupancy_constancy::ROW;
-    use crate::params::{DISPLACEMENTS, REACH, SIDE};
+    use crate::params::{LINE, REACH, ROW};
     use crate::record::{VALID, flow, flow_displacement};
     use crate::window::outside_cost;
     use std::vec;
@@ -81,10 +80,10 @@ mod tests {
             for (n, &c) in foreground.iter().enumerate() {
                 let (i, j) = (c as i32 / side, c as i32 % side);
                 let mut best: Option<(i64, [i32; 2])> = None;
-                for index in 0..DISPLACEMENTS as i32 {
-                    let d = [index / SIDE as i32 - REACH, index % SIDE as i32 - REACH];
+                for index in 0..ROW as i32 {
+                    let d = [index / LINE as i32 - REACH, index % LINE as i32 - REACH];
                     let (ti, tj) = (i + d[0], j + d[1]);
-                    if !(0..side).contains(&ti) || !(0..side).contains(&tj) {
+                    if d[1] > REACH || !(0..side).contains(&ti) || !(0..side).contains(&tj) {
                         continue;
                     }
                     let mut e = matching[n * ROW + index as usize] as i64

@@ -23,7 +23,7 @@ fn cost_of(rank: u32, index: i32) -> i32 {
 }
 
 fn displacement(index: i32) -> vec2<i32> {
-    return vec2<i32>(index / i32(SIDE), index % i32(SIDE)) - vec2<i32>(REACH);
+    return vec2<i32>(index / i32(LINE), index % i32(LINE)) - vec2<i32>(REACH);
 }
 
 fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best {
@@ -49,9 +49,9 @@ fn outside_cost(i: i32, j: i32) -> i32 {
 fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
     var least = I32_MAX;
-    for (var index = 0; index < i32(DISPLACEMENTS); index += 1) { // <= DISPLACEMENTS
+    for (var index = 0; index < i32(ROW); index += 1) { // <= ROW
         let d = displacement(index);
-        if inside(i + d.x, j + d.y) {
+        if d.y <= REACH && inside(i + d.x, j + d.y) {
             let square = d.x * d.x + d.y * d.y;
             let energy = cost_of(rank, index) + params.displacement_cost * square + outside;
             least = min(least, energy);
@@ -89,7 +89,7 @@ fn rings(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32, n: i32,
             if inside(i + d.x, j + d.y) && max(abs(d.x), abs(d.y)) <= REACH {
                 let square = d.x * d.x + d.y * d.y;
                 let smoothness = squares + n * square - 2 * (d.x * s.x + d.y * s.y);
-                let index = (d.x + REACH) * i32(SIDE) + d.y + REACH;
+                let index = (d.x + REACH) * i32(LINE) + d.y + REACH;
                 let energy = cost_of(rank, index) + outside
                     + params.displacement_cost * square + params.smoothing * smoothness;
                 best = consider(best, column, index, energy, own);
