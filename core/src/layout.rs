@@ -75,8 +75,7 @@ buffers! {
     Filter "filter_table" Device "i32" * 1, |_p| TABLE_WORDS, "background filter by mask byte";
     Weights "constancy_weights" Device "i32" * 1, |_p| WEIGHT_WORDS, "constancy weights by level";
     Costs "constancy_costs" Device "u32" * 1, |_p| SCORES_MAX, "cost of each score, 1/1000 nat";
-    Slots "slots" Device "atomic<u32>" * 1, |_p| MERGE_SLOTS, "distinct rays: 1 + index of one";
-    RayWeights "ray_weights" Device "atomic<u32>" * 1, |_p| MERGE_SLOTS, "distinct rays: how many";
+    Slots "slots" Device "vec2<u32>" * 2, |_p| MERGE_SLOTS, "distinct rays: 1 + index of one, and how many";
     Distinct "distinct" Device "u32" * 1, |_p| POINTS_MAX, "used slots";
     Counters "counters" Device "atomic<u32>" * 1, |_p| COUNTERS, "counts and indirect group counts";
     LogOdds "log_odds" Device "atomic<i32>" * 1, |p| p.voxels(), "log-odds of every voxel, tenths";

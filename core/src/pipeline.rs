@@ -21,7 +21,7 @@ use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
-use crate::prepare::{Dropped, Preparation, Window, place};
+use crate::prepare::{Dropped, Preparation, Window, central, place};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::sweep::{Point, Rig, Sweep};
 use crate::tracklet::{Tracklets, Turnover};
@@ -37,9 +37,7 @@ pub struct Storage<'a> {
     /// Its table of costs.
     pub constancy_costs: &'a [u32],
     /// [`crate::params::MERGE_SLOTS`] elements.
-    pub slots: &'a mut [u32],
-    /// [`crate::params::MERGE_SLOTS`] elements.
-    pub weights: &'a mut [u32],
+    pub slots: &'a mut [[u32; 2]],
     /// [`POINTS_MAX`] elements.
     pub distinct: &'a mut [u32],
     /// One element per voxel.
@@ -89,12 +87,11 @@ pub fn perceive<'a>(
     lap: &mut dyn FnMut(&'static str),
 ) -> Perceived<'a> {
     shift(step, s.now, s.before);
-    s.slots.fill(0);
-    s.weights.fill(0);
-    let used = ray_merge(rays, s.slots, s.weights, s.distinct);
+    s.slots.fill([0; 2]);
+    let used = ray_merge(rays, s.slots, s.distinct);
     lap("ray_merge");
     s.log_odds.fill(0);
-    ray_trace(step, origins, rays, s.slots, s.weights, &s.distinct[..used], s.log_odds);
+    ray_trace(step, origins, rays, s.slots, &s.distinct[..used], s.log_odds);
     lap("ray_trace");
     columns(step, s.log_odds, s.now);
     lap("columns");
@@ -380,9 +377,7 @@ impl Pipeline {
                 continue;
             }
             let (i, j) = (column as i32 / step.side, column as i32 % step.side);
-            let centre =
-                DVec3::new(i as f64, j as f64, (step.levels / 2) as f64) * self.profile.voxel_m;
-            let at = vehicle_from_grid.transform(centre);
+            let at = vehicle_from_grid.transform(self.from_central(i, j));
             let world = before.pose.transform(at);
             let mut flow = ColumnFlow {
                 cell: [current.window.corner[0] + i, current.window.corner[1] + j],
@@ -472,13 +467,17 @@ impl Pipeline {
         self.tracklets.all().iter().filter_map(move |t| Some(self.state_of(t, &current?)))
     }
 
+    /// Centre of a column, at the level of the anchor, from the window's central voxel, m.
+    fn from_central(&self, i: i32, j: i32) -> DVec3 {
+        let [ci, cj, _] = central(&self.profile);
+        DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0) * self.profile.voxel_m
+    }
+
     fn state_of(&self, t: &crate::tracklet::Tracklet, current: &Side) -> TrackletState {
         let side = self.profile.side as i32;
         let (i, j) = (t.column as i32 / side, t.column as i32 % side);
-        let r = self.profile.voxel_m;
-        let level = (self.profile.levels / 2) as f64;
-        let centre = DVec3::new(i as f64, j as f64, level) * r;
-        let grid = centre + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
+        let grid =
+            self.from_central(i, j) + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
         let at = current.window.grid_from_vehicle.inverse().transform(grid);
         let world = current.pose.transform(at);
         let ego = EgoMotion::new(&current.pose, &current.twist);

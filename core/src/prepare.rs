@@ -11,7 +11,8 @@ use glam::DVec3;
 /// Where the window lies in one sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// From vehicle coordinates to metres from the centre of the window's first voxel.
+    /// From vehicle coordinates to metres from the centre of the window's central voxel: what is
+    /// rounded to voxels is the same whatever the window's size.
     pub grid_from_vehicle: Pose,
     /// Lattice index of the window's first voxel.
     pub corner: [i32; 3],
@@ -19,23 +20,27 @@ pub struct Window {
     pub lattice_origin: DVec3,
 }
 
-/// Level whose centre lies [`ANCHOR_ABOVE_GROUND_M`] above the ground.
-fn anchor_level(profile: &Profile) -> i32 {
-    profile.levels as i32 / 2
+/// The central voxel of a window; its level lies [`ANCHOR_ABOVE_GROUND_M`] above the ground.
+pub fn central(profile: &Profile) -> [i32; 3] {
+    let half = profile.side as i32 / 2;
+    [half, half, profile.levels as i32 / 2]
+}
+
+fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Places the window. `lattice_origin` is that of the drive, or `None` on its first sweep: the
 /// lattice then has a cell centre at the anchor, the point of the vehicle's axis
 /// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
 pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
-    let half = profile.side as i32 / 2;
-    let below = [half, half, anchor_level(profile)];
+    let below = central(profile);
     let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
     let r = profile.voxel_m;
     let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
     match profile.frame {
         Frame::Sensor => Window {
-            grid_from_vehicle: Pose { translation: metres(below) - anchor, ..Pose::IDENTITY },
+            grid_from_vehicle: Pose { translation: -anchor, ..Pose::IDENTITY },
             corner: below.map(|b| -b),
             lattice_origin: pose.translation,
         },
@@ -47,7 +52,7 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
             Window {
                 grid_from_vehicle: Pose {
                     rotation: pose.rotation,
-                    translation: pose.translation - origin - metres(corner),
+                    translation: pose.translation - origin - metres(cell),
                 },
                 corner,
                 lattice_origin: origin,
@@ -136,6 +141,7 @@ impl Preparation {
         }
 
         let (side, levels) = (profile.side, profile.levels);
+        let centre = central(profile);
         let mut dropped = Dropped::default();
         let taken = sweep.points.len().min(POINTS_MAX);
         dropped.over_capacity = (sweep.points.len() - taken) as u64;
@@ -157,7 +163,7 @@ impl Preparation {
                 continue;
             }
             let slot = if moving { self.slot(rig, point) } else { 0 };
-            let end = voxel(&to_voxel[slot], p);
+            let end = add(voxel(&to_voxel[slot], p), centre);
             if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
                 dropped.too_far += 1;
                 continue;
@@ -259,7 +265,8 @@ fn place_origins(
                 if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m).to_array().map(|c| libm::floor(c + 0.5) as i32);
-            let v = [v[0], v[1], v[2], 0];
+            let [x, y, z] = add(v, central(profile));
+            let v = [x, y, z, 0];
             let known = origins[..count].iter().position(|o| *o == v);
             *id = known.unwrap_or(count) as u32;
             if known.is_none() {

@@ -15,18 +15,18 @@ pub fn flow(profile: &Profile) -> Program {
     use Buffer::*;
     let columns = profile.columns();
     let mut ops = vec![copy(StepIn, StepNow), copy(OriginsIn, Origins), copy(RaysIn, Rays)];
-    ops.extend([Slots, RayWeights, Counters, LogOdds, State].map(|b| fill(b, 0)));
+    ops.extend([Slots, Counters, LogOdds, State].map(|b| fill(b, 0)));
     ops.push(fill(TargetEnergy, NONE));
     ops.extend([
         threads("shift", &SHIFT, &[StepNow, Now, Before], columns),
         threads(
-            "ray_merge", &RAY_MERGE, &[StepNow, Rays, Slots, RayWeights, Distinct, Counters],
+            "ray_merge", &RAY_MERGE, &[StepNow, Rays, Slots, Distinct, Counters],
             POINTS_MAX,
         ),
         threads("plan", &PLAN, &[Counters], 1),
         indirect(
             "ray_trace", &RAY_TRACE,
-            &[StepNow, Origins, Rays, Slots, RayWeights, Distinct, Counters, LogOdds],
+            &[StepNow, Origins, Rays, Slots, Distinct, Counters, LogOdds],
             GROUPS_DISTINCT,
         ),
         threads("columns", &COLUMNS, &[StepNow, LogOdds, Now], columns),

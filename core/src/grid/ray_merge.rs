@@ -6,18 +6,13 @@ use crate::record::Ray;
 
 /// Merges equal rays in an open-addressed table of indices into `rays`.
 ///
-/// `slots` must hold [`MERGE_SLOTS`] zeros and receives `index + 1` of one ray of each kind;
-/// `weights` must hold as many zeros and receives how many there are; `distinct` must hold
+/// `slots` must hold [`MERGE_SLOTS`] zeros and receives `index + 1` of one ray of each kind, and
+/// how many of it there are; `distinct` must hold
 /// `rays.len()` elements and receives the used slots in an order of no meaning. Returns how many
 /// are used. A ray that finds no place within [`MERGE_PROBES`] is appended as
 /// `MERGE_SLOTS + index` and counts once: which rays that meets changes no sum.
-pub fn ray_merge(
-    rays: &[Ray],
-    slots: &mut [u32],
-    weights: &mut [u32],
-    distinct: &mut [u32],
-) -> usize {
-    assert!(slots.len() == MERGE_SLOTS && weights.len() == MERGE_SLOTS);
+pub fn ray_merge(rays: &[Ray], slots: &mut [[u32; 2]], distinct: &mut [u32]) -> usize {
+    assert!(slots.len() == MERGE_SLOTS);
     assert!(distinct.len() >= rays.len());
     let mut used = 0;
     for (index, ray) in rays.iter().enumerate() {
@@ -27,14 +22,13 @@ pub fn ray_merge(
             if probes == MERGE_PROBES {
                 break (MERGE_SLOTS + index) as u32;
             }
-            let holder = slots[slot];
+            let [holder, _] = slots[slot];
             if holder == 0 {
-                slots[slot] = index as u32 + 1;
-                weights[slot] = 1;
+                slots[slot] = [index as u32 + 1, 1];
                 break slot as u32;
             }
             if rays[holder as usize - 1] == *ray {
-                weights[slot] += 1;
+                slots[slot][1] += 1;
                 break NOTHING_NEW;
             }
             slot = (slot + 1) & (MERGE_SLOTS - 1);
@@ -60,10 +54,10 @@ fn hash(ray: Ray) -> usize {
 
 /// The ray of an entry of `distinct`, and its weight.
 #[inline]
-pub fn merged(entry: u32, rays: &[Ray], slots: &[u32], weights: &[u32]) -> (Ray, i32) {
+pub fn merged(entry: u32, rays: &[Ray], slots: &[[u32; 2]]) -> (Ray, i32) {
     let entry = entry as usize;
     if entry < MERGE_SLOTS {
-        (rays[slots[entry] as usize - 1], weights[entry] as i32)
+        (rays[slots[entry][0] as usize - 1], slots[entry][1] as i32)
     } else {
         (rays[entry - MERGE_SLOTS], 1)
     }

@@ -13,13 +13,12 @@ pub fn ray_trace(
     step: &Step,
     origins: &[[i32; 4]],
     rays: &[Ray],
-    slots: &[u32],
-    weights: &[u32],
+    slots: &[[u32; 2]],
     distinct: &[u32],
     log_odds: &mut [i32],
 ) {
     for &entry in distinct {
-        let (ray, weight) = merged(entry, rays, slots, weights);
+        let (ray, weight) = merged(entry, rays, slots);
         let [x, y, z, _] = origins[ray_origin(ray)];
         let (start, end) = ([x, y, z], ray_end(ray));
         let mut entered = false;
@@ -90,14 +89,14 @@ mod tests {
                     ray([random(60) - 15, random(60) - 15, random(16) - 4], 0, random(20) == 0)
                 })
                 .collect();
-            let (mut slots, mut weights) = (vec![0; MERGE_SLOTS], vec![0; MERGE_SLOTS]);
+            let mut slots = vec![[0; 2]; MERGE_SLOTS];
             let mut distinct = vec![0; rays.len()];
-            let used = ray_merge(&rays, &mut slots, &mut weights, &mut distinct);
+            let used = ray_merge(&rays, &mut slots, &mut distinct);
             let kinds: std::collections::HashSet<_> = rays.iter().collect();
             assert_eq!(used, kinds.len());
             let mut grid = vec![0; 31 * 31 * 8];
             let origins = [[origin[0], origin[1], origin[2], 0]];
-            ray_trace(&step, &origins, &rays, &slots, &weights, &distinct[..used], &mut grid);
+            ray_trace(&step, &origins, &rays, &slots, &distinct[..used], &mut grid);
             let map = naive(&step, origin, &rays);
             for i in 0..31 {
                 for j in 0..31 {

@@ -4,10 +4,9 @@ struct Rays { d: array<vec2<u32>> }
 @group(0) @binding(1) var<storage, read> rays: Rays;
 struct Atomics { d: array<atomic<u32>> }
 @group(0) @binding(2) var<storage, read_write> slots: Atomics;
-@group(0) @binding(3) var<storage, read_write> ray_weights: Atomics;
 struct Words { d: array<u32> }
-@group(0) @binding(4) var<storage, read_write> distinct: Words;
-@group(0) @binding(5) var<storage, read_write> counters: Atomics;
+@group(0) @binding(3) var<storage, read_write> distinct: Words;
+@group(0) @binding(4) var<storage, read_write> counters: Atomics;
 
 fn first_slot(ray: vec2<u32>) -> u32 {
     var mixed = (ray.x * 0x9e3779b1u) ^ (ray.y * 0x85ebca77u);
@@ -27,17 +26,17 @@ fn ray_merge(@builtin(global_invocation_id) id: vec3<u32>) {
     var entry = MERGE_SLOTS + index;
     for (var probe = 0u; probe < MERGE_PROBES; probe += 1u) { // <= MERGE_PROBES
         // A look before the exchange: most rays find their like already there.
-        var holder = atomicLoad(&slots.d[slot]);
+        var holder = atomicLoad(&slots.d[2u * slot]);
         if holder == 0u {
-            holder = atomicCompareExchangeWeak(&slots.d[slot], 0u, index + 1u).old_value;
+            holder = atomicCompareExchangeWeak(&slots.d[2u * slot], 0u, index + 1u).old_value;
             if holder == 0u {
-                atomicAdd(&ray_weights.d[slot], 1u);
+                atomicAdd(&slots.d[2u * slot + 1u], 1u);
                 entry = slot;
                 break;
             }
         }
         if all(rays.d[holder - 1u] == ray) {
-            atomicAdd(&ray_weights.d[slot], 1u);
+            atomicAdd(&slots.d[2u * slot + 1u], 1u);
             return;
         }
         slot = (slot + 1u) & (MERGE_SLOTS - 1u);

@@ -4,13 +4,12 @@ struct Origins { d: array<vec4<i32>> }
 @group(0) @binding(1) var<storage, read> origins: Origins;
 struct Rays { d: array<vec2<u32>> }
 @group(0) @binding(2) var<storage, read> rays: Rays;
+@group(0) @binding(3) var<storage, read> slots: Rays;
 struct Words { d: array<u32> }
-@group(0) @binding(3) var<storage, read> slots: Words;
-@group(0) @binding(4) var<storage, read> ray_weights: Words;
-@group(0) @binding(5) var<storage, read> distinct: Words;
-@group(0) @binding(6) var<storage, read> counters: Words;
+@group(0) @binding(4) var<storage, read> distinct: Words;
+@group(0) @binding(5) var<storage, read> counters: Words;
 struct LogOdds { d: array<atomic<i32>> }
-@group(0) @binding(7) var<storage, read_write> log_odds: LogOdds;
+@group(0) @binding(6) var<storage, read_write> log_odds: LogOdds;
 
 fn inside(v: vec3<i32>) -> bool {
     return all(v >= vec3<i32>(0)) && v.x < params.side && v.y < params.side && v.z < params.levels;
@@ -29,8 +28,9 @@ fn ray_trace(@builtin(global_invocation_id) id: vec3<u32>) {
     var ray = vec2<u32>(0u);
     var weight = 1;
     if entry < MERGE_SLOTS {
-        ray = rays.d[slots.d[entry] - 1u];
-        weight = i32(ray_weights.d[entry]);
+        let slot = slots.d[entry];
+        ray = rays.d[slot.x - 1u];
+        weight = i32(slot.y);
     } else {
         ray = rays.d[entry - MERGE_SLOTS];
     }
