@@ -53,8 +53,8 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
 /// Compiles every entry point of a file and appends a static per entry point to `table`.
 fn compile(table: &mut String, file: &Path, source: &str, mode: &str) {
     let fail = |what: String| -> ! { panic!("{}: {what}", file.display()) };
-    let module = naga::front::wgsl::parse_str(source)
-        .unwrap_or_else(|e| fail(e.emit_to_string(source)));
+    let module =
+        naga::front::wgsl::parse_str(source).unwrap_or_else(|e| fail(e.emit_to_string(source)));
     let flags = naga::valid::ValidationFlags::all();
     let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
         .validate(&module)

@@ -71,6 +71,9 @@ pub fn background_filter(step: &Step, table: &[i32], before: &[Column], foregrou
     }
 }
 
+/// The filter shipped with the program: see the file's provenance.
+pub const SHIPPED: &str = include_str!("../weights/background.txt");
+
 #[cfg(test)]
 mod tests {
     extern crate std;

@@ -3,7 +3,10 @@
 
 use crate::background_filter::TABLE_WORDS;
 use crate::occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
-use crate::params::{FOREGROUND_MAX, MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile, ROW_WORDS};
+use crate::params::{
+    BAND_UPDATES, FOREGROUND_MAX, MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile, RADIX, ROW_WORDS,
+    TILE,
+};
 use crate::record::Step;
 
 /// Where a buffer lives.
@@ -82,7 +85,7 @@ buffers! {
     Now "columns_now" Device "vec2<u32>" * 2, |p| p.columns(), "columns of this sweep";
     Before "columns_before" Device "vec2<u32>" * 2, |p| p.columns(), "columns of the sweep before, in this window";
     Marks "marks" Device "u32" * 1, |p| p.columns(), "1 where a column is foreground";
-    Tiles "tiles" Device "u32" * 1, |_p| crate::params::TILE, "sums of the tiles of the prefix sum";
+    Tiles "tiles" Device "u32" * 1, |_p| TILE + 1, "sums of the tiles of the prefix sum, sum of all";
     Rank "rank" Device "u32" * 1, |p| p.columns(), "position of a column in the foreground";
     Foreground "foreground" Device "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns, ascending";
     Cost "cost" Device "vec4<u32>" * 4, |_p| FOREGROUND_MAX * ROW_WORDS / 4, "costs of pairs of columns, two 16-bit values a word";
@@ -114,6 +117,37 @@ pub const GROUPS_DISTINCT: usize = 4;
 pub const GROUPS_FOREGROUND: usize = 8;
 /// First word of the group counts, one group per foreground column.
 pub const GROUPS_ROWS: usize = 12;
+
+buffers! {
+    /// Buffers of the sparse map.
+    MapBuffer, MAP_BUFFERS:
+    StepIn "params_in" Upload "u32" * 1, |_p| Step::WORDS, "record `Step` of the sweep and band";
+    OriginsIn "origins_in" Upload "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
+    RaysIn "rays_in" Upload "vec2<u32>" * 2, |_p| POINTS_MAX, "rays of the sweep";
+    StepNow "params" Device "u32" * 1, |_p| Step::WORDS, "record `Step`";
+    Origins "origins" Device "vec4<i32>" * 4, |_p| ORIGINS_MAX, "voxels of the ray origins";
+    Rays "rays" Device "vec2<u32>" * 2, |_p| POINTS_MAX, "rays";
+    Slots "slots" Device "vec2<u32>" * 2, |_p| MERGE_SLOTS, "distinct rays: 1 + index of one, and how many";
+    Distinct "distinct" Device "u32" * 1, |_p| POINTS_MAX, "used slots";
+    Counters "counters" Device "atomic<u32>" * 1, |_p| COUNTERS, "counts, shift of the digit";
+    Counts "counts" Device "u32" * 1, |_p| POINTS_MAX, "updates of each distinct ray in the band";
+    Offsets "offsets" Device "u32" * 1, |_p| POINTS_MAX, "where its updates start";
+    CountTiles "count_tiles" Device "u32" * 1, |_p| TILE + 1, "tiles of their prefix sum, updates of the band";
+    Updates "updates" Device "vec2<u32>" * 2, |_p| BAND_UPDATES, "updates (key, log-odds), then sorted";
+    Scratch "scratch" Device "vec2<u32>" * 2, |_p| BAND_UPDATES, "the other side of a radix pass, then voxels";
+    Histograms "histograms" Device "u32" * 1, |_p| RADIX * BAND_UPDATES / TILE, "digits of each tile";
+    DigitOffsets "digit_offsets" Device "u32" * 1, |_p| RADIX * BAND_UPDATES / TILE, "where they go";
+    DigitTiles "digit_tiles" Device "u32" * 1, |_p| TILE + 1, "tiles of their prefix sum";
+    Heads "heads" Device "u32" * 1, |_p| BAND_UPDATES, "1 where a key is new";
+    Runs "runs" Device "u32" * 1, |_p| BAND_UPDATES, "voxels before";
+    RunTiles "run_tiles" Device "u32" * 1, |_p| TILE + 1, "tiles of their prefix sum, voxels of the band";
+    CountOut "count_out" Readback "u32" * 1, |_p| TILE + 1, "updates of the band, last word";
+    RunsOut "runs_out" Readback "u32" * 1, |_p| TILE + 1, "voxels of the band, last word";
+    VoxelsOut "voxels_out" Readback "vec2<u32>" * 2, |_p| BAND_UPDATES, "voxels of the band";
+}
+
+/// Word of the sparse map's counters that holds the shift of the radix pass.
+pub const DIGIT_SHIFT: usize = 3;
 
 #[cfg(test)]
 mod tests {

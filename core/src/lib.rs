@@ -10,6 +10,7 @@ pub mod digest;
 pub mod flow;
 pub mod grid;
 pub mod layout;
+pub mod map;
 pub mod motion_compensation;
 pub mod occupancy_constancy;
 pub mod output;

@@ -197,6 +197,25 @@ impl Profile {
         }
     }
 
+    /// The sparse map: the sensor's whole range, in all directions.
+    pub fn map() -> Profile {
+        // 334 voxels either way: 100 m at 0.30 m.
+        Profile { name: short("map"), side: 669, levels: 669, ..Profile::hdl64() }
+    }
+
+    /// Checks a profile of the sparse map, whose window is bounded by its 32-bit keys alone.
+    pub fn check_map(&self) -> Result<(), ProfileError> {
+        let fail = |field, must| Err(ProfileError { field, must });
+        if self.side.is_multiple_of(2) || self.levels.is_multiple_of(2) {
+            return fail("side", "odd, and levels odd");
+        }
+        let keys = (self.side as u64).pow(2) * self.levels as u64;
+        if keys >= 1 << 31 || self.side > 2 * EXTENT_VOXELS as u32 {
+            return fail("side", "such that the window has less than 2^31 voxels");
+        }
+        Profile { side: 167, levels: 14, ..self.clone() }.check()
+    }
+
     /// The shipped profiles of the flow pipeline.
     pub fn named(name: &str) -> Option<Profile> {
         [Profile::hdl64(), Profile::wide(), Profile::dissertation()]

@@ -28,6 +28,7 @@ pub fn prelude() -> String {
         ("GROUPS_DISTINCT", layout::GROUPS_DISTINCT),
         ("GROUPS_FOREGROUND", layout::GROUPS_FOREGROUND),
         ("GROUPS_ROWS", layout::GROUPS_ROWS),
+        ("DIGIT_SHIFT", layout::DIGIT_SHIFT),
         ("NO_END", record::NO_END as usize),
         ("VALID", record::VALID as usize),
         ("NONE", record::NONE as usize),

@@ -1,7 +1,7 @@
 // Exclusive prefix sum of a whole buffer: reduce, then scan. Twin: core/src/prefix_sum.rs
 //
-// `reduce` sums tiles of TILE values, `spine` scans the sums of up to TILE tiles in one workgroup,
-// `scan` scans within each tile and adds the tile's offset. Workgroup memory only: no subgroups, no
+// `reduce` sums tiles of TILE values, `spine` scans the sums of up to TILE tiles in one workgroup
+// and leaves the sum of all behind them, `scan` scans within each tile and adds the tile's offset. Workgroup memory only: no subgroups, no
 // progress between workgroups assumed.
 struct Words { d: array<u32> }
 @group(0) @binding(0) var<storage, read> values: Words;
@@ -60,6 +60,9 @@ fn spine(@builtin(local_invocation_index) lane: u32) {
         }
     }
     let before = scan_workgroup(lane, sum);
+    if lane == WORKGROUP - 1u {
+        tiles.d[TILE] = before + sum;
+    }
     for (var n = 0u; n < EACH; n += 1u) { // <= 4
         let tile = lane * EACH + n;
         if tile < tiles_used {

@@ -18,3 +18,34 @@ fn pack_flow(d: vec2<i32>) -> u32 {
 fn flow_displacement(flow: u32) -> vec2<i32> {
     return vec2<i32>(i32((flow >> 8u) & 0xffu), i32(flow & 0xffu)) - vec2<i32>(REACH);
 }
+
+// Bresenham's walk in three dimensions, as `Walk` in core/src/grid/mod.rs.
+struct Walk {
+    voxel: vec3<i32>,
+    left: i32,
+    step_by: vec3<i32>,
+    fall: i32,
+    rise: vec3<i32>,
+    length: i32,
+    error: vec3<i32>,
+}
+
+fn walk(start: vec3<i32>, end: vec3<i32>, limit: i32) -> Walk {
+    let extent = abs(end - start);
+    let length = max(extent.x, max(extent.y, extent.z));
+    let error = 2 * extent - length;
+    return Walk(start, min(length, limit), sign(end - start), 2 * length, 2 * extent, length, error);
+}
+
+fn advance(w: Walk) -> Walk {
+    let due = w.error >= vec3<i32>(0);
+    var next = w;
+    next.voxel += select(vec3<i32>(0), w.step_by, due);
+    next.error += w.rise - select(vec3<i32>(0), vec3<i32>(w.fall), due);
+    next.left -= 1;
+    return next;
+}
+
+fn inside_window(v: vec3<i32>, side: i32, levels: i32) -> bool {
+    return all(v >= vec3<i32>(0)) && v.x < side && v.y < side && v.z < levels;
+}

@@ -11,10 +11,6 @@ struct Words { d: array<u32> }
 struct LogOdds { d: array<atomic<i32>> }
 @group(0) @binding(6) var<storage, read_write> log_odds: LogOdds;
 
-fn inside(v: vec3<i32>) -> bool {
-    return all(v >= vec3<i32>(0)) && v.x < params.side && v.y < params.side && v.z < params.levels;
-}
-
 fn index_of(v: vec3<i32>) -> i32 {
     return (v.x * params.side + v.y) * params.levels + v.z;
 }
@@ -34,28 +30,20 @@ fn ray_trace(@builtin(global_invocation_id) id: vec3<u32>) {
     } else {
         ray = rays.d[entry - MERGE_SLOTS];
     }
-    var voxel = origins.d[ray_origin(ray)].xyz;
     let end = ray_end(ray);
-    let extent = abs(end - voxel);
-    let length = max(extent.x, max(extent.y, extent.z));
-    let step_by = sign(end - voxel);
-    let rise = 2 * extent;
-    var error = rise - length;
     var entered = false;
-    for (var left = min(length, params.range_steps); left > 0; left -= 1) { // <= 2000
-        if inside(voxel) {
+    var w = walk(origins.d[ray_origin(ray)].xyz, end, params.range_steps);
+    for (; w.left > 0; w = advance(w)) { // <= 2000
+        if inside_window(w.voxel, params.side, params.levels) {
             entered = true;
-            atomicAdd(&log_odds.d[index_of(voxel)], LOG_ODDS_FREE * weight);
+            atomicAdd(&log_odds.d[index_of(w.voxel)], LOG_ODDS_FREE * weight);
         } else if entered {
             // The window is convex: once left, it is never met again.
             break;
         }
-        let due = error >= vec3<i32>(0);
-        voxel += select(vec3<i32>(0), step_by, due);
-        error += rise - select(vec3<i32>(0), vec3<i32>(2 * length), due);
     }
-    let hit = (ray.y & NO_END) == 0u && length <= params.range_steps;
-    if hit && inside(end) {
+    let hit = (ray.y & NO_END) == 0u && w.length <= params.range_steps;
+    if hit && inside_window(end, params.side, params.levels) {
         atomicAdd(&log_odds.d[index_of(end)], LOG_ODDS_OCCUPIED * weight);
     }
 }

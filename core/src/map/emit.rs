@@ -1,0 +1,74 @@
+//! The list of updates (B.2.2), at its exact size.
+
+use super::Update;
+use crate::grid::Walk;
+use crate::grid::ray_merge::merged;
+use crate::grid::ray_trace::inside;
+use crate::params::{LOG_ODDS_FREE, LOG_ODDS_OCCUPIED};
+use crate::record::{NO_END, Ray, Step, ray_end, ray_origin};
+
+/// `counts[n]` becomes the number of updates of `distinct[n]` whose keys lie in the band.
+pub fn count(
+    step: &Step,
+    origins: &[[i32; 4]],
+    rays: &[Ray],
+    slots: &[[u32; 2]],
+    distinct: &[u32],
+    counts: &mut [u32],
+) {
+    for (&entry, count) in distinct.iter().zip(counts) {
+        *count = 0;
+        walk(step, origins, rays, slots, entry, |_| *count += 1);
+    }
+}
+
+/// Writes the updates of every distinct ray in the band, from `offsets` on.
+pub fn emit(
+    step: &Step,
+    origins: &[[i32; 4]],
+    rays: &[Ray],
+    slots: &[[u32; 2]],
+    distinct: &[u32],
+    offsets: &[u32],
+    updates: &mut [Update],
+) {
+    for (&entry, &offset) in distinct.iter().zip(offsets) {
+        let mut at = offset as usize;
+        walk(step, origins, rays, slots, entry, |update| {
+            updates[at] = update;
+            at += 1;
+        });
+    }
+}
+
+/// Calls `each` with every update of a distinct ray in the band.
+#[inline]
+fn walk(
+    step: &Step,
+    origins: &[[i32; 4]],
+    rays: &[Ray],
+    slots: &[[u32; 2]],
+    entry: u32,
+    mut each: impl FnMut(Update),
+) {
+    let (ray, weight) = merged(entry, rays, slots);
+    let [x, y, z, _] = origins[ray_origin(ray)];
+    let (start, end) = ([x, y, z], ray_end(ray));
+    // Keys ascend with x: a ray beside the band's slabs has nothing in it.
+    let slab = step.side * step.levels;
+    if end[0].max(x) < step.band_from / slab || end[0].min(x) > step.band_to / slab {
+        return;
+    }
+    let band = step.band_from as usize..step.band_to as usize;
+    let mut put = |voxel, log_odds: i32| {
+        if let Some(key) = inside(step, voxel).filter(|k| band.contains(k)) {
+            each([key as u32, (log_odds * weight) as u32]);
+        }
+    };
+    for voxel in Walk::new(start, end, step.range_steps) {
+        put(voxel, LOG_ODDS_FREE);
+    }
+    if ray[1] & NO_END == 0 && !Walk::beyond(start, end, step.range_steps) {
+        put(end, LOG_ODDS_OCCUPIED);
+    }
+}

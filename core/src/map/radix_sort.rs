@@ -1,0 +1,51 @@
+//! Stable sort of updates by key (B.2.3), least significant digit first.
+
+use super::Update;
+
+/// Sorts `updates` by key; equal keys keep their order. `scratch` must hold as many elements.
+pub fn radix_sort(updates: &mut [Update], scratch: &mut [Update]) {
+    assert!(updates.len() == scratch.len());
+    let mut histograms = [[0u32; 256]; 4];
+    for [key, _] in updates.iter() {
+        for (digit, histogram) in key.to_le_bytes().into_iter().zip(&mut histograms) {
+            histogram[digit as usize] += 1;
+        }
+    }
+    let (mut from, mut to) = (updates, scratch);
+    for (digit, histogram) in histograms.iter_mut().enumerate() {
+        let mut sum = 0;
+        for count in histogram.iter_mut() {
+            sum += core::mem::replace(count, sum);
+        }
+        for &update in from.iter() {
+            let place = &mut histogram[(update[0] >> (8 * digit) & 0xff) as usize];
+            to[*place as usize] = update;
+            *place += 1;
+        }
+        // Four passes: the result ends where it began.
+        core::mem::swap(&mut from, &mut to);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    #[test]
+    fn equals_a_stable_sort() {
+        for n in [0u32, 1, 2, 1023, 1024, 5000] {
+            for spread in [1u32, 2, 300, u32::MAX] {
+                let mut updates: Vec<Update> =
+                    (0..n).map(|i| [i.wrapping_mul(2654435761) % spread, i]).collect();
+                let mut wanted = updates.clone();
+                wanted.sort_by_key(|u| u[0]);
+                let mut scratch = vec![[0; 2]; updates.len()];
+                radix_sort(&mut updates, &mut scratch);
+                assert!(updates == wanted, "{n} keys below {spread}");
+            }
+        }
+    }
+}

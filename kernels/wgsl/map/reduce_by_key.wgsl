@@ -1,0 +1,42 @@
+// Sums the updates of each key of a sorted list. Twin: core/src/map/reduce_by_key.rs
+//
+// `heads` marks where a key is new; the prefix sum of the marks numbers the keys; `fold` adds every
+// update to its key's voxel. `voxels` must start as zeros.
+struct Words { d: array<u32> }
+@group(0) @binding(0) var<storage, read> count_tiles: Words;
+struct Updates { d: array<vec2<u32>> }
+@group(0) @binding(1) var<storage, read> updates: Updates;
+@group(0) @binding(2) var<storage, read_write> heads: Words;
+@group(0) @binding(3) var<storage, read> runs: Words;
+struct Atomics { d: array<atomic<u32>> }
+@group(0) @binding(4) var<storage, read_write> voxels: Atomics;
+
+fn is_head(index: u32) -> bool {
+    if index == 0u {
+        return true;
+    }
+    return updates.d[index].x != updates.d[index - 1u].x;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn mark_heads(@builtin(global_invocation_id) id: vec3<u32>) {
+    var head = 0u;
+    if id.x < count_tiles.d[TILE] {
+        head = select(0u, 1u, is_head(id.x));
+    }
+    heads.d[id.x] = head;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn fold(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= count_tiles.d[TILE] {
+        return;
+    }
+    let update = updates.d[id.x];
+    let head = heads.d[id.x];
+    let voxel = runs.d[id.x] + head - 1u;
+    if head == 1u {
+        atomicStore(&voxels.d[2u * voxel], update.x);
+    }
+    atomicAdd(&voxels.d[2u * voxel + 1u], update.y);
+}
