@@ -1,0 +1,126 @@
+//! `raywake map`: the sparse map of appendix B, one per sweep, over the sensor's whole range.
+
+pub mod device;
+pub mod scalar;
+
+use raywake_core::layout::{MAP_BUFFERS, MapBuffer};
+use raywake_core::map::Update;
+use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::prepare::{Dropped, Preparation, Window, place};
+use raywake_core::record::{NONE, Ray, Step};
+use raywake_core::sweep::{Rig, Sweep};
+use raywake_gpu::GpuError;
+
+/// Either backend.
+pub enum MapBackend {
+    /// The core's twins on one thread.
+    Scalar(Box<scalar::ScalarMap>),
+    /// The kernels on a Vulkan device.
+    Device(Box<device::DeviceMap>),
+}
+
+impl MapBackend {
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+        match self {
+            MapBackend::Scalar(b) => b.input(),
+            MapBackend::Device(b) => b.input(),
+        }
+    }
+
+    fn map(&mut self, step: &Step, put: &mut dyn FnMut(&[Update])) -> Result<(), GpuError> {
+        match self {
+            MapBackend::Scalar(b) => {
+                b.map(step, put);
+                Ok(())
+            }
+            MapBackend::Device(b) => b.map(step, put),
+        }
+    }
+}
+
+/// Turns sweeps into sparse maps in one lattice.
+pub struct Mapper {
+    profile: Profile,
+    rig: Rig,
+    preparation: Preparation,
+    lattice_origin: Option<glam::DVec3>,
+    columns: Vec<u32>,
+    backend: MapBackend,
+}
+
+/// Where a map lies and what it left out.
+#[derive(Clone, Copy, Debug)]
+pub struct Mapped {
+    /// The window: keys count from its corner.
+    pub window: Window,
+    /// Returns left out.
+    pub dropped: Dropped,
+    /// Rays.
+    pub rays: usize,
+}
+
+impl Mapper {
+    /// A mapper for a profile that passed [`Profile::check_map`].
+    pub fn new(profile: Profile, rig: Rig, backend: MapBackend) -> Mapper {
+        Mapper {
+            profile,
+            rig,
+            preparation: Preparation::new(),
+            lattice_origin: None,
+            columns: vec![NONE; POINTS_MAX],
+            backend,
+        }
+    }
+
+    /// Number of keys of a profile.
+    pub fn keys(profile: &Profile) -> u32 {
+        profile.side * profile.side * profile.levels
+    }
+
+    /// Bytes of the map's buffers, whichever backend holds them.
+    pub fn bytes(profile: &Profile) -> usize {
+        MAP_BUFFERS.iter().map(|b| b.bytes(profile)).sum()
+    }
+
+    /// Maps a sweep. `put` receives voxels `[key, log-odds in tenths as i32]` in ascending order.
+    pub fn map(
+        &mut self,
+        sweep: &Sweep,
+        put: &mut dyn FnMut(&[Update]),
+    ) -> Result<Mapped, GpuError> {
+        let window =
+            place(&self.profile, &self.rig, &sweep.world_from_vehicle, self.lattice_origin);
+        self.lattice_origin.get_or_insert(window.lattice_origin);
+        let (rays, origins) = self.backend.input();
+        let (count, dropped) = self.preparation.prepare(
+            &self.profile,
+            &self.rig,
+            &window,
+            sweep,
+            rays,
+            &mut self.columns,
+            origins,
+        );
+        let step = Step {
+            side: self.profile.side as i32,
+            levels: self.profile.levels as i32,
+            rays: count as i32,
+            range_steps: self.profile.range_steps(),
+            ..Step::default()
+        };
+        self.backend.map(&step, put)?;
+        Ok(Mapped { window, dropped, rays: count })
+    }
+
+    /// Lattice indices of a key.
+    pub fn cell(&self, mapped: &Mapped, key: u32) -> [i32; 3] {
+        let (side, levels) = (self.profile.side, self.profile.levels);
+        let local = [key / levels / side, key / levels % side, key % levels];
+        core::array::from_fn(|a| local[a] as i32 + mapped.window.corner[a])
+    }
+}
+
+/// Index of a row of the map's table.
+fn row(buffer: MapBuffer) -> usize {
+    buffer as usize
+}
