@@ -67,7 +67,7 @@ pub struct TrackletState {
     pub position_vehicle_m: [f32; 2],
     /// Heading of motion in the world, rad.
     pub heading_rad: f32,
-    /// Speed over ground along the heading, m/s (may be negative: the state of 3.15 is signed).
+    /// Speed over ground along the heading, m/s.
     pub speed_mps: f32,
     /// Turning rate, rad/s.
     pub turn_rate_radps: f32,

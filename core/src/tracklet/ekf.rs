@@ -99,13 +99,27 @@ impl Ekf {
         }
         let gain: Matrix5x2<f32> = p.fixed_view::<5, 2>(0, 0) * inverse;
         self.mean += gain * innovation;
-        self.mean[2] = wrap(self.mean[2]);
         let mut keep = Matrix5::identity();
         let mut seen_part = keep.fixed_view_mut::<5, 2>(0, 0);
         seen_part -= gain;
         let joseph = keep * p * keep.transpose() + gain * r * gain.transpose();
         self.covariance = (joseph + joseph.transpose()) * 0.5;
+        self.face_forward();
         true
+    }
+
+    /// Backwards at one heading is forwards at the opposite one: of the two, the state with the
+    /// speed that is not negative.
+    fn face_forward(&mut self) {
+        if self.mean[3] < 0.0 {
+            self.mean[3] = -self.mean[3];
+            self.mean[2] += core::f32::consts::PI;
+            for n in [0, 1, 2, 4] {
+                self.covariance[(3, n)] = -self.covariance[(3, n)];
+                self.covariance[(n, 3)] = -self.covariance[(n, 3)];
+            }
+        }
+        self.mean[2] = wrap(self.mean[2]);
     }
 
     /// Puts the state into axes turned by `angle` (a vehicle frame that turned, section 3.7).
@@ -243,10 +257,12 @@ mod tests {
 
     #[test]
     fn the_covariance_is_honest() {
-        // Mean of 1,000 chi-square values of 5 degrees of freedom: 95 % within 5 +- 0.196.
+        // Mean of 1,000 chi-square values of 5 degrees of freedom: 95 % within 5 +- 0.196. At
+        // 5 m/s two positions half a cell off leave the heading open by 24 degrees: until age 12
+        // or so, linearisation makes a few states of a thousand too sure.
         let band = 1.96 * (2.0f32 * 5.0 / 1000.0).sqrt();
-        for speed in [10.0, 20.0] {
-            let sum: f32 = (0..1000).map(|s| follow(s, speed, None, 12).unwrap().1).sum();
+        for speed in [5.0, 10.0, 20.0] {
+            let sum: f32 = (0..1000).map(|s| follow(s, speed, None, 25).unwrap().1).sum();
             let mean = sum / 1000.0;
             std::println!("{speed} m/s: mean normalised squared error {mean}");
             assert!((mean - 5.0).abs() <= band, "{speed} m/s: {mean}");
