@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use raywake_gpu::GpuError;
+
 /// A failure the user can act on. Its text names the file and the place in it.
 #[derive(Debug)]
 pub enum Error {
@@ -34,6 +36,15 @@ pub enum Error {
         /// Its reason.
         source: io::Error,
     },
+    /// The Vulkan device, or the lack of one.
+    Device(GpuError),
+    /// More memory than the user allows.
+    OverBudget {
+        /// What is needed, bytes.
+        bytes: u64,
+        /// What is allowed, bytes.
+        limit: u64,
+    },
 }
 
 impl Error {
@@ -53,12 +64,14 @@ impl Error {
     }
 
     /// Exit code of the process: 2 for usage (and what this build cannot do), 3 for input, 4 for
-    /// output.
+    /// output, 5 for the device, 6 for memory over a limit.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) | Error::Unsupported(_) => 2,
             Error::Input { .. } | Error::Read { .. } => 3,
             Error::Write { .. } => 4,
+            Error::Device(_) => 5,
+            Error::OverBudget { .. } => 6,
         }
     }
 }
@@ -75,7 +88,20 @@ impl fmt::Display for Error {
             }
             Error::Read { path, source } => write!(f, "cannot read {}: {source}", path.display()),
             Error::Write { path, source } => write!(f, "cannot write {}: {source}", path.display()),
+            Error::Device(e @ (GpuError::NoLoader | GpuError::NoDevice)) => {
+                write!(f, "{e}: see `raywake devices`, or give --backend scalar")
+            }
+            Error::Device(e) => write!(f, "device: {e}"),
+            Error::OverBudget { bytes, limit } => {
+                write!(f, "{bytes} bytes are needed, the limit is {limit}")
+            }
         }
+    }
+}
+
+impl From<GpuError> for Error {
+    fn from(e: GpuError) -> Error {
+        Error::Device(e)
     }
 }
 
@@ -83,6 +109,7 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Error::Read { source, .. } | Error::Write { source, .. } => Some(source),
+            Error::Device(e) => Some(e),
             _ => None,
         }
     }
@@ -103,5 +130,9 @@ mod tests {
         assert_eq!(full.to_string(), "cannot write a/poses.txt: disk full");
         assert_eq!(full.exit_code(), 4);
         assert_eq!(Error::Usage("x".into()).exit_code(), 2);
+        let device = Error::from(GpuError::NoLoader);
+        assert!(device.to_string().starts_with("no Vulkan loader found: see"));
+        assert_eq!(device.exit_code(), 5);
+        assert_eq!(Error::OverBudget { bytes: 2, limit: 1 }.exit_code(), 6);
     }
 }

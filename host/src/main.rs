@@ -1,46 +1,45 @@
-use raywake::backend::{Backend, Tables, scalar::Scalar};
-use raywake::drive::Drive;
-use raywake::source::{self, SweepData};
-use raywake_core::digest::Digest;
-use raywake_core::params::Profile;
-fn main() {
-    let path = std::env::args().nth(1).unwrap();
-    let mut source = source::open(path.as_ref(), &Default::default()).unwrap();
-    println!("{}", source.describe());
-    let profile = Profile::hdl64();
-    let t = || Tables::load(&profile, None, raywake_core::occupancy_constancy::SHIPPED).unwrap();
-    let mut drive = Drive::new(
-        &profile,
-        source.rig(),
-        &t(),
-        Backend::Scalar(Box::new(Scalar::new(&profile, t()))),
-    );
-    let (mut now, mut before) = (SweepData::default(), SweepData::default());
-    let mut digest = Digest::default();
-    for n in 0..source.len() {
-        source.read(n, &mut now).unwrap();
-        let s = drive.step(&now.sweep(), &before.points).unwrap();
-        if let Some(f) = &s.flows {
-            f.columns.iter().for_each(|c| digest.column(c));
-            if n % 20 == 1 {
-                println!(
-                    "{n} {} pts {} rays, {} solid, {} fg, {} valid {:?} {:?}",
-                    now.points.len(),
-                    s.rays,
-                    f.columns.len(),
-                    s.foreground,
-                    f.valid,
-                    f.turnover,
-                    s.prepared.dropped
-                );
-                for (n, ms) in s.laps.stages() {
-                    print!("{n} {ms:.2}  ");
-                }
-                println!("total {:.2}", s.laps.stages().map(|s| s.1).sum::<f64>());
-            }
+#![forbid(unsafe_code)]
+//! The command line program; see `raywake --help`.
+
+use std::alloc::System;
+use std::io::{Write, stderr};
+use std::process::ExitCode;
+
+use clap::Parser;
+use raywake::args::{Args, Command};
+use raywake::error::Error;
+use raywake::summary::Summary;
+use raywake::{budget, choose, engine, run};
+use raywake_gpu::guard::Guard;
+
+/// Exit code of a process ended by SIGINT, as shells have it.
+const INTERRUPTED: u8 = 130;
+
+#[global_allocator]
+static ALLOCATOR: Guard<System> = Guard(System);
+
+fn main() -> ExitCode {
+    let code = match execute(Args::parse().command) {
+        Ok(code) => code,
+        Err(e) => {
+            // Nobody is left to tell where standard error is closed.
+            let _ = writeln!(stderr(), "raywake: {e}");
+            e.exit_code()
         }
-        drive.tracklets().for_each(|t| digest.tracklet(&t));
-        std::mem::swap(&mut now, &mut before);
+    };
+    ExitCode::from(code)
+}
+
+fn execute(command: Command) -> Result<u8, Error> {
+    match command {
+        Command::Run(args) => run::run(&args).map(code),
+        #[cfg(feature = "demo")]
+        Command::Demo(args) => raywake::demo::demo(&args).map(code),
+        Command::Budget(args) => budget::budget(&args).map(|()| 0),
+        Command::Devices => engine::say(false, &choose::list_devices()?).map(|()| 0),
     }
-    println!("{:016x}", digest.value());
+}
+
+fn code(summary: Summary) -> u8 {
+    if summary.interrupted { INTERRUPTED } else { 0 }
 }

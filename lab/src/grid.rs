@@ -5,7 +5,7 @@ use raywake_core::grid::columns::columns;
 use raywake_core::grid::ray_merge::ray_merge;
 use raywake_core::grid::ray_trace::ray_trace;
 use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, Window, place};
+use raywake_core::prepare::{Preparation, Window, central, place};
 use raywake_core::record::{Column, Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
 
@@ -16,8 +16,7 @@ pub struct Grid {
     lattice_origin: Option<DVec3>,
     rays: Vec<Ray>,
     origins: Vec<[i32; 4]>,
-    slots: Vec<u32>,
-    weights: Vec<u32>,
+    slots: Vec<[u32; 2]>,
     distinct: Vec<u32>,
     log_odds: Vec<i32>,
     /// Sizes of the window.
@@ -36,8 +35,7 @@ impl Grid {
             lattice_origin: None,
             rays: vec![[0; 2]; POINTS_MAX],
             origins: vec![[0; 4]; ORIGINS_MAX],
-            slots: vec![0; MERGE_SLOTS],
-            weights: vec![0; MERGE_SLOTS],
+            slots: vec![[0; 2]; MERGE_SLOTS],
             distinct: vec![0; POINTS_MAX],
             log_odds: vec![0; profile.voxels()],
             step: Step {
@@ -72,16 +70,14 @@ impl Grid {
         );
         self.step.rays = count as i32;
         let rays = &self.rays[..count];
-        self.slots.fill(0);
-        self.weights.fill(0);
-        let used = ray_merge(rays, &mut self.slots, &mut self.weights, &mut self.distinct);
+        self.slots.fill([0; 2]);
+        let used = ray_merge(rays, &mut self.slots, &mut self.distinct);
         self.log_odds.fill(0);
         ray_trace(
             &self.step,
             &self.origins,
             rays,
             &self.slots,
-            &self.weights,
             &self.distinct[..used],
             &mut self.log_odds,
         );
@@ -97,7 +93,37 @@ impl Grid {
     /// Where a column's centre lies in the vehicle frame, m; the height is that of the anchor.
     pub fn centre(&self, window: &Window, column: usize) -> DVec3 {
         let (i, j) = (column as i32 / self.step.side, column as i32 % self.step.side);
-        let cell = DVec3::new(i as f64, j as f64, (self.step.levels / 2) as f64);
+        let [ci, cj, _] = central(&self.profile);
+        let cell = DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0);
         window.grid_from_vehicle.inverse().transform(cell * self.profile.voxel_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_core::pose::{Pose, Twist};
+    use raywake_core::sweep::{Point, Timing};
+
+    #[test]
+    fn a_point_lies_in_the_column_around_it() {
+        let rig = Rig {
+            sensors: [Pose::IDENTITY].into_iter().collect(),
+            timing: Timing::AtStamp,
+            distorted: false,
+            ground_m: -1.73,
+            own_vehicle: None,
+        };
+        let mut grid = Grid::new(Profile::hdl64());
+        for world_from_vehicle in [Pose::IDENTITY, Pose::planar(7.1, -3.4, 0.2, 0.6)] {
+            let points = [Point { position: [11.3, -4.2, -0.5], ..Point::default() }];
+            let twist = Twist::ZERO;
+            let sweep = Sweep { stamp_s: 0.0, points: &points, world_from_vehicle, twist };
+            let window = grid.sweep(&rig, &sweep);
+            let column = grid.of_point[0] as usize;
+            assert!(grid.solid().eq([column]));
+            let off = grid.centre(&window, column) - DVec3::new(11.3, -4.2, 0.0);
+            assert!(off.x.hypot(off.y) <= 0.3 * 0.5f64.sqrt() + 1e-6);
+        }
     }
 }

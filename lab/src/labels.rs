@@ -13,7 +13,10 @@ pub struct Footprint {
 impl Footprint {
     /// Of a box of this length and width.
     pub fn new(vehicle_from_box: Pose, length: f64, width: f64) -> Footprint {
-        Footprint { box_from_vehicle: vehicle_from_box.inverse(), half: [0.5 * length, 0.5 * width] }
+        Footprint {
+            box_from_vehicle: vehicle_from_box.inverse(),
+            half: [0.5 * length, 0.5 * width],
+        }
     }
 
     /// Whether a point (vehicle frame) lies above or below it, or within `margin` m of it.
@@ -30,7 +33,8 @@ mod tests {
     #[test]
     fn inside_and_beside() {
         let f = Footprint::new(Pose::planar(10.0, 2.0, -0.8, 0.5), 4.0, 2.0);
-        let at = |x: f64, y: f64| Pose::planar(10.0, 2.0, 0.0, 0.5).transform(DVec3::new(x, y, 0.0));
+        let at =
+            |x: f64, y: f64| Pose::planar(10.0, 2.0, 0.0, 0.5).transform(DVec3::new(x, y, 0.0));
         assert!(f.holds(at(1.99, -0.99), 0.0) && !f.holds(at(2.1, 0.0), 0.0));
         assert!(f.holds(at(2.1, 0.0), 0.15) && !f.holds(at(0.0, 1.2), 0.15));
     }

@@ -6,7 +6,7 @@ use crate::labels::Footprint;
 use raywake_core::params::Profile;
 use raywake_core::record::NONE;
 use raywake_core::sweep::Sweep;
-use raywake_sim::{Drive, Options, Rng, SimSweep};
+use raywake_sim::{Drive, Options, Rng, Sensor, SimSweep};
 
 /// Sweeps between those that are used: neighbours are nearly the same.
 const STRIDE: usize = 7;
@@ -31,6 +31,7 @@ pub fn of_drive(grid: &mut Grid, seed: u64, index: usize, sweeps: usize) -> Vec<
     let options = Options {
         sweeps: STRIDE * (sweeps - 1) + 1,
         density: rng.range(0.3, 1.3),
+        sensor: sensor(&mut rng),
         threads: 1,
         ..Options::default()
     };
@@ -41,6 +42,23 @@ pub fn of_drive(grid: &mut Grid, seed: u64, index: usize, sweeps: usize) -> Vec<
         of_sweep(grid, &drive, &drive.sweep(n * STRIDE), &mut rng, &mut samples);
     }
     samples
+}
+
+/// An HDL-64E that differs a little from any other in noise, strength and pitch of its beams, so
+/// that the filter does not come to rely on one copy of it.
+fn sensor(rng: &mut Rng) -> Sensor {
+    let base = Sensor::hdl64();
+    let mut beams = base.beams;
+    let pitch = rng.range(-0.005, 0.005);
+    beams.iter_mut().for_each(|b| b.elevation += pitch);
+    Sensor {
+        beams,
+        range_noise: rng.range(0.01, 0.05),
+        angle_noise: rng.range(2e-4, 1e-3),
+        dropout: rng.range(0.0, 0.15),
+        signal: base.signal * rng.range(0.4, 1.2),
+        ..base
+    }
 }
 
 /// Foreground where a return comes from an object, or the centre lies in an object's footprint.

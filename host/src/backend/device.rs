@@ -1,8 +1,6 @@
 //! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
 
-use raywake_core::layout::{
-    BUFFERS, Buffer, DISTINCT_COUNT, FOREGROUND_COUNT, FOREGROUND_MARKED,
-};
+use raywake_core::layout::{BUFFERS, Buffer, DISTINCT_COUNT, FOREGROUND_COUNT, FOREGROUND_MARKED};
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Perceived;
 use raywake_core::record::{Ray, Step};

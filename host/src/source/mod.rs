@@ -21,6 +21,8 @@ mod kitti;
 mod oxts;
 mod poses;
 mod recognise;
+#[cfg(feature = "demo")]
+pub mod simulated;
 mod text;
 
 #[cfg(test)]

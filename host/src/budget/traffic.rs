@@ -1,0 +1,58 @@
+//! Who writes and who reads each buffer, as the schedules say.
+
+use raywake_core::layout::{BUFFERS, Heap};
+use raywake_gpu::{Groups, Op, Program};
+
+/// Names of the steps that touch a buffer, each once, from first to last.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Traffic {
+    pub writers: Vec<&'static str>,
+    pub readers: Vec<&'static str>,
+}
+
+/// The traffic of every buffer of the layout over the programs, in the order they run.
+pub(super) fn of(programs: &[Program]) -> Vec<Traffic> {
+    let mut all: Vec<Traffic> = vec![Traffic::default(); BUFFERS.len()];
+    for (buffer, traffic) in BUFFERS.iter().zip(&mut all) {
+        if buffer.heap == Heap::Upload {
+            note(&mut traffic.writers, "host");
+        }
+    }
+    programs.iter().flat_map(|p| &p.ops).for_each(|op| step(op, &mut all));
+    for (buffer, traffic) in BUFFERS.iter().zip(&mut all) {
+        if buffer.heap == Heap::Readback {
+            note(&mut traffic.readers, "host");
+        }
+    }
+    all
+}
+
+fn step(op: &Op, all: &mut [Traffic]) {
+    let name = op.name();
+    match op {
+        Op::Fill { buffer, .. } => note(&mut all[*buffer].writers, name),
+        Op::Copy { from, to } => {
+            note(&mut all[*from].readers, name);
+            note(&mut all[*to].writers, name);
+        }
+        Op::Dispatch { kernel, buffers, groups, .. } => {
+            for (binding, buffer) in kernel.bindings.iter().zip(buffers) {
+                if binding.writes {
+                    note(&mut all[*buffer].writers, name);
+                }
+                if binding.reads {
+                    note(&mut all[*buffer].readers, name);
+                }
+            }
+            if let Groups::Indirect { buffer, .. } = groups {
+                note(&mut all[*buffer].readers, name);
+            }
+        }
+    }
+}
+
+fn note(names: &mut Vec<&'static str>, name: &'static str) {
+    if !names.contains(&name) {
+        names.push(name);
+    }
+}

@@ -1,0 +1,123 @@
+//! `raywake demo`: a small simulated drive, and how far the flow is from its truth.
+
+use std::collections::HashMap;
+
+use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::params::Profile;
+use raywake_core::pipeline::Flows;
+use raywake_sim::Truth;
+
+use crate::args::{Demo, Learned};
+use crate::config::Weights;
+use crate::engine::{self, Plan, say};
+use crate::error::Error;
+use crate::outputs::Kinds;
+use crate::source::SweepData;
+use crate::source::simulated::Simulated;
+use crate::statistics::Spread;
+use crate::summary::Summary;
+
+const SEED: u64 = 1;
+const SWEEPS: usize = 20;
+/// Observations of a tracklet before its velocity is compared with the truth.
+const AGE: u32 = 5;
+/// Objects slower than this do not count as moving, m/s.
+const MOVING_MPS: f32 = 1.0;
+
+/// Runs on the simulated drive, writes flow and pictures, prints the accuracy.
+pub fn demo(args: &Demo) -> Result<Summary, Error> {
+    let profile = Profile::hdl64();
+    let plan = Plan {
+        weights: Weights::read(&Learned::default(), &profile)?,
+        backend: &args.backend,
+        sweeps: 0..SWEEPS,
+        out: Some(args.out.clone()),
+        kinds: Kinds {
+            columns: cfg!(feature = "arrow"),
+            points: false,
+            png: cfg!(feature = "png"),
+            argoverse: false,
+        },
+        summary: None,
+        quiet: args.quiet,
+        profile,
+    };
+    let mut source = Simulated::new(SEED, SWEEPS);
+    let mut errors = Errors::default();
+    let voxel_m = plan.profile.voxel_m;
+    let summary = engine::execute(&plan, &mut source, &mut |source, index, first, flows| {
+        let truth = Field::new(source, first, source.truth(index), voxel_m);
+        errors.add(&truth, flows);
+    })?;
+    say(args.quiet, &errors.line())?;
+    say(args.quiet, &format!("results in {}\n", args.out.display()))?;
+    Ok(summary)
+}
+
+/// True velocities of moving objects by cell of the world.
+struct Field {
+    sums: HashMap<[i64; 2], ([f32; 2], f32)>,
+    cell_m: f64,
+}
+
+impl Field {
+    /// From the returns of a sweep, each at the place where the vehicle was at its time.
+    fn new(source: &Simulated, sweep: &SweepData, truth: &[Truth], cell_m: f64) -> Field {
+        let mut field = Field { sums: HashMap::new(), cell_m };
+        for (point, truth) in sweep.points.iter().zip(truth) {
+            let [x, y, _] = truth.velocity_world;
+            if x.hypot(y) < MOVING_MPS {
+                continue;
+            }
+            let at = source.drive().world_from_vehicle(sweep.stamp_s + f64::from(point.offset_s));
+            let world = at.transform(glam::Vec3::from_array(point.position).as_dvec3());
+            let (sum, count) = field.sums.entry(field.cell([world.x, world.y])).or_default();
+            *sum = [sum[0] + x, sum[1] + y];
+            *count += 1.0;
+        }
+        field
+    }
+
+    fn cell(&self, place: [f64; 2]) -> [i64; 2] {
+        place.map(|v| (v / self.cell_m).floor() as i64)
+    }
+
+    /// Mean velocity of what moves in the cell of a column.
+    fn at(&self, column: &ColumnFlow) -> Option<[f32; 2]> {
+        let (sum, count) = self.sums.get(&self.cell(column.position_world_m))?;
+        Some(sum.map(|v| v / count))
+    }
+}
+
+/// How far velocities are from the truth.
+#[derive(Default)]
+struct Errors {
+    speed_mps: Vec<f64>,
+    velocity_mps: Vec<f64>,
+}
+
+impl Errors {
+    /// Matched columns of moving objects whose tracklet is old enough.
+    fn add(&mut self, truth: &Field, flows: &Flows) {
+        let old = |c: &&ColumnFlow| c.origin == Origin::Matched && c.age >= AGE;
+        for column in flows.columns.iter().filter(old) {
+            let Some([x, y]) = truth.at(column) else { continue };
+            let [u, v] = column.velocity_world_mps;
+            self.speed_mps.push(f64::from((u.hypot(v) - x.hypot(y)).abs()));
+            self.velocity_mps.push(f64::from((u - x).hypot(v - y)));
+        }
+    }
+
+    fn line(&self) -> String {
+        match (Spread::of(&self.speed_mps), Spread::of(&self.velocity_mps)) {
+            (Some(speed), Some(velocity)) => format!(
+                "accuracy   median speed error {:.2} m/s, median velocity error {:.2} m/s over {} \
+                 columns of moving objects seen {AGE} times or more\n",
+                speed.median,
+                velocity.median,
+                self.speed_mps.len()
+            ),
+            _ => "accuracy   no column of a moving object was followed long enough\n".into(),
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The table a run ends with.
+
+use std::fmt::Write;
+
+use crate::statistics::Spread;
+use crate::summary::Summary;
+
+/// Everything a summary holds, for people.
+pub fn text(s: &Summary) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = write(&mut out, s);
+    out
+}
+
+fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
+    let end = if s.interrupted { ", INTERRUPTED" } else { "" };
+    writeln!(out, "\n{} sweeps, {} with a pair{end}", s.sweeps, s.pairs)?;
+    times(out, s)?;
+    amounts(out, s)?;
+    tracklets(out, s)?;
+    left_out(out, s)?;
+    writeln!(
+        out,
+        "memory     {} device, {} host; {} Vulkan allocations, {} allocations after the first sweep began",
+        bytes(s.device_bytes),
+        bytes(s.host_bytes),
+        s.vulkan_allocations,
+        s.allocations_after_seal
+    )?;
+    if let Some(messages) = &s.validation_messages {
+        writeln!(out, "validation {} messages", messages.len())?;
+        messages.iter().try_for_each(|m| writeln!(out, "  {m}"))?;
+    }
+    writeln!(out, "digest     {}", s.digest)
+}
+
+fn times(out: &mut String, s: &Summary) -> std::fmt::Result {
+    let Some(total) = &s.total_ms else {
+        return writeln!(out, "no pair of sweeps, no flow, no times");
+    };
+    let names = s.stage_ms.0.iter().map(|(name, _)| name.len());
+    let width = names.max().unwrap_or(0).max(5);
+    let head = ["median", "sd", "p99", "max"];
+    writeln!(out, "\n{:width$}  {}   ms", "stage", head.map(|h| format!("{h:>8}")).join(""))?;
+    let mut row = |name: &str, t: &Spread| {
+        let values = [t.median, t.sd, t.p99, t.max].map(|v| format!("{v:8.2}"));
+        writeln!(out, "{name:width$}  {}", values.join(""))
+    };
+    s.stage_ms.0.iter().try_for_each(|(name, spread)| row(name, spread))?;
+    row("total", total)?;
+    let share = 100.0 * s.share_under_100_ms.unwrap_or(0.0);
+    writeln!(
+        out,
+        "{share:.1} % of the pairs in less than 100 ms, at {:.0} solid and {:.0} foreground columns",
+        s.solid_columns, s.foreground_columns
+    )?;
+    writeln!(out, "files besides: {:.1} ms reading, {:.1} ms writing", s.read_ms, s.write_ms)
+}
+
+fn amounts(out: &mut String, s: &Summary) -> std::fmt::Result {
+    writeln!(
+        out,
+        "\nmean       {:.0} returns, {:.0} distinct rays, {:.0} solid columns, {:.0} foreground, \
+         {:.0} valid flows",
+        s.points, s.distinct_rays, s.solid_columns, s.foreground_columns, s.valid_flows_per_sweep
+    )
+}
+
+fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
+    let ages = &s.tracklets_by_age.0;
+    let cells = |cell: &dyn Fn(usize) -> String| -> String {
+        (0..ages.len()).map(|n| format!("{:>8}", cell(n))).collect()
+    };
+    writeln!(out, "tracklets  age    {}", cells(&|n| ages[n].0.to_string()))?;
+    writeln!(out, "           mean   {}", cells(&|n| format!("{:.0}", ages[n].1.mean)))?;
+    writeln!(out, "           at end {}", cells(&|n| ages[n].1.end.to_string()))?;
+    let t = &s.tracklet_turnover;
+    writeln!(
+        out,
+        "           {} born, {} updates; ended: {} without flow, {} by the gate, {} out of the window",
+        t.born, t.updated, t.lost, t.gated, t.left
+    )
+}
+
+fn left_out(out: &mut String, s: &Summary) -> std::fmt::Result {
+    let d = &s.dropped;
+    let kinds = [
+        (d.over_capacity, "returns over capacity"),
+        (d.not_finite, "not finite"),
+        (d.no_return, "without an echo"),
+        (d.too_far, "too far"),
+        (d.unknown_sensor, "of an unknown sensor"),
+        (d.own_vehicle, "on the own vehicle"),
+        (d.null_rows, "null rows"),
+        (d.missing_sweeps, "sweeps missing"),
+        (d.foreground, "foreground columns over capacity"),
+    ];
+    let some = kinds.iter().filter(|k| k.0 > 0).map(|(n, what)| format!("{n} {what}"));
+    let some = some.collect::<Vec<_>>().join(", ");
+    writeln!(out, "left out   {}", if some.is_empty() { "nothing" } else { &some })?;
+    for (n, reset) in s.resets.iter().enumerate() {
+        let label = if n == 0 { "resets" } else { "" };
+        writeln!(out, "{label:10} sweep {} (frame {}): {}", reset.sweep, reset.frame, reset.text)?;
+    }
+    Ok(())
+}
+
+/// Bytes in the unit that suits them.
+pub fn bytes(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} B"),
+        10_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
+        _ => format!("{:.1} MB", bytes as f64 * 1e-6),
+    }
+}

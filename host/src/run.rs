@@ -1,0 +1,29 @@
+//! `raywake run`.
+
+use crate::args;
+use crate::config::{self, Weights};
+use crate::engine::{self, Plan};
+use crate::error::Error;
+use crate::outputs::Kinds;
+use crate::source;
+use crate::summary::Summary;
+
+/// Estimates the flow of a recorded drive.
+pub fn run(args: &args::Run) -> Result<Summary, Error> {
+    let mut profile = config::profile(&args.profile)?;
+    // Asked for by name, it is wanted under every profile.
+    profile.deskew |= args.recording.deskew == Some(true);
+    let weights = Weights::read(&args.learned, &profile)?;
+    let mut source = source::open(&args.data, &args.recording.options())?;
+    let plan = Plan {
+        sweeps: args.range(source.len())?,
+        profile,
+        weights,
+        backend: &args.backend,
+        out: args.results.out.clone(),
+        kinds: Kinds::of(&args.results),
+        summary: args.results.summary.clone(),
+        quiet: args.quiet,
+    };
+    engine::execute(&plan, source.as_mut(), &mut |_, _, _, _| ())
+}

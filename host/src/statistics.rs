@@ -1,0 +1,273 @@
+//! What a run counts and times, sweep by sweep.
+
+use raywake_core::digest::Digest;
+use raywake_core::output::TrackletState;
+use raywake_core::pipeline::{Flows, Reset};
+use raywake_core::prepare;
+use raywake_core::tracklet::Turnover;
+use serde::Serialize;
+
+use crate::drive::Stepped;
+use crate::laps::Laps;
+use crate::source::SweepData;
+
+/// Classes of tracklets by age: name and least age.
+pub const AGES: [(&str, u32); 5] = [("0", 0), ("1-2", 1), ("3-5", 3), ("6-9", 6), ("10+", 10)];
+
+/// The time a sweep may take: sweeps come at 10 Hz, ms.
+pub const BUDGET_MS: f64 = 100.0;
+
+/// How a quantity is distributed over sweeps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Half lie below.
+    pub median: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// 99 % lie at or below.
+    pub p99: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// None without values.
+    pub fn of(values: &[f64]) -> Option<Spread> {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (n, max) = (sorted.len(), *sorted.last()?);
+        let mean = sorted.iter().sum::<f64>() / n as f64;
+        let variance = sorted.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n as f64;
+        let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
+        Some(Spread { median, sd: variance.sqrt(), p99: sorted[(99 * n).div_ceil(100) - 1], max })
+    }
+}
+
+/// A sweep that had no usable predecessor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ResetAt {
+    /// Index of the sweep in the recording.
+    pub sweep: usize,
+    /// Frame number or timestamp of the sweep.
+    pub frame: u64,
+    /// `first`, `backwards`, `gap` or `jump`.
+    pub reason: &'static str,
+    /// The reason in words, with its value.
+    pub text: String,
+}
+
+impl ResetAt {
+    fn new(sweep: usize, frame: u64, reset: Reset) -> ResetAt {
+        let (reason, text) = match reset {
+            Reset::First => ("first", "first sweep".to_string()),
+            Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the sweep before")),
+            Reset::Gap(dt) => ("gap", format!("gap of {dt:.3} s")),
+            Reset::Jump(mps) => ("jump", format!("poses jump at {mps:.0} m/s")),
+        };
+        ResetAt { sweep, frame, reason, text }
+    }
+}
+
+/// Left out, and why. Counts over all sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Dropped {
+    /// Returns beyond the capacity for points.
+    pub over_capacity: u64,
+    /// Returns with a NaN or an infinity.
+    pub not_finite: u64,
+    /// Returns at exactly (0, 0, 0).
+    pub no_return: u64,
+    /// Returns beyond the extent of the ray coordinates.
+    pub too_far: u64,
+    /// Returns of a sensor the rig does not have.
+    pub unknown_sensor: u64,
+    /// Returns on the own vehicle: free space without an end.
+    pub own_vehicle: u64,
+    /// Rows without a coordinate in the source's files.
+    pub null_rows: u64,
+    /// Sweeps the source's frame numbers say are missing.
+    pub missing_sweeps: u64,
+    /// Solid columns beyond the capacity for foreground.
+    pub foreground: u64,
+}
+
+impl Dropped {
+    fn add(&mut self, data: &SweepData, d: &prepare::Dropped) {
+        self.over_capacity += d.over_capacity;
+        self.not_finite += d.not_finite;
+        self.no_return += d.no_return;
+        self.too_far += d.too_far;
+        self.unknown_sensor += d.unknown_sensor;
+        self.own_vehicle += d.own_vehicle;
+        self.null_rows += u64::from(data.dropped.null_rows);
+    }
+}
+
+/// Tracklets born and ended. Counts over all sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tally {
+    /// Born.
+    pub born: u64,
+    /// Updated.
+    pub updated: u64,
+    /// Ended by the gate.
+    pub gated: u64,
+    /// Ended without a valid flow at their cell.
+    pub lost: u64,
+    /// Ended because their cell left the window.
+    pub left: u64,
+}
+
+impl Tally {
+    fn add(&mut self, t: &Turnover) {
+        let pairs = [
+            (&mut self.born, t.born),
+            (&mut self.updated, t.updated),
+            (&mut self.gated, t.gated),
+            (&mut self.lost, t.lost),
+            (&mut self.left, t.left),
+        ];
+        pairs.into_iter().for_each(|(sum, n)| *sum += u64::from(n));
+    }
+}
+
+/// Times of one stage.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Its name.
+    pub name: &'static str,
+    /// One value per pair of sweeps, ms.
+    pub milliseconds: Vec<f64>,
+}
+
+/// Everything counted and timed. Times are of sweeps that complete a pair; a sweep after a reset,
+/// the first one too, yields no flow and counts for no time.
+#[derive(Debug, Default)]
+pub struct Statistics {
+    /// Sweeps done.
+    pub sweeps: u64,
+    /// Sweeps that completed a pair.
+    pub pairs: u64,
+    /// Returns of all sweeps.
+    pub points: u64,
+    /// Distinct rays of all sweeps.
+    pub rays: u64,
+    /// Solid columns of all pairs.
+    pub solid: u64,
+    /// Foreground columns of all pairs.
+    pub foreground: u64,
+    /// Valid flows of all pairs.
+    pub valid: u64,
+    /// Times by stage, in the order of the first pair.
+    pub stages: Vec<Stage>,
+    /// Sums of the stages of each pair, ms.
+    pub totals: Vec<f64>,
+    /// Time to read sweeps, ms.
+    pub read_ms: f64,
+    /// Time to write results, ms.
+    pub write_ms: f64,
+    /// Left out.
+    pub dropped: Dropped,
+    /// Tracklets born and ended.
+    pub turnover: Tally,
+    /// Tracklets after the last sweep, by class of [`AGES`].
+    pub ages_at_end: [u64; AGES.len()],
+    /// Tracklets after every sweep that completed a pair.
+    pub ages_sum: [u64; AGES.len()],
+    /// Resets.
+    pub resets: Vec<ResetAt>,
+    /// Of all results, see [`Statistics::tracklets`].
+    pub digest: Digest,
+}
+
+impl Statistics {
+    /// Counts a sweep; its columns go to the digest.
+    pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
+        self.dropped.add(data, &stepped.prepared.dropped);
+        if self.sweeps > 0 {
+            self.dropped.missing_sweeps += data.dropped.sweeps_before;
+        }
+        self.sweeps += 1;
+        self.points += data.points.len() as u64;
+        self.rays += stepped.rays as u64;
+        if let Some(reset) = stepped.prepared.reset {
+            self.resets.push(ResetAt::new(index, data.frame, reset));
+        }
+        if let Some(flows) = &stepped.flows {
+            self.pair(flows, stepped.foreground);
+            self.times(&stepped.laps);
+        }
+    }
+
+    fn pair(&mut self, flows: &Flows, foreground: usize) {
+        self.pairs += 1;
+        self.solid += flows.columns.len() as u64;
+        self.foreground += foreground as u64;
+        self.valid += flows.valid as u64;
+        self.dropped.foreground += flows.foreground_dropped as u64;
+        self.turnover.add(&flows.turnover);
+        flows.columns.iter().for_each(|c| self.digest.column(c));
+    }
+
+    fn times(&mut self, laps: &Laps) {
+        let mut total = 0.0;
+        for (name, ms) in laps.stages() {
+            total += ms;
+            match self.stages.iter_mut().find(|s| s.name == name) {
+                Some(stage) => stage.milliseconds.push(ms),
+                None => self.stages.push(Stage { name, milliseconds: vec![ms] }),
+            }
+        }
+        self.totals.push(total);
+    }
+
+    /// Counts the tracklets after a sweep.
+    ///
+    /// The digest is over every column of a pair in the order of the output, then every tracklet
+    /// after the pair in the order of the output, pair by pair.
+    pub fn tracklets(&mut self, tracklets: &[TrackletState], paired: bool) {
+        self.ages_at_end = [0; AGES.len()];
+        for tracklet in tracklets {
+            let class = AGES.iter().rposition(|(_, least)| tracklet.age >= *least);
+            self.ages_at_end[class.unwrap_or(0)] += 1;
+            self.digest.tracklet(tracklet);
+        }
+        if paired {
+            let sums = self.ages_sum.iter_mut().zip(self.ages_at_end);
+            sums.for_each(|(sum, n)| *sum += n);
+        }
+    }
+
+    /// Share of pairs within [`BUDGET_MS`]; none without pairs.
+    pub fn share_in_time(&self) -> Option<f64> {
+        let within = self.totals.iter().filter(|ms| **ms < BUDGET_MS).count();
+        (!self.totals.is_empty()).then(|| within as f64 / self.totals.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads() {
+        assert_eq!(Spread::of(&[]), None);
+        let one = Spread::of(&[3.0]).unwrap();
+        assert_eq!(one, Spread { median: 3.0, sd: 0.0, p99: 3.0, max: 3.0 });
+        let values: Vec<f64> = (1..=200).rev().map(f64::from).collect();
+        let s = Spread::of(&values).unwrap();
+        assert_eq!((s.median, s.p99, s.max), (100.5, 198.0, 200.0));
+        assert!((s.sd - 57.734).abs() < 1e-3);
+    }
+
+    #[test]
+    fn ages() {
+        let mut s = Statistics::default();
+        let aged = |age| TrackletState { age, ..TrackletState::default() };
+        let all: Vec<_> = [0, 1, 2, 3, 5, 6, 9, 10, 99].map(aged).into();
+        s.tracklets(&all, true);
+        s.tracklets(&all[..1], true);
+        s.tracklets(&[], false);
+        assert_eq!((s.ages_sum, s.ages_at_end), ([2, 2, 2, 2, 2], [0; 5]));
+    }
+}

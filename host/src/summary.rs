@@ -1,0 +1,192 @@
+//! The figures of a run: what `--summary` writes as JSON and what the report prints.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use raywake_core::params::Profile;
+use serde::{Serialize, Serializer};
+
+use crate::backend::Backend;
+use crate::error::Error;
+use crate::sink::atomic;
+use crate::statistics::{AGES, Dropped, ResetAt, Spread, Statistics, Tally};
+
+/// Entries of a JSON object in the order given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ordered<T>(
+    /// Names and values.
+    pub Vec<(&'static str, T)>,
+);
+
+impl<T: Serialize> Serialize for Ordered<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}
+
+/// Tracklets of one class of age.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Aged {
+    /// After the last sweep.
+    pub end: u64,
+    /// Mean after a pair of sweeps.
+    pub mean: f64,
+}
+
+/// What a run was and what came of it. Means are per sweep for points and rays, per pair of sweeps
+/// for the rest; times are of sweeps that complete a pair, without reading and writing files.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Version of this program.
+    pub version: &'static str,
+    /// Name of the recording.
+    pub source: String,
+    /// Name of the profile.
+    pub profile: String,
+    /// `scalar` or `vulkan`.
+    pub backend: &'static str,
+    /// Name of the device.
+    pub device: String,
+    /// Where the background filter comes from.
+    pub filter: String,
+    /// Whether the run was ended by a signal.
+    pub interrupted: bool,
+    /// Sweeps done.
+    pub sweeps: u64,
+    /// Of these, sweeps that completed a pair.
+    pub pairs: u64,
+    /// Digest of all results, 16 hexadecimal digits; see [`Statistics::tracklets`].
+    pub digest: String,
+    /// Valid flows of all pairs.
+    pub valid_flows: u64,
+    /// Their mean.
+    pub valid_flows_per_sweep: f64,
+    /// Mean foreground columns.
+    pub foreground_columns: f64,
+    /// Mean solid columns.
+    pub solid_columns: f64,
+    /// Mean returns.
+    pub points: f64,
+    /// Mean distinct rays.
+    pub distinct_rays: f64,
+    /// Time of every stage, ms.
+    pub stage_ms: Ordered<Spread>,
+    /// Time of all stages, ms; null without a pair.
+    pub total_ms: Option<Spread>,
+    /// Share (0..1) of pairs done within 100 ms; null without a pair.
+    pub share_under_100_ms: Option<f64>,
+    /// Mean time to read a sweep, ms.
+    pub read_ms: f64,
+    /// Mean time to write a sweep's results, ms.
+    pub write_ms: f64,
+    /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
+    pub device_bytes: u64,
+    /// Bytes of host memory held throughout.
+    pub host_bytes: u64,
+    /// Calls of vkAllocateMemory.
+    pub vulkan_allocations: u64,
+    /// Allocations of the program within sweeps, and of the device, after the first sweep began.
+    pub allocations_after_seal: u64,
+    /// Messages of the validation layer, where it is on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_messages: Option<Vec<String>>,
+    /// Left out.
+    pub dropped: Dropped,
+    /// Tracklets born and ended.
+    pub tracklet_turnover: Tally,
+    /// Tracklets by observations after birth.
+    pub tracklets_by_age: Ordered<Aged>,
+    /// Sweeps without a usable predecessor.
+    pub resets: Vec<ResetAt>,
+}
+
+/// What a summary tells besides the statistics.
+pub struct Facts<'a> {
+    /// Name of the recording.
+    pub source: &'a str,
+    /// The profile.
+    pub profile: &'a Profile,
+    /// The backend, after the run.
+    pub backend: &'a Backend,
+    /// Where the background filter comes from.
+    pub filter: &'a str,
+    /// Ended by a signal.
+    pub interrupted: bool,
+    /// Runs under the validation layer.
+    pub validating: bool,
+    /// Bytes of host memory.
+    pub host_bytes: u64,
+    /// Allocations of the program within sweeps.
+    pub allocations: u64,
+}
+
+impl Summary {
+    /// Puts the figures together.
+    pub fn new(facts: &Facts, s: &Statistics) -> Summary {
+        let census = facts.backend.census().unwrap_or_default();
+        let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
+        let spreads =
+            s.stages.iter().filter_map(|t| Some((t.name, Spread::of(&t.milliseconds)?))).collect();
+        let ages = AGES.iter().zip(s.ages_at_end.iter().zip(s.ages_sum));
+        let ages =
+            ages.map(|((name, _), (&end, sum))| (*name, Aged { end, mean: per(sum, s.pairs) }));
+        Summary {
+            version: env!("CARGO_PKG_VERSION"),
+            source: facts.source.to_string(),
+            profile: facts.profile.name.to_string(),
+            backend: facts.backend.name(),
+            device: facts.backend.device().to_string(),
+            filter: facts.filter.to_string(),
+            interrupted: facts.interrupted,
+            sweeps: s.sweeps,
+            pairs: s.pairs,
+            digest: format!("{:016x}", s.digest.value()),
+            valid_flows: s.valid,
+            valid_flows_per_sweep: per(s.valid, s.pairs),
+            foreground_columns: per(s.foreground, s.pairs),
+            solid_columns: per(s.solid, s.pairs),
+            points: per(s.points, s.sweeps),
+            distinct_rays: per(s.rays, s.sweeps),
+            stage_ms: Ordered(spreads),
+            total_ms: Spread::of(&s.totals),
+            share_under_100_ms: s.share_in_time(),
+            read_ms: s.read_ms / s.sweeps.max(1) as f64,
+            write_ms: s.write_ms / s.sweeps.max(1) as f64,
+            device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
+            host_bytes: facts.host_bytes,
+            vulkan_allocations: census.memory_allocations,
+            allocations_after_seal: facts.allocations + census.after_seal,
+            validation_messages: facts.validating.then(|| facts.backend.messages()),
+            dropped: s.dropped,
+            tracklet_turnover: s.turnover,
+            tracklets_by_age: Ordered(ages.collect()),
+            resets: s.resets.clone(),
+        }
+    }
+
+    /// Writes the summary as JSON.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let text =
+            serde_json::to_string_pretty(self).map_err(|e| Error::writing(path)(e.into()))?;
+        replace(path, &(text + "\n"))
+    }
+}
+
+/// Writes a file whole or not at all; to what is no file (a pipe, a terminal) as it comes, because
+/// a file must not take its place.
+fn replace(path: &Path, text: &str) -> Result<(), Error> {
+    if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        let mut out = File::options().write(true).open(path).map_err(Error::writing(path))?;
+        return out.write_all(text.as_bytes()).map_err(Error::writing(path));
+    }
+    atomic::write(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// Creates the folder a summary will go to, so that a wrong path shows before the first sweep.
+pub fn make_room(path: &Option<PathBuf>) -> Result<(), Error> {
+    match path.as_deref().and_then(Path::parent) {
+        Some(folder) if !folder.as_os_str().is_empty() => atomic::create_folder(folder),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,250 @@
+//! The program as a user meets it: exit codes, messages, files.
+
+mod common;
+
+use std::fs;
+use std::process::Stdio;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use common::{Outcome, Temp, raywake, weights};
+
+/// Shape of a background filter, and how many weights come before its bias.
+const FILTER: [usize; 3] = [25, 2, 14];
+const FILTER_WEIGHTS: usize = 25 * 2 * 14;
+const BACKEND: [&str; 2] = ["--backend", "scalar"];
+
+/// `raywake run DRIVE` with more arguments, on a small window.
+fn run(t: &Temp, more: &[&str]) -> Outcome {
+    let config = t.write("small.toml", "name = \"small\"\nside = 61\nem_rounds = 3\n");
+    let data = t.path().join("drive");
+    let head = ["run", data.to_str().unwrap(), "--config", config.to_str().unwrap()];
+    raywake(&[&head, &BACKEND[..], more].concat())
+}
+
+#[test]
+fn figures_and_files() {
+    let t = Temp::new();
+    t.drive(6);
+    let out = t.path().join("out");
+    let more =
+        ["--out", out.to_str().unwrap(), "--png", "--export", "argoverse", "--filter", "none"];
+    let first = run(&t, &more);
+    first.succeeded();
+    assert!(first.stdout.contains("memory budget") && first.stdout.contains("100 ms per sweep"));
+    for text in ["ray_trace", "median", "tracklets", "left out", "digest"] {
+        assert!(first.stdout.contains(text), "{text} in {}", first.stdout);
+    }
+    for folder in ["columns", "points", "png"] {
+        assert_eq!(fs::read_dir(out.join(folder)).unwrap().count(), 5, "{folder}");
+    }
+    assert!(out.join("columns/0000000000.feather").is_file());
+    assert!(out.join("tracklets/0000000005.feather").is_file());
+    assert!(out.join("argoverse/drive/4.feather").is_file());
+    let s = first.summary(&out.join("summary.json"));
+    let wanted = "version source profile backend device filter interrupted sweeps pairs digest \
+        valid_flows valid_flows_per_sweep foreground_columns solid_columns points distinct_rays \
+        stage_ms total_ms share_under_100_ms device_bytes host_bytes vulkan_allocations \
+        allocations_after_seal dropped tracklets_by_age resets";
+    for key in wanted.split_whitespace() {
+        assert!(s.get(key).is_some(), "{key}");
+    }
+    assert_eq!((&s["sweeps"], &s["pairs"], &s["profile"]), (&6.into(), &5.into(), &"small".into()));
+    assert_eq!((&s["allocations_after_seal"], &s["interrupted"]), (&0.into(), &false.into()));
+    assert!(s["valid_flows"].as_u64() > Some(100) && s["stage_ms"]["flow"]["p99"].is_f64());
+    let digest = s["digest"].as_str().unwrap();
+    assert!(digest.len() == 16 && u64::from_str_radix(digest, 16).is_ok());
+
+    let file = t.path().join("again.json");
+    let again = run(&t, &["--filter", "none", "--quiet", "--summary", file.to_str().unwrap()]);
+    again.succeeded();
+    assert_eq!((again.stdout.as_str(), again.stderr.as_str()), ("", ""));
+    assert_eq!(again.summary(&file)["digest"], s["digest"]);
+}
+
+#[test]
+fn ranges_of_sweeps() {
+    let t = Temp::new();
+    t.drive(6);
+    let json = t.path().join("s.json");
+    let sweeps = |more: &[&str]| {
+        let o = run(&t, &[more, &["--summary", json.to_str().unwrap()]].concat());
+        o.succeeded();
+        let s = o.summary(&json);
+        (s["sweeps"].as_u64().unwrap(), s["total_ms"].is_null(), s["resets"][0]["sweep"].as_u64())
+    };
+    assert_eq!(sweeps(&["--sweeps", "2..5"]), (3, false, Some(2)));
+    assert_eq!(sweeps(&["--sweeps", "1..", "-n", "2"]), (2, false, Some(1)));
+    assert_eq!(sweeps(&["-n", "1"]), (1, true, Some(0)));
+    run(&t, &["--sweeps", "3..7"]).failed(2, &["--sweeps 3..7", "6 sweeps"]);
+    run(&t, &["--sweeps", "6.."]).failed(2, &["--sweeps 6..", "6 sweeps"]);
+    run(&t, &["--sweeps", "4..4"]).failed(2, &["--sweeps", "4..4"]);
+}
+
+#[test]
+fn mistakes_in_profiles() {
+    let t = Temp::new();
+    t.drive(2);
+    let data = t.path().join("drive");
+    let with = |text: &str| {
+        let config = t.write("p.toml", text);
+        raywake(&["run", data.to_str().unwrap(), "--config", config.to_str().unwrap()])
+    };
+    with("side = 61\nsied = 3\n").failed(3, &["p.toml", "line 2", "`sied`"]);
+    with("side = 257\n").failed(3, &["p.toml", "`side`", "255"]);
+    with("levels = 12\n").failed(2, &["12 levels", "--filter"]);
+    let data = data.to_str().unwrap();
+    raywake(&["run", data, "--profile", "nosuch"]).failed(2, &["`nosuch`", "hdl64"]);
+    raywake(&["run", data, "--config", "absent.toml"]).failed(3, &["absent.toml"]);
+}
+
+#[test]
+fn mistakes_in_weights() {
+    let t = Temp::new();
+    t.drive(3);
+    let with = |text: &str| {
+        let file = t.write("filter.txt", text);
+        run(&t, &["--filter", file.to_str().unwrap()])
+    };
+    let good = weights("background", &FILTER, |n| if n == FILTER_WEIGHTS { "1" } else { "0" });
+    let o = with(&good);
+    o.succeeded();
+    assert!(o.stdout.contains("background filter: made up"), "{}", o.stdout);
+    let flipped = good.replacen("\n0\n", "\n4\n", 1);
+    with(&flipped).failed(3, &["filter.txt", "checksum"]);
+    let nan = weights("background", &FILTER, |n| if n == 3 { "NaN" } else { "0" });
+    with(&nan).failed(3, &["filter.txt", "value 3"]);
+    let shape = weights("background", &[25, 2, 13], |_| "0");
+    with(&shape).failed(3, &["filter.txt", "shape"]);
+    let file = t.write("filter.txt", [b'r', 0xff]);
+    run(&t, &["--filter", file.to_str().unwrap()]).failed(3, &["filter.txt", "byte 1"]);
+    run(&t, &["--filter", "absent.txt"]).failed(3, &["absent.txt"]);
+    run(&t, &["--constancy", file.to_str().unwrap()]).failed(3, &["filter.txt"]);
+}
+
+#[test]
+fn unreadable_and_unwritable() {
+    let t = Temp::new();
+    raywake(&["run", "no/such/folder"]).failed(3, &["no/such/folder"]);
+    raywake(&["run", t.path().to_str().unwrap()]).failed(3, &[t.path().to_str().unwrap()]);
+    t.drive(3);
+    let file = t.write("file", "");
+    let below = file.join("out");
+    run(&t, &["--out", below.to_str().unwrap()]).failed(4, &[below.to_str().unwrap()]);
+    let below = file.join("s.json");
+    run(&t, &["--summary", below.to_str().unwrap()]).failed(4, &[file.to_str().unwrap()]);
+    if std::path::Path::new("/dev/full").exists() {
+        run(&t, &["--summary", "/dev/full"]).failed(4, &["/dev/full", "No space"]);
+    }
+    t.write("drive/velodyne_points/data/0000000002.bin", [0; 17]);
+    let out = t.path().join("out");
+    run(&t, &["--out", out.to_str().unwrap()]).failed(3, &["0000000002.bin", "truncated"]);
+    assert!(out.join("columns/0000000000.feather").is_file());
+    assert!(!out.join("summary.json").exists());
+}
+
+#[test]
+fn nothing_seen() {
+    let t = Temp::new();
+    t.drive(3);
+    for n in 0..3 {
+        t.write(&format!("drive/velodyne_points/data/{n:010}.bin"), []);
+    }
+    let json = t.path().join("s.json");
+    let out = t.path().join("out");
+    let o =
+        run(&t, &["--summary", json.to_str().unwrap(), "--out", out.to_str().unwrap(), "--png"]);
+    o.succeeded();
+    let s = o.summary(&json);
+    assert_eq!((&s["points"], &s["valid_flows"], &s["pairs"]), (&0.0.into(), &0.into(), &2.into()));
+}
+
+#[test]
+fn gaps_and_jumps() {
+    let t = Temp::new();
+    t.drive(9);
+    let stamp = |n: usize| n as f64 * 0.1 + if n < 3 { 0.0 } else { 1.0 };
+    let place = |n: usize| n as f64 * 0.5 + if n < 6 { 0.0 } else { 100.0 };
+    t.write("drive/times.txt", (0..9).map(|n| format!("{}\n", stamp(n))).collect::<String>());
+    t.write("drive/poses.txt", (0..9).map(|n| common::row(place(n))).collect::<String>());
+    let json = t.path().join("s.json");
+    let o = run(&t, &["--summary", json.to_str().unwrap()]);
+    o.succeeded();
+    assert!(o.stdout.contains("sweep 3 (frame 3): gap of 1.100 s"), "{}", o.stdout);
+    assert!(o.stdout.contains("sweep 6 (frame 6): poses jump at 1005 m/s"), "{}", o.stdout);
+    let s = o.summary(&json);
+    let reasons: Vec<_> = s["resets"].as_array().unwrap().iter().map(|r| &r["reason"]).collect();
+    assert_eq!(reasons, ["first", "gap", "jump"]);
+    assert_eq!(s["pairs"], 6);
+}
+
+#[test]
+fn an_interrupt_ends_the_run_in_order() {
+    let t = Temp::new();
+    t.drive(1200);
+    let out = t.path().join("out");
+    let config = t.write("small.toml", "side = 61\n");
+    let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
+        .args(BACKEND)
+        .args(["--out", out.to_str().unwrap(), "--config", config.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let since = Instant::now();
+    while !out.join("columns/0000000001.feather").exists() {
+        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
+        thread::sleep(Duration::from_millis(2));
+    }
+    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    let o = Outcome::of(child.wait_with_output().unwrap());
+    assert_eq!(o.code, Some(130), "{}", o.stderr);
+    assert!(o.stdout.contains("INTERRUPTED") && o.stdout.contains("digest"), "{}", o.stdout);
+    let s = o.summary(&out.join("summary.json"));
+    assert_eq!(s["interrupted"], true);
+    let (sweeps, pairs) = (s["sweeps"].as_u64().unwrap(), s["pairs"].as_u64().unwrap());
+    assert!(sweeps > 1 && sweeps < 1200 && pairs == sweeps - 1, "{sweeps}");
+    for folder in ["columns", "points", "tracklets"] {
+        let names: Vec<_> = fs::read_dir(out.join(folder)).unwrap().collect();
+        assert_eq!(names.len() as u64, pairs, "{folder}");
+        let whole = |name: &str| !name.ends_with(".partial");
+        assert!(names.iter().all(|n| whole(n.as_ref().unwrap().file_name().to_str().unwrap())));
+    }
+}
+
+#[test]
+fn budgets() {
+    let all = raywake(&["budget"]);
+    all.succeeded();
+    assert!(all.stdout.contains("| hdl64, dissertation | wide |"));
+    let one = raywake(&["budget", "--profile", "wide", "--limit", "1000000000"]);
+    one.succeeded();
+    assert!(one.stdout.contains("`ray") && !one.stdout.contains("dissertation"));
+    let over = raywake(&["budget", "--limit", "1"]);
+    over.failed(6, &["the limit is 1"]);
+    assert!(over.stdout.contains("## Totals"));
+}
+
+#[test]
+fn help_and_devices() {
+    let help = raywake(&["run", "--help"]);
+    help.succeeded();
+    assert!(help.stdout.contains("130  interrupted") && help.stdout.contains("--ground"));
+    raywake(&["devices"]).succeeded();
+    raywake(&["run"]).failed(2, &["<DATA>"]);
+    raywake(&["run", "x", "--png"]).failed(2, &["--out"]);
+}
+
+#[cfg(feature = "demo")]
+#[test]
+fn a_demo() {
+    let t = Temp::new();
+    let out = t.path().join("demo");
+    let o = raywake(&[&["demo", "--out", out.to_str().unwrap()], &BACKEND[..]].concat());
+    o.succeeded();
+    assert!(o.stdout.contains("median speed error"), "{}", o.stdout);
+    assert!(o.summary(&out.join("summary.json"))["valid_flows"].as_u64() > Some(1000));
+    assert!(out.join("columns/0000000000.feather").is_file());
+    assert!(out.join("png/0000000018.png").is_file());
+}

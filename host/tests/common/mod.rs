@@ -1,0 +1,124 @@
+//! The program and made-up recordings for it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use raywake_core::digest::Digest;
+
+/// A folder that goes away with the value.
+pub struct Temp(PathBuf);
+
+impl Temp {
+    pub fn new() -> Temp {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let n = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("raywake-cli-{}-{n}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Temp(path)
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Writes a file and the folders above it.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, content).unwrap();
+        path
+    }
+
+    /// A drive `drive` of some sweeps in KITTI's layout: half a metre forward every 0.1 s, between
+    /// walls, something ahead driving along.
+    pub fn drive(&self, sweeps: usize) {
+        for n in 0..sweeps {
+            self.write(&format!("drive/velodyne_points/data/{n:010}.bin"), cloud(n % 100));
+        }
+        let lines = |line: &dyn Fn(usize) -> String| (0..sweeps).map(line).collect::<String>();
+        self.write("drive/poses.txt", lines(&|n| row((n % 100) as f64 * 0.5)));
+        self.write("drive/times.txt", lines(&|n| format!("{}\n", n as f64 * 0.1)));
+    }
+}
+
+impl Drop for Temp {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A row of a pose `x` metres along its axis.
+pub fn row(x: f64) -> String {
+    format!("1 0 0 {x} 0 1 0 0 0 0 1 0\n")
+}
+
+fn cloud(n: usize) -> Vec<u8> {
+    let mut points: Vec<[f32; 4]> = Vec::new();
+    for i in 0..40 {
+        let x = i as f32 * 0.4 - 8.0 - (n as f32 * 0.5) % 0.4;
+        points.extend([-0.2, 0.4].map(|z| [x, 6.0, z, 0.5]));
+        points.extend([-0.2, 0.4].map(|z| [x, -6.0, z, 0.5]));
+    }
+    for i in 0..10 {
+        points.extend([-0.8, -0.2].map(|z| [5.0 + n as f32 * 0.3 % 2.0, i as f32 * 0.2, z, 0.1]));
+    }
+    points.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// A weights file of zeros and others, its checksum right.
+pub fn weights(kind: &str, shape: &[usize], value: impl Fn(usize) -> &'static str) -> String {
+    let sizes: Vec<_> = shape.iter().map(usize::to_string).collect();
+    let values: Vec<_> = (0..shape.iter().product::<usize>() + 1).map(value).collect();
+    let (sizes, values) = (sizes.join(" "), values.join("\n"));
+    let body = format!("kind {kind}\nshape {sizes}\nscale 10\nprovenance made up\n{values}\n");
+    format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()))
+}
+
+/// What a process left behind.
+pub struct Outcome {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Outcome {
+    pub fn of(output: Output) -> Outcome {
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Outcome {
+            code: output.status.code(),
+            stdout: text(output.stdout),
+            stderr: text(output.stderr),
+        }
+    }
+
+    #[track_caller]
+    pub fn succeeded(&self) {
+        assert_eq!(self.code, Some(0), "{}", self.stderr);
+    }
+
+    /// Ended with this code, and a message with these words.
+    #[track_caller]
+    pub fn failed(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, Some(code), "{}", self.stderr);
+        for word in words {
+            assert!(self.stderr.contains(word), "`{word}` in {}", self.stderr);
+        }
+        assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
+    }
+
+    pub fn summary(&self, path: &Path) -> serde_json::Value {
+        serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+    }
+}
+
+pub fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_raywake"));
+    command.args(arguments);
+    command
+}
+
+pub fn raywake(arguments: &[&str]) -> Outcome {
+    Outcome::of(command(arguments).output().unwrap())
+}
