@@ -39,6 +39,8 @@ pub enum Command {
     /// Estimate the flow of a recorded drive
     #[command(after_help = EXIT_CODES)]
     Run(Box<Run>),
+    /// Map the occupancy of every sweep over the sensor's whole range
+    Map(Box<Map>),
     /// Run on a small simulated drive and compare with its truth
     #[cfg(feature = "demo")]
     Demo(Demo),
@@ -68,12 +70,9 @@ pub struct Run {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub results: Results,
-    /// Stop after this many sweeps
-    #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
-    pub count: Option<usize>,
-    /// Only these sweeps, the last one excluded; `A..` and `..B` are open ends
-    #[arg(long, value_name = "A..B", value_parser = Sweeps::parse)]
-    pub sweeps: Option<Sweeps>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub part: Part,
     /// No progress and no report, errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -191,6 +190,39 @@ pub enum Export {
     Argoverse,
 }
 
+/// `raywake map`.
+#[derive(Debug, clap::Args)]
+pub struct Map {
+    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of `.bin` clouds
+    pub data: PathBuf,
+    /// Folder for one map a sweep: FRAME.feather with i, j, k and log-odds of every voxel touched
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub recording: Recording,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub backend: BackendChoice,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub part: Part,
+    /// No progress and no report, errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Which sweeps.
+#[derive(Debug, Default, clap::Args)]
+pub struct Part {
+    /// Stop after this many sweeps
+    #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
+    pub count: Option<usize>,
+    /// Only these sweeps, the last one excluded; `A..` and `..B` are open ends
+    #[arg(long, value_name = "A..B", value_parser = Sweeps::parse)]
+    pub sweeps: Option<Sweeps>,
+}
+
 /// `raywake demo`.
 #[derive(Debug, clap::Args)]
 pub struct Demo {
@@ -216,7 +248,7 @@ pub struct Budget {
     pub limit: Option<u64>,
 }
 
-impl Run {
+impl Part {
     /// The sweeps asked for of a recording of `len`.
     pub fn range(&self, len: usize) -> Result<Range<usize>, Error> {
         let range = self.sweeps.unwrap_or_default().within(len)?;

@@ -17,28 +17,41 @@ pub struct Chosen {
     pub note: Option<String>,
 }
 
+/// Where the heavy half is to run.
+pub struct Wanted {
+    /// How to run on a device; none: on the CPU.
+    pub device: Option<Options>,
+    /// Why it is not a device where one might be expected.
+    pub note: Option<String>,
+}
+
 /// Makes the backend asked for.
 pub fn backend(choice: &BackendChoice, profile: &Profile, tables: Tables) -> Result<Chosen, Error> {
+    let wanted = wanted(choice)?;
+    let backend = match &wanted.device {
+        Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
+        None => Backend::Scalar(Box::new(Scalar::new(profile, tables))),
+    };
+    Ok(Chosen { backend, note: wanted.note })
+}
+
+/// Decides between device and CPU.
+pub fn wanted(choice: &BackendChoice) -> Result<Wanted, Error> {
     let device_wanted = choice.device.is_some() || choice.validation.is_some();
     let lacking = match choice.backend {
         BackendKind::Scalar if device_wanted => {
             let what = "--device and --validation are for Vulkan, --backend scalar is not";
             return Err(Error::Usage(what.into()));
         }
-        BackendKind::Scalar => return Ok(scalar(profile, tables, None)),
+        BackendKind::Scalar => return Ok(Wanted { device: None, note: None }),
         BackendKind::Vulkan => None,
         BackendKind::Auto if device_wanted => None,
         BackendKind::Auto => no_device(),
     };
-    if let Some(why) = lacking {
-        return Ok(scalar(profile, tables, Some(format!("{why}: scalar backend"))));
-    }
-    let device = Device::new(profile, &tables, &options(choice))?;
-    Ok(Chosen { backend: Backend::Device(Box::new(device)), note: None })
-}
-
-fn scalar(profile: &Profile, tables: Tables, note: Option<String>) -> Chosen {
-    Chosen { backend: Backend::Scalar(Box::new(Scalar::new(profile, tables))), note }
+    Ok(match lacking {
+        Some(why) => Wanted { device: None, note: Some(format!("{why}: scalar backend")) },
+        None => Wanted { device: Some(options(choice)), note: None },
+    })
 }
 
 /// Why `auto` finds no device; none where there is one.

@@ -117,7 +117,7 @@ impl Running {
         let (mut now, mut before) = (SweepData::default(), SweepData::default());
         let mut progress = Progress::new(plan.sweeps.len(), plan.quiet);
         for (done, index) in plan.sweeps.clone().enumerate() {
-            if INTERRUPTED.load(Ordering::Relaxed) {
+            if interrupted() {
                 progress.finish();
                 return Ok(true);
             }
@@ -164,8 +164,13 @@ fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
+/// Whether a signal came.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
 /// From now on SIGINT and SIGTERM end a run after the sweep in hand.
-fn listen() {
+pub fn listen() {
     // Fails where a handler is there already: another run's, which sets the same flag.
     let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
 }

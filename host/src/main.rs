@@ -9,7 +9,7 @@ use clap::Parser;
 use raywake::args::{Args, Command};
 use raywake::error::Error;
 use raywake::summary::Summary;
-use raywake::{budget, choose, engine, run};
+use raywake::{budget, choose, engine, map, run};
 use raywake_gpu::guard::Guard;
 
 /// Exit code of a process ended by SIGINT, as shells have it.
@@ -33,6 +33,9 @@ fn main() -> ExitCode {
 fn execute(command: Command) -> Result<u8, Error> {
     match command {
         Command::Run(args) => run::run(&args).map(code),
+        Command::Map(args) => {
+            map::command::map(&args).map(|whole| if whole { 0 } else { INTERRUPTED })
+        }
         #[cfg(feature = "demo")]
         Command::Demo(args) => raywake::demo::demo(&args).map(code),
         Command::Budget(args) => budget::budget(&args).map(|()| 0),

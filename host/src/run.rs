@@ -16,7 +16,7 @@ pub fn run(args: &args::Run) -> Result<Summary, Error> {
     let weights = Weights::read(&args.learned, &profile)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
     let plan = Plan {
-        sweeps: args.range(source.len())?,
+        sweeps: args.part.range(source.len())?,
         profile,
         weights,
         backend: &args.backend,

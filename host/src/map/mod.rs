@@ -1,5 +1,6 @@
 //! `raywake map`: the sparse map of appendix B, one per sweep, over the sensor's whole range.
 
+pub mod command;
 pub mod device;
 pub mod scalar;
 
@@ -20,6 +21,14 @@ pub enum MapBackend {
 }
 
 impl MapBackend {
+    /// The device's name.
+    pub fn name(&self) -> &str {
+        match self {
+            MapBackend::Scalar(_) => "CPU, one thread",
+            MapBackend::Device(b) => b.name(),
+        }
+    }
+
     fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
         match self {
             MapBackend::Scalar(b) => b.input(),
