@@ -50,6 +50,8 @@ pub struct PointFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 3],
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where not matched.
+    pub covariance: [f32; 3],
     /// Age of the column's tracklet.
     pub age: u32,
     /// Where the flow comes from; returns outside the window are background.

@@ -453,6 +453,7 @@ impl Pipeline {
             *out = PointFlow::default();
             if let Some(flow) = columns.get(flow as usize) {
                 out.velocity_world_mps = flow.velocity_world_mps;
+                out.covariance = flow.covariance;
                 out.age = flow.age;
                 out.origin = flow.origin;
             }

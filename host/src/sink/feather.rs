@@ -66,7 +66,7 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 
 /// Writes the flow of returns, one row each in the sweep's order.
 ///
-/// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps` float32; `age`
+/// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy cov_yy` of the world velocity float32; `age`
 /// uint32; `foreground`, `valid` bool. `points` and `flows` are of the same sweep; fails with
 /// [`Error::Usage`] where their lengths differ.
 pub fn write_points(
@@ -85,6 +85,9 @@ pub fn write_points(
     t.f32s("vx_ego_mps", flows, |f| f.velocity_ego_mps[0]);
     t.f32s("vy_ego_mps", flows, |f| f.velocity_ego_mps[1]);
     t.f32s("vz_ego_mps", flows, |f| f.velocity_ego_mps[2]);
+    t.f32s("cov_xx", flows, |f| f.covariance[0]);
+    t.f32s("cov_xy", flows, |f| f.covariance[1]);
+    t.f32s("cov_yy", flows, |f| f.covariance[2]);
     t.u32s("age", flows, |f| f.age);
     t.bools("foreground", flows, |f| f.origin != Origin::Background);
     t.bools("valid", flows, |f| f.origin == Origin::Matched);
