@@ -1,0 +1,120 @@
+//! Devices that are missing, too small or too slow end in an error that says so.
+
+#![forbid(unsafe_code)]
+
+use raywake::backend::Backend;
+use raywake::backend::device::Device;
+use raywake_core::layout::BUFFERS;
+use raywake_core::params::Profile;
+use raywake_gpu::{Buffer, DeviceKind, Executor, GpuError, Heap, Options, devices};
+use raywake_kernels::schedule;
+use raywake_tests::drives::{Setup, street, sweep};
+use raywake_tests::vulkan;
+use std::time::{Duration, Instant};
+
+/// Longer than any error may take to come back.
+const SOON: Duration = Duration::from_secs(5);
+
+#[test]
+fn a_device_that_is_not_there() {
+    if !vulkan::available() {
+        return;
+    }
+    let setup = Setup::new(Profile::hdl64(), None);
+    let beyond = devices().expect("a list").len();
+    for index in [beyond, usize::MAX] {
+        let options = Options { device: Some(index), ..Options::default() };
+        let found = Device::new(&setup.profile, &setup.tables(), &options);
+        assert_eq!(found.err(), Some(GpuError::NoDevice), "device {index}");
+    }
+}
+
+#[test]
+fn buffers_that_do_not_fit() {
+    if !vulkan::available() {
+        return;
+    }
+    let exabyte = 1 << 60;
+    for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
+        let mut table = schedule::buffers(BUFFERS, &Profile::hdl64());
+        table.push(Buffer { name: "too much", heap, bytes: exabyte });
+        let Err(error) = Executor::new(&Options::default(), &table, &[]) else {
+            panic!("{heap:?}: an exabyte");
+        };
+        let GpuError::OutOfMemory { heap: found, bytes } = error else {
+            panic!("{heap:?}: {error}");
+        };
+        assert!(found == heap && bytes >= exabyte, "{error}");
+    }
+}
+
+#[test]
+fn a_backend_that_cannot_be_set_up_in_time() {
+    let setup = Setup::new(Profile::hdl64(), None);
+    let options = Options { timeout: Duration::from_nanos(1), ..Options::default() };
+    let begin = Instant::now();
+    let device = Device::new(&setup.profile, &setup.tables(), &options);
+    match vulkan::present(device.map(|_| ())) {
+        None => {}
+        Some(Err(GpuError::Timeout { during, after })) => {
+            assert!(["load", "flow"].contains(&during.program), "{during}");
+            assert_eq!(after, options.timeout);
+            assert!(begin.elapsed() < SOON, "{:?}", begin.elapsed());
+        }
+        Some(Err(error)) => panic!("{error}"),
+        Some(Ok(())) => eprintln!("skipped: too fast a device to be late for sure"),
+    }
+}
+
+/// A window so wide and so many rounds that a sweep of a street takes long, and its set-up.
+fn slow() -> Setup {
+    Setup::new(Profile { side: 255, em_rounds: 100, ..Profile::wide() }, None)
+}
+
+/// How long set-up without rays takes, kernels compiled; none without a software device.
+fn set_up_time(setup: &Setup) -> Option<Duration> {
+    let mut time = Duration::ZERO;
+    for _ in 0..2 {
+        let begin = Instant::now();
+        let Backend::Device(device) = setup.device(&Options::default())? else {
+            unreachable!("a device was asked for")
+        };
+        time = begin.elapsed();
+        let kind = devices().expect("a list").into_iter().find(|d| d.name == device.name());
+        if kind.is_none_or(|d| d.kind != DeviceKind::Cpu) {
+            eprintln!("skipped: too fast a device to be late for sure");
+            return None;
+        }
+    }
+    Some(time)
+}
+
+#[test]
+fn a_drive_that_misses_its_deadline_says_so_for_good() {
+    let setup = slow();
+    let Some(enough) = set_up_time(&setup) else { return };
+    let options = Options { timeout: enough, ..Options::default() };
+    let Some(Ok(device)) = vulkan::present(Device::new(&setup.profile, &setup.tables(), &options))
+    else {
+        eprintln!("skipped: the machine is busy");
+        return;
+    };
+    let mut drive = setup.drive(Backend::Device(Box::new(device)));
+    let [first, second] = [&street()[0], &street()[1]];
+    let errors = [(first, &[][..]), (second, &first.points), (second, &first.points)]
+        .map(|(now, before)| drive.step(&sweep(now), before).err());
+    let Some(error) = errors[1].clone() else {
+        eprintln!("skipped: {enough:?} were enough for a sweep");
+        return;
+    };
+    let GpuError::Timeout { during, after } = &error else { panic!("{error}") };
+    assert_eq!((during.program, *after), ("flow", enough));
+    let begin = Instant::now();
+    for _ in 0..10 {
+        assert_eq!(drive.step(&sweep(second), &first.points).err().as_ref(), Some(&error));
+    }
+    assert_eq!(errors[2], errors[1]);
+    assert!(begin.elapsed() < SOON, "at once, not after {:?}", begin.elapsed());
+    drop(drive);
+    assert!(begin.elapsed() < 2 * SOON, "dropped after {:?}", begin.elapsed());
+}

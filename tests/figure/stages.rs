@@ -1,0 +1,93 @@
+//! The device against the scalar backend, stage by stage.
+
+use raywake_core::background_filter;
+use raywake_core::params::Profile;
+use raywake_gpu::Options;
+use raywake_tests::drives::{Setup, pairs, street};
+use raywake_tests::pair::Side;
+use raywake_tests::weights;
+
+/// Both backends over the first sweeps of the street.
+fn check(profile: Profile, filter: Option<String>, sweeps: usize) {
+    let setup = Setup::new(profile, filter);
+    let Some(device) = setup.device(&Options::default()) else { return };
+    let (mut scalar, mut device) = (Side::new(&setup, setup.scalar()), Side::new(&setup, device));
+    let mut most = [0; 3];
+    for (n, (now, before)) in pairs(&street()[..sweeps]).enumerate() {
+        let (wanted, found) = (scalar.step(now, before), device.step(now, before));
+        if let Some(what) = found.difference(&wanted) {
+            panic!("{}, sweep {n}: {what}", setup.profile.name);
+        }
+        let counts = [&wanted.columns.len(), &wanted.points.len(), &wanted.tracklets.len()];
+        most = std::array::from_fn(|k| most[k].max(*counts[k]));
+    }
+    assert!(most.iter().all(|m| *m > 100), "the case says something: {most:?}");
+}
+
+/// What the program runs with.
+fn shipped_filter() -> Option<String> {
+    Some(background_filter::SHIPPED.into())
+}
+
+/// Keeps about half of the columns, without any sense.
+fn some_filter() -> Option<String> {
+    Some(weights::filter(40, 14, 100, 0))
+}
+
+#[test]
+fn hdl64_unfiltered() {
+    check(Profile::hdl64(), None, 5);
+}
+
+#[test]
+fn hdl64_filtered() {
+    check(Profile::hdl64(), some_filter(), 5);
+}
+
+#[test]
+fn hdl64_as_shipped() {
+    check(Profile::hdl64(), shipped_filter(), 5);
+}
+
+#[test]
+fn wide_unfiltered() {
+    check(Profile::wide(), None, 3);
+}
+
+#[test]
+fn wide_filtered() {
+    check(Profile::wide(), some_filter(), 3);
+}
+
+#[test]
+fn dissertation_unfiltered() {
+    check(Profile::dissertation(), None, 4);
+}
+
+#[test]
+fn dissertation_filtered() {
+    check(Profile::dissertation(), some_filter(), 4);
+}
+
+#[test]
+fn a_window_of_other_sizes() {
+    let profile = Profile { side: 31, levels: 16, em_rounds: 3, ..Profile::hdl64() };
+    let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
+    // The shipped classifier has 14 levels: another one for 16.
+    let text = weights::constancy(42, 16, 150);
+    let tables = || {
+        raywake::backend::Tables::load(&setup.profile, setup.filter.as_deref(), &text).expect("set")
+    };
+    let device =
+        raywake::backend::device::Device::new(&setup.profile, &tables(), &Options::default());
+    let Some(device) = raywake_tests::vulkan::expect(device) else { return };
+    let scalar = raywake::backend::scalar::Scalar::new(&setup.profile, tables());
+    let mut sides = [
+        Side::with(&setup, &tables(), raywake::backend::Backend::Scalar(Box::new(scalar))),
+        Side::with(&setup, &tables(), raywake::backend::Backend::Device(Box::new(device))),
+    ];
+    for (now, before) in pairs(&street()[..5]) {
+        let [wanted, found] = sides.each_mut().map(|s| s.step(now, before));
+        assert_eq!(found.difference(&wanted), None);
+    }
+}

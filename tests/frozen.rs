@@ -1,0 +1,75 @@
+//! Nothing is allocated, created or recorded between the first sweep and the last.
+
+#![forbid(unsafe_code)]
+
+use raywake::backend::Backend;
+use raywake_core::background_filter;
+use raywake_core::params::Profile;
+use raywake_gpu::guard::{self, Guard};
+use raywake_gpu::{Census, Options};
+use raywake_tests::drives::{Setup, pairs, street, sweep};
+
+#[global_allocator]
+static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
+
+/// What a device may hold for a window of 50 m.
+const DEVICE_BYTES: u64 = 64 << 20;
+
+fn main() {
+    the_guard_sees();
+    let mut passed = 1;
+    for filter in [None, Some(background_filter::SHIPPED.to_string())] {
+        let setup = Setup::new(Profile::hdl64(), filter);
+        check(&setup, setup.scalar());
+        passed += 1;
+        if let Some(device) = setup.device(&Options::default()) {
+            check(&setup, device);
+            passed += 1;
+        }
+    }
+    println!("frozen: {passed} passed, 0 failed");
+}
+
+/// An allocation on purpose is counted, one outside is not.
+fn the_guard_sees() {
+    let before = guard::allocations();
+    let inside = guard::guarded(|| std::hint::black_box(vec![0u8; 100]));
+    assert_eq!(guard::allocations() - before, 1);
+    drop((inside, std::hint::black_box(vec![0u8; 100])));
+    assert_eq!(guard::allocations() - before, 1);
+    println!("the guard counts an allocation ... ok");
+}
+
+/// Ten sweeps after the seal. An allocation among them ends the process.
+fn check(setup: &Setup, mut backend: Backend) {
+    let name = backend.name();
+    let filter = if setup.filter.is_some() { "on" } else { "off" };
+    let sweeps = street();
+    assert_eq!(sweeps.len(), 10);
+    backend.seal();
+    let mut drive = setup.drive(backend);
+    let before = guard::allocations();
+    guard::abort_on_allocation(true);
+    let mut columns = 0;
+    for (now, earlier) in pairs(sweeps) {
+        let points = earlier.map_or(&[][..], |e| &e.points);
+        let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
+        columns += stepped.flows.map_or(0, |flows| flows.valid);
+    }
+    let tracklets = guard::guarded(|| drive.tracklets().count());
+    guard::abort_on_allocation(false);
+    assert_eq!(guard::allocations(), before);
+    assert!(columns > 1000 && tracklets > 10, "{columns} flows, {tracklets} tracklets");
+    let census = drive.backend().census();
+    let bytes = census.map_or(0, |census| check_census(&census));
+    println!("{name}, filter {filter}: {columns} flows, {bytes} bytes on the device ... ok");
+}
+
+/// Bytes on the device.
+fn check_census(census: &Census) -> u64 {
+    let bytes = census.upload_bytes + census.device_bytes + census.readback_bytes;
+    assert_eq!(census.after_seal, 0, "{census:?}");
+    assert!(census.memory_allocations <= 3, "{census:?}");
+    assert!(bytes <= DEVICE_BYTES, "{census:?}");
+    bytes
+}

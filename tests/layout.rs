@@ -1,0 +1,115 @@
+//! Files that must agree with the code, and the order of the packages.
+
+#![forbid(unsafe_code)]
+
+use raywake::budget;
+use raywake_tests::{files, read, root};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Kernels' files without a scalar twin: group counts, and what is put in front of all others.
+const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
+
+/// Which packages of the project each one may name. Whatever is not listed may name any.
+const MAY_NAME: [(&str, &[&str]); 5] = [
+    ("core", &[]),
+    ("gpu", &[]),
+    ("kernels", &["raywake-core", "raywake-gpu"]),
+    ("lab/sim", &["raywake-core"]),
+    ("host", &["raywake-core", "raywake-kernels", "raywake-gpu", "raywake-sim"]),
+];
+
+#[test]
+fn the_memory_layout_is_what_the_code_says() {
+    let path = root().join("memory-layout.md");
+    let text = budget::memory_layout(&budget::shipped());
+    if std::env::var_os("UPDATE").is_some() {
+        std::fs::write(&path, &text).expect("the file can be written");
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(found == text, "memory-layout.md is out of date; UPDATE=1 rewrites it");
+}
+
+#[test]
+fn every_kernel_lies_where_its_twin_does() {
+    let folder = root().join("kernels/wgsl");
+    let mut alone = BTreeSet::new();
+    for file in files(&folder, ".wgsl") {
+        let path = file.strip_prefix(&folder).expect("below").with_extension("rs");
+        if !root().join("core/src").join(&path).is_file() {
+            alone.insert(path.with_extension("wgsl").display().to_string());
+        }
+    }
+    assert_eq!(alone, WITHOUT_TWIN.map(String::from).into());
+}
+
+/// Packages of the project among the dependencies in a manifest, development ones apart.
+fn dependencies(manifest: &str) -> Vec<&str> {
+    let mut section = "";
+    let mut found = Vec::new();
+    for line in manifest.lines() {
+        if line.starts_with('[') {
+            section = line;
+        }
+        let name = line.split(['.', ' ', '=']).next().unwrap_or_default();
+        let counts = section.ends_with("dependencies]") && !section.contains("dev-");
+        if counts && name.starts_with("raywake") {
+            found.push(name);
+        }
+    }
+    found
+}
+
+#[test]
+fn dependencies_run_one_way() {
+    for (package, allowed) in MAY_NAME {
+        let manifest = read(&root().join(package).join("Cargo.toml"));
+        for name in dependencies(&manifest) {
+            assert!(allowed.contains(&name), "{package} depends on {name}");
+        }
+    }
+    let host = read(&root().join("host/Cargo.toml"));
+    let simulator = host.lines().find(|l| l.starts_with("raywake-sim"));
+    assert!(simulator.is_none_or(|l| l.contains("optional = true")), "{simulator:?}");
+}
+
+#[test]
+fn dependencies_are_read() {
+    let manifest = "[package]\nname = \"raywake\"\n[features]\nraywake-x = []\n\
+                    [dependencies]\nraywake-core.workspace = true\nash = \"1\"\n\
+                    [build-dependencies]\nraywake-gpu = { path = \"gpu\" }\n\
+                    [dev-dependencies]\nraywake-lab.workspace = true\n";
+    assert_eq!(dependencies(manifest), ["raywake-core", "raywake-gpu"]);
+}
+
+/// Lines where a word stands outside of comments and strings.
+fn lines_with(word: &str, source: &str) -> Vec<usize> {
+    let has = |line: &str| {
+        let code = line.split("//").next().unwrap_or_default();
+        let outside = code.split('"').step_by(2);
+        let parts = outside.flat_map(|part| part.split(|c: char| !c.is_alphanumeric() && c != '_'));
+        parts.into_iter().any(|part| part == word)
+    };
+    (1..).zip(source.lines()).filter(|(_, line)| has(line)).map(|(n, _)| n).collect()
+}
+
+#[test]
+fn words_are_found() {
+    let source = "a b\n// b\nx(\"b\") + ab\nb{}\n#![forbid(b_code)]";
+    assert_eq!(lines_with("b", source), [1, 4]);
+}
+
+#[test]
+fn only_the_vulkan_executor_is_trusted() {
+    for package in ["core", "kernels", "host", "lab", "tests"] {
+        for file in files(&root().join(package), ".rs") {
+            let lines = lines_with("unsafe", &read(&file));
+            assert!(lines.is_empty(), "{}: lines {lines:?}", file.display());
+        }
+    }
+    for library in ["core/src", "kernels/src", "host/src", "lab/sim/src"] {
+        let text = read(&root().join(library).join("lib.rs"));
+        assert!(text.contains("#![forbid(unsafe_code)]"), "{library}");
+    }
+    assert!(Path::new(&root().join("gpu/src/lib.rs")).is_file());
+}

@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# Everything that must hold, in one command. Installs the software Vulkan device, the validation
+# layers and spirv-val on Debian where they are missing, so that nothing is skipped.
+#
+#   RAYWAKE_DATA=FOLDER   also run the tests on recorded drives found there
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+say() { printf '\n== %s\n' "$*"; }
+
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
+
+missing_packages() {
+    local package
+    for package in "$@"; do
+        dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q ' installed' || echo "$package"
+    done
+}
+
+install() {
+    local packages
+    packages=$(missing_packages "$@")
+    [ -z "$packages" ] && return 0
+    say "installing" $packages
+    as_root apt-get update -qq
+    # shellcheck disable=SC2086
+    as_root env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends $packages >/dev/null
+}
+
+if command -v apt-get >/dev/null; then
+    install libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools gcc
+fi
+export RAYWAKE_VULKAN=${RAYWAKE_VULKAN:-required}
+
+say "format and lints"
+cargo fmt --all --check
+cargo clippy --workspace --all-targets --quiet -- -D warnings
+
+say "core without an operating system"
+if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
+    cargo check --quiet -p raywake-core --target thumbv7em-none-eabihf
+    echo "checks for thumbv7em-none-eabihf"
+else
+    echo "skipped: the target thumbv7em-none-eabihf cannot be installed"
+fi
+
+say "the program alone, onboard, with every index clamped, and for aarch64"
+cargo build --quiet --release -p raywake
+cargo build --quiet --release -p raywake --no-default-features --target-dir target/onboard
+RAYWAKE_KERNELS=restrict cargo build --quiet --release -p raywake --target-dir target/restrict
+ls -l target/onboard/release/raywake | awk '{print "onboard binary: " $5 " bytes"}'
+others=(target/release/raywake target/onboard/release/raywake target/restrict/release/raywake)
+
+# The same bits on another instruction set: an emulator wrapped up as one more program.
+aarch64() {
+    [ "$(uname -m)" = x86_64 ] || return 1
+    command -v apt-get >/dev/null || return 1
+    install gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || return 1
+    rustup target add aarch64-unknown-linux-gnu >/dev/null 2>&1 || return 1
+    CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+        cargo build --quiet --release -p raywake --target aarch64-unknown-linux-gnu || return 1
+    local program=$PWD/target/aarch64-unknown-linux-gnu/release/raywake
+    printf '#!/bin/sh\nexec qemu-aarch64-static -L /usr/aarch64-linux-gnu %s "$@"\n' "$program" \
+        >target/raywake-aarch64
+    chmod +x target/raywake-aarch64
+    others+=(target/raywake-aarch64)
+}
+aarch64 || echo "skipped: no aarch64 compiler, linker or emulator to be had"
+RAYWAKE_DIGEST_OF=$(printf "$PWD/%s:" "${others[@]}")
+export RAYWAKE_DIGEST_OF=${RAYWAKE_DIGEST_OF%:}
+
+say "tests"
+if [ -n "${RAYWAKE_DATA:-}" ]; then
+    cargo test --workspace --quiet -- --include-ignored
+else
+    cargo test --workspace --quiet
+fi
+
+say "all passed"

@@ -1,0 +1,158 @@
+//! Proposals of the expectation step.
+
+use raywake_core::flow::expectation::expectation;
+use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT};
+use raywake_core::params::{REACH, ROW, ROW_WORKGROUP};
+use raywake_core::record::{NONE, Proposal, Step, flow};
+use raywake_gpu::Kernel;
+use raywake_kernels::kernel::EXPECTATION;
+use raywake_tests::bench::Bench;
+use raywake_tests::random::Random;
+
+use super::{POISON, around, packed, window};
+
+pub const KERNELS: &[&Kernel] = &[&EXPECTATION];
+
+/// What a round of expectation looks at.
+struct Round {
+    step: Step,
+    foreground: Vec<u32>,
+    matching: Vec<u16>,
+    state: Vec<u32>,
+    target_energy: Vec<u32>,
+    bound: Vec<u32>,
+}
+
+impl Round {
+    /// The first round of some columns: no flow yet, nobody at any target, the bounds unknown.
+    fn first(step: Step, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
+        let columns = (step.side * step.side) as usize;
+        Round {
+            matching: (0..foreground.len() * ROW).map(|_| cost()).collect(),
+            bound: vec![POISON; foreground.len()],
+            foreground,
+            step,
+            state: vec![0; columns],
+            target_energy: vec![NONE; columns],
+        }
+    }
+
+    /// Both, compared. Keeps the bounds, as later rounds need them, and returns the proposals.
+    fn check(&mut self, case: &str) -> Vec<Proposal> {
+        let count = self.foreground.len();
+        let mut proposal = vec![[POISON; 2]; count];
+        let mut counters = vec![POISON; COUNTERS];
+        counters[FOREGROUND_COUNT] = count as u32;
+        let mut foreground = self.foreground.clone();
+        // Left from a sweep with more of them.
+        foreground.extend([0; 3]);
+        let bench = Bench::new(Some(&self.step))
+            .buffer("counters", counters)
+            .buffer("foreground", foreground)
+            .buffer("matching", packed(&self.matching))
+            .buffer("state", self.state.clone())
+            .buffer("target_energy", self.target_energy.clone())
+            .buffer("bound", padded(&self.bound))
+            .buffer("proposal", padded(bytemuck::cast_slice(&proposal)))
+            .threads(&EXPECTATION, count + 3);
+        expectation(
+            &self.step,
+            &self.foreground,
+            &self.matching,
+            &self.state,
+            &self.target_energy,
+            &mut self.bound,
+            &mut proposal,
+        );
+        if let Some(outcome) = bench.run() {
+            let wanted = [padded(&self.bound), padded(bytemuck::cast_slice(&proposal))];
+            let case = format!("{case}, {count} columns, {:?}", self.step);
+            outcome.check(&case, &[("bound", &wanted[0]), ("proposal", &wanted[1])]);
+        }
+        proposal
+    }
+}
+
+/// With words behind the last one that must stay as they are.
+fn padded(words: &[u32]) -> Vec<u32> {
+    [words, &[POISON; 3]].concat()
+}
+
+fn any_flow(random: &mut Random) -> u32 {
+    flow([random.between(-REACH, REACH), random.between(-REACH, REACH)])
+}
+
+/// Settings from nothing to the ceilings of a profile.
+const SETTINGS: [[i32; 3]; 5] =
+    [[1000, 1, 693], [1000, 1, 17_289], [0, 0, 0], [10_000, 1000, 100_000], [100, 0, 693]];
+
+fn with(side: i32, [smoothing, displacement_cost, outside_cost]: [i32; 3]) -> Step {
+    Step { smoothing, displacement_cost, outside_cost, ..window(side, 14) }
+}
+
+/// A first round, then later ones over states and targets of every kind.
+fn check_rounds(case: &str, mut round: Round, seed: u64) {
+    let mut random = Random::new(seed);
+    round.check(&format!("{case}, first round"));
+    for (filled, share) in [("a sixth", 6), ("half", 2), ("all", 1)] {
+        for flow in &mut round.state {
+            *flow = if random.below(share) == 0 { any_flow(&mut random) } else { 0 };
+        }
+        round.target_energy.fill(NONE);
+        round.check(&format!("{case}, {filled} with flow"));
+        for energy in &mut round.target_energy {
+            *energy = if random.below(3) == 0 { NONE } else { random.below(30_000) };
+        }
+        round.check(&format!("{case}, {filled} with flow, targets taken"));
+        // The own flow alone is feasible.
+        round.target_energy.fill(0);
+        round.check(&format!("{case}, {filled} with flow, no target left"));
+    }
+}
+
+#[test]
+fn rounds_of_every_size() {
+    let mut random = Random::new(18);
+    for (count, settings) in around(ROW_WORKGROUP).into_iter().zip(SETTINGS) {
+        let foreground = (0..count as u32).map(|n| n * 14 + n % 3).collect();
+        let cost = || random.below(6000) as u16;
+        check_rounds("some", Round::first(with(31, settings), foreground, cost), count as u64);
+    }
+}
+
+#[test]
+fn rounds_of_every_setting() {
+    let mut random = Random::new(19);
+    for settings in SETTINGS {
+        for side in [31, 33] {
+            let all = (0..(side * side) as u32).collect();
+            let few_values = || 700 * random.below(4) as u16;
+            check_rounds("ties", Round::first(with(side, settings), all, few_values), 20);
+        }
+        let all: Vec<u32> = (0..961).collect();
+        check_rounds("free", Round::first(with(31, settings), all.clone(), || 0), 21);
+        check_rounds("dear", Round::first(with(31, settings), all, || u16::MAX), 22);
+    }
+}
+
+#[test]
+fn flows_that_agree() {
+    let mut random = Random::new(23);
+    for settings in SETTINGS {
+        let all = (0..961).collect();
+        let mut round = Round::first(with(31, settings), all, || random.below(9000) as u16);
+        round.check("agreement, first round");
+        for d in [[0, 0], [REACH, REACH], [-REACH, REACH], [3, -7]] {
+            round.state.fill(flow(d));
+            round.check(&format!("all by {d:?}"));
+        }
+    }
+}
+
+#[test]
+fn nothing_is_feasible_where_every_target_is_taken() {
+    let mut round = Round::first(with(31, SETTINGS[0]), (0..961).collect(), || 9);
+    round.target_energy.fill(0);
+    let proposal = round.check("taken");
+    assert!(proposal.iter().all(|p| *p == [0, NONE]));
+}

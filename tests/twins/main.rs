@@ -1,0 +1,88 @@
+//! Every kernel against its scalar twin, bit for bit.
+
+#![forbid(unsafe_code)]
+
+mod constancy;
+mod expectation;
+mod filter;
+mod maximisation;
+mod plan;
+mod rays;
+mod sums;
+mod voxels;
+
+use raywake_core::layout::COUNTERS;
+use raywake_core::record::{Column, Step};
+use raywake_gpu::Kernel;
+use raywake_tests::bench::Bench;
+use std::collections::BTreeSet;
+
+/// Content of what a kernel must not touch, or has to write itself.
+const POISON: u32 = 0xdead_beef;
+
+/// The kernels these tests run.
+const COVERED: [&[&Kernel]; 8] = [
+    constancy::KERNELS,
+    expectation::KERNELS,
+    filter::KERNELS,
+    maximisation::KERNELS,
+    plan::KERNELS,
+    rays::KERNELS,
+    sums::KERNELS,
+    voxels::KERNELS,
+];
+
+/// Folder of the sparse map's kernels, which these tests do not cover yet.
+const LATER: &str = "map";
+
+/// Counts around the borders of a workgroup or tile.
+fn around(size: usize) -> [usize; 5] {
+    [0, 1, size - 1, size, size + 1]
+}
+
+/// Columns as a buffer holds them.
+fn words(columns: &[Column]) -> Vec<u32> {
+    columns.as_flattened().to_vec()
+}
+
+/// 16-bit costs as a buffer holds them: two a word, the first in the low half.
+fn packed(costs: &[u16]) -> Vec<u32> {
+    costs.chunks_exact(2).map(|c| c[0] as u32 | (c[1] as u32) << 16).collect()
+}
+
+/// A square window.
+fn window(side: i32, levels: i32) -> Step {
+    Step { side, levels, ..Step::default() }
+}
+
+/// Names of the functions behind `@compute`.
+fn entry_points(source: &str) -> impl Iterator<Item = &str> {
+    source.split("@compute").skip(1).filter_map(|rest| {
+        let (_, rest) = rest.split_once("fn ")?;
+        rest.split('(').next()
+    })
+}
+
+#[test]
+fn a_wrong_word_is_noticed() {
+    let bench =
+        |kernel| Bench::new(None).buffer("counters", vec![7; COUNTERS]).groups(kernel, 1).run();
+    let Some(outcome) = bench(&raywake_kernels::kernel::PLAN) else { return };
+    let failed = |expected: &[(&str, &[u32])]| {
+        std::panic::catch_unwind(|| outcome.check("on purpose", expected)).is_err()
+    };
+    let right = outcome.words("counters").to_vec();
+    let mut wrong = right.clone();
+    wrong[COUNTERS - 1] ^= 1;
+    assert!(failed(&[]) && failed(&[("counters", &wrong)]) && !failed(&[("counters", &right)]));
+}
+
+#[test]
+fn no_kernel_is_left_out() {
+    let sources = raywake_tests::files(&raywake_tests::root().join("kernels/wgsl"), ".wgsl");
+    let sources = sources.iter().filter(|f| !f.components().any(|c| c.as_os_str() == LATER));
+    let sources: Vec<String> = sources.map(|f| raywake_tests::read(f)).collect();
+    let wanted: BTreeSet<&str> = sources.iter().flat_map(|s| entry_points(s)).collect();
+    let found: BTreeSet<&str> = COVERED.iter().copied().flatten().map(|k| k.name).collect();
+    assert_eq!(found, wanted);
+}

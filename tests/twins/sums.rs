@@ -1,0 +1,144 @@
+//! Prefix sums and compaction.
+
+use raywake_core::compact::compact;
+use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT, FOREGROUND_MARKED};
+use raywake_core::params::{COLUMNS_MAX, FOREGROUND_MAX, TILE, WORKGROUP};
+use raywake_core::prefix_sum::prefix_sum;
+use raywake_gpu::Kernel;
+use raywake_kernels::kernel::{COMPACT, REDUCE, SCAN, SPINE};
+use raywake_tests::bench::Bench;
+use raywake_tests::random::Random;
+
+use super::{POISON, around};
+
+pub const KERNELS: &[&Kernel] = &[&REDUCE, &SPINE, &SCAN, &COMPACT];
+
+/// All three kernels of the sum, each looked at for itself.
+fn check_sum(case: &str, values: &[u32]) {
+    let count = values.len();
+    let groups = count.div_ceil(TILE);
+    let mut totals = vec![POISON; TILE];
+    for (total, tile) in totals.iter_mut().zip(values.chunks(TILE)) {
+        *total = tile.iter().sum();
+    }
+    let mut offsets = totals.clone();
+    prefix_sum(&totals[..groups], &mut offsets[..groups]);
+    let mut sums = vec![0; count];
+    prefix_sum(values, &mut sums);
+
+    let bench = |tiles: &[u32]| {
+        Bench::new(None)
+            .buffer("values", values.to_vec())
+            .buffer("tiles", tiles.to_vec())
+            .buffer("sums", vec![POISON; count])
+    };
+    let poisoned = [POISON; TILE];
+    let all = bench(&poisoned).groups(&REDUCE, groups).groups(&SPINE, 1).groups(&SCAN, groups);
+    let Some(outcome) = all.run() else { return };
+    outcome.check(case, &[("tiles", &offsets), ("sums", &sums)]);
+    for (kernel, groups, tiles, expected) in [
+        (&REDUCE, groups, &poisoned[..], ("tiles", &totals)),
+        (&SPINE, 1, &totals[..], ("tiles", &offsets)),
+        (&SCAN, groups, &offsets[..], ("sums", &sums)),
+    ] {
+        if let Some(outcome) = bench(tiles).groups(kernel, groups).run() {
+            outcome.check(&format!("{case}, {}", kernel.name), &[(expected.0, expected.1)]);
+        }
+    }
+}
+
+#[test]
+fn sums_of_every_length() {
+    let mut random = Random::new(2);
+    let tiles = [around(WORKGROUP), around(TILE), around(2 * TILE), around(COLUMNS_MAX)];
+    let mut sizes: Vec<usize> = tiles.into_iter().flatten().filter(|n| *n > 0).collect();
+    sizes.extend([TILE * TILE - 1, TILE * TILE]);
+    sizes.sort();
+    sizes.dedup();
+    for size in sizes {
+        // Just small enough for the sum of the longest to fit a word.
+        let values: Vec<u32> = (0..size).map(|_| random.below(4096)).collect();
+        check_sum(&format!("{size} values"), &values);
+    }
+}
+
+#[test]
+fn sums_of_every_kind() {
+    let size = 3 * TILE + 77;
+    let ascending: Vec<u32> = (0..size as u32).collect();
+    let mut last = vec![0; size];
+    last[size - 1] = u32::MAX;
+    check_sum("zeros", &vec![0; size]);
+    check_sum("ones", &vec![1; size]);
+    check_sum("sorted", &ascending);
+    check_sum("reversed", &ascending.iter().rev().copied().collect::<Vec<_>>());
+    check_sum("all of it at the end", &last);
+    last.rotate_right(1);
+    last.swap(0, TILE);
+    check_sum("all of it in the middle", &last);
+}
+
+fn check_compact(case: &str, marks: &[u32], capacity: usize) {
+    let count = marks.len();
+    let mut rank = vec![0; count];
+    prefix_sum(marks, &mut rank);
+    let mut list = vec![POISON; capacity];
+    let mut counters = vec![POISON; COUNTERS];
+    let bench = Bench::new(None)
+        .buffer("marks", marks.to_vec())
+        .buffer("rank", rank.clone())
+        .buffer("foreground", list.clone())
+        .buffer("counters", counters.clone())
+        .threads(&COMPACT, count);
+    let (listed, marked) = compact(marks, &mut rank, &mut list);
+    (counters[FOREGROUND_COUNT], counters[FOREGROUND_MARKED]) = (listed as u32, marked as u32);
+    if let Some(outcome) = bench.run() {
+        let expected = [("rank", &rank[..]), ("foreground", &list), ("counters", &counters)];
+        outcome.check(&format!("{case}, {count} marks, room for {capacity}"), &expected);
+    }
+}
+
+#[test]
+fn lists_of_every_length() {
+    let mut random = Random::new(3);
+    for count in [1, WORKGROUP - 1, WORKGROUP, WORKGROUP + 1, 167 * 167, COLUMNS_MAX] {
+        let marks: Vec<u32> = (0..count).map(|_| (random.below(5) == 0) as u32).collect();
+        let marked = marks.iter().sum::<u32>() as usize;
+        for capacity in [marked.max(2) - 1, marked + 1, FOREGROUND_MAX] {
+            check_compact("random", &marks, capacity);
+        }
+        check_compact("none", &vec![0; count], FOREGROUND_MAX);
+        check_compact("all", &vec![1; count], FOREGROUND_MAX);
+        check_compact("all", &vec![1; count], count);
+    }
+}
+
+#[test]
+fn the_prefix_sum_feeds_the_list() {
+    let mut random = Random::new(4);
+    let marks: Vec<u32> = (0..COLUMNS_MAX).map(|_| random.below(2)).collect();
+    let mut rank = vec![POISON; marks.len()];
+    let mut list = vec![POISON; FOREGROUND_MAX];
+    // The prefix sum knows the marks as `values` and the ranks as `sums`.
+    let bench = Bench::new(None)
+        .buffer("values", marks.clone())
+        .buffer("tiles", vec![POISON; TILE])
+        .buffer("sums", rank.clone())
+        .groups(&REDUCE, COLUMNS_MAX / TILE)
+        .groups(&SPINE, 1)
+        .groups(&SCAN, COLUMNS_MAX / TILE);
+    let Some(outcome) = bench.run() else { return };
+    let summed = outcome.words("sums").to_vec();
+    let bench = Bench::new(None)
+        .buffer("marks", marks.clone())
+        .buffer("rank", summed)
+        .buffer("foreground", list.clone())
+        .buffer("counters", vec![0; COUNTERS])
+        .threads(&COMPACT, COLUMNS_MAX);
+    let (listed, marked) = compact(&marks, &mut rank, &mut list);
+    assert!(marked > listed, "more marks than room");
+    let outcome = bench.run().expect("the same device");
+    let mut counters = vec![0; COUNTERS];
+    (counters[FOREGROUND_COUNT], counters[FOREGROUND_MARKED]) = (listed as u32, marked as u32);
+    outcome.check("chain", &[("rank", &rank), ("foreground", &list), ("counters", &counters)]);
+}
