@@ -93,7 +93,9 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
             let speed = objects[id as usize - 1].velocity_world.length();
             let (count, off) = (errors.len(), together(&errors));
             let each = median(errors.iter().map(|e| e.length()).collect());
-            println!("{case}: object {id}, {speed:4.1} m/s: {off:.2} m/s off, each {each:.2}, {count} columns");
+            println!(
+                "{case}: object {id}, {speed:4.1} m/s: {off:.2} m/s off, each {each:.2}, {count} columns"
+            );
             if count < ENOUGH {
                 continue;
             }

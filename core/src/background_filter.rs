@@ -20,6 +20,10 @@ pub const TABLE_WORDS: usize = TABLE + 1;
 pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsError> {
     assert!(table.len() == TABLE_WORDS && levels <= LEVELS_MAX);
     let weights = Weights::parse(text, "background", &[PATCH * PATCH, 2, levels])?;
+    let largest: i64 = weights.values().map(|w| (w as i64).abs()).sum();
+    if largest > i32::MAX as i64 {
+        return Err(WeightsError::Range);
+    }
     let mut values = weights.values();
     for patch in table[..TABLE].chunks_exact_mut(4 * 256) {
         let mut of_bit = [0; 32];
@@ -127,6 +131,14 @@ mod tests {
             }
             assert_eq!(score(&step, &table, &columns, index), sum);
         }
+        let all: String = (0..701).map(|_| "8000000 ").collect();
+        let body =
+            std::format!("kind background\nshape 25 2 14\nscale 1000\nprovenance test\n{all}\n");
+        let text = std::format!(
+            "raywake-weights 1\nchecksum {:016x}\n{body}",
+            Digest::of(body.as_bytes())
+        );
+        assert_eq!(load(&text, levels, &mut table), Err(WeightsError::Range));
         let mut marks = vec![9; 81];
         background_filter(&step, &table, &columns, &mut marks);
         for (n, m) in marks.iter().enumerate() {

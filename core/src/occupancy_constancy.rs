@@ -54,7 +54,7 @@ pub fn load(
     }
     let count = high - low + 1;
     if count as usize > SCORES_MAX {
-        return Err(WeightsError::Header("scale"));
+        return Err(WeightsError::Range);
     }
     for (n, cost) in costs.iter_mut().enumerate() {
         let x = (low + n as i32) as f64 / file.scale as f64;

@@ -295,15 +295,15 @@ impl Pipeline {
             return Some(Reset::First);
         };
         let dt = sweep.stamp_s - before.stamp_s;
-        // A NaN is not above zero either.
-        if !(dt > 0.0) {
+        if dt <= 0.0 || dt.is_nan() {
             return Some(Reset::Backwards(dt));
         }
         if dt > self.profile.gap_s {
             return Some(Reset::Gap(dt));
         }
         let moved = (sweep.world_from_vehicle.translation - before.pose.translation).length() / dt;
-        (!(moved <= self.profile.jump_mps)).then_some(Reset::Jump(moved))
+        let jumped = moved > self.profile.jump_mps || moved.is_nan();
+        jumped.then_some(Reset::Jump(moved))
     }
 
     /// From the flow of columns to velocities: tracklets, motion compensation, columns and points.
@@ -377,7 +377,7 @@ impl Pipeline {
                 continue;
             }
             let (i, j) = (column as i32 / step.side, column as i32 % step.side);
-            let at = vehicle_from_grid.transform(self.from_central(i, j));
+            let at = vehicle_from_grid.transform(self.centre_of(i, j));
             let world = before.pose.transform(at);
             let mut flow = ColumnFlow {
                 cell: [current.window.corner[0] + i, current.window.corner[1] + j],
@@ -468,8 +468,8 @@ impl Pipeline {
         self.tracklets.all().iter().filter_map(move |t| Some(self.state_of(t, &current?)))
     }
 
-    /// Centre of a column, at the level of the anchor, from the window's central voxel, m.
-    fn from_central(&self, i: i32, j: i32) -> DVec3 {
+    /// The centre of a column, at the level of the anchor, from the window's central voxel, m.
+    fn centre_of(&self, i: i32, j: i32) -> DVec3 {
         let [ci, cj, _] = central(&self.profile);
         DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0) * self.profile.voxel_m
     }
@@ -478,7 +478,7 @@ impl Pipeline {
         let side = self.profile.side as i32;
         let (i, j) = (t.column as i32 / side, t.column as i32 % side);
         let grid =
-            self.from_central(i, j) + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
+            self.centre_of(i, j) + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
         let at = current.window.grid_from_vehicle.inverse().transform(grid);
         let world = current.pose.transform(at);
         let ego = EgoMotion::new(&current.pose, &current.twist);

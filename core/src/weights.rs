@@ -43,6 +43,8 @@ pub enum WeightsError {
     Value(usize),
     /// More values than the shape has.
     Surplus,
+    /// Their sums do not fit the arithmetic or the tables that take them.
+    Range,
 }
 
 impl fmt::Display for WeightsError {
@@ -55,6 +57,7 @@ impl fmt::Display for WeightsError {
             WeightsError::Shape => write!(f, "weights of another shape than the profile needs"),
             WeightsError::Value(n) => write!(f, "value {n} is missing or no integer below 2^23"),
             WeightsError::Surplus => write!(f, "more values than the shape has"),
+            WeightsError::Range => write!(f, "the sums of the weights are too large"),
         }
     }
 }

@@ -144,7 +144,7 @@ mod tests {
             // Costs of few values, so that ties are common, with a preferred displacement.
             let matching: Vec<u16> = (0..foreground.len() * ROW)
                 .map(|n| {
-                    let liked = n % ROW == 500 || (n / ROW % 5 == 0 && n % ROW == 333);
+                    let liked = n % ROW == 500 || ((n / ROW).is_multiple_of(5) && n % ROW == 333);
                     (if liked { random(3) * 900 } else { 2000 + random(12) * 700 }) as u16
                 })
                 .collect();

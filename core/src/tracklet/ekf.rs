@@ -93,8 +93,9 @@ impl Ekf {
         let determinant = s[(0, 0)] * s[(1, 1)] - s[(0, 1)] * s[(1, 0)];
         let inverse =
             Matrix2::new(s[(1, 1)], -s[(0, 1)], -s[(1, 0)], s[(0, 0)]) * (1.0 / determinant);
-        // A NaN, should one ever arise, fails the comparison and ends the tracklet.
-        if !((innovation.transpose() * inverse * innovation)[0] <= params.gate_d2) {
+        let d2 = (innovation.transpose() * inverse * innovation)[0];
+        // A NaN, should one ever arise, ends the tracklet.
+        if d2 > params.gate_d2 || d2.is_nan() {
             return false;
         }
         let gain: Matrix5x2<f32> = p.fixed_view::<5, 2>(0, 0) * inverse;
