@@ -3,7 +3,8 @@
 mod markdown;
 mod traffic;
 
-use raywake_core::layout::{BUFFERS, Heap};
+use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
+use raywake_core::map::Bands;
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::sweep::Point;
@@ -17,6 +18,7 @@ use crate::config;
 use crate::drive::Drive;
 use crate::engine::say;
 use crate::error::Error;
+use crate::map::Mapper;
 use crate::report::bytes;
 use crate::statistics::BUDGET_MS;
 
@@ -28,15 +30,14 @@ pub const ALIGNMENT: usize = 16;
 const HEAPS: [Heap; 3] = [Heap::Upload, Heap::Device, Heap::Readback];
 
 /// The profiles `memory-layout.md` is about.
-pub fn shipped() -> [Profile; 3] {
-    [Profile::hdl64(), Profile::wide(), Profile::dissertation()]
+pub fn shipped() -> [Profile; 4] {
+    [Profile::hdl64(), Profile::wide(), Profile::dissertation(), Profile::map()]
 }
 
 /// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where
 /// one of them takes more than the limit.
 pub fn budget(args: &args::Budget) -> Result<(), Error> {
-    let one = args.profile.profile.is_some() || args.profile.config.is_some();
-    let profiles = if one { vec![config::profile(&args.profile)?] } else { shipped().to_vec() };
+    let profiles = profiles(&args.profile)?;
     say(false, &memory_layout(&profiles))?;
     let most = profiles.iter().map(|p| device_bytes(p) + host_bytes(p, false)).max();
     match (most, args.limit) {
@@ -45,9 +46,29 @@ pub fn budget(args: &args::Budget) -> Result<(), Error> {
     }
 }
 
+/// The profiles asked for. `map` is one here only: nothing but `raywake map` runs on it.
+fn profiles(choice: &args::ProfileChoice) -> Result<Vec<Profile>, Error> {
+    let map = Profile::map();
+    match (&choice.profile, &choice.config) {
+        (None, None) => Ok(shipped().to_vec()),
+        (Some(name), _) if *name == map.name.as_str() => Ok(vec![map]),
+        _ => Ok(vec![config::profile(choice)?]),
+    }
+}
+
+/// Whether a profile is the sparse map's.
+fn is_map(profile: &Profile) -> bool {
+    *profile == Profile::map()
+}
+
+/// The buffers of what a profile is for.
+fn table(profile: &Profile) -> &'static [Row] {
+    if is_map(profile) { MAP_BUFFERS } else { BUFFERS }
+}
+
 /// Bytes of a heap, padding between buffers included.
 pub fn heap_bytes(heap: Heap, profile: &Profile) -> u64 {
-    let rows = BUFFERS.iter().filter(|b| b.heap == heap);
+    let rows = table(profile).iter().filter(|b| b.heap == heap);
     rows.map(|b| b.bytes(profile).next_multiple_of(ALIGNMENT) as u64).sum()
 }
 
@@ -70,7 +91,15 @@ pub struct Part {
 /// The parts of the host's memory held throughout a run; the scalar backend has its buffers there
 /// too. Sweeps grow to the largest one read; they are taken to be at the capacity.
 pub fn host_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
-    let part = |name, kind, bytes: usize| Part { name, kind, bytes: bytes as u64 };
+    if is_map(profile) { map_parts(profile, scalar) } else { flow_parts(profile, scalar) }
+}
+
+fn part(name: &'static str, kind: &'static str, bytes: usize) -> Part {
+    Part { name, kind, bytes: bytes as u64 }
+}
+
+/// [`host_parts`] of `raywake run`.
+fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     let tracklets = size_of::<Tracklets>();
     let pipeline = size_of::<Pipeline>();
     let words = background_filter::TABLE_WORDS
@@ -93,6 +122,21 @@ pub fn host_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
             "Scalar",
             Scalar::bytes(profile) + 4 * words,
         ));
+    }
+    parts
+}
+
+/// [`host_parts`] of `raywake map`. Its scalar backend has no more than the device's buffers.
+fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
+    let mut parts = vec![
+        part("mapper", "Mapper", size_of::<Mapper>()),
+        part("bands", "Bands", size_of::<Bands>()),
+        part("columns of the rays", "u32", POINTS_MAX * size_of::<u32>()),
+        part("one sweep at capacity", "Point", POINTS_MAX * size_of::<Point>()),
+    ];
+    if scalar {
+        let most = Mapper::bytes(profile);
+        parts.push(part("buffers of the scalar backend, at most", "ScalarMap", most));
     }
     parts
 }
@@ -135,6 +179,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_map_alone() {
+        let text = memory_layout(&[Profile::map()]);
+        assert!(text.contains("\n### Totals\n") && !text.contains("\n## Totals\n"), "{text}");
+        assert!(text.contains("| `updates` |") && !text.contains("| `matching` |"), "{text}");
+        assert!(device_bytes(&Profile::map()) >= Mapper::bytes(&Profile::map()) as u64);
+        let named = |name: &str| {
+            let profile = Some(name.to_string());
+            profiles(&args::ProfileChoice { profile, config: None }).ok()
+        };
+        assert_eq!(named("map"), Some(vec![Profile::map()]));
+        assert_eq!((named("wide"), named("maps")), (Some(vec![Profile::wide()]), None));
+    }
+
+    #[test]
     fn sums() {
         let p = Profile::hdl64();
         let (device, scalar) = (device_bytes(&p), host_bytes(&p, true) - host_bytes(&p, false));
@@ -142,6 +200,8 @@ mod tests {
         assert!(scalar < device && scalar > heap_bytes(Heap::Upload, &p), "{scalar}");
         let text = memory_layout(&shipped());
         assert!(text.contains("| hdl64, dissertation | wide |"), "{text}");
-        assert!(BUFFERS.iter().all(|b| text.contains(&format!("| `{}` |", b.name))));
+        let named = |row: &Row| text.contains(&format!("| `{}` |", row.name));
+        assert!(BUFFERS.iter().chain(MAP_BUFFERS).all(named), "{text}");
+        assert!(text.contains("\n## Sparse map\n") && text.contains("\n## Records\n"));
     }
 }

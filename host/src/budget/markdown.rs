@@ -2,25 +2,70 @@
 
 use std::fmt::Write;
 
-use raywake_core::layout::{BUFFERS, Heap, Row};
+use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
 use raywake_core::params::Profile;
+use raywake_core::record::Step;
 use raywake_kernels::schedule;
 
 use super::traffic::{self, Traffic};
-use super::{ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts};
+use super::{ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts, is_map};
 
 const HEAD: &str = "\
 # Memory layout
 
 What `raywake run` holds from its first sweep to its last, in bytes; nothing is allocated between.
-`raywake budget` prints this file from the declarations the program allocates by, and a test
-compares the two.
+The buffers of `raywake map` are as fixed; they are under `Sparse map`. `raywake budget` prints this
+file from the declarations the program allocates by, and a test compares the two.
 
 A buffer is so many elements of so many bytes. Words are 32-bit, little-endian; an element is
 aligned to its own size. Each heap is one allocation of device memory; in it every buffer begins at
-a multiple of 16 bytes, more where a device asks for it. Writers and readers are the steps of the
-schedule in the order they first touch the buffer; `fill` sets every word, `copy` moves a whole
-buffer.
+a multiple of 16 bytes, more where a device asks for it. No two buffers alias: each has its bytes to
+itself from start to end. Writers and readers are the steps of the schedule in the order they first
+touch the buffer; `fill` sets every word, `copy` moves a whole buffer.
+";
+
+/// Below the device's table of the flow pipeline; a test of [`traffic`] sees that it is so.
+const LIFETIME: &str = "
+The two largest tables, `cost` and `matching`, are alive at the same time only in `window`, which
+reads the one and writes the other.
+";
+
+const MAP_HEAD: &str = "
+## Sparse map
+
+`raywake map` holds these buffers instead. A sweep goes through `map rays` once, then through `map
+count` and `map band` for every band of keys.
+";
+
+/// Below the host's table of the sparse map.
+const MAP_HOST: &str = "
+The voxels of a sweep, and the file made of them, grow with what is seen and are not counted.
+";
+
+/// Below the host's table of either.
+const CAPACITY: &str = "
+A sweep of more returns than the capacity is read whole; what the pipeline leaves out of it is
+counted.
+";
+
+const RECORDS_HEAD: &str = "
+## Records
+
+`params_in` and `params` hold one record `Step`, of the sweep or, in the sparse map, of the band.
+
+| word | byte | field | type |
+|--:|--:|---|---|
+";
+
+/// The packed elements, from `raywake_core::record` and `raywake_core::map`.
+const PACKED: &str = "
+Other elements are plain words or packed:
+
+- `Ray`, 2 words: `[i | j << 16, k | origin << 16 | no_end << 31]`, `i, j, k` its end's signed 16-bit voxel from the window's corner, `origin` an index of the origins, `no_end` set where nothing is hit there
+- `Column`, 2 words: `[free | occupied << 16, solid]`, one bit a level
+- `Flow`, 1 word: `1 << 31 | (du + 15) << 8 | (dv + 15)`, cells, or 0 where there is none
+- `Proposal`, 2 words: `[flow, cost]`, flow 0 where no target is feasible
+- `Update`, 2 words: `[key, log-odds as i32]`, an update or a voxel of the sparse map
 ";
 
 /// Profiles that take the same bytes share a column.
@@ -29,23 +74,70 @@ struct Sizes<'a> {
     profile: &'a Profile,
 }
 
-/// `memory-layout.md` for some profiles, of which the first one's schedule names the steps.
+/// Buffers that are allocated together, with their headings.
+struct Layout<'a> {
+    /// What precedes the title of a section.
+    level: &'static str,
+    table: &'static [Row],
+    sizes: Vec<Sizes<'a>>,
+    traffic: Vec<Traffic>,
+    /// Below the device's table.
+    device: &'static str,
+    /// Below the host's table.
+    host: &'static str,
+}
+
+/// `memory-layout.md` for some profiles. Of the flow's, the first one's schedule names the steps.
 pub fn memory_layout(profiles: &[Profile]) -> String {
+    let (maps, flows): (Vec<&Profile>, Vec<&Profile>) = profiles.iter().partition(|p| is_map(p));
     let mut out = String::from(HEAD);
-    if let Some(first) = profiles.first() {
-        let traffic = traffic::of(&[schedule::load(), schedule::flow(first)]);
-        let sizes = sizes(profiles);
-        // Writing to a string cannot fail.
-        let _ = HEAPS.iter().try_for_each(|heap| heap_table(&mut out, *heap, &sizes, &traffic));
-        let _ = host_table(&mut out, &sizes).and_then(|()| totals(&mut out, &sizes));
+    // Writing to a string cannot fail.
+    if let Some(first) = flows.first() {
+        let _ = flow(first, &flows).write(&mut out);
     }
+    if !maps.is_empty() {
+        out += MAP_HEAD;
+        let _ = map(&maps).write(&mut out);
+    }
+    let _ = records(&mut out);
     out
 }
 
-fn sizes(profiles: &[Profile]) -> Vec<Sizes<'_>> {
-    let bytes = |p: &Profile| -> Vec<usize> { BUFFERS.iter().map(|b| b.bytes(p)).collect() };
+fn flow<'a>(first: &Profile, profiles: &[&'a Profile]) -> Layout<'a> {
+    Layout {
+        level: "##",
+        table: BUFFERS,
+        sizes: sizes(BUFFERS, profiles),
+        traffic: traffic::of(BUFFERS, &[schedule::load(), schedule::flow(first)]),
+        device: LIFETIME,
+        host: "",
+    }
+}
+
+fn map<'a>(profiles: &[&'a Profile]) -> Layout<'a> {
+    let programs = [schedule::map_rays(), schedule::map_count(), schedule::map_band()];
+    Layout {
+        level: "###",
+        table: MAP_BUFFERS,
+        sizes: sizes(MAP_BUFFERS, profiles),
+        traffic: traffic::of(MAP_BUFFERS, &programs),
+        device: "",
+        host: MAP_HOST,
+    }
+}
+
+impl Layout<'_> {
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        HEAPS.iter().try_for_each(|heap| heap_table(out, *heap, self))?;
+        host_table(out, self)?;
+        totals(out, self)
+    }
+}
+
+fn sizes<'a>(table: &[Row], profiles: &[&'a Profile]) -> Vec<Sizes<'a>> {
+    let bytes = |p: &Profile| -> Vec<usize> { table.iter().map(|b| b.bytes(p)).collect() };
     let mut all: Vec<Sizes> = Vec::new();
-    for profile in profiles {
+    for &profile in profiles {
         match all.iter_mut().find(|s| bytes(s.profile) == bytes(profile)) {
             Some(same) => same.names += &format!(", {}", profile.name),
             None => all.push(Sizes { names: profile.name.to_string(), profile }),
@@ -59,23 +151,19 @@ fn cells(sizes: &[Sizes], cell: impl Fn(&Sizes) -> String) -> String {
     sizes.iter().map(cell).collect::<Vec<_>>().join(" | ")
 }
 
-fn heap_table(
-    out: &mut String,
-    heap: Heap,
-    sizes: &[Sizes],
-    traffic: &[Traffic],
-) -> std::fmt::Result {
+fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result {
+    let (level, sizes) = (layout.level, &layout.sizes[..]);
     let title = match heap {
         Heap::Upload => "Upload: the host writes through a mapping, copies read",
         Heap::Device => "Device: kernels only",
         Heap::Readback => "Readback: copies write, the host reads through a mapping",
     };
-    writeln!(out, "\n## {title}\n")?;
+    writeln!(out, "\n{level} {title}\n")?;
     let names = cells(sizes, |s| s.names.clone());
     writeln!(out, "| buffer | element | {names} | align | written by | read by | holds |")?;
     let rule = cells(sizes, |_| "--:".into());
     writeln!(out, "|---|---|{}|--:|---|---|---|", rule.replace(' ', ""))?;
-    let rows = BUFFERS.iter().zip(traffic).filter(|(row, _)| row.heap == heap);
+    let rows = layout.table.iter().zip(&layout.traffic).filter(|(row, _)| row.heap == heap);
     for (row, traffic) in rows {
         let bytes = cells(sizes, |s| amount(row, s.profile));
         let (writers, readers) = (traffic.writers.join(", "), traffic.readers.join(", "));
@@ -86,7 +174,9 @@ fn heap_table(
         )?;
     }
     let sums = cells(sizes, |s| grouped(heap_bytes(heap, s.profile)));
-    writeln!(out, "| total, with padding | | {sums} | | | | |")
+    writeln!(out, "| total, with padding | | {sums} | | | | |")?;
+    out.push_str(if heap == Heap::Device { layout.device } else { "" });
+    Ok(())
 }
 
 /// `27,889 x 8 = 223,112`.
@@ -95,8 +185,9 @@ fn amount(row: &Row, profile: &Profile) -> String {
     format!("{count} x {of} = {}", grouped(row.bytes(profile) as u64))
 }
 
-fn host_table(out: &mut String, sizes: &[Sizes]) -> std::fmt::Result {
-    writeln!(out, "\n## Host\n")?;
+fn host_table(out: &mut String, layout: &Layout) -> std::fmt::Result {
+    let (level, sizes) = (layout.level, &layout.sizes[..]);
+    writeln!(out, "\n{level} Host\n")?;
     writeln!(out, "| part | type | {} |", cells(sizes, |s| s.names.clone()))?;
     writeln!(out, "|---|---|{}|", cells(sizes, |_| "--:".into()).replace(' ', ""))?;
     let parts: Vec<_> = sizes.iter().map(|s| host_parts(s.profile, true)).collect();
@@ -104,15 +195,14 @@ fn host_table(out: &mut String, sizes: &[Sizes]) -> std::fmt::Result {
         let bytes: Vec<_> = parts.iter().map(|p| grouped(p[n].bytes)).collect();
         writeln!(out, "| {} | `{}` | {} |", part.name, part.kind, bytes.join(" | "))?;
     }
-    writeln!(
-        out,
-        "\nA sweep of more returns than the capacity is read whole; what the pipeline leaves out of \
-         it is counted."
-    )
+    out.push_str(CAPACITY);
+    out.push_str(layout.host);
+    Ok(())
 }
 
-fn totals(out: &mut String, sizes: &[Sizes]) -> std::fmt::Result {
-    writeln!(out, "\n## Totals\n")?;
+fn totals(out: &mut String, layout: &Layout) -> std::fmt::Result {
+    let (level, sizes) = (layout.level, &layout.sizes[..]);
+    writeln!(out, "\n{level} Totals\n")?;
     writeln!(out, "| backend | memory | {} |", cells(sizes, |s| s.names.clone()))?;
     writeln!(out, "|---|---|{}|", cells(sizes, |_| "--:".into()).replace(' ', ""))?;
     let mut row = |name: &str, bytes: &dyn Fn(&Profile) -> u64| {
@@ -122,6 +212,16 @@ fn totals(out: &mut String, sizes: &[Sizes]) -> std::fmt::Result {
     row("vulkan | host", &|p| host_bytes(p, false))?;
     row("vulkan | both", &|p| device_bytes(p) + host_bytes(p, false))?;
     row("scalar | host", &|p| host_bytes(p, true))
+}
+
+/// The words of records, and how elements are packed.
+fn records(out: &mut String) -> std::fmt::Result {
+    out.push_str(RECORDS_HEAD);
+    for (word, field) in Step::FIELDS.iter().enumerate() {
+        writeln!(out, "| {word} | {} | `{field}` | `i32` |", 4 * word)?;
+    }
+    out.push_str(PACKED);
+    Ok(())
 }
 
 /// Thousands apart.
@@ -138,7 +238,13 @@ fn grouped(number: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::grouped;
+    use super::{PACKED, grouped};
+    use raywake_core::params::REACH;
+
+    #[test]
+    fn flows_are_packed_as_said() {
+        assert!(PACKED.contains(&format!("(du + {REACH}) << 8 | (dv + {REACH})")));
+    }
 
     #[test]
     fn thousands() {

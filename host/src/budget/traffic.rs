@@ -1,6 +1,6 @@
 //! Who writes and who reads each buffer, as the schedules say.
 
-use raywake_core::layout::{BUFFERS, Heap};
+use raywake_core::layout::{Heap, Row};
 use raywake_gpu::{Groups, Op, Program};
 
 /// Names of the steps that touch a buffer, each once, from first to last.
@@ -10,16 +10,16 @@ pub(super) struct Traffic {
     pub readers: Vec<&'static str>,
 }
 
-/// The traffic of every buffer of the layout over the programs, in the order they run.
-pub(super) fn of(programs: &[Program]) -> Vec<Traffic> {
-    let mut all: Vec<Traffic> = vec![Traffic::default(); BUFFERS.len()];
-    for (buffer, traffic) in BUFFERS.iter().zip(&mut all) {
+/// The traffic of every buffer of a table over the programs made for it, in the order they run.
+pub(super) fn of(table: &[Row], programs: &[Program]) -> Vec<Traffic> {
+    let mut all: Vec<Traffic> = vec![Traffic::default(); table.len()];
+    for (buffer, traffic) in table.iter().zip(&mut all) {
         if buffer.heap == Heap::Upload {
             note(&mut traffic.writers, "host");
         }
     }
     programs.iter().flat_map(|p| &p.ops).for_each(|op| step(op, &mut all));
-    for (buffer, traffic) in BUFFERS.iter().zip(&mut all) {
+    for (buffer, traffic) in table.iter().zip(&mut all) {
         if buffer.heap == Heap::Readback {
             note(&mut traffic.readers, "host");
         }
@@ -54,5 +54,28 @@ fn step(op: &Op, all: &mut [Traffic]) {
 fn note(names: &mut Vec<&'static str>, name: &'static str) {
     if !names.contains(&name) {
         names.push(name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_core::layout::{BUFFERS, Buffer};
+    use raywake_core::params::Profile;
+    use raywake_kernels::schedule;
+
+    #[test]
+    fn the_large_tables_meet_in_one_step() {
+        let programs = [schedule::load(), schedule::flow(&Profile::hdl64())];
+        let all = of(BUFFERS, &programs);
+        let [cost, matching] = [Buffer::Cost, Buffer::Matching].map(|b| &all[b as usize]);
+        assert_eq!(
+            (&cost.writers[..], &cost.readers[..]),
+            (&["occupancy_constancy"][..], &["window"][..])
+        );
+        assert_eq!(
+            (&matching.writers[..], &matching.readers[..]),
+            (&["window"][..], &["expectation"][..])
+        );
     }
 }

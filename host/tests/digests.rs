@@ -1,0 +1,188 @@
+//! One digest, however the program is run: on which backend, how wide, on how many threads, as
+//! which build. `RAYWAKE_DIGEST_OF` names further builds to compare, separated by `:`.
+
+#[allow(dead_code)]
+mod common;
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use common::{Outcome, Temp};
+use raywake_sim::{Drive, Ego, Options, SimSweep};
+
+/// Widths of software Vulkan's vectors, bits.
+const WIDTHS: [u32; 3] = [128, 256, 512];
+/// Numbers of its threads besides the calling one, and the width they are tried at.
+const THREADS: [u32; 3] = [0, 1, 2];
+const THREADS_AT: u32 = 256;
+/// What a run of the default profile may take on the device.
+const DEVICE_BYTES: u64 = 64 << 20;
+
+/// The simulated street, turning, in KITTI's layout.
+fn drive(t: &Temp) -> PathBuf {
+    static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
+    let ego = Ego::Turn { left: true, speed: 6.0 };
+    let options = Options { sweeps: 4, ego, ..Options::default() };
+    let sweeps = SWEEPS.get_or_init(|| Drive::new(3, options).collect());
+    for (n, sweep) in sweeps.iter().enumerate() {
+        let values = sweep.points.iter().flat_map(|p| {
+            let [x, y, z] = p.position;
+            [x, y, z, p.intensity]
+        });
+        let cloud: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+        t.write(&format!("drive/velodyne_points/data/{n:010}.bin"), cloud);
+    }
+    let lines = |line: &dyn Fn(&SimSweep) -> String| sweeps.iter().map(line).collect::<String>();
+    t.write("drive/times.txt", lines(&|s| format!("{}\n", s.stamp_s)));
+    t.write("drive/poses.txt", lines(&pose));
+    t.path().join("drive")
+}
+
+/// A row of `poses.txt`.
+fn pose(sweep: &SimSweep) -> String {
+    let pose = sweep.world_from_vehicle;
+    let (turn, place) = (pose.matrix(), pose.translation.to_array());
+    let row = |n: usize| {
+        let [a, b, c] = turn.row(n).to_array();
+        format!("{a} {b} {c} {}", place[n])
+    };
+    format!("{} {} {}\n", row(0), row(1), row(2))
+}
+
+/// How to run.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    Scalar,
+    /// Vulkan. Where a CPU plays the device: the width of its vectors and the number of threads.
+    Vulkan(u32, Option<u32>),
+}
+
+impl Way {
+    /// A command of a program that will run this way.
+    fn command(self, program: &Path, what: &str, data: &Path) -> Command {
+        let mut command = Command::new(program);
+        command.arg(what).arg(data);
+        let Way::Vulkan(width, threads) = self else {
+            command.args(["--backend", "scalar"]);
+            return command;
+        };
+        command.args(["--backend", "vulkan", "--timeout", "120"]);
+        command.env("LP_NATIVE_VECTOR_WIDTH", width.to_string());
+        // Kept from test to test, but one for each width: the driver does not tell them apart.
+        let cache = env::temp_dir().join(format!("raywake-shaders-{width}"));
+        command.env("MESA_SHADER_CACHE_DIR", cache);
+        match threads {
+            Some(n) => command.env("LP_NUM_THREADS", n.to_string()),
+            None => command.env_remove("LP_NUM_THREADS"),
+        };
+        command
+    }
+}
+
+/// The program of this package.
+fn own() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_raywake"))
+}
+
+/// Whether a program finds a Vulkan device. `RAYWAKE_VULKAN=required` says that ours must.
+fn vulkan(program: &Path) -> bool {
+    let devices = Outcome::of(Command::new(program).arg("devices").output().unwrap());
+    devices.succeeded();
+    let found = !devices.stdout.starts_with("No Vulkan");
+    if !found {
+        let required = env::var("RAYWAKE_VULKAN").is_ok_and(|v| v == "required");
+        assert!(!required || program != own(), "{}", devices.stdout);
+        eprintln!("skipped: no Vulkan device for {}", program.display());
+    }
+    found
+}
+
+/// The digest of `run`, whose summary must be in order.
+fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
+    let file = t.path().join("summary.json");
+    let mut command = way.command(program, "run", &t.path().join("drive"));
+    command.args(["--quiet", "--no-points", "--summary"]).arg(&file).args(more);
+    let outcome = Outcome::of(command.output().unwrap());
+    outcome.succeeded();
+    let s = outcome.summary(&file);
+    let number = |key: &str| s[key].as_u64().unwrap_or_else(|| panic!("{key} in {s}"));
+    let on_device = matches!(way, Way::Vulkan(..));
+    assert_eq!(s["backend"], if on_device { "vulkan" } else { "scalar" });
+    if let (Way::Vulkan(width, _), Some(device)) = (way, s["device"].as_str()) {
+        let told = !device.starts_with("llvmpipe") || device.contains(&format!("{width} bits"));
+        assert!(told, "{device} for {width} bits");
+    }
+    assert!(number("device_bytes") <= DEVICE_BYTES, "{s}");
+    assert!(number("vulkan_allocations") <= 3, "{s}");
+    assert_eq!(on_device, number("device_bytes") > 0 && number("vulkan_allocations") > 0, "{s}");
+    assert_eq!(number("allocations_after_seal"), 0, "{s}");
+    assert!(number("pairs") == 3 && number("valid_flows") > 0, "{s}");
+    s["digest"].as_str().unwrap().to_string()
+}
+
+/// The digest that `map` prints.
+fn map_digest(t: &Temp, way: Way) -> String {
+    let mut command = way.command(own(), "map", &t.path().join("drive"));
+    command.arg("--out").arg(t.path().join("map")).args(["-n", "2"]);
+    let outcome = Outcome::of(command.output().unwrap());
+    outcome.succeeded();
+    let digest = outcome.stdout.lines().find_map(|line| line.strip_prefix("digest "));
+    digest.unwrap_or_else(|| panic!("{}", outcome.stdout)).to_string()
+}
+
+#[test]
+fn widths_and_threads() {
+    let t = Temp::new();
+    drive(&t);
+    let scalar = digest(&t, own(), Way::Scalar, &[]);
+    assert_eq!(digest(&t, own(), Way::Scalar, &[]), scalar, "scalar again");
+    if !vulkan(own()) {
+        return;
+    }
+    let widths = WIDTHS.map(|width| Way::Vulkan(width, None));
+    let threads = THREADS.map(|n| Way::Vulkan(THREADS_AT, Some(n)));
+    for way in widths.into_iter().chain(threads) {
+        assert_eq!(digest(&t, own(), way, &[]), scalar, "{way:?}");
+    }
+}
+
+#[test]
+fn without_the_filter() {
+    let t = Temp::new();
+    drive(&t);
+    let none = ["--filter", "none"];
+    let scalar = digest(&t, own(), Way::Scalar, &none);
+    assert_ne!(digest(&t, own(), Way::Scalar, &[]), scalar, "the filter does something");
+    if vulkan(own()) {
+        assert_eq!(digest(&t, own(), Way::Vulkan(THREADS_AT, None), &none), scalar);
+    }
+}
+
+#[test]
+fn maps() {
+    let t = Temp::new();
+    drive(&t);
+    let scalar = map_digest(&t, Way::Scalar);
+    assert_eq!(map_digest(&t, Way::Scalar), scalar, "scalar again");
+    if vulkan(own()) {
+        assert_eq!(map_digest(&t, Way::Vulkan(THREADS_AT, None)), scalar);
+    }
+}
+
+#[test]
+fn other_builds() {
+    let Some(programs) = env::var_os("RAYWAKE_DIGEST_OF") else { return };
+    let t = Temp::new();
+    drive(&t);
+    let wanted = digest(&t, own(), Way::Scalar, &[]);
+    for program in env::split_paths(&programs).filter(|p| !p.as_os_str().is_empty()) {
+        let name = program.display();
+        assert_eq!(digest(&t, &program, Way::Scalar, &[]), wanted, "{name}, scalar");
+        if vulkan(&program) {
+            let way = Way::Vulkan(THREADS_AT, None);
+            assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");
+        }
+    }
+}
