@@ -77,4 +77,7 @@ else
     cargo test --workspace --quiet
 fi
 
+say "variants side by side, two sweeps each"
+cargo test --quiet -p raywake-tests --benches
+
 say "all passed"

@@ -10,8 +10,11 @@ use crate::{difference, vulkan};
 pub struct Bench {
     names: Vec<&'static str>,
     contents: Vec<Vec<u32>>,
-    dispatches: Vec<(&'static Kernel, u32)>,
+    dispatches: Vec<(&'static Kernel, u32, &'static [Bound])>,
 }
+
+/// A variable of a kernel and the buffer it stands for.
+pub type Bound = (&'static str, &'static str);
 
 /// The buffers after a run.
 pub struct Outcome {
@@ -49,8 +52,18 @@ impl Bench {
     }
 
     /// Adds a dispatch of some workgroups.
-    pub fn groups(mut self, kernel: &'static Kernel, groups: usize) -> Bench {
-        self.dispatches.push((kernel, groups as u32));
+    pub fn groups(self, kernel: &'static Kernel, groups: usize) -> Bench {
+        self.bound(kernel, groups, &[])
+    }
+
+    /// Adds a dispatch of some workgroups in which variables stand for buffers of other names.
+    pub fn bound(
+        mut self,
+        kernel: &'static Kernel,
+        groups: usize,
+        names: &'static [Bound],
+    ) -> Bench {
+        self.dispatches.push((kernel, groups as u32, names));
         self
     }
 
@@ -83,11 +96,19 @@ impl Bench {
     fn program(&self) -> Program {
         let count = self.names.len();
         let mut ops: Vec<Op> = (0..count).map(|n| Op::Copy { from: n, to: count + n }).collect();
-        ops.extend(self.dispatches.iter().map(|(kernel, groups)| Op::Dispatch {
-            name: kernel.name,
-            kernel,
-            buffers: kernel.bindings.iter().map(|b| count + self.index(b.name)).collect(),
-            groups: Groups::Fixed([*groups, 1, 1]),
+        ops.extend(self.dispatches.iter().map(|(kernel, groups, names)| {
+            let buffer =
+                |variable| names.iter().find(|n| n.0 == variable).map_or(variable, |n| n.1);
+            Op::Dispatch {
+                name: kernel.name,
+                kernel,
+                buffers: kernel
+                    .bindings
+                    .iter()
+                    .map(|b| count + self.index(buffer(b.name)))
+                    .collect(),
+                groups: Groups::Fixed([*groups, 1, 1]),
+            }
         }));
         ops.extend((0..count).map(|n| Op::Copy { from: count + n, to: 2 * count + n }));
         Program { name: "bench", ops }

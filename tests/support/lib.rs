@@ -4,8 +4,10 @@
 
 pub mod bench;
 pub mod drives;
+pub mod grid;
 pub mod pair;
 pub mod random;
+pub mod table;
 pub mod vulkan;
 pub mod weights;
 

@@ -17,12 +17,13 @@ pub const KERNELS: &[&Kernel] = &[&REDUCE, &SPINE, &SCAN, &COMPACT];
 fn check_sum(case: &str, values: &[u32]) {
     let count = values.len();
     let groups = count.div_ceil(TILE);
-    let mut totals = vec![POISON; TILE];
+    // Behind the tiles, the spine leaves the sum of all.
+    let mut totals = vec![POISON; TILE + 1];
     for (total, tile) in totals.iter_mut().zip(values.chunks(TILE)) {
         *total = tile.iter().sum();
     }
     let mut offsets = totals.clone();
-    prefix_sum(&totals[..groups], &mut offsets[..groups]);
+    offsets[TILE] = prefix_sum(&totals[..groups], &mut offsets[..groups]);
     let mut sums = vec![0; count];
     prefix_sum(values, &mut sums);
 
@@ -32,7 +33,7 @@ fn check_sum(case: &str, values: &[u32]) {
             .buffer("tiles", tiles.to_vec())
             .buffer("sums", vec![POISON; count])
     };
-    let poisoned = [POISON; TILE];
+    let poisoned = [POISON; TILE + 1];
     let all = bench(&poisoned).groups(&REDUCE, groups).groups(&SPINE, 1).groups(&SCAN, groups);
     let Some(outcome) = all.run() else { return };
     outcome.check(case, &[("tiles", &offsets), ("sums", &sums)]);
@@ -122,7 +123,7 @@ fn the_prefix_sum_feeds_the_list() {
     // The prefix sum knows the marks as `values` and the ranks as `sums`.
     let bench = Bench::new(None)
         .buffer("values", marks.clone())
-        .buffer("tiles", vec![POISON; TILE])
+        .buffer("tiles", vec![POISON; TILE + 1])
         .buffer("sums", rank.clone())
         .groups(&REDUCE, COLUMNS_MAX / TILE)
         .groups(&SPINE, 1)

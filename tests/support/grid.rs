@@ -1,0 +1,76 @@
+//! The dense window of a sweep, apart from the pipeline.
+
+use raywake_core::grid::ray_merge::ray_merge;
+use raywake_core::grid::ray_trace::ray_trace;
+use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
+use raywake_core::prepare::{Preparation, Window};
+use raywake_core::record::{Ray, Step};
+use raywake_core::sweep::{Rig, Sweep};
+
+/// A sweep as rays in a window.
+pub struct Rays {
+    /// Sizes.
+    pub step: Step,
+    /// Rays.
+    pub rays: Vec<Ray>,
+    /// Where they begin.
+    pub origins: Vec<[i32; 4]>,
+}
+
+impl Rays {
+    /// Prepares a sweep.
+    pub fn new(profile: &Profile, rig: &Rig, window: &Window, sweep: &Sweep) -> Rays {
+        let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
+        let mut origins = vec![[0; 4]; ORIGINS_MAX];
+        let preparation = Preparation::new();
+        let (count, _) =
+            preparation.prepare(profile, rig, window, sweep, &mut rays, &mut columns, &mut origins);
+        rays.truncate(count);
+        let step = Step {
+            side: profile.side as i32,
+            levels: profile.levels as i32,
+            rays: count as i32,
+            range_steps: profile.range_steps(),
+            ..Step::default()
+        };
+        Rays { step, rays, origins }
+    }
+}
+
+/// Storage for merging and tracing.
+pub struct Tracer {
+    slots: Vec<[u32; 2]>,
+    distinct: Vec<u32>,
+    used: usize,
+}
+
+impl Default for Tracer {
+    fn default() -> Tracer {
+        Tracer { slots: vec![[0; 2]; MERGE_SLOTS], distinct: vec![0; POINTS_MAX], used: 0 }
+    }
+}
+
+impl Tracer {
+    /// Merges equal rays; returns how many are left.
+    pub fn merge(&mut self, rays: &Rays) -> usize {
+        self.slots.fill([0; 2]);
+        self.used = ray_merge(&rays.rays, &mut self.slots, &mut self.distinct);
+        self.used
+    }
+
+    /// Lists every ray by itself instead; returns the list.
+    pub fn single(&mut self, rays: &Rays) -> &[u32] {
+        self.used = rays.rays.len();
+        let list = &mut self.distinct[..self.used];
+        // An entry from `MERGE_SLOTS` on is a ray without a place in the table: it counts once.
+        list.iter_mut().zip(MERGE_SLOTS as u32..).for_each(|(entry, n)| *entry = n);
+        list
+    }
+
+    /// Traces what was merged or listed.
+    pub fn trace(&self, rays: &Rays, log_odds: &mut [i32]) {
+        log_odds.fill(0);
+        let distinct = &self.distinct[..self.used];
+        ray_trace(&rays.step, &rays.origins, &rays.rays, &self.slots, distinct, log_odds);
+    }
+}
