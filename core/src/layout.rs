@@ -94,7 +94,7 @@ buffers! {
     TargetEnergy "target_energy" Device "atomic<u32>" * 1, |p| p.columns(), "energy of the winner at every target";
     TargetRank "target_rank" Device "atomic<u32>" * 1, |p| p.columns(), "rank of the winner at every target";
     Proposal "proposal" Device "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "flow and energy each foreground column proposes";
-    Bound "bound" Device "u32" * 1, |_p| FOREGROUND_MAX, "least a foreground column can pay";
+    Least "least" Device "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "least energy of a foreground column, and where";
     CountersOut "counters_out" Readback "u32" * 1, |_p| COUNTERS, "counts";
     BeforeOut "columns_before_out" Readback "vec2<u32>" * 2, |p| p.columns(), "columns of the sweep before";
     ForegroundOut "foreground_out" Readback "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns";
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn rows_fit_their_profiles() {
-        assert_eq!(Buffer::Bound.row().name, "bound");
+        assert_eq!(Buffer::Least.row().name, "least");
         assert_eq!(Buffer::StepIn.row().name, "params_in");
         for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
             // 128 MiB is the least a Vulkan device must let a shader bind.

@@ -110,6 +110,10 @@ pub fn flow_displacement(f: Flow) -> [i32; 2] {
 /// Proposal of one round of expectation: `[flow, cost]`; flow 0 where no target is feasible.
 pub type Proposal = [u32; 2];
 
+/// The least energy of a column at any displacement, smoothing apart, and its place in the column's
+/// row of costs: `[energy, place]`.
+pub type Least = [u32; 2];
+
 /// No index, no cost yet.
 pub const NONE: u32 = u32::MAX;
 

@@ -17,7 +17,7 @@ pub fn flow(profile: &Profile) -> Program {
     let columns = profile.columns();
     let mut ops = vec![copy(StepIn, StepNow), copy(OriginsIn, Origins), copy(RaysIn, Rays)];
     ops.extend([Slots, Counters, LogOdds, State].map(|b| fill(b, 0)));
-    ops.push(fill(TargetEnergy, NONE));
+    ops.extend([TargetEnergy, Least].map(|b| fill(b, NONE)));
     ops.extend([
         threads("shift", &SHIFT, &[StepNow, Now, Before], columns),
         threads("ray_merge", &RAY_MERGE, &[StepNow, Rays, Slots, Distinct, Counters], POINTS_MAX),
@@ -54,7 +54,7 @@ pub fn flow(profile: &Profile) -> Program {
             indirect(
                 "expectation",
                 &EXPECTATION,
-                &[StepNow, Counters, Foreground, Matching, State, TargetEnergy, Bound, Proposal],
+                &[StepNow, Counters, Foreground, Matching, State, TargetEnergy, Least, Proposal],
                 GROUPS_FOREGROUND,
             ),
             fill(TargetEnergy, NONE),

@@ -32,10 +32,11 @@ fn four(first: u32) -> vec4<i32> {
     return vec4<i32>(bits[first], bits[first + 1u], bits[first + 2u], bits[first + 3u]);
 }
 
-// Sum of the weights of the four lowest bits of `state` that are set.
-fn sum_of(state: u32, weights: vec4<i32>) -> i32 {
-    let chosen = (vec4<u32>(state) & vec4<u32>(1u, 2u, 4u, 8u)) != vec4<u32>(0u);
-    let w = select(vec4<i32>(0), weights, chosen);
+// Sums of the weights of four bits for two targets at once, whose masks are the halves of `masks`,
+// shifted so that the bits come first: the sum for the low half plus 65536 times that for the high.
+fn sums_of(masks: u32, weights: vec4<i32>) -> i32 {
+    let chosen = (vec4<u32>(masks) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(0x10001u);
+    let w = vec4<i32>(chosen) * weights;
     return (w.x + w.y) + (w.z + w.w);
 }
 
@@ -72,15 +73,18 @@ fn occupancy_constancy(
     let j = column % params.side;
     let offset = constancy_weights.d[3u * LEVELS_MAX] - params.score_min;
     for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= 8
-        var packed = 0u;
-        for (var half = 0u; half < 2u; half += 1u) { // <= 2
-            let state = target_at(i, j, 2u * word + half);
-            let score = sum_of(state, w0) + sum_of(state >> 4u, w1)
-                + sum_of(state >> 8u, w2) + sum_of(state >> 12u, w3)
-                + sum_of(state >> 16u, w4) + sum_of(state >> 20u, w5)
-                + sum_of(state >> 24u, w6) + sum_of(state >> 28u, w7);
-            packed |= constancy_costs.d[score + offset] << (16u * half);
-        }
-        cost.d[group.x * ROW_WORDS + word] = packed;
+        let low = target_at(i, j, 2u * word);
+        let high = target_at(i, j, 2u * word + 1u);
+        let free = (low & 0xffffu) | (high << 16u);
+        let occupied = (low >> 16u) | (high & 0xffff0000u);
+        let both = sums_of(free, w0) + sums_of(free >> 4u, w1)
+            + sums_of(free >> 8u, w2) + sums_of(free >> 12u, w3)
+            + sums_of(occupied, w4) + sums_of(occupied >> 4u, w5)
+            + sums_of(occupied >> 8u, w6) + sums_of(occupied >> 12u, w7);
+        // Scores fit 16 bits with their sign: the low one is taken out before the high one.
+        let first = (both << 16u) >> 16u;
+        let second = (both - first) >> 16u;
+        cost.d[group.x * ROW_WORDS + word] = constancy_costs.d[first + offset]
+            | (constancy_costs.d[second + offset] << 16u);
     }
 }

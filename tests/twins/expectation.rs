@@ -3,7 +3,7 @@
 use raywake_core::flow::expectation::expectation;
 use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT};
 use raywake_core::params::{REACH, ROW, ROW_WORKGROUP};
-use raywake_core::record::{NONE, Proposal, Step, flow};
+use raywake_core::record::{Least, NONE, Proposal, Step, flow};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::EXPECTATION;
 use raywake_tests::bench::Bench;
@@ -20,16 +20,16 @@ struct Round {
     matching: Vec<u16>,
     state: Vec<u32>,
     target_energy: Vec<u32>,
-    bound: Vec<u32>,
+    least: Vec<Least>,
 }
 
 impl Round {
-    /// The first round of some columns: no flow yet, nobody at any target, the bounds unknown.
+    /// The first round of some columns: no flow yet, nobody at any target, what they can pay unknown.
     fn first(step: Step, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
         let columns = (step.side * step.side) as usize;
         Round {
             matching: (0..foreground.len() * ROW).map(|_| cost()).collect(),
-            bound: vec![POISON; foreground.len()],
+            least: vec![[NONE; 2]; foreground.len()],
             foreground,
             step,
             state: vec![0; columns],
@@ -37,7 +37,7 @@ impl Round {
         }
     }
 
-    /// Both, compared. Keeps the bounds, as later rounds need them, and returns the proposals.
+    /// Both, compared. Keeps what they can pay at least, as later rounds need them, and returns the proposals.
     fn check(&mut self, case: &str) -> Vec<Proposal> {
         let count = self.foreground.len();
         let mut proposal = vec![[POISON; 2]; count];
@@ -52,7 +52,7 @@ impl Round {
             .buffer("matching", packed(&self.matching))
             .buffer("state", self.state.clone())
             .buffer("target_energy", self.target_energy.clone())
-            .buffer("bound", padded(&self.bound))
+            .buffer("least", padded(bytemuck::cast_slice(&self.least)))
             .buffer("proposal", padded(bytemuck::cast_slice(&proposal)))
             .threads(&EXPECTATION, count + 3);
         expectation(
@@ -61,13 +61,16 @@ impl Round {
             &self.matching,
             &self.state,
             &self.target_energy,
-            &mut self.bound,
+            &mut self.least,
             &mut proposal,
         );
         if let Some(outcome) = bench.run() {
-            let wanted = [padded(&self.bound), padded(bytemuck::cast_slice(&proposal))];
+            let wanted = [
+                padded(bytemuck::cast_slice(&self.least)),
+                padded(bytemuck::cast_slice(&proposal)),
+            ];
             let case = format!("{case}, {count} columns, {:?}", self.step);
-            outcome.check(&case, &[("bound", &wanted[0]), ("proposal", &wanted[1])]);
+            outcome.check(&case, &[("least", &wanted[0]), ("proposal", &wanted[1])]);
         }
         proposal
     }

@@ -2,12 +2,13 @@
 //!
 //! Smoothing over `n` valid neighbours with displacements `s` collapses to
 //! `w_p (S2 + n |d|² - 2 d.S1)` with `S1`, `S2` the sums of `s` and `|s|²`. A column without valid
-//! neighbours looks at every displacement, and so learns the least it can pay anywhere. With
-//! neighbours, that bound plus the smoothing term, a paraboloid around their mean, excludes all but
+//! neighbours looks at every displacement, and so learns the least it can pay anywhere, and where:
+//! should it be without neighbours again, that displacement wins if it is feasible. With
+//! neighbours, that least plus the smoothing term, a paraboloid around their mean, excludes all but
 //! a few: rings around the rounded mean are visited until no farther ring can win or tie.
 
 use crate::params::{LINE, REACH, ROW};
-use crate::record::{Flow, NONE, Proposal, Step, VALID, flow, flow_displacement};
+use crate::record::{Flow, Least, NONE, Proposal, Step, VALID, flow, flow_displacement};
 use crate::window::outside_cost;
 
 /// Best found so far; ties go to the lower index in scan order.
@@ -17,15 +18,15 @@ struct Best {
 }
 
 /// Proposes a flow for every column of `foreground`. `matching` holds a row of
-/// [`ROW`] costs, `bound` and `proposal` one element per foreground column; `bound` is written
-/// in the first round, when no column has a valid neighbour.
+/// [`ROW`] costs, `least` and `proposal` one element per foreground column; `least` must start as
+/// [`NONE`] and is found in the first round, when no column has a valid neighbour.
 pub fn expectation(
     step: &Step,
     foreground: &[u32],
     matching: &[u16],
     state: &[Flow],
     target_energy: &[u32],
-    bound: &mut [u32],
+    least: &mut [Least],
     proposal: &mut [Proposal],
 ) {
     for (n, &column) in foreground.iter().enumerate() {
@@ -42,9 +43,15 @@ pub fn expectation(
         let outside = outside_cost(step, column as usize);
         let mut best = Best { energy: i32::MAX, index: i32::MAX };
         if around.count == 0 {
-            bound[n] = search.everywhere(outside, &mut best);
+            let [energy, index] = least[n];
+            if index != NONE {
+                search.consider(index as i32, energy as i32, &mut best);
+            }
+            if best.index == i32::MAX {
+                least[n] = search.everywhere(outside, &mut best);
+            }
         } else {
-            search.rings(outside, bound[n] as i32, &around, &mut best);
+            search.rings(outside, least[n][0] as i32, &around, &mut best);
         }
         proposal[n] = match best.index {
             i32::MAX => [0, NONE],
@@ -118,28 +125,31 @@ impl Search<'_> {
         (-REACH).max(-at)..=REACH.min(self.step.side - 1 - at)
     }
 
-    /// Every displacement, without smoothing. Returns the least energy, feasible or not.
-    fn everywhere(&self, outside: i32, best: &mut Best) -> u32 {
+    /// Every displacement, without smoothing. Returns the least energy, feasible or not, and where.
+    fn everywhere(&self, outside: i32, best: &mut Best) -> Least {
         let cost = self.step.displacement_cost;
-        let mut least = i32::MAX;
+        let mut least = [NONE; 2];
         for du in self.reach(self.i) {
             let line = (du + REACH) * LINE as i32 + REACH;
             let energy = |dv: i32| {
                 self.row[(line + dv) as usize] as i32 + cost * (du * du + dv * dv) + outside
             };
             let least_of_line = self.reach(self.j).map(energy).min().unwrap_or(i32::MAX);
-            least = least.min(least_of_line);
+            if (least_of_line as u32) < least[0] {
+                let first = self.reach(self.j).find(|dv| energy(*dv) == least_of_line);
+                least = [least_of_line as u32, (line + first.unwrap_or(0)) as u32];
+            }
             // A whole line above the best cannot win; candidates come in scan order, so neither
             // can one that only ties.
             if least_of_line < best.energy {
                 self.reach(self.j).for_each(|dv| self.consider(line + dv, energy(dv), best));
             }
         }
-        least as u32
+        least
     }
 
     /// Rings of growing distance around the mean of the neighbours' flows.
-    fn rings(&self, outside: i32, bound: i32, around: &Neighbours, best: &mut Best) {
+    fn rings(&self, outside: i32, least: i32, around: &Neighbours, best: &mut Best) {
         let (n, [su, sv], smoothing) = (around.count, around.sum, self.step.smoothing);
         let mean = [round_div(su, n), round_div(sv, n)];
         // |s - mean|² summed: what the smoothing costs at the mean itself, rounded down.
@@ -147,7 +157,7 @@ impl Search<'_> {
         for ring in 0..=2 * REACH {
             // On a ring some component lies at least ring - 1/2 from the mean.
             let near = (2 * ring - 1).max(0);
-            if bound.saturating_add(smoothing * (n * near * near / 4 + spread)) > best.energy {
+            if least.saturating_add(smoothing * (n * near * near / 4 + spread)) > best.energy {
                 break;
             }
             for du in -ring..=ring {

@@ -10,7 +10,7 @@ pub mod expectation;
 pub mod maximisation;
 
 use crate::params::FOREGROUND_MAX;
-use crate::record::{Flow, NONE, Proposal, Step};
+use crate::record::{Flow, Least, NONE, Proposal, Step};
 
 /// State of the minimisation between rounds. All slices but `state` and the two of the targets
 /// hold one element per foreground column; those hold one per column of the window.
@@ -23,8 +23,8 @@ pub struct Em<'a> {
     pub target_rank: &'a mut [u32],
     /// What each foreground column proposes in this round.
     pub proposal: &'a mut [Proposal],
-    /// Lower bound of what each foreground column can pay at any displacement.
-    pub bound: &'a mut [u32],
+    /// Least each foreground column can pay at any displacement, smoothing apart.
+    pub least: &'a mut [Least],
 }
 
 impl Em<'_> {
@@ -33,6 +33,7 @@ impl Em<'_> {
         assert!(foreground.len() <= FOREGROUND_MAX);
         self.state.fill(0);
         self.target_energy.fill(NONE);
+        self.least[..foreground.len()].fill([NONE; 2]);
         for _ in 0..rounds {
             expectation::expectation(
                 step,
@@ -40,7 +41,7 @@ impl Em<'_> {
                 matching,
                 self.state,
                 self.target_energy,
-                self.bound,
+                self.least,
                 self.proposal,
             );
             self.target_energy.fill(NONE);
@@ -151,13 +152,13 @@ mod tests {
             let columns = 37 * 37;
             let (mut flows, mut energy) = (vec![0; columns], vec![0; columns]);
             let (mut rank, mut proposal) = (vec![0; columns], vec![[0; 2]; foreground.len()]);
-            let mut bound = vec![0; foreground.len()];
+            let mut least = vec![[0; 2]; foreground.len()];
             let mut em = Em {
                 state: &mut flows,
                 target_energy: &mut energy,
                 target_rank: &mut rank,
                 proposal: &mut proposal,
-                bound: &mut bound,
+                least: &mut least,
             };
             for rounds in [1, 2, 6, 20] {
                 em.run(&step, rounds, &foreground, &matching);

@@ -63,7 +63,7 @@ impl Scalar {
             TargetEnergy,
             TargetRank,
             Proposal,
-            Bound,
+            Least,
         ];
         let [
             rays,
@@ -82,7 +82,7 @@ impl Scalar {
             target_energy,
             target_rank,
             proposal,
-            bound,
+            least,
         ] = self.buffers.get_disjoint_mut(order.map(|b| b as usize)).expect("distinct rows");
         let storage = Storage {
             filter_table: &self.tables.filter,
@@ -103,7 +103,7 @@ impl Scalar {
                 target_energy,
                 target_rank,
                 proposal: bytemuck::cast_slice_mut(proposal),
-                bound,
+                least: bytemuck::cast_slice_mut(least),
             },
         };
         let rays: &[Ray] = bytemuck::cast_slice(rays);

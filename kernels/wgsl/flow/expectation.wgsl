@@ -7,9 +7,9 @@ struct Words { d: array<u32> }
 @group(0) @binding(3) var<storage, read> matching: Words;
 @group(0) @binding(4) var<storage, read> state: Words;
 @group(0) @binding(5) var<storage, read> target_energy: Words;
-@group(0) @binding(6) var<storage, read_write> bound: Words;
-struct Proposals { d: array<vec2<u32>> }
-@group(0) @binding(7) var<storage, read_write> proposal: Proposals;
+struct Pairs { d: array<vec2<u32>> }
+@group(0) @binding(6) var<storage, read_write> least: Pairs;
+@group(0) @binding(7) var<storage, read_write> proposal: Pairs;
 
 struct Best { energy: i32, index: i32 }
 
@@ -45,22 +45,24 @@ fn outside_cost(i: i32, j: i32) -> i32 {
     return (9 - rows * lines) * params.outside_cost;
 }
 
-// Every displacement, without smoothing; also learns the least energy, feasible or not.
+// Every displacement, without smoothing; also learns the least energy, feasible or not, and where.
 fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    var least = I32_MAX;
+    var lowest = vec2<u32>(NONE);
     for (var index = 0; index < i32(ROW); index += 1) { // <= ROW
         let d = displacement(index);
         if d.y <= REACH && inside(i + d.x, j + d.y) {
             let square = d.x * d.x + d.y * d.y;
             let energy = cost_of(rank, index) + params.displacement_cost * square + outside;
-            least = min(least, energy);
+            if u32(energy) < lowest.x {
+                lowest = vec2<u32>(u32(energy), u32(index));
+            }
             if energy < best.energy {
                 best = consider(best, column, index, energy, own);
             }
         }
     }
-    bound.d[rank] = u32(least);
+    least.d[rank] = lowest;
     return best;
 }
 
@@ -74,7 +76,7 @@ fn round_div(a: i32, n: i32) -> i32 {
 // Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
 fn rings(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32, n: i32, s: vec2<i32>, squares: i32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    let floor_energy = i32(bound.d[rank]);
+    let floor_energy = i32(least.d[rank].x);
     let mean = vec2<i32>(round_div(s.x, n), round_div(s.y, n));
     let spread = (n * squares - s.x * s.x - s.y * s.y) / n;
     for (var ring = 0; ring <= 2 * REACH; ring += 1) { // <= 31
@@ -141,7 +143,14 @@ fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
     let outside = outside_cost(i, j);
     var best = Best(I32_MAX, I32_MAX);
     if count == 0 {
-        best = everywhere(rank, column, i, j, outside, own);
+        // Where it paid least before, it pays least again, if it may.
+        let known = least.d[rank];
+        if known.y != NONE {
+            best = consider(best, column, i32(known.y), i32(known.x), own);
+        }
+        if best.index == I32_MAX {
+            best = everywhere(rank, column, i, j, outside, own);
+        }
     } else {
         best = rings(rank, column, i, j, outside, own, count, sum, squares);
     }
