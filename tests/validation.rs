@@ -11,14 +11,15 @@ use raywake_tests::{vulkan, weights};
 use std::collections::BTreeMap;
 use std::process::Command;
 
-/// The pipeline over a few sweeps of the street.
+/// The pipeline over the street.
 fn check(profile: Profile, validation: Validation) {
     let Some(options) = vulkan::under(validation) else { return };
     let setup = Setup::new(profile, Some(weights::filter(50, 14, 100, 0)));
     let backend = setup.device(&options).expect("the device that has just been there");
     let mut drive = setup.drive(backend);
     let mut valid = 0;
-    for (now, before) in pairs(&street()[..3]) {
+    // Twice: twenty sweeps, and the reset between them.
+    for (now, before) in pairs(street()).chain(pairs(street())) {
         let points = before.map_or(&[][..], |b| &b.points);
         let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
         valid += stepped.flows.map_or(0, |flows| flows.valid);
@@ -73,7 +74,9 @@ fn kernels_are_valid() {
         let arguments = ["--target-env", "vulkan1.1"];
         let said = Command::new("spirv-val").args(arguments).arg(&path).output().expect("it runs");
         let text = String::from_utf8_lossy(&[said.stdout, said.stderr].concat()).into_owned();
-        assert!(said.status.success() || text.contains(KNOWN), "{name}: {text}");
+        let errors = text.lines().filter(|line| line.starts_with("error"));
+        let others = errors.filter(|line| !line.contains(KNOWN)).count();
+        assert!(said.status.success() || others == 0 && text.contains(KNOWN), "{name}: {text}");
     }
     let _ = std::fs::remove_dir_all(&folder);
 }

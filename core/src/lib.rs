@@ -6,6 +6,7 @@
 
 pub mod background_filter;
 pub mod compact;
+pub mod continuity;
 pub mod digest;
 pub mod flow;
 pub mod grid;

@@ -46,13 +46,22 @@ impl EgoMotion {
     /// Covariance (xx, xy, yy) from vehicle axes to world axes.
     pub fn turn_covariance(&self, c: [f32; 3]) -> [f32; 3] {
         let x = self.world_from_vehicle.col(0);
-        let (cos, sin) = (x.x as f32, x.y as f32);
-        [
-            cos * cos * c[0] - 2.0 * cos * sin * c[1] + sin * sin * c[2],
-            cos * sin * (c[0] - c[2]) + (cos * cos - sin * sin) * c[1],
-            sin * sin * c[0] + 2.0 * cos * sin * c[1] + cos * cos * c[2],
-        ]
+        turned_covariance(x.x as f32, x.y as f32, c)
     }
+}
+
+/// A velocity and its covariance (xx, xy, yy), turned by `angle` (rad).
+pub fn turn(angle: f32, [x, y]: [f32; 2], covariance: [f32; 3]) -> ([f32; 2], [f32; 3]) {
+    let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
+    ([cos * x - sin * y, sin * x + cos * y], turned_covariance(cos, sin, covariance))
+}
+
+fn turned_covariance(cos: f32, sin: f32, c: [f32; 3]) -> [f32; 3] {
+    [
+        cos * cos * c[0] - 2.0 * cos * sin * c[1] + sin * sin * c[2],
+        cos * sin * (c[0] - c[2]) + (cos * cos - sin * sin) * c[1],
+        sin * sin * c[0] + 2.0 * cos * sin * c[1] + cos * cos * c[2],
+    ]
 }
 
 #[cfg(test)]
@@ -76,5 +85,8 @@ mod tests {
         assert!(seen.iter().all(|v| v.abs() < 1e-5));
         let turned = ego.turn_covariance([4.0, 0.0, 1.0]);
         assert!((turned[0] - 1.0).abs() < 1e-5 && (turned[2] - 4.0).abs() < 1e-5);
+        let (v, c) = turn(core::f32::consts::FRAC_PI_2, [3.0, 1.0], [4.0, 0.0, 1.0]);
+        assert!((v[0] + 1.0).abs() < 1e-5 && (v[1] - 3.0).abs() < 1e-5);
+        assert!((c[0] - 1.0).abs() < 1e-5 && (c[2] - 4.0).abs() < 1e-5);
     }
 }

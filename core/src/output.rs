@@ -20,8 +20,8 @@ pub enum Origin {
 /// Flow of one solid column of the pair's first sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColumnFlow {
-    /// Index of the column in the lattice, counted from the world origin (`dissertation` preset:
-    /// from the sensor).
+    /// Index of the column in the lattice, whose cell (0, 0) lies at the vehicle in the first sweep
+    /// of the run (`dissertation` preset: in this sweep).
     pub cell: [i32; 2],
     /// Centre of the column in the world, m.
     pub position_world_m: [f64; 2],
@@ -77,7 +77,8 @@ pub struct TrackletState {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 2],
-    /// Covariance of (x, y, heading, speed, turn rate), row-major.
+    /// Covariance of the filter's (x, y, heading, speed, turn rate), row-major; under the
+    /// `dissertation` preset its motion is relative to the vehicle, along vehicle axes.
     pub covariance: [[f32; 5]; 5],
     /// Observations after birth.
     pub age: u32,

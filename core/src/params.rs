@@ -1,5 +1,6 @@
 //! Every number a human chooses: ceilings that size storage, then the tunables of a run.
 
+use crate::continuity::Limits;
 use heapless::String;
 
 /// Returns of one sweep; further ones, in the source's order, are dropped and counted.
@@ -128,10 +129,8 @@ pub struct Profile {
     pub outside_cost: u32,
     /// Tracklet filter.
     pub tracklet: TrackletParams,
-    /// Time between sweeps above which tracklets are dropped, s.
-    pub gap_s: f64,
-    /// Speed between poses above which tracklets are dropped, m/s.
-    pub jump_mps: f64,
+    /// Beyond these two sweeps make no pair, and tracklets are dropped.
+    pub limits: Limits,
 }
 
 /// Why a profile cannot run.
@@ -166,8 +165,7 @@ impl Profile {
                 gate_d2: 9.2103,
                 birth: Birth::Target,
             },
-            gap_s: 0.5,
-            jump_mps: 70.0,
+            limits: Limits::DEFAULT,
         }
     }
 
@@ -199,21 +197,8 @@ impl Profile {
 
     /// The sparse map: the sensor's whole range, in all directions.
     pub fn map() -> Profile {
-        // 334 voxels either way: 100 m at 0.30 m.
+        // 334 voxels either way: 100 m at 0.30 m; the keys of its voxels fit 31 bits.
         Profile { name: short("map"), side: 669, levels: 669, ..Profile::hdl64() }
-    }
-
-    /// Checks a profile of the sparse map, whose window is bounded by its 32-bit keys alone.
-    pub fn check_map(&self) -> Result<(), ProfileError> {
-        let fail = |field, must| Err(ProfileError { field, must });
-        if self.side.is_multiple_of(2) || self.levels.is_multiple_of(2) {
-            return fail("side", "odd, and levels odd");
-        }
-        let keys = (self.side as u64).pow(2) * self.levels as u64;
-        if keys >= 1 << 31 || self.side > 2 * EXTENT_VOXELS as u32 {
-            return fail("side", "such that the window has less than 2^31 voxels");
-        }
-        Profile { side: 167, levels: 14, ..self.clone() }.check()
     }
 
     /// The shipped profiles of the flow pipeline.
@@ -240,9 +225,9 @@ impl Profile {
 
     /// Checks every field against its range and the ceilings.
     pub fn check(&self) -> Result<(), ProfileError> {
-        let t = &self.tracklet;
+        let (t, l) = (&self.tracklet, &self.limits);
         let positive = |v: f32| v.is_finite() && v > 0.0;
-        let rules: [(bool, &'static str, &'static str); 17] = [
+        let rules: [(bool, &'static str, &'static str); 18] = [
             (self.side % 2 == 1 && self.side >= 31, "side", "odd and at least 31"),
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
@@ -261,8 +246,9 @@ impl Profile {
             (positive(t.turn_noise_radps2), "turn_noise_radps2", "above 0"),
             (positive(t.turn_birth_radps), "turn_birth_radps", "above 0"),
             (positive(t.gate_d2), "gate_d2", "above 0"),
-            (self.gap_s > 0.0 && self.gap_s <= 10.0, "gap_s", "above 0, at most 10"),
-            (self.jump_mps > 0.0 && self.jump_mps <= 1000.0, "jump_mps", "above 0, at most 1,000"),
+            (l.gap_s > 0.0 && l.gap_s <= 10.0, "gap_s", "above 0, at most 10"),
+            (l.jump_mps > 0.0 && l.jump_mps <= 1000.0, "jump_mps", "above 0, at most 1,000"),
+            (l.spin_radps > 0.0 && l.spin_radps <= 100.0, "spin_radps", "above 0, at most 100"),
             (!self.name.is_empty(), "name", "not empty"),
         ];
         match rules.iter().find(|r| !r.0) {
@@ -293,6 +279,7 @@ mod tests {
         assert_eq!(Profile::named("nosuch"), None);
         assert_eq!(Profile::hdl64().range_steps(), 334);
         assert_eq!(Profile::hdl64().voxels(), 390_446);
+        assert!(Profile::map().voxels() < 1 << 31);
     }
 
     #[test]

@@ -11,12 +11,13 @@
 
 use crate::background_filter::background_filter;
 use crate::compact::compact;
+use crate::continuity::Reset;
 use crate::flow::Em;
 use crate::grid::columns::columns;
 use crate::grid::ray_merge::ray_merge;
 use crate::grid::ray_trace::ray_trace;
 use crate::grid::shift::shift;
-use crate::motion_compensation::EgoMotion;
+use crate::motion_compensation::{EgoMotion, turn};
 use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
@@ -132,19 +133,6 @@ struct Side {
     twist: Twist,
     stamp_s: f64,
     points: usize,
-}
-
-/// Why tracklets were dropped and no flow was computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reset {
-    /// The first sweep.
-    First,
-    /// Time stood still or went backwards by this much, s.
-    Backwards(f64),
-    /// More time than the profile's `gap_s` passed, s.
-    Gap(f64),
-    /// The poses differ by more than the profile's `jump_mps`, m/s.
-    Jump(f64),
 }
 
 /// What [`Pipeline::prepare`] hands to perception.
@@ -283,7 +271,6 @@ impl Pipeline {
             displacement_cost: self.profile.displacement_cost as i32,
             outside_cost: self.profile.outside_cost as i32,
             score_min: self.scores.min,
-            score_count: self.scores.count,
             ..Step::default()
         };
         Prepared { step, dropped, reset }
@@ -294,16 +281,8 @@ impl Pipeline {
         let Some(before) = &self.before else {
             return Some(Reset::First);
         };
-        let dt = sweep.stamp_s - before.stamp_s;
-        if dt <= 0.0 || dt.is_nan() {
-            return Some(Reset::Backwards(dt));
-        }
-        if dt > self.profile.gap_s {
-            return Some(Reset::Gap(dt));
-        }
-        let moved = (sweep.world_from_vehicle.translation - before.pose.translation).length() / dt;
-        let jumped = moved > self.profile.jump_mps || moved.is_nan();
-        jumped.then_some(Reset::Jump(moved))
+        let dt_s = sweep.stamp_s - before.stamp_s;
+        self.profile.limits.broken(&before.pose, &sweep.world_from_vehicle, dt_s)
     }
 
     /// From the flow of columns to velocities: tracklets, motion compensation, columns and points.
@@ -318,17 +297,19 @@ impl Pipeline {
     ) -> Option<Flows<'o>> {
         let (before, current) = (self.before?, self.current?);
         let dt = current.stamp_s - before.stamp_s;
-        let turned = (before.pose.inverse() * current.pose).yaw_rad();
+        let moved = before.pose.inverse() * current.pose;
+        let turned = moved.yaw_rad() as f32;
         let turnover = self.tracklets.update(
             &self.profile,
             step,
             dt as f32,
-            turned as f32,
+            turned,
             perceived.foreground,
             perceived.state,
             &mut self.slot_of_source,
         );
-        let ego = EgoMotion::new(&before.pose, &before.twist);
+        // The odometry flow of the pair: the vehicle's motion from the one sweep to the other.
+        let ego = EgoMotion::new(&before.pose, &moved.twist(dt));
         let (count, valid) = self.flow_of_columns(
             step,
             perceived,
@@ -336,6 +317,7 @@ impl Pipeline {
             &current,
             &ego,
             dt as f32,
+            turned,
             output.columns,
         );
         self.flow_of_points(step, points, &ego, &output.columns[..count], output.points);
@@ -359,6 +341,7 @@ impl Pipeline {
         current: &Side,
         ego: &EgoMotion,
         dt: f32,
+        turned: f32,
         out: &mut [ColumnFlow],
     ) -> (usize, usize) {
         // The first sweep's vehicle in the second's window: the corners differ by whole cells.
@@ -392,7 +375,7 @@ impl Pipeline {
                     flow.origin = Origin::Matched;
                     flow.displacement_cells = flow_displacement(perceived.state[column]);
                     flow.energy = perceived.proposal[rank][1] as i32;
-                    self.set_velocity(&mut flow, rank, dt);
+                    self.set_velocity(&mut flow, rank, dt, turned);
                 }
             }
             let planar = DVec3::new(at.x, at.y, 0.0);
@@ -413,7 +396,7 @@ impl Pipeline {
 
     /// Velocity along the grid's axes of a matched column: its tracklet's, or, where the gate
     /// ended that, the raw flow's with the covariance of two measured positions.
-    fn set_velocity(&self, flow: &mut ColumnFlow, rank: usize, dt: f32) {
+    fn set_velocity(&self, flow: &mut ColumnFlow, rank: usize, dt: f32, turned: f32) {
         let r = self.profile.voxel_m as f32;
         let (velocity, covariance) = match self.slot_of_source[rank] {
             NONE => {
@@ -424,7 +407,12 @@ impl Pipeline {
             slot => {
                 let t = &self.tracklets.all()[slot as usize];
                 flow.age = t.age;
-                t.ekf.velocity()
+                let (velocity, covariance) = t.ekf.velocity();
+                match self.profile.frame {
+                    Frame::Lattice => (velocity, covariance),
+                    // The tracklet has gone over to the second sweep's axes.
+                    Frame::Sensor => turn(turned, velocity, covariance),
+                }
             }
         };
         flow.covariance = covariance;

@@ -47,7 +47,10 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
         Frame::Lattice => {
             let at = pose.transform(anchor);
             let origin = lattice_origin.unwrap_or(at);
-            let cell = ((at - origin) / r).to_array().map(|c| libm::floor(c + 0.5) as i32);
+            // A pose a world away saturates; its sweep is no continuation of any other.
+            let cell = ((at - origin) / r)
+                .to_array()
+                .map(|c| libm::floor(c + 0.5).clamp(-1e9, 1e9) as i32);
             let corner = [cell[0] - below[0], cell[1] - below[1], cell[2] - below[2]];
             Window {
                 grid_from_vehicle: Pose {
@@ -76,6 +79,38 @@ pub struct Dropped {
     pub unknown_sensor: u64,
     /// Returns on the own vehicle: their rays count as free space, without an end.
     pub own_vehicle: u64,
+}
+
+impl core::ops::AddAssign for Dropped {
+    fn add_assign(&mut self, more: Dropped) {
+        self.over_capacity += more.over_capacity;
+        self.not_finite += more.not_finite;
+        self.no_return += more.no_return;
+        self.too_far += more.too_far;
+        self.unknown_sensor += more.unknown_sensor;
+        self.own_vehicle += more.own_vehicle;
+    }
+}
+
+impl core::fmt::Display for Dropped {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        let kinds = [
+            (self.over_capacity, "over the capacity"),
+            (self.not_finite, "not finite"),
+            (self.no_return, "without an echo"),
+            (self.too_far, "too far"),
+            (self.unknown_sensor, "of an unknown sensor"),
+            (self.own_vehicle, "on the own vehicle"),
+        ];
+        let mut some = kinds.iter().filter(|(count, _)| *count > 0);
+        match some.next() {
+            None => write!(f, "nothing"),
+            Some((count, what)) => {
+                write!(f, "{count} {what}")?;
+                some.try_for_each(|(count, what)| write!(f, ", {count} {what}"))
+            }
+        }
+    }
 }
 
 /// Entries of the table from direction to slot.
@@ -257,6 +292,8 @@ fn place_origins(
     ids: &mut [[u32; SLOTS]; SENSORS_MAX],
 ) {
     assert!(origins.len() == ORIGINS_MAX);
+    // Looked up here, not in `origins`: that may be memory of a device, slow to read.
+    let mut table = [[0; 4]; ORIGINS_MAX];
     let mut count = 0;
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
@@ -264,17 +301,20 @@ fn place_origins(
             let moved =
                 if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
-            let v = (at / profile.voxel_m).to_array().map(|c| libm::floor(c + 0.5) as i32);
+            let v = (at / profile.voxel_m)
+                .to_array()
+                .map(|c| libm::floor(c + 0.5).clamp(-1e6, 1e6) as i32);
             let [x, y, z] = add(v, central(profile));
             let v = [x, y, z, 0];
-            let known = origins[..count].iter().position(|o| *o == v);
+            let known = table[..count].iter().position(|o| *o == v);
             *id = known.unwrap_or(count) as u32;
             if known.is_none() {
-                origins[count] = v;
+                table[count] = v;
                 count += 1;
             }
         }
     }
+    origins[..count].copy_from_slice(&table[..count]);
 }
 
 #[cfg(test)]

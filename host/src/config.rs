@@ -31,6 +31,7 @@ struct Keys {
     outside_cost: Option<u32>,
     gap_s: Option<f64>,
     jump_mps: Option<f64>,
+    spin_radps: Option<f64>,
     #[serde(default)]
     tracklet: TrackletKeys,
 }
@@ -83,8 +84,9 @@ impl Keys {
         set(&mut p.smoothing, self.smoothing);
         set(&mut p.displacement_cost, self.displacement_cost);
         set(&mut p.outside_cost, self.outside_cost);
-        set(&mut p.gap_s, self.gap_s);
-        set(&mut p.jump_mps, self.jump_mps);
+        set(&mut p.limits.gap_s, self.gap_s);
+        set(&mut p.limits.jump_mps, self.jump_mps);
+        set(&mut p.limits.spin_radps, self.spin_radps);
         let (t, keys) = (&mut p.tracklet, self.tracklet);
         set(&mut t.measurement_cells, keys.measurement_cells);
         set(&mut t.speed_noise_mps2, keys.speed_noise_mps2);
@@ -214,14 +216,17 @@ mod tests {
     fn every_key() {
         let text = "base = \"wide\"\nname = \"mine\"\nside = 101\nlevels = 12\nvoxel_m = 0.4\n\
             range_m = 80\nframe = \"sensor\"\ndeskew = false\nem_rounds = 5\nsmoothing = 7\n\
-            displacement_cost = 8\noutside_cost = 9\ngap_s = 0.25\njump_mps = 33.0\n[tracklet]\n\
+            displacement_cost = 8\noutside_cost = 9\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
             measurement_cells = 0.75\nspeed_noise_mps2 = 2.0\nturn_noise_radps2 = 3.0\n\
             turn_birth_radps = 4.0\ngate_d2 = 5.0\nbirth = \"source\"\n";
         let p = parsed(text).unwrap();
         assert_eq!((p.name.as_str(), p.side, p.levels), ("mine", 101, 12));
         assert_eq!((p.voxel_m, p.range_m, p.frame, p.deskew), (0.4, 80.0, Frame::Sensor, false));
         assert_eq!((p.em_rounds, p.smoothing, p.displacement_cost, p.outside_cost), (5, 7, 8, 9));
-        assert_eq!((p.gap_s, p.jump_mps, p.tracklet.birth), (0.25, 33.0, Birth::Source));
+        assert_eq!(
+            (p.limits.gap_s, p.limits.jump_mps, p.tracklet.birth),
+            (0.25, 33.0, Birth::Source)
+        );
         let t = &p.tracklet;
         assert_eq!(
             (t.measurement_cells, t.speed_noise_mps2, t.turn_noise_radps2),

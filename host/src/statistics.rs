@@ -1,8 +1,9 @@
 //! What a run counts and times, sweep by sweep.
 
+use raywake_core::continuity::Reset;
 use raywake_core::digest::Digest;
 use raywake_core::output::TrackletState;
-use raywake_core::pipeline::{Flows, Reset};
+use raywake_core::pipeline::Flows;
 use raywake_core::prepare;
 use raywake_core::tracklet::Turnover;
 use serde::Serialize;
@@ -50,7 +51,7 @@ pub struct ResetAt {
     pub sweep: usize,
     /// Frame number or timestamp of the sweep.
     pub frame: u64,
-    /// `first`, `backwards`, `gap` or `jump`.
+    /// `first`, `backwards`, `gap`, `jump` or `spin`.
     pub reason: &'static str,
     /// The reason in words, with its value.
     pub text: String,
@@ -63,6 +64,7 @@ impl ResetAt {
             Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the sweep before")),
             Reset::Gap(dt) => ("gap", format!("gap of {dt:.3} s")),
             Reset::Jump(mps) => ("jump", format!("poses jump at {mps:.0} m/s")),
+            Reset::Spin(radps) => ("spin", format!("poses turn at {radps:.1} rad/s")),
         };
         ResetAt { sweep, frame, reason, text }
     }

@@ -185,6 +185,10 @@ fn replace(path: &Path, text: &str) -> Result<(), Error> {
 
 /// Creates the folder a summary will go to, so that a wrong path shows before the first sweep.
 pub fn make_room(path: &Option<PathBuf>) -> Result<(), Error> {
+    // That of an earlier run would vouch for this one, should this one fail.
+    if let Some(old) = path.as_deref().filter(|p| p.is_file()) {
+        std::fs::remove_file(old).map_err(Error::writing(old))?;
+    }
     match path.as_deref().and_then(Path::parent) {
         Some(folder) if !folder.as_os_str().is_empty() => atomic::create_folder(folder),
         _ => Ok(()),

@@ -178,6 +178,58 @@ fn gaps_and_jumps() {
     assert_eq!(s["pairs"], 6);
 }
 
+/// The vehicle does not move at the speed of a jump, neither in its own sweep nor in the next pair.
+#[test]
+fn after_a_jump_all_is_as_before() {
+    let t = Temp::new();
+    t.drive(9);
+    let figures = |t: &Temp| {
+        let json = t.path().join("s.json");
+        let o =
+            run(t, &["--sweeps", "4..9", "--filter", "none", "--summary", json.to_str().unwrap()]);
+        o.succeeded();
+        let s = o.summary(&json);
+        assert!(s["valid_flows"].as_u64().unwrap() > 0, "{s}");
+        (s["distinct_rays"].clone(), s["solid_columns"].clone(), s["valid_flows"].clone())
+    };
+    let rows = |jump: f64| {
+        let place = |n: usize| n as f64 * 0.5 + if n < 4 { 0.0 } else { jump };
+        (0..9).map(|n| common::row(place(n))).collect::<String>()
+    };
+    t.write("drive/poses.txt", rows(0.0));
+    let wanted = figures(&t);
+    t.write("drive/poses.txt", rows(120.0));
+    assert_eq!(figures(&t), wanted);
+}
+
+#[test]
+fn poses_that_flip_reset_the_tracklets() {
+    let t = Temp::new();
+    t.drive(5);
+    let row = |n: usize| match n {
+        0..3 => common::row(n as f64 * 0.5),
+        _ => format!("0 -1 0 {} 1 0 0 0 0 0 1 0\n", n as f64 * 0.5),
+    };
+    t.write("drive/poses.txt", (0..5).map(row).collect::<String>());
+    let o = run(&t, &[]);
+    o.succeeded();
+    assert!(o.stdout.contains("sweep 3 (frame 3): poses turn at 15.7 rad/s"), "{}", o.stdout);
+}
+
+#[test]
+fn absurd_files_are_refused() {
+    let t = Temp::new();
+    t.drive(3);
+    t.write("drive/poses.txt", [0.0, 0.5, 1e300].map(common::row).concat());
+    let o = run(&t, &[]);
+    o.failed(3, &["poses.txt, line 3", "from the first pose"]);
+    t.write("drive/poses.txt", [0.0, 0.5, 1.0].map(common::row).concat());
+    let cloud = t.path().join("drive/velodyne_points/data/0000000001.bin");
+    std::fs::File::create(&cloud).unwrap().set_len(1 << 40).unwrap();
+    let o = run(&t, &[]);
+    o.failed(3, &["0000000001.bin", "bytes are more than any sweep has"]);
+}
+
 #[test]
 fn an_interrupt_ends_the_run_in_order() {
     let t = Temp::new();

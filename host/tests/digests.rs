@@ -128,7 +128,7 @@ fn map_digest(t: &Temp, way: Way) -> String {
     command.arg("--out").arg(t.path().join("map")).args(["-n", "2"]);
     let outcome = Outcome::of(command.output().unwrap());
     outcome.succeeded();
-    let digest = outcome.stdout.lines().find_map(|line| line.strip_prefix("digest "));
+    let digest = outcome.stdout.lines().find_map(|line| line.strip_prefix("digest     "));
     digest.unwrap_or_else(|| panic!("{}", outcome.stdout)).to_string()
 }
 
@@ -184,5 +184,32 @@ fn other_builds() {
             let way = Way::Vulkan(THREADS_AT, None);
             assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");
         }
+    }
+}
+
+/// A whole recorded drive: equal digests, flow in every pair, nothing allocated.
+#[test]
+#[ignore = "needs RAYWAKE_DATA"]
+fn a_recorded_drive() {
+    let data = PathBuf::from(env::var_os("RAYWAKE_DATA").expect("RAYWAKE_DATA"));
+    let data = data.join("kitti_raw_0005");
+    let t = Temp::new();
+    for more in [&[][..], &["--filter", "none"]] {
+        let mut digests = Vec::new();
+        let mut ways = vec![Way::Scalar];
+        ways.extend(vulkan(own()).then_some(Way::Vulkan(THREADS_AT, None)));
+        for way in ways {
+            let file = t.path().join("summary.json");
+            let mut command = way.command(own(), "run", &data);
+            command.args(["--quiet", "--summary"]).arg(&file).args(more);
+            let outcome = Outcome::of(command.output().unwrap());
+            outcome.succeeded();
+            let s = outcome.summary(&file);
+            assert!(s["sweeps"] == 154 && s["allocations_after_seal"] == 0, "{s}");
+            assert!(s["device_bytes"].as_u64().unwrap() <= DEVICE_BYTES, "{s}");
+            assert!(s["valid_flows_per_sweep"].as_f64().unwrap() >= 1000.0, "{s}");
+            digests.push(s["digest"].to_string());
+        }
+        assert!(digests.iter().all(|d| *d == digests[0]), "{more:?}: {digests:?}");
     }
 }

@@ -14,23 +14,25 @@ fn run(profile: &Profile, filter: Option<String>, sweeps: usize) -> Vec<Stages> 
     pairs(&street()[..sweeps]).map(|(now, before)| side.step(now, before)).collect()
 }
 
-/// `-v - w x p`.
-fn odometry(sweep: &SimSweep, at: DVec3) -> DVec3 {
-    -sweep.twist.linear - sweep.twist.angular.cross(at)
+/// `-v - w x p` with the motion from the one sweep to the next.
+fn odometry(sweep: &SimSweep, next: &SimSweep, at: DVec3) -> DVec3 {
+    let moved = sweep.world_from_vehicle.inverse() * next.world_from_vehicle;
+    let twist = moved.twist(next.stamp_s - sweep.stamp_s);
+    -twist.linear - twist.angular.cross(at)
 }
 
-fn check_odometry(sweep: &SimSweep, stages: &Stages) {
+fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
     for c in &stages.columns {
         assert_eq!((c.origin, c.age), (Origin::Background, 0));
         assert_eq!((c.velocity_world_mps, c.covariance), ([0.0; 2], [0.0; 3]));
         let [x, y] = c.position_vehicle_m.map(f64::from);
-        let wanted = odometry(sweep, DVec3::new(x, y, 0.0));
+        let wanted = odometry(sweep, next, DVec3::new(x, y, 0.0));
         let [u, v] = c.velocity_ego_mps.map(f64::from);
         assert!((wanted.x - u).abs() < 1e-4 && (wanted.y - v).abs() < 1e-4, "{c:?}: {wanted}");
     }
     for (p, flow) in sweep.points.iter().zip(&stages.points) {
         assert_eq!((flow.origin, flow.velocity_world_mps), (Origin::Background, [0.0; 2]));
-        let wanted = odometry(sweep, DVec3::from_array(p.position.map(f64::from)));
+        let wanted = odometry(sweep, next, DVec3::from_array(p.position.map(f64::from)));
         let off = wanted - DVec3::from_array(flow.velocity_ego_mps.map(f64::from));
         assert!(off.length() < 1e-4, "{flow:?}: {wanted}");
     }
@@ -40,11 +42,12 @@ fn check_odometry(sweep: &SimSweep, stages: &Stages) {
 fn where_nothing_may_move_all_flow_is_odometry() {
     for profile in [Profile::hdl64(), Profile::dissertation()] {
         let all = run(&profile, Some(weights::closed_filter(14)), 4);
-        for (before, stages) in street().iter().zip(&all[1..]) {
+        for (pair, stages) in street().windows(2).zip(&all[1..]) {
+            let [before, next] = pair else { unreachable!("pairs") };
             assert!(before.twist.linear.length() > 4.0, "the vehicle moves");
             assert!(stages.columns.len() > 1000 && stages.points.len() == before.points.len());
             assert!(stages.tracklets.is_empty() && stages.words("compact").is_empty());
-            check_odometry(before, stages);
+            check_odometry(before, next, stages);
         }
         assert!(street()[3].twist.angular.length() > 0.3, "and turns");
     }

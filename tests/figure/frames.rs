@@ -65,3 +65,31 @@ fn posts_stand_still_in_either_frame() {
     // His filter starts a step late and so too fast: see `tracklet::ekf`.
     assert!(world.abs() < 2.0 && (ego - world + 8.0).abs() < 0.1, "{world} {ego}");
 }
+
+/// In the sensor's frame a tracklet goes over to the second sweep's axes; its column's velocity is
+/// told along those of the first, like the raw flow.
+#[test]
+fn columns_keep_the_axes_of_their_sweep_in_a_turn() {
+    let setup = Setup::new(Profile::dissertation(), Some(weights::tall_filter(14)));
+    let mut side = Side::new(&setup, setup.scalar());
+    let mut scene = Scene::empty();
+    for at in posts() {
+        let post = Shape::cylinder(0.25, 2.4);
+        scene.put(Class::Pole, post, Pose::planar(at.x, at.y, 1.2, 0.0), Surface::matt(0.6));
+    }
+    let path = Path::from(State { speed: 6.0, ..State::default() }).then(9.0, 0.0, 0.08);
+    let sweeps: Vec<SimSweep> = ideal(scene, path, 4).collect();
+    let mut born = 0;
+    for (now, before) in pairs(&sweeps) {
+        for c in side.step(now, before).columns {
+            // A tracklet just born has the velocity of its displacement, in the same axes.
+            if c.origin == Origin::Matched && c.age == 0 && c.displacement_cells != [0, 0] {
+                let raw = c.displacement_cells.map(|d| d as f32 * 3.0);
+                let off = (c.velocity_ego_mps[0] - raw[0]).hypot(c.velocity_ego_mps[1] - raw[1]);
+                assert!(off < 0.03, "{c:?}");
+                born += 1;
+            }
+        }
+    }
+    assert!(born > 20, "{born} columns");
+}

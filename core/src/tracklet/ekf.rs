@@ -66,6 +66,30 @@ impl Ekf {
         Ekf { mean, covariance: p }
     }
 
+    /// Whether every match since birth stayed in its cell. Then speed is zero and the heading, which
+    /// a polar state needs to let the speed grow, is unknown.
+    pub fn at_rest(&self) -> bool {
+        self.mean[3] == 0.0
+    }
+
+    /// What a tracklet at rest becomes with its first displacement, `elapsed` seconds after the
+    /// match before its birth: a tracklet born of that displacement over that time, or nothing if
+    /// it lies beyond the gate, which is the same in all directions here.
+    pub fn depart(
+        &self,
+        params: &TrackletParams,
+        voxel_m: f32,
+        moved: [f32; 2],
+        elapsed: f32,
+        dt: f32,
+    ) -> Option<Ekf> {
+        let p = &self.covariance;
+        let ahead = p[(0, 0)] + (2.0 * p[(0, 3)] + p[(3, 3)] * dt) * dt;
+        let d2 = (moved[0] * moved[0] + moved[1] * moved[1])
+            / (ahead + measurement_variance(params, voxel_m));
+        (d2 <= params.gate_d2).then(|| Ekf::birth(params, voxel_m, moved, elapsed))
+    }
+
     /// Prediction over `dt` seconds (3.16, 3.20, 3.21).
     pub fn predict(&mut self, params: &TrackletParams, dt: f32) {
         let [heading, speed, turn] = [self.mean[2], self.mean[3], self.mean[4]];
@@ -138,6 +162,10 @@ impl Ekf {
     pub fn velocity(&self) -> ([f32; 2], [f32; 3]) {
         let (sin, cos) = (libm::sinf(self.mean[2]), libm::cosf(self.mean[2]));
         let speed = self.mean[3];
+        if self.at_rest() {
+            // Any direction is as likely.
+            return ([0.0; 2], [self.covariance[(3, 3)], 0.0, self.covariance[(3, 3)]]);
+        }
         let (hh, hs, ss) =
             (self.covariance[(2, 2)], self.covariance[(2, 3)], self.covariance[(3, 3)]);
         // Rows of the Jacobian of (v cos h, v sin h) by (h, v).
@@ -268,6 +296,51 @@ mod tests {
             std::println!("{speed} m/s: mean normalised squared error {mean}");
             assert!((mean - 5.0).abs() <= band, "{speed} m/s: {mean}");
         }
+    }
+
+    /// Slow walkers, seen by the cell they are in, live and show their velocity whichever way they
+    /// go: starting at rest, a polar state must not prefer the x axis.
+    #[test]
+    fn slow_walkers_in_any_direction() {
+        use crate::tracklet::{Tracklet, observe};
+        let profile = Profile::hdl64();
+        for speed in [0.8f32, 1.5] {
+            let mut survived = [0; 4];
+            let mut errors = [const { Vec::new() }; 4];
+            for (way, direction) in
+                [[1.0f32, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]].iter().enumerate()
+            {
+                for phase in 0..30 {
+                    let at = |n: i32| {
+                        let along = (n as f32 * speed * DT + phase as f32 * 0.01) / 0.3;
+                        direction.map(|d| (d * along + 0.5).floor() as i32)
+                    };
+                    let moved = |n: i32| [0, 1].map(|a| (at(n + 1)[a] - at(n)[a]) as f32 * 0.3);
+                    let born = Ekf::birth(&profile.tracklet, 0.3, moved(0), DT);
+                    let mut t = Tracklet { ekf: born, age: 0, column: 0 };
+                    let mut alive = true;
+                    for n in 1..20 {
+                        alive = alive && observe(&mut t, &profile, 0.3, moved(n), DT);
+                        t.age += 1;
+                    }
+                    if alive {
+                        survived[way] += 1;
+                        let v = t.ekf.velocity().0;
+                        errors[way]
+                            .push((v[0] - direction[0] * speed).hypot(v[1] - direction[1] * speed));
+                    }
+                }
+            }
+            std::println!("{speed} m/s: {survived:?} of 30");
+            assert!(survived.iter().all(|s| *s >= 28), "{speed} m/s: {survived:?}");
+            for e in &mut errors {
+                e.sort_by(f32::total_cmp);
+                assert!(e[e.len() / 2] < 0.4, "{speed} m/s: {}", e[e.len() / 2]);
+            }
+        }
+        let rest = Ekf::birth(&profile.tracklet, 0.3, [0.0, 0.0], DT);
+        let (_, [xx, xy, yy]) = rest.velocity();
+        assert!(xx == yy && xx > 1.0 && xy == 0.0);
     }
 
     #[test]

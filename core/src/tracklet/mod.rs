@@ -7,7 +7,7 @@
 
 pub mod ekf;
 
-use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile};
+use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile};
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use ekf::Ekf;
 
@@ -35,6 +35,34 @@ pub struct Turnover {
     pub lost: u32,
     /// Ended because their cell left the window.
     pub left: u32,
+}
+
+/// Sweeps over which the first displacement of a tracklet at rest is taken to have happened, at
+/// most: what stood for long and starts is not slow.
+const DEPARTURE_SWEEPS: u32 = 10;
+
+/// Predicts and updates a tracklet with a displacement, and puts it into its new cell. Returns
+/// whether it passed the gate.
+pub(crate) fn observe(
+    t: &mut Tracklet,
+    profile: &Profile,
+    r: f32,
+    moved: [f32; 2],
+    dt: f32,
+) -> bool {
+    let params = &profile.tracklet;
+    if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
+        // From the sweep before its birth to this one.
+        let elapsed = dt * (t.age + 2).min(DEPARTURE_SWEEPS) as f32;
+        let departed = t.ekf.depart(params, r, moved, elapsed, dt);
+        t.ekf = departed.unwrap_or(t.ekf);
+        return departed.is_some();
+    }
+    t.ekf.predict(params, dt);
+    let passed = t.ekf.update(params, r, moved);
+    t.ekf.mean[0] -= moved[0];
+    t.ekf.mean[1] -= moved[1];
+    passed
 }
 
 /// All tracklets: fixed capacity, one per foreground column at most.
@@ -102,14 +130,11 @@ impl Tracklets {
                 (Ekf::birth(&profile.tracklet, r, moved, dt), 0)
             } else {
                 let mut t = self.now[known as usize];
-                t.ekf.predict(&profile.tracklet, dt);
-                if !t.ekf.update(&profile.tracklet, r, moved) {
+                if !observe(&mut t, profile, r, moved, dt) {
                     turnover.gated += 1;
                     continue;
                 }
                 turnover.updated += 1;
-                t.ekf.mean[0] -= moved[0];
-                t.ekf.mean[1] -= moved[1];
                 (t.ekf, t.age + 1)
             };
             if profile.frame == Frame::Sensor {

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
+use raywake_core::prepare::Dropped;
 
 use super::{MapBackend, Mapped, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
@@ -46,6 +47,7 @@ pub fn map(args: &args::Map) -> Result<bool, Error> {
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
     let (mut sweep, mut voxels) = (SweepData::default(), Voxels::default());
     let (mut digest, mut times, mut count) = (Digest::default(), Vec::new(), 0);
+    let mut left_out = Dropped::default();
     let mut progress = Progress::new(sweeps.len(), args.quiet);
     for (done, index) in sweeps.clone().enumerate() {
         if interrupted() {
@@ -56,6 +58,7 @@ pub fn map(args: &args::Map) -> Result<bool, Error> {
         let clock = Instant::now();
         let mut found = Vec::new();
         let mapped = mapper.map(&sweep.sweep(), &mut |band| found.extend_from_slice(band))?;
+        left_out += mapped.dropped;
         times.push(clock.elapsed().as_secs_f64() * 1e3);
         found.iter().flatten().for_each(|word| digest.word(*word));
         voxels.set(&mapper, &mapped, &found);
@@ -74,7 +77,8 @@ pub fn map(args: &args::Map) -> Result<bool, Error> {
         let mean = count / times.len();
         let text = format!(
             "{} sweeps, {mean} voxels a sweep; {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max a map\n\
-             digest {:016x}\n",
+             left out   {left_out}\n\
+             digest     {:016x}\n",
             times.len(),
             t.median,
             t.sd,

@@ -56,6 +56,7 @@ impl DeviceMap {
             }
             executor.run(BAND)?;
             let voxels = executor.readback(row(MapBuffer::RunsOut))[TILE] as usize;
+            let voxels = voxels.min(BAND_UPDATES);
             let words = executor.readback(row(MapBuffer::VoxelsOut));
             put(&bytemuck::cast_slice(words)[..voxels]);
             Ok(true)

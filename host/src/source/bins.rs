@@ -68,6 +68,9 @@ impl Source for Bins {
     }
 }
 
+/// Largest file that is read: 16 million returns, a hundred times what a sweep has.
+const SIZE_MAX: u64 = 256 << 20;
+
 /// Replaces `points` by the returns of a `.bin` file; an empty file has none.
 ///
 /// Fails, leaving no points, where the file cannot be read or ends within a return.
@@ -75,7 +78,11 @@ pub(super) fn read_bin(path: &Path, points: &mut Vec<Point>) -> Result<(), Error
     points.clear();
     let mut file = File::open(path).map_err(Error::reading(path))?;
     let size = file.metadata().map_err(Error::reading(path))?.len();
-    points.reserve(usize::try_from(size / RETURN as u64).unwrap_or(0));
+    if size > SIZE_MAX {
+        let what = format!("{size} bytes are more than any sweep has ({SIZE_MAX} at most)");
+        return Err(Error::input(path, "", what));
+    }
+    points.reserve((size / RETURN as u64) as usize);
     let mut chunk = vec![0; CHUNK];
     let mut total = 0;
     loop {

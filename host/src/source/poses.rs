@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use raywake_core::continuity::Limits;
 use raywake_core::pose::{Pose, PoseError, Twist};
 
 use super::text;
@@ -11,6 +12,9 @@ use crate::error::Error;
 
 /// Interval between sweeps that is assumed where a source has no times, s.
 pub(super) const INTERVAL_S: f64 = 0.1;
+
+/// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
+const REACH_MAX_M: f64 = 1e6;
 
 /// Stamp (s) and pose of every sweep of a source.
 #[derive(Clone, Debug, Default)]
@@ -21,12 +25,18 @@ pub(super) struct Track {
 
 impl Track {
     /// Velocity at sweep `i`, in the vehicle frame at its stamp: what leads from the sweep before
-    /// it to it. The first sweep looks ahead; a single one stands still.
+    /// it to it, or from it to the next where that is no motion, as on the first sweep or after a
+    /// jump. Between two of those it stands still.
     pub fn twist(&self, i: usize) -> Twist {
-        if self.poses.len() < 2 {
-            return Twist::ZERO;
-        }
-        let other = if i == 0 { 1 } else { i - 1 };
+        let steady = |a: usize, b: usize| {
+            let dt_s = self.stamps_s[b] - self.stamps_s[a];
+            Limits::DEFAULT.broken(&self.poses[a], &self.poses[b], dt_s).is_none()
+        };
+        let other = match i {
+            _ if i > 0 && steady(i - 1, i) => i - 1,
+            _ if i + 1 < self.poses.len() && steady(i, i + 1) => i + 1,
+            _ => return Twist::ZERO,
+        };
         // Seen from sweep i, so that the result is along the axes it has at its own stamp.
         let here_from_other = self.poses[i].inverse() * self.poses[other];
         here_from_other.twist(self.stamps_s[other] - self.stamps_s[i])
@@ -70,13 +80,20 @@ pub(super) fn pose_from(rows: &[f64; 12], path: &Path, place: String) -> Result<
 
 /// The rows of a `poses.txt`, one per sweep.
 ///
-/// Fails where a line is no pose, or where there are more or fewer rows than `sweeps`.
+/// Fails where a line is no pose, where one lies beyond any drive's reach, or where there are more or fewer rows than `sweeps`.
 pub(super) fn read_rows(path: &Path, sweeps: usize) -> Result<Vec<Pose>, Error> {
     let text = text::read(path)?;
     let mut poses = Vec::with_capacity(sweeps);
     for (line, content) in text::lines(&text) {
         let rows = text::exactly(path, line, content)?;
-        poses.push(pose_from(&rows, path, format!("line {line}"))?);
+        let pose = pose_from(&rows, path, format!("line {line}"))?;
+        let first = poses.first().unwrap_or(&pose);
+        let away_m = (pose.translation - first.translation).length();
+        if away_m > REACH_MAX_M {
+            let what = format!("{away_m:.3e} m from the first pose, more than {REACH_MAX_M:.0e} m");
+            return Err(Error::input(path, format!("line {line}"), what));
+        }
+        poses.push(pose);
     }
     if poses.len() != sweeps {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

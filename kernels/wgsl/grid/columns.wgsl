@@ -1,5 +1,4 @@
-// Log-odds to column masks, and the masks of the sweep before moved into the new window.
-// Twin: core/src/grid/columns.rs
+// Log-odds to column masks. Twin: core/src/grid/columns.rs
 @group(0) @binding(0) var<storage, read> params: Step;
 struct LogOdds { d: array<i32> }
 @group(0) @binding(1) var<storage, read> log_odds: LogOdds;
