@@ -92,24 +92,17 @@ impl core::ops::AddAssign for Dropped {
     }
 }
 
-impl core::fmt::Display for Dropped {
-    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
-        let kinds = [
-            (self.over_capacity, "over the capacity"),
-            (self.not_finite, "not finite"),
-            (self.no_return, "without an echo"),
-            (self.too_far, "too far"),
-            (self.unknown_sensor, "of an unknown sensor"),
-            (self.own_vehicle, "on the own vehicle"),
-        ];
-        let mut some = kinds.iter().filter(|(count, _)| *count > 0);
-        match some.next() {
-            None => write!(f, "nothing"),
-            Some((count, what)) => {
-                write!(f, "{count} {what}")?;
-                some.try_for_each(|(count, what)| write!(f, ", {count} {what}"))
-            }
-        }
+impl Dropped {
+    /// Every count with the name of its field and a name for people.
+    pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
+        [
+            ("over_capacity", "over the capacity", self.over_capacity),
+            ("not_finite", "not finite", self.not_finite),
+            ("no_return", "without an echo", self.no_return),
+            ("too_far", "too far", self.too_far),
+            ("unknown_sensor", "of an unknown sensor", self.unknown_sensor),
+            ("own_vehicle", "on the own vehicle", self.own_vehicle),
+        ]
     }
 }
 

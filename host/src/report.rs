@@ -84,21 +84,7 @@ fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
 }
 
 fn left_out(out: &mut String, s: &Summary) -> std::fmt::Result {
-    let d = &s.dropped;
-    let kinds = [
-        (d.over_capacity, "returns over capacity"),
-        (d.not_finite, "not finite"),
-        (d.no_return, "without an echo"),
-        (d.too_far, "too far"),
-        (d.unknown_sensor, "of an unknown sensor"),
-        (d.own_vehicle, "on the own vehicle"),
-        (d.null_rows, "null rows"),
-        (d.missing_sweeps, "sweeps missing"),
-        (d.foreground, "foreground columns over capacity"),
-    ];
-    let some = kinds.iter().filter(|k| k.0 > 0).map(|(n, what)| format!("{n} {what}"));
-    let some = some.collect::<Vec<_>>().join(", ");
-    writeln!(out, "left out   {}", if some.is_empty() { "nothing" } else { &some })?;
+    writeln!(out, "left out   {}", s.dropped)?;
     for (n, reset) in s.resets.iter().enumerate() {
         let label = if n == 0 { "resets" } else { "" };
         writeln!(out, "{label:10} sweep {} (frame {}): {}", reset.sweep, reset.frame, reset.text)?;

@@ -1,12 +1,14 @@
 //! What a run counts and times, sweep by sweep.
 
+use std::fmt;
+
 use raywake_core::continuity::Reset;
 use raywake_core::digest::Digest;
 use raywake_core::output::TrackletState;
 use raywake_core::pipeline::Flows;
 use raywake_core::prepare;
 use raywake_core::tracklet::Turnover;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::drive::Stepped;
 use crate::laps::Laps;
@@ -71,20 +73,10 @@ impl ResetAt {
 }
 
 /// Left out, and why. Counts over all sweeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// Returns beyond the capacity for points.
-    pub over_capacity: u64,
-    /// Returns with a NaN or an infinity.
-    pub not_finite: u64,
-    /// Returns at exactly (0, 0, 0).
-    pub no_return: u64,
-    /// Returns beyond the extent of the ray coordinates.
-    pub too_far: u64,
-    /// Returns of a sensor the rig does not have.
-    pub unknown_sensor: u64,
-    /// Returns on the own vehicle: free space without an end.
-    pub own_vehicle: u64,
+    /// Returns left out by preparation.
+    pub returns: prepare::Dropped,
     /// Rows without a coordinate in the source's files.
     pub null_rows: u64,
     /// Sweeps the source's frame numbers say are missing.
@@ -94,14 +86,27 @@ pub struct Dropped {
 }
 
 impl Dropped {
-    fn add(&mut self, data: &SweepData, d: &prepare::Dropped) {
-        self.over_capacity += d.over_capacity;
-        self.not_finite += d.not_finite;
-        self.no_return += d.no_return;
-        self.too_far += d.too_far;
-        self.unknown_sensor += d.unknown_sensor;
-        self.own_vehicle += d.own_vehicle;
-        self.null_rows += u64::from(data.dropped.null_rows);
+    /// Every count with its key and a name for people.
+    pub fn counts(&self) -> impl Iterator<Item = (&'static str, &'static str, u64)> {
+        self.returns.counts().into_iter().chain([
+            ("null_rows", "null rows", self.null_rows),
+            ("missing_sweeps", "sweeps missing", self.missing_sweeps),
+            ("foreground", "foreground columns over the capacity", self.foreground),
+        ])
+    }
+}
+
+impl Serialize for Dropped {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.counts().map(|(key, _, count)| (key, count)))
+    }
+}
+
+impl fmt::Display for Dropped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let some = self.counts().filter(|c| c.2 > 0).map(|(_, what, n)| format!("{n} {what}"));
+        let some = some.collect::<Vec<_>>().join(", ");
+        f.write_str(if some.is_empty() { "nothing" } else { &some })
     }
 }
 
@@ -185,7 +190,8 @@ pub struct Statistics {
 impl Statistics {
     /// Counts a sweep; its columns go to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
-        self.dropped.add(data, &stepped.prepared.dropped);
+        self.dropped.returns += stepped.prepared.dropped;
+        self.dropped.null_rows += u64::from(data.dropped.null_rows);
         if self.sweeps > 0 {
             self.dropped.missing_sweeps += data.dropped.sweeps_before;
         }

@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
-use raywake_core::prepare::Dropped;
 
 use super::{MapBackend, Mapped, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
@@ -15,7 +14,7 @@ use crate::progress::Progress;
 use crate::report::bytes;
 use crate::sink::{atomic, feather};
 use crate::source::{self, SweepData};
-use crate::statistics::Spread;
+use crate::statistics::{Dropped, Spread};
 
 /// Voxels of one sweep, in columns as the file has them.
 #[derive(Default)]
@@ -58,7 +57,8 @@ pub fn map(args: &args::Map) -> Result<bool, Error> {
         let clock = Instant::now();
         let mut found = Vec::new();
         let mapped = mapper.map(&sweep.sweep(), &mut |band| found.extend_from_slice(band))?;
-        left_out += mapped.dropped;
+        left_out.returns += mapped.dropped;
+        left_out.null_rows += u64::from(sweep.dropped.null_rows);
         times.push(clock.elapsed().as_secs_f64() * 1e3);
         found.iter().flatten().for_each(|word| digest.word(*word));
         voxels.set(&mapper, &mapped, &found);
