@@ -169,9 +169,10 @@ pub struct Results {
     /// Folder for `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Bird's-eye pictures too
-    #[arg(long, requires = "out")]
-    pub png: bool,
+    /// Bird's-eye pictures too, with the flow over ground or as the moving vehicle sees it
+    #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
+    #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
+    pub png: Option<PictureFrame>,
     /// No files of single returns
     #[arg(long)]
     pub no_points: bool,
@@ -181,6 +182,15 @@ pub struct Results {
     /// Figures of the run as JSON; with --out they go to DIR/summary.json otherwise
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
+}
+
+/// Velocities a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PictureFrame {
+    /// Over ground
+    World,
+    /// Relative to the vehicle
+    Ego,
 }
 
 /// Formats of other programs.

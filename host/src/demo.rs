@@ -7,7 +7,7 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 use raywake_sim::Truth;
 
-use crate::args::{Demo, Learned};
+use crate::args::{Demo, Learned, PictureFrame};
 use crate::config::Weights;
 use crate::engine::{self, Plan, say};
 use crate::error::Error;
@@ -35,7 +35,7 @@ pub fn demo(args: &Demo) -> Result<Summary, Error> {
         kinds: Kinds {
             columns: cfg!(feature = "arrow"),
             points: false,
-            png: cfg!(feature = "png"),
+            png: cfg!(feature = "png").then_some(PictureFrame::World),
             argoverse: false,
         },
         summary: None,

@@ -17,7 +17,7 @@ use raywake_core::output::{PointFlow, TrackletState};
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 
-use crate::args::{Export, Results};
+use crate::args::{Export, PictureFrame, Results};
 use crate::error::Error;
 use crate::sink::{argoverse, atomic, feather, picture};
 use crate::source::SweepData;
@@ -30,7 +30,7 @@ pub struct Kinds {
     /// Feather files of returns.
     pub points: bool,
     /// Pictures.
-    pub png: bool,
+    pub png: Option<PictureFrame>,
     /// Submission files of Argoverse 2.
     pub argoverse: bool,
 }
@@ -46,7 +46,7 @@ struct Folders {
     columns: Option<PathBuf>,
     tracklets: Option<PathBuf>,
     points: Option<PathBuf>,
-    png: Option<PathBuf>,
+    png: Option<(PathBuf, PictureFrame)>,
     argoverse: Option<PathBuf>,
 }
 
@@ -65,7 +65,7 @@ impl Kinds {
     fn check(&self) -> Result<(), Error> {
         let needs = [
             (self.columns || self.points || self.argoverse, cfg!(feature = "arrow"), "arrow"),
-            (self.png, cfg!(feature = "png"), "png"),
+            (self.png.is_some(), cfg!(feature = "png"), "png"),
         ];
         match needs.iter().find(|(wanted, there, _)| *wanted && !there) {
             Some((_, _, name)) => {
@@ -102,9 +102,12 @@ impl Outputs {
             let points = &first.points[..flows.points.len().min(first.points.len())];
             feather::write_points(&named(folder, first, "feather"), points, flows.points, &meta)?;
         }
-        if let Some(folder) = &folders.png {
+        if let Some((folder, frame)) = &folders.png {
             let yaw = first.world_from_vehicle.yaw_rad();
-            let velocity = picture::Velocity::World { vehicle_yaw_rad: yaw };
+            let velocity = match frame {
+                PictureFrame::World => picture::Velocity::World { vehicle_yaw_rad: yaw },
+                PictureFrame::Ego => picture::Velocity::Ego,
+            };
             let half = self.half_extent_m;
             let rgb = picture::birdseye(&first.points, flows.columns, half, velocity);
             picture::write_png(&named(folder, first, "png"), &rgb)?;
@@ -148,7 +151,7 @@ impl Folders {
             columns: folder("columns", kinds.columns)?,
             tracklets: folder("tracklets", kinds.columns)?,
             points: folder("points", kinds.points)?,
-            png: folder("png", kinds.png)?,
+            png: folder("png", kinds.png.is_some())?.zip(kinds.png),
             argoverse: folder("argoverse", kinds.argoverse)?,
         })
     }

@@ -152,8 +152,10 @@ fn nothing_seen() {
     }
     let json = t.path().join("s.json");
     let out = t.path().join("out");
-    let o =
-        run(&t, &["--summary", json.to_str().unwrap(), "--out", out.to_str().unwrap(), "--png"]);
+    let o = run(
+        &t,
+        &["--summary", json.to_str().unwrap(), "--out", out.to_str().unwrap(), "--png=ego"],
+    );
     o.succeeded();
     let s = o.summary(&json);
     assert_eq!((&s["points"], &s["valid_flows"], &s["pairs"]), (&0.0.into(), &0.into(), &2.into()));

@@ -17,6 +17,10 @@ const ARROW_S: f32 = 0.5;
 /// Slower columns are dots, m/s.
 const SLOW_MPS: f32 = 0.5;
 
+/// Observations below which a tracklet is not drawn, as in the author's viewer: most false matches
+/// end before.
+const AGE_MIN: u32 = 3;
+
 /// Heights above ground from the palest to the darkest returns, m.
 const HEIGHT_SPAN_M: f32 = 2.5;
 
@@ -44,8 +48,8 @@ pub enum Velocity {
     Ego,
 }
 
-/// Draws returns coloured by height and the flow of matched foreground columns as arrows as long as
-/// the way in half a second, dots below 0.5 m/s; the vehicle in the middle, forward up; circles
+/// Draws returns coloured by height and the flow of matched foreground columns, from the third
+/// observation on, as arrows as long as the way in half a second, dots below 0.5 m/s; the vehicle in the middle, forward up; circles
 /// every 20 m and a scale of 10 m. Reaches `half_extent_m` to every side.
 ///
 /// Returns [`SIZE`] rows of [`SIZE`] pixels of red, green, blue.
@@ -150,7 +154,8 @@ fn draw_flow(canvas: &mut Canvas, view: &View, columns: &[ColumnFlow], velocity:
         let drawn = to.iter().all(|v| v.is_finite()) && view.sees(from, 0.0);
         drawn.then_some((from, to, v[0].hypot(v[1]) < SLOW_MPS))
     };
-    let matched = columns.iter().filter(|c| c.origin == Origin::Matched);
+    let old = |c: &&ColumnFlow| c.origin == Origin::Matched && c.age >= AGE_MIN;
+    let matched = columns.iter().filter(old);
     let arrows: Vec<_> = matched.filter_map(ends).collect();
     // All heads after all shafts: columns stand close, and shafts would cover their neighbours'
     // heads.

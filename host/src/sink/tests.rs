@@ -55,10 +55,13 @@ fn arrows_point_where_things_go() {
         velocity_world_mps: [10.0, 0.0],
         velocity_ego_mps: [0.0, -10.0],
         origin: Origin::Matched,
+        age: 3,
         ..ColumnFlow::default()
     };
+    // Too young to be drawn.
+    let young = ColumnFlow { position_vehicle_m: [-10.0, 0.0], age: 2, ..column };
     let red = |velocity| {
-        let rgb = picture::birdseye(&points, &[column], 30.0, velocity);
+        let rgb = picture::birdseye(&points, &[column, young], 30.0, velocity);
         assert_eq!(rgb.len(), 3 * picture::SIZE * picture::SIZE);
         let is_red = |p: &[u8]| p[0].saturating_sub(p[1]) > 40 && p[0] > p[2];
         let pixels = rgb.chunks_exact(3).enumerate().filter(|(_, p)| is_red(p));
@@ -88,6 +91,7 @@ fn pictures_bear_nonsense() {
     let column = |v| ColumnFlow {
         velocity_ego_mps: [v; 2],
         origin: Origin::Matched,
+        age: 9,
         ..ColumnFlow::default()
     };
     let columns = [column(f32::NAN), column(1e30), column(f32::INFINITY)];
