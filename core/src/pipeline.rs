@@ -22,7 +22,7 @@ use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
-use crate::prepare::{Dropped, Preparation, Window, central, place};
+use crate::prepare::{Dropped, Preparation, Window, central, place, step_of};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::sweep::{Point, Rig, Sweep};
 use crate::tracklet::{Tracklets, Turnover};
@@ -259,10 +259,6 @@ impl Pipeline {
             (None, _) => [side, 0, 0],
         };
         let step = Step {
-            side,
-            levels: self.profile.levels as i32,
-            rays: count as i32,
-            range_steps: self.profile.range_steps(),
             shift_x: shift[0],
             shift_y: shift[1],
             shift_z: shift[2],
@@ -271,7 +267,7 @@ impl Pipeline {
             displacement_cost: self.profile.displacement_cost as i32,
             outside_cost: self.profile.outside_cost as i32,
             score_min: self.scores.min,
-            ..Step::default()
+            ..step_of(&self.profile, count)
         };
         Prepared { step, dropped, reset }
     }

@@ -4,7 +4,7 @@ use crate::params::{
     ANCHOR_ABOVE_GROUND_M, EXTENT_VOXELS, Frame, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS,
 };
 use crate::pose::Pose;
-use crate::record::{NONE, Ray, ray};
+use crate::record::{NONE, Ray, Step, ray};
 use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
 use glam::DVec3;
 
@@ -61,6 +61,17 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
                 lattice_origin: origin,
             }
         }
+    }
+}
+
+/// What tracing `rays` rays through a profile's window needs to know.
+pub fn step_of(profile: &Profile, rays: usize) -> Step {
+    Step {
+        side: profile.side as i32,
+        levels: profile.levels as i32,
+        rays: rays as i32,
+        range_steps: profile.range_steps(),
+        ..Step::default()
     }
 }
 

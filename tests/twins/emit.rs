@@ -11,7 +11,7 @@ use raywake_kernels::kernel::{COUNT, EMIT};
 use raywake_tests::bench::Bench;
 use raywake_tests::random::Random;
 
-use super::{POISON, around, roomy, window};
+use super::{POISON, around, extremes, roomy, window};
 
 pub const KERNELS: &[&Kernel] = &[&COUNT, &EMIT];
 
@@ -151,18 +151,8 @@ fn the_window_of_the_map() {
 
 #[test]
 fn extreme_rays() {
-    let step = Step { range_steps: 2000, ..window(255, 16) };
-    let origins = [[127, 127, 8, 0], [-EXTENT_VOXELS, EXTENT_VOXELS, 0, 0]];
-    let e = EXTENT_VOXELS;
-    for (case, end, origin) in [
-        ("onto itself", [127, 127, 8], 0),
-        ("one step", [127, 128, 8], 0),
-        ("to a corner", [0, 0, 0], 0),
-        ("far", [e, -e, e], 0),
-        ("through everything", [e, -e, 15], 1),
-        ("too far by one", [127 + 2001, 127, 8], 0),
-        ("just in range", [127, 127 - 2000, 8], 0),
-    ] {
+    let (step, origins, ends) = extremes();
+    for (case, end, origin) in ends {
         for no_end in [false, true] {
             // The weight of all returns of a sweep in one ray.
             let ray = Distinct::of(vec![ray(end, origin, no_end)], || POINTS_MAX as u32);

@@ -15,7 +15,7 @@ mod sums;
 mod voxels;
 
 use raywake_core::layout::COUNTERS;
-use raywake_core::params::TILE;
+use raywake_core::params::{EXTENT_VOXELS, TILE};
 use raywake_core::record::{Column, Step};
 use raywake_gpu::Kernel;
 use raywake_tests::bench::Bench;
@@ -42,6 +42,24 @@ const COVERED: [&[&Kernel]; 11] = [
 /// Counts around the borders of a workgroup or tile.
 fn around(size: usize) -> [usize; 5] {
     [0, 1, size - 1, size, size + 1]
+}
+
+/// A window, ray origins, and the ends of rays that strain a walk: what each is, where it ends, and
+/// which origin it has.
+#[allow(clippy::type_complexity)]
+fn extremes() -> (Step, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7]) {
+    let step = Step { range_steps: 2000, ..window(255, 16) };
+    let e = EXTENT_VOXELS;
+    let ends = [
+        ("onto itself", [127, 127, 8], 0),
+        ("one step", [127, 128, 8], 0),
+        ("to a corner", [0, 0, 0], 0),
+        ("far", [e, -e, e], 0),
+        ("through everything", [e, -e, 15], 1),
+        ("too far by one", [127 + 2001, 127, 8], 0),
+        ("just in range", [127, 127 - 2000, 8], 0),
+    ];
+    (step, [[127, 127, 8, 0], [-e, e, 0, 0]], ends)
 }
 
 /// Columns as a buffer holds them.

@@ -11,7 +11,7 @@ use raywake_tests::bench::Bench;
 use raywake_tests::difference;
 use raywake_tests::random::Random;
 
-use super::{POISON, around, window};
+use super::{POISON, around, extremes, window};
 
 pub const KERNELS: &[&Kernel] = &[&RAY_MERGE, &RAY_TRACE];
 
@@ -186,18 +186,8 @@ fn traces_of_every_kind() {
 
 #[test]
 fn extreme_traces() {
-    let step = Step { range_steps: 2000, ..window(255, 16) };
-    let origins = [[127, 127, 8, 0], [-EXTENT_VOXELS, EXTENT_VOXELS, 0, 0]];
-    let e = EXTENT_VOXELS;
-    for (case, end, origin) in [
-        ("onto itself", [127, 127, 8], 0),
-        ("one step", [127, 128, 8], 0),
-        ("to a corner", [0, 0, 0], 0),
-        ("far", [e, -e, e], 0),
-        ("through everything", [e, -e, 15], 1),
-        ("too far by one", [127 + 2001, 127, 8], 0),
-        ("just in range", [127, 127 - 2000, 8], 0),
-    ] {
+    let (step, origins, ends) = extremes();
+    for (case, end, origin) in ends {
         // The weight of all returns of a sweep in one ray: a 16-bit sum would overflow.
         for no_end in [false, true] {
             let rays = vec![ray(end, origin, no_end); POINTS_MAX];

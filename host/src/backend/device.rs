@@ -3,6 +3,7 @@
 use raywake_core::layout::{BUFFERS, Buffer, DISTINCT_COUNT, FOREGROUND_COUNT, FOREGROUND_MARKED};
 use raywake_core::params::{FOREGROUND_MAX, Profile};
 use raywake_core::pipeline::Perceived;
+use raywake_core::prepare::step_of;
 use raywake_core::record::{Ray, Step};
 use raywake_gpu::{Census, Executor, GpuError, Options};
 use raywake_kernels::schedule;
@@ -35,12 +36,8 @@ impl Device {
         fill(Buffer::CostsIn, &tables.costs);
         executor.run(LOAD)?;
         let mut device = Device { executor };
-        let empty = Step {
-            side: profile.side as i32,
-            levels: profile.levels as i32,
-            shift_x: profile.side as i32,
-            ..Step::default()
-        };
+        // Nothing of what the device held before comes into view.
+        let empty = Step { shift_x: profile.side as i32, ..step_of(profile, 0) };
         device.perceive(&empty, &mut Laps::start())?;
         Ok(device)
     }

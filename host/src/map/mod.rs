@@ -7,7 +7,7 @@ pub mod scalar;
 use raywake_core::layout::{MAP_BUFFERS, MapBuffer};
 use raywake_core::map::Update;
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::{Dropped, Preparation, Window, place};
+use raywake_core::prepare::{Dropped, Preparation, Window, place, step_of};
 use raywake_core::record::{NONE, Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_gpu::GpuError;
@@ -110,14 +110,7 @@ impl Mapper {
             &mut self.columns,
             origins,
         );
-        let step = Step {
-            side: self.profile.side as i32,
-            levels: self.profile.levels as i32,
-            rays: count as i32,
-            range_steps: self.profile.range_steps(),
-            ..Step::default()
-        };
-        self.backend.map(&step, put)?;
+        self.backend.map(&step_of(&self.profile, count), put)?;
         Ok(Mapped { window, dropped, rays: count })
     }
 
