@@ -1,8 +1,8 @@
 //! `raywake-lab check-filter`: a filter against a recorded drive with labelled boxes.
 
-use crate::features::LEVELS;
 use crate::grid::Grid;
 use crate::labels::Footprint;
+use crate::train::LEVELS;
 use glam::DVec3;
 use raywake::source::{OpenOptions, SweepData, open};
 use raywake_core::background_filter::{TABLE_WORDS, load, score};

@@ -1,6 +1,6 @@
 //! Labelled columns of simulated drives.
 
-use crate::features::{Features, features};
+use super::features::{Features, features};
 use crate::grid::Grid;
 use crate::labels::Footprint;
 use raywake_core::params::Profile;

@@ -1,9 +1,9 @@
-//! `raywake-lab train-filter`.
+//! `raywake-lab train filter`.
 
-use crate::features::WIDTH;
-use crate::logistic::Data;
-use crate::samples::{BACKGROUND_KEPT, Sample, of_drives};
-use crate::weights_file::{SCALE, quantise, text};
+use super::features::WIDTH;
+use super::logistic::Data;
+use super::samples::{BACKGROUND_KEPT, Sample, of_drives};
+use super::weights_file::{SCALE, quantise, text};
 use std::error::Error;
 use std::fs;
 use std::path::PathBuf;

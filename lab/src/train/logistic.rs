@@ -1,6 +1,6 @@
 //! Logistic regression by Newton's method: a convex problem of few unknowns, solved exactly.
 
-use crate::solve::cholesky;
+use super::solve::cholesky;
 
 /// Labelled rows of small counts.
 pub struct Data {

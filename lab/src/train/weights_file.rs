@@ -1,6 +1,6 @@
 //! The weights file of the background filter, as `raywake_core::weights` reads it.
 
-use crate::features::{LEVELS, expand};
+use super::features::{LEVELS, expand};
 use raywake_core::background_filter::PATCH;
 use raywake_core::digest::Digest;
 use std::fmt::Write;
@@ -32,7 +32,7 @@ pub fn text(weights: &[i32], provenance: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::features::{WIDTH, features};
+    use crate::train::features::{WIDTH, features};
     use raywake_core::background_filter::{TABLE_WORDS, load, score};
     use raywake_core::record::{Column, Step};
 

@@ -1,0 +1,67 @@
+//! Labelled objects of a recorded or simulated drive: boxes over time, whatever file they are from.
+
+mod footprint;
+
+pub use footprint::Footprint;
+
+use raywake_core::pose::Pose;
+use std::collections::BTreeMap;
+
+/// Kinds of objects that the data sets share; their own names stay in [`Track::class`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// Passenger cars.
+    Car,
+    /// Vans and small delivery vehicles.
+    Van,
+    /// Lorries.
+    Truck,
+    /// Buses.
+    Bus,
+    /// Trams and trains.
+    Tram,
+    /// Motorcycles, with or without a rider.
+    Motorcycle,
+    /// Bicycles with a rider.
+    Cyclist,
+    /// People on foot, standing or sitting.
+    Pedestrian,
+    /// Whatever else is labelled.
+    Other,
+}
+
+/// One labelled object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Unlike any other's in the drive, as the file has it.
+    pub id: String,
+    /// Class as the file names it.
+    pub class: String,
+    /// The same in common terms.
+    pub kind: Kind,
+    /// Length, width and height of the box, m.
+    pub size: [f64; 3],
+    /// Where it is, by frame (as [`raywake::source::Source::frame`] counts): `vehicle_from_box`,
+    /// the box's frame lying in its centre, x forward, y left, z up.
+    pub boxes: BTreeMap<u64, Pose>,
+}
+
+/// Where objects are labelled; outside nothing is known of what is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// All around.
+    All,
+    /// In the view of a camera that looks forward (KITTI).
+    Camera,
+}
+
+/// All labels of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labels {
+    /// In the order of the file.
+    pub tracks: Vec<Track>,
+    /// Where they are complete.
+    pub view: View,
+    /// What was left out, and why: one line each for people.
+    pub notes: Vec<String>,
+}
