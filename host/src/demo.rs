@@ -45,9 +45,9 @@ pub fn demo(args: &Demo) -> Result<Summary, Error> {
     let mut source = Simulated::new(SEED, SWEEPS);
     let mut errors = Errors::default();
     let voxel_m = plan.profile.voxel_m;
-    let summary = engine::execute(&plan, &mut source, &mut |source, index, first, flows| {
-        let truth = Field::new(source, first, source.truth(index), voxel_m);
-        errors.add(&truth, flows);
+    let summary = engine::execute(&plan, &mut source, &mut |source, pair| {
+        let truth = Field::new(source, pair.first, source.truth(pair.index), voxel_m);
+        errors.add(&truth, pair.flows);
     })?;
     say(args.quiet, &errors.line())?;
     say(args.quiet, &format!("results in {}\n", args.out.display()))?;

@@ -18,6 +18,7 @@ use crate::choose;
 use crate::config::Weights;
 use crate::drive::Drive;
 use crate::error::Error;
+use crate::laps::Laps;
 use crate::outputs::{Kinds, Outputs};
 use crate::progress::Progress;
 use crate::report;
@@ -47,8 +48,22 @@ pub struct Plan<'a> {
     pub quiet: bool,
 }
 
-/// Sees every pair: the index and data of its first sweep, and its flow.
-pub type Observer<'a, S> = &'a mut dyn FnMut(&S, usize, &SweepData, &Flows);
+/// Two sweeps and the flow between them.
+pub struct Pair<'a> {
+    /// Index of the first sweep in the source.
+    pub index: usize,
+    /// The first sweep, whose flow it is.
+    pub first: &'a SweepData,
+    /// The second sweep.
+    pub second: &'a SweepData,
+    /// Flow of the first sweep.
+    pub flows: &'a Flows<'a>,
+    /// Time of every stage.
+    pub laps: &'a Laps,
+}
+
+/// Sees every pair.
+pub type Observer<'a, S> = &'a mut dyn FnMut(&S, &Pair);
 
 /// Runs to the end, or to a signal: then the sweep in hand is finished and the summary says so.
 /// After an error the files already written stay.
@@ -147,7 +162,8 @@ impl Running {
         let dt_s = stepped.flows.map(|f| f.dt_s);
         if let Some(flows) = &stepped.flows {
             self.outputs.pair(before, flows)?;
-            observe(source, index - 1, before, flows);
+            let laps = &stepped.laps;
+            observe(source, &Pair { index: index - 1, first: before, second: now, flows, laps });
         }
         self.tracklets.clear();
         self.tracklets.extend(self.drive.tracklets());

@@ -25,5 +25,5 @@ pub fn run(args: &args::Run) -> Result<Summary, Error> {
         summary: args.results.summary.clone(),
         quiet: args.quiet,
     };
-    engine::execute(&plan, source.as_mut(), &mut |_, _, _, _| ())
+    engine::execute(&plan, source.as_mut(), &mut |_, _| ())
 }

@@ -23,6 +23,8 @@ pub const BUDGET_MS: f64 = 100.0;
 /// How a quantity is distributed over sweeps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
+    /// Sum over count.
+    pub mean: f64,
     /// Half lie below.
     pub median: f64,
     /// Standard deviation.
@@ -42,7 +44,13 @@ impl Spread {
         let mean = sorted.iter().sum::<f64>() / n as f64;
         let variance = sorted.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n as f64;
         let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
-        Some(Spread { median, sd: variance.sqrt(), p99: sorted[(99 * n).div_ceil(100) - 1], max })
+        Some(Spread {
+            mean,
+            median,
+            sd: variance.sqrt(),
+            p99: sorted[(99 * n).div_ceil(100) - 1],
+            max,
+        })
     }
 }
 
@@ -261,7 +269,7 @@ mod tests {
     fn spreads() {
         assert_eq!(Spread::of(&[]), None);
         let one = Spread::of(&[3.0]).unwrap();
-        assert_eq!(one, Spread { median: 3.0, sd: 0.0, p99: 3.0, max: 3.0 });
+        assert_eq!(one, Spread { mean: 3.0, median: 3.0, sd: 0.0, p99: 3.0, max: 3.0 });
         let values: Vec<f64> = (1..=200).rev().map(f64::from).collect();
         let s = Spread::of(&values).unwrap();
         assert_eq!((s.median, s.p99, s.max), (100.5, 198.0, 200.0));

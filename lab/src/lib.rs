@@ -3,6 +3,7 @@
 //! Everything off-board: simulated drives, training of the learned numbers, and evaluation.
 
 pub mod check;
+pub mod eval;
 pub mod grid;
 pub mod labels;
 pub mod train;

@@ -1,0 +1,226 @@
+//! One row per (drive, sweep, solid column): what was estimated, what is true, and what is needed
+//! to choose between them. Written as Parquet, so that any engine can aggregate many drives.
+
+use crate::labels::Kind;
+use arrow_array::builder::BooleanBuilder;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, Int32Type, UInt8Type, UInt32Type, UInt64Type};
+use arrow_array::{
+    Array, ArrayRef, BooleanArray, DictionaryArray, Float32Array, Int32Array, RecordBatch,
+    StringArray, UInt8Array, UInt32Array, UInt64Array,
+};
+use arrow_schema::{DataType, Field, Schema};
+use std::sync::Arc;
+
+/// Names of [`Row::class`]: what is in no labelled box, then the kinds of [`Kind`].
+pub const CLASSES: [&str; 10] = [
+    "Background",
+    "Car",
+    "Van",
+    "Truck",
+    "Bus",
+    "Tram",
+    "Motorcycle",
+    "Cyclist",
+    "Pedestrian",
+    "Other",
+];
+
+/// Index of a kind in [`CLASSES`].
+pub fn class_of(kind: Kind) -> u8 {
+    kind as u8 + 1
+}
+
+/// How a Rust type lies in a Parquet column.
+trait Cell: Copy {
+    fn data_type() -> DataType;
+    fn write(values: impl Iterator<Item = Self>) -> ArrayRef;
+    fn read(array: &dyn Array) -> Option<Vec<Self>>;
+}
+
+macro_rules! cell {
+    ($rust:ty, $array:ty, $arrow:ty, $name:ident) => {
+        impl Cell for $rust {
+            fn data_type() -> DataType {
+                DataType::$name
+            }
+            fn write(values: impl Iterator<Item = Self>) -> ArrayRef {
+                Arc::new(<$array>::from_iter_values(values))
+            }
+            fn read(array: &dyn Array) -> Option<Vec<Self>> {
+                let array = array.as_primitive_opt::<$arrow>()?;
+                (array.null_count() == 0).then(|| array.values().to_vec())
+            }
+        }
+    };
+}
+
+cell!(f32, Float32Array, Float32Type, Float32);
+cell!(i32, Int32Array, Int32Type, Int32);
+cell!(u8, UInt8Array, UInt8Type, UInt8);
+cell!(u32, UInt32Array, UInt32Type, UInt32);
+cell!(u64, UInt64Array, UInt64Type, UInt64);
+
+impl Cell for bool {
+    fn data_type() -> DataType {
+        DataType::Boolean
+    }
+    fn write(values: impl Iterator<Item = Self>) -> ArrayRef {
+        let mut builder = BooleanBuilder::new();
+        values.for_each(|v| builder.append_value(v));
+        Arc::new(builder.finish())
+    }
+    fn read(array: &dyn Array) -> Option<Vec<Self>> {
+        let array: &BooleanArray = array.as_boolean_opt()?;
+        (array.null_count() == 0).then(|| array.iter().map(|v| v == Some(true)).collect())
+    }
+}
+
+/// Declares the record, its schema, its writer and its reader at once.
+macro_rules! row {
+    ($($(#[$doc:meta])* $field:ident: $type:ty),* $(,)?) => {
+        /// One solid column of the first sweep of a pair.
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct Row { $($(#[$doc])* pub $field: $type),* }
+
+        fn fields() -> Vec<Field> {
+            vec![$(Field::new(stringify!($field), <$type as Cell>::data_type(), false)),*]
+        }
+
+        fn arrays(rows: &[Row]) -> Vec<ArrayRef> {
+            vec![$(<$type as Cell>::write(rows.iter().map(|r| r.$field))),*]
+        }
+
+        /// The rows of a batch; the name of the column that is missing or of another type.
+        pub fn rows(batch: &RecordBatch) -> Result<Vec<Row>, &'static str> {
+            let mut rows = vec![Row::default(); batch.num_rows()];
+            $({
+                let name = stringify!($field);
+                let array = batch.column_by_name(name).ok_or(name)?;
+                let values = <$type as Cell>::read(array).ok_or(name)?;
+                rows.iter_mut().zip(values).for_each(|(r, v)| r.$field = v);
+            })*
+            Ok(rows)
+        }
+    };
+}
+
+row! {
+    /// Index of the sweep in the drive.
+    sweep: u32,
+    /// Frame as the source counts.
+    frame: u64,
+    /// Cell of the lattice.
+    cell_i: i32,
+    /// Cell of the lattice.
+    cell_j: i32,
+    /// Centre of the column in the vehicle frame, forward, m.
+    x: f32,
+    /// Centre of the column in the vehicle frame, left, m.
+    y: f32,
+    /// Index in [`CLASSES`].
+    class: u8,
+    /// 1 + index of the labelled track; 0: none.
+    track: u32,
+    /// Where labels are complete, at both ends of the true motion.
+    in_view: bool,
+    /// The labelled object moves over ground ([`crate::labels`] says from when on).
+    moving: bool,
+    /// Occupied voxels of the column: its weight in the dissertation's tables.
+    voxels: u8,
+    /// Score of the background filter, in the weights' integers; foreground above 0.
+    score: i32,
+    /// [`raywake_core::output::Origin`]: 0 background, 1 unmatched, 2 matched.
+    origin: u8,
+    /// Estimated displacement over ground until the next sweep, world axes, m.
+    flow_x: f32,
+    /// See `flow_x`.
+    flow_y: f32,
+    /// True displacement by the labels as they are, m.
+    true_x: f32,
+    /// See `true_x`.
+    true_y: f32,
+    /// Displacement by the labels' smoothed motion, zero for what is parked, m.
+    smooth_x: f32,
+    /// See `smooth_x`.
+    smooth_y: f32,
+    /// What "no motion relative to the vehicle" would be over ground, m.
+    carried_x: f32,
+    /// See `carried_x`.
+    carried_y: f32,
+    /// The true displacement (labels as they are) rounded to whole cells, m.
+    rounded_x: f32,
+    /// See `rounded_x`.
+    rounded_y: f32,
+    /// Velocity over ground after the tracklet filter, world axes, m/s.
+    velocity_x: f32,
+    /// See `velocity_x`.
+    velocity_y: f32,
+    /// Covariance of the velocity, (m/s)^2; zero where there is no tracklet.
+    covariance_xx: f32,
+    /// See `covariance_xx`.
+    covariance_xy: f32,
+    /// See `covariance_xx`.
+    covariance_yy: f32,
+    /// Observations of the tracklet after its birth.
+    age: u32,
+    /// True velocity over ground by the labels' smoothed motion, zero for what is parked, m/s.
+    speed_x: f32,
+    /// See `speed_x`.
+    speed_y: f32,
+    /// Time to the next sweep, s.
+    dt: f32,
+}
+
+/// The columns of a file: `drive` and `kind` as text, then the fields of [`Row`].
+pub fn schema() -> Arc<Schema> {
+    let text = || DataType::Dictionary(Box::new(DataType::UInt8), Box::new(DataType::Utf8));
+    let mut all = vec![Field::new("drive", text(), false), Field::new("kind", text(), false)];
+    all.extend(fields());
+    Arc::new(Schema::new(all))
+}
+
+/// Rows of a drive as a batch of [`schema`].
+pub fn batch(drive: &str, rows: &[Row]) -> RecordBatch {
+    let coded = |keys: UInt8Array, names: Vec<&str>| -> ArrayRef {
+        let names = Arc::new(StringArray::from(names));
+        Arc::new(DictionaryArray::<UInt8Type>::new(keys, names))
+    };
+    let drives = UInt8Array::from_iter_values(rows.iter().map(|_| 0));
+    let kinds = UInt8Array::from_iter_values(rows.iter().map(|r| r.class));
+    let mut columns = vec![coded(drives, vec![drive]), coded(kinds, CLASSES.to_vec())];
+    columns.extend(arrays(rows));
+    RecordBatch::try_new(schema(), columns).expect("columns as the schema has them")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn written_and_read() {
+        let rows: Vec<Row> = (0..5)
+            .map(|n| Row {
+                sweep: n,
+                frame: 1 << 40,
+                class: n as u8,
+                moving: n == 2,
+                flow_x: n as f32 * 0.3,
+                score: -7,
+                ..Row::default()
+            })
+            .collect();
+        let batch = batch("a", &rows);
+        assert_eq!(super::rows(&batch).unwrap(), rows);
+        let less = batch.project(&(0..6).collect::<Vec<_>>()).unwrap();
+        assert_eq!(super::rows(&less), Err("x"));
+    }
+
+    #[test]
+    fn classes_are_the_kinds() {
+        for kind in [Kind::Car, Kind::Van, Kind::Tram, Kind::Cyclist, Kind::Pedestrian, Kind::Other]
+        {
+            assert_eq!(CLASSES[class_of(kind) as usize], format!("{kind:?}"));
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! Rows to errors by class and motion: what tables 3.1 and 3.2 and figures 3.6 to 3.9 are made of.
+
+use super::row::{CLASSES, Row};
+use super::statistics::{Errors, Sorted, Weight};
+
+/// From this age on a tracklet counts as settled (table 3.2).
+pub const SETTLED: u32 = 10;
+
+/// What is compared with the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Estimate {
+    /// The pipeline's.
+    Ours,
+    /// The pipeline's, where it found a match; the other columns are left out.
+    Matched,
+    /// Nothing moves relative to the vehicle.
+    Zero,
+    /// Nothing moves over ground.
+    EgoOnly,
+    /// The truth in whole cells.
+    Rounded,
+}
+
+impl Estimate {
+    /// All of them, as they are listed.
+    pub const ALL: [Estimate; 5] =
+        [Estimate::Ours, Estimate::Matched, Estimate::Zero, Estimate::EgoOnly, Estimate::Rounded];
+
+    /// For people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Estimate::Ours => "raywake",
+            Estimate::Matched => "raywake, matched columns only",
+            Estimate::Zero => "zero flow",
+            Estimate::EgoOnly => "ego motion only",
+            Estimate::Rounded => "truth rounded to cells",
+        }
+    }
+
+    /// Displacement over ground, m; none where the column does not count.
+    fn of(self, row: &Row) -> Option<[f32; 2]> {
+        match self {
+            Estimate::Ours => Some([row.flow_x, row.flow_y]),
+            Estimate::Matched => (row.origin == 2).then_some([row.flow_x, row.flow_y]),
+            Estimate::Zero => Some([row.carried_x, row.carried_y]),
+            Estimate::EgoOnly => Some([0.0; 2]),
+            Estimate::Rounded => Some([row.rounded_x, row.rounded_y]),
+        }
+    }
+}
+
+/// Which truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Truth {
+    /// Labels as they are: they jitter.
+    Raw,
+    /// Labels smoothed over time, zero for what is parked.
+    Smooth,
+}
+
+/// Whether the labelled object moves over ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Motion {
+    /// Both.
+    Any,
+    /// Moving.
+    Moving,
+    /// Parked or standing.
+    Parked,
+}
+
+impl Motion {
+    /// All of them.
+    pub const ALL: [Motion; 3] = [Motion::Any, Motion::Moving, Motion::Parked];
+
+    /// For people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Motion::Any => "all",
+            Motion::Moving => "moving",
+            Motion::Parked => "parked",
+        }
+    }
+
+    fn holds(self, moving: bool) -> bool {
+        match self {
+            Motion::Any => true,
+            Motion::Moving => moving,
+            Motion::Parked => !moving,
+        }
+    }
+}
+
+/// A set of classes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Group {
+    /// One of [`CLASSES`].
+    Class(u8),
+    /// Everything in a labelled box.
+    Labelled,
+}
+
+impl Group {
+    /// For people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Group::Class(class) => CLASSES[class as usize],
+            Group::Labelled => "All labelled",
+        }
+    }
+
+    /// Classes of labelled objects and all of them together.
+    pub fn labelled() -> impl Iterator<Item = Group> {
+        (1..CLASSES.len() as u8).map(Group::Class).chain([Group::Labelled])
+    }
+
+    fn holds(self, class: usize) -> bool {
+        match self {
+            Group::Class(c) => usize::from(c) == class,
+            Group::Labelled => class > 0,
+        }
+    }
+}
+
+const COUNT: usize = CLASSES.len();
+/// Errors by class, then parked and moving.
+type Cells = [[Errors; 2]; COUNT];
+
+/// Of one age and more, or of one age.
+#[derive(Clone, Debug, Default)]
+struct Velocities {
+    smooth: Cells,
+    raw: Cells,
+    /// Distance between the two truths: the floor of the raw one.
+    floor: Cells,
+}
+
+/// Everything the tables need.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// By estimate as in [`Estimate::ALL`], against the labels as they are.
+    raw: [Cells; 5],
+    /// The same against smoothed labels.
+    smooth: [Cells; 5],
+    /// Settled tracklets.
+    settled: Velocities,
+    /// Errors of tracklets by age, against smoothed labels.
+    by_age: Vec<(u32, Cells)>,
+    /// Solid columns in view, and those with a settled tracklet.
+    columns: [[u64; 2]; COUNT],
+    covered: [[u64; 2]; COUNT],
+    /// Score of the filter and class of every solid column in view.
+    pub scores: Vec<(i32, u8)>,
+    /// Rows that do not count because labels are not complete there.
+    pub out_of_view: u64,
+}
+
+fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+impl Tally {
+    /// Ages shown apart.
+    pub const AGES: [u32; 5] = [0, 2, 5, 10, 20];
+
+    /// An empty one.
+    pub fn new() -> Tally {
+        Tally { by_age: Tally::AGES.map(|a| (a, Cells::default())).to_vec(), ..Tally::default() }
+    }
+
+    /// Counts a row.
+    pub fn row(&mut self, row: &Row) {
+        if !row.in_view {
+            self.out_of_view += 1;
+            return;
+        }
+        let (class, moving) = (row.class as usize, usize::from(row.moving));
+        self.scores.push((row.score, row.class));
+        let (raw, smooth) = ([row.true_x, row.true_y], [row.smooth_x, row.smooth_y]);
+        for (n, estimate) in Estimate::ALL.iter().enumerate() {
+            let Some(flow) = estimate.of(row) else { continue };
+            self.raw[n][class][moving].push(distance(flow, raw), row.voxels);
+            self.smooth[n][class][moving].push(distance(flow, smooth), row.voxels);
+        }
+        self.columns[class][moving] += 1;
+        if row.origin == 2 {
+            self.tracklet(row, class, moving);
+        }
+    }
+
+    fn tracklet(&mut self, row: &Row, class: usize, moving: usize) {
+        let (found, truth) = ([row.velocity_x, row.velocity_y], [row.speed_x, row.speed_y]);
+        let error = distance(found, truth);
+        if let Some((_, cells)) = self.by_age.iter_mut().find(|a| a.0 == row.age) {
+            cells[class][moving].push(error, row.voxels);
+        }
+        if row.age < SETTLED {
+            return;
+        }
+        self.covered[class][moving] += 1;
+        let raw = [row.true_x / row.dt, row.true_y / row.dt];
+        self.settled.smooth[class][moving].push(error, row.voxels);
+        self.settled.raw[class][moving].push(distance(found, raw), row.voxels);
+        self.settled.floor[class][moving].push(distance(truth, raw), row.voxels);
+    }
+
+    /// Errors of displacement, m.
+    pub fn flow(
+        &self,
+        estimate: Estimate,
+        truth: Truth,
+        group: Group,
+        motion: Motion,
+        weight: Weight,
+    ) -> Sorted {
+        let by = if truth == Truth::Raw { &self.raw } else { &self.smooth };
+        let n = Estimate::ALL.iter().position(|e| *e == estimate).expect("all are listed");
+        gather(&by[n], group, motion).sorted(weight)
+    }
+
+    /// Errors of the velocity of settled tracklets against smoothed labels, m/s.
+    pub fn settled(&self, group: Group, motion: Motion, weight: Weight) -> Sorted {
+        gather(&self.settled.smooth, group, motion).sorted(weight)
+    }
+
+    /// The same against labels as they are, and their own distance from the smoothed ones.
+    pub fn settled_raw(&self, group: Group, motion: Motion) -> [Sorted; 2] {
+        [&self.settled.raw, &self.settled.floor]
+            .map(|cells| gather(cells, group, motion).sorted(Weight::Column))
+    }
+
+    /// Errors of the velocity of tracklets of one age of [`Self::AGES`], m/s.
+    pub fn at_age(&self, age: usize, group: Group, motion: Motion) -> Sorted {
+        gather(&self.by_age[age].1, group, motion).sorted(Weight::Column)
+    }
+
+    /// Solid columns in view, and how many of them have a settled tracklet.
+    pub fn coverage(&self, group: Group, motion: Motion) -> [u64; 2] {
+        [&self.columns, &self.covered].map(|counts| {
+            let chosen = cells(group, motion);
+            chosen.map(|(class, moving)| counts[class][moving]).sum()
+        })
+    }
+}
+
+/// Indices of the cells that a group and a motion name.
+fn cells(group: Group, motion: Motion) -> impl Iterator<Item = (usize, usize)> {
+    let classes = (0..COUNT).filter(move |c| group.holds(*c));
+    classes.flat_map(move |c| (0..2).filter(move |m| motion.holds(*m == 1)).map(move |m| (c, m)))
+}
+
+fn gather(of: &Cells, group: Group, motion: Motion) -> Errors {
+    let mut all = Errors::default();
+    cells(group, motion).for_each(|(class, moving)| all.extend(&of[class][moving]));
+    all
+}
+
+/// A point of the filter's precision-recall curve (figure 3.6).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Operating {
+    /// Columns with a score above this are foreground.
+    pub threshold: i32,
+    /// Share of the labelled columns that are kept.
+    pub recall: f64,
+    /// Share of the kept columns that are labelled.
+    pub precision: f64,
+    /// Share of the other columns that are rejected.
+    pub background: f64,
+}
+
+/// The curve over all thresholds from the strictest on: one point wherever the score changes.
+/// Empty where there are no labelled columns, or no others.
+pub fn curve(scores: &[(i32, u8)]) -> Vec<Operating> {
+    let mut ordered: Vec<(i32, bool)> = scores.iter().map(|s| (s.0, s.1 > 0)).collect();
+    ordered.sort_unstable_by(|a, b| b.cmp(a));
+    let positive = ordered.iter().filter(|s| s.1).count();
+    let negative = ordered.len() - positive;
+    if positive == 0 || negative == 0 {
+        return Vec::new();
+    }
+    let (mut kept, mut wrong) = (0usize, 0usize);
+    let mut points = Vec::new();
+    for (n, &(score, labelled)) in ordered.iter().enumerate() {
+        *(if labelled { &mut kept } else { &mut wrong }) += 1;
+        if ordered.get(n + 1).is_some_and(|next| next.0 == score) {
+            continue;
+        }
+        points.push(Operating {
+            threshold: score.saturating_sub(1),
+            recall: kept as f64 / positive as f64,
+            precision: kept as f64 / (kept + wrong) as f64,
+            background: 1.0 - wrong as f64 / negative as f64,
+        });
+    }
+    points
+}
+
+/// The strictest point that keeps at least `recall`.
+pub fn at_recall(curve: &[Operating], recall: f64) -> Option<Operating> {
+    curve.iter().copied().find(|p| p.recall >= recall)
+}
+
+/// The point of a threshold: what scores above it is kept.
+pub fn at_threshold(curve: &[Operating], threshold: i32) -> Option<Operating> {
+    curve.iter().copied().take_while(|p| p.threshold >= threshold).last()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(class: u8, moving: bool, flow: f32, truth: f32) -> Row {
+        Row {
+            class,
+            moving,
+            in_view: true,
+            origin: 2,
+            voxels: 2,
+            flow_x: flow,
+            true_x: truth,
+            smooth_x: truth,
+            carried_x: -1.0,
+            velocity_x: flow * 10.0,
+            speed_x: truth * 10.0,
+            dt: 0.1,
+            age: 10,
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn classes_and_motions_are_kept_apart() {
+        let mut tally = Tally::new();
+        tally.row(&row(1, true, 0.6, 0.5));
+        tally.row(&row(1, false, 0.0, 0.02));
+        tally.row(&Row { voxels: 5, origin: 1, ..row(7, true, 0.0, 0.4) });
+        tally.row(&row(0, false, 0.3, 0.0));
+        tally.row(&Row { in_view: false, ..row(1, true, 9.0, 0.0) });
+        let flow = |e, g, m| tally.flow(e, Truth::Raw, g, m, Weight::Column);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
+        assert!(near(flow(Estimate::Ours, Group::Class(1), Motion::Moving).mean(), 0.1));
+        assert!(near(flow(Estimate::Ours, Group::Labelled, Motion::Any).mean(), 0.52 / 3.0));
+        assert!(near(flow(Estimate::Zero, Group::Labelled, Motion::Moving).mean(), 1.45));
+        assert!(near(flow(Estimate::EgoOnly, Group::Class(0), Motion::Any).mean(), 0.0));
+        assert_eq!(flow(Estimate::Matched, Group::Labelled, Motion::Any).count(), 2);
+        let voxels =
+            tally.flow(Estimate::Ours, Truth::Raw, Group::Labelled, Motion::Any, Weight::Voxel);
+        assert_eq!(voxels.count(), 9);
+        assert_eq!(tally.coverage(Group::Labelled, Motion::Moving), [2, 1]);
+        assert!(near(tally.settled(Group::Labelled, Motion::Moving, Weight::Column).mean(), 1.0));
+        assert!(near(tally.settled_raw(Group::Labelled, Motion::Any)[1].mean(), 0.0));
+        assert_eq!(tally.at_age(3, Group::Labelled, Motion::Any).count(), 2);
+        assert_eq!((tally.out_of_view, tally.scores.len()), (1, 4));
+    }
+
+    #[test]
+    fn a_curve_by_hand() {
+        let points = curve(&[(5, 1), (3, 0), (3, 2), (1, 1), (-2, 0), (-4, 1)]);
+        let expected = [(4, 0.25, 1.0, 1.0), (2, 0.5, 2.0 / 3.0, 0.5), (0, 0.75, 0.75, 0.5)];
+        for (p, e) in points.iter().zip(expected) {
+            assert_eq!((p.threshold, p.recall, p.precision, p.background), e);
+        }
+        assert_eq!(points.len(), 5);
+        assert_eq!(at_recall(&points, 0.6).unwrap().threshold, 0);
+        assert_eq!(at_threshold(&points, 0).unwrap().recall, 0.75);
+        assert_eq!(at_threshold(&points, 9), None);
+        assert!(curve(&[(1, 1)]).is_empty() && curve(&[]).is_empty());
+    }
+}
