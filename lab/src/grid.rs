@@ -50,6 +50,11 @@ impl Grid {
         }
     }
 
+    /// A grid on the lattice of a window: that of the drive's first sweep.
+    pub fn on_lattice(profile: Profile, window: Window) -> Grid {
+        Grid { lattice_origin: Some(window.lattice_origin), ..Grid::new(profile) }
+    }
+
     /// Forgets where the lattice lies: another drive begins.
     pub fn restart(&mut self) {
         self.lattice_origin = None;

@@ -1,0 +1,184 @@
+//! From a pair of sweeps to rows: every solid column beside its truth.
+
+use super::objects::{Objects, Present};
+use super::row::Row;
+use crate::grid::Grid;
+use crate::labels::View;
+use glam::DVec3;
+use raywake::engine::Pair;
+use raywake::source::SweepData;
+use raywake_core::background_filter::score;
+use raywake_core::output::{ColumnFlow, Origin, PointFlow};
+use raywake_core::params::{Frame, Profile};
+use raywake_core::pose::Pose;
+use raywake_core::prepare::place;
+use raywake_core::sweep::Rig;
+
+/// A copy of a pair, for another thread.
+pub struct Seen {
+    /// Index of the first sweep in the drive.
+    pub index: usize,
+    /// The first sweep.
+    pub first: SweepData,
+    /// Pose of the vehicle in the second.
+    pub then: Pose,
+    /// Frame of the second.
+    pub frame_then: u64,
+    /// Time between them, s.
+    pub dt_s: f64,
+    /// Flow of the first sweep's columns.
+    pub columns: Vec<ColumnFlow>,
+    /// Flow of its returns.
+    pub points: Vec<PointFlow>,
+}
+
+impl Seen {
+    /// Copies.
+    pub fn of(pair: &Pair) -> Seen {
+        Seen {
+            index: pair.index,
+            first: pair.first.clone(),
+            then: pair.second.world_from_vehicle,
+            frame_then: pair.second.frame,
+            dt_s: pair.flows.dt_s,
+            columns: pair.flows.columns.to_vec(),
+            points: pair.flows.points.to_vec(),
+        }
+    }
+
+    /// Pose of the vehicle in the first sweep.
+    pub fn now(&self) -> Pose {
+        self.first.world_from_vehicle
+    }
+}
+
+/// Makes rows of the pairs of one drive.
+pub struct Collector<'a> {
+    profile: Profile,
+    rig: Rig,
+    /// Table of the background filter.
+    filter: Vec<i32>,
+    view: View,
+    /// By how much a box reaches beyond its sides, m.
+    margin_m: f64,
+    objects: &'a Objects,
+    grid: Grid,
+}
+
+impl<'a> Collector<'a> {
+    /// For a drive whose first sweep was taken at `start`.
+    pub fn new(
+        profile: Profile,
+        rig: Rig,
+        start: Pose,
+        filter: Vec<i32>,
+        objects: &'a Objects,
+        view: View,
+        margin_m: f64,
+    ) -> Collector<'a> {
+        let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
+        Collector { profile, rig, filter, view, margin_m, objects, grid }
+    }
+
+    /// Rows of the first sweep's solid columns.
+    pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
+        let window = self.grid.sweep(&self.rig, &seen.first.sweep());
+        let present = self.objects.at(seen.first.frame, seen.frame_then);
+        let side = self.profile.side as i32;
+        let mut rows = Vec::with_capacity(seen.columns.len());
+        for flow in &seen.columns {
+            let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
+            // A column of the window is within it, unless the lattices differ.
+            if !(0..side).contains(&i) || !(0..side).contains(&j) {
+                continue;
+            }
+            let column = (i * side + j) as usize;
+            let masks = self.grid.columns[column][0];
+            let score = score(&self.grid.step, &self.filter, &self.grid.columns, column);
+            rows.push(self.row(seen, flow, &present, (masks >> 16).count_ones() as u8, score));
+        }
+        rows
+    }
+
+    fn row(
+        &self,
+        seen: &Seen,
+        flow: &ColumnFlow,
+        present: &[Present],
+        voxels: u8,
+        score: i32,
+    ) -> Row {
+        let [x, y] = flow.position_vehicle_m;
+        let flat = DVec3::new(f64::from(x), f64::from(y), 0.0);
+        let object = present.iter().find(|p| p.footprint.holds(flat, self.margin_m));
+        // Flow is planar; the height matters where the vehicle nods, a little.
+        let at = DVec3::new(flat.x, flat.y, object.map_or(self.rig.ground_m, |p| p.height_m));
+        let world = seen.now().transform(at);
+        let true_world = object.map_or(world, |p| p.raw.map_or(world, |m| m.transform(world)));
+        let vanishes = object.is_some_and(|p| p.raw.is_none());
+        let ends = [at, seen.then.inverse().transform(true_world)];
+        let truth = true_world - world;
+        let speed = object.map_or(DVec3::ZERO, |p| p.velocity(world));
+        let [cells_x, cells_y] = flow.displacement_cells.map(f64::from);
+        let cell = self.profile.voxel_m;
+        let found = match flow.origin {
+            Origin::Matched => self.over_ground(seen, at, DVec3::new(cells_x, cells_y, 0.0) * cell),
+            _ => DVec3::ZERO,
+        };
+        let carried = seen.then.transform(at) - world;
+        let rounded = (self.in_grid(seen, at, truth) / cell).round() * cell;
+        let rounded = self.over_ground(seen, at, DVec3::new(rounded.x, rounded.y, 0.0));
+        Row {
+            sweep: seen.index as u32,
+            frame: seen.first.frame,
+            cell_i: flow.cell[0],
+            cell_j: flow.cell[1],
+            x,
+            y,
+            class: object.map_or(0, |p| p.class),
+            track: object.map_or(0, |p| p.track + 1),
+            in_view: !vanishes && ends.iter().all(|end| self.view.holds(*end)),
+            moving: object.is_some_and(|p| p.moving),
+            voxels,
+            score,
+            origin: flow.origin as u8,
+            flow_x: found.x as f32,
+            flow_y: found.y as f32,
+            true_x: truth.x as f32,
+            true_y: truth.y as f32,
+            smooth_x: (speed.x * seen.dt_s) as f32,
+            smooth_y: (speed.y * seen.dt_s) as f32,
+            carried_x: carried.x as f32,
+            carried_y: carried.y as f32,
+            rounded_x: rounded.x as f32,
+            rounded_y: rounded.y as f32,
+            velocity_x: flow.velocity_world_mps[0],
+            velocity_y: flow.velocity_world_mps[1],
+            covariance_xx: flow.covariance[0],
+            covariance_xy: flow.covariance[1],
+            covariance_yy: flow.covariance[2],
+            age: flow.age,
+            speed_x: speed.x as f32,
+            speed_y: speed.y as f32,
+            dt: seen.dt_s as f32,
+        }
+    }
+
+    /// A displacement in the frame of the grid as a displacement over ground.
+    fn over_ground(&self, seen: &Seen, at: DVec3, by: DVec3) -> DVec3 {
+        match self.profile.frame {
+            Frame::Lattice => by,
+            Frame::Sensor => seen.then.transform(at + by) - seen.now().transform(at),
+        }
+    }
+
+    /// A displacement over ground in the frame of the grid.
+    fn in_grid(&self, seen: &Seen, at: DVec3, by: DVec3) -> DVec3 {
+        match self.profile.frame {
+            Frame::Lattice => by,
+            Frame::Sensor => {
+                seen.then.inverse().transform(seen.now().transform(at) + by) - at
+            }
+        }
+    }
+}

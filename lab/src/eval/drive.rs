@@ -1,0 +1,179 @@
+//! One drive: the pipeline on one thread, rows and pictures on another.
+
+use super::collect::{Collector, Seen};
+use super::facts::Facts;
+use super::objects::Objects;
+use super::rows_file;
+use crate::labels::{self, View};
+use raywake::args::BackendChoice;
+use raywake::config::Weights;
+use raywake::engine::{self, Plan};
+use raywake::error::Error;
+use raywake::outputs::Kinds;
+use raywake::source::{self, OpenOptions, Source};
+use raywake_core::params::Profile;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Instant;
+
+/// Pairs that may wait for their rows: the pipeline waits where rows take longer.
+const WAITING: usize = 2;
+
+/// What all drives of an evaluation have in common.
+pub struct Settings {
+    /// Checked.
+    pub profile: Profile,
+    /// Read and checked.
+    pub weights: Weights,
+    /// Digest of the weights' texts.
+    pub weights_digest: String,
+    /// Where the heavy half runs.
+    pub backend: BackendChoice,
+    /// How recordings are opened.
+    pub open: OpenOptions,
+    /// By how much a box reaches beyond its sides, m.
+    pub margin_m: f64,
+    /// Sweeps of a drive at most.
+    pub sweeps: usize,
+}
+
+impl Settings {
+    /// What decides the rows of a drive.
+    fn key(&self, source: &dyn Source) -> serde_json::Value {
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "profile": format!("{:?}", self.profile),
+            "weights": self.weights_digest,
+            "backend": format!("{:?}", self.backend.backend),
+            "margin_m": self.margin_m,
+            "sweeps": self.sweeps.min(source.len()),
+            "first_frame": source.frame(0),
+        })
+    }
+}
+
+/// Files of a drive's results.
+pub struct Files {
+    /// Rows.
+    pub rows: PathBuf,
+    /// Facts, written last.
+    pub facts: PathBuf,
+}
+
+impl Files {
+    /// Of a drive in a folder of results.
+    pub fn of(out: &Path, drive: &str) -> Files {
+        Files {
+            rows: out.join("rows").join(format!("{drive}.parquet")),
+            facts: out.join("drives").join(format!("{drive}.json")),
+        }
+    }
+}
+
+/// Evaluates the drive at `path` unless that has been done with the same settings. Returns its
+/// facts and whether they were there already.
+pub fn evaluate(
+    path: &Path,
+    name: &str,
+    settings: &Settings,
+    out: &Path,
+) -> Result<(Facts, bool), Error> {
+    let begin = Instant::now();
+    let mut source = source::open(path, &settings.open)?;
+    let files = Files::of(out, name);
+    let key = settings.key(source.as_ref());
+    if files.rows.is_file()
+        && let Ok(facts) = Facts::read(&files.facts)
+        && facts.settings == key
+    {
+        return Ok((facts, true));
+    }
+    let labels = labels::open(path, source.as_ref())?;
+    let objects = Objects::new(&labels, source.as_ref());
+    let mut facts = Facts {
+        drive: name.to_string(),
+        settings: key,
+        view: view(labels.view).into(),
+        tracks: labels.tracks.len(),
+        boxes: labels.tracks.iter().map(|t| t.boxes.len()).sum(),
+        notes: [source.notes(), &labels.notes, &objects.notes].concat(),
+        ..Facts::default()
+    };
+    let collector = Collector::new(
+        settings.profile.clone(),
+        source.rig().clone(),
+        source.pose(0),
+        settings.weights.tables(&settings.profile)?.filter,
+        &objects,
+        labels.view,
+        settings.margin_m,
+    );
+    run(source.as_mut(), settings, &files, collector, &mut facts)?;
+    facts.seconds = begin.elapsed().as_secs_f64();
+    facts.write(&files.facts)?;
+    Ok((facts, false))
+}
+
+fn view(view: View) -> &'static str {
+    match view {
+        View::All => "all around",
+        View::Camera => "the front camera's view",
+    }
+}
+
+/// The pipeline here, rows on a thread of their own.
+fn run(
+    source: &mut dyn Source,
+    settings: &Settings,
+    files: &Files,
+    collector: Collector,
+    facts: &mut Facts,
+) -> Result<(), Error> {
+    let plan = Plan {
+        profile: settings.profile.clone(),
+        weights: settings.weights.clone(),
+        backend: &settings.backend,
+        sweeps: 0..settings.sweeps.min(source.len()),
+        out: None,
+        kinds: Kinds::default(),
+        summary: None,
+        quiet: true,
+    };
+    let (send, receive) = sync_channel(WAITING);
+    let drive = facts.drive.clone();
+    let (summary, written) = std::thread::scope(|scope| {
+        let rows = scope.spawn(move || collect(&drive, collector, &receive, files));
+        let summary = engine::execute(&plan, source, &mut |_, pair| {
+            facts.pair(pair.first.points.len(), pair.laps);
+            // Fails where the other thread has; it will say why.
+            let _ = send.send(Seen::of(pair));
+        });
+        drop(send);
+        (summary, rows.join().expect("the thread that makes rows panicked"))
+    });
+    let summary = summary?;
+    written?;
+    if summary.interrupted {
+        return Err(Error::Interrupted);
+    }
+    facts.sweeps = summary.sweeps;
+    facts.pairs = summary.pairs;
+    facts.digest = summary.digest;
+    facts.notes.extend(summary.resets.iter().skip(1).map(|r| format!("frame {}: {}", r.frame, r.text)));
+    let dropped = summary.dropped.to_string();
+    facts.notes.push(format!("left out by the pipeline: {dropped}"));
+    Ok(())
+}
+
+/// Rows of all pairs as they come.
+fn collect(
+    drive: &str,
+    mut collector: Collector,
+    pairs: &Receiver<Seen>,
+    files: &Files,
+) -> Result<(), Error> {
+    rows_file::write(&files.rows, drive, || {
+        Ok(pairs.recv().ok().map(|seen| collector.rows(&seen)))
+    })
+}
