@@ -12,7 +12,7 @@ enum Command {
     /// Train learned numbers on labelled drives.
     #[command(subcommand)]
     Train(train::Command),
-    /// Measure a background filter on a recorded drive with boxes.csv.
+    /// Measure a background filter on a recorded drive with labels.
     CheckFilter(check::Args),
 }
 
