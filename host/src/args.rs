@@ -145,7 +145,7 @@ pub enum Validate {
 }
 
 /// Which backend.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Backend")]
 pub struct BackendChoice {
     /// Where the heavy half runs

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use raywake_core::background_filter::{self, TABLE_WORDS};
+use raywake_core::digest::Digest;
 use raywake_core::occupancy_constancy::{self, SCORES_MAX, WEIGHT_WORDS};
 use raywake_core::params::{Birth, Frame, Profile};
 use raywake_core::weights::WeightsError;
@@ -149,6 +150,7 @@ fn read(path: &Path) -> Result<String, Error> {
 }
 
 /// The texts of both weights files, checked against a profile.
+#[derive(Clone)]
 pub struct Weights {
     filter: Option<String>,
     constancy: String,
@@ -176,6 +178,12 @@ impl Weights {
         occupancy_constancy::load(&constancy.1, levels, &mut words, &mut costs)
             .map_err(|e| mistake(constancy.0, "occupancy constancy", "--constancy", profile, e))?;
         Ok(Weights { filter: filter.map(|f| f.1), constancy: constancy.1 })
+    }
+
+    /// A digest of both texts, 16 hexadecimal digits.
+    pub fn digest(&self) -> String {
+        let all = format!("{:?}{}", self.filter, self.constancy);
+        format!("{:016x}", Digest::of(all.as_bytes()))
     }
 
     /// The tables made of them.

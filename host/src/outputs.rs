@@ -23,7 +23,7 @@ use crate::sink::{argoverse, atomic, feather, picture};
 use crate::source::SweepData;
 
 /// Which files are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
     /// Feather files of columns and tracklets.
     pub columns: bool,

@@ -2,7 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
-use raywake_lab::{check, train};
+use raywake_lab::{check, eval, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -12,6 +12,8 @@ enum Command {
     /// Train learned numbers on labelled drives.
     #[command(subcommand)]
     Train(train::Command),
+    /// Run labelled drives through the pipeline and compare flow and tracklets with the truth.
+    Eval(Box<eval::Args>),
     /// Measure a background filter on a recorded drive with labels.
     CheckFilter(check::Args),
 }
@@ -19,6 +21,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command),
+        Command::Eval(args) => eval::run(&args).map_err(Into::into),
         Command::CheckFilter(args) => check::run(&args),
     };
     match done {

@@ -22,8 +22,6 @@ pub struct Seen {
     pub first: SweepData,
     /// Pose of the vehicle in the second.
     pub then: Pose,
-    /// Frame of the second.
-    pub frame_then: u64,
     /// Time between them, s.
     pub dt_s: f64,
     /// Flow of the first sweep's columns.
@@ -39,7 +37,6 @@ impl Seen {
             index: pair.index,
             first: pair.first.clone(),
             then: pair.second.world_from_vehicle,
-            frame_then: pair.second.frame,
             dt_s: pair.flows.dt_s,
             columns: pair.flows.columns.to_vec(),
             points: pair.flows.points.to_vec(),
@@ -83,7 +80,7 @@ impl<'a> Collector<'a> {
     /// Rows of the first sweep's solid columns.
     pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
-        let present = self.objects.at(seen.first.frame, seen.frame_then);
+        let present = self.objects.at(seen.first.frame);
         let side = self.profile.side as i32;
         let mut rows = Vec::with_capacity(seen.columns.len());
         for flow in &seen.columns {
@@ -95,7 +92,7 @@ impl<'a> Collector<'a> {
             let column = (i * side + j) as usize;
             let masks = self.grid.columns[column][0];
             let score = score(&self.grid.step, &self.filter, &self.grid.columns, column);
-            rows.push(self.row(seen, flow, &present, (masks >> 16).count_ones() as u8, score));
+            rows.push(self.row(seen, flow, present, (masks >> 16).count_ones() as u8, score));
         }
         rows
     }
@@ -176,9 +173,7 @@ impl<'a> Collector<'a> {
     fn in_grid(&self, seen: &Seen, at: DVec3, by: DVec3) -> DVec3 {
         match self.profile.frame {
             Frame::Lattice => by,
-            Frame::Sensor => {
-                seen.then.inverse().transform(seen.now().transform(at) + by) - at
-            }
+            Frame::Sensor => seen.then.inverse().transform(seen.now().transform(at) + by) - at,
         }
     }
 }

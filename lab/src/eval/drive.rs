@@ -155,12 +155,14 @@ fn run(
     let summary = summary?;
     written?;
     if summary.interrupted {
-        return Err(Error::Interrupted);
+        return Err(Error::Usage("interrupted".into()));
     }
     facts.sweeps = summary.sweeps;
     facts.pairs = summary.pairs;
     facts.digest = summary.digest;
-    facts.notes.extend(summary.resets.iter().skip(1).map(|r| format!("frame {}: {}", r.frame, r.text)));
+    facts
+        .notes
+        .extend(summary.resets.iter().skip(1).map(|r| format!("frame {}: {}", r.frame, r.text)));
     let dropped = summary.dropped.to_string();
     facts.notes.push(format!("left out by the pipeline: {dropped}"));
     Ok(())
@@ -173,7 +175,5 @@ fn collect(
     pairs: &Receiver<Seen>,
     files: &Files,
 ) -> Result<(), Error> {
-    rows_file::write(&files.rows, drive, || {
-        Ok(pairs.recv().ok().map(|seen| collector.rows(&seen)))
-    })
+    rows_file::write(&files.rows, drive, || Ok(pairs.recv().ok().map(|seen| collector.rows(&seen))))
 }

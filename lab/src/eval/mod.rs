@@ -1,5 +1,165 @@
 //! `raywake-lab eval`: chapter 3's tables and figures, and today's metrics, on labelled drives.
+//!
+//! Two steps. Every drive goes through the pipeline once and leaves its rows (Parquet, one per
+//! solid column of every pair) and facts (JSON) in the folder of results: on several drives at a
+//! time, and only on those not there yet. Then all rows are read again for tables, figures and
+//! the report; any engine that reads Parquet can do the same over more drives than one machine
+//! holds.
 
+mod collect;
+mod conclude;
+mod drive;
+mod facts;
+mod figures;
+mod objects;
 mod row;
+mod rows_file;
 mod statistics;
+mod tables;
 mod tally;
+
+use conclude::conclude;
+use drive::Settings;
+use facts::Facts;
+use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
+use raywake::config::{self, Weights};
+use raywake::engine::interrupted;
+use raywake::error::Error;
+use raywake::sink::atomic;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// `raywake-lab eval`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Labelled drives: simulated, KITTI or Argoverse 2
+    #[arg(required = true, value_name = "DRIVE")]
+    drives: Vec<PathBuf>,
+    /// Folder of results: report.html, rows/DRIVE.parquet, drives/DRIVE.json, charts
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    profile: ProfileChoice,
+    #[command(flatten)]
+    learned: Learned,
+    #[command(flatten)]
+    backend: BackendChoice,
+    #[command(flatten)]
+    recording: Recording,
+    /// By how much a box reaches beyond its sides, m: the dissertation's programs have 0 (chapter
+    /// 3) and 0.3 (chapter 4)
+    #[arg(long, value_name = "M", default_value_t = 0.0)]
+    margin: f64,
+    /// Drives at a time; each keeps two cores busy
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    jobs: usize,
+    /// Stop after this many sweeps of every drive
+    #[arg(short = 'n', value_name = "COUNT")]
+    count: Option<usize>,
+}
+
+/// Evaluates, writes and prints. Drives that fail are named at the end; the others are evaluated.
+pub fn run(args: &Args) -> Result<(), Error> {
+    if !(0.0..=2.0).contains(&args.margin) {
+        return Err(Error::Usage("--margin must be 0 to 2 m".into()));
+    }
+    let profile = config::profile(&args.profile)?;
+    let weights = Weights::read(&args.learned, &profile)?;
+    let settings = Settings {
+        weights_digest: weights.digest(),
+        weights,
+        profile,
+        backend: args.backend.clone(),
+        open: args.recording.options(),
+        margin_m: args.margin,
+        sweeps: args.count.unwrap_or(usize::MAX),
+    };
+    let names = names(&args.drives)?;
+    for folder in ["rows", "drives"] {
+        atomic::create_folder(&args.out.join(folder))?;
+    }
+    raywake::engine::listen();
+    let (done, failed) = all(&names, &settings, &args.out, args.jobs.max(1));
+    if interrupted() {
+        return Err(Error::Usage("interrupted; the drives that were finished stay".into()));
+    }
+    if !done.is_empty() {
+        for table in conclude(&done, &settings, &args.out)? {
+            println!("{}", table.caption);
+        }
+        println!("report: {}", args.out.join("report.html").display());
+    }
+    match failed.first() {
+        None => Ok(()),
+        Some(_) => {
+            let list = failed.iter().map(|(name, e)| format!("{name}: {e}"));
+            let list = list.collect::<Vec<_>>().join("\n  ");
+            Err(Error::Usage(format!("{} drives failed:\n  {list}", failed.len())))
+        }
+    }
+}
+
+/// A name for every drive: its folder's.
+fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
+    let mut names = BTreeMap::new();
+    for path in drives {
+        let full = path.canonicalize().map_err(Error::reading(path))?;
+        let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if let Some(other) = names.insert(name, path.as_path()) {
+            let what = format!("has the same name as {}", other.display());
+            return Err(Error::input(path, "", what));
+        }
+    }
+    Ok(names)
+}
+
+/// Evaluates all drives, `jobs` at a time.
+fn all(
+    names: &BTreeMap<String, &Path>,
+    settings: &Settings,
+    out: &Path,
+    jobs: usize,
+) -> (Vec<Facts>, Vec<(String, Error)>) {
+    let list: Vec<_> = names.iter().collect();
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+    let work = || {
+        while let Some((name, path)) = list.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if interrupted() {
+                return;
+            }
+            let result = drive::evaluate(path, name, settings, out);
+            let mut done = done.lock().expect("no thread panics with it");
+            done.insert(name.to_string(), result);
+            say(&done[*name], name, done.len(), list.len());
+        }
+    };
+    std::thread::scope(|scope| {
+        (0..jobs.min(list.len())).for_each(|_| {
+            scope.spawn(work);
+        });
+    });
+    let (mut good, mut bad) = (Vec::new(), Vec::new());
+    for (name, result) in done.into_inner().expect("no thread panicked with it") {
+        match result {
+            Ok((facts, _)) => good.push(facts),
+            Err(e) => bad.push((name, e)),
+        }
+    }
+    (good, bad)
+}
+
+fn say(result: &Result<(Facts, bool), Error>, name: &str, n: usize, of: usize) {
+    match result {
+        Ok((_, true)) => eprintln!("[{n}/{of}] {name}: there already"),
+        Ok((f, false)) => {
+            let rate = f.sweeps as f64 / f.seconds;
+            eprintln!(
+                "[{n}/{of}] {name}: {} sweeps, {:.1} s, {rate:.1} sweeps/s",
+                f.sweeps, f.seconds
+            );
+        }
+        Err(e) => eprintln!("[{n}/{of}] {name}: failed: {e}"),
+    }
+}

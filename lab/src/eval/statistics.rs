@@ -15,19 +15,6 @@ pub struct Errors {
     values: Vec<(f32, u8)>,
 }
 
-/// What a table shows of errors; NaN where there are none.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
-    /// Sum of the weights.
-    pub count: u64,
-    /// Weighted median.
-    pub median: f64,
-    /// Weighted mean.
-    pub mean: f64,
-    /// Share strictly below the limit, 0..1.
-    pub within: f64,
-}
-
 impl Errors {
     /// Adds one. A NaN counts as infinite: nothing gets better by failing.
     pub fn push(&mut self, error: f32, voxels: u8) {
@@ -98,16 +85,6 @@ impl Sorted {
             })
             .sum();
         if self.values.is_empty() { f64::NAN } else { sum / self.count() as f64 }
-    }
-
-    /// All of it, with the share below `limit`.
-    pub fn summary(&self, limit: f64) -> Summary {
-        Summary {
-            count: self.count(),
-            median: self.quantile(0.5),
-            mean: self.mean(),
-            within: self.share_below(limit),
-        }
     }
 
     /// Weight in bins of `width` from 0, the last one open.

@@ -37,6 +37,11 @@ impl Estimate {
         }
     }
 
+    /// Whether it needs no LIDAR.
+    pub fn is_reference(self) -> bool {
+        !matches!(self, Estimate::Ours | Estimate::Matched)
+    }
+
     /// Displacement over ground, m; none where the column does not count.
     fn of(self, row: &Row) -> Option<[f32; 2]> {
         match self {

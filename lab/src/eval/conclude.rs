@@ -1,0 +1,162 @@
+//! From the rows of all drives to tables, figures and the report.
+
+use super::drive::{Files, Settings};
+use super::facts::Facts;
+use super::tally::{Group, Motion, Tally, Truth, at_recall, at_threshold, curve};
+use super::statistics::Weight;
+use super::{figures, rows_file, tables};
+use crate::report::{Picture, Report, Table};
+use raywake::error::Error;
+use std::path::Path;
+
+/// Reads the rows of all drives, writes the report and returns the tables for the screen.
+pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec<Table>, Error> {
+    let mut tally = Tally::new();
+    for facts in drives {
+        let rows = Files::of(out, &facts.drive).rows;
+        rows_file::read(&rows, |rows| rows.iter().for_each(|row| tally.row(row)))?;
+    }
+    let curve = curve(&tally.scores);
+    let mut report = Report::new("Temporal scene flow", &subtitle(drives));
+    headlines(&mut report, &tally, drives);
+    facts(&mut report, drives, settings);
+    let [by_class, by_motion] = figures::histograms(&tally, settings.profile.voxel_m);
+    let shown = [
+        tables::raw_flow(&tally, Weight::Column),
+        tables::references(&tally, Truth::Raw),
+        tables::tracklets(&tally),
+        tables::filter(&curve),
+        tables::times(drives),
+    ];
+    let [raw, beside, settled, filter, times] = shown.clone();
+    report
+        .section("Raw scene flow")
+        .text(RAW)
+        .table(raw)
+        .chart(by_class)
+        .chart(by_motion)
+        .table(beside)
+        .chart(figures::references(&tally))
+        .table(tables::references(&tally, Truth::Smooth))
+        .table(tables::raw_flow(&tally, Weight::Voxel));
+    report
+        .section("Temporal scene flow")
+        .text(TRACKLETS)
+        .table(settled)
+        .chart(figures::settled(&tally))
+        .chart(figures::tracklets(&tally));
+    report
+        .section("Background filter")
+        .table(filter)
+        .chart(figures::precision_recall(&curve));
+    report
+        .section("Time")
+        .table(times)
+        .chart(figures::times(drives))
+        .chart(figures::time_by_points(drives));
+    pictures(&mut report, drives, out)?;
+    choices(&mut report, drives, settings, &tally);
+    report.write(out)?;
+    Ok(shown.into())
+}
+
+const RAW: &str = "The error is the distance between the displacement found for a solid column from \
+    one sweep to the next and that of the labelled box its centre lies in. Columns that the filter \
+    takes for background, and columns without a match, put out no motion over ground and are \
+    scored as such.";
+
+const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
+    tracklet and that of its object at the column's centre.";
+
+fn subtitle(drives: &[Facts]) -> String {
+    let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
+    format!("{} drives, {pairs} pairs of sweeps", drives.len())
+}
+
+fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
+    let flow = |motion| {
+        tally.flow(super::tally::Estimate::Ours, Truth::Raw, Group::Labelled, motion, Weight::Column)
+    };
+    let number = |v: f64, unit: &str, digits: usize| {
+        if v.is_finite() { format!("{v:.digits$} {unit}") } else { "–".into() }
+    };
+    let (moving, parked) = (flow(Motion::Moving), flow(Motion::Parked));
+    let settled = tally.settled(Group::Labelled, Motion::Moving, Weight::Column);
+    report.headline(
+        &number(100.0 * moving.quantile(0.5), "cm", 1),
+        "median error of raw flow, moving",
+        "all labelled, moving and parked, in the dissertation: 11.0 cm",
+    );
+    report.headline(
+        &number(100.0 * parked.quantile(0.5), "cm", 1),
+        "median error of raw flow, parked",
+        "truth: labels as they are, which jitter",
+    );
+    report.headline(
+        &number(settled.quantile(0.5), "m/s", 2),
+        "median error of tracklets of age 10 and more, moving",
+        "all labelled in the dissertation: 0.50 m/s",
+    );
+    let stages = tables::stages(drives);
+    let total = stages.last().map(|s| s.1.as_slice()).unwrap_or_default();
+    if let Some(s) = raywake::statistics::Spread::of(total) {
+        report.headline(
+            &number(s.median, "ms", 1),
+            "median time of a pair of sweeps",
+            "the dissertation's mean on a GTX 1080: 85.7 ms",
+        );
+    }
+}
+
+fn facts(report: &mut Report, drives: &[Facts], settings: &Settings) {
+    report.fact("Profile", &settings.profile.name);
+    report.fact("Weights", &settings.weights_digest);
+    let list = |f: &dyn Fn(&Facts) -> String| drives.iter().map(f).collect::<Vec<_>>().join(", ");
+    if drives.len() <= 12 {
+        report.fact("Drives", &list(&|d| format!("{} ({})", d.drive, d.digest)));
+    }
+    let times: f64 = drives.iter().map(|d| d.seconds).sum();
+    let sweeps: u64 = drives.iter().map(|d| d.sweeps).sum();
+    report.fact("Evaluated", &format!("{sweeps} sweeps in {times:.1} s of work"));
+}
+
+/// Best and worst sweeps, of the first drives.
+fn pictures(report: &mut Report, drives: &[Facts], out: &Path) -> Result<(), Error> {
+    const SHOWN: usize = 8;
+    let panels: Vec<_> = drives.iter().flat_map(|d| &d.panels).take(SHOWN).collect();
+    if panels.is_empty() {
+        return Ok(());
+    }
+    let section = report.section("Best and worst sweeps");
+    for (n, panel) in panels.into_iter().enumerate() {
+        let path = out.join("panels").join(&panel.file);
+        let png = std::fs::read(&path).map_err(Error::reading(&path))?;
+        let (id, caption) = (format!("panel-{n}"), panel.caption.clone());
+        section.picture(Picture { id, caption, png });
+    }
+    Ok(())
+}
+
+/// Every choice that decides what is counted.
+fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &Tally) {
+    let boxes: usize = drives.iter().map(|d| d.boxes).sum();
+    let tracks: usize = drives.iter().map(|d| d.tracks).sum();
+    let section = report.section("What is counted");
+    section.text(&format!(
+        "A column belongs to the first labelled box, in the order of the labels, that its centre \
+         lies in, seen from above, with a margin of {} m. {tracks} labelled objects have {boxes} \
+         boxes.\n\n\
+         Columns count where labels are complete, at both ends of their true motion: in drives \
+         labelled in a front camera's view, within 40 degrees of straight ahead; in the others, all \
+         around. {} columns do not.\n\n\
+         An object moves from {} m/s over ground on.\n\n\
+         Columns without a valid match and columns that the filter rejects are scored with what \
+         the program puts out for them: no motion over ground.",
+        settings.margin_m,
+        tally.out_of_view,
+        super::objects::MOVING_MPS,
+    ));
+    let views = drives.iter().map(|d| format!("`{}`: labelled in {}", d.drive, d.view));
+    let notes = drives.iter().flat_map(|d| d.notes.iter().map(|n| format!("`{}`: {n}", d.drive)));
+    section.text(&views.chain(notes).take(200).collect::<Vec<_>>().join("\n\n"));
+}

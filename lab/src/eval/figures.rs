@@ -1,0 +1,191 @@
+//! Figures 3.6 to 3.9 and B.4 of an evaluation.
+
+use super::facts::Facts;
+use super::statistics::{Sorted, Weight};
+use super::tables::{RECALL, stages};
+use super::tally::{Estimate, Group, Motion, Operating, Tally, Truth, at_recall, at_threshold};
+use crate::report::{
+    Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
+};
+use raywake::statistics::{BUDGET_MS, Spread};
+
+/// Bins of the histograms: 5 cm, up to 1.5 m.
+const BIN_M: f64 = 0.05;
+const BINS: usize = 30;
+/// Ends of the axes of distributions.
+const CDF_M: f64 = 1.0;
+const CDF_MPS: f64 = 3.0;
+/// Points of a curve.
+const POINTS: usize = 200;
+
+/// Classes with a figure of their own in the dissertation, and all that are there.
+fn groups(tally: &Tally) -> Vec<Group> {
+    let some = |g: &Group| tally.coverage(*g, Motion::Any)[0] > 0;
+    Group::labelled().chain([Group::Class(0)]).filter(some).collect()
+}
+
+/// Figure 3.6: precision over recall of the background filter.
+pub fn precision_recall(curve: &[Operating]) -> Chart {
+    let mark = |p: Option<Operating>, label: &str| {
+        p.map(|p| Mark { at: [p.recall, p.precision], label: label.into() })
+    };
+    let marks = [mark(at_threshold(curve, 0), "shipped"), mark(at_recall(curve, RECALL), "95 %")];
+    let thin = curve.len().div_ceil(4 * POINTS).max(1);
+    let points = curve.iter().step_by(thin).chain(curve.last());
+    let series = Series {
+        name: "background filter".into(),
+        points: points.map(|p| [p.recall, p.precision]).collect(),
+        style: Style::Line,
+        marks: marks.into_iter().flatten().collect(),
+    };
+    let mut lines = Lines::new(
+        Axis::new("recall of labelled columns").range(0.0, 1.0),
+        Axis::new("precision").range(0.0, 1.0),
+    );
+    lines.series.push(series);
+    let caption = "Figure 3.6. Precision and recall of the background filter over solid columns in \
+        view, for every threshold; foreground is the positive class.";
+    Chart::new("figure-3-6", caption, Plot::Lines(lines))
+}
+
+fn histogram(errors: &Sorted, cell_m: f64) -> Plot {
+    let mut counts = errors.histogram(BIN_M, BINS + 1);
+    let overflow = counts.pop().unwrap_or(0);
+    let histogram = Histogram {
+        x: "error, m".into(),
+        y: "columns".into(),
+        width: BIN_M,
+        counts,
+        overflow,
+        skipped: 0,
+        line: None,
+    };
+    Plot::Histogram(histogram.line(cell_m, "cell"))
+}
+
+/// Figures 3.7 and 3.8: errors of the raw flow by class, and of all that moves and is parked.
+pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
+    let of = |group, motion| {
+        histogram(&tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column), cell_m)
+    };
+    let by_class = groups(tally)
+        .into_iter()
+        .filter(|g| *g != Group::Labelled)
+        .map(|g| (g.label().to_string(), of(g, Motion::Any)));
+    let motions = [Motion::Moving, Motion::Parked];
+    let by_motion = motions.map(|m| (format!("All labelled, {}", m.label()), of(Group::Labelled, m)));
+    [
+        Chart::small_multiples(
+            "figure-3-7",
+            "Figure 3.7. Errors of the raw flow by class; the dashed line is the size of a cell.",
+            by_class.collect(),
+        ),
+        Chart::small_multiples(
+            "figure-3-8",
+            "Figure 3.8. Errors of the raw flow of all labelled columns, moving and parked apart.",
+            by_motion.into(),
+        ),
+    ]
+}
+
+fn cdf(name: &str, errors: &Sorted, limit: f64, style: Style) -> Series {
+    let name = format!("{name}, n = {}", errors.count());
+    Series { name, points: errors.cdf(limit, POINTS), style, marks: Vec::new() }
+}
+
+/// Raw flow of what moves and what is parked beside the estimates that need no LIDAR.
+pub fn references(tally: &Tally) -> Chart {
+    let part = |motion: Motion| {
+        let mut lines = Lines::new(
+            Axis::new("error, m").range(0.0, CDF_M),
+            Axis::new("share of columns").range(0.0, 1.0),
+        );
+        lines.series = Estimate::ALL
+            .iter()
+            .map(|e| {
+                let errors = tally.flow(*e, Truth::Raw, Group::Labelled, motion, Weight::Column);
+                let style = if e.is_reference() { Style::Reference } else { Style::Line };
+                Series { name: e.label().into(), ..cdf("", &errors, CDF_M, style) }
+            })
+            .collect();
+        (motion.label().to_string(), Plot::Lines(lines))
+    };
+    let caption = "Raw flow of all labelled columns beside estimates that need no LIDAR.";
+    let parts = [Motion::Moving, Motion::Parked].map(part);
+    Chart::small_multiples("figure-references", caption, parts.into())
+}
+
+/// Figure 3.9: errors of tracklets by age, by class.
+pub fn tracklets(tally: &Tally) -> Chart {
+    let part = |group: Group| {
+        let mut lines = Lines::new(
+            Axis::new("error, m/s").range(0.0, CDF_MPS),
+            Axis::new("share of columns").range(0.0, 1.0),
+        );
+        lines.ordered = true;
+        lines.series = Tally::AGES
+            .iter()
+            .enumerate()
+            .map(|(n, age)| {
+                let errors = tally.at_age(n, group, Motion::Any);
+                let series = cdf("", &errors, CDF_MPS, Style::Line);
+                Series { name: format!("age {age}"), ..series }
+            })
+            .collect();
+        (group.label().to_string(), Plot::Lines(lines))
+    };
+    let labelled = groups(tally).into_iter().filter(|g| *g != Group::Class(0));
+    let caption = "Figure 3.9. Errors of the velocity of tracklets after so many observations.";
+    Chart::small_multiples("figure-3-9", caption, labelled.map(part).collect())
+}
+
+/// Settled tracklets, moving and parked apart.
+pub fn settled(tally: &Tally) -> Chart {
+    let mut lines = Lines::new(
+        Axis::new("error, m/s").range(0.0, CDF_MPS),
+        Axis::new("share of columns").range(0.0, 1.0),
+    );
+    for motion in [Motion::Moving, Motion::Parked] {
+        let errors = tally.settled(Group::Labelled, motion, Weight::Column);
+        lines.series.push(cdf(motion.label(), &errors, CDF_MPS, Style::Line));
+    }
+    lines.guides.push(Guide::Y(0.5, "median".into()));
+    let caption = "Errors of the velocity of tracklets of age 10 and more, all labelled columns.";
+    Chart::new("figure-settled", caption, Plot::Lines(lines))
+}
+
+/// Table 3.3 as bars: median and 99 % of every stage.
+pub fn times(drives: &[Facts]) -> Chart {
+    let stages = stages(drives);
+    let bar = |ms: &[f64]| {
+        Spread::of(ms).map(|s| Bar { value: s.median, spread: Some([s.median, s.p99]) })
+    };
+    let series = BarSeries {
+        name: "median, with a line to 99 %".into(),
+        reference: false,
+        bars: stages.iter().map(|s| bar(&s.1)).collect(),
+    };
+    let categories = stages.iter().map(|s| s.0.clone()).collect();
+    let bars = Bars { x: Axis::new("ms"), categories, series: vec![series] };
+    let caption = "Time of every stage per pair of sweeps: median, and a line to the 99 % quantile.";
+    Chart::new("figure-stages", caption, Plot::Bars(bars))
+}
+
+/// Section B.4: time against number of points.
+pub fn time_by_points(drives: &[Facts]) -> Chart {
+    let points = drives.iter().flat_map(|d| d.points.iter().zip(&d.totals));
+    let series = Series {
+        name: "pairs of sweeps".into(),
+        points: points.map(|(n, ms)| [*n as f64, *ms]).collect(),
+        style: Style::Dots,
+        marks: Vec::new(),
+    };
+    let mut lines = Lines::new(Axis::new("returns of the sweep"), Axis::new("total time, ms"));
+    lines.series.push(series);
+    let slowest = drives.iter().flat_map(|d| &d.totals).fold(0.0, |a, b| f64::max(a, *b));
+    if slowest > 0.5 * BUDGET_MS {
+        lines.guides.push(Guide::Y(BUDGET_MS, "time between sweeps".into()));
+    }
+    let caption = "Section B.4. Time of a pair of sweeps against its number of returns.";
+    Chart::new("figure-b-4", caption, Plot::Lines(lines))
+}
