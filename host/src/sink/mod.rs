@@ -6,7 +6,7 @@ pub mod atomic;
 mod canvas;
 pub mod feather;
 pub mod picture;
-mod table;
+pub mod table;
 
 #[cfg(test)]
 mod tests;

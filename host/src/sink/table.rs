@@ -6,22 +6,38 @@ use super::Meta;
 use crate::error::Error;
 
 /// Values of one column.
-#[cfg_attr(not(feature = "arrow"), allow(dead_code))]
-pub(super) enum Column {
+pub enum Column {
+    /// float32.
     F32(Vec<f32>),
+    /// float64.
     F64(Vec<f64>),
+    /// int32.
     I32(Vec<i32>),
+    /// uint8.
+    U8(Vec<u8>),
+    /// uint32.
     U32(Vec<u32>),
+    /// uint64.
+    U64(Vec<u64>),
+    /// bool.
     Bool(Vec<bool>),
+    /// utf8.
+    Text(Vec<String>),
 }
 
 /// A table under construction.
 #[derive(Default)]
-pub(super) struct Table {
+pub struct Table {
     columns: Vec<(String, Column)>,
+    compressed: bool,
 }
 
 impl Table {
+    /// A table that is written with LZ4: a third of a sweep's truth, at some milliseconds.
+    pub fn compressed() -> Table {
+        Table { compressed: true, ..Table::default() }
+    }
+
     /// Adds a column; all must be of the same length.
     pub fn push(&mut self, name: &str, column: Column) {
         self.columns.push((name.to_owned(), column));
@@ -52,13 +68,16 @@ impl Table {
         self.push(name, Column::Bool(rows.iter().map(value).collect()));
     }
 
-    /// Writes the table, uncompressed: a sweep's worth takes a millisecond then. The metadata goes
-    /// to the schema, with this program's version as `raywake`.
+    /// Writes the table, uncompressed unless it was made so: a sweep's worth takes a millisecond
+    /// then. The metadata goes to the schema, with this program's version as `raywake`.
     #[cfg(feature = "arrow")]
     pub fn write(self, path: &Path, meta: Meta<'_>) -> Result<(), Error> {
         let batch = arrow::batch(self.columns, meta)
             .map_err(|e| Error::Write { path: path.to_path_buf(), source: arrow::reason(e) })?;
-        super::atomic::write(path, |out| arrow::write(&batch, out).map_err(arrow::reason))
+        let compressed = self.compressed;
+        super::atomic::write(path, |out| {
+            arrow::write(&batch, compressed, out).map_err(arrow::reason)
+        })
     }
 
     /// Fails: this build has no feather files.
@@ -76,9 +95,11 @@ mod arrow {
     use std::sync::Arc;
 
     use arrow_array::{
-        ArrayRef, BooleanArray, Float32Array, Float64Array, Int32Array, RecordBatch, UInt32Array,
+        ArrayRef, BooleanArray, Float32Array, Float64Array, Int32Array, RecordBatch, StringArray,
+        UInt8Array, UInt32Array, UInt64Array,
     };
-    use arrow_ipc::writer::FileWriter;
+    use arrow_ipc::CompressionType;
+    use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
     use arrow_schema::{ArrowError, Field, Schema};
 
     use super::{Column, Meta};
@@ -105,14 +126,23 @@ mod arrow {
             Column::F32(v) => Arc::new(Float32Array::from(v)),
             Column::F64(v) => Arc::new(Float64Array::from(v)),
             Column::I32(v) => Arc::new(Int32Array::from(v)),
+            Column::U8(v) => Arc::new(UInt8Array::from(v)),
             Column::U32(v) => Arc::new(UInt32Array::from(v)),
+            Column::U64(v) => Arc::new(UInt64Array::from(v)),
             Column::Bool(v) => Arc::new(BooleanArray::from(v)),
+            Column::Text(v) => Arc::new(StringArray::from(v)),
         }
     }
 
     /// One batch as a file.
-    pub fn write(batch: &RecordBatch, out: &mut impl Write) -> Result<(), ArrowError> {
-        let mut writer = FileWriter::try_new(out, &batch.schema())?;
+    pub fn write(
+        batch: &RecordBatch,
+        compressed: bool,
+        out: &mut impl Write,
+    ) -> Result<(), ArrowError> {
+        let codec = compressed.then_some(CompressionType::LZ4_FRAME);
+        let options = IpcWriteOptions::default().try_with_compression(codec)?;
+        let mut writer = FileWriter::try_new_with_options(out, &batch.schema(), options)?;
         writer.write(batch)?;
         writer.finish()
     }

@@ -8,6 +8,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig};
 
 use super::poses::Track;
+use super::sidecars::Sidecars;
 use super::{Dropped, Source, SweepData};
 use crate::error::Error;
 
@@ -28,6 +29,8 @@ pub(super) struct Bins {
     pub files: Vec<(u64, PathBuf)>,
     pub track: Track,
     pub rig: Rig,
+    /// Files that tell times and sensors of returns.
+    pub sidecars: Option<Sidecars>,
     pub notes: Vec<String>,
 }
 
@@ -69,7 +72,9 @@ impl Source for Bins {
         into.stamp_s = self.track.stamps_s[index];
         into.world_from_vehicle = self.track.poses[index];
         into.twist = self.track.twist(index);
-        read_bin(path, &mut into.points)
+        read_bin(path, &mut into.points)?;
+        let Some(sidecars) = &self.sidecars else { return Ok(()) };
+        sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
     }
 
     fn notes(&self) -> &[String] {

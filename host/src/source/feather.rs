@@ -77,18 +77,18 @@ impl Table {
         })
     }
 
-    /// A column of integers (u8, u32, i32, i64, u64). Fails at a null or a value beyond i64.
+    /// A column of integers (u8, i32, u32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
         let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
             match column.data_type() {
                 DataType::UInt8 => {
                     out.extend(column.as_primitive::<UInt8Type>().iter().map(|v| v.map(i64::from)))
                 }
-                DataType::Int32 => {
-                    out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
-                }
                 DataType::UInt32 => {
                     out.extend(column.as_primitive::<UInt32Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::Int32 => {
+                    out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
                 }
                 DataType::Int64 => out.extend(column.as_primitive::<Int64Type>().iter()),
                 DataType::UInt64 => out

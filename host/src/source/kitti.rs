@@ -1,6 +1,6 @@
 //! KITTI drives and odometry sequences, and folders of `.bin` clouds that look like them.
 //!
-//! The vehicle frame is that of the Velodyne HDL-64E.
+//! The vehicle frame is that of the Velodyne HDL-64E, unless sidecars tell of other sensors.
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,7 @@ use raywake_core::sweep::{Rig, Timing};
 use super::bins::Bins;
 use super::poses::{self, Track};
 use super::recognise::{note_gaps, numbered};
+use super::sidecars::Sidecars;
 use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
 use crate::error::Error;
 
@@ -39,6 +40,7 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Bins, Erro
         None if drive.join("oxts/data").is_dir() => opening.read_oxts()?,
         None => return Err(no_poses(drive, "neither `poses.txt` nor `oxts/data`")),
     }
+    opening.sidecars = Sidecars::open(&drive.join("velodyne_points"))?;
     Ok(opening.finish(options))
 }
 
@@ -82,6 +84,7 @@ struct Opening {
     track: Track,
     /// Whether the stamps were read and not assumed.
     timed: bool,
+    sidecars: Option<Sidecars>,
     notes: Vec<String>,
 }
 
@@ -95,7 +98,16 @@ impl Opening {
         let frames: Vec<u64> = files.iter().map(|f| f.0).collect();
         note_gaps(&frames, &mut notes);
         let (root, track) = (root.to_path_buf(), Track::default());
-        Ok(Opening { root, kind, poses_from: String::new(), files, track, timed: false, notes })
+        Ok(Opening {
+            root,
+            kind,
+            poses_from: String::new(),
+            files,
+            track,
+            timed: false,
+            sidecars: None,
+            notes,
+        })
     }
 
     fn frames(&self) -> Vec<u64> {
@@ -182,12 +194,9 @@ impl Opening {
 
     fn finish(self, options: &OpenOptions) -> Bins {
         let frames = self.frames();
-        let mut rig = Rig {
-            sensors: core::iter::once(Pose::IDENTITY).collect(),
-            timing: Timing::Azimuth { span_s: self.turn_s(&frames) },
-            distorted: true,
-            ground_m: GROUND_M,
-            own_vehicle: Some(OWN_VEHICLE),
+        let mut rig = match &self.sidecars {
+            Some(sidecars) => sidecars.rig.clone(),
+            None => self.velodyne(&frames),
         };
         apply(options, &mut rig);
         Bins {
@@ -197,7 +206,19 @@ impl Opening {
             files: self.files,
             track: self.track,
             rig,
+            sidecars: self.sidecars,
             notes: self.notes,
+        }
+    }
+
+    /// KITTI's HDL-64E on its vehicle.
+    fn velodyne(&self, frames: &[u64]) -> Rig {
+        Rig {
+            sensors: core::iter::once(Pose::IDENTITY).collect(),
+            timing: Timing::Azimuth { span_s: self.turn_s(frames) },
+            distorted: true,
+            ground_m: GROUND_M,
+            own_vehicle: Some(OWN_VEHICLE),
         }
     }
 

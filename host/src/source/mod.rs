@@ -8,7 +8,8 @@
 //! | [`Format::Bin`] | `*.bin` | a file named on the command line |
 //!
 //! A `.bin` is little-endian float32 x, y, z, intensity per return. Poses and times are read and
-//! checked when a source is opened, clouds one at a time.
+//! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
+//! `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` beside its clouds.
 
 #[cfg(feature = "arrow")]
 mod argoverse;
@@ -21,6 +22,7 @@ mod kitti;
 mod oxts;
 mod poses;
 mod recognise;
+mod sidecars;
 #[cfg(feature = "demo")]
 pub mod simulated;
 pub mod text;

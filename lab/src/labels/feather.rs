@@ -81,3 +81,93 @@ fn read(
     }
     Ok(gather.finish(View::All))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Kind, tests::Temp};
+    use super::*;
+    use arrow_array::{
+        ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt32Array, UInt64Array,
+    };
+    use arrow_ipc::writer::FileWriter;
+    use glam::DVec3;
+    use std::fs;
+    use std::path::PathBuf;
+    use std::sync::Arc;
+
+    fn write(t: &Temp, name: &str, columns: Vec<(&str, ArrayRef)>) -> PathBuf {
+        let batch = RecordBatch::try_from_iter(columns).unwrap();
+        let mut writer = FileWriter::try_new(Vec::new(), &batch.schema()).unwrap();
+        writer.write(&batch).unwrap();
+        t.write(name, writer.into_inner().unwrap())
+    }
+
+    fn floats(values: [f64; 2]) -> ArrayRef {
+        Arc::new(Float64Array::from(values.to_vec()))
+    }
+
+    /// Columns of boxes after their keys; the second box is 1.5 m on.
+    fn columns<'a>(centre: [&'a str; 3], size: [&'a str; 3], x: f64) -> Vec<(&'a str, ArrayRef)> {
+        let [qw, q] = [[1.0; 2], [0.0; 2]].map(floats);
+        let mut columns = vec![("qw", qw), ("qx", q.clone()), ("qy", q.clone()), ("qz", q)];
+        columns.extend(centre.into_iter().zip([[x, x + 1.5], [2.0; 2], [0.5; 2]].map(floats)));
+        columns.extend(size.into_iter().zip([[4.0; 2], [1.8; 2], [1.5; 2]].map(floats)));
+        columns
+    }
+
+    fn logged(t: &Temp, x: f64, stamps: [i64; 2]) -> PathBuf {
+        let text = |value: &str| Arc::new(StringArray::from(vec![value; 2]));
+        let mut all = columns(["tx_m", "ty_m", "tz_m"], ["length_m", "width_m", "height_m"], x);
+        all.push(("timestamp_ns", Arc::new(Int64Array::from(stamps.to_vec()))));
+        all.push(("track_uuid", text("ab-c")));
+        all.push(("category", text("REGULAR_VEHICLE")));
+        write(t, "annotations.feather", all)
+    }
+
+    #[test]
+    fn annotations_of_a_log() {
+        let t = Temp::new();
+        let labels = annotations(&logged(&t, 7.0, [100, 200])).unwrap();
+        assert_eq!((labels.view, labels.exact, labels.notes.len()), (View::All, false, 0));
+        let [track] = &labels.tracks[..] else { panic!("{labels:?}") };
+        assert_eq!(
+            (track.id.as_str(), track.kind, track.size),
+            ("ab-c", Kind::Car, [4.0, 1.8, 1.5])
+        );
+        assert_eq!(track.boxes[&200].translation, DVec3::new(8.5, 2.0, 0.5));
+        let odd = annotations(&logged(&t, f64::NAN, [100, 200])).unwrap();
+        assert_eq!(odd.notes, ["2 boxes left out: a NaN or infinite number"]);
+        let negative = annotations(&logged(&t, 7.0, [-1, 200])).unwrap();
+        assert_eq!(negative.notes, ["1 boxes left out: a negative frame"]);
+        let twice = annotations(&logged(&t, 7.0, [200, 200])).unwrap();
+        assert_eq!(twice.notes, ["1 boxes left out: the track has another in the same frame"]);
+    }
+
+    #[test]
+    fn damaged_feather_files() {
+        let t = Temp::new();
+        let whole = fs::read(logged(&t, 7.0, [100, 200])).unwrap();
+        let refused = |bytes: &[u8]| {
+            let path = t.write("annotations.feather", bytes);
+            annotations(&path).unwrap_err().to_string()
+        };
+        assert!(refused(&whole[..whole.len() / 2]).contains("annotations.feather: truncated"));
+        assert!(refused(&[]).contains("annotations.feather: is no feather file"));
+        let path = write(&t, "annotations.feather", vec![("qw", floats([1.0; 2]))]);
+        let e = annotations(&path).unwrap_err().to_string();
+        assert!(e.ends_with("annotations.feather: has no column `timestamp_ns`"), "{e}");
+    }
+
+    #[test]
+    fn objects_of_a_simulated_drive() {
+        let t = Temp::new();
+        let mut all = columns(["x", "y", "z"], ["length", "width", "height"], 7.0);
+        all.push(("frame", Arc::new(UInt64Array::from(vec![3, 4]))));
+        all.push(("id", Arc::new(UInt32Array::from(vec![9, 9]))));
+        all.push(("class", Arc::new(StringArray::from(vec!["Pedestrian"; 2]))));
+        let labels = objects(&write(&t, "truth/objects.feather", all)).unwrap();
+        assert_eq!((labels.view, labels.exact, labels.notes.len()), (View::All, true, 0));
+        let track = &labels.tracks[0];
+        assert_eq!((track.id.as_str(), track.kind, track.boxes.len()), ("9", Kind::Pedestrian, 2));
+    }
+}

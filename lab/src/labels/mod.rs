@@ -5,7 +5,12 @@ mod feather;
 mod footprint;
 mod gather;
 mod kind;
+mod kitti_tracking;
 mod open;
+pub mod semantic_kitti;
+mod sweeps;
+mod tracklets;
+pub mod trajectory;
 
 #[cfg(test)]
 mod tests;
@@ -14,6 +19,7 @@ pub use footprint::Footprint;
 pub use kind::kind;
 pub use open::open;
 pub use raywake::error::Error;
+pub use trajectory::{Motion, Trajectory, trajectories};
 
 use glam::DVec3;
 use raywake_core::pose::Pose;

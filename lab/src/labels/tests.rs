@@ -2,7 +2,8 @@
 
 use super::*;
 use raywake::source::simulated::Simulated;
-use raywake::source::{OpenOptions, Source};
+use raywake::source::{OpenOptions, Source, SweepData};
+use raywake_core::sweep::Rig;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -38,12 +39,87 @@ impl Drop for Temp {
     }
 }
 
+/// Sweeps without clouds.
+pub(super) struct Road {
+    rig: Rig,
+    moments: Vec<(f64, Pose)>,
+}
+
+impl Road {
+    /// Stamps, s, and poses of the vehicle.
+    pub fn of(moments: impl Iterator<Item = (f64, Pose)>) -> Road {
+        let rig = Simulated::new(1, 1).rig().clone();
+        Road { rig, moments: moments.collect() }
+    }
+
+    pub fn moment(&self, index: usize) -> (f64, Pose) {
+        self.moments[index]
+    }
+}
+
+impl Source for Road {
+    fn name(&self) -> &str {
+        "road"
+    }
+
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn len(&self) -> usize {
+        self.moments.len()
+    }
+
+    fn describe(&self) -> String {
+        self.name().into()
+    }
+
+    fn frame(&self, index: usize) -> u64 {
+        index as u64
+    }
+
+    fn stamp_s(&self, index: usize) -> f64 {
+        self.moments[index].0
+    }
+
+    fn pose(&self, index: usize) -> Pose {
+        self.moments[index].1
+    }
+
+    fn read(&mut self, _: usize, _: &mut SweepData) -> Result<(), Error> {
+        unreachable!("labels need no clouds")
+    }
+
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+}
+
+/// A car with these boxes.
+pub(super) fn track(id: &str, boxes: impl Iterator<Item = (u64, Pose)>) -> Track {
+    let (id, class, kind) = (id.into(), "Car".into(), Kind::Car);
+    Track { id, class, kind, size: [4.0, 2.0, 1.5], boxes: boxes.collect() }
+}
+
+pub(super) fn labels_of(tracks: impl IntoIterator<Item = Track>) -> Labels {
+    let tracks = tracks.into_iter().collect();
+    Labels { tracks, view: View::All, exact: false, notes: Vec::new() }
+}
+
 #[test]
 fn a_drive_without_labels() {
     let t = Temp::new();
     fs::create_dir_all(t.path().join("velodyne_points/data")).unwrap();
     let e = open(t.path(), &Simulated::new(1, 1)).unwrap_err().to_string();
     assert!(e.contains("no labels found"), "{e}");
+    let tracking = "0 7 Van 0 0 -1.8 1 2 3 4 2.0 1.8 4.4 -4.9 1.7 13.3 0\n";
+    t.write("label_02/0004.txt", tracking);
+    t.write("calib/0004.txt", "R_rect 1 0 0 0 1 0 0 0 1\nTr_velo_cam 0 -1 0 0 0 0 -1 0 1 0 0 0\n");
+    let drive = t.path().join("velodyne/0004");
+    t.write("velodyne/0004/000000.bin", []);
+    for path in [t.path(), &drive] {
+        assert_eq!(open(path, &Simulated::new(1, 1)).unwrap().tracks[0].kind, Kind::Van);
+    }
     t.write("boxes.csv", "frame,track_id,class,x,y,z,l,w,h,yaw\n0,1,Car,9,0,0,4,2,2,0\n");
     assert_eq!(open(t.path(), &Simulated::new(1, 1)).unwrap().tracks.len(), 1);
 }
@@ -59,12 +135,20 @@ fn data(name: &str) -> (Box<dyn Source>, Labels) {
 #[test]
 #[ignore = "needs RAYWAKE_DATA"]
 fn recorded_drives() {
-    let (_, kitti) = data("kitti_raw_0005");
+    let (source, kitti) = data("kitti_raw_0005");
     let boxes = |labels: &Labels| labels.tracks.iter().map(|t| t.boxes.len()).sum::<usize>();
     assert_eq!((kitti.tracks.len(), boxes(&kitti), kitti.view), (15, 711, View::Camera));
+    assert!(kitti.notes.is_empty(), "{:?}", kitti.notes);
+    for (track, path) in kitti.tracks.iter().zip(trajectories(&kitti, source.as_ref())) {
+        let moves = ["0", "1", "2", "4", "12"].contains(&track.id.as_str());
+        let expected = if moves { Motion::Moving } else { Motion::Parked };
+        assert!(path.states().iter().all(|s| s.motion == expected), "{track:?}");
+    }
     let (source, log) = data("av2_log");
     let (_, pair) = data("av2_7fab2350");
     assert_eq!((pair.view, log.view), (View::All, View::All));
+    // The log has boxes of 156 sweeps, two of which are there.
+    assert!(log.notes[0].ends_with("boxes left out: their frame has no sweep"), "{:?}", log.notes);
     assert_eq!(boxes(&pair), 162);
     for index in 0..2u64 {
         let frame = source.frame(index as usize);

@@ -6,8 +6,10 @@ use crate::labels::Footprint;
 use raywake_core::params::Profile;
 use raywake_core::record::NONE;
 use raywake_core::sweep::Sweep;
-use raywake_sim::{Drive, Options, Rng, Sensor, SimSweep};
+use raywake_sim::{Drive, Options, Rng, Sensor, SensorRig, SimSweep};
 
+/// Height of the sensor above the ground, m.
+const HEIGHT_M: f64 = 1.73;
 /// Sweeps between those that are used: neighbours are nearly the same.
 const STRIDE: usize = 7;
 /// Share of the background columns that is kept.
@@ -31,7 +33,7 @@ pub fn of_drive(grid: &mut Grid, seed: u64, index: usize, sweeps: usize) -> Vec<
     let options = Options {
         sweeps: STRIDE * (sweeps - 1) + 1,
         density: rng.range(0.3, 1.3),
-        sensor: sensor(&mut rng),
+        rig: SensorRig::single(sensor(&mut rng), HEIGHT_M),
         threads: 1,
         ..Options::default()
     };

@@ -5,6 +5,7 @@ mod argoverse;
 mod formats;
 mod mistakes;
 mod real;
+mod sidecars;
 
 use std::fs;
 use std::path::{Path, PathBuf};

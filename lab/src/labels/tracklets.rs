@@ -1,0 +1,173 @@
+//! `tracklet_labels.xml` of a KITTI raw drive, as boost serialises it.
+//!
+//! An item of `tracklets` is a track: `objectType`, `h`, `w`, `l`, `first_frame`, and in `poses` an
+//! item for every frame from that one on. A pose is that of the middle of the box's bottom in the
+//! Velodyne's frame (Geiger et al. 2013).
+
+use super::gather::{Gather, Row};
+use super::{Error, Labels, View};
+use glam::{DQuat, DVec3};
+use raywake::source::text;
+use roxmltree::{Document, Node, ParsingOptions};
+use std::path::Path;
+
+/// Value of `state` of a pose that nobody set.
+const UNSET: u64 = 0;
+
+/// Reads a file. Poses that nobody set are left out.
+///
+/// Fails where the file cannot be read, is no whole XML, lacks an element, or has another number of
+/// items than it says.
+pub(super) fn read(path: &Path) -> Result<Labels, Error> {
+    let text = text::read(path)?;
+    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(&text, options)
+        .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;
+    let file = File { path, document: &document };
+    let mut gather = Gather::default();
+    let tracklets = file.child(document.root_element(), "tracklets")?;
+    for (index, item) in file.items(tracklets)?.into_iter().enumerate() {
+        file.track(item, &index.to_string(), &mut gather)?;
+    }
+    Ok(gather.finish(View::Camera))
+}
+
+/// A parsed file with its name.
+struct File<'a> {
+    path: &'a Path,
+    document: &'a Document<'a>,
+}
+
+impl<'a> File<'a> {
+    fn track(&self, item: Node<'a, 'a>, id: &str, gather: &mut Gather) -> Result<(), Error> {
+        let class = self.text(item, "objectType")?;
+        let size = [self.number(item, "l")?, self.number(item, "w")?, self.number(item, "h")?];
+        let first: u32 = self.number(item, "first_frame")?;
+        let poses = self.child(item, "poses")?;
+        for (n, pose) in self.items(poses)?.into_iter().enumerate() {
+            if self.number::<u64>(pose, "state")? == UNSET {
+                gather.leave_out("boxes left out: nobody set their pose");
+                continue;
+            }
+            let number = |name: &str| self.number::<f64>(pose, name);
+            let rotation = DQuat::from_rotation_z(number("rz")?)
+                * DQuat::from_rotation_y(number("ry")?)
+                * DQuat::from_rotation_x(number("rx")?);
+            let bottom = DVec3::new(number("tx")?, number("ty")?, number("tz")?);
+            let centre = (bottom + rotation * DVec3::new(0.0, 0.0, 0.5 * size[2])).to_array();
+            let frame = u64::from(first) + n as u64;
+            gather.add(&Row { id, class, frame, size, centre, rotation });
+        }
+        Ok(())
+    }
+
+    fn error(&self, node: Node, what: String) -> Error {
+        let line = self.document.text_pos_at(node.range().start).row;
+        Error::input(self.path, format!("line {line}"), what)
+    }
+
+    fn child(&self, node: Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>, Error> {
+        let lacks = || self.error(node, format!("<{}> has no <{name}>", node.tag_name().name()));
+        node.children().find(|c| c.has_tag_name(name)).ok_or_else(lacks)
+    }
+
+    fn text(&self, node: Node<'a, 'a>, name: &str) -> Result<&'a str, Error> {
+        Ok(self.child(node, name)?.text().unwrap_or("").trim())
+    }
+
+    fn number<T: std::str::FromStr>(&self, node: Node<'a, 'a>, name: &str) -> Result<T, Error> {
+        let text = self.text(node, name)?;
+        text.parse().map_err(|_| self.error(node, format!("<{name}>: `{text}` is no number")))
+    }
+
+    /// The items of a list, as many as its `count` says.
+    fn items(&self, list: Node<'a, 'a>) -> Result<Vec<Node<'a, 'a>>, Error> {
+        let items: Vec<_> = list.children().filter(|c| c.has_tag_name("item")).collect();
+        let count: usize = self.number(list, "count")?;
+        if count == items.len() {
+            return Ok(items);
+        }
+        let name = list.tag_name().name();
+        Err(self.error(list, format!("<{name}> of {count} items has {}", items.len())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Kind, tests::Temp};
+    use super::*;
+
+    fn pose(x: f64, rest: &str) -> String {
+        format!(
+            "<item><tx>{x}</tx><ty>2</ty><tz>-1.7</tz><rx>0</rx><ry>0</ry><rz>1.5</rz>{rest}\
+             <occlusion>0</occlusion><truncation>0</truncation></item>\n"
+        )
+    }
+
+    fn file() -> String {
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\" ?>\n\
+             <!DOCTYPE boost_serialization>\n\
+             <boost_serialization signature=\"serialization::archive\" version=\"9\">\n\
+             <tracklets class_id=\"0\" tracking_level=\"0\" version=\"0\">\n\
+             <count>1</count><item_version>1</item_version>\n\
+             <item class_id=\"1\" tracking_level=\"0\" version=\"1\">\n\
+             <objectType>Van</objectType><h>2</h><w>1.8</w><l>4.4</l><first_frame>5</first_frame>\n\
+             <poses class_id=\"2\" tracking_level=\"0\" version=\"0\">\n\
+             <count>3</count><item_version>2</item_version>\n\
+             {}{}{}</poses><finished>1</finished></item></tracklets></boost_serialization>\n",
+            pose(10.0, "<state>2</state>"),
+            pose(99.0, "<state>0</state>"),
+            pose(11.0, "<state>1</state>")
+        )
+    }
+
+    #[test]
+    fn a_track() {
+        let t = Temp::new();
+        let labels = read(&t.write("tracklet_labels.xml", file())).unwrap();
+        assert_eq!((labels.tracks.len(), labels.view), (1, View::Camera));
+        let track = &labels.tracks[0];
+        assert_eq!((track.kind, track.size), (Kind::Van, [4.4, 1.8, 2.0]));
+        assert_eq!(track.boxes.keys().copied().collect::<Vec<_>>(), [5, 7]);
+        let last = track.boxes[&7];
+        assert!((last.translation - DVec3::new(11.0, 2.0, -0.7)).length() < 1e-12, "{last:?}");
+        assert!((last.yaw_rad() - 1.5).abs() < 1e-12);
+        assert_eq!(labels.notes, ["1 boxes left out: nobody set their pose"]);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let t = Temp::new();
+        let refused = |text: &str| {
+            let path = t.write("tracklet_labels.xml", text);
+            read(&path).unwrap_err().to_string()
+        };
+        let whole = file();
+        let cut = refused(&whole[..whole.len() / 2]);
+        assert!(cut.contains("tracklet_labels.xml, line ") && cut.contains("no XML"), "{cut}");
+        assert!(refused("").contains("no XML"));
+        let without = |part: &str, instead: &str| refused(&whole.replace(part, instead));
+        assert!(without("<h>2</h>", "").ends_with("line 6: <item> has no <h>"));
+        assert!(without("<h>2</h>", "<h>tall</h>").contains("<h>: `tall` is no number"));
+        assert!(
+            without("<count>3</count>", "<count>4</count>").contains("<poses> of 4 items has 3")
+        );
+        assert!(without("<count>1</count>", "<count>0</count>").contains("<tracklets> of 0 items"));
+        assert!(without("<first_frame>5", "<first_frame>-5").contains("`-5` is no number"));
+        assert!(without("tracklets", "others").contains("has no <tracklets>"));
+        assert!(without("<rz>1.5</rz>", "").contains("<item> has no <rz>"));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_counted() {
+        let t = Temp::new();
+        let notes = |part: &str, instead: &str| {
+            let text = file().replace(part, instead);
+            read(&t.write("tracklet_labels.xml", text)).unwrap().notes.join("; ")
+        };
+        assert!(notes("<tx>10</tx>", "<tx>nan</tx>").contains("1 boxes left out: a NaN"));
+        assert!(notes("<w>1.8</w>", "<w>0</w>").contains("2 boxes left out: no length"));
+        assert!(notes("Van", "Zeppelin").contains("class `Zeppelin` is unknown: 1 tracks"));
+    }
+}

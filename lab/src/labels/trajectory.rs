@@ -1,0 +1,340 @@
+//! Tracks in the world: the true motion of labelled objects.
+
+use super::sweeps::{Sweeps, turn};
+use super::{Labels, Track};
+use glam::{DMat3, DVec3};
+use raywake::source::Source;
+use raywake_core::pose::Pose;
+
+/// Sweeps before and after a sweep whose boxes make its smoothed box: 11 in all, a second at 10 Hz.
+pub const HALF_WINDOW: usize = 5;
+
+/// An object is parked where the boxes of its track lie no farther than this from their mean (root
+/// of the mean square, on the ground), m. A voxel's side: boxes of parked vehicles wander by up to
+/// two thirds of it as the vehicle passes, its own poses drifting. What creeps goes 1 m until it
+/// shows.
+pub const PARKED_M: f64 = 0.3;
+
+/// Speed over ground from which an object moves, and below which one is parked, m/s.
+pub const MOVING_MPS: f64 = 0.5;
+
+/// What an object does at a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Stands for as long as it is labelled: its true velocity is 0.
+    Parked,
+    /// Moves by [`MOVING_MPS`] or more.
+    Moving,
+    /// Slower than that, though not parked: at a traffic light, or standing about. Its labels do
+    /// not tell noise from motion.
+    Slow,
+}
+
+/// An object at a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// Frame of the sweep.
+    pub frame: u64,
+    /// Its number in the source.
+    pub index: usize,
+    /// Its stamp, s.
+    pub stamp_s: f64,
+    /// Pose of the vehicle.
+    pub world_from_vehicle: Pose,
+    /// Smoothed pose of the box, upright.
+    pub world_from_box: Pose,
+    /// Velocity of the box's centre over ground, along the axes of the world, m/s.
+    pub velocity: DVec3,
+    /// What it does.
+    pub motion: Motion,
+}
+
+/// A track in the world.
+///
+/// Poses of parked objects are their mean, so that they do not move at all. Those of others are
+/// smoothed: a quadratic is laid through position and heading of the boxes within [`HALF_WINDOW`]
+/// sweeps by least squares, and taken at the sweep; a line through fewer than five boxes. At the
+/// ends of a track the window has one side only. Exact labels stay as they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    states: Vec<State>,
+}
+
+/// The trajectories of all tracks, in their order; boxes of frames that the source lacks do not
+/// count.
+pub fn trajectories(labels: &Labels, source: &dyn Source) -> Vec<Trajectory> {
+    let sweeps = Sweeps::of(source);
+    labels.tracks.iter().map(|t| Trajectory::new(t, labels.exact, &sweeps)).collect()
+}
+
+impl Trajectory {
+    fn new(track: &Track, exact: bool, sweeps: &Sweeps) -> Trajectory {
+        let (states, headings) = placed(track, sweeps);
+        let samples: Vec<Sample> = states
+            .iter()
+            .zip(&headings)
+            .map(|(s, &yaw)| Sample {
+                index: s.index,
+                stamp_s: s.stamp_s,
+                at: s.world_from_box.translation,
+                yaw,
+            })
+            .collect();
+        let mut trajectory = Trajectory { states };
+        if let Some(mean) = parked(&samples) {
+            trajectory.park(mean);
+        } else {
+            trajectory.smooth(&samples, exact);
+        }
+        trajectory
+    }
+
+    fn park(&mut self, mean: Pose) {
+        for state in &mut self.states {
+            (state.world_from_box, state.velocity) = (mean, DVec3::ZERO);
+            state.motion = Motion::Parked;
+        }
+    }
+
+    fn smooth(&mut self, samples: &[Sample], exact: bool) {
+        for (n, state) in self.states.iter_mut().enumerate() {
+            let fit = fit(samples, n, exact);
+            if !exact {
+                state.world_from_box = Pose::planar(fit.at.x, fit.at.y, fit.at.z, fit.yaw);
+            }
+            state.velocity = fit.velocity;
+            let moves = state.velocity.length() >= MOVING_MPS;
+            state.motion = if moves { Motion::Moving } else { Motion::Slow };
+        }
+    }
+
+    /// Where it is labelled, in order of time.
+    pub fn states(&self) -> &[State] {
+        &self.states
+    }
+
+    /// What it is at a frame; `None` where it is not labelled.
+    pub fn at(&self, frame: u64) -> Option<&State> {
+        self.place(frame).map(|n| &self.states[n])
+    }
+
+    fn place(&self, frame: u64) -> Option<usize> {
+        self.states.binary_search_by_key(&frame, |s| s.frame).ok()
+    }
+
+    /// Motion of its body from the sweep of a frame to the next sweep of the source, as a transform
+    /// of points of the world; `None` where one of them has no box.
+    pub fn step(&self, frame: u64) -> Option<Pose> {
+        let n = self.place(frame)?;
+        let (here, next) = (&self.states[n], self.states.get(n + 1)?);
+        let follows = next.index == here.index + 1;
+        follows.then(|| match here.motion {
+            Motion::Parked => Pose::IDENTITY,
+            _ => next.world_from_box * here.world_from_box.inverse(),
+        })
+    }
+
+    /// Displacement over ground of a point of its body, given in the vehicle frame of a frame's
+    /// sweep, until the next sweep; along the axes of the world, m. `None` as for
+    /// [`Trajectory::step`].
+    pub fn displacement(&self, frame: u64, at: DVec3) -> Option<DVec3> {
+        let point = self.at(frame)?.world_from_vehicle.transform(at);
+        Some(self.step(frame)?.transform(point) - point)
+    }
+}
+
+/// The boxes of a track in the world as they are labelled, and their headings without leaps, rad.
+fn placed(track: &Track, sweeps: &Sweeps) -> (Vec<State>, Vec<f64>) {
+    let (mut states, mut headings): (Vec<State>, Vec<f64>) = Default::default();
+    for (&frame, &vehicle_from_box) in &track.boxes {
+        let Some(index) = sweeps.index(frame) else { continue };
+        let (stamp_s, world_from_vehicle) = sweeps.moment(index);
+        let world_from_box = world_from_vehicle * vehicle_from_box;
+        let yaw = world_from_box.yaw_rad();
+        headings.push(headings.last().map_or(yaw, |last| last + turn(*last, yaw)));
+        let (velocity, motion) = (DVec3::ZERO, Motion::Slow);
+        states.push(State {
+            frame,
+            index,
+            stamp_s,
+            world_from_vehicle,
+            world_from_box,
+            velocity,
+            motion,
+        });
+    }
+    (states, headings)
+}
+
+/// A box in the world, as labelled.
+#[derive(Clone, Copy)]
+struct Sample {
+    index: usize,
+    stamp_s: f64,
+    at: DVec3,
+    yaw: f64,
+}
+
+/// The mean pose of an object that is parked: boxes within [`PARKED_M`] of it, and no steady motion
+/// of [`MOVING_MPS`] hidden in them, as there may be in a short track. A track of one box
+/// tells nothing.
+fn parked(samples: &[Sample]) -> Option<Pose> {
+    if samples.len() < 2 {
+        return None;
+    }
+    let (at, yaw) = samples.iter().fold((DVec3::ZERO, 0.0), |s, b| (s.0 + b.at, s.1 + b.yaw));
+    let (at, yaw) = (at / samples.len() as f64, yaw / samples.len() as f64);
+    let square: f64 = samples.iter().map(|s| (s.at - at).truncate().length_squared()).sum();
+    let stays = square <= PARKED_M.powi(2) * samples.len() as f64;
+    let drift = polynomial(samples, samples[0].stamp_s, 1).velocity.truncate().length();
+    (stays && drift < MOVING_MPS).then(|| Pose::planar(at.x, at.y, at.z, yaw))
+}
+
+/// Position (m), velocity (m/s) and heading (rad) of a fitted motion.
+struct Fit {
+    at: DVec3,
+    velocity: DVec3,
+    yaw: f64,
+}
+
+/// The motion at sample `n` from its window; of exact ones, from its neighbours alone.
+fn fit(samples: &[Sample], n: usize, exact: bool) -> Fit {
+    let half = if exact { 1 } else { HALF_WINDOW };
+    let near = |s: &&Sample| s.index.abs_diff(samples[n].index) <= half;
+    let window: Vec<Sample> = samples.iter().filter(near).copied().collect();
+    let degree = match window.len() {
+        few if exact => (few - 1).min(2),
+        few @ 1..5 => few.min(2) - 1,
+        _ => 2,
+    };
+    polynomial(&window, samples[n].stamp_s, degree)
+}
+
+/// The polynomial of a degree up to 2 through the samples by least squares, at a stamp.
+fn polynomial(samples: &[Sample], stamp_s: f64, degree: usize) -> Fit {
+    let mut gram = DMat3::ZERO;
+    // Sums of powers of time by x, y, z, heading.
+    let mut sums = [DVec3::ZERO; 4];
+    for s in samples {
+        let t = s.stamp_s - stamp_s;
+        let powers = DVec3::new(1.0, t, t * t);
+        gram += DMat3::from_cols(powers, powers * t, powers * (t * t));
+        for (sum, value) in sums.iter_mut().zip([s.at.x, s.at.y, s.at.z, s.yaw]) {
+            *sum += powers * value;
+        }
+    }
+    // Powers above the degree get the coefficient 0.
+    for power in degree + 1..3 {
+        for other in 0..3 {
+            gram.col_mut(other)[power] = 0.0;
+        }
+        *gram.col_mut(power) = DVec3::AXES[power];
+        sums.iter_mut().for_each(|sum| sum[power] = 0.0);
+    }
+    let inverse = gram.inverse();
+    let [x, y, z, yaw] = sums.map(|sum| inverse * sum);
+    let of = |power: usize| DVec3::new(x[power], y[power], z[power]);
+    Fit { at: of(0), velocity: of(1), yaw: yaw.x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Road, labels_of, track};
+    use super::*;
+
+    /// A vehicle that turns and drives on, and boxes given in the world.
+    fn trajectory(exact: bool, world_from_box: impl Fn(f64) -> Pose, count: usize) -> Trajectory {
+        let road = Road::of(
+            (0..count)
+                .map(|i| 0.1 * i as f64)
+                .map(|t| (t, Pose::planar(8.0 * t, 0.3 * t * t, 0.0, 0.2 * t))),
+        );
+        let boxes = (0..count as u64).map(|f| {
+            let (t, pose) = road.moment(f as usize);
+            (f, pose.inverse() * world_from_box(t))
+        });
+        let labels = Labels { exact, ..labels_of([track("a", boxes)]) };
+        trajectories(&labels, &road).remove(0)
+    }
+
+    /// Noise of a fixed pattern, up to one.
+    fn noise(t: f64) -> f64 {
+        (1e4 * t).sin()
+    }
+
+    #[test]
+    fn steady_acceleration_and_turn_are_kept_and_noise_is_not() {
+        let truth = |t: f64| Pose::planar(3.0 + 5.0 * t + t * t, 2.0 - t, 0.1 * t, 3.0 + 0.4 * t);
+        let found = trajectory(false, truth, 20);
+        for state in found.states() {
+            let expected = truth(state.stamp_s);
+            let off = (expected.inverse() * state.world_from_box).translation.length();
+            assert!(off < 1e-9, "{state:?}");
+            let velocity = DVec3::new(5.0 + 2.0 * state.stamp_s, -1.0, 0.1);
+            assert!((state.velocity - velocity).length() < 1e-9);
+            assert_eq!(state.motion, Motion::Moving);
+        }
+        let shaken = |t: f64| {
+            let p = truth(t);
+            Pose { translation: p.translation + 0.03 * noise(t) * DVec3::Y, ..p }
+        };
+        let smooth = trajectory(false, shaken, 20);
+        let (mut raw, mut left) = (0.0, 0.0);
+        for state in &smooth.states()[5..15] {
+            raw += (0.03 * noise(state.stamp_s)).powi(2);
+            left +=
+                (state.world_from_box.translation.y - truth(state.stamp_s).translation.y).powi(2);
+        }
+        assert!(left < 0.5 * raw, "{left} of {raw}");
+    }
+
+    #[test]
+    fn a_point_of_a_turning_body() {
+        // Turning on the spot around (20, 5) by 1 rad/s; its centre 3 m ahead of that.
+        let truth = |t: f64| Pose::planar(20.0, 5.0, 0.0, t) * Pose::planar(3.0, 0.0, 0.0, 0.0);
+        let exact = trajectory(true, truth, 5);
+        let at = exact.at(2).unwrap().world_from_vehicle.inverse();
+        let middle = exact.displacement(2, at.transform(DVec3::new(20.0, 5.0, 0.7))).unwrap();
+        assert!(middle.length() < 1e-9, "{middle}");
+        let beside = exact.displacement(2, at.transform(DVec3::new(22.0, 5.0, 0.0))).unwrap();
+        let expected = DVec3::new(2.0 * (0.1f64.cos() - 1.0), 2.0 * 0.1f64.sin(), 0.0);
+        assert!((beside - expected).length() < 1e-9, "{beside}");
+        assert_eq!(
+            (exact.displacement(4, DVec3::ZERO), exact.displacement(9, DVec3::ZERO)),
+            (None, None)
+        );
+    }
+
+    #[test]
+    fn parked_moving_and_neither() {
+        let stands = |t: f64| Pose::planar(9.0 + 0.1 * noise(t), 4.0, 0.0, 3.1 + 0.2 * noise(t));
+        let parked = trajectory(false, stands, 12);
+        assert!(parked.states().iter().all(|s| s.motion == Motion::Parked));
+        assert_eq!(parked.step(3), Some(Pose::IDENTITY));
+        assert_eq!(parked.displacement(3, DVec3::X), Some(DVec3::ZERO));
+        assert_eq!(parked.step(11), None);
+        let mean = parked.at(0).unwrap().world_from_box;
+        assert!((mean.translation.x - 9.0).abs() < 0.05 && turn(mean.yaw_rad(), 3.1).abs() < 0.1);
+        // Stays for a second, then leaves.
+        let leaves = |t: f64| Pose::planar(9.0 + 2.0 * (t - 1.0).max(0.0).powi(2), 0.0, 0.0, 0.0);
+        let leaving = trajectory(false, leaves, 30);
+        let motion = |frame: u64| leaving.at(frame).unwrap().motion;
+        assert_eq!((motion(2), motion(20)), (Motion::Slow, Motion::Moving));
+        // In two sweeps nobody gets far.
+        let walks = |t: f64| Pose::planar(1.5 * t, 0.0, 0.0, 0.0);
+        assert_eq!(trajectory(false, walks, 2).at(0).unwrap().motion, Motion::Moving);
+        assert_eq!(trajectory(false, walks, 1).at(0).unwrap().motion, Motion::Slow);
+    }
+
+    #[test]
+    fn a_sweep_without_a_box_breaks_no_more_than_its_own_steps() {
+        let road = Road::of((0..8).map(|i| (0.1 * i as f64, Pose::IDENTITY)));
+        let boxes =
+            (0..8u64).filter(|f| *f != 4).map(|f| (f, Pose::planar(f as f64, 0.0, 0.0, 0.0)));
+        let found = trajectories(&labels_of([track("a", boxes)]), &road).remove(0);
+        assert!(found.at(4).is_none());
+        let steps: Vec<bool> = (0..8).map(|f| found.step(f).is_some()).collect();
+        assert_eq!(steps, [true, true, true, false, false, true, true, false]);
+        assert!((found.step(5).unwrap().translation.x - 1.0).abs() < 1e-9);
+    }
+}
