@@ -2,6 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
+use raywake_lab::metrics::grade;
 use raywake_lab::{check, train};
 use std::process::ExitCode;
 
@@ -14,12 +15,15 @@ enum Command {
     Train(train::Command),
     /// Measure a background filter on a recorded drive with boxes.csv.
     CheckFilter(check::Args),
+    /// Grade scene flow on an Argoverse 2 log with the official metrics.
+    Grade(grade::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command),
         Command::CheckFilter(args) => check::run(&args),
+        Command::Grade(args) => grade::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type, UInt8Type, UInt64Type,
+    Float16Type, Float32Type, Float64Type, Int8Type, Int32Type, Int64Type, UInt8Type, UInt64Type,
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReaderBuilder;
@@ -17,7 +17,7 @@ use super::feather_check;
 use crate::error::Error;
 
 /// The columns of a file that were asked for.
-pub(super) struct Table {
+pub struct Table {
     path: PathBuf,
     batches: Vec<RecordBatch>,
 }
@@ -77,12 +77,15 @@ impl Table {
         })
     }
 
-    /// A column of integers (u8, i32, i64, u64). Fails at a null or a value beyond i64.
+    /// A column of integers (u8, i8, i32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
         let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
             match column.data_type() {
                 DataType::UInt8 => {
                     out.extend(column.as_primitive::<UInt8Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::Int8 => {
+                    out.extend(column.as_primitive::<Int8Type>().iter().map(|v| v.map(i64::from)))
                 }
                 DataType::Int32 => {
                     out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
@@ -94,11 +97,19 @@ impl Table {
             }
             true
         })?;
-        let filled = |(row, v): (usize, Option<i64>)| {
-            let what = || format!("column `{name}` is null or out of range");
-            v.ok_or_else(|| Error::input(&self.path, format!("row {row}"), what()))
-        };
-        values.into_iter().enumerate().map(filled).collect()
+        self.filled(name, values)
+    }
+
+    /// A column of booleans. Fails at a null.
+    pub fn booleans(&self, name: &str) -> Result<Vec<bool>, Error> {
+        let values = self.gather(name, "booleans", |column, out: &mut Vec<Option<bool>>| {
+            let boolean = column.data_type() == &DataType::Boolean;
+            if boolean {
+                out.extend(column.as_boolean().iter());
+            }
+            boolean
+        })?;
+        self.filled(name, values)
     }
 
     /// A column of text; null becomes the empty string.
@@ -113,6 +124,15 @@ impl Table {
             }
             true
         })
+    }
+
+    /// The values of a column that may hold no null.
+    fn filled<T>(&self, name: &str, values: Vec<Option<T>>) -> Result<Vec<T>, Error> {
+        let filled = |(row, v): (usize, Option<T>)| {
+            let what = || format!("column `{name}` is null or out of range");
+            v.ok_or_else(|| Error::input(&self.path, format!("row {row}"), what()))
+        };
+        values.into_iter().enumerate().map(filled).collect()
     }
 
     /// A column over all batches; `take` returns false for a type it cannot use.

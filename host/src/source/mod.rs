@@ -14,7 +14,7 @@
 mod argoverse;
 mod bins;
 #[cfg(feature = "arrow")]
-mod feather;
+pub mod feather;
 #[cfg(feature = "arrow")]
 mod feather_check;
 mod kitti;
