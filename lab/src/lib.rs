@@ -6,4 +6,5 @@ pub mod check;
 pub mod eval;
 pub mod grid;
 pub mod labels;
+pub mod metrics;
 pub mod train;

@@ -2,6 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
+use raywake_lab::metrics::grade;
 use raywake_lab::{check, eval, train};
 use std::process::ExitCode;
 
@@ -16,6 +17,8 @@ enum Command {
     Eval(Box<eval::Args>),
     /// Measure a background filter on a recorded drive with labels.
     CheckFilter(check::Args),
+    /// Grade scene flow on an Argoverse 2 log with the official metrics.
+    Grade(grade::Args),
 }
 
 fn main() -> ExitCode {
@@ -23,6 +26,7 @@ fn main() -> ExitCode {
         Command::Train(command) => train::run(&command),
         Command::Eval(args) => eval::run(&args).map_err(Into::into),
         Command::CheckFilter(args) => check::run(&args),
+        Command::Grade(args) => grade::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type, UInt8Type, UInt32Type, UInt64Type,
+    Float16Type, Float32Type, Float64Type, Int8Type, Int32Type, Int64Type, UInt8Type, UInt32Type,
+    UInt64Type,
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReaderBuilder;
@@ -77,7 +78,7 @@ impl Table {
         })
     }
 
-    /// A column of integers (u8, i32, u32, i64, u64). Fails at a null or a value beyond i64.
+    /// A column of integers (u8, i8, i32, u32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
         let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
             match column.data_type() {
@@ -86,6 +87,9 @@ impl Table {
                 }
                 DataType::UInt32 => {
                     out.extend(column.as_primitive::<UInt32Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::Int8 => {
+                    out.extend(column.as_primitive::<Int8Type>().iter().map(|v| v.map(i64::from)))
                 }
                 DataType::Int32 => {
                     out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
@@ -97,11 +101,19 @@ impl Table {
             }
             true
         })?;
-        let filled = |(row, v): (usize, Option<i64>)| {
-            let what = || format!("column `{name}` is null or out of range");
-            v.ok_or_else(|| Error::input(&self.path, format!("row {row}"), what()))
-        };
-        values.into_iter().enumerate().map(filled).collect()
+        self.filled(name, values)
+    }
+
+    /// A column of booleans. Fails at a null.
+    pub fn booleans(&self, name: &str) -> Result<Vec<bool>, Error> {
+        let values = self.gather(name, "booleans", |column, out: &mut Vec<Option<bool>>| {
+            let boolean = column.data_type() == &DataType::Boolean;
+            if boolean {
+                out.extend(column.as_boolean().iter());
+            }
+            boolean
+        })?;
+        self.filled(name, values)
     }
 
     /// A column of text; null becomes the empty string.
@@ -116,6 +128,15 @@ impl Table {
             }
             true
         })
+    }
+
+    /// The values of a column that may hold no null.
+    fn filled<T>(&self, name: &str, values: Vec<Option<T>>) -> Result<Vec<T>, Error> {
+        let filled = |(row, v): (usize, Option<T>)| {
+            let what = || format!("column `{name}` is null or out of range");
+            v.ok_or_else(|| Error::input(&self.path, format!("row {row}"), what()))
+        };
+        values.into_iter().enumerate().map(filled).collect()
     }
 
     /// A column over all batches; `take` returns false for a type it cannot use.

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use arrow_array::types::{ArrowPrimitiveType, Float16Type};
 use arrow_array::{
-    ArrayRef, Float16Array, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray,
-    UInt8Array,
+    ArrayRef, BooleanArray, Float16Array, Float64Array, Int8Array, Int32Array, Int64Array,
+    RecordBatch, StringArray, UInt8Array,
 };
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
@@ -203,6 +203,23 @@ fn no_cut_or_flipped_byte_panics() {
             }
         }
     }
+}
+
+#[test]
+fn booleans_and_small_integers() {
+    let columns: Vec<(&str, ArrayRef)> = vec![
+        ("classes", Arc::new(Int8Array::from(vec![-1, 29]))),
+        ("valid", Arc::new(BooleanArray::from(vec![true, false]))),
+        ("holey", Arc::new(BooleanArray::from(vec![Some(true), None]))),
+    ];
+    let bytes = file(&[batch(columns)], None);
+    let table =
+        Table::parse(Path::new("f.feather"), &bytes, &["classes", "valid", "holey"]).unwrap();
+    assert_eq!(table.integers("classes").unwrap(), [-1, 29]);
+    assert_eq!(table.booleans("valid").unwrap(), [true, false]);
+    let refused = |name| table.booleans(name).unwrap_err().to_string();
+    assert_eq!(refused("holey"), "f.feather, row 1: column `holey` is null or out of range");
+    assert_eq!(refused("classes"), "f.feather: column `classes` is Int8, not booleans");
 }
 
 #[test]

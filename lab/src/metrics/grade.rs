@@ -1,0 +1,165 @@
+//! `raywake-lab grade`: the official figures of estimates on an Argoverse 2 log.
+
+use super::argoverse::{Log, read_estimate};
+use super::{
+    AccuracyTable, BucketedEpe, Pair, Range, Rules, ScoreError, ThreeWayEpe, print, reference,
+};
+use raywake::error::Error;
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Cell that the truth is rounded to for comparison, m: the profiles' voxels.
+const CELL_M: f32 = 0.30;
+
+/// Options of `grade`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Argoverse 2 log, with its map.
+    log: PathBuf,
+    /// Folder with an estimate, LOG/NUMBER.feather, as `raywake run --export argoverse` writes to
+    /// OUT/argoverse; several are graded side by side.
+    #[arg(long, value_name = "FOLDER")]
+    estimate: Vec<PathBuf>,
+    /// Folder with the truth, LOG/NUMBER.feather; else SPLIT_sceneflow_feather beside the folder
+    /// SPLIT of the log.
+    #[arg(long, value_name = "FOLDER")]
+    truth: Option<PathBuf>,
+    /// Count returns from the ground too; the challenge does not.
+    #[arg(long)]
+    with_ground: bool,
+    /// Grade every Nth pair of the log only; the challenge's own script takes every fifth.
+    #[arg(long, value_name = "N", default_value = "1")]
+    every: NonZeroUsize,
+}
+
+/// The metrics of one estimate.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grades {
+    /// Bucket-normalised error.
+    pub bucketed: BucketedEpe,
+    /// Three-way error.
+    pub three_way: ThreeWayEpe,
+    /// Accuracies and outliers, without the vehicle's motion.
+    pub over_ground: AccuracyTable,
+    /// The same with it.
+    pub with_ego_motion: AccuracyTable,
+}
+
+impl Grades {
+    /// Counts a pair.
+    pub fn add(
+        &mut self,
+        pair: &Pair,
+        estimate_m: &[[f32; 3]],
+        rules: &Rules,
+    ) -> Result<(), ScoreError> {
+        let mut points = pair.score(estimate_m, rules)?;
+        self.bucketed.add(&points);
+        self.three_way.add(&points);
+        self.over_ground.add(&points);
+        for point in &mut points {
+            *point = point.with_ego_motion(&pair.second_from_first);
+        }
+        self.with_ego_motion.add(&points);
+        Ok(())
+    }
+
+    /// Adds what was counted elsewhere.
+    pub fn merge(&mut self, other: &Grades) {
+        self.bucketed.merge(&other.bucketed);
+        self.three_way.merge(&other.three_way);
+        self.over_ground.merge(&other.over_ground);
+        self.with_ego_motion.merge(&other.with_ego_motion);
+    }
+}
+
+/// An estimate under way, or what there is to compare it with.
+struct Row {
+    name: String,
+    from: From,
+    grades: Grades,
+    /// Returns that count, but that the estimate does not vouch for.
+    unvouched: u64,
+}
+
+/// Where a row's flow is from.
+enum From {
+    /// Files by the index of the pair's first sweep.
+    Files(BTreeMap<usize, PathBuf>),
+    /// The truth itself.
+    Reference(Reference),
+}
+
+/// Makes an estimate of a pair out of its truth.
+type Reference = fn(&Pair) -> Vec<[f32; 3]>;
+
+/// Grades and prints.
+pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
+    let mut log = Log::open(&args.log, args.truth.as_deref(), !args.with_ground)?;
+    let rules = Rules { ground: args.with_ground, ..Rules::OFFICIAL };
+    let mut rows = references();
+    for folder in &args.estimate {
+        let files = From::Files(log.estimates(folder)?);
+        rows.push(Row::new(&folder.display().to_string(), files));
+    }
+    let pairs: Vec<(usize, PathBuf)> = log
+        .pairs()
+        .filter(|(sweep, _)| sweep.is_multiple_of(args.every.get()))
+        .map(|(sweep, truth)| (sweep, truth.to_path_buf()))
+        .collect();
+    for (sweep, truth) in &pairs {
+        let pair = log.pair(*sweep)?;
+        for row in &mut rows {
+            row.add(*sweep, truth, &pair, &rules)?;
+        }
+    }
+    let ground = if args.with_ground { "with ground" } else { "without ground" };
+    println!("log {}: {} pairs graded, {ground}", log.name(), pairs.len());
+    for row in &rows {
+        println!("\n{}", row.name);
+        if row.unvouched > 0 {
+            println!(
+                "  {} returns that count are not valid in it: graded all the same",
+                row.unvouched
+            );
+        }
+        print::figures(&row.grades);
+        if let From::Files(_) = row.from {
+            print::buckets(&row.grades.bucketed.errors(Range::Near));
+        }
+    }
+    Ok(())
+}
+
+fn references() -> Vec<Row> {
+    let rows: [(&str, Reference); 3] = [
+        ("reference: zero flow, the vehicle's motion known", reference::standing),
+        ("reference: zero flow, the vehicle's motion unknown", reference::carried),
+        ("reference: truth rounded to 0.30 m", |pair| reference::rounded(pair, CELL_M)),
+    ];
+    rows.map(|(name, estimate)| Row::new(name, From::Reference(estimate))).into()
+}
+
+impl Row {
+    fn new(name: &str, from: From) -> Row {
+        Row { name: name.into(), from, grades: Grades::default(), unvouched: 0 }
+    }
+
+    /// Counts a pair, whose truth is from the file `truth`.
+    fn add(&mut self, sweep: usize, truth: &Path, pair: &Pair, rules: &Rules) -> Result<(), Error> {
+        let (path, flow_m) = match &self.from {
+            From::Reference(estimate) => (truth, estimate(pair)),
+            From::Files(files) => {
+                let path = files[&sweep].as_path();
+                let estimate = read_estimate(path, pair)?;
+                self.unvouched += estimate.unvouched(pair, rules);
+                (path, estimate.flow_m)
+            }
+        };
+        self.grades.add(pair, &flow_m, rules).map_err(|e| {
+            let path = if matches!(e, ScoreError::Truth { .. }) { truth } else { path };
+            Error::input(path, "", e.to_string())
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! The scene-flow metrics in use today, on flow per return, equal to the official graders' to a
+//! millionth.
+//!
+//! | metric | as in |
+//! |---|---|
+//! | [`BucketedEpe`], [`ThreeWayEpe`] | `bucketed-scene-flow-eval` 2.0.25, the Argoverse 2 challenge |
+//! | [`AccuracyTable`] | av2-api (EPE, strict and relaxed accuracy, angle), FlowNet3D (outliers) |
+//!
+//! A [`Pair`] holds the truth of two sweeps and says which returns count ([`Rules`]); an estimate
+//! gives each a flow, and [`Pair::score`] the list that every metric takes. Metrics are sums: they
+//! take pairs one at a time and merge with what another thread has counted.
+//!
+//! Flow is motion over ground, in metres over the pair, along the axes of the first sweep's
+//! vehicle frame: the vehicle's own motion is removed.
+
+mod accuracy;
+pub mod argoverse;
+mod bucketed;
+mod category;
+pub mod grade;
+mod ground;
+mod npy;
+mod pair;
+mod print;
+pub mod reference;
+mod speed_table;
+mod three_way;
+
+#[cfg(test)]
+mod tests;
+
+pub use accuracy::{Accuracy, AccuracyTable, Motion};
+pub use bucketed::{BucketedEpe, BucketedErrors, ClassError};
+pub use category::{Category, Class};
+pub use pair::{MOVING_M, NEAR_M, Pair, Rules, ScoreError, Scored, TruePoint};
+pub use speed_table::{Bucket, Range, SpeedTable};
+pub use three_way::{ThreeWayEpe, ThreeWayErrors};
