@@ -2,7 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
-use raywake_lab::{check, train};
+use raywake_lab::{check, registration, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -14,12 +14,15 @@ enum Command {
     Train(train::Command),
     /// Measure a background filter on a recorded drive with boxes.csv.
     CheckFilter(check::Args),
+    /// Ego motion of a drive by scan matching, against the drive's own poses.
+    Match(registration::command::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command),
         Command::CheckFilter(args) => check::run(&args),
+        Command::Match(args) => registration::command::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
