@@ -7,7 +7,7 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use std::f64::consts::TAU;
 
 /// Side of the voxels that keep one return each, m.
-const VOXEL_M: f64 = 0.4;
+pub const VOXEL_M: f64 = 0.4;
 /// Returns nearer or farther than this are left out, m: near ones are often of the own vehicle, far
 /// ones too sparse for normals.
 const RANGE_M: [f64; 2] = [2.0, 100.0];

@@ -1,10 +1,16 @@
-//! Ego motion of a drive: each sweep registered with the one before it.
+//! Ego motion of a drive: each sweep registered with the few before it.
 
-use super::deskew::{Thinned, span_s};
-use super::{Cloud, Options, Registration, register};
+use super::deskew::{Thinned, VOXEL_M, span_s};
+use super::{Cloud, Options, Registration, register, thin};
+use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig};
+use std::collections::VecDeque;
 
+/// Sweeps that the target has beside the one before. With four, simulated drives end closer to the
+/// truth than with none (0.01 against 0.15 degrees, 1 against 3 cm in 20 sweeps), single steps are
+/// as good, and a pair takes a third longer.
+const EARLIER: usize = 4;
 /// Times that a pair is deskewed by the motion found so far and registered again, at most.
 const ROUNDS: usize = 4;
 /// A motion this close to the one that the sweeps were deskewed by changes no point by more than
@@ -28,23 +34,51 @@ pub struct Matcher {
     rig: Rig,
     options: Options,
     before: Option<(f64, Thinned)>,
+    /// Points of sweeps before that one, in its frame, deskewed; the latest first.
+    earlier: VecDeque<Vec<DVec3>>,
 }
 
 impl Matcher {
     /// For the sweeps of a rig.
     pub fn new(rig: &Rig, options: Options) -> Matcher {
-        Matcher { rig: rig.clone(), options, before: None }
+        Matcher { rig: rig.clone(), options, before: None, earlier: VecDeque::new() }
     }
 
     /// The motion from the sweep before this one, started at `initial` (`before_from_now`). `None`
     /// on the first sweep.
     pub fn next(&mut self, stamp_s: f64, points: &[Point], initial: Pose) -> Option<Matched> {
         let now = Thinned::new(points, &self.rig);
-        let matched = self.before.as_ref().map(|(before_s, before)| {
-            self.pair(before, &now, self.duration_s(stamp_s - before_s), initial)
+        let before = self.before.take();
+        let matched = before.map(|(before_s, before)| {
+            let dt_s = self.duration_s(stamp_s - before_s);
+            let matched = self.pair(&before, &now, dt_s, initial);
+            self.remember(&before, dt_s, &matched);
+            matched
         });
         self.before = Some((stamp_s, now));
         matched
+    }
+
+    /// Moves the sweep before to the earlier ones, and all of them into the frame of this one. Where
+    /// the motion is unknown they are of no use.
+    fn remember(&mut self, before: &Thinned, dt_s: f64, matched: &Matched) {
+        if !matched.registration.converged {
+            self.earlier.clear();
+            return;
+        }
+        self.earlier.push_front(before.at_stamp(&matched.motion.twist(dt_s)));
+        self.earlier.truncate(EARLIER);
+        let now_from_before = matched.motion.inverse();
+        for p in self.earlier.iter_mut().flatten() {
+            *p = now_from_before.transform(*p);
+        }
+    }
+
+    /// The sweep before, and where it leaves voxels empty the earlier ones.
+    fn target(&self, before: Vec<DVec3>) -> Cloud {
+        let all: Vec<DVec3> =
+            before.into_iter().chain(self.earlier.iter().flatten().copied()).collect();
+        Cloud::new(thin(all.iter().copied(), VOXEL_M).into_iter().map(|n| all[n]))
     }
 
     /// Time between two stamps: whole turns where the sensor spins, as stamps are often coarser.
@@ -59,7 +93,7 @@ impl Matcher {
     fn pair(&self, before: &Thinned, now: &Thinned, dt_s: f64, initial: Pose) -> Matched {
         let mut motion = initial;
         for rounds in 1.. {
-            let target = Cloud::new(before.at_stamp(&motion.twist(dt_s)));
+            let target = self.target(before.at_stamp(&motion.twist(dt_s)));
             let source = Cloud::new(now.at_stamp(&motion.inverse().twist(-dt_s)));
             let registration = register(&source, &target, motion, &self.options);
             if !registration.converged {
