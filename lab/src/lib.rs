@@ -7,4 +7,5 @@ pub mod eval;
 pub mod grid;
 pub mod labels;
 pub mod metrics;
+pub mod registration;
 pub mod train;

@@ -3,7 +3,7 @@
 
 use clap::Parser;
 use raywake_lab::metrics::grade;
-use raywake_lab::{check, eval, train};
+use raywake_lab::{check, eval, registration, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -19,6 +19,8 @@ enum Command {
     CheckFilter(check::Args),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
+    /// Ego motion of a drive by scan matching, against the drive's own poses.
+    Match(registration::command::Args),
 }
 
 fn main() -> ExitCode {
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args).map_err(Into::into),
         Command::CheckFilter(args) => check::run(&args),
         Command::Grade(args) => grade::run(&args),
+        Command::Match(args) => registration::command::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

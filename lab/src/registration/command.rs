@@ -1,0 +1,166 @@
+//! `raywake-lab match`: ego motion of a drive by scan matching, against the drive's own poses.
+
+use super::differences::{Differences, quantile};
+use super::{Matched, Matcher, Options};
+use raywake::sink::atomic;
+use raywake::source::simulated::Simulated;
+use raywake::source::{OpenOptions, Source, SweepData, open};
+use raywake_core::pose::Pose;
+use std::error::Error;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Where each registration starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Initial {
+    /// At the drive's own motion, as in the dissertation (section 3.8.3).
+    Given,
+    /// At the motion found before.
+    ConstantVelocity,
+    /// At no motion.
+    Identity,
+}
+
+/// Options of `match`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Recorded drive, in any format that `raywake run` reads.
+    #[arg(value_name = "DRIVE", required_unless_present = "simulated")]
+    drive: Option<PathBuf>,
+    /// A simulated drive with this seed instead, whose poses are exact.
+    #[arg(long, value_name = "SEED", conflicts_with = "drive")]
+    simulated: Option<u64>,
+    /// File of poses to write: world from vehicle, rows of 3x4, one per sweep matched. The world is
+    /// that of the drive's first pose. Readable by `raywake run --poses` (KITTI odometry:
+    /// `--poses-frame vehicle`).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Where each registration starts.
+    #[arg(long, value_enum, default_value_t = Initial::Given)]
+    initial: Initial,
+    /// The first sweeps only.
+    #[arg(short = 'n', value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..))]
+    count: Option<u32>,
+}
+
+/// Sweeps of a simulated drive unless the count says otherwise.
+const SIMULATED_SWEEPS: u32 = 30;
+
+/// Matches, writes and compares.
+pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
+    let mut source: Box<dyn Source> = match (&args.drive, args.simulated) {
+        (Some(drive), _) => open(drive, &OpenOptions::default())?,
+        (None, seed) => {
+            let sweeps = args.count.unwrap_or(SIMULATED_SWEEPS);
+            Box::new(Simulated::new(seed.unwrap_or_default(), sweeps as usize))
+        }
+    };
+    println!("{}", source.describe());
+    let count = args.count.map_or(source.len(), |n| source.len().min(n as usize));
+    let chain = chain(source.as_mut(), count, args.initial)?;
+    write(&args.out, &chain.poses)?;
+    print!("{}", chain.report()?);
+    Ok(())
+}
+
+/// A drive matched.
+struct Chain {
+    /// `world_from_vehicle` of every sweep.
+    poses: Vec<Pose>,
+    given: Vec<Pose>,
+    matched: Vec<Matched>,
+    /// Of every pair, in ms.
+    times_ms: Vec<f64>,
+}
+
+fn chain(source: &mut dyn Source, count: usize, initial: Initial) -> Result<Chain, Box<dyn Error>> {
+    let mut matcher = Matcher::new(source.rig(), Options::default());
+    let mut sweep = SweepData::default();
+    let (mut poses, mut given, mut matched) = (Vec::new(), Vec::<Pose>::new(), Vec::new());
+    let mut times_ms = Vec::new();
+    let mut last = Pose::IDENTITY;
+    for index in 0..count {
+        source.read(index, &mut sweep)?;
+        let start = match (initial, given.last()) {
+            (Initial::Given, Some(before)) => before.inverse() * sweep.world_from_vehicle,
+            (Initial::ConstantVelocity, Some(_)) => last,
+            _ => Pose::IDENTITY,
+        };
+        let begin = Instant::now();
+        let pose = match matcher.next(sweep.stamp_s, &sweep.points, start) {
+            Some(found) => {
+                times_ms.push(1e3 * begin.elapsed().as_secs_f64());
+                matched.push(found);
+                last = found.motion;
+                poses[index - 1] * found.motion
+            }
+            None => sweep.world_from_vehicle,
+        };
+        poses.push(pose);
+        given.push(sweep.world_from_vehicle);
+    }
+    Ok(Chain { poses, given, matched, times_ms })
+}
+
+impl Chain {
+    fn report(&self) -> Result<String, Box<dyn Error>> {
+        let mut differences = Differences::default();
+        for (n, found) in self.matched.iter().enumerate() {
+            differences.add(&found.motion, &(self.given[n].inverse() * self.given[n + 1]));
+        }
+        let count = |of: &dyn Fn(&Matched) -> bool| self.matched.iter().filter(|m| of(m)).count();
+        let sorted = |of: &dyn Fn(&Matched) -> f64| {
+            let mut values: Vec<f64> = self.matched.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let [rms, rounds, steps, least] = [
+            sorted(&|m| m.registration.rms),
+            sorted(&|m| m.rounds as f64),
+            sorted(&|m| m.registration.iterations as f64),
+            sorted(&|m| m.registration.least_eigenvalue),
+        ];
+        let mut times = self.times_ms.clone();
+        times.sort_by(f64::total_cmp);
+        let (first, end) = match (self.poses.last(), self.given.last()) {
+            (Some(found), Some(given)) => (found, given),
+            _ => return Ok(String::new()),
+        };
+        Ok(format!(
+            "{}converged       {} of {} pairs; the others keep their initial motion\n\
+             undetermined    {} pairs, least eigenvalue {:.4}\n\
+             inliers' rms    median {:.4} m, max {:.4} m\n\
+             steps           median {}, max {}; rounds of deskewing median {}, max {}\n\
+             time            median {:.0} ms, 95 % {:.0} ms, max {:.0} ms a pair\n",
+            differences.table(first, end)?,
+            count(&|m| m.registration.converged),
+            self.matched.len(),
+            count(&|m| m.registration.unobserved > 0),
+            least.first().copied().unwrap_or(0.0),
+            quantile(&rms, 0.5),
+            quantile(&rms, 1.0),
+            quantile(&steps, 0.5),
+            quantile(&steps, 1.0),
+            quantile(&rounds, 0.5),
+            quantile(&rounds, 1.0),
+            quantile(&times, 0.5),
+            quantile(&times, 0.95),
+            quantile(&times, 1.0),
+        ))
+    }
+}
+
+/// Writes poses as rows of 3x4 numbers that read back as they are.
+fn write(path: &Path, poses: &[Pose]) -> Result<(), raywake::error::Error> {
+    atomic::write(path, |to| poses.iter().try_for_each(|pose| write_row(to, pose)))
+}
+
+fn write_row(to: &mut impl Write, pose: &Pose) -> io::Result<()> {
+    let (m, t) = (pose.matrix(), pose.translation);
+    let rows = [0, 1, 2].map(|i| {
+        let r = m.row(i);
+        format!("{:?} {:?} {:?} {:?}", r.x, r.y, r.z, t[i])
+    });
+    writeln!(to, "{}", rows.join(" "))
+}

@@ -1,0 +1,148 @@
+//! Ego motion of a drive: each sweep registered with the few before it.
+
+use super::deskew::{Thinned, VOXEL_M, span_s};
+use super::{Cloud, Options, Registration, register, thin};
+use glam::DVec3;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Point, Rig};
+use std::collections::VecDeque;
+
+/// Sweeps that the target has beside the one before. With four, simulated drives end closer to the
+/// truth than with none (0.01 against 0.15 degrees, 1 against 3 cm in 20 sweeps), single steps are
+/// as good, and a pair takes a third longer.
+const EARLIER: usize = 4;
+/// Times that a pair is deskewed by the motion found so far and registered again, at most.
+const ROUNDS: usize = 4;
+/// A motion this close to the one that the sweeps were deskewed by changes no point by more than
+/// half of it (m, and rad at 20 m).
+const CLOSE_M: f64 = 0.02;
+const CLOSE_RAD: f64 = 0.001;
+
+/// Motion from one sweep to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Matched {
+    /// `before_from_now`; the initial one where the registration did not converge.
+    pub motion: Pose,
+    /// The last registration; its source is the later sweep.
+    pub registration: Registration,
+    /// Registrations it took, each deskewed by the motion before it.
+    pub rounds: usize,
+}
+
+/// Registers sweeps in the order they come.
+pub struct Matcher {
+    rig: Rig,
+    options: Options,
+    before: Option<(f64, Thinned)>,
+    /// Points of sweeps before that one, in its frame, deskewed; the latest first.
+    earlier: VecDeque<Vec<DVec3>>,
+}
+
+impl Matcher {
+    /// For the sweeps of a rig.
+    pub fn new(rig: &Rig, options: Options) -> Matcher {
+        Matcher { rig: rig.clone(), options, before: None, earlier: VecDeque::new() }
+    }
+
+    /// The motion from the sweep before this one, started at `initial` (`before_from_now`). `None`
+    /// on the first sweep.
+    pub fn next(&mut self, stamp_s: f64, points: &[Point], initial: Pose) -> Option<Matched> {
+        let now = Thinned::new(points, &self.rig);
+        let before = self.before.take();
+        let matched = before.map(|(before_s, before)| {
+            let dt_s = self.duration_s(stamp_s - before_s);
+            let matched = self.pair(&before, &now, dt_s, initial);
+            self.remember(&before, dt_s, &matched);
+            matched
+        });
+        self.before = Some((stamp_s, now));
+        matched
+    }
+
+    /// Moves the sweep before to the earlier ones, and all of them into the frame of this one. Where
+    /// the motion is unknown they are of no use.
+    fn remember(&mut self, before: &Thinned, dt_s: f64, matched: &Matched) {
+        if !matched.registration.converged {
+            self.earlier.clear();
+            return;
+        }
+        self.earlier.push_front(before.at_stamp(&matched.motion.twist(dt_s)));
+        self.earlier.truncate(EARLIER);
+        let now_from_before = matched.motion.inverse();
+        for p in self.earlier.iter_mut().flatten() {
+            *p = now_from_before.transform(*p);
+        }
+    }
+
+    /// The sweep before, and where it leaves voxels empty the earlier ones.
+    fn target(&self, before: Vec<DVec3>) -> Cloud {
+        let all: Vec<DVec3> =
+            before.into_iter().chain(self.earlier.iter().flatten().copied()).collect();
+        Cloud::new(thin(all.iter().copied(), VOXEL_M).into_iter().map(|n| all[n]))
+    }
+
+    /// Time between two stamps: whole turns where the sensor spins, as stamps are often coarser.
+    fn duration_s(&self, between_s: f64) -> f64 {
+        match span_s(&self.rig) {
+            Some(turn_s) if turn_s > 0.0 => (between_s / turn_s).round().max(1.0) * turn_s,
+            _ => between_s,
+        }
+    }
+
+    /// Both sweeps are deskewed as if the vehicle had moved evenly from stamp to stamp.
+    fn pair(&self, before: &Thinned, now: &Thinned, dt_s: f64, initial: Pose) -> Matched {
+        let mut motion = initial;
+        for rounds in 1.. {
+            let target = self.target(before.at_stamp(&motion.twist(dt_s)));
+            let source = Cloud::new(now.at_stamp(&motion.inverse().twist(-dt_s)));
+            let registration = register(&source, &target, motion, &self.options);
+            if !registration.converged {
+                return Matched { motion: initial, registration, rounds };
+            }
+            let change = (motion.inverse() * registration.pose).twist(1.0);
+            motion = registration.pose;
+            let close = change.linear.length() < CLOSE_M && change.angular.length() < CLOSE_RAD;
+            if close || !self.rig.distorted || rounds == ROUNDS {
+                return Matched { motion, registration, rounds };
+            }
+        }
+        unreachable!("the last round returns")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_sim::{Drive, Ego, Options as Sim};
+
+    #[test]
+    fn a_simulated_drive_from_nothing() {
+        let ego = Ego::Straight { speed: 11.0 };
+        let drive = Drive::new(4, Sim { sweeps: 3, ego, ..Sim::default() });
+        let mut matcher = Matcher::new(&drive.rig(), Options::default());
+        let mut before = None;
+        for sweep in drive {
+            let found = matcher.next(sweep.stamp_s, &sweep.points, Pose::IDENTITY);
+            let truth = before.map(|b: Pose| b.inverse() * sweep.world_from_vehicle);
+            assert_eq!(found.is_some(), truth.is_some());
+            if let (Some(found), Some(truth)) = (found, truth) {
+                let error = (truth.inverse() * found.motion).twist(1.0);
+                let (m, rad) = (error.linear.length(), error.angular.length());
+                assert!(found.registration.converged && found.rounds > 1, "{found:?}");
+                assert!(m < 0.03 && rad.to_degrees() < 0.06, "{m} m, {rad} rad, {found:?}");
+            }
+            before = Some(sweep.world_from_vehicle);
+        }
+    }
+
+    #[test]
+    fn sweeps_without_returns_fall_back() {
+        let drive = Drive::new(4, Sim { sweeps: 1, ..Sim::default() });
+        let mut matcher = Matcher::new(&drive.rig(), Options::default());
+        let initial = Pose::planar(1.0, 0.0, 0.0, 0.1);
+        assert_eq!(matcher.next(0.0, &[], initial), None);
+        let nan = Point { position: [f32::NAN; 3], ..Point::default() };
+        let found = matcher.next(0.1, &[nan; 1000], initial).unwrap();
+        assert!(!found.registration.converged && found.motion == initial);
+    }
+}

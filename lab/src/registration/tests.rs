@@ -1,0 +1,145 @@
+//! Clouds whose motion is known.
+
+use super::*;
+use glam::{DQuat, DVec3};
+use raywake::source::{OpenOptions, SweepData, open};
+use raywake_sim::Rng;
+
+/// Walls, a ground and a slope, every 0.3 m.
+fn corner() -> Vec<DVec3> {
+    let mut points = Vec::new();
+    for i in 0..60 {
+        for j in 0..20 {
+            let (u, v) = (0.3 * f64::from(i) - 9.0, 0.3 * f64::from(j));
+            points.push(DVec3::new(u, v - 3.0, -1.7));
+            points.push(DVec3::new(u, 6.0, v));
+            points.push(DVec3::new(9.0 + 0.3 * v, u, v - 1.0));
+        }
+    }
+    points
+}
+
+fn moved(points: &[DVec3], pose: &Pose) -> Cloud {
+    Cloud::new(points.iter().map(|p| pose.transform(*p)))
+}
+
+/// Length and angle (rad) between two poses.
+fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+    let between = (a.inverse() * *b).twist(1.0);
+    (between.linear.length(), between.angular.length())
+}
+
+fn motion(degrees: f64, axis: DVec3, translation: DVec3) -> Pose {
+    Pose::new(DQuat::from_axis_angle(axis.normalize(), degrees.to_radians()), translation)
+}
+
+#[test]
+fn an_exact_motion_comes_back() {
+    let (points, target) = (corner(), Cloud::new(corner()));
+    let cases = [
+        motion(0.0, DVec3::X, DVec3::ZERO),
+        motion(1.0, DVec3::new(0.2, -0.1, 1.0), DVec3::new(0.3, -0.1, 0.05)),
+        motion(5.0, DVec3::new(0.1, 0.1, 1.0), DVec3::new(1.5, 0.5, -0.2)),
+    ];
+    for truth in cases {
+        let source = moved(&points, &truth.inverse());
+        let found = register(&source, &target, Pose::IDENTITY, &Options::default());
+        let (metres, radians) = apart(&found.pose, &truth);
+        assert!(found.converged && found.unobserved == 0, "{found:?}");
+        assert!(metres < 1e-6 && radians < 1e-6, "{metres} m, {radians} rad, {found:?}");
+        assert!(found.rms < 1e-6 && found.inliers > 3000, "{found:?}");
+        assert_eq!(found, register(&source, &target, Pose::IDENTITY, &Options::default()));
+    }
+}
+
+#[test]
+fn what_moves_by_itself_does_not_count() {
+    let truth = motion(2.0, DVec3::Z, DVec3::new(0.6, 0.0, 0.0));
+    let mut rng = Rng::new(5);
+    // A lorry's side and back, a seventh of all points, that goes half a metre its own way.
+    let lorry: Vec<DVec3> = (0..600)
+        .map(|n| match n % 2 {
+            0 => DVec3::new(rng.range(0.0, 8.0), 2.5, rng.range(-1.5, 1.5)),
+            _ => DVec3::new(0.0, rng.range(2.5, 5.0), rng.range(-1.5, 1.5)),
+        })
+        .collect();
+    let first: Vec<DVec3> = corner().into_iter().chain(lorry.iter().copied()).collect();
+    let ahead = lorry.iter().map(|p| *p + DVec3::new(0.5, 0.3, 0.0));
+    let second: Vec<DVec3> = corner().into_iter().chain(ahead).collect();
+    let source = moved(&second, &truth.inverse());
+    let found = register(&source, &Cloud::new(first), Pose::IDENTITY, &Options::default());
+    let (metres, radians) = apart(&found.pose, &truth);
+    assert!(found.converged && metres < 0.005 && radians < 5e-4, "{metres} m, {radians} rad");
+}
+
+#[test]
+fn a_plane_tells_three_motions_and_no_more() {
+    let mut rng = Rng::new(7);
+    let mut plane = || -> Vec<DVec3> {
+        let mut at = || rng.range(-10.0, 10.0);
+        (0..4000).map(|_| DVec3::new(at(), at(), 0.001 * at())).collect()
+    };
+    let target = Cloud::new(plane());
+    let source = Cloud::new(plane().into_iter().map(|p| p - DVec3::new(0.0, 0.0, 0.2)));
+    let initial = Pose::planar(0.7, 0.1, 0.0, 0.02);
+    let found = register(&source, &target, initial, &Options::default());
+    assert_eq!(found.unobserved, 3, "{found:?}");
+    assert!(found.least_eigenvalue < OBSERVABLE);
+    let t = found.pose.translation;
+    assert!((t - DVec3::new(0.7, 0.1, 0.2)).length() < 0.01, "{t}");
+    assert!((found.pose.yaw_rad() - 0.02).abs() < 1e-3);
+}
+
+#[test]
+fn bad_clouds_do_not_converge() {
+    let good = Cloud::new(corner());
+    let empty = Cloud::new([]);
+    let identical = Cloud::new(vec![DVec3::ONE; 5000]);
+    let few = Cloud::new(corner().into_iter().take(12));
+    let initial = Pose::planar(0.3, 0.0, 0.0, 0.01);
+    for bad in [&empty, &identical, &few] {
+        for (source, target) in [(bad, &good), (&good, bad), (bad, bad)] {
+            let found = register(source, target, initial, &Options::default());
+            assert!(!found.converged && found.pose == initial, "{found:?}");
+            assert!(found.rms == 0.0 && found.inliers == 0);
+        }
+    }
+    // Nothing within reach.
+    let away = Pose::planar(1e300, 0.0, 0.0, 0.0);
+    assert!(!register(&good, &good, away, &Options::default()).converged);
+    let nan = Pose { translation: DVec3::NAN, ..Pose::IDENTITY };
+    let found = register(&good, &good, nan, &Options::default());
+    assert!(!found.converged && found.pose == Pose::IDENTITY);
+}
+
+/// Pairs of the drive against its given poses, from near and from as far off as is promised.
+#[test]
+#[ignore = "needs RAYWAKE_DATA"]
+fn pairs_of_a_recorded_drive() {
+    let folder = std::env::var_os("RAYWAKE_DATA").expect("RAYWAKE_DATA names a folder");
+    let drive = std::path::Path::new(&folder).join("kitti_raw_0005");
+    let mut source = open(&drive, &OpenOptions::default()).unwrap();
+    let [mut first, mut second] = [SweepData::default(), SweepData::default()];
+    for index in [5, 60, 100, 140] {
+        source.read(index, &mut first).unwrap();
+        source.read(index + 1, &mut second).unwrap();
+        let given = first.world_from_vehicle.inverse() * second.world_from_vehicle;
+        let off = [
+            Pose::IDENTITY,
+            given.inverse(),
+            motion(5.0, DVec3::Z, DVec3::new(2.0, 0.5, 0.0)),
+            motion(-5.0, DVec3::Z, DVec3::new(-2.0, -0.5, 0.1)),
+            motion(2.0, DVec3::X, DVec3::new(2.9, 0.0, 0.0)),
+        ];
+        for (n, off) in off.iter().enumerate() {
+            let mut matcher = Matcher::new(source.rig(), Options::default());
+            assert!(matcher.next(first.stamp_s, &first.points, Pose::IDENTITY).is_none());
+            let found = matcher.next(second.stamp_s, &second.points, given * *off).unwrap();
+            let (metres, radians) = apart(&found.motion, &given);
+            let degrees = radians.to_degrees();
+            println!("pair {index}, start {n}: {metres:.4} m, {degrees:.4} deg, {found:?}");
+            assert!(found.registration.converged && found.registration.unobserved == 0);
+            assert!(metres < 0.02 && degrees < 0.08, "pair {index}, start {n}");
+        }
+    }
+}
