@@ -8,4 +8,5 @@ pub mod grid;
 pub mod labels;
 pub mod metrics;
 pub mod registration;
+pub mod simulate;
 pub mod train;

@@ -3,7 +3,7 @@
 
 use clap::Parser;
 use raywake_lab::metrics::grade;
-use raywake_lab::{check, eval, registration, train};
+use raywake_lab::{check, eval, registration, simulate, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -21,6 +21,8 @@ enum Command {
     Grade(grade::Args),
     /// Ego motion of a drive by scan matching, against the drive's own poses.
     Match(registration::command::Args),
+    /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
+    Sim(simulate::Args),
 }
 
 fn main() -> ExitCode {
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         Command::CheckFilter(args) => check::run(&args),
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => registration::command::run(&args),
+        Command::Sim(args) => simulate::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,286 @@
+//! One drive: what it is made of, and its folder.
+
+use super::calibration::{Camera, imu};
+use super::layout::{drive_name, frame_name, spaced, timestamp};
+use super::tracklets::Tracklets;
+use super::{oxts, truth};
+use raywake::error::Error;
+use raywake::sink::atomic::create_folder;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Point, Rig, Timing};
+use raywake_sim::{Drive, Ego, Options, Rng, SensorRig, SimSweep};
+use serde_json::json;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Height of KITTI's Velodyne, which readers of its layout assume, m.
+const KITTI_HEIGHT_M: f64 = 1.73;
+
+/// Last file of a drive: what it was made of.
+const MANIFEST: &str = "manifest.json";
+
+/// What the vehicle does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Motion {
+    /// One of the others, drawn for every drive.
+    Any,
+    /// Stands.
+    Standing,
+    /// Goes straight on.
+    Straight,
+    /// Turns left or right at a crossing.
+    Turn,
+    /// Brakes to a stop and starts again.
+    StopAndGo,
+}
+
+/// What the drives of a run have in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// Every drive's own seed is drawn from it.
+    pub seed: u64,
+    /// Sweeps of a drive.
+    pub sweeps: usize,
+    /// One of [`SensorRig::NAMES`].
+    pub sensor: String,
+    /// What the vehicle does.
+    pub motion: Motion,
+    /// Amount of traffic; 1 is a busy street.
+    pub density: f64,
+}
+
+impl Recipe {
+    /// The simulator of drive `number`.
+    pub fn drive(&self, number: usize, threads: usize) -> Result<Drive, Error> {
+        let mut rng = Rng::split(self.seed, number as u64);
+        let seed = rng.bits();
+        let ego = match self.motion {
+            Motion::Any => Ego::Any,
+            Motion::Standing => Ego::Standing,
+            Motion::Straight => Ego::Straight { speed: rng.range(2.0, 14.0) },
+            Motion::Turn => Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) },
+            Motion::StopAndGo => Ego::StopAndGo { speed: rng.range(4.0, 10.0) },
+        };
+        let (sweeps, density, rig) = (self.sweeps, self.density, self.sensors()?);
+        Ok(Drive::new(seed, Options { sweeps, ego, density, rig, threads }))
+    }
+
+    /// The sensors.
+    fn sensors(&self) -> Result<SensorRig, Error> {
+        self.sensor.parse().map_err(|e: raywake_sim::UnknownRig| Error::Usage(e.to_string()))
+    }
+
+    /// What the sensors are to a reader.
+    pub fn rig(&self) -> Result<Rig, Error> {
+        let nowhere =
+            Options { sweeps: 0, density: 0.0, rig: self.sensors()?, ..Default::default() };
+        Ok(Drive::new(0, nowhere).rig())
+    }
+
+    /// What tells a drive from any other.
+    fn manifest(&self, number: usize) -> String {
+        let motion = clap::ValueEnum::to_possible_value(&self.motion);
+        let manifest = json!({
+            "raywake": env!("CARGO_PKG_VERSION"),
+            "seed": self.seed,
+            "drive": number,
+            "sweeps": self.sweeps,
+            "sensor": self.sensor,
+            "ego": motion.map_or_else(String::new, |m| m.get_name().to_owned()),
+            "density": self.density,
+        });
+        format!("{manifest}\n")
+    }
+}
+
+/// What there is of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing that is whole.
+    Missing,
+    /// All of it.
+    Finished,
+}
+
+/// Whether drive `number` is there. Fails where its name is taken by something else.
+pub fn state(day: &Path, recipe: &Recipe, number: usize) -> Result<State, Error> {
+    let folder = day.join(drive_name(number));
+    match fs::symlink_metadata(&folder) {
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            return Ok(State::Missing);
+        }
+        Err(e) => return Err(Error::reading(&folder)(e)),
+        Ok(_) => {}
+    }
+    let wanted = recipe.manifest(number);
+    match fs::read_to_string(folder.join(MANIFEST)) {
+        Ok(found) if found == wanted => Ok(State::Finished),
+        Ok(found) => {
+            let what = format!(
+                "holds another drive, {}, not {}; choose another folder",
+                found.trim(),
+                wanted.trim()
+            );
+            Err(Error::input(&folder, "", what))
+        }
+        Err(_) => {
+            let what = "is there and is no drive of this program; choose another folder";
+            Err(Error::input(&folder, "", what))
+        }
+    }
+}
+
+/// Writes drive `number` under a temporary name, which becomes its own when all is there.
+///
+/// `tell` is called after each sweep and returns whether to go on; where it says no, the drive
+/// stays unfinished. Fails where a file cannot be written.
+pub fn write(
+    day: &Path,
+    recipe: &Recipe,
+    number: usize,
+    threads: usize,
+    tell: &dyn Fn() -> bool,
+) -> Result<(), Error> {
+    let folder = day.join(drive_name(number));
+    let partial = day.join(format!(".{}.partial", drive_name(number)));
+    if partial.exists() {
+        fs::remove_dir_all(&partial).map_err(Error::writing(&partial))?;
+    }
+    let drive = recipe.drive(number, threads)?;
+    let mut writer = Writer::new(&partial, &drive)?;
+    for frame in 0..recipe.sweeps {
+        writer.sweep(frame)?;
+        if !tell() {
+            return Ok(());
+        }
+    }
+    writer.finish()?;
+    save(&partial, MANIFEST, recipe.manifest(number))?;
+    fs::rename(&partial, &folder).map_err(Error::writing(&folder))
+}
+
+/// A file of a folder.
+fn save(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> Result<(), Error> {
+    let path = folder.join(name);
+    fs::write(&path, content).map_err(Error::writing(&path))
+}
+
+/// A drive while it is being written.
+struct Writer<'a> {
+    root: PathBuf,
+    drive: &'a Drive,
+    vehicle_from_imu: Pose,
+    unit: oxts::Unit,
+    sidecars: bool,
+    tracklets: Tracklets,
+    objects: Vec<truth::ObjectTruth>,
+    poses: String,
+    frames: usize,
+}
+
+impl<'a> Writer<'a> {
+    fn new(root: &Path, drive: &'a Drive) -> Result<Writer<'a>, Error> {
+        let rig = drive.rig();
+        let sidecars = rig.sensors.iter().any(|pose| *pose != Pose::IDENTITY)
+            || rig.sensors.len() != 1
+            || rig.ground_m != -KITTI_HEIGHT_M;
+        let always = ["velodyne_points/data", "oxts/data", "truth/points"];
+        let beside = ["velodyne_points/offset_s", "velodyne_points/sensor"];
+        for name in always.iter().chain(beside.iter().filter(|_| sidecars)) {
+            create_folder(&root.join(name))?;
+        }
+        if sidecars {
+            save(root, "velodyne_points/sensors.txt", sensors(&rig))?;
+        }
+        save(root, "oxts/dataformat.txt", oxts::FORMAT)?;
+        save(root, "truth/classes.txt", truth::classes())?;
+        let vehicle_from_imu = imu(&rig);
+        let unit = oxts::Unit::new(drive.world_from_vehicle(0.0) * vehicle_from_imu);
+        let tracklets = Tracklets::new(Camera::new(&rig));
+        let (objects, poses, frames) = (Vec::new(), String::new(), 0);
+        let root = root.to_path_buf();
+        Ok(Writer {
+            root,
+            drive,
+            vehicle_from_imu,
+            unit,
+            sidecars,
+            tracklets,
+            objects,
+            poses,
+            frames,
+        })
+    }
+
+    /// Casts a sweep and writes what is of it alone.
+    fn sweep(&mut self, frame: usize) -> Result<(), Error> {
+        let sweep = self.drive.sweep(frame);
+        let bin = frame_name(frame, "bin");
+        save(&self.root, &format!("velodyne_points/data/{bin}"), cloud(&sweep.points))?;
+        if self.sidecars {
+            self.beside(&bin, &sweep)?;
+        }
+        let world_from_imu = |t: f64| self.drive.world_from_vehicle(t) * self.vehicle_from_imu;
+        let packet = self.unit.packet(&world_from_imu, sweep.stamp_s);
+        save(&self.root, &format!("oxts/data/{}", frame_name(frame, "txt")), packet)?;
+        let path = truth::points_path(&self.root, frame as u64);
+        truth::write_points(&path, &truth::of_points(&sweep))?;
+        let objects = self.drive.objects(sweep.stamp_s);
+        self.objects.extend(truth::of_objects(frame as u64, self.drive, &sweep, &objects));
+        self.tracklets.add(frame, &sweep, &objects);
+        self.poses += &truth::pose_row(&sweep.world_from_vehicle);
+        self.frames = frame + 1;
+        Ok(())
+    }
+
+    /// Times and sensors of the returns.
+    fn beside(&self, bin: &str, sweep: &SimSweep) -> Result<(), Error> {
+        let times: Vec<u8> = sweep.points.iter().flat_map(|p| p.offset_s.to_le_bytes()).collect();
+        let sensors: Vec<u8> = sweep.points.iter().map(|p| p.sensor as u8).collect();
+        save(&self.root, &format!("velodyne_points/offset_s/{bin}"), times)?;
+        save(&self.root, &format!("velodyne_points/sensor/{bin}"), sensors)
+    }
+
+    /// Writes what is of the whole drive.
+    fn finish(self) -> Result<(), Error> {
+        let [from_s, span_s] = span(&self.drive.rig());
+        let times =
+            |offset_s| -> String { (0..self.frames).map(|n| timestamp(n, offset_s)).collect() };
+        for (name, offset_s) in [("", 0.0), ("_start", from_s), ("_end", from_s + span_s)] {
+            let name = format!("velodyne_points/timestamps{name}.txt");
+            save(&self.root, &name, times(offset_s))?;
+        }
+        save(&self.root, "oxts/timestamps.txt", times(0.0))?;
+        save(&self.root, "truth/poses.txt", &self.poses)?;
+        truth::write_objects(&truth::objects_path(&self.root), &self.objects)?;
+        save(&self.root, "tracklet_labels.xml", self.tracklets.xml())
+    }
+}
+
+/// Earliest offset and duration of a sweep, s.
+fn span(rig: &Rig) -> [f64; 2] {
+    match rig.timing {
+        Timing::Offset { from_s, span_s } => [from_s, span_s],
+        Timing::Azimuth { span_s } => [-0.5 * span_s, span_s],
+        Timing::AtStamp => [0.0, 0.0],
+    }
+}
+
+/// `sensors.txt`, as `raywake::source` reads it.
+fn sensors(rig: &Rig) -> String {
+    let mut text = format!("span: {}\nground: {}\n", spaced(span(rig)), rig.ground_m);
+    for pose in &rig.sensors {
+        text += &format!("sensor: {}\n", spaced(super::layout::rows(pose)));
+    }
+    text
+}
+
+/// A `.bin`: little-endian float32 x, y, z, intensity.
+fn cloud(points: &[Point]) -> Vec<u8> {
+    let values = points.iter().flat_map(|p| {
+        let [x, y, z] = p.position;
+        [x, y, z, p.intensity]
+    });
+    values.flat_map(f32::to_le_bytes).collect()
+}

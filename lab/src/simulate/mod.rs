@@ -1,0 +1,153 @@
+//! `raywake-lab sim`: simulated drives in the layout of KITTI's raw recordings, with exact truth.
+//!
+//! A drive is `OUT/DATE/DATE_drive_NNNN_sync/`, its calibration `OUT/DATE/calib_*.txt`. Beside what
+//! a recording has, it has `truth/`: see [`truth`]. Its vehicle frame ("Velodyne" in KITTI's files)
+//! is that of [`raywake_sim::Drive::rig`].
+
+mod calibration;
+mod drive;
+mod layout;
+mod oxts;
+mod tracklets;
+pub mod truth;
+
+#[cfg(test)]
+mod tests;
+
+pub use drive::{Motion, Recipe};
+
+use clap::builder::PossibleValuesParser;
+use drive::State;
+use raywake::error::Error;
+use raywake::progress::Progress;
+use raywake::sink::atomic;
+use raywake_sim::SensorRig;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Most sweeps of a drive: nearly three hours.
+const SWEEPS_MAX: u64 = 100_000;
+
+/// Largest density of traffic: beyond, there is no room in the street.
+const DENSITY_MAX: f64 = 10.0;
+
+/// Options of `sim`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder the drives are written to; finished ones in it are left as they are.
+    out: PathBuf,
+    /// Number of drives.
+    #[arg(long, default_value_t = 1)]
+    drives: usize,
+    /// Sweeps of each drive, 10 a second.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=SWEEPS_MAX))]
+    sweeps: u64,
+    /// Drive k of a seed is the same whatever the number of drives.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Sensors on the vehicle.
+    #[arg(long, default_value = "hdl64", value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
+    sensor: String,
+    /// What the vehicle does.
+    #[arg(long, value_enum, default_value = "any")]
+    ego: Motion,
+    /// Amount of traffic: 1 is a busy street, 0 an empty one.
+    #[arg(long, default_value_t = 1.0, value_parser = density)]
+    density: f64,
+    /// Threads; as many as the machine runs at once unless given.
+    #[arg(long)]
+    jobs: Option<usize>,
+}
+
+/// Reads a density.
+fn density(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let fits = (0.0..=DENSITY_MAX).contains(&value);
+    fits.then_some(value).ok_or_else(|| format!("not within 0 to {DENSITY_MAX}"))
+}
+
+/// What a run did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Drives written.
+    pub drives: usize,
+    /// Drives that were there already.
+    pub skipped: usize,
+}
+
+/// Writes what the command line asks for, and says how fast.
+pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
+    let recipe = Recipe {
+        seed: args.seed,
+        sweeps: args.sweeps as usize,
+        sensor: args.sensor.clone(),
+        motion: args.ego,
+        density: args.density,
+    };
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let start = Instant::now();
+    let done = write(&args.out, &recipe, args.drives, args.jobs.unwrap_or_else(cores), false)?;
+    let (sweeps, elapsed_s) = (done.drives * recipe.sweeps, start.elapsed().as_secs_f64());
+    println!(
+        "{}: {} drives written, {} were there; {sweeps} sweeps in {elapsed_s:.1} s, {:.2} a second",
+        args.out.display(),
+        done.drives,
+        done.skipped,
+        sweeps as f64 / elapsed_s
+    );
+    Ok(())
+}
+
+/// Writes drives 0 to `drives` of a recipe by `jobs` threads, the number of which does not show.
+///
+/// Drives that are there are kept; a drive that a run left unfinished is begun anew. Two runs must
+/// not write to one folder at once. Fails where a folder holds something else than the drive meant
+/// to be there, before anything is written, and where a file cannot be written.
+pub fn write(
+    out: &Path,
+    recipe: &Recipe,
+    drives: usize,
+    jobs: usize,
+    quiet: bool,
+) -> Result<Written, Error> {
+    let rig = recipe.rig()?;
+    let day = out.join(layout::DATE);
+    let mut missing = Vec::new();
+    for number in 0..drives {
+        if drive::state(&day, recipe, number)? == State::Missing {
+            missing.push(number);
+        }
+    }
+    atomic::create_folder(&day)?;
+    calibration::write(&day, &rig)?;
+    // Threads that find no drive of their own help casting.
+    let workers = jobs.clamp(1, missing.len().max(1));
+    let threads = (jobs / workers).max(1);
+    let progress = Mutex::new(Progress::new(missing.len() * recipe.sweeps, quiet));
+    let (next, swept, stop) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
+    let tell = || {
+        let done = swept.fetch_add(1, Ordering::Relaxed) + 1;
+        progress.lock().expect("no thread panics while it shows progress").update(done);
+        !stop.load(Ordering::Relaxed)
+    };
+    let work = || {
+        while let Some(&number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let result = drive::write(&day, recipe, number, threads, &tell);
+            // The others need not go on.
+            result.inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+        }
+        Ok(())
+    };
+    let results: Vec<Result<(), Error>> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().map(|t| t.join().expect("a simulating thread panicked")).collect()
+    });
+    progress.lock().expect("no thread panics while it shows progress").finish();
+    results.into_iter().collect::<Result<(), Error>>()?;
+    Ok(Written { drives: missing.len(), skipped: drives - missing.len() })
+}

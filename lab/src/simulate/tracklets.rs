@@ -1,0 +1,179 @@
+//! `tracklet_labels.xml`: the boxes a labeller would see, as KITTI's development kit stores them
+//! (boost serialisation).
+//!
+//! An object has poses from the first frame on which the camera sees a return of it to the last;
+//! on frames between where it sees none, it is marked as fully occluded. Boxes are upright, as
+//! KITTI's are: (tx, ty, tz) lies half the height below the centre, and rz is the heading.
+
+use super::calibration::Camera;
+use glam::DVec3;
+use raywake_core::pose::Pose;
+use raywake_sim::{Class, ObjectState, SimSweep};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+/// Box of one frame.
+struct Row {
+    /// Bottom centre (m) and heading (rad) in the vehicle frame.
+    at: DVec3,
+    yaw: f64,
+    /// Whether the camera sees a return of it.
+    seen: bool,
+    /// Corners in the image.
+    corners: usize,
+}
+
+/// One labelled object.
+struct Tracklet {
+    class: Class,
+    size: [f64; 3],
+    first_frame: usize,
+    rows: Vec<Row>,
+}
+
+/// The labels of a drive, frame by frame.
+pub struct Tracklets {
+    camera: Camera,
+    by_id: BTreeMap<u32, Tracklet>,
+}
+
+impl Tracklets {
+    /// No labels yet.
+    pub fn new(camera: Camera) -> Tracklets {
+        Tracklets { camera, by_id: BTreeMap::new() }
+    }
+
+    /// Adds a frame; frames come in order, none left out. `objects` are those at its stamp.
+    pub fn add(&mut self, frame: usize, sweep: &SimSweep, objects: &[ObjectState]) {
+        let in_view =
+            |position: [f32; 3]| self.camera.sees(DVec3::from_array(position.map(f64::from)));
+        let returns = sweep.points.iter().zip(&sweep.truth);
+        let seen: BTreeSet<u32> = returns
+            .filter(|(p, t)| t.object != 0 && in_view(p.position))
+            .map(|(_, t)| t.object)
+            .collect();
+        let vehicle_from_world = sweep.world_from_vehicle.inverse();
+        for object in objects {
+            let seen = seen.contains(&object.id);
+            if !seen && !self.by_id.contains_key(&object.id) {
+                continue;
+            }
+            let row = self.row(vehicle_from_world * object.world_from_object, object.size, seen);
+            let (class, size) = (object.class, object.size);
+            let begin = || Tracklet { class, size, first_frame: frame, rows: Vec::new() };
+            self.by_id.entry(object.id).or_insert_with(begin).rows.push(row);
+        }
+    }
+
+    fn row(&self, centre: Pose, size: [f64; 3], seen: bool) -> Row {
+        let half = DVec3::from_array(size) * 0.5;
+        let corner = |n: usize| {
+            let sign = |bit: usize| if n & bit == 0 { -1.0 } else { 1.0 };
+            centre.transform(half * DVec3::new(sign(1), sign(2), sign(4)))
+        };
+        Row {
+            at: centre.translation - DVec3::new(0.0, 0.0, half.z),
+            yaw: centre.yaw_rad(),
+            seen,
+            corners: (0..8).filter(|&n| self.camera.sees(corner(n))).count(),
+        }
+    }
+
+    /// The file.
+    pub fn xml(mut self) -> String {
+        for tracklet in self.by_id.values_mut() {
+            let last = tracklet.rows.iter().rposition(|row| row.seen).unwrap_or(0);
+            tracklet.rows.truncate(last + 1);
+        }
+        let mut text = String::from(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\" ?>\n\
+             <!DOCTYPE boost_serialization>\n\
+             <boost_serialization signature=\"serialization::archive\" version=\"9\">\n\
+             <tracklets class_id=\"0\" tracking_level=\"0\" version=\"0\">\n",
+        );
+        let _ = writeln!(text, "\t<count>{}</count>", self.by_id.len());
+        text += "\t<item_version>1</item_version>\n";
+        let (mut first, mut first_pose) = (true, true);
+        for tracklet in self.by_id.values() {
+            tracklet.write(&mut text, &mut first, &mut first_pose);
+        }
+        text + "</tracklets>\n</boost_serialization>\n"
+    }
+}
+
+/// The attributes that boost gives to the first element of a class alone.
+fn attributes(first: &mut bool, class_id: usize, version: usize) -> String {
+    match std::mem::replace(first, false) {
+        true => format!(" class_id=\"{class_id}\" tracking_level=\"0\" version=\"{version}\""),
+        false => String::new(),
+    }
+}
+
+impl Tracklet {
+    fn write(&self, text: &mut String, first: &mut bool, first_pose: &mut bool) {
+        let (item, poses) = match *first {
+            true => (attributes(first, 1, 1), attributes(&mut true, 2, 0)),
+            false => Default::default(),
+        };
+        let ([l, w, h], kind) = (self.size, object_type(self.class));
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "\t<item{item}>\n\t\t<objectType>{kind}</objectType>\n\t\t<h>{h}</h>\n\t\t<w>{w}</w>\n\
+             \t\t<l>{l}</l>\n\t\t<first_frame>{}</first_frame>\n\t\t<poses{poses}>\n\
+             \t\t\t<count>{}</count>\n\t\t\t<item_version>2</item_version>\n",
+            self.first_frame,
+            self.rows.len()
+        );
+        for row in &self.rows {
+            let _ = writeln!(text, "\t\t\t<item{}>", attributes(first_pose, 3, 2));
+            for (name, value) in row.fields() {
+                let _ = writeln!(text, "\t\t\t\t<{name}>{value}</{name}>");
+            }
+            *text += "\t\t\t</item>\n";
+        }
+        *text += "\t\t</poses>\n\t\t<finished>1</finished>\n\t</item>\n";
+    }
+}
+
+impl Row {
+    /// Elements of a pose. State 2: labelled; occlusion 0: visible, 2: fully occluded; truncation
+    /// 0: in the image, 1: truncated, 2: outside.
+    fn fields(&self) -> [(&'static str, f64); 15] {
+        let truncation = match self.corners {
+            8 => 0.0,
+            0 if !self.seen => 2.0,
+            _ => 1.0,
+        };
+        [
+            ("tx", self.at.x),
+            ("ty", self.at.y),
+            ("tz", self.at.z),
+            ("rx", 0.0),
+            ("ry", 0.0),
+            ("rz", self.yaw),
+            ("state", 2.0),
+            ("occlusion", if self.seen { 0.0 } else { 2.0 }),
+            ("occlusion_kf", 0.0),
+            ("truncation", truncation),
+            ("amt_occlusion", 0.0),
+            ("amt_occlusion_kf", -1.0),
+            ("amt_border_l", 0.0),
+            ("amt_border_r", 0.0),
+            ("amt_border_kf", -1.0),
+        ]
+    }
+}
+
+/// KITTI's name of a class; what it has no name for is "Misc".
+fn object_type(class: Class) -> &'static str {
+    match class {
+        Class::Car => "Car",
+        Class::Van => "Van",
+        Class::Truck => "Truck",
+        Class::Tram => "Tram",
+        Class::Cyclist => "Cyclist",
+        Class::Pedestrian => "Pedestrian",
+        _ => "Misc",
+    }
+}
