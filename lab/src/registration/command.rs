@@ -123,7 +123,7 @@ impl Chain {
         ];
         let mut times = self.times_ms.clone();
         times.sort_by(f64::total_cmp);
-        let (first, end) = match (self.poses.last(), self.given.last()) {
+        let (found, given) = match (self.poses.last(), self.given.last()) {
             (Some(found), Some(given)) => (found, given),
             _ => return Ok(String::new()),
         };
@@ -133,7 +133,7 @@ impl Chain {
              inliers' rms    median {:.4} m, max {:.4} m\n\
              steps           median {}, max {}; rounds of deskewing median {}, max {}\n\
              time            median {:.0} ms, 95 % {:.0} ms, max {:.0} ms a pair\n",
-            differences.table(first, end)?,
+            differences.table(found, given)?,
             count(&|m| m.registration.converged),
             self.matched.len(),
             count(&|m| m.registration.unobserved > 0),
@@ -163,4 +163,28 @@ fn write_row(to: &mut impl Write, pose: &Pose) -> io::Result<()> {
         format!("{:?} {:?} {:?} {:?}", r.x, r.y, r.z, t[i])
     });
     writeln!(to, "{}", rows.join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_drive_and_its_file() {
+        let mut source = Simulated::new(2, 3);
+        let chain = chain(&mut source, 3, Initial::ConstantVelocity).unwrap();
+        assert_eq!((chain.poses.len(), chain.matched.len()), (3, 2));
+        assert_eq!(chain.poses[0], chain.given[0]);
+        let report = chain.report().unwrap();
+        assert!(report.contains("converged       2 of 2 pairs"), "{report}");
+        for pose in &chain.poses {
+            let mut row = Vec::new();
+            write_row(&mut row, pose).unwrap();
+            let text = String::from_utf8(row).unwrap();
+            let numbers: Vec<f64> = text.split_whitespace().map(|w| w.parse().unwrap()).collect();
+            let back = Pose::from_rows(&numbers.try_into().unwrap()).unwrap();
+            assert!((back.translation - pose.translation).length() == 0.0);
+            assert!(back.rotation.dot(pose.rotation).abs() > 1.0 - 1e-14);
+        }
+    }
 }

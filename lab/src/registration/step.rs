@@ -58,14 +58,9 @@ pub fn solve(pairs: &[Pair], observable: f64) -> Option<Step> {
         let pull = -weight * pair.residual();
         for i in 0..6 {
             right[i] += pull * row[i];
-            for j in i..6 {
+            for j in 0..6 {
                 matrix[i][j] += weight * row[i] * row[j];
             }
-        }
-    }
-    for i in 0..6 {
-        for j in 0..i {
-            matrix[i][j] = matrix[j][i];
         }
     }
     let (values, vectors) = eigen::symmetric(matrix);
