@@ -44,7 +44,7 @@ pub fn export(
 }
 
 /// Motion over ground in `dt_s` along the vehicle's axes, m.
-fn displacement(flow: &PointFlow, world_from_vehicle: &Pose, dt_s: f64) -> [f32; 3] {
+pub fn displacement(flow: &PointFlow, world_from_vehicle: &Pose, dt_s: f64) -> [f32; 3] {
     let [x, y] = flow.velocity_world_mps.map(f64::from);
     let motion = world_from_vehicle.rotation.conjugate() * DVec3::new(x, y, 0.0) * dt_s;
     motion.as_vec3().to_array()

@@ -3,7 +3,7 @@
 use super::objects::{Objects, Present};
 use super::row::Row;
 use crate::grid::Grid;
-use crate::labels::View;
+use crate::labels::{Motion, View};
 use glam::DVec3;
 use raywake::engine::Pair;
 use raywake::source::SweepData;
@@ -77,10 +77,15 @@ impl<'a> Collector<'a> {
         Collector { profile, rig, filter, view, margin_m, objects, grid }
     }
 
+    /// The labelled objects of the first sweep.
+    pub fn present(&self, seen: &Seen) -> &'a [Present] {
+        self.objects.at(seen.first.frame)
+    }
+
     /// Rows of the first sweep's solid columns.
     pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
-        let present = self.objects.at(seen.first.frame);
+        let present = self.present(seen);
         let side = self.profile.side as i32;
         let mut rows = Vec::with_capacity(seen.columns.len());
         for flow in &seen.columns {
@@ -111,11 +116,11 @@ impl<'a> Collector<'a> {
         // Flow is planar; the height matters where the vehicle nods, a little.
         let at = DVec3::new(flat.x, flat.y, object.map_or(self.rig.ground_m, |p| p.height_m));
         let world = seen.now().transform(at);
-        let true_world = object.map_or(world, |p| p.raw.map_or(world, |m| m.transform(world)));
-        let vanishes = object.is_some_and(|p| p.raw.is_none());
-        let ends = [at, seen.then.inverse().transform(true_world)];
-        let truth = true_world - world;
-        let speed = object.map_or(DVec3::ZERO, |p| p.velocity(world));
+        let step = object.and_then(|p| p.step);
+        let vanishes = object.is_some() && step.is_none();
+        let moved = |by: Option<Pose>| by.map_or(world, |m| m.transform(world)) - world;
+        let (truth, smooth) = (moved(step.map(|s| s.raw)), moved(step.map(|s| s.smooth)));
+        let ends = [at, seen.then.inverse().transform(world + truth)];
         let [cells_x, cells_y] = flow.displacement_cells.map(f64::from);
         let cell = self.profile.voxel_m;
         let found = match flow.origin {
@@ -135,7 +140,7 @@ impl<'a> Collector<'a> {
             class: object.map_or(0, |p| p.class),
             track: object.map_or(0, |p| p.track + 1),
             in_view: !vanishes && ends.iter().all(|end| self.view.holds(*end)),
-            moving: object.is_some_and(|p| p.moving),
+            motion: object.map_or(0, |p| motion(p.motion)),
             voxels,
             score,
             origin: flow.origin as u8,
@@ -143,8 +148,8 @@ impl<'a> Collector<'a> {
             flow_y: found.y as f32,
             true_x: truth.x as f32,
             true_y: truth.y as f32,
-            smooth_x: (speed.x * seen.dt_s) as f32,
-            smooth_y: (speed.y * seen.dt_s) as f32,
+            smooth_x: smooth.x as f32,
+            smooth_y: smooth.y as f32,
             carried_x: carried.x as f32,
             carried_y: carried.y as f32,
             rounded_x: rounded.x as f32,
@@ -155,8 +160,6 @@ impl<'a> Collector<'a> {
             covariance_xy: flow.covariance[1],
             covariance_yy: flow.covariance[2],
             age: flow.age,
-            speed_x: speed.x as f32,
-            speed_y: speed.y as f32,
             dt: seen.dt_s as f32,
         }
     }
@@ -175,5 +178,14 @@ impl<'a> Collector<'a> {
             Frame::Lattice => by,
             Frame::Sensor => seen.then.inverse().transform(seen.now().transform(at) + by) - at,
         }
+    }
+}
+
+/// As [`Row::motion`] has it.
+fn motion(motion: Motion) -> u8 {
+    match motion {
+        Motion::Parked => 0,
+        Motion::Slow => 1,
+        Motion::Moving => 2,
     }
 }

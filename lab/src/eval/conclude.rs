@@ -2,8 +2,8 @@
 
 use super::drive::{Files, Settings};
 use super::facts::Facts;
-use super::tally::{Group, Motion, Tally, Truth, at_recall, at_threshold, curve};
 use super::statistics::Weight;
+use super::tally::{Estimate, Group, Motion, Tally, Truth, curve};
 use super::{figures, rows_file, tables};
 use crate::report::{Picture, Report, Table};
 use raywake::error::Error;
@@ -21,14 +21,19 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
     headlines(&mut report, &tally, drives);
     facts(&mut report, drives, settings);
     let [by_class, by_motion] = figures::histograms(&tally, settings.profile.voxel_m);
+    let scores = tables::scores(drives);
+    let [bucketed, three_way] = tables::argoverse(&scores);
     let shown = [
         tables::raw_flow(&tally, Weight::Column),
         tables::references(&tally, Truth::Raw),
         tables::tracklets(&tally),
+        bucketed,
+        three_way,
+        tables::accuracy(&scores),
         tables::filter(&curve),
         tables::times(drives),
     ];
-    let [raw, beside, settled, filter, times] = shown.clone();
+    let [raw, beside, settled, bucketed, three_way, accuracy, filter, times] = shown.clone();
     report
         .section("Raw scene flow")
         .text(RAW)
@@ -46,9 +51,12 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         .chart(figures::settled(&tally))
         .chart(figures::tracklets(&tally));
     report
-        .section("Background filter")
-        .table(filter)
-        .chart(figures::precision_recall(&curve));
+        .section("Flow of single returns")
+        .text(POINTS)
+        .table(bucketed)
+        .table(three_way)
+        .table(accuracy);
+    report.section("Background filter").table(filter).chart(figures::precision_recall(&curve));
     report
         .section("Time")
         .table(times)
@@ -68,15 +76,20 @@ const RAW: &str = "The error is the distance between the displacement found for 
 const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
     tracklet and that of its object at the column's centre.";
 
+const POINTS: &str = "Every return has the velocity of its column over the time between the sweeps. \
+    Truth is the simulator's, or the motion of the labelled box a return lies in; what is in none \
+    stands. Without a map, returns without a label up to 0.3 m above the plane the vehicle stands \
+    on count as ground, which is left out. For the graders' own truth and ground of an Argoverse \
+    2 log see `raywake-lab grade`.";
+
 fn subtitle(drives: &[Facts]) -> String {
     let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
     format!("{} drives, {pairs} pairs of sweeps", drives.len())
 }
 
 fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
-    let flow = |motion| {
-        tally.flow(super::tally::Estimate::Ours, Truth::Raw, Group::Labelled, motion, Weight::Column)
-    };
+    let flow =
+        |motion| tally.flow(Estimate::Ours, Truth::Raw, Group::Labelled, motion, Weight::Column);
     let number = |v: f64, unit: &str, digits: usize| {
         if v.is_finite() { format!("{v:.digits$} {unit}") } else { "–".into() }
     };
@@ -154,7 +167,7 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
          the program puts out for them: no motion over ground.",
         settings.margin_m,
         tally.out_of_view,
-        super::objects::MOVING_MPS,
+        crate::labels::trajectory::MOVING_MPS,
     ));
     let views = drives.iter().map(|d| format!("`{}`: labelled in {}", d.drive, d.view));
     let notes = drives.iter().flat_map(|d| d.notes.iter().map(|n| format!("`{}`: {n}", d.drive)));

@@ -3,6 +3,7 @@
 use super::collect::{Collector, Seen};
 use super::facts::Facts;
 use super::objects::Objects;
+use super::points::{PointScores, Points};
 use super::rows_file;
 use crate::labels::{self, View};
 use raywake::args::BackendChoice;
@@ -97,7 +98,7 @@ pub fn evaluate(
         view: view(labels.view).into(),
         tracks: labels.tracks.len(),
         boxes: labels.tracks.iter().map(|t| t.boxes.len()).sum(),
-        notes: [source.notes(), &labels.notes, &objects.notes].concat(),
+        notes: [source.notes(), &labels.notes].concat(),
         ..Facts::default()
     };
     let collector = Collector::new(
@@ -109,7 +110,14 @@ pub fn evaluate(
         labels.view,
         settings.margin_m,
     );
-    run(source.as_mut(), settings, &files, collector, &mut facts)?;
+    let points = Points::new(
+        path,
+        labels.view,
+        source.rig().ground_m,
+        settings.margin_m,
+        settings.profile.voxel_m,
+    );
+    run(source.as_mut(), settings, &files, collector, points, &mut facts)?;
     facts.seconds = begin.elapsed().as_secs_f64();
     facts.write(&files.facts)?;
     Ok((facts, false))
@@ -128,6 +136,7 @@ fn run(
     settings: &Settings,
     files: &Files,
     collector: Collector,
+    points: Points,
     facts: &mut Facts,
 ) -> Result<(), Error> {
     let plan = Plan {
@@ -143,7 +152,7 @@ fn run(
     let (send, receive) = sync_channel(WAITING);
     let drive = facts.drive.clone();
     let (summary, written) = std::thread::scope(|scope| {
-        let rows = scope.spawn(move || collect(&drive, collector, &receive, files));
+        let rows = scope.spawn(move || collect(&drive, collector, points, &receive, files));
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
@@ -153,7 +162,7 @@ fn run(
         (summary, rows.join().expect("the thread that makes rows panicked"))
     });
     let summary = summary?;
-    written?;
+    facts.scores = written?;
     if summary.interrupted {
         return Err(Error::Usage("interrupted".into()));
     }
@@ -168,12 +177,18 @@ fn run(
     Ok(())
 }
 
-/// Rows of all pairs as they come.
+/// Rows and scores of all pairs as they come.
 fn collect(
     drive: &str,
     mut collector: Collector,
+    mut points: Points,
     pairs: &Receiver<Seen>,
     files: &Files,
-) -> Result<(), Error> {
-    rows_file::write(&files.rows, drive, || Ok(pairs.recv().ok().map(|seen| collector.rows(&seen))))
+) -> Result<[PointScores; 3], Error> {
+    rows_file::write(&files.rows, drive, || {
+        let Ok(seen) = pairs.recv() else { return Ok(None) };
+        points.pair(&seen, collector.present(&seen))?;
+        Ok(Some(collector.rows(&seen)))
+    })?;
+    Ok(points.scores)
 }

@@ -1,5 +1,6 @@
 //! What is kept of a drive beside its rows: settings, times, notes.
 
+use super::points::PointScores;
 use raywake::error::Error;
 use raywake::laps::Laps;
 use raywake::sink::atomic;
@@ -53,6 +54,8 @@ pub struct Facts {
     pub points: Vec<usize>,
     /// What was left out, of data and labels.
     pub notes: Vec<String>,
+    /// Scores of single returns, in the order of [`super::points::ESTIMATES`].
+    pub scores: [PointScores; 3],
     /// Pictures of its best and worst sweeps.
     pub panels: Vec<Panel>,
     /// Wall time of the evaluation, s.

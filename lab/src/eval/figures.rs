@@ -73,7 +73,8 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
         .filter(|g| *g != Group::Labelled)
         .map(|g| (g.label().to_string(), of(g, Motion::Any)));
     let motions = [Motion::Moving, Motion::Parked];
-    let by_motion = motions.map(|m| (format!("All labelled, {}", m.label()), of(Group::Labelled, m)));
+    let by_motion =
+        motions.map(|m| (format!("All labelled, {}", m.label()), of(Group::Labelled, m)));
     [
         Chart::small_multiples(
             "figure-3-7",
@@ -167,7 +168,8 @@ pub fn times(drives: &[Facts]) -> Chart {
     };
     let categories = stages.iter().map(|s| s.0.clone()).collect();
     let bars = Bars { x: Axis::new("ms"), categories, series: vec![series] };
-    let caption = "Time of every stage per pair of sweeps: median, and a line to the 99 % quantile.";
+    let caption =
+        "Time of every stage per pair of sweeps: median, and a line to the 99 % quantile.";
     Chart::new("figure-stages", caption, Plot::Bars(bars))
 }
 

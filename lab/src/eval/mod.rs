@@ -12,6 +12,7 @@ mod drive;
 mod facts;
 mod figures;
 mod objects;
+mod points;
 mod row;
 mod rows_file;
 mod statistics;

@@ -1,14 +1,11 @@
-//! The labelled objects of every sweep, with their motion.
+//! The labelled objects of every sweep, with their motion to the next.
 
 use super::row::class_of;
-use crate::labels::{Footprint, Labels};
+use crate::labels::{Footprint, Labels, Motion, trajectories};
 use glam::DVec3;
 use raywake::source::Source;
 use raywake_core::pose::Pose;
 use std::collections::HashMap;
-
-/// From this speed over ground on something moves, m/s.
-pub const MOVING_MPS: f64 = 0.5;
 
 /// An object in one sweep.
 #[derive(Clone, Debug)]
@@ -21,72 +18,65 @@ pub struct Present {
     pub footprint: Footprint,
     /// Height of the box's centre in the vehicle frame, m.
     pub height_m: f64,
-    /// Whether it moves over ground.
-    pub moving: bool,
-    /// World motion to the next sweep by the labels as they are; none where the object has no box
-    /// there.
-    pub raw: Option<Pose>,
-    /// Centre in the world, m.
-    centre: DVec3,
-    /// Smoothed velocity over ground of the centre, m/s.
-    linear: DVec3,
-    /// Smoothed rate of turn, rad/s.
-    turn_radps: f64,
+    /// Height of the box, m.
+    pub box_m: f64,
+    /// What it does.
+    pub motion: Motion,
+    /// Motion to the next sweep; none where the object has no box there.
+    pub step: Option<Step>,
 }
 
 impl Present {
-    /// Smoothed velocity over ground of a point (world frame) of the object, m/s; zero where it is
-    /// parked.
-    pub fn velocity(&self, world: DVec3) -> DVec3 {
-        if !self.moving {
-            return DVec3::ZERO;
-        }
-        let arm = world - self.centre;
-        self.linear + DVec3::new(-arm.y, arm.x, 0.0) * self.turn_radps
+    /// Whether a point of the vehicle frame lies in the box, or within `margin_m` of it.
+    pub fn holds(&self, at: DVec3, margin_m: f64) -> bool {
+        self.footprint.holds(at, margin_m)
+            && (at.z - self.height_m).abs() <= 0.5 * self.box_m + margin_m
     }
 }
 
-/// Where the objects of a drive are.
-pub struct Objects {
-    /// By frame.
-    frames: HashMap<u64, Vec<Present>>,
-    /// What did not fit.
-    pub notes: Vec<String>,
+/// Motion of an object from a sweep to the next, as transforms of points of the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// By the labels as they are.
+    pub raw: Pose,
+    /// By the smoothed labels; none for what is parked.
+    pub smooth: Pose,
 }
 
+/// The objects of a drive by frame.
+pub struct Objects(HashMap<u64, Vec<Present>>);
+
 impl Objects {
-    /// Of labels and poses.
+    /// Of labels, with the poses of the drive.
     pub fn new(labels: &Labels, source: &dyn Source) -> Objects {
-        let stamps: Vec<(u64, f64, Pose)> = (0..source.len())
-            .map(|n| (source.frame(n), source.stamp_s(n), source.pose(n)))
-            .collect();
         let mut frames: HashMap<u64, Vec<Present>> = HashMap::new();
-        for pair in stamps.windows(2) {
-            let ((frame, t0, from), (then, t1, to)) = (pair[0], pair[1]);
-            for (index, track) in labels.tracks.iter().enumerate() {
-                let Some(now) = track.boxes.get(&frame) else { continue };
-                let here = from * *now;
-                let next = track.boxes.get(&then).map(|b| to * *b);
-                let linear =
-                    next.map_or(DVec3::ZERO, |n| (n.translation - here.translation) / (t1 - t0));
-                frames.entry(frame).or_default().push(Present {
+        let all = trajectories(labels, source);
+        for (index, (track, trajectory)) in labels.tracks.iter().zip(&all).enumerate() {
+            let states = trajectory.states();
+            for (n, state) in states.iter().enumerate() {
+                let now = track.boxes[&state.frame];
+                let step = trajectory.step(state.frame).map(|smooth| {
+                    let next = &states[n + 1];
+                    let there = next.world_from_vehicle * track.boxes[&next.frame];
+                    let raw = there * (state.world_from_vehicle * now).inverse();
+                    Step { raw, smooth }
+                });
+                frames.entry(state.frame).or_default().push(Present {
                     track: index as u32,
                     class: class_of(track.kind),
-                    footprint: Footprint::new(*now, track.size[0], track.size[1]),
+                    footprint: Footprint::new(now, track.size[0], track.size[1]),
                     height_m: now.translation.z,
-                    moving: linear.length() > MOVING_MPS,
-                    raw: next.map(|n| n * here.inverse()),
-                    centre: here.translation,
-                    linear,
-                    turn_radps: 0.0,
+                    box_m: track.size[2],
+                    motion: state.motion,
+                    step,
                 });
             }
         }
-        Objects { frames, notes: Vec::new() }
+        Objects(frames)
     }
 
     /// Objects in the sweep of `frame`, in the order of the labels.
     pub fn at(&self, frame: u64) -> &[Present] {
-        self.frames.get(&frame).map_or(&[], Vec::as_slice)
+        self.0.get(&frame).map_or(&[], Vec::as_slice)
     }
 }

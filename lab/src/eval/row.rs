@@ -124,8 +124,8 @@ row! {
     track: u32,
     /// Where labels are complete, at both ends of the true motion.
     in_view: bool,
-    /// The labelled object moves over ground ([`crate::labels`] says from when on).
-    moving: bool,
+    /// 0: parked, or in no box; 1: slow; 2: moving ([`crate::labels::Motion`]).
+    motion: u8,
     /// Occupied voxels of the column: its weight in the dissertation's tables.
     voxels: u8,
     /// Score of the background filter, in the weights' integers; foreground above 0.
@@ -140,7 +140,8 @@ row! {
     true_x: f32,
     /// See `true_x`.
     true_y: f32,
-    /// Displacement by the labels' smoothed motion, zero for what is parked, m.
+    /// Displacement by the labels' smoothed motion, zero for what is parked, m. Over `dt` it is the
+    /// true velocity.
     smooth_x: f32,
     /// See `smooth_x`.
     smooth_y: f32,
@@ -164,10 +165,6 @@ row! {
     covariance_yy: f32,
     /// Observations of the tracklet after its birth.
     age: u32,
-    /// True velocity over ground by the labels' smoothed motion, zero for what is parked, m/s.
-    speed_x: f32,
-    /// See `speed_x`.
-    speed_y: f32,
     /// Time to the next sweep, s.
     dt: f32,
 }
@@ -204,7 +201,7 @@ mod tests {
                 sweep: n,
                 frame: 1 << 40,
                 class: n as u8,
-                moving: n == 2,
+                in_view: n == 2,
                 flow_x: n as f32 * 0.3,
                 score: -7,
                 ..Row::default()
@@ -218,8 +215,7 @@ mod tests {
 
     #[test]
     fn classes_are_the_kinds() {
-        for kind in [Kind::Car, Kind::Van, Kind::Tram, Kind::Cyclist, Kind::Pedestrian, Kind::Other]
-        {
+        for kind in Kind::ALL {
             assert_eq!(CLASSES[class_of(kind) as usize], format!("{kind:?}"));
         }
     }

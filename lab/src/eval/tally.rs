@@ -63,35 +63,39 @@ pub enum Truth {
     Smooth,
 }
 
-/// Whether the labelled object moves over ground.
+/// What labelled objects do over ground; see [`crate::labels::Motion`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Motion {
-    /// Both.
+    /// Whatever.
     Any,
     /// Moving.
     Moving,
-    /// Parked or standing.
+    /// Neither moving nor parked.
+    Slow,
+    /// Parked.
     Parked,
 }
 
 impl Motion {
     /// All of them.
-    pub const ALL: [Motion; 3] = [Motion::Any, Motion::Moving, Motion::Parked];
+    pub const ALL: [Motion; 4] = [Motion::Any, Motion::Moving, Motion::Slow, Motion::Parked];
 
     /// For people.
     pub fn label(self) -> &'static str {
         match self {
             Motion::Any => "all",
             Motion::Moving => "moving",
+            Motion::Slow => "slow",
             Motion::Parked => "parked",
         }
     }
 
-    fn holds(self, moving: bool) -> bool {
+    fn holds(self, motion: usize) -> bool {
         match self {
             Motion::Any => true,
-            Motion::Moving => moving,
-            Motion::Parked => !moving,
+            Motion::Moving => motion == 2,
+            Motion::Slow => motion == 1,
+            Motion::Parked => motion == 0,
         }
     }
 }
@@ -128,8 +132,8 @@ impl Group {
 }
 
 const COUNT: usize = CLASSES.len();
-/// Errors by class, then parked and moving.
-type Cells = [[Errors; 2]; COUNT];
+/// Errors by class, then by [`Row::motion`].
+type Cells = [[Errors; 3]; COUNT];
 
 /// Of one age and more, or of one age.
 #[derive(Clone, Debug, Default)]
@@ -152,8 +156,8 @@ pub struct Tally {
     /// Errors of tracklets by age, against smoothed labels.
     by_age: Vec<(u32, Cells)>,
     /// Solid columns in view, and those with a settled tracklet.
-    columns: [[u64; 2]; COUNT],
-    covered: [[u64; 2]; COUNT],
+    columns: [[u64; 3]; COUNT],
+    covered: [[u64; 3]; COUNT],
     /// Score of the filter and class of every solid column in view.
     pub scores: Vec<(i32, u8)>,
     /// Rows that do not count because labels are not complete there.
@@ -179,34 +183,35 @@ impl Tally {
             self.out_of_view += 1;
             return;
         }
-        let (class, moving) = (row.class as usize, usize::from(row.moving));
+        let (class, motion) = (row.class as usize, row.motion as usize);
         self.scores.push((row.score, row.class));
         let (raw, smooth) = ([row.true_x, row.true_y], [row.smooth_x, row.smooth_y]);
         for (n, estimate) in Estimate::ALL.iter().enumerate() {
             let Some(flow) = estimate.of(row) else { continue };
-            self.raw[n][class][moving].push(distance(flow, raw), row.voxels);
-            self.smooth[n][class][moving].push(distance(flow, smooth), row.voxels);
+            self.raw[n][class][motion].push(distance(flow, raw), row.voxels);
+            self.smooth[n][class][motion].push(distance(flow, smooth), row.voxels);
         }
-        self.columns[class][moving] += 1;
+        self.columns[class][motion] += 1;
         if row.origin == 2 {
-            self.tracklet(row, class, moving);
+            self.tracklet(row, class, motion);
         }
     }
 
-    fn tracklet(&mut self, row: &Row, class: usize, moving: usize) {
-        let (found, truth) = ([row.velocity_x, row.velocity_y], [row.speed_x, row.speed_y]);
+    fn tracklet(&mut self, row: &Row, class: usize, motion: usize) {
+        let found = [row.velocity_x, row.velocity_y];
+        let truth = [row.smooth_x / row.dt, row.smooth_y / row.dt];
         let error = distance(found, truth);
         if let Some((_, cells)) = self.by_age.iter_mut().find(|a| a.0 == row.age) {
-            cells[class][moving].push(error, row.voxels);
+            cells[class][motion].push(error, row.voxels);
         }
         if row.age < SETTLED {
             return;
         }
-        self.covered[class][moving] += 1;
+        self.covered[class][motion] += 1;
         let raw = [row.true_x / row.dt, row.true_y / row.dt];
-        self.settled.smooth[class][moving].push(error, row.voxels);
-        self.settled.raw[class][moving].push(distance(found, raw), row.voxels);
-        self.settled.floor[class][moving].push(distance(truth, raw), row.voxels);
+        self.settled.smooth[class][motion].push(error, row.voxels);
+        self.settled.raw[class][motion].push(distance(found, raw), row.voxels);
+        self.settled.floor[class][motion].push(distance(truth, raw), row.voxels);
     }
 
     /// Errors of displacement, m.
@@ -243,7 +248,7 @@ impl Tally {
     pub fn coverage(&self, group: Group, motion: Motion) -> [u64; 2] {
         [&self.columns, &self.covered].map(|counts| {
             let chosen = cells(group, motion);
-            chosen.map(|(class, moving)| counts[class][moving]).sum()
+            chosen.map(|(class, motion)| counts[class][motion]).sum()
         })
     }
 }
@@ -251,12 +256,12 @@ impl Tally {
 /// Indices of the cells that a group and a motion name.
 fn cells(group: Group, motion: Motion) -> impl Iterator<Item = (usize, usize)> {
     let classes = (0..COUNT).filter(move |c| group.holds(*c));
-    classes.flat_map(move |c| (0..2).filter(move |m| motion.holds(*m == 1)).map(move |m| (c, m)))
+    classes.flat_map(move |c| (0..3).filter(move |m| motion.holds(*m)).map(move |m| (c, m)))
 }
 
 fn gather(of: &Cells, group: Group, motion: Motion) -> Errors {
     let mut all = Errors::default();
-    cells(group, motion).for_each(|(class, moving)| all.extend(&of[class][moving]));
+    cells(group, motion).for_each(|(class, motion)| all.extend(&of[class][motion]));
     all
 }
 
@@ -314,10 +319,10 @@ pub fn at_threshold(curve: &[Operating], threshold: i32) -> Option<Operating> {
 mod tests {
     use super::*;
 
-    fn row(class: u8, moving: bool, flow: f32, truth: f32) -> Row {
+    fn row(class: u8, motion: u8, flow: f32, truth: f32) -> Row {
         Row {
             class,
-            moving,
+            motion,
             in_view: true,
             origin: 2,
             voxels: 2,
@@ -326,7 +331,6 @@ mod tests {
             smooth_x: truth,
             carried_x: -1.0,
             velocity_x: flow * 10.0,
-            speed_x: truth * 10.0,
             dt: 0.1,
             age: 10,
             ..Row::default()
@@ -336,11 +340,11 @@ mod tests {
     #[test]
     fn classes_and_motions_are_kept_apart() {
         let mut tally = Tally::new();
-        tally.row(&row(1, true, 0.6, 0.5));
-        tally.row(&row(1, false, 0.0, 0.02));
-        tally.row(&Row { voxels: 5, origin: 1, ..row(7, true, 0.0, 0.4) });
-        tally.row(&row(0, false, 0.3, 0.0));
-        tally.row(&Row { in_view: false, ..row(1, true, 9.0, 0.0) });
+        tally.row(&row(1, 2, 0.6, 0.5));
+        tally.row(&row(1, 0, 0.0, 0.02));
+        tally.row(&Row { voxels: 5, origin: 1, ..row(7, 2, 0.0, 0.4) });
+        tally.row(&row(0, 0, 0.3, 0.0));
+        tally.row(&Row { in_view: false, ..row(1, 2, 9.0, 0.0) });
         let flow = |e, g, m| tally.flow(e, Truth::Raw, g, m, Weight::Column);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
         assert!(near(flow(Estimate::Ours, Group::Class(1), Motion::Moving).mean(), 0.1));

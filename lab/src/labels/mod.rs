@@ -48,6 +48,21 @@ pub enum Kind {
     Other,
 }
 
+impl Kind {
+    /// All of them, in their order.
+    pub const ALL: [Kind; 9] = [
+        Kind::Car,
+        Kind::Van,
+        Kind::Truck,
+        Kind::Bus,
+        Kind::Tram,
+        Kind::Motorcycle,
+        Kind::Cyclist,
+        Kind::Pedestrian,
+        Kind::Other,
+    ];
+}
+
 /// One labelled object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {

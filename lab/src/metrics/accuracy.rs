@@ -9,6 +9,7 @@
 
 use super::{Category, Scored};
 use glam::{DVec3, DVec4};
+use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
 /// Error below which an estimate is accurate, in metres and as a share of the true motion.
@@ -37,7 +38,7 @@ pub enum Motion {
     Any,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sums {
     count: u64,
     strict: u64,
@@ -59,7 +60,7 @@ impl AddAssign for Sums {
 }
 
 /// Sums over pairs, by category and motion.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AccuracyTable {
     /// Standing and moving.
     cells: Vec<[Sums; 2]>,

@@ -7,6 +7,7 @@
 //! 1 for an estimate of no motion. Every class weighs the same, however few its returns.
 
 use super::{Bucket, Category, Class, Range, Scored, SpeedTable};
+use serde::{Deserialize, Serialize};
 
 /// Speed from which there is a single bucket, m per pair: 20 m/s at 10 Hz.
 const MAX_SPEED_M: f64 = 2.0;
@@ -15,7 +16,7 @@ const MAX_SPEED_M: f64 = 2.0;
 const BUCKETS: usize = 50;
 
 /// Sums over pairs.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BucketedEpe {
     table: SpeedTable,
 }
@@ -48,7 +49,7 @@ impl Default for BucketedEpe {
     fn default() -> BucketedEpe {
         let width = MAX_SPEED_M / BUCKETS as f64;
         let mut edges: Vec<f64> = (0..BUCKETS).map(|i| i as f64 * width).collect();
-        edges.extend([MAX_SPEED_M, f64::INFINITY]);
+        edges.push(MAX_SPEED_M);
         BucketedEpe { table: SpeedTable::new(edges) }
     }
 }

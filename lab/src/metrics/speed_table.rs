@@ -1,6 +1,7 @@
 //! Errors gathered by category, distance and true speed, over any number of pairs.
 
 use super::{Category, Scored};
+use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
 /// Which returns by distance, as the grader has it for both of its tables.
@@ -13,7 +14,7 @@ pub enum Range {
 }
 
 /// What came together in one cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sums {
     count: u64,
     error_m: f64,
@@ -54,31 +55,31 @@ impl Bucket {
 ///
 /// The grader averages every pair by itself and the pairs weighted by their counts, which is the
 /// mean over all returns, as here.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeedTable {
-    /// Borders of the buckets: rising from 0 to infinity.
+    /// Lower borders of the buckets, rising from 0; the last bucket is open.
     edges_m: Vec<f64>,
     /// By category, then bucket; near returns and the others apart.
     cells: Vec<[Sums; 2]>,
 }
 
 impl SpeedTable {
-    /// An empty table with buckets between `edges_m`, which rise from 0 to infinity.
+    /// An empty table with buckets from each of `edges_m`, which rise from 0, to the next.
     pub fn new(edges_m: Vec<f64>) -> SpeedTable {
-        let cells = vec![[Sums::default(); 2]; Category::COUNT * (edges_m.len() - 1)];
+        let cells = vec![[Sums::default(); 2]; Category::COUNT * edges_m.len()];
         SpeedTable { edges_m, cells }
     }
 
     /// Number of buckets.
     pub fn buckets(&self) -> usize {
-        self.edges_m.len() - 1
+        self.edges_m.len()
     }
 
     /// Counts the returns of a pair.
     pub fn add(&mut self, points: &[Scored]) {
         for p in points {
             let speed = f64::from(p.speed_m);
-            // The first edge is 0 and the last infinite, so that every speed has a bucket.
+            // The first edge is 0 and the last bucket open, so that every speed has one.
             let bucket = self.edges_m[1..].partition_point(|&edge| edge <= speed);
             let cell = p.category.index() * self.buckets() + bucket;
             self.cells[cell][usize::from(!p.near)] +=
@@ -108,7 +109,7 @@ impl SpeedTable {
         let count = sums.count as f64;
         Bucket {
             from_m: self.edges_m[bucket],
-            to_m: self.edges_m[bucket + 1],
+            to_m: self.edges_m.get(bucket + 1).copied().unwrap_or(f64::INFINITY),
             count: sums.count,
             epe_m: sums.error_m / count,
             mean_speed_m: sums.speed_m / count,

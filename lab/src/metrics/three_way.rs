@@ -5,9 +5,10 @@
 //! labelled objects, of the rest of them, and of the background.
 
 use super::{Bucket, Category, Class, MOVING_M, Range, Scored, SpeedTable};
+use serde::{Deserialize, Serialize};
 
 /// Sums over pairs.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThreeWayEpe {
     table: SpeedTable,
 }
@@ -27,7 +28,7 @@ pub struct ThreeWayErrors {
 
 impl Default for ThreeWayEpe {
     fn default() -> ThreeWayEpe {
-        ThreeWayEpe { table: SpeedTable::new(vec![0.0, MOVING_M, f64::INFINITY]) }
+        ThreeWayEpe { table: SpeedTable::new(vec![0.0, MOVING_M]) }
     }
 }
 

@@ -16,6 +16,9 @@ use raywake_core::pose::Pose;
 use raywake_sim::{Class, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
 
+/// Time that [`PointTruth::flow`] is over, s.
+pub const FLOW_S: f64 = 0.1;
+
 /// Step of the difference that gives turn rates, s.
 const STEP_S: f64 = 5e-4;
 

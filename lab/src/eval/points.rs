@@ -1,0 +1,143 @@
+//! Today's metrics on the flow of every return, for drives with labelled boxes or exact truth.
+
+use super::collect::Seen;
+use super::objects::Present;
+use super::row::CLASSES;
+use crate::labels::{Kind, View, kind};
+use crate::metrics::{
+    AccuracyTable, BucketedEpe, Category, Pair, Rules, ThreeWayEpe, TruePoint, reference,
+};
+use crate::simulate::truth;
+use glam::DVec3;
+use raywake::error::Error;
+use raywake::sink::argoverse::displacement;
+use raywake_sim::Class;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Returns without a label up to this height above the plane the vehicle stands on count as
+/// ground, m, where no truth tells; the graders leave ground out.
+pub const GROUND_M: f64 = 0.3;
+
+/// The estimates that are scored.
+pub const ESTIMATES: [&str; 3] = ["raywake", "ego motion only", "truth rounded to cells"];
+
+/// What one estimate scores over some pairs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointScores {
+    /// EPE3D, AccS, AccR, outliers.
+    pub accuracy: AccuracyTable,
+    /// Bucket-normalised error.
+    pub bucketed: BucketedEpe,
+    /// Three-way error.
+    pub three_way: ThreeWayEpe,
+}
+
+impl PointScores {
+    /// Adds what was counted elsewhere.
+    pub fn merge(&mut self, other: &PointScores) {
+        self.accuracy.merge(&other.accuracy);
+        self.bucketed.merge(&other.bucketed);
+        self.three_way.merge(&other.three_way);
+    }
+}
+
+/// Scores the returns of one drive.
+pub struct Points {
+    /// Folder of a simulated drive, whose files tell the truth of every return.
+    simulated: Option<PathBuf>,
+    view: View,
+    ground_m: f64,
+    margin_m: f64,
+    cell_m: f64,
+    /// In the order of [`ESTIMATES`].
+    pub scores: [PointScores; 3],
+}
+
+impl Points {
+    /// For the drive in a folder.
+    pub fn new(drive: &Path, view: View, ground_m: f64, margin_m: f64, cell_m: f64) -> Points {
+        let simulated = truth::objects_path(drive).is_file().then(|| drive.to_path_buf());
+        Points { simulated, view, ground_m, margin_m, cell_m, scores: Default::default() }
+    }
+
+    /// Scores the first sweep of a pair. Fails where the file with its truth does not fit.
+    pub fn pair(&mut self, seen: &Seen, present: &[Present]) -> Result<(), Error> {
+        let now = seen.now();
+        let points = match &self.simulated {
+            Some(drive) => self.exact(drive, seen)?,
+            None => {
+                seen.first.points.iter().map(|p| self.boxed(p.position, seen, present)).collect()
+            }
+        };
+        let pair = Pair { points, second_from_first: seen.then.inverse() * now };
+        let ours = seen.points.iter().map(|f| displacement(f, &now, seen.dt_s)).collect();
+        let estimates: [Vec<[f32; 3]>; 3] =
+            [ours, reference::standing(&pair), reference::rounded(&pair, self.cell_m as f32)];
+        for (scores, estimate) in self.scores.iter_mut().zip(&estimates) {
+            let scored = pair
+                .score(estimate, &Rules::OFFICIAL)
+                .map_err(|e| Error::Usage(format!("flow of frame {}: {e}", seen.first.frame)))?;
+            scores.accuracy.add(&scored);
+            scores.bucketed.add(&scored);
+            scores.three_way.add(&scored);
+        }
+        Ok(())
+    }
+
+    /// By the simulator.
+    fn exact(&self, drive: &Path, seen: &Seen) -> Result<Vec<TruePoint>, Error> {
+        let path = truth::points_path(drive, seen.first.frame);
+        let rows = truth::read_points(&path)?;
+        if rows.len() != seen.first.points.len() {
+            let what = format!("{} rows for {} returns", rows.len(), seen.first.points.len());
+            return Err(Error::input(&path, "", what));
+        }
+        // Flow over 0.1 s; pairs may lie a little closer or farther apart.
+        let span = (seen.dt_s / truth::FLOW_S) as f32;
+        let point = |(p, t): (&raywake_core::sweep::Point, &truth::PointTruth)| TruePoint {
+            position_m: p.position,
+            flow_m: t.flow.map(|v| v * span),
+            category: category(t.class),
+            valid: p.position.iter().all(|v| v.is_finite()),
+            ground: t.class == Class::Ground,
+        };
+        Ok(seen.first.points.iter().zip(&rows).map(point).collect())
+    }
+
+    /// By the box around it: what is in none stands.
+    fn boxed(&self, position_m: [f32; 3], seen: &Seen, present: &[Present]) -> TruePoint {
+        let at = DVec3::from_array(position_m.map(f64::from));
+        let mut point = TruePoint {
+            position_m,
+            flow_m: [0.0; 3],
+            category: Category::BACKGROUND,
+            valid: at.is_finite() && self.view.holds(at),
+            ground: false,
+        };
+        if !point.valid {
+            return point;
+        }
+        let Some(object) = present.iter().find(|p| p.holds(at, self.margin_m)) else {
+            point.ground = at.z < self.ground_m + GROUND_M;
+            return point;
+        };
+        let named = Kind::ALL[object.class as usize - 1];
+        debug_assert_eq!(CLASSES[object.class as usize], format!("{named:?}"));
+        match (object.step, Category::of_kind(named)) {
+            (Some(step), Some(category)) => {
+                let world = seen.now().transform(at);
+                let moved = step.raw.transform(world) - world;
+                let flow = seen.now().rotation.conjugate() * moved;
+                TruePoint { flow_m: flow.as_vec3().to_array(), category, ..point }
+            }
+            _ => TruePoint { valid: false, ..point },
+        }
+    }
+}
+
+/// The category of what the simulator shows.
+fn category(class: Class) -> Category {
+    let kind = kind(truth::class_name(class)).filter(|_| class.is_foreground());
+    kind.and_then(Category::of_kind).unwrap_or(Category::BACKGROUND)
+}
