@@ -116,6 +116,10 @@ fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
     Ok(names)
 }
 
+/// Stack of a thread that runs a drive: unoptimised builds make the pipeline there before it moves
+/// to the heap.
+const STACK: usize = 64 << 20;
+
 /// Evaluates all drives, `jobs` at a time.
 fn all(
     names: &BTreeMap<String, &Path>,
@@ -137,9 +141,10 @@ fn all(
         }
     };
     std::thread::scope(|scope| {
-        (0..jobs.min(list.len())).for_each(|_| {
-            scope.spawn(work);
-        });
+        for _ in 0..jobs.min(list.len()) {
+            let thread = std::thread::Builder::new().stack_size(STACK);
+            thread.spawn_scoped(scope, work).expect("the system has threads");
+        }
     });
     let (mut good, mut bad) = (Vec::new(), Vec::new());
     for (name, result) in done.into_inner().expect("no thread panicked with it") {
