@@ -77,6 +77,11 @@ impl<'a> Collector<'a> {
         Collector { profile, rig, filter, view, margin_m, objects, grid }
     }
 
+    /// Edge of a column, m.
+    pub fn cell_m(&self) -> f64 {
+        self.profile.voxel_m
+    }
+
     /// The labelled objects of the first sweep.
     pub fn present(&self, seen: &Seen) -> &'a [Present] {
         self.objects.at(seen.first.frame)
@@ -114,7 +119,11 @@ impl<'a> Collector<'a> {
         let flat = DVec3::new(f64::from(x), f64::from(y), 0.0);
         let object = present.iter().find(|p| p.footprint.holds(flat, self.margin_m));
         // Flow is planar; the height matters where the vehicle nods, a little.
-        let at = DVec3::new(flat.x, flat.y, object.map_or(self.rig.ground_m, |p| p.height_m));
+        let at = DVec3::new(
+            flat.x,
+            flat.y,
+            object.map_or(self.rig.ground_m, |p| p.vehicle_from_box.translation.z),
+        );
         let world = seen.now().transform(at);
         let step = object.and_then(|p| p.step);
         let vanishes = object.is_some() && step.is_none();

@@ -1,8 +1,9 @@
 //! One drive: the pipeline on one thread, rows and pictures on another.
 
 use super::collect::{Collector, Seen};
-use super::facts::Facts;
+use super::facts::{Facts, Panel};
 use super::objects::Objects;
+use super::panels::Panels;
 use super::points::{PointScores, Points};
 use super::rows_file;
 use crate::labels::{self, View};
@@ -60,6 +61,8 @@ pub struct Files {
     pub rows: PathBuf,
     /// Facts, written last.
     pub facts: PathBuf,
+    /// Folder of pictures.
+    pub panels: PathBuf,
 }
 
 impl Files {
@@ -68,6 +71,7 @@ impl Files {
         Files {
             rows: out.join("rows").join(format!("{drive}.parquet")),
             facts: out.join("drives").join(format!("{drive}.json")),
+            panels: out.join("panels"),
         }
     }
 }
@@ -162,7 +166,9 @@ fn run(
         (summary, rows.join().expect("the thread that makes rows panicked"))
     });
     let summary = summary?;
-    facts.scores = written?;
+    let collected = written?;
+    facts.scores = collected.scores;
+    facts.panels = collected.panels;
     if summary.interrupted {
         return Err(Error::Usage("interrupted".into()));
     }
@@ -184,11 +190,22 @@ fn collect(
     mut points: Points,
     pairs: &Receiver<Seen>,
     files: &Files,
-) -> Result<[PointScores; 3], Error> {
+) -> Result<Collected, Error> {
+    let mut panels = Panels::default();
     rows_file::write(&files.rows, drive, || {
         let Ok(seen) = pairs.recv() else { return Ok(None) };
-        points.pair(&seen, collector.present(&seen))?;
-        Ok(Some(collector.rows(&seen)))
+        let present = collector.present(&seen);
+        points.pair(&seen, present)?;
+        let rows = collector.rows(&seen);
+        panels.consider(seen, rows.clone(), present);
+        Ok(Some(rows))
     })?;
-    Ok(points.scores)
+    let panels = panels.write(&files.panels, drive, collector.cell_m())?;
+    Ok(Collected { scores: points.scores, panels })
+}
+
+/// What the thread that makes rows has besides.
+struct Collected {
+    scores: [PointScores; 3],
+    panels: Vec<Panel>,
 }

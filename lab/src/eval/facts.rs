@@ -80,8 +80,12 @@ impl Facts {
     /// Reads the facts of an earlier run.
     pub fn read(path: &Path) -> Result<Facts, Error> {
         let text = fs::read_to_string(path).map_err(Error::reading(path))?;
-        serde_json::from_str(&text)
-            .map_err(|e| Error::input(path, format!("line {}", e.line()), e.to_string()))
+        let facts: Facts = serde_json::from_str(&text)
+            .map_err(|e| Error::input(path, format!("line {}", e.line()), e.to_string()))?;
+        if !facts.scores.iter().all(PointScores::are_whole) {
+            return Err(Error::input(path, "key `scores`", "is of another version"));
+        }
+        Ok(facts)
     }
 
     /// Writes them, whole or not at all.

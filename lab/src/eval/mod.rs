@@ -12,6 +12,7 @@ mod drive;
 mod facts;
 mod figures;
 mod objects;
+mod panels;
 mod points;
 mod row;
 mod rows_file;
@@ -78,7 +79,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         sweeps: args.count.unwrap_or(usize::MAX),
     };
     let names = names(&args.drives)?;
-    for folder in ["rows", "drives"] {
+    for folder in ["rows", "drives", "panels"] {
         atomic::create_folder(&args.out.join(folder))?;
     }
     raywake::engine::listen();

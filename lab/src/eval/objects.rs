@@ -16,10 +16,10 @@ pub struct Present {
     pub class: u8,
     /// From above, vehicle frame.
     pub footprint: Footprint,
-    /// Height of the box's centre in the vehicle frame, m.
-    pub height_m: f64,
-    /// Height of the box, m.
-    pub box_m: f64,
+    /// The box's frame lies in its centre.
+    pub vehicle_from_box: Pose,
+    /// Length, width and height, m.
+    pub size: [f64; 3],
     /// What it does.
     pub motion: Motion,
     /// Motion to the next sweep; none where the object has no box there.
@@ -30,7 +30,7 @@ impl Present {
     /// Whether a point of the vehicle frame lies in the box, or within `margin_m` of it.
     pub fn holds(&self, at: DVec3, margin_m: f64) -> bool {
         self.footprint.holds(at, margin_m)
-            && (at.z - self.height_m).abs() <= 0.5 * self.box_m + margin_m
+            && (at.z - self.vehicle_from_box.translation.z).abs() <= 0.5 * self.size[2] + margin_m
     }
 }
 
@@ -65,8 +65,8 @@ impl Objects {
                     track: index as u32,
                     class: class_of(track.kind),
                     footprint: Footprint::new(now, track.size[0], track.size[1]),
-                    height_m: now.translation.z,
-                    box_m: track.size[2],
+                    vehicle_from_box: now,
+                    size: track.size,
                     motion: state.motion,
                     step,
                 });

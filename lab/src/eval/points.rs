@@ -34,6 +34,11 @@ pub struct PointScores {
 }
 
 impl PointScores {
+    /// Whether they are whole; those read from a file need not be.
+    pub fn are_whole(&self) -> bool {
+        self.accuracy.is_whole() && self.bucketed.is_whole() && self.three_way.is_whole()
+    }
+
     /// Adds what was counted elsewhere.
     pub fn merge(&mut self, other: &PointScores) {
         self.accuracy.merge(&other.accuracy);

@@ -97,6 +97,11 @@ impl AccuracyTable {
         }
     }
 
+    /// Whether it is whole; one read from a file need not be.
+    pub fn is_whole(&self) -> bool {
+        self.cells.len() == Category::COUNT
+    }
+
     /// Adds what was counted elsewhere.
     pub fn merge(&mut self, other: &AccuracyTable) {
         for (mine, theirs) in self.cells.iter_mut().zip(&other.cells) {

@@ -60,6 +60,11 @@ impl BucketedEpe {
         self.table.add(points);
     }
 
+    /// Whether it is whole; one read from a file need not be.
+    pub fn is_whole(&self) -> bool {
+        self.table.fits(&BucketedEpe::default().table)
+    }
+
     /// Adds what was counted elsewhere.
     pub fn merge(&mut self, other: &BucketedEpe) {
         self.table.merge(&other.table);

@@ -87,9 +87,14 @@ impl SpeedTable {
         }
     }
 
+    /// Whether another table has the same buckets; one read from a file need not.
+    pub fn fits(&self, other: &SpeedTable) -> bool {
+        self.edges_m == other.edges_m && self.cells.len() == other.cells.len()
+    }
+
     /// Adds what another table with the same buckets has counted.
     pub fn merge(&mut self, other: &SpeedTable) {
-        assert_eq!(self.edges_m, other.edges_m, "tables of different metrics");
+        assert!(self.fits(other), "tables of different metrics");
         for (mine, theirs) in self.cells.iter_mut().zip(&other.cells) {
             mine[0] += theirs[0];
             mine[1] += theirs[1];

@@ -38,6 +38,11 @@ impl ThreeWayEpe {
         self.table.add(points);
     }
 
+    /// Whether it is whole; one read from a file need not be.
+    pub fn is_whole(&self) -> bool {
+        self.table.fits(&ThreeWayEpe::default().table)
+    }
+
     /// Adds what was counted elsewhere.
     pub fn merge(&mut self, other: &ThreeWayEpe) {
         self.table.merge(&other.table);
