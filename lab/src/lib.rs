@@ -8,7 +8,5 @@ pub mod grid;
 pub mod labels;
 pub mod metrics;
 pub mod registration;
-#[path = "/tmp/wt/report/lab/src/report/mod.rs"]
-pub mod report;
 pub mod simulate;
 pub mod train;
