@@ -5,4 +5,5 @@
 pub mod check;
 pub mod grid;
 pub mod labels;
+pub mod report;
 pub mod train;
