@@ -8,5 +8,6 @@ pub mod grid;
 pub mod labels;
 pub mod metrics;
 pub mod registration;
+pub mod report;
 pub mod simulate;
 pub mod train;

@@ -1,0 +1,102 @@
+//! Colours, safe for colour-blind readers (Okabe and Ito) and apart in print.
+
+use crate::labels::Kind;
+
+/// A colour on paper, and the class by which a style sheet may replace it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Paint {
+    /// Class of an SVG element.
+    pub class: &'static str,
+    /// `#rrggbb`.
+    pub light: &'static str,
+}
+
+const fn paint(class: &'static str, light: &'static str) -> Paint {
+    Paint { class, light }
+}
+
+/// Text.
+pub(super) const INK: Paint = paint("ink", "#1f2430");
+/// Text that steps back, and reference values.
+pub(super) const MUTED: Paint = paint("muted", "#667085");
+/// Grid lines.
+pub(super) const GRID: Paint = paint("grid", "#e4e7ec");
+/// Lines at zero.
+pub(super) const AXIS: Paint = paint("axis", "#98a2b3");
+/// The page.
+pub(super) const PAPER: Paint = paint("paper", "#ffffff");
+/// Bars of reference values.
+pub(super) const REFERENCE: Paint = paint("reference", "#c3cad5");
+/// Marks upon curves.
+pub(super) const MARK: Paint = paint("mark", "#c0182b");
+
+const SERIES: [Paint; 7] = [
+    paint("s0", "#0072b2"),
+    paint("s1", "#d55e00"),
+    paint("s2", "#009e73"),
+    paint("s3", "#b5609a"),
+    paint("s4", "#e69f00"),
+    paint("s5", "#56b4e9"),
+    paint("s6", "#7a6a53"),
+];
+
+const ORDERED: [Paint; 7] = [
+    paint("o0", "#a9d4ea"),
+    paint("o1", "#7cbbdf"),
+    paint("o2", "#4f9fd0"),
+    paint("o3", "#2f81bb"),
+    paint("o4", "#1b639f"),
+    paint("o5", "#12467b"),
+    paint("o6", "#0a2a54"),
+];
+
+/// Of the `i`-th of several things; repeats after seven.
+pub(super) fn series(i: usize) -> Paint {
+    SERIES[i % SERIES.len()]
+}
+
+/// Of the `i`-th of `n` things that have an order, pale to dark.
+pub(super) fn ordered(i: usize, n: usize) -> Paint {
+    let last = ORDERED.len() - 1;
+    ORDERED[if n > 1 { (i * last / (n - 1)).min(last) } else { last }]
+}
+
+/// Of a kind of object, with its name.
+pub(super) fn kind(kind: Kind) -> (&'static str, &'static str) {
+    match kind {
+        Kind::Car => ("car", "#0072b2"),
+        Kind::Van => ("van", "#3f9bd0"),
+        Kind::Truck => ("truck", "#7a6a53"),
+        Kind::Bus => ("bus", "#a37f36"),
+        Kind::Tram => ("tram", "#4b4f58"),
+        Kind::Motorcycle => ("motorcycle", "#b5609a"),
+        Kind::Cyclist => ("cyclist", "#d55e00"),
+        Kind::Pedestrian => ("pedestrian", "#a3308a"),
+        Kind::Other => ("other", "#8792a2"),
+    }
+}
+
+/// From good (0) to bad (1): green, yellow, orange, dark red; lightness tells the ends apart too.
+pub(super) fn goodness(t: f64) -> String {
+    blend(
+        &[[0.0, 158.0, 115.0], [240.0, 214.0, 60.0], [226.0, 106.0, 20.0], [140.0, 16.0, 40.0]],
+        t,
+    )
+}
+
+/// Of returns from the ground (0) up (1), pale to slate.
+pub(super) fn height(t: f64) -> [u8; 3] {
+    mix(&[[208.0, 216.0, 226.0], [156.0, 172.0, 192.0], [98.0, 116.0, 142.0]], t)
+}
+
+fn blend(stops: &[[f64; 3]], t: f64) -> String {
+    let [r, g, b] = mix(stops, t);
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+fn mix(stops: &[[f64; 3]], t: f64) -> [u8; 3] {
+    let place = t.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
+    let i = (place as usize).min(stops.len() - 2);
+    let part = place - i as f64;
+    [0, 1, 2].map(|c| (stops[i][c] + (stops[i + 1][c] - stops[i][c]) * part).round() as u8)
+}
