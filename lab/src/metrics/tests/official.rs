@@ -18,6 +18,8 @@
 //! (`bucket`: category, range, speeds, count, EPE, mean speed) and its `get_mean_average_values`
 //! (`mean`).
 //!
+//! `both` is one evaluator given two frames: `zero` without ground, then `pattern` with it.
+//!
 //! `accuracy` lines (count, EPE, strict, relaxed, outliers, angle) are the formulas of av2-api's
 //! `evaluation/scene_flow/eval.py`, and for outliers FlowNet3D's, in numpy on the returns that the
 //! grader above counts without ground, with the vehicle's motion `removed` or `included`.
@@ -110,10 +112,12 @@ fn equal_to_the_official_graders() {
     let mut log = Log::open(&data, Some(&data.join("truth")), true).unwrap();
     assert_eq!(log.pairs().count(), 1);
     let pair = log.pair(0).unwrap();
-    let graded = |name: &str, ground: &str| {
-        let rules = Rules { ground: ground == "with", ..Rules::OFFICIAL };
+    let graded = |frames: &[(&str, bool)]| {
         let mut grades = Grades::default();
-        grades.add(&pair, &estimate(name, &pair), &rules).unwrap();
+        for &(name, ground) in frames {
+            let rules = Rules { ground, ..Rules::OFFICIAL };
+            grades.add(&pair, &estimate(name, &pair), &rules).unwrap();
+        }
         grades
     };
     let mut at_hand = (String::new(), Grades::default());
@@ -121,7 +125,11 @@ fn equal_to_the_official_graders() {
         let words: Vec<&str> = line.split(' ').collect();
         let key = format!("{} {}", words[0], words[2]);
         if at_hand.0 != key {
-            at_hand = (key, graded(words[0], words[2]));
+            let frames = match words[0] {
+                "both" => &[("zero", false), ("pattern", true)][..],
+                name => &[(name, words[2] == "with")],
+            };
+            at_hand = (key, graded(frames));
         }
         let named = match words[1..] {
             ["accuracy", ..] => 5,
