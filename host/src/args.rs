@@ -53,7 +53,7 @@ pub enum Command {
 /// `raywake run`.
 #[derive(Debug, clap::Args)]
 pub struct Run {
-    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of `.bin` clouds
+    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of clouds
     pub data: PathBuf,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -203,7 +203,7 @@ pub enum Export {
 /// `raywake map`.
 #[derive(Debug, clap::Args)]
 pub struct Map {
-    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of `.bin` clouds
+    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of clouds
     pub data: PathBuf,
     /// Folder for one map a sweep: FRAME.feather with i, j, k and log-odds of every voxel touched
     #[arg(long, value_name = "DIR")]

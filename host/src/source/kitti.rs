@@ -1,4 +1,4 @@
-//! KITTI drives and odometry sequences, and folders of `.bin` clouds that look like them.
+//! KITTI drives and odometry sequences, and folders of clouds that look like them.
 //!
 //! The vehicle frame is that of the Velodyne HDL-64E, unless sidecars tell of other sensors.
 
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 
-use super::bins::Bins;
+use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, Track};
-use super::recognise::{note_gaps, numbered};
-use super::sidecars::Sidecars;
+use super::recognise::{extensions, note_gaps, numbered};
+use super::sidecars::{SPAN_MAX_S, Sidecars};
 use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
 use crate::error::Error;
 
@@ -31,8 +31,8 @@ const OWN_VEHICLE: [[f32; 2]; 2] = [[-1.5, -1.75], [4.5, 1.75]];
 const RAW_CLOUDS: &str = "velodyne_points/data";
 
 /// A KITTI raw drive. `poses.txt` (or the option `poses`) wins over `oxts`.
-pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Bins, Error> {
-    let mut opening = Opening::new(drive, &drive.join(RAW_CLOUDS), "KITTI raw drive")?;
+pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
+    let mut opening = Opening::new(drive, &drive.join(RAW_CLOUDS), "bin", "KITTI raw drive")?;
     opening.read_times(&["times.txt", "velodyne_points/timestamps.txt", "oxts/timestamps.txt"])?;
     let own = drive.join("poses.txt");
     match options.poses.as_ref().or(Some(&own).filter(|p| p.is_file())) {
@@ -46,8 +46,8 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Bins, Erro
 
 /// A KITTI odometry sequence. Its poses are in `poses.txt` or, as distributed, in
 /// `../../poses/NN.txt`.
-pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Bins, Error> {
-    let mut opening = Opening::new(sequence, &sequence.join("velodyne"), "KITTI odometry")?;
+pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
+    let mut opening = Opening::new(sequence, &sequence.join("velodyne"), "bin", "KITTI odometry")?;
     opening.read_times(&["times.txt"])?;
     let apart = format!("../../poses/{}.txt", folder_name(sequence));
     let own = [sequence.join("poses.txt"), sequence.join(apart)];
@@ -57,15 +57,25 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Bi
     Ok(opening.finish(options))
 }
 
-/// A folder of `.bin` clouds; the option `poses` is needed.
-pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Bins, Error> {
-    let mut opening = Opening::new(folder, folder, "folder of clouds")?;
+/// A folder of clouds of one kind; the option `poses` is needed.
+pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
+    let mut kinds = extensions(folder)?;
+    let kind = kinds.next().unwrap_or("bin");
+    if let Some(other) = kinds.next() {
+        let what = format!("holds `.{kind}` and `.{other}` files; one kind of clouds is expected");
+        return Err(Error::input(folder, "", what));
+    }
+    let mut opening = Opening::new(folder, folder, kind, "folder of clouds")?;
     opening.read_times(&["times.txt"])?;
     let path = options.poses.as_ref().ok_or_else(|| no_poses(folder, "clouds alone"))?;
     opening.read_poses(path, options, PosesFrame::Vehicle)?;
-    opening.notes.push(
-        "sensor taken to be mounted and to spin as KITTI's HDL-64E (1.73 m above ground)".into(),
-    );
+    opening.span = opening.find_span()?;
+    let spins = match opening.span {
+        Some(_) => "mounted",
+        None => "mounted and to spin",
+    };
+    let note = format!("sensor taken to be {spins} as KITTI's HDL-64E (1.73 m above ground)");
+    opening.notes.push(note);
     Ok(opening.finish(options))
 }
 
@@ -85,12 +95,19 @@ struct Opening {
     /// Whether the stamps were read and not assumed.
     timed: bool,
     sidecars: Option<Sidecars>,
+    /// Earliest time after the stamp and duration of a sweep, s, where clouds have times.
+    span: Option<[f64; 2]>,
     notes: Vec<String>,
 }
 
 impl Opening {
-    fn new(root: &Path, clouds: &Path, kind: &'static str) -> Result<Opening, Error> {
-        let (files, by_number) = numbered(clouds, "bin")?;
+    fn new(
+        root: &Path,
+        clouds: &Path,
+        extension: &str,
+        kind: &'static str,
+    ) -> Result<Opening, Error> {
+        let (files, by_number) = numbered(clouds, extension)?;
         let mut notes = Vec::new();
         if !by_number {
             notes.push("names of sweeps are no numbers; counted from 0 in their order".into());
@@ -106,6 +123,7 @@ impl Opening {
             track,
             timed: false,
             sidecars: None,
+            span: None,
             notes,
         })
     }
@@ -192,14 +210,31 @@ impl Opening {
         Ok(oxts::default_velo_from_imu())
     }
 
-    fn finish(self, options: &OpenOptions) -> Bins {
+    /// The span of the first sweep's times; `None` where it has none, or they are all the same.
+    fn find_span(&self) -> Result<Option<[f64; 2]>, Error> {
+        let (path, mut points) = (&self.files[0].1, Vec::new());
+        if !read_cloud(path, &mut points)? {
+            return Ok(None);
+        }
+        let times = points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
+        let limits = (f64::INFINITY, f64::NEG_INFINITY);
+        let (from_s, to_s) = times.fold(limits, |l, t| (l.0.min(t), l.1.max(t)));
+        let span_s = to_s - from_s;
+        if span_s > SPAN_MAX_S {
+            let what = format!("times of returns {span_s:.3} s apart; {SPAN_MAX_S} s at most");
+            return Err(Error::input(path, "", what));
+        }
+        Ok((span_s > 0.0).then_some([from_s, span_s]))
+    }
+
+    fn finish(self, options: &OpenOptions) -> Clouds {
         let frames = self.frames();
         let mut rig = match &self.sidecars {
             Some(sidecars) => sidecars.rig.clone(),
             None => self.velodyne(&frames),
         };
         apply(options, &mut rig);
-        Bins {
+        Clouds {
             name: folder_name(&self.root),
             kind: format!("{} {}", self.kind, self.root.display()),
             poses_from: self.poses_from,
@@ -215,7 +250,10 @@ impl Opening {
     fn velodyne(&self, frames: &[u64]) -> Rig {
         Rig {
             sensors: core::iter::once(Pose::IDENTITY).collect(),
-            timing: Timing::Azimuth { span_s: self.turn_s(frames) },
+            timing: match self.span {
+                Some([from_s, span_s]) => Timing::Offset { from_s, span_s },
+                None => Timing::Azimuth { span_s: self.turn_s(frames) },
+            },
             distorted: true,
             ground_m: GROUND_M,
             own_vehicle: Some(OWN_VEHICLE),

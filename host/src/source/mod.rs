@@ -5,7 +5,7 @@
 //! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt`, else `oxts/data/N.txt` |
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
-//! | [`Format::Bin`] | `*.bin` | a file named on the command line |
+//! | [`Format::Clouds`] | `*.bin`, `*.pcd` or `*.ply` | a file named on the command line |
 //!
 //! A `.bin` is little-endian float32 x, y, z, intensity per return. Poses and times are read and
 //! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
@@ -13,15 +13,20 @@
 
 #[cfg(feature = "arrow")]
 mod argoverse;
-mod bins;
+mod bin;
+mod clouds;
 #[cfg(feature = "arrow")]
 pub mod feather;
 #[cfg(feature = "arrow")]
 mod feather_check;
 mod kitti;
+mod lzf;
 mod oxts;
+mod pcd;
+mod ply;
 mod poses;
 mod recognise;
+mod returns;
 mod sidecars;
 #[cfg(feature = "demo")]
 pub mod simulated;
@@ -138,8 +143,9 @@ pub enum Format {
     /// An Argoverse 2 sensor log.
     #[value(name = "argoverse")]
     Argoverse2,
-    /// A folder of `.bin` clouds.
-    Bin,
+    /// A folder of `.bin`, `.pcd` or `.ply` clouds.
+    #[value(alias = "bin")]
+    Clouds,
 }
 
 /// Frame whose motion a file of poses tells.
@@ -181,7 +187,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
     match format {
         Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),
         Format::KittiOdometry => Ok(Box::new(kitti::open_odometry(&root, options)?)),
-        Format::Bin => Ok(Box::new(kitti::open_folder(&root, options)?)),
+        Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
         Format::Argoverse2 => open_argoverse(&root, options),
     }
 }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Format;
+use super::clouds::EXTENSIONS;
 use crate::error::Error;
 
 /// Levels of folders below the named one that are searched for a recording.
@@ -28,7 +29,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
             path,
             "",
             "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
-             nor any `.bin` file",
+             nor any `.bin`, `.pcd` or `.ply` file",
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
@@ -65,8 +66,14 @@ fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     if has("velodyne") {
         return Ok(Some(Format::KittiOdometry));
     }
-    let bins = entries(path)?.iter().any(|p| p.extension().is_some_and(|e| e == "bin"));
-    Ok(bins.then_some(Format::Bin))
+    Ok(extensions(path)?.next().map(|_| Format::Clouds))
+}
+
+/// Extensions of the clouds in a folder, each once.
+pub(super) fn extensions(path: &Path) -> Result<impl Iterator<Item = &'static str>, Error> {
+    let files = entries(path)?;
+    let there = move |e: &&str| files.iter().any(|p| p.extension().is_some_and(|x| x == *e));
+    Ok(EXTENSIONS.into_iter().filter(there))
 }
 
 /// Entries of a folder, sorted by name.

@@ -22,7 +22,7 @@ use super::text;
 use crate::error::Error;
 
 /// Longest sweep that is believed, s.
-const SPAN_MAX_S: f64 = 1.0;
+pub(super) const SPAN_MAX_S: f64 = 1.0;
 
 /// How far a return's time may lie outside the declared span, s: rounding, nothing more.
 const SLACK_S: f32 = 1e-4;

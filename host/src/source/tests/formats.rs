@@ -165,7 +165,7 @@ fn folder_of_clouds() {
     // A single sweep stands still.
     t.remove("b.bin");
     let poses = t.write("elsewhere/p.txt", row(9.0, 0.0, 0.0));
-    let format = Some(Format::Bin);
+    let format = Some(Format::Clouds);
     let options = OpenOptions { poses: Some(poses), format, ..OpenOptions::default() };
     let mut source = open(t.path(), &options).unwrap();
     assert_eq!(read(source.as_mut(), 0).unwrap().twist, raywake_core::pose::Twist::ZERO);

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "arrow")]
 mod argoverse;
+mod files;
 mod formats;
 mod mistakes;
 mod real;

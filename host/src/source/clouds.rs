@@ -1,0 +1,88 @@
+//! A folder of clouds with the track of the vehicle.
+
+use std::path::{Path, PathBuf};
+
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Point, Rig};
+
+use super::poses::Track;
+use super::sidecars::Sidecars;
+use super::{Dropped, Source, SweepData, bin, pcd, ply};
+use crate::error::Error;
+
+/// An open folder.
+pub(super) struct Clouds {
+    pub name: String,
+    /// Format and folder, for [`Source::describe`].
+    pub kind: String,
+    /// Where the poses are from, for [`Source::describe`].
+    pub poses_from: String,
+    /// Frame number and file, in order.
+    pub files: Vec<(u64, PathBuf)>,
+    pub track: Track,
+    pub rig: Rig,
+    /// Files that tell times and sensors of returns.
+    pub sidecars: Option<Sidecars>,
+    pub notes: Vec<String>,
+}
+
+impl Source for Clouds {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    fn describe(&self) -> String {
+        let (sweeps, span) = (self.files.len(), self.track.duration_s());
+        format!("{}: {sweeps} sweeps, {span:.1} s, poses from {}", self.kind, self.poses_from)
+    }
+
+    fn frame(&self, index: usize) -> u64 {
+        self.files[index].0
+    }
+
+    fn stamp_s(&self, index: usize) -> f64 {
+        self.track.stamps_s[index]
+    }
+
+    fn pose(&self, index: usize) -> Pose {
+        self.track.poses[index]
+    }
+
+    fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
+        let (frame, path) = &self.files[index];
+        let before = index.checked_sub(1).map_or(*frame, |i| self.files[i].0 + 1);
+        into.frame = *frame;
+        into.dropped = Dropped { sweeps_before: frame - before, null_rows: 0 };
+        into.stamp_s = self.track.stamps_s[index];
+        into.world_from_vehicle = self.track.poses[index];
+        into.twist = self.track.twist(index);
+        read_cloud(path, &mut into.points)?;
+        let Some(sidecars) = &self.sidecars else { return Ok(()) };
+        sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
+/// Replaces `points` by the returns of a file of one of the [`EXTENSIONS`]; returns whether they
+/// have times. Fails, leaving no points, where the file cannot be read or is damaged.
+pub(super) fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("pcd") => pcd::read(path, points),
+        Some("ply") => ply::read(path, points),
+        _ => bin::read(path, points).map(|()| false),
+    }
+}
+
+/// Names of files of clouds end so.
+pub(super) const EXTENSIONS: [&str; 3] = ["bin", "pcd", "ply"];

@@ -1,0 +1,204 @@
+//! PCD files of the Point Cloud Library, version 0.7: text, binary or compressed.
+//!
+//! The fields are those of [`super::returns`]. `VIEWPOINT` is not applied: points are taken to be
+//! in the vehicle frame.
+
+use std::path::Path;
+
+use raywake_core::sweep::Point;
+
+use super::lzf;
+use super::returns::{Column, Fields, Head, Number, load, records, table};
+use crate::error::Error;
+
+/// Replaces `points` by those of a file; returns whether they have times.
+///
+/// Fails, leaving no points, where the file cannot be read, its header does not fit together, or it
+/// ends early.
+pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
+    points.clear();
+    let bytes = load(path)?;
+    let mut head = Head::new(path, &bytes);
+    let header = Header::read(&mut head)?;
+    let named: Vec<_> = header.fields.iter().map(|f| (f.name.clone(), f.number)).collect();
+    let fields = Fields::find(&named).map_err(|what| Error::input(path, "", what))?;
+    let (rows, at) = (header.rows, head.next.0);
+    match header.data {
+        Data::Text => {
+            let width = header.fields.iter().map(|f| f.count).sum();
+            let numbers = table(path, &bytes, head.next, rows, width)?;
+            let first = header.before(|f| f.count);
+            Ok(fields.returns(rows, |row, f| numbers[row * width + first[f]], points))
+        }
+        Data::Binary => {
+            let size = header.record();
+            let records = records(path, &bytes, at, rows, size)?;
+            let before = header.before(Field::size);
+            let columns = header.columns(|f| (before[f], size));
+            Ok(fields.returns(rows, |row, f| columns[f].value(records, row, false), points))
+        }
+        Data::Compressed => {
+            let unpacked = unpack(path, &bytes, at, rows.saturating_mul(header.record()))?;
+            let before = header.before(Field::size);
+            // Field after field, each of all points.
+            let columns = header.columns(|f| (rows * before[f], header.fields[f].size()));
+            Ok(fields.returns(rows, |row, f| columns[f].value(&unpacked, row, false), points))
+        }
+    }
+}
+
+/// The body of a compressed file: its packed and unpacked length, 32 bits each, and the former's
+/// bytes.
+fn unpack(path: &Path, bytes: &[u8], at: usize, size: usize) -> Result<Vec<u8>, Error> {
+    let wrong = |what: String| Error::input(path, format!("byte {at}"), what);
+    let rest = bytes.get(at..).unwrap_or_default();
+    let (lengths, rest) = rest.split_at_checked(8).ok_or_else(|| {
+        wrong(format!("truncated: two lengths expected, {} bytes left", rest.len()))
+    })?;
+    let length = |n: usize| Number::Unsigned(4).read(&lengths[4 * n..], false) as usize;
+    if length(1) != size {
+        return Err(wrong(format!("unpacks to {} bytes, the header asks for {size}", length(1))));
+    }
+    let packed = rest.get(..length(0)).ok_or_else(|| {
+        wrong(format!("truncated: {} packed bytes, {} bytes left", length(0), rest.len()))
+    })?;
+    lzf::unpack(packed, size).map_err(|what| wrong(what.into()))
+}
+
+/// How the points are stored.
+#[derive(Clone, Copy)]
+enum Data {
+    Text,
+    Binary,
+    Compressed,
+}
+
+/// A field of a point.
+struct Field {
+    name: String,
+    number: Number,
+    /// Numbers it has; the first is taken.
+    count: usize,
+}
+
+impl Field {
+    fn size(&self) -> usize {
+        self.number.size() * self.count
+    }
+}
+
+struct Header {
+    fields: Vec<Field>,
+    rows: usize,
+    data: Data,
+}
+
+/// Fields and numbers of a field that are believed.
+const FIELDS_MAX: usize = 1 << 10;
+
+impl Header {
+    fn read(head: &mut Head) -> Result<Header, Error> {
+        let (mut names, mut sizes, mut types) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut counts, mut width, mut height, mut points) = (None, None, None, None);
+        loop {
+            let words = head.words()?;
+            let Some((&key, rest)) = words.split_first() else { continue };
+            match key {
+                "VERSION" | "VIEWPOINT" => {}
+                "FIELDS" | "COLUMNS" => names = rest.iter().map(|n| n.to_string()).collect(),
+                "SIZE" => sizes = whole(head, rest)?,
+                "TYPE" => types = rest.iter().map(|t| t.to_string()).collect(),
+                "COUNT" => counts = Some(whole(head, rest)?),
+                "WIDTH" => width = Some(one(head, rest)?),
+                "HEIGHT" => height = Some(one(head, rest)?),
+                "POINTS" => points = Some(one(head, rest)?),
+                "DATA" => {
+                    let area = width.zip(height.or(Some(1)));
+                    let area = area.and_then(|(w, h): (usize, usize)| w.checked_mul(h));
+                    let rows = points.or(area).ok_or_else(|| head.wrong("no POINTS before"))?;
+                    if area.is_some_and(|a| a != rows) {
+                        let what = format!("{rows} POINTS are not WIDTH times HEIGHT");
+                        return Err(head.wrong(what));
+                    }
+                    let fields = fields(&names, &sizes, &types, counts.as_deref());
+                    let fields = fields.map_err(|what| head.wrong(what))?;
+                    let data = match rest {
+                        ["ascii"] => Data::Text,
+                        ["binary"] => Data::Binary,
+                        ["binary_compressed"] => Data::Compressed,
+                        _ => return Err(head.wrong(format!("unknown DATA {}", rest.join(" ")))),
+                    };
+                    return Ok(Header { fields, rows, data });
+                }
+                _ if key.starts_with('#') => {}
+                _ => return Err(head.wrong(format!("`{key:.20}` is no entry of a PCD header"))),
+            }
+        }
+    }
+
+    /// Bytes of a point.
+    fn record(&self) -> usize {
+        self.fields.iter().map(Field::size).sum()
+    }
+
+    /// What the fields before each field take.
+    fn before(&self, of: impl Fn(&Field) -> usize) -> Vec<usize> {
+        let mut sum = 0;
+        let place = |f: &Field| {
+            sum += of(f);
+            sum - of(f)
+        };
+        self.fields.iter().map(place).collect()
+    }
+
+    /// The columns of the fields, by start and step.
+    fn columns(&self, place: impl Fn(usize) -> (usize, usize)) -> Vec<Column> {
+        let column = |(n, field): (usize, &Field)| {
+            let (start, step) = place(n);
+            Column { number: field.number, start, step }
+        };
+        self.fields.iter().enumerate().map(column).collect()
+    }
+}
+
+fn fields(
+    names: &[String],
+    sizes: &[usize],
+    types: &[String],
+    counts: Option<&[usize]>,
+) -> Result<Vec<Field>, String> {
+    let n = names.len();
+    if n == 0 || sizes.len() != n || types.len() != n || counts.is_some_and(|c| c.len() != n) {
+        return Err("FIELDS, SIZE, TYPE and COUNT before do not have the same number".into());
+    }
+    let field = |i: usize| {
+        let number = match (types[i].as_str(), sizes[i]) {
+            ("F", 4) => Number::F32,
+            ("F", 8) => Number::F64,
+            ("U", size @ (1 | 2 | 4 | 8)) => Number::Unsigned(size),
+            ("I", size @ (1 | 2 | 4 | 8)) => Number::Signed(size),
+            (kind, size) => {
+                return Err(format!("field `{}`: TYPE {kind} of SIZE {size}", names[i]));
+            }
+        };
+        let count = counts.map_or(1, |c| c[i]);
+        if n > FIELDS_MAX || !(1..=FIELDS_MAX).contains(&count) {
+            return Err(format!("field `{}`: COUNT {count} in {n} fields", names[i]));
+        }
+        Ok(Field { name: names[i].clone(), number, count })
+    };
+    (0..n).map(field).collect()
+}
+
+/// Whole numbers of a header's line.
+fn whole(head: &Head, words: &[&str]) -> Result<Vec<usize>, Error> {
+    let number = |w: &&str| w.parse().map_err(|_| head.wrong(format!("`{w:.20}` is no count")));
+    words.iter().map(number).collect()
+}
+
+fn one(head: &Head, words: &[&str]) -> Result<usize, Error> {
+    match whole(head, words)?[..] {
+        [number] => Ok(number),
+        _ => Err(head.wrong("one number expected")),
+    }
+}
