@@ -14,7 +14,7 @@ impl Yard<'_> {
             _ => {
                 let radius = self.rng.range(0.1, 0.28);
                 let (trunk, spread) = (self.rng.range(2.0, 3.4), self.rng.range(1.4, 3.2));
-                let clumps = self.count(3, 8);
+                let clumps = self.count(4, 11);
                 self.crown([x, y], [radius, trunk], spread, porosity, clumps);
             }
         }
@@ -50,14 +50,30 @@ impl Yard<'_> {
         }
     }
 
-    /// One to four clumps.
+    /// One to six clumps.
     pub(super) fn bush(&mut self, x: f64, y: f64) {
-        for _ in 0..self.count(1, 5) {
+        for _ in 0..self.count(1, 7) {
             let wide = self.rng.range(0.6, 1.6);
             let size = [wide, wide * self.rng.range(0.7, 1.2), self.rng.range(0.5, 1.8)];
             let at = [x + self.rng.range(-0.6, 0.6), y + self.rng.range(-0.5, 0.5), -0.15];
             let porosity = self.rng.range(0.15, 0.6);
             self.leaves(at, size, porosity);
+        }
+    }
+
+    /// A bed of loose shrubs a few metres across, out of which rays come back from any depth.
+    pub(super) fn bed(&mut self, x: f64, y: f64) {
+        let half = [self.rng.range(1.0, 3.0), self.rng.range(0.6, 1.8)];
+        let (height, porosity) = (self.rng.range(0.4, 1.6), self.rng.range(0.5, 0.85));
+        for _ in 0..self.count(6, 16) {
+            let at = [
+                x + self.rng.range(-half[0], half[0]),
+                y + self.rng.range(-half[1], half[1]),
+                self.rng.range(-0.2, 0.3 * height),
+            ];
+            let wide = self.rng.range(0.4, 1.4);
+            let tall = height * self.rng.range(0.5, 1.1);
+            self.leaves(at, [wide, wide, tall], porosity);
         }
     }
 
@@ -93,10 +109,10 @@ impl Yard<'_> {
             if self.in_crossing(at, 2.0) {
                 continue;
             }
-            if self.rng.chance(0.55) {
-                self.tree(at, y);
-            } else {
-                self.bush(at, y);
+            match self.count(0, 10) {
+                0..5 => self.tree(at, y),
+                5..8 => self.bush(at, y),
+                _ => self.bed(at, y + 2.0 * side),
             }
         }
     }

@@ -35,6 +35,9 @@ impl Yard<'_> {
     /// walls are not all planes.
     fn front(&mut self, middle: f64, side: f64, front: f64, size: [f64; 2], wall: Surface) {
         let [length, height] = size;
+        if self.rng.chance(0.5) {
+            self.piers([middle - 0.5 * length, middle + 0.5 * length], side * front, height, wall);
+        }
         for _ in 0..self.count(1, 3 + (length / 3.0) as u32) {
             let x = middle + self.rng.range(-0.45, 0.45) * length;
             let out = self.rng.range(0.15, 0.6);
@@ -66,6 +69,22 @@ impl Yard<'_> {
                     self.raised(Class::Building, at, size, 0.0, Surface::glass(0.4));
                 }
             }
+        }
+    }
+
+    /// Regular strips of wall before a front, with panes between some of them.
+    fn piers(&mut self, x: [f64; 2], front: f64, height: f64, wall: Surface) {
+        let (step, width) = (self.rng.range(1.8, 4.0), self.rng.range(0.4, 1.1));
+        let (out, panes) = (self.rng.range(0.12, 0.4), self.rng.chance(0.5));
+        let mut at = x[0] + 0.5 * width;
+        while at < x[1] {
+            self.cuboid(Class::Building, [at, front], [width, 2.0 * out, height], 0.0, wall);
+            if panes && at + step < x[1] {
+                let size = [step - width, 0.1, self.rng.range(1.5, 2.6)];
+                let middle = [at + 0.5 * step, front, self.rng.range(0.1, 0.9)];
+                self.raised(Class::Building, middle, size, 0.0, Surface::glass(0.3));
+            }
+            at += step;
         }
     }
 
@@ -123,10 +142,10 @@ impl Yard<'_> {
             for _ in 0..self.count(1, 7) {
                 let x = middle + self.rng.range(-0.5, 0.5) * plot;
                 let y = side * self.rng.range(EDGE + 1.0, front - 0.5);
-                if self.rng.chance(0.25) {
-                    self.tree(x, y);
-                } else {
-                    self.bush(x, y);
+                match self.count(0, 8) {
+                    0 | 1 => self.tree(x, y),
+                    2 => self.bed(x, y),
+                    _ => self.bush(x, y),
                 }
             }
         }
@@ -145,7 +164,7 @@ impl Yard<'_> {
                 at += length;
                 if self.rng.chance(0.25) {
                     self.tree(x, y);
-                    self.bush(self.crossing + side * (front + 0.5), y + 2.0);
+                    self.bed(self.crossing + side * (front + 2.5), y + 2.0);
                     continue;
                 }
                 let wall = Surface::matt(self.rng.range(0.25, 0.6));
