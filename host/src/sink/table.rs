@@ -29,6 +29,7 @@ pub enum Column {
 #[derive(Default)]
 pub struct Table {
     columns: Vec<(String, Column)>,
+    #[cfg_attr(not(feature = "arrow"), allow(dead_code))]
     compressed: bool,
 }
 

@@ -46,7 +46,7 @@ fn times_and_sensors() {
 #[test]
 fn damaged_sensors() {
     let t = with_sidecars();
-    let mut refuse = |content: &str, with: &str| {
+    let refuse = |content: &str, with: &str| {
         t.write("velodyne_points/sensors.txt", content);
         let text = refused(t.path());
         assert!(text.contains("sensors.txt") && text.contains(with), "{content}: {text}");
