@@ -34,7 +34,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table that is written with LZ4: a third of a sweep's truth, at some milliseconds.
+    /// A table that is written with LZ4: of a simulated sweep's truth a twentieth is left.
     pub fn compressed() -> Table {
         Table { compressed: true, ..Table::default() }
     }
