@@ -27,8 +27,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Most sweeps of a drive: nearly three hours.
-const SWEEPS_MAX: u64 = 100_000;
+/// Most sweeps of a drive: a quarter of an hour.
+const SWEEPS_MAX: u64 = 10_000;
 
 /// Largest density of traffic: beyond, there is no room in the street.
 const DENSITY_MAX: f64 = 10.0;

@@ -2,8 +2,9 @@
 //! (boost serialisation).
 //!
 //! An object has poses from the first frame on which the camera sees a return of it to the last;
-//! on frames between where it sees none, it is marked as fully occluded. Boxes are upright, as
-//! KITTI's are: (tx, ty, tz) lies half the height below the centre, and rz is the heading.
+//! on frames between where it sees none, its pose is marked as unset and fully occluded. Boxes are
+//! upright, as KITTI's are: (tx, ty, tz) lies half the height below the centre, and rz is the
+//! heading.
 
 use super::calibration::Camera;
 use glam::DVec3;
@@ -137,8 +138,8 @@ impl Tracklet {
 }
 
 impl Row {
-    /// Elements of a pose. State 2: labelled; occlusion 0: visible, 2: fully occluded; truncation
-    /// 0: in the image, 1: truncated, 2: outside.
+    /// Elements of a pose. State 0: unset, 2: labelled; occlusion 0: visible (or partly, which is
+    /// not told apart), 2: fully; truncation 0: in the image, 1: truncated, 2: outside.
     fn fields(&self) -> [(&'static str, f64); 15] {
         let truncation = match self.corners {
             8 => 0.0,
@@ -152,7 +153,7 @@ impl Row {
             ("rx", 0.0),
             ("ry", 0.0),
             ("rz", self.yaw),
-            ("state", 2.0),
+            ("state", if self.seen { 2.0 } else { 0.0 }),
             ("occlusion", if self.seen { 0.0 } else { 2.0 }),
             ("occlusion_kf", 0.0),
             ("truncation", truncation),
@@ -175,5 +176,52 @@ fn object_type(class: Class) -> &'static str {
         Class::Cyclist => "Cyclist",
         Class::Pedestrian => "Pedestrian",
         _ => "Misc",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_core::pose::Twist;
+    use raywake_core::sweep::Point;
+    use raywake_sim::{Drive, Options, Truth};
+
+    #[test]
+    fn gaps_are_unset_and_ends_cut() {
+        let drive = Drive::new(1, Options { sweeps: 0, density: 0.0, ..Options::default() });
+        let mut tracklets = Tracklets::new(Camera::new(&drive.rig()));
+        let object = ObjectState {
+            id: 7,
+            class: Class::Bus,
+            world_from_object: Pose::planar(15.0, 2.0, -0.2, 0.0),
+            size: [12.0, 2.5, 3.0],
+            velocity_world: DVec3::ZERO,
+        };
+        // Seen in front, behind the camera, of something else, and not at all.
+        for (frame, (x, id)) in
+            [(9.0, 0), (9.0, 7), (-9.0, 7), (9.0, 7), (9.0, 3)].iter().enumerate()
+        {
+            let sweep = SimSweep {
+                stamp_s: 0.1 * frame as f64,
+                points: vec![Point { position: [*x, 1.0, -0.5], ..Point::default() }],
+                truth: vec![Truth { object: *id, ..Truth::default() }],
+                world_from_vehicle: Pose::IDENTITY,
+                twist: Twist::ZERO,
+            };
+            tracklets.add(frame, &sweep, &[object]);
+        }
+        let xml = tracklets.xml();
+        let count = |text: &str| xml.matches(text).count();
+        assert_eq!((count("<objectType>Misc<"), count("<first_frame>1<")), (1, 1));
+        assert_eq!((count("<count>1<"), count("<count>3<"), count("<tx>15<")), (1, 1, 3));
+        assert_eq!((count("<state>2<"), count("<state>0<"), count("<occlusion>2<")), (2, 1, 1));
+        assert_eq!((count("<tz>-1.7<"), count("<rz>0<")), (3, 3));
+    }
+
+    #[test]
+    fn a_drive_of_nothing() {
+        let drive = Drive::new(1, Options { sweeps: 0, density: 0.0, ..Options::default() });
+        let xml = Tracklets::new(Camera::new(&drive.rig())).xml();
+        assert!(xml.contains("<count>0</count>") && xml.ends_with("</boost_serialization>\n"));
     }
 }
