@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     if !done.is_empty() {
         for table in conclude(&done, &settings, &args.out)? {
-            println!("{}", table.caption);
+            println!("{}", table.text());
         }
         println!("report: {}", args.out.join("report.html").display());
     }

@@ -112,11 +112,36 @@ impl Table {
         encode::csv(&rows)
     }
 
+    /// For a screen: the caption, then columns of equal width, numbers flush right.
+    pub fn text(&self) -> String {
+        let shown: Vec<Vec<String>> = [self.columns.clone()]
+            .into_iter()
+            .chain(self.rows.iter().map(|r| r.cells.iter().map(Cell::shown).collect()))
+            .collect();
+        let widths: Vec<usize> = (0..self.columns.len())
+            .map(|c| shown.iter().map(|r| r[c].chars().count()).max().unwrap_or(0))
+            .collect();
+        let mut out = format!("{}\n", self.caption);
+        for row in &shown {
+            let cells = row.iter().zip(&widths).enumerate().map(|(c, (cell, width))| {
+                if self.is_text(c) { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+            });
+            out += cells.collect::<Vec<_>>().join("  ").trim_end();
+            out.push('\n');
+        }
+        out
+    }
+
+    /// Whether a column holds words.
+    fn is_text(&self, column: usize) -> bool {
+        self.rows.iter().any(|r| matches!(r.cells[column], Cell::Text(_)))
+    }
+
     /// As `<table>`; columns of numbers are flush right.
     pub(super) fn html(&self) -> String {
-        let text = |c: usize| self.rows.iter().any(|r| matches!(r.cells[c], Cell::Text(_)));
-        let class: Vec<&str> =
-            (0..self.columns.len()).map(|c| if text(c) { "" } else { " class=\"n\"" }).collect();
+        let class: Vec<&str> = (0..self.columns.len())
+            .map(|c| if self.is_text(c) { "" } else { " class=\"n\"" })
+            .collect();
         let mut out = String::from("<div class=\"wide\"><table>\n<thead><tr>");
         for (name, class) in self.columns.iter().zip(&class) {
             out += &format!("<th{class}>{}</th>", xml(name));
