@@ -114,7 +114,9 @@ impl Table {
 
     /// As `<table>`; columns of numbers are flush right.
     pub(super) fn html(&self) -> String {
-        let text = |c: usize| self.rows.iter().any(|r| matches!(r.cells[c], Cell::Text(_)));
+        let text = |c: usize| {
+            self.rows.is_empty() || self.rows.iter().any(|r| matches!(r.cells[c], Cell::Text(_)))
+        };
         let class: Vec<&str> =
             (0..self.columns.len()).map(|c| if text(c) { "" } else { " class=\"n\"" }).collect();
         let mut out = String::from("<div class=\"wide\"><table>\n<thead><tr>");
