@@ -134,7 +134,8 @@ impl Table {
 
     /// Whether a column holds words.
     fn is_text(&self, column: usize) -> bool {
-        self.rows.iter().any(|r| matches!(r.cells[column], Cell::Text(_)))
+        let text = |r: &Row| matches!(r.cells[column], Cell::Text(_));
+        self.rows.is_empty() || self.rows.iter().any(text)
     }
 
     /// As `<table>`; columns of numbers are flush right.

@@ -10,8 +10,11 @@ use raywake::error::Error;
 use raywake_core::pose::Pose;
 use view::View;
 
-/// Width and height of a panel, units.
-const SIDE: f64 = 700.0;
+/// Width and height of a panel in units and pixels per unit: where panels stand side by side on a
+/// page, they are smaller beside the same text.
+fn side_and_scale(panels: usize) -> (f64, f32) {
+    if panels > 1 { (460.0, 3.0) } else { (700.0, 2.0) }
+}
 
 /// Around everything, units.
 const MARGIN: f64 = 14.0;
@@ -24,9 +27,6 @@ const TITLE: f64 = 30.0;
 
 /// Below the panels, for two rows of legend; units.
 const LEGEND: f64 = 66.0;
-
-/// Pixels per unit.
-const SCALE: f32 = 2.0;
 
 /// Height of text, units.
 const SIZE: f64 = 13.0;
@@ -99,22 +99,23 @@ pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Vec<u8>, Error> {
         let what = format!("bird's-eye view: reaches {} m", look.half_extent_m);
         return Err(Error::Usage(what));
     }
+    let (side, scale) = side_and_scale(panels.len());
     let n = panels.len().max(1) as f64;
-    let size = [SIDE * n + GAP * (n - 1.0), TITLE + SIDE + LEGEND];
-    let views: Vec<View> = (0..panels.len()).map(|i| View::new(i, look)).collect();
+    let size = [side * n + GAP * (n - 1.0), TITLE + side + LEGEND];
+    let views: Vec<View> = (0..panels.len()).map(|i| View::new(i, side, look)).collect();
     let mut under = Svg::new(size[0], size[1], MARGIN);
     let mut over = Svg::new(size[0], size[1], MARGIN);
-    let mut sheet = raster::sheet(under.size(), SCALE)?;
+    let mut sheet = raster::sheet(under.size(), scale)?;
     for (view, panel) in views.iter().zip(panels) {
         view.draw_under(&mut under, panel);
         view.draw_over(&mut over, panel, look);
     }
-    legend::draw(&mut over, panels, look, TITLE + SIDE + 24.0);
-    raster::draw(&under.finish("circles"), SCALE, &mut sheet)?;
+    legend::draw(&mut over, panels, look, TITLE + side + 24.0);
+    raster::draw(&under.finish("circles"), scale, &mut sheet)?;
     for (view, panel) in views.iter().zip(panels) {
-        view.draw_points(&mut sheet, &panel.points);
+        view.draw_points(&mut sheet, scale, &panel.points);
     }
-    raster::draw(&over.finish("labels and flow"), SCALE, &mut sheet)?;
+    raster::draw(&over.finish("labels and flow"), scale, &mut sheet)?;
     raster::encode(&sheet)
 }
 

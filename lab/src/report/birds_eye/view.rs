@@ -1,9 +1,6 @@
 //! One panel.
 
-use super::{
-    Column, ESTIMATE, GAP, Look, MARGIN, Outline, Panel, SCALE, SIDE, SIZE, TITLE, TRUTH, path,
-    rect,
-};
+use super::{Column, ESTIMATE, GAP, Look, MARGIN, Outline, Panel, SIZE, TITLE, TRUTH, path, rect};
 use crate::report::palette::{self, INK, MUTED, PAPER};
 use crate::report::svg::{Anchor, Area, Stroke, Svg, width};
 use glam::DVec3;
@@ -26,14 +23,15 @@ pub(super) struct View {
 }
 
 impl View {
-    pub fn new(index: usize, look: &Look) -> View {
-        let left = index as f64 * (SIDE + GAP);
-        let area = Area { left, top: TITLE, width: SIDE, height: SIDE };
-        View { area, per_m: 0.5 * SIDE / look.half_extent_m }
+    pub fn new(index: usize, side: f64, look: &Look) -> View {
+        let left = index as f64 * (side + GAP);
+        let area = Area { left, top: TITLE, width: side, height: side };
+        View { area, per_m: 0.5 * side / look.half_extent_m }
     }
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let middle = [self.area.left + 0.5 * SIDE, self.area.top + 0.5 * SIDE];
+        let middle =
+            [self.area.left + 0.5 * self.area.width, self.area.top + 0.5 * self.area.width];
         [middle[0] - y * self.per_m, middle[1] - x * self.per_m]
     }
 
@@ -64,17 +62,17 @@ impl View {
 
     /// Between circles: a round number, so that three to seven of them reach the border.
     fn circle_m(&self) -> f64 {
-        let reach = 0.5 * SIDE / self.per_m;
+        let reach = 0.5 * self.area.width / self.per_m;
         let power = 10f64.powf((reach / 5.0).log10().floor());
         let digits = [1.0, 2.0, 5.0, 10.0];
         power * digits.into_iter().find(|d| d * power * 5.0 >= reach * 0.8).unwrap_or(10.0)
     }
 
     fn circles(&self) -> usize {
-        (0.5 * SIDE / self.per_m * std::f64::consts::SQRT_2 / self.circle_m()) as usize
+        (0.5 * self.area.width / self.per_m * std::f64::consts::SQRT_2 / self.circle_m()) as usize
     }
 
-    pub fn draw_points(&self, sheet: &mut Pixmap, points: &[[f32; 3]]) {
+    pub fn draw_points(&self, sheet: &mut Pixmap, scale: f32, points: &[[f32; 3]]) {
         let seen = |p: &[f32; 3]| {
             let place = self.seen([f64::from(p[0]), f64::from(p[1])])?;
             p[2].is_finite().then_some((p[2], place))
@@ -91,8 +89,8 @@ impl View {
             paint.set_color_rgba8(r, g, b, 150 + (90.0 * height) as u8);
             let [x, y] = [x, y].map(|v| v as f32);
             if let Some(disc) = PathBuilder::from_circle(x, y, POINT as f32) {
-                let scale = Transform::from_scale(SCALE, SCALE).pre_translate(margin, margin);
-                sheet.fill_path(&disc, &paint, FillRule::Winding, scale, None);
+                let onto = Transform::from_scale(scale, scale).pre_translate(margin, margin);
+                sheet.fill_path(&disc, &paint, FillRule::Winding, onto, None);
             }
         }
     }
