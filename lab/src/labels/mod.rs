@@ -8,6 +8,7 @@ mod kind;
 mod kitti_tracking;
 mod open;
 pub mod semantic_kitti;
+mod smooth;
 mod sweeps;
 mod tracklets;
 pub mod trajectory;

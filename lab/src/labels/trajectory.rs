@@ -1,13 +1,11 @@
 //! Tracks in the world: the true motion of labelled objects.
 
+use super::smooth::{Sample, fit, polynomial};
 use super::sweeps::{Sweeps, turn};
 use super::{Labels, Track};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use raywake::source::Source;
 use raywake_core::pose::Pose;
-
-/// Sweeps before and after a sweep whose boxes make its smoothed box: 11 in all, a second at 10 Hz.
-pub const HALF_WINDOW: usize = 5;
 
 /// An object is parked where the boxes of its track lie no farther than this from their mean (root
 /// of the mean square, on the ground), m. A voxel's side: boxes of parked vehicles wander by up to
@@ -52,7 +50,7 @@ pub struct State {
 /// A track in the world.
 ///
 /// Poses of parked objects are their mean, so that they do not move at all. Those of others are
-/// smoothed: a quadratic is laid through position and heading of the boxes within [`HALF_WINDOW`]
+/// smoothed: a quadratic is laid through position and heading of the boxes within five
 /// sweeps by least squares, and taken at the sweep; a line through fewer than five boxes. At the
 /// ends of a track the window has one side only. Exact labels stay as they are.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,15 +164,6 @@ fn placed(track: &Track, sweeps: &Sweeps) -> (Vec<State>, Vec<f64>) {
     (states, headings)
 }
 
-/// A box in the world, as labelled.
-#[derive(Clone, Copy)]
-struct Sample {
-    index: usize,
-    stamp_s: f64,
-    at: DVec3,
-    yaw: f64,
-}
-
 /// The mean pose of an object that is parked: boxes within [`PARKED_M`] of it, and no steady motion
 /// of [`MOVING_MPS`] hidden in them, as there may be in a short track. A track of one box
 /// tells nothing.
@@ -188,53 +177,6 @@ fn parked(samples: &[Sample]) -> Option<Pose> {
     let stays = square <= PARKED_M.powi(2) * samples.len() as f64;
     let drift = polynomial(samples, samples[0].stamp_s, 1).velocity.truncate().length();
     (stays && drift < MOVING_MPS).then(|| Pose::planar(at.x, at.y, at.z, yaw))
-}
-
-/// Position (m), velocity (m/s) and heading (rad) of a fitted motion.
-struct Fit {
-    at: DVec3,
-    velocity: DVec3,
-    yaw: f64,
-}
-
-/// The motion at sample `n` from its window; of exact ones, from its neighbours alone.
-fn fit(samples: &[Sample], n: usize, exact: bool) -> Fit {
-    let half = if exact { 1 } else { HALF_WINDOW };
-    let near = |s: &&Sample| s.index.abs_diff(samples[n].index) <= half;
-    let window: Vec<Sample> = samples.iter().filter(near).copied().collect();
-    let degree = match window.len() {
-        few if exact => (few - 1).min(2),
-        few @ 1..5 => few.min(2) - 1,
-        _ => 2,
-    };
-    polynomial(&window, samples[n].stamp_s, degree)
-}
-
-/// The polynomial of a degree up to 2 through the samples by least squares, at a stamp.
-fn polynomial(samples: &[Sample], stamp_s: f64, degree: usize) -> Fit {
-    let mut gram = DMat3::ZERO;
-    // Sums of powers of time by x, y, z, heading.
-    let mut sums = [DVec3::ZERO; 4];
-    for s in samples {
-        let t = s.stamp_s - stamp_s;
-        let powers = DVec3::new(1.0, t, t * t);
-        gram += DMat3::from_cols(powers, powers * t, powers * (t * t));
-        for (sum, value) in sums.iter_mut().zip([s.at.x, s.at.y, s.at.z, s.yaw]) {
-            *sum += powers * value;
-        }
-    }
-    // Powers above the degree get the coefficient 0.
-    for power in degree + 1..3 {
-        for other in 0..3 {
-            gram.col_mut(other)[power] = 0.0;
-        }
-        *gram.col_mut(power) = DVec3::AXES[power];
-        sums.iter_mut().for_each(|sum| sum[power] = 0.0);
-    }
-    let inverse = gram.inverse();
-    let [x, y, z, yaw] = sums.map(|sum| inverse * sum);
-    let of = |power: usize| DVec3::new(x[power], y[power], z[power]);
-    Fit { at: of(0), velocity: of(1), yaw: yaw.x }
 }
 
 #[cfg(test)]
