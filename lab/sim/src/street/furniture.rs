@@ -17,7 +17,7 @@ impl Yard<'_> {
             let y = side * (ROAD_HALF + self.rng.range(0.45, 0.8));
             if !self.in_crossing(at, 1.0) {
                 match self.count(0, 20) {
-                    0..6 => self.tree(at, y),
+                    0..6 => self.street_tree(at, y),
                     6..9 => self.lamp(at, y),
                     9..12 => self.sign(at, y),
                     12 => self.bin(at, y),
@@ -41,7 +41,8 @@ impl Yard<'_> {
             if !self.in_crossing(at, 0.5 * length + 0.5) {
                 match self.count(0, 10) {
                     0..4 => self.border(at, y, length),
-                    4 | 5 => self.bush(at, y),
+                    4 => self.bush(at, y + 0.7 * side),
+                    5 => self.bed(at, y + 2.2 * side),
                     6 => self.bicycles(at, y),
                     7 => self.containers(at, y),
                     8 => self.shelter(at, side),

@@ -12,12 +12,19 @@ impl Yard<'_> {
             0 => self.conifer(x, y, porosity),
             1 => self.crown([x, y], [0.06, 2.2], 0.9, porosity, 3),
             _ => {
-                let radius = self.rng.range(0.1, 0.28);
-                let (trunk, spread) = (self.rng.range(2.0, 3.4), self.rng.range(1.4, 3.2));
-                let clumps = self.count(4, 11);
-                self.crown([x, y], [radius, trunk], spread, porosity, clumps);
+                let stem = [self.rng.range(0.1, 0.28), self.rng.range(1.2, 3.2)];
+                let (spread, clumps) = (self.rng.range(1.4, 3.2), self.count(4, 11));
+                self.crown([x, y], stem, spread, porosity, clumps);
             }
         }
+    }
+
+    /// A tree by the kerb: nothing of it hangs low, where people walk and cars are parked.
+    pub(super) fn street_tree(&mut self, x: f64, y: f64) {
+        let stem = [self.rng.range(0.06, 0.24), self.rng.range(2.2, 3.4)];
+        let (spread, clumps) = (self.rng.range(0.9, 2.6), self.count(3, 9));
+        let porosity = self.rng.range(0.3, 0.75);
+        self.crown([x, y], stem, spread, porosity, clumps);
     }
 
     fn crown(&mut self, [x, y]: [f64; 2], stem: [f64; 2], spread: f64, porosity: f64, clumps: u32) {
@@ -102,7 +109,7 @@ impl Yard<'_> {
 
     /// Trees and bushes without houses, to some distance.
     pub(super) fn park(&mut self, x: [f64; 2], side: f64) {
-        let amount = ((x[1] - x[0]) * 0.5) as u32;
+        let amount = ((x[1] - x[0]) * 0.9) as u32;
         for _ in 0..amount {
             let (at, back) = (self.rng.range(x[0], x[1]), self.rng.unit());
             let y = side * (EDGE + 1.2 + 32.0 * back * back);

@@ -1,5 +1,6 @@
 //! The street's background, block by block: closed rows of houses, houses behind gardens, green.
 
+mod fronts;
 mod furniture;
 mod green;
 mod houses;
@@ -67,12 +68,12 @@ impl Yard<'_> {
             match (self.rng.unit() * 10.0) as u32 {
                 0..4 => {
                     self.row_of_houses([at, end], side);
-                    self.house_side([at, end], side, [4.0, 22.0]);
+                    self.house_side([at, end], side, [1.5, 12.0]);
                 }
                 4..8 => self.gardens([at, end], side),
                 _ => {
                     self.park([at, end], side);
-                    self.house_side([at, end], side, [2.0, 14.0]);
+                    self.house_side([at, end], side, [1.0, 8.0]);
                 }
             }
             at = end;
