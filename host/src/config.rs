@@ -180,6 +180,11 @@ impl Weights {
         Ok(Weights { filter: filter.map(|f| f.1), constancy: constancy.1 })
     }
 
+    /// The same without the background filter: every solid column is foreground.
+    pub fn without_filter(self) -> Weights {
+        Weights { filter: None, ..self }
+    }
+
     /// A digest of both texts, 16 hexadecimal digits.
     pub fn digest(&self) -> String {
         let all = format!("{:?}{}", self.filter, self.constancy);

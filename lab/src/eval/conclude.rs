@@ -110,9 +110,8 @@ fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
         "median error of tracklets of age 10 and more, moving",
         "all labelled in the dissertation: 0.50 m/s",
     );
-    let stages = tables::stages(drives);
-    let total = stages.last().map(|s| s.1.as_slice()).unwrap_or_default();
-    if let Some(s) = raywake::statistics::Spread::of(total) {
+    let totals: Vec<f64> = drives.iter().flat_map(|d| &d.totals).copied().collect();
+    if let Some(s) = raywake::statistics::Spread::of(&totals) {
         report.headline(
             &number(s.median, "ms", 1),
             "median time of a pair of sweeps",

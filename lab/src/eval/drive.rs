@@ -38,9 +38,25 @@ pub struct Settings {
     pub margin_m: f64,
     /// Sweeps of a drive at most.
     pub sweeps: usize,
+    /// Time the pipeline without its filter too.
+    pub all_columns: bool,
 }
 
 impl Settings {
+    /// A run that writes nothing.
+    fn plan(&self, source: &dyn Source, weights: Weights) -> Plan<'_> {
+        Plan {
+            profile: self.profile.clone(),
+            weights,
+            backend: &self.backend,
+            sweeps: 0..self.sweeps.min(source.len()),
+            out: None,
+            kinds: Kinds::default(),
+            summary: None,
+            quiet: true,
+        }
+    }
+
     /// What decides the rows of a drive.
     fn key(&self, source: &dyn Source) -> serde_json::Value {
         json!({
@@ -49,10 +65,21 @@ impl Settings {
             "weights": self.weights_digest,
             "backend": format!("{:?}", self.backend.backend),
             "margin_m": self.margin_m,
+            "all_columns": self.all_columns,
             "sweeps": self.sweeps.min(source.len()),
             "first_frame": source.frame(0),
         })
     }
+}
+
+/// Total time of every pair where every solid column is foreground, ms.
+fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, Error> {
+    let mut totals = Vec::new();
+    let plan = settings.plan(source, settings.weights.clone().without_filter());
+    let summary = engine::execute(&plan, source, &mut |_, pair| {
+        totals.push(pair.laps.stages().map(|s| s.1).sum());
+    })?;
+    if summary.interrupted { Err(Error::Usage("interrupted".into())) } else { Ok(totals) }
 }
 
 /// Files of a drive's results.
@@ -122,6 +149,9 @@ pub fn evaluate(
         settings.profile.voxel_m,
     );
     run(source.as_mut(), settings, &files, collector, points, &mut facts)?;
+    if settings.all_columns {
+        facts.unfiltered = unfiltered(source.as_mut(), settings)?;
+    }
     facts.seconds = begin.elapsed().as_secs_f64();
     facts.write(&files.facts)?;
     Ok((facts, false))
@@ -143,16 +173,7 @@ fn run(
     points: Points,
     facts: &mut Facts,
 ) -> Result<(), Error> {
-    let plan = Plan {
-        profile: settings.profile.clone(),
-        weights: settings.weights.clone(),
-        backend: &settings.backend,
-        sweeps: 0..settings.sweeps.min(source.len()),
-        out: None,
-        kinds: Kinds::default(),
-        summary: None,
-        quiet: true,
-    };
+    let plan = settings.plan(source, settings.weights.clone());
     let (send, receive) = sync_channel(WAITING);
     let drive = facts.drive.clone();
     let (summary, written) = std::thread::scope(|scope| {

@@ -50,6 +50,8 @@ pub struct Facts {
     pub stages: Vec<Stage>,
     /// Sum of the stages per pair, ms.
     pub totals: Vec<f64>,
+    /// The same without the background filter, where that was asked for.
+    pub unfiltered: Vec<f64>,
     /// Returns of the first sweep of each pair.
     pub points: Vec<usize>,
     /// What was left out, of data and labels.

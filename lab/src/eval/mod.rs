@@ -19,6 +19,8 @@ mod rows_file;
 mod statistics;
 mod tables;
 mod tally;
+#[cfg(test)]
+mod tests;
 
 use conclude::conclude;
 use drive::Settings;
@@ -57,6 +59,9 @@ pub struct Args {
     /// Drives at a time; each keeps two cores busy
     #[arg(long, value_name = "N", default_value_t = 1)]
     jobs: usize,
+    /// Run every drive once more without the filter, for the time that all columns take
+    #[arg(long)]
+    all_columns: bool,
     /// Stop after this many sweeps of every drive
     #[arg(short = 'n', value_name = "COUNT")]
     count: Option<usize>,
@@ -77,6 +82,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         open: args.recording.options(),
         margin_m: args.margin,
         sweeps: args.count.unwrap_or(usize::MAX),
+        all_columns: args.all_columns,
     };
     let names = names(&args.drives)?;
     for folder in ["rows", "drives", "panels"] {

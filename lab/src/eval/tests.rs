@@ -1,0 +1,135 @@
+//! Drives evaluated from end to end.
+
+use super::row::{CLASSES, Row};
+use super::{Args, rows_file, run};
+use crate::simulate::{Motion, Recipe, write};
+use clap::Parser;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+#[derive(Parser)]
+struct Command {
+    #[command(flatten)]
+    args: Args,
+}
+
+/// `raywake-lab eval` with these words.
+fn eval(words: &[&Path], options: &[&str]) -> Result<(), String> {
+    let words = words.iter().map(|w| w.as_os_str());
+    let options = ["--backend", "scalar"].iter().chain(options).map(std::ffi::OsStr::new);
+    let all = [std::ffi::OsStr::new("eval")].into_iter().chain(words).chain(options);
+    run(&Command::parse_from(all).args).map_err(|e| e.to_string())
+}
+
+/// A busy street in six sweeps, seen from a standing vehicle.
+fn drive(folder: &Path) -> PathBuf {
+    let (seed, sensor) = (3, "hdl64".to_string());
+    let recipe = Recipe { seed, sweeps: 6, sensor, motion: Motion::Standing, density: 1.0 };
+    write(folder, &recipe, 1, 2, true).unwrap();
+    folder.join("2000_01_01/2000_01_01_drive_0000_sync")
+}
+
+fn rows(file: &Path) -> Vec<Row> {
+    let mut all = Vec::new();
+    rows_file::read(file, |rows| all.extend_from_slice(rows)).unwrap();
+    all
+}
+
+fn facts(out: &Path) -> serde_json::Value {
+    let file = out.join("drives/2000_01_01_drive_0000_sync.json");
+    serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap()
+}
+
+/// Rounded to what f32 keeps of some metres.
+fn same(a: f32, b: f32) -> bool {
+    (a - b).abs() < 1e-4
+}
+
+#[test]
+fn a_simulated_drive() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let drive = drive(folder.path());
+    let flag: &Path = Path::new("--out");
+    eval(&[&drive, flag, &out], &["--all-columns"]).unwrap();
+
+    let rows_of = out.join("rows/2000_01_01_drive_0000_sync.parquet");
+    let rows = rows(&rows_of);
+    // Pairs, and columns of each.
+    assert_eq!(rows.iter().map(|r| r.sweep).max(), Some(4));
+    assert!(rows.len() > 5 * 3000, "{} rows", rows.len());
+    // Seen all around by a vehicle at rest: nothing is carried along, and rounding is within half
+    // a cell along each axis.
+    let labelled: Vec<&Row> = rows.iter().filter(|r| r.class > 0 && r.in_view).collect();
+    assert!(labelled.len() > 200, "{} labelled", labelled.len());
+    for r in &labelled {
+        assert!(r.carried_x.hypot(r.carried_y) < 2e-3 && r.voxels > 0 && r.track > 0);
+        let off = [r.rounded_x - r.true_x, r.rounded_y - r.true_y];
+        assert!(off.iter().all(|v| v.abs() <= 0.15 + 1e-4), "{off:?}");
+        // Exact labels are their own smoothed motion.
+        assert!(same(r.smooth_x, r.true_x) && same(r.smooth_y, r.true_y), "{r:?}");
+        let moved = r.true_x.hypot(r.true_y) / r.dt;
+        assert_eq!(r.motion == 0, moved < 0.02, "{} moves at {moved} m/s", CLASSES[r.class as usize]);
+    }
+    assert!(labelled.iter().any(|r| r.motion == 2) && labelled.iter().any(|r| r.motion == 0));
+    for r in rows.iter().filter(|r| r.origin != 2) {
+        assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
+    }
+    // Whatever the filter rejects scored no more than 0.
+    assert!(rows.iter().all(|r| (r.origin > 0) == (r.score > 0)));
+
+    let first = facts(&out);
+    assert_eq!((&first["pairs"], &first["sweeps"]), (&5.into(), &6.into()));
+    assert_eq!(first["unfiltered"].as_array().unwrap().len(), 5);
+    for file in ["report.html", "tables/table-3-1-columns.csv", "charts/figure-3-6.png"] {
+        assert!(fs::metadata(out.join(file)).unwrap().len() > 100, "{file}");
+    }
+    let table = fs::read_to_string(out.join("tables/references-raw.csv")).unwrap();
+    let line = table.lines().find(|l| l.starts_with("parked,ego motion only")).unwrap();
+    assert!(line.split(',').nth(4).unwrap().parse::<f64>().unwrap() < 1e-3, "{line}");
+
+    // Again: nothing is done over; with another margin it is.
+    eval(&[&drive, flag, &out], &["--all-columns"]).unwrap();
+    assert_eq!(facts(&out), first);
+    eval(&[&drive, flag, &out], &["--margin", "0.3"]).unwrap();
+    assert_ne!(facts(&out)["settings"], first["settings"]);
+    let wider = super::tests::rows(&rows_of).iter().filter(|r| r.class > 0).count();
+    assert!(wider > rows.iter().filter(|r| r.class > 0).count());
+
+    // Damaged facts are made anew, damaged rows are named.
+    let facts_of = out.join("drives/2000_01_01_drive_0000_sync.json");
+    fs::write(&facts_of, "{").unwrap();
+    eval(&[&drive, flag, &out], &["-n", "3"]).unwrap();
+    let whole = fs::read(&rows_of).unwrap();
+    fs::write(&rows_of, &whole[..whole.len() / 2]).unwrap();
+    let failed = eval(&[&drive, flag, &out], &["-n", "3"]).unwrap_err();
+    assert!(failed.contains("2000_01_01_drive_0000_sync.parquet"), "{failed}");
+}
+
+#[test]
+fn drives_that_fail_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let good = drive(folder.path());
+    let flag: &Path = Path::new("--out");
+    // Another without its labels.
+    let bad = folder.path().join("unlabelled");
+    let copy = std::process::Command::new("cp").arg("-r").arg(&good).arg(&bad).status().unwrap();
+    assert!(copy.success());
+    fs::remove_file(bad.join("truth/objects.feather")).unwrap();
+    fs::remove_file(bad.join("tracklet_labels.xml")).unwrap();
+    let failed = eval(&[&bad, &good, flag, &out], &["-n", "2", "--jobs", "2"]).unwrap_err();
+    assert!(failed.contains("unlabelled") && failed.contains("label"), "{failed}");
+    assert!(out.join("report.html").is_file());
+    // Truth that does not fit the clouds.
+    let truth = good.join("truth/points");
+    fs::copy(truth.join("0000000001.feather"), truth.join("0000000000.feather")).unwrap();
+    let failed = eval(&[&good, flag, &out], &["-n", "3"]).unwrap_err();
+    assert!(failed.contains("0000000000.feather"), "{failed}");
+    // One name for two drives, no drive, a margin that is none.
+    let twin = folder.path().join("twin").join(good.file_name().unwrap());
+    fs::create_dir_all(&twin).unwrap();
+    assert!(eval(&[&good, &twin, flag, &out], &[]).unwrap_err().contains("same name"));
+    assert!(eval(&[Path::new("/nowhere"), flag, &out], &[]).unwrap_err().contains("/nowhere"));
+    assert!(eval(&[&good, flag, &out], &["--margin", "9"]).unwrap_err().contains("--margin"));
+}
