@@ -13,6 +13,9 @@ use raywake_core::pose::Pose;
 /// shows.
 pub const PARKED_M: f64 = 0.3;
 
+/// The same where labels are exact, m: what a body sways on its springs.
+const EXACT_M: f64 = 0.01;
+
 /// Speed over ground from which an object moves, and below which one is parked, m/s.
 pub const MOVING_MPS: f64 = 0.5;
 
@@ -79,7 +82,8 @@ impl Trajectory {
             })
             .collect();
         let mut trajectory = Trajectory { states };
-        if let Some(mean) = parked(&samples) {
+        let tolerance_m = if exact { EXACT_M } else { PARKED_M };
+        if let Some(mean) = parked(&samples, tolerance_m) {
             trajectory.park(mean);
         } else {
             trajectory.smooth(&samples, exact);
@@ -164,17 +168,17 @@ fn placed(track: &Track, sweeps: &Sweeps) -> (Vec<State>, Vec<f64>) {
     (states, headings)
 }
 
-/// The mean pose of an object that is parked: boxes within [`PARKED_M`] of it, and no steady motion
+/// The mean pose of an object that is parked: boxes within a tolerance of it, and no steady motion
 /// of [`MOVING_MPS`] hidden in them, as there may be in a short track. A track of one box
 /// tells nothing.
-fn parked(samples: &[Sample]) -> Option<Pose> {
+fn parked(samples: &[Sample], tolerance_m: f64) -> Option<Pose> {
     if samples.len() < 2 {
         return None;
     }
     let (at, yaw) = samples.iter().fold((DVec3::ZERO, 0.0), |s, b| (s.0 + b.at, s.1 + b.yaw));
     let (at, yaw) = (at / samples.len() as f64, yaw / samples.len() as f64);
     let square: f64 = samples.iter().map(|s| (s.at - at).truncate().length_squared()).sum();
-    let stays = square <= PARKED_M.powi(2) * samples.len() as f64;
+    let stays = square <= tolerance_m.powi(2) * samples.len() as f64;
     let drift = polynomial(samples, samples[0].stamp_s, 1).velocity.truncate().length();
     (stays && drift < MOVING_MPS).then(|| Pose::planar(at.x, at.y, at.z, yaw))
 }
@@ -262,6 +266,10 @@ mod tests {
         let leaving = trajectory(false, leaves, 30);
         let motion = |frame: u64| leaving.at(frame).unwrap().motion;
         assert_eq!((motion(2), motion(20)), (Motion::Slow, Motion::Moving));
+        // What creeps exactly so is not parked.
+        let creeps = |t: f64| Pose::planar(0.3 * t, 0.0, 0.0, 0.0);
+        assert_eq!(trajectory(true, creeps, 20).at(9).unwrap().motion, Motion::Slow);
+        assert_eq!(trajectory(false, creeps, 20).at(9).unwrap().motion, Motion::Parked);
         // In two sweeps nobody gets far.
         let walks = |t: f64| Pose::planar(1.5 * t, 0.0, 0.0, 0.0);
         assert_eq!(trajectory(false, walks, 2).at(0).unwrap().motion, Motion::Moving);
