@@ -9,5 +9,7 @@ pub mod labels;
 pub mod metrics;
 pub mod registration;
 pub mod report;
+#[cfg(test)]
+mod scratch;
 pub mod simulate;
 pub mod train;

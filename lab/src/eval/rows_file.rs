@@ -56,14 +56,12 @@ pub fn read(path: &Path, mut each: impl FnMut(&[Row])) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn file(name: &str) -> std::path::PathBuf {
-        std::env::temp_dir().join(format!("raywake-{}-{name}", std::process::id()))
-    }
+    use crate::scratch::Scratch;
 
     #[test]
     fn written_and_read() {
-        let path = file("rows.parquet");
+        let scratch = Scratch::new();
+        let path = scratch.path().join("rows.parquet");
         let row = |n: u32| Row { sweep: n, flow_x: n as f32, ..Row::default() };
         let mut batches = vec![vec![row(1), row(2)], vec![], vec![row(3)]].into_iter();
         write(&path, "a", || Ok(batches.next())).unwrap();
@@ -73,12 +71,12 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
         assert!(read(&path, |_| ()).unwrap_err().to_string().contains("rows.parquet"));
-        std::fs::remove_file(&path).unwrap();
     }
 
     #[test]
     fn a_failure_leaves_no_file() {
-        let path = file("none.parquet");
+        let scratch = Scratch::new();
+        let path = scratch.path().join("none.parquet");
         let failed = write(&path, "a", || Err(Error::Usage("why".into())));
         assert!(failed.unwrap_err().to_string().contains("why"));
         assert!(!path.exists());

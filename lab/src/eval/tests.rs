@@ -2,6 +2,7 @@
 
 use super::row::{CLASSES, Row};
 use super::{Args, rows_file, run};
+use crate::scratch::Scratch;
 use crate::simulate::{Motion, Recipe, write};
 use clap::Parser;
 use std::fs;
@@ -47,7 +48,7 @@ fn same(a: f32, b: f32) -> bool {
 
 #[test]
 fn a_simulated_drive() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Scratch::new();
     let out = folder.path().join("out");
     let drive = drive(folder.path());
     let flag: &Path = Path::new("--out");
@@ -69,7 +70,12 @@ fn a_simulated_drive() {
         // Exact labels are their own smoothed motion.
         assert!(same(r.smooth_x, r.true_x) && same(r.smooth_y, r.true_y), "{r:?}");
         let moved = r.true_x.hypot(r.true_y) / r.dt;
-        assert_eq!(r.motion == 0, moved < 0.02, "{} moves at {moved} m/s", CLASSES[r.class as usize]);
+        assert_eq!(
+            r.motion == 0,
+            moved < 0.02,
+            "{} moves at {moved} m/s",
+            CLASSES[r.class as usize]
+        );
     }
     assert!(labelled.iter().any(|r| r.motion == 2) && labelled.iter().any(|r| r.motion == 0));
     for r in rows.iter().filter(|r| r.origin != 2) {
@@ -108,7 +114,7 @@ fn a_simulated_drive() {
 
 #[test]
 fn drives_that_fail_are_named() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Scratch::new();
     let out = folder.path().join("out");
     let good = drive(folder.path());
     let flag: &Path = Path::new("--out");

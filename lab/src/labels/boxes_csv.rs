@@ -67,14 +67,14 @@ fn behind(vehicle_from_box: &raywake_core::pose::Pose, size: [f64; 3]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::Temp;
     use super::*;
+    use crate::scratch::Scratch;
 
     const HEADER: &str = "frame,track_id,class,x,y,z,l,w,h,yaw,occlusion\n";
 
     #[test]
     fn boxes_are_read_or_refused() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let read_text = |text: &str| read(&t.write("boxes.csv", HEADER.to_owned() + text));
         let labels =
             read_text("7,3,Van,10,2,-0.8,4,2,1.9,1.5707963,0\n8,3,Van,10,3,-0.8,4,2,1.9,1.5,0\n");
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_box_behind_shows_that_labels_lie_all_around() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let view = |line: &str| {
             let path = t.write("boxes.csv", HEADER.to_owned() + line);
             read(&path).unwrap().view

@@ -84,8 +84,9 @@ fn read(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, tests::Temp};
+    use super::super::Kind;
     use super::*;
+    use crate::scratch::Scratch;
     use arrow_array::{
         ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray, UInt32Array, UInt64Array,
     };
@@ -95,7 +96,7 @@ mod tests {
     use std::path::PathBuf;
     use std::sync::Arc;
 
-    fn write(t: &Temp, name: &str, columns: Vec<(&str, ArrayRef)>) -> PathBuf {
+    fn write(t: &Scratch, name: &str, columns: Vec<(&str, ArrayRef)>) -> PathBuf {
         let batch = RecordBatch::try_from_iter(columns).unwrap();
         let mut writer = FileWriter::try_new(Vec::new(), &batch.schema()).unwrap();
         writer.write(&batch).unwrap();
@@ -115,7 +116,7 @@ mod tests {
         columns
     }
 
-    fn logged(t: &Temp, x: f64, stamps: [i64; 2]) -> PathBuf {
+    fn logged(t: &Scratch, x: f64, stamps: [i64; 2]) -> PathBuf {
         let text = |value: &str| Arc::new(StringArray::from(vec![value; 2]));
         let mut all = columns(["tx_m", "ty_m", "tz_m"], ["length_m", "width_m", "height_m"], x);
         all.push(("timestamp_ns", Arc::new(Int64Array::from(stamps.to_vec()))));
@@ -126,7 +127,7 @@ mod tests {
 
     #[test]
     fn annotations_of_a_log() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let labels = annotations(&logged(&t, 7.0, [100, 200])).unwrap();
         assert_eq!((labels.view, labels.exact, labels.notes.len()), (View::All, false, 0));
         let [track] = &labels.tracks[..] else { panic!("{labels:?}") };
@@ -145,7 +146,7 @@ mod tests {
 
     #[test]
     fn damaged_feather_files() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let whole = fs::read(logged(&t, 7.0, [100, 200])).unwrap();
         let refused = |bytes: &[u8]| {
             let path = t.write("annotations.feather", bytes);
@@ -160,7 +161,7 @@ mod tests {
 
     #[test]
     fn objects_of_a_simulated_drive() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let mut all = columns(["x", "y", "z"], ["length", "width", "height"], 7.0);
         all.push(("frame", Arc::new(UInt64Array::from(vec![3, 4]))));
         all.push(("id", Arc::new(UInt32Array::from(vec![9, 9]))));

@@ -94,20 +94,21 @@ fn keyed<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, tests::Temp};
+    use super::super::Kind;
     use super::*;
+    use crate::scratch::Scratch;
 
     const CALIB: &str = "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n\
         R_rect 1 0 0 0 1 0 0 0 1\n\
         Tr_velo_cam 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n";
 
-    fn labels(t: &Temp, text: &str) -> Result<Labels, Error> {
+    fn labels(t: &Scratch, text: &str) -> Result<Labels, Error> {
         read(&t.write("label_02/0000.txt", text), &t.write("calib/0000.txt", CALIB))
     }
 
     #[test]
     fn boxes_in_the_velodyne_frame() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let text = "0 -1 DontCare -1 -1 -10 1 2 3 4 -1 -1 -1 -1000 -1000 -1000 -10\n\
             0 7 Van 0 0 -1.8 1 2 3 4 2.0 1.8 4.4 -4.9 1.7 13.3 -1.5707963267948966\n\
             2 7 Van 0 0 -1.8 1 2 3 4 2.0 1.8 4.4 -4.9 1.7 13.3 0 0.99\n";
@@ -126,7 +127,7 @@ mod tests {
 
     #[test]
     fn mistakes() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let refused = |text: &str| labels(&t, text).unwrap_err().to_string();
         assert!(refused("0 7 Van 0 0\n").ends_with("0000.txt, line 1: 5 fields, 17 expected"));
         let line = "0 7 Van 0 0 -1.8 1 2 3 4 2.0 1.8 4.4 -4.9 1.7 13.3 0";

@@ -98,12 +98,12 @@ pub fn read(path: &Path, points: usize) -> Result<Vec<PointLabel>, Error> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::Temp;
     use super::*;
+    use crate::scratch::Scratch;
 
     #[test]
     fn words_are_split() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let words = [252u32 | 7 << 16, 40, 30, 5000];
         let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
         t.write("labels/000003.label", &bytes);
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn another_number_of_returns() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let path = t.write("labels/000000.label", [0; 10]);
         let e = read(&path, 3).unwrap_err().to_string();
         assert!(e.ends_with("10 bytes are not the labels of 3 returns, 4 bytes each"), "{e}");

@@ -1,43 +1,12 @@
 //! Folders of labels.
 
 use super::*;
+use crate::scratch::Scratch;
 use raywake::source::simulated::Simulated;
 use raywake::source::{OpenOptions, Source, SweepData};
 use raywake_core::sweep::Rig;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-
-/// A folder that goes away with the value.
-pub(super) struct Temp(PathBuf);
-
-impl Temp {
-    pub fn new() -> Temp {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let n = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("raywake-labels-{}-{n}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Temp(path)
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-
-    /// Writes a file and the folders above it.
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(&path, content).unwrap();
-        path
-    }
-}
-
-impl Drop for Temp {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
+use std::path::PathBuf;
 
 /// Sweeps without clouds.
 pub(super) struct Road {
@@ -108,7 +77,7 @@ pub(super) fn labels_of(tracks: impl IntoIterator<Item = Track>) -> Labels {
 
 #[test]
 fn a_drive_without_labels() {
-    let t = Temp::new();
+    let t = Scratch::new();
     fs::create_dir_all(t.path().join("velodyne_points/data")).unwrap();
     let e = open(t.path(), &Simulated::new(1, 1)).unwrap_err().to_string();
     assert!(e.contains("no labels found"), "{e}");

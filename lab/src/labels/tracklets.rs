@@ -94,8 +94,9 @@ impl<'a> File<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, tests::Temp};
+    use super::super::Kind;
     use super::*;
+    use crate::scratch::Scratch;
 
     fn pose(x: f64, rest: &str) -> String {
         format!(
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_track() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let labels = read(&t.write("tracklet_labels.xml", file())).unwrap();
         assert_eq!((labels.tracks.len(), labels.view), (1, View::Camera));
         let track = &labels.tracks[0];
@@ -138,7 +139,7 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let refused = |text: &str| {
             let path = t.write("tracklet_labels.xml", text);
             read(&path).unwrap_err().to_string()
@@ -161,7 +162,7 @@ mod tests {
 
     #[test]
     fn what_makes_no_sense_is_counted() {
-        let t = Temp::new();
+        let t = Scratch::new();
         let notes = |part: &str, instead: &str| {
             let text = file().replace(part, instead);
             read(&t.write("tracklet_labels.xml", text)).unwrap().notes.join("; ")

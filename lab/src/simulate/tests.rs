@@ -3,6 +3,7 @@
 use super::calibration::Camera;
 use super::drive::{Motion, Recipe};
 use super::{Written, truth, write};
+use crate::scratch::Scratch;
 use glam::DVec3;
 use raywake::source::{OpenOptions, SweepData, open};
 use raywake_core::sweep::Timing;
@@ -10,26 +11,6 @@ use raywake_sim::SimSweep;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-
-/// A folder that goes away with the value.
-struct Temp(PathBuf);
-
-impl Temp {
-    fn new() -> Temp {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let n = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("raywake-lab-sim-{}-{n}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Temp(path)
-    }
-}
-
-impl Drop for Temp {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
 
 fn recipe(sensor: &str, motion: Motion, sweeps: usize) -> Recipe {
     Recipe { seed: 5, sweeps, sensor: sensor.into(), motion, density: 0.6 }
@@ -60,10 +41,10 @@ fn files(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 /// Writes drive 0 and checks all that can be read back against the simulator.
 fn round_trip(sensor: &str, motion: Motion, sweeps: usize) {
-    let t = Temp::new();
+    let t = Scratch::new();
     let recipe = recipe(sensor, motion, sweeps);
-    write(&t.0, &recipe, 1, 2, true).unwrap();
-    let folder = drive_folder(&t.0, 0);
+    write(t.path(), &recipe, 1, 2, true).unwrap();
+    let folder = drive_folder(t.path(), 0);
     let mut source = open(&folder, &OpenOptions::default()).unwrap();
     assert!(source.notes().is_empty(), "{:?}", source.notes());
     assert_eq!(source.len(), sweeps);
@@ -217,10 +198,10 @@ fn labels(xml: &str) -> Vec<Label> {
 
 #[test]
 fn labels_hold_what_the_camera_sees() {
-    let (t, sweeps) = (Temp::new(), 4);
+    let (t, sweeps) = (Scratch::new(), 4);
     let recipe = recipe("hdl64", Motion::Turn, sweeps);
-    write(&t.0, &recipe, 1, 2, true).unwrap();
-    let folder = drive_folder(&t.0, 0);
+    write(t.path(), &recipe, 1, 2, true).unwrap();
+    let folder = drive_folder(t.path(), 0);
     let labels = labels(&fs::read_to_string(folder.join("tracklet_labels.xml")).unwrap());
     let objects = truth::read_objects(&truth::objects_path(&folder)).unwrap();
     let drive = recipe.drive(0, 2).unwrap();
@@ -255,16 +236,16 @@ fn labels_hold_what_the_camera_sees() {
 
 #[test]
 fn the_same_seed_writes_the_same_bytes() {
-    let (a, b) = (Temp::new(), Temp::new());
+    let (a, b) = (Scratch::new(), Scratch::new());
     let recipe = recipe("vlp32x2", Motion::Any, 1);
-    assert_eq!(write(&a.0, &recipe, 2, 2, true).unwrap(), Written { drives: 2, skipped: 0 });
-    assert_eq!(write(&b.0, &recipe, 1, 1, true).unwrap(), Written { drives: 1, skipped: 0 });
+    assert_eq!(write(a.path(), &recipe, 2, 2, true).unwrap(), Written { drives: 2, skipped: 0 });
+    assert_eq!(write(b.path(), &recipe, 1, 1, true).unwrap(), Written { drives: 1, skipped: 0 });
     // What a run that was stopped leaves behind.
-    let partial = b.0.join("2000_01_01/.2000_01_01_drive_0001_sync.partial");
+    let partial = b.path().join("2000_01_01/.2000_01_01_drive_0001_sync.partial");
     fs::create_dir_all(&partial).unwrap();
     fs::write(partial.join("rubbish"), "x").unwrap();
-    assert_eq!(write(&b.0, &recipe, 2, 1, true).unwrap(), Written { drives: 1, skipped: 1 });
-    let (a, b) = (files(&a.0), files(&b.0));
+    assert_eq!(write(b.path(), &recipe, 2, 1, true).unwrap(), Written { drives: 1, skipped: 1 });
+    let (a, b) = (files(a.path()), files(b.path()));
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, content) in &a {
         assert!(*content == b[name], "{} differs", name.display());
@@ -277,29 +258,29 @@ fn the_same_seed_writes_the_same_bytes() {
 
 #[test]
 fn what_is_in_the_way() {
-    let t = Temp::new();
+    let t = Scratch::new();
     let small = Recipe { density: 0.0, ..recipe("hdl64", Motion::Standing, 1) };
     let refused =
         |out: &Path, recipe: &Recipe| write(out, recipe, 1, 1, true).unwrap_err().to_string();
-    fs::write(t.0.join("file"), "").unwrap();
-    let text = refused(&t.0.join("file"), &small);
+    fs::write(t.path().join("file"), "").unwrap();
+    let text = refused(&t.path().join("file"), &small);
     assert!(text.starts_with("cannot write ") && text.contains("file/2000_01_01"), "{text}");
-    write(&t.0, &small, 1, 1, true).unwrap();
-    let text = refused(&t.0, &Recipe { seed: 6, ..small.clone() });
+    write(t.path(), &small, 1, 1, true).unwrap();
+    let text = refused(t.path(), &Recipe { seed: 6, ..small.clone() });
     assert!(text.contains("drive_0000_sync: holds another drive") && text.contains("\"seed\":6"));
-    fs::rename(drive_folder(&t.0, 0), drive_folder(&t.0, 1)).unwrap();
-    let text = refused(&t.0, &Recipe { sensor: "beam128".into(), ..small.clone() });
+    fs::rename(drive_folder(t.path(), 0), drive_folder(t.path(), 1)).unwrap();
+    let text = refused(t.path(), &Recipe { sensor: "beam128".into(), ..small.clone() });
     assert!(text.contains("calib_velo_to_cam.txt: belongs to drives of other sensors"), "{text}");
-    fs::create_dir(drive_folder(&t.0, 0)).unwrap();
-    assert!(refused(&t.0, &small).contains("is there and is no drive of this program"));
-    let text = refused(&t.0, &Recipe { sensor: "hdl65".into(), ..small });
+    fs::create_dir(drive_folder(t.path(), 0)).unwrap();
+    assert!(refused(t.path(), &small).contains("is there and is no drive of this program"));
+    let text = refused(t.path(), &Recipe { sensor: "hdl65".into(), ..small });
     assert!(text.contains("hdl65"));
 }
 
 #[test]
 fn damaged_truth() {
-    let t = Temp::new();
-    let path = t.0.join("points.feather");
+    let t = Scratch::new();
+    let path = t.path().join("points.feather");
     let row = truth::PointTruth {
         offset_s: -0.01,
         sensor: 1,

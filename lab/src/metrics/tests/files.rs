@@ -1,6 +1,7 @@
 //! A log of three sweeps with truth, estimates and a map, and what can be wrong with them.
 
 use super::*;
+use crate::scratch::Scratch;
 use argoverse::{Log, read_estimate};
 use arrow_array::{
     ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int32Array, Int64Array,
@@ -9,20 +10,17 @@ use arrow_array::{
 use arrow_ipc::writer::FileWriter;
 use clap::Parser;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 const STAMPS: [i64; 3] = [1_000_000_000, 1_100_000_000, 1_200_000_000];
 
-/// A folder that goes away with the value.
-struct Temp(PathBuf);
+/// A folder of logs.
+struct Logs(Scratch);
 
-impl Temp {
+impl Logs {
     fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        let path = self.0.join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, content).unwrap();
+        self.0.write(name, content);
     }
 
     fn feather(&self, name: &str, columns: Vec<(&str, ArrayRef)>) {
@@ -33,7 +31,7 @@ impl Temp {
     }
 
     fn open(&self) -> Result<Log, String> {
-        Log::open(&self.0.join("val/log"), None, true).map_err(|e| e.to_string())
+        Log::open(&self.0.path().join("val/log"), None, true).map_err(|e| e.to_string())
     }
 
     /// What the command says of an estimate in `folder`.
@@ -43,18 +41,12 @@ impl Temp {
             #[command(flatten)]
             args: grade::Args,
         }
-        let (log, folder) = (self.0.join("val/log"), self.0.join(folder));
+        let (log, folder) = (self.0.path().join("val/log"), self.0.path().join(folder));
         let words = ["grade".as_ref(), log.as_os_str(), "--estimate".as_ref(), folder.as_os_str()];
         match grade::run(&Command::parse_from(words).args) {
             Ok(()) => String::new(),
             Err(e) => e.to_string(),
         }
-    }
-}
-
-impl Drop for Temp {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
     }
 }
 
@@ -92,10 +84,8 @@ fn truth<'a>(x: &[f32], classes: &[i8]) -> Vec<(&'a str, ArrayRef)> {
 }
 
 /// Returns 1 m above the map's ground, 0.375 m above it, and where it has a hole.
-fn log() -> Temp {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let n = COUNT.fetch_add(1, Ordering::Relaxed);
-    let t = Temp(std::env::temp_dir().join(format!("raywake-metrics-{}-{n}", std::process::id())));
+fn log() -> Logs {
+    let t = Logs(Scratch::new());
     for stamp in STAMPS {
         let sweep = vec![
             ("x", f32s(&[5.0, 6.0, 7.0])),
@@ -147,12 +137,14 @@ fn a_pair() {
         assert_eq!(pair.points[0].category.class(), Some(Class::Car));
         assert_eq!(pair.points[0].flow_m, [0.5, 0.0, 0.0]);
         assert!((pair.second_from_first.translation.x + 1.0).abs() < 1e-12);
-        let estimate = read_estimate(&log.estimates(&t.0.join("out")).unwrap()[&sweep], &pair);
+        let estimate =
+            read_estimate(&log.estimates(&t.0.path().join("out")).unwrap()[&sweep], &pair);
         let scored = score(&pair, &estimate.unwrap().flow_m);
         assert_eq!(scored.iter().map(|s| s.error_m).collect::<Vec<_>>(), [0.25, 0.0]);
     }
     assert_eq!(t.grade("out"), "");
-    let without = Log::open(&t.0.join("val"), Some(&t.0.join("val_sceneflow_feather")), false);
+    let without =
+        Log::open(&t.0.path().join("val"), Some(&t.0.path().join("val_sceneflow_feather")), false);
     assert!(without.unwrap().pair(0).unwrap().points.iter().all(|p| !p.ground));
 }
 
@@ -160,7 +152,7 @@ fn a_pair() {
 #[test]
 fn ground() {
     let t = log();
-    let ground = ground::Ground::read(&t.0.join("val/log")).unwrap();
+    let ground = ground::Ground::read(&t.0.path().join("val/log")).unwrap();
     let at = |x: f64, y: f64, z: f64| ground.holds(glam::DVec3::new(x, y, z));
     let holds = |x, z| at(x, 0.0, z);
     assert!(holds(4.0, 10.4 - 1e-9) && !holds(4.0, 10.41) && holds(4.0, -99.0));
@@ -175,7 +167,7 @@ fn ground() {
 fn by_name_or_by_order() {
     let t = log();
     // One pair of the truth is missing: the other keeps its place, unlike in the grader.
-    fs::remove_file(t.0.join(TRUTH)).unwrap();
+    fs::remove_file(t.0.path().join(TRUTH)).unwrap();
     assert_eq!(t.open().unwrap().pairs().next().unwrap().0, 1);
     assert_eq!(t.grade("out"), "");
     // Names that are no stamps count by order; others are passed over.
@@ -218,21 +210,21 @@ fn wrong_estimates() {
     assert_eq!(t.grade("out"), "");
     let mut log = t.open().unwrap();
     let pair = log.pair(0).unwrap();
-    let estimate = read_estimate(&t.0.join(ESTIMATE), &pair).unwrap();
+    let estimate = read_estimate(&t.0.path().join(ESTIMATE), &pair).unwrap();
     assert_eq!(estimate.unvouched(&pair, &Rules::OFFICIAL), 2);
 }
 
 #[test]
 fn truncated_or_missing() {
     let t = log();
-    let whole = fs::read(t.0.join(ESTIMATE)).unwrap();
+    let whole = fs::read(t.0.path().join(ESTIMATE)).unwrap();
     for cut in (0..whole.len()).step_by(97) {
         t.write(ESTIMATE, &whole[..cut]);
         let text = t.grade("out");
         assert!(text.contains("out/log/1000000000.feather: "), "{text}");
     }
     assert!(t.grade("nowhere").contains("cannot read"));
-    fs::create_dir_all(t.0.join("empty/log")).unwrap();
+    fs::create_dir_all(t.0.path().join("empty/log")).unwrap();
     assert!(t.grade("empty").contains("empty/log: no flow"));
 }
 
@@ -251,7 +243,7 @@ fn wrong_truth() {
     t.feather(TRUTH, truth(&[f32::NAN, 0.0, 0.0], &[18, -1, -1]));
     let text = t.grade("out");
     assert!(text.contains("val_sceneflow_feather/log/1000000000.feather: row 0: the true"));
-    fs::remove_dir_all(t.0.join("val_sceneflow_feather")).unwrap();
+    fs::remove_dir_all(t.0.path().join("val_sceneflow_feather")).unwrap();
     assert!(t.grade("out").contains("cannot read"));
 }
 
@@ -264,13 +256,13 @@ fn wrong_maps() {
         t.write(sim, text);
         assert!(refused().contains("img_Sim2_city.json: "), "{}", refused());
     }
-    fs::remove_file(t.0.join(sim)).unwrap();
+    fs::remove_file(t.0.path().join(sim)).unwrap();
     assert!(refused().contains("map: lacks a Sim2"));
     t.write("val/log/map/log_ground_height_surface____X.npy", "PK");
     assert!(refused().contains("X.npy: is no NumPy file"));
     t.write("val/log/map/log_ground_height_surface____Y.npy", "");
     assert!(refused().contains("map: holds 2 files that could be a raster of heights"));
-    fs::remove_dir_all(t.0.join("val/log/map")).unwrap();
+    fs::remove_dir_all(t.0.path().join("val/log/map")).unwrap();
     assert!(refused().contains("cannot read"));
     let elsewhere = Log::open(Path::new("/nowhere"), None, true);
     assert!(elsewhere.err().unwrap().to_string().contains("cannot read /nowhere"));

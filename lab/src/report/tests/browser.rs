@@ -1,7 +1,7 @@
 //! The page in a browser.
 
 use super::example;
-use super::files::Folder;
+use crate::scratch::Scratch;
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -31,12 +31,12 @@ fn browser() -> PathBuf {
 #[test]
 #[ignore = "needs Chromium, on PATH or named by RAYWAKE_BROWSER"]
 fn a_browser_shows_every_picture() {
-    let folder = Folder::new("browser");
-    example::report().write(&folder.0).unwrap();
-    let page = fs::read_to_string(folder.0.join("report.html")).unwrap();
-    let copy = folder.0.join("copy.html");
+    let folder = Scratch::new();
+    example::report().write(folder.path()).unwrap();
+    let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let copy = folder.path().join("copy.html");
     fs::write(&copy, page.replace("</body>", &format!("{COUNT}</body>"))).unwrap();
-    let dom = folder.0.join("dom.txt");
+    let dom = folder.path().join("dom.txt");
     let mut child = Command::new(browser())
         .args([
             "--headless",
@@ -45,7 +45,7 @@ fn a_browser_shows_every_picture() {
             "--dump-dom",
             "--window-size=1280,900",
         ])
-        .arg(format!("--user-data-dir={}", folder.0.join("profile").display()))
+        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
         .arg(format!("file://{}", copy.display()))
         .stdout(fs::File::create(&dom).unwrap())
         .stderr(Stdio::null())

@@ -2,28 +2,12 @@
 
 use super::example;
 use crate::report::*;
+use crate::scratch::Scratch;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::PathBuf;
 
-/// A folder of its own, removed with what is in it.
-pub struct Folder(pub PathBuf);
-
-impl Folder {
-    pub fn new(name: &str) -> Folder {
-        let name = format!("raywake-report-{name}-{}", std::process::id());
-        Folder(std::env::temp_dir().join(name))
-    }
-
-    fn text(&self, name: &str) -> String {
-        fs::read_to_string(self.0.join(name)).unwrap()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
+fn text(folder: &Scratch, name: &str) -> String {
+    fs::read_to_string(folder.path().join(name)).unwrap()
 }
 
 /// How many colours a picture has.
@@ -56,9 +40,9 @@ fn unbase64(text: &str) -> Vec<u8> {
 
 #[test]
 fn the_page_is_whole_and_needs_no_other_file() {
-    let folder = Folder::new("page");
-    example::report().write(&folder.0).unwrap();
-    let text = folder.text("report.html");
+    let folder = Scratch::new();
+    example::report().write(folder.path()).unwrap();
+    let text = text(&folder, "report.html");
     let page = parse(&text);
     let named = |name: &'static str| page.descendants().filter(move |n| n.has_tag_name(name));
     let svgs = page.descendants().filter(|n| n.attribute("role") == Some("img")).count();
@@ -81,10 +65,10 @@ fn the_page_is_whole_and_needs_no_other_file() {
     assert_eq!(files, 8 + 2 + 1);
     let image = named("img").next().unwrap().attribute("src").unwrap();
     let data = unbase64(image.strip_prefix("data:image/png;base64,").unwrap());
-    assert_eq!(data, fs::read(folder.0.join("pictures/ego-world.png")).unwrap());
+    assert_eq!(data, fs::read(folder.path().join("pictures/ego-world.png")).unwrap());
     assert!(colours(&data) > 200);
     assert!(
-        !fs::read_dir(&folder.0)
+        !fs::read_dir(folder.path())
             .unwrap()
             .any(|f| { f.unwrap().file_name().to_string_lossy().ends_with(".partial") })
     );
@@ -92,9 +76,9 @@ fn the_page_is_whole_and_needs_no_other_file() {
 
 #[test]
 fn text_is_escaped() {
-    let folder = Folder::new("escape");
-    example::report().write(&folder.0).unwrap();
-    let text = folder.text("report.html");
+    let folder = Scratch::new();
+    example::report().write(folder.path()).unwrap();
+    let text = text(&folder, "report.html");
     let page = parse(&text);
     let title = page.descendants().find(|n| n.has_tag_name("h1")).unwrap();
     assert_eq!(title.text(), Some("Scene flow <on> two drives"));
@@ -105,10 +89,10 @@ fn text_is_escaped() {
 
 #[test]
 fn every_chart_is_there_three_times() {
-    let folder = Folder::new("charts");
-    example::report().write(&folder.0).unwrap();
+    let folder = Scratch::new();
+    example::report().write(folder.path()).unwrap();
     let mut seen = 0;
-    for file in fs::read_dir(folder.0.join("charts")).unwrap() {
+    for file in fs::read_dir(folder.path().join("charts")).unwrap() {
         let path = file.unwrap().path();
         if path.extension().is_none_or(|e| e != "svg") {
             continue;
@@ -207,12 +191,12 @@ fn odd_values_are_drawn_or_left_out() {
 
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
-    let folder = Folder::new("refused");
+    let folder = Scratch::new();
     let refused = |fill: &dyn Fn(&mut Section)| {
         let mut report = Report::new("t", "");
         fill(report.section("s"));
-        let error = report.write(&folder.0).unwrap_err().to_string();
-        assert!(!folder.0.exists());
+        let error = report.write(&folder.path().join("report")).unwrap_err().to_string();
+        assert!(!folder.path().join("report").exists());
         error
     };
     let twice = refused(&|s| {
