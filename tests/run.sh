@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that must hold, in one command. Installs the software Vulkan device, the validation
-# layers and spirv-val on Debian where they are missing, so that nothing is skipped.
+# layers, spirv-val and a browser on Debian where they are missing, so that nothing is skipped.
 #
 #   RAYWAKE_DATA=FOLDER   also run the tests on recorded drives found there
 set -euo pipefail
@@ -30,6 +30,11 @@ install() {
 
 if command -v apt-get >/dev/null; then
     install libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools gcc
+fi
+# Opens a report; nothing else needs it.
+browser() { [ -n "${RAYWAKE_BROWSER:-}" ] || command -v chromium chromium-browser google-chrome; }
+if ! browser >/dev/null && command -v apt-get >/dev/null; then
+    install chromium || echo "chromium cannot be installed"
 fi
 export RAYWAKE_VULKAN=${RAYWAKE_VULKAN:-required}
 
@@ -71,10 +76,13 @@ RAYWAKE_DIGEST_OF=$(printf "$PWD/%s:" "${others[@]}")
 export RAYWAKE_DIGEST_OF=${RAYWAKE_DIGEST_OF%:}
 
 say "tests"
+unable=()
+browser >/dev/null || { echo "skipped: reports in a browser, there is none"; unable=(--skip a_browser); }
 if [ -n "${RAYWAKE_DATA:-}" ]; then
-    cargo test --workspace --quiet -- --include-ignored
+    cargo test --workspace --quiet -- --include-ignored "${unable[@]}"
 else
     cargo test --workspace --quiet
+    cargo test --quiet -p raywake-lab --lib a_browser -- --ignored "${unable[@]}"
 fi
 
 say "variants side by side, two sweeps each"

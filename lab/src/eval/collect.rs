@@ -15,6 +15,7 @@ use raywake_core::prepare::place;
 use raywake_core::sweep::Rig;
 
 /// A copy of a pair, for another thread.
+#[derive(Clone)]
 pub struct Seen {
     /// Index of the first sweep in the drive.
     pub index: usize,

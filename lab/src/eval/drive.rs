@@ -6,13 +6,14 @@ use super::objects::Objects;
 use super::panels::Panels;
 use super::points::{PointScores, Points};
 use super::rows_file;
-use crate::labels::{self, View};
+use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
 use raywake::config::Weights;
 use raywake::engine::{self, Plan};
 use raywake::error::Error;
 use raywake::outputs::Kinds;
 use raywake::source::{self, OpenOptions, Source};
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -58,7 +59,7 @@ impl Settings {
     }
 
     /// What decides the rows of a drive.
-    fn key(&self, source: &dyn Source) -> serde_json::Value {
+    fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
         json!({
             "version": env!("CARGO_PKG_VERSION"),
             "profile": format!("{:?}", self.profile),
@@ -67,7 +68,9 @@ impl Settings {
             "margin_m": self.margin_m,
             "all_columns": self.all_columns,
             "sweeps": self.sweeps.min(source.len()),
+            "recording": format!("{:?}", self.open),
             "first_frame": source.frame(0),
+            "labels": format!("{:016x}", Digest::of(format!("{labels:?}").as_bytes())),
         })
     }
 }
@@ -114,14 +117,14 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     let files = Files::of(out, name);
-    let key = settings.key(source.as_ref());
+    let labels = labels::open(path, source.as_ref())?;
+    let key = settings.key(source.as_ref(), &labels);
     if files.rows.is_file()
         && let Ok(facts) = Facts::read(&files.facts)
         && facts.settings == key
     {
         return Ok((facts, true));
     }
-    let labels = labels::open(path, source.as_ref())?;
     let objects = Objects::new(&labels, source.as_ref());
     let mut facts = Facts {
         drive: name.to_string(),
@@ -218,7 +221,7 @@ fn collect(
         let present = collector.present(&seen);
         points.pair(&seen, present)?;
         let rows = collector.rows(&seen);
-        panels.consider(seen, rows.clone(), present);
+        panels.consider(&seen, &rows, present);
         Ok(Some(rows))
     })?;
     let panels = panels.write(&files.panels, drive, collector.cell_m())?;

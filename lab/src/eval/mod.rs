@@ -62,6 +62,9 @@ pub struct Args {
     /// Run every drive once more without the filter, for the time that all columns take
     #[arg(long)]
     all_columns: bool,
+    /// Leave rows and facts only: for many processes that share a folder, the report coming last
+    #[arg(long)]
+    rows_only: bool,
     /// Stop after this many sweeps of every drive
     #[arg(short = 'n', value_name = "COUNT")]
     count: Option<usize>,
@@ -93,7 +96,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if interrupted() {
         return Err(Error::Usage("interrupted; the drives that were finished stay".into()));
     }
-    if !done.is_empty() {
+    if !done.is_empty() && !args.rows_only {
         for table in conclude(&done, &settings, &args.out)? {
             println!("{}", table.text());
         }

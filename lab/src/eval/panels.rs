@@ -1,4 +1,5 @@
-//! Pictures of a drive's best and worst sweeps, and of motion in both frames (figures 3.10-3.12).
+//! Pictures of a drive: its best and worst sweeps, and motion over ground beside motion as the
+//! vehicle sees it (figures 3.10 to 3.12).
 
 use super::collect::Seen;
 use super::facts;
@@ -9,8 +10,7 @@ use crate::report::{Column, Look, Outline, Panel, birds_eye};
 use glam::DVec3;
 use raywake::error::Error;
 use raywake::sink::atomic;
-use raywake_core::output::Origin;
-use raywake_core::pose::Pose;
+use raywake_core::output::{ColumnFlow, Origin};
 use std::io::Write;
 use std::path::Path;
 
@@ -22,49 +22,45 @@ const CLIP_M: f32 = 1.0;
 const ARROW_S: f64 = 0.5;
 /// How far a picture reaches, m.
 const EXTENT_M: f64 = 40.0;
+/// Error from which on columns have the colour of the worst, m.
+const WORST_M: f64 = 0.6;
+/// Observations below which a tracklet is not drawn, as in the author's viewer.
+const AGE: u32 = 3;
 
 /// A sweep worth a picture.
 struct Candidate {
+    /// Of all candidates for the same picture the one with the greatest is drawn.
+    merit: f32,
+    /// Mean error of the raw flow of labelled columns, m.
     mean_m: f32,
     seen: Seen,
     rows: Vec<Row>,
     outlines: Vec<Outline>,
 }
 
-/// The best and the worst sweep so far.
+/// Which sweeps are drawn.
+const PICTURES: [&str; 3] = ["worst", "best", "busiest"];
+
+/// The sweeps to be drawn so far.
 #[derive(Default)]
-pub struct Panels {
-    best: Option<Candidate>,
-    worst: Option<Candidate>,
-}
+pub struct Panels([Option<Candidate>; PICTURES.len()]);
 
 impl Panels {
     /// Considers a sweep.
-    pub fn consider(&mut self, seen: Seen, rows: Vec<Row>, present: &[Present]) {
-        let errors: Vec<f32> = rows
-            .iter()
-            .filter(|r| r.in_view && r.class > 0)
-            .map(|r| (r.flow_x - r.true_x).hypot(r.flow_y - r.true_y).min(CLIP_M))
-            .collect();
-        if errors.len() < LABELLED {
+    pub fn consider(&mut self, seen: &Seen, rows: &[Row], present: &[Present]) {
+        let labelled = || rows.iter().filter(|r| r.in_view && r.class > 0);
+        let count = labelled().count();
+        if count < LABELLED {
             return;
         }
-        let mean_m = errors.iter().sum::<f32>() / errors.len() as f32;
-        let better = self.best.as_ref().is_none_or(|b| mean_m < b.mean_m);
-        let worse = self.worst.as_ref().is_none_or(|w| mean_m > w.mean_m);
-        if !better && !worse {
-            return;
-        }
-        let outlines = present.iter().map(|p| Outline {
-            pose: p.vehicle_from_box,
-            size: [p.size[0], p.size[1]],
-            kind: Kind::ALL[p.class as usize - 1],
-        });
-        let candidate = Candidate { mean_m, outlines: outlines.collect(), seen, rows };
-        if better {
-            self.best = Some(candidate);
-        } else {
-            self.worst = Some(candidate);
+        let mean_m = labelled().map(|r| error_m(r).min(CLIP_M)).sum::<f32>() / count as f32;
+        let moving = labelled().filter(|r| r.motion == 2).count() as f32;
+        for (kept, merit) in self.0.iter_mut().zip([mean_m, -mean_m, moving]) {
+            if kept.as_ref().is_none_or(|c| merit > c.merit) {
+                let outlines = present.iter().map(outline).collect();
+                let (seen, rows) = (seen.clone(), rows.to_vec());
+                *kept = Some(Candidate { merit, mean_m, seen, rows, outlines });
+            }
         }
     }
 
@@ -76,84 +72,100 @@ impl Panels {
         cell_m: f64,
     ) -> Result<Vec<facts::Panel>, Error> {
         let mut written = Vec::new();
-        for (what, candidate) in [("worst", self.worst), ("best", self.best)] {
+        for (what, candidate) in PICTURES.iter().zip(self.0) {
             let Some(c) = candidate else { continue };
             let file = format!("{drive}-{what}.png");
-            let caption = format!(
-                "The {what} sweep of `{drive}`, frame {}: mean error of the raw flow of labelled \
-                 columns {:.0} cm. Left: over ground, with the error of labelled columns; right: \
-                 the tracklets' velocities as the moving vehicle sees them.",
-                c.seen.first.frame,
-                100.0 * c.mean_m,
-            );
-            let png = c.picture(cell_m)?;
+            let frame = c.seen.first.frame;
+            let (panels, shows) = match *what {
+                "busiest" => (
+                    [c.tracklets(true), c.tracklets(false)],
+                    "Tracklets over ground and as the moving vehicle sees them, as in figures 3.10 \
+                     to 3.12."
+                        .to_string(),
+                ),
+                _ => (
+                    [c.raw(), c.tracklets(true)],
+                    format!(
+                        "Mean error of the raw flow of labelled columns: {:.0} cm, errors counted \
+                         up to {CLIP_M} m.",
+                        100.0 * c.mean_m
+                    ),
+                ),
+            };
+            let look = Look {
+                half_extent_m: EXTENT_M,
+                cell_m,
+                error: "error, m".into(),
+                worst: WORST_M,
+                arrows: format!("way in {ARROW_S} s"),
+            };
+            let png = birds_eye(&panels, &look)?;
             atomic::write(&folder.join(&file), |out| out.write_all(&png))?;
+            let caption = format!("The {what} sweep of `{drive}`, frame {frame}. {shows}");
             written.push(facts::Panel { file, caption });
         }
         Ok(written)
     }
 }
 
-impl Candidate {
-    fn picture(&self, cell_m: f64) -> Result<Vec<u8>, Error> {
-        let points: Vec<[f32; 3]> = self.seen.first.points.iter().map(|p| p.position).collect();
-        let ground = Panel {
-            title: "raw flow over ground".into(),
-            points: points.clone(),
-            outlines: self.outlines.clone(),
-            columns: self
-                .rows
-                .iter()
-                .filter(|r| r.origin != Origin::Background as u8)
-                .map(|r| self.raw(r))
-                .collect(),
-        };
-        let ego = Panel {
-            title: "velocity of tracklets relative to the vehicle".into(),
-            points,
-            outlines: self.outlines.clone(),
-            columns: self
-                .seen
-                .columns
-                .iter()
-                .filter(|c| c.origin == Origin::Matched)
-                .map(|c| Column {
-                    at: c.position_vehicle_m.map(f64::from),
-                    error: None,
-                    truth: None,
-                    estimate: Some(c.velocity_ego_mps.map(|v| ARROW_S * f64::from(v))),
-                })
-                .collect(),
-        };
-        let look = Look {
-            half_extent_m: EXTENT_M,
-            cell_m,
-            error: "error, m".into(),
-            worst: 0.6,
-            arrows: format!("way in {ARROW_S} s"),
-        };
-        birds_eye(&[ground, ego], &look)
-    }
-
-    /// A column with the arrows of its raw flow, along the vehicle's axes.
-    fn raw(&self, row: &Row) -> Column {
-        let now = self.seen.now();
-        let scale = ARROW_S / self.seen.dt_s;
-        let labelled = row.in_view && row.class > 0;
-        let found = arrow(&now, row.flow_x, row.flow_y, scale);
-        let truth = arrow(&now, row.true_x, row.true_y, scale);
-        let error = f64::from((row.flow_x - row.true_x).hypot(row.flow_y - row.true_y));
-        Column {
-            at: [row.x, row.y].map(f64::from),
-            error: labelled.then_some(error),
-            truth: labelled.then_some(truth),
-            estimate: (row.origin == Origin::Matched as u8).then_some(found),
-        }
-    }
+fn outline(present: &Present) -> Outline {
+    let [length, width, _] = present.size;
+    let kind = Kind::ALL[present.class as usize - 1];
+    Outline { pose: present.vehicle_from_box, size: [length, width], kind }
 }
 
-/// A displacement over ground along the vehicle's axes.
-fn arrow(world_from_vehicle: &Pose, x: f32, y: f32, scale: f64) -> [f64; 2] {
-    let along = world_from_vehicle.rotation.conjugate() * DVec3::new(x.into(), y.into(), 0.0);
-    [along.x * scale, along.y * scale]
+fn error_m(row: &Row) -> f32 {
+    (row.flow_x - row.true_x).hypot(row.flow_y - row.true_y)
+}
+
+impl Candidate {
+    fn panel(&self, title: &str, columns: Vec<Column>) -> Panel {
+        Panel {
+            title: title.into(),
+            points: self.seen.first.points.iter().map(|p| p.position).collect(),
+            outlines: self.outlines.clone(),
+            columns,
+        }
+    }
+
+    /// Raw flow, with the errors of labelled columns.
+    fn raw(&self) -> Panel {
+        let foreground = self.rows.iter().filter(|r| r.origin != Origin::Background as u8);
+        self.panel("raw flow over ground", foreground.map(|r| self.raw_column(r)).collect())
+    }
+
+    fn raw_column(&self, row: &Row) -> Column {
+        let labelled = row.in_view && row.class > 0;
+        let per_s = 1.0 / self.seen.dt_s;
+        let arrow = |x: f32, y: f32| self.arrow([x, y].map(|v| f64::from(v) * per_s));
+        Column {
+            at: [row.x, row.y].map(f64::from),
+            error: labelled.then(|| f64::from(error_m(row))),
+            truth: labelled.then(|| arrow(row.true_x, row.true_y)),
+            estimate: (row.origin == Origin::Matched as u8).then(|| arrow(row.flow_x, row.flow_y)),
+        }
+    }
+
+    /// Tracklets, over ground or relative to the vehicle.
+    fn tracklets(&self, over_ground: bool) -> Panel {
+        let estimate = |c: &ColumnFlow| match over_ground {
+            true => self.arrow(c.velocity_world_mps.map(f64::from)),
+            false => c.velocity_ego_mps.map(|v| ARROW_S * f64::from(v)),
+        };
+        let old = self.seen.columns.iter().filter(|c| c.origin == Origin::Matched && c.age >= AGE);
+        let columns = old.map(|c| Column {
+            at: c.position_vehicle_m.map(f64::from),
+            error: None,
+            truth: None,
+            estimate: Some(estimate(c)),
+        });
+        let title = if over_ground { "tracklets over ground" } else { "tracklets, vehicle frame" };
+        self.panel(title, columns.collect())
+    }
+
+    /// An arrow along the vehicle's axes of a velocity over ground, m/s.
+    fn arrow(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let along = self.seen.now().rotation.conjugate() * DVec3::new(x, y, 0.0);
+        [along.x * ARROW_S, along.y * ARROW_S]
+    }
 }
