@@ -54,7 +54,7 @@ impl Panels {
             return;
         }
         let mean_m = labelled().map(|r| error_m(r).min(CLIP_M)).sum::<f32>() / count as f32;
-        let moving = labelled().filter(|r| r.motion == 2).count() as f32;
+        let moving = labelled().filter(|r| r.motion == 2 && r.age >= AGE).count() as f32;
         for (kept, merit) in self.0.iter_mut().zip([mean_m, -mean_m, moving]) {
             if kept.as_ref().is_none_or(|c| merit > c.merit) {
                 let outlines = present.iter().map(outline).collect();

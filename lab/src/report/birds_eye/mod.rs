@@ -13,7 +13,7 @@ use view::View;
 /// Width and height of a panel in units and pixels per unit: where panels stand side by side on a
 /// page, they are smaller beside the same text.
 fn side_and_scale(panels: usize) -> (f64, f32) {
-    if panels > 1 { (460.0, 3.0) } else { (700.0, 2.0) }
+    if panels > 1 { (460.0, 1.8) } else { (700.0, 1.5) }
 }
 
 /// Around everything, units.

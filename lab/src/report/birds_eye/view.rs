@@ -4,13 +4,13 @@ use super::{Column, ESTIMATE, GAP, Look, MARGIN, Outline, Panel, SIZE, TITLE, TR
 use crate::report::palette::{self, INK, MUTED, PAPER};
 use crate::report::svg::{Anchor, Area, Stroke, Svg, width};
 use glam::DVec3;
-use resvg::tiny_skia::{FillRule, Paint, PathBuilder, Pixmap, Transform};
+use resvg::tiny_skia::{Paint, Pixmap, Rect, Transform};
 use std::collections::BTreeSet;
 
 /// Heights above ground from the palest to the darkest returns, m.
 const HEIGHT_SPAN_M: f32 = 2.5;
 
-/// Radius of a return, units.
+/// Half the width of a return, units.
 const POINT: f64 = 0.8;
 
 /// Colour of the vehicle.
@@ -81,16 +81,17 @@ impl View {
         // From the ground up, so that what stands there stays visible.
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some(&(ground, _)) = seen.get(seen.len() / 10) else { return };
-        let mut paint = Paint { anti_alias: true, ..Paint::default() };
-        let margin = MARGIN as f32;
+        // Squares of whole pixels: a hundred thousand smooth discs would take most of a second.
+        let mut paint = Paint { anti_alias: false, ..Paint::default() };
+        let (margin, half) = (MARGIN as f32, POINT as f32 * scale);
         for (z, [x, y]) in seen {
             let height = ((z - ground) / HEIGHT_SPAN_M).clamp(0.0, 1.0);
             let [r, g, b] = palette::height(f64::from(height));
             paint.set_color_rgba8(r, g, b, 150 + (90.0 * height) as u8);
-            let [x, y] = [x, y].map(|v| v as f32);
-            if let Some(disc) = PathBuilder::from_circle(x, y, POINT as f32) {
-                let onto = Transform::from_scale(scale, scale).pre_translate(margin, margin);
-                sheet.fill_path(&disc, &paint, FillRule::Winding, onto, None);
+            let [x, y] = [x, y].map(|v| ((v as f32 + margin) * scale - half).round());
+            let side = (2.0 * half).round();
+            if let Some(square) = Rect::from_xywh(x, y, side, side) {
+                sheet.fill_rect(square, &paint, Transform::identity(), None);
             }
         }
     }
