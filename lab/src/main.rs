@@ -2,23 +2,23 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
-use raywake_lab::{check, train};
+use raywake_lab::check;
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
 #[derive(Parser)]
 #[command(version)]
 enum Command {
-    /// Train learned numbers on labelled drives.
-    #[command(subcommand)]
-    Train(train::Command),
+
+
+    CheckX,
     /// Measure a background filter on a recorded drive with boxes.csv.
     CheckFilter(check::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
-        Command::Train(command) => train::run(&command),
+        Command::CheckX => Ok(()),
         Command::CheckFilter(args) => check::run(&args),
     };
     match done {

@@ -10,9 +10,8 @@ pub struct Data {
     pub rows: Vec<u8>,
     /// Label of every row.
     pub labels: Vec<bool>,
-    /// Weight of a row of the background and of the foreground; they are to sum up to about 1
-    /// over all rows.
-    pub weight: [f64; 2],
+    /// Weight of every row; they are to sum up to about 1.
+    pub weights: Vec<f32>,
     /// Half of this times the squared length of the weights, bias excepted, adds to the loss.
     pub ridge: f64,
 }
@@ -94,7 +93,7 @@ impl Data {
         for r in rows {
             let row = &self.rows[r * self.width..][..self.width];
             let (label, score) = (self.labels[r], Data::score(weights, row));
-            let weight = self.weight[label as usize];
+            let weight = f64::from(self.weights[r]);
             let signed = if label { -score } else { score };
             sum.loss += weight * (signed.max(0.0) + (-signed.abs()).exp().ln_1p());
             if !second {
@@ -121,7 +120,8 @@ mod tests {
         let mut rng = raywake_sim::Rng::new(5);
         let labels: Vec<bool> = (0..200).map(|_| rng.chance(0.3)).collect();
         let rows = (0..200 * 4).map(|_| rng.range(0.0, 4.0) as u8).collect();
-        Data { width: 4, rows, labels, weight: [0.003, 0.008], ridge: 0.01 }
+        let weights = (0..200).map(|_| rng.range(0.0, 0.01) as f32).collect();
+        Data { width: 4, rows, labels, weights, ridge: 0.01 }
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
             width: 1,
             rows: vec![1, 1, 1, 1, 0, 0, 0, 0],
             labels: vec![true, true, true, false, true, false, false, false],
-            weight: [0.125; 2],
+            weights: vec![0.125; 8],
             ridge: 0.0,
         };
         let w = data.fit(&mut |_| ());
@@ -167,7 +167,7 @@ mod tests {
             width: 2,
             rows: vec![2, 0, 3, 1, 0, 2, 1, 3],
             labels: vec![true, true, false, false],
-            weight: [0.25; 2],
+            weights: vec![0.25; 4],
             ridge: 1e-3,
         };
         let w = data.fit(&mut |_| ());

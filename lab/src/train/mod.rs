@@ -1,26 +1,18 @@
 //! `raywake-lab train`: the learned numbers of chapter 3.
 
-mod features;
-mod filter;
-mod logistic;
-mod samples;
+#![allow(missing_docs)]
+pub mod constancy_samples;
+pub mod curve;
+pub mod drives;
+pub mod features;
+pub mod filter_samples;
+pub mod logistic;
+pub mod owner;
+pub mod pairs;
+pub mod recorded;
+pub mod simulated;
 mod solve;
-mod weights_file;
-
-use std::error::Error;
-
-/// What can be trained.
-#[derive(clap::Subcommand)]
-pub enum Command {
-    /// The background filter (section 3.4.2).
-    Filter(filter::Args),
-}
-
-/// Trains, writes and reports.
-pub fn run(command: &Command) -> Result<(), Box<dyn Error>> {
-    match command {
-        Command::Filter(args) => filter::run(args),
-    }
-}
+pub mod tmp_labels;
+pub mod weights_file;
 
 pub use features::LEVELS;

@@ -1,0 +1,104 @@
+//! Simulated drives, each with a sensor and a street of its own.
+
+use super::drives::{Labelled, LabelledSweep, Seen};
+use crate::labels::Kind;
+use glam::DVec3;
+use raywake::source::{Dropped, SweepData};
+use raywake_core::record::NONE;
+use raywake_core::sweep::Rig;
+use raywake_sim::{Class, Drive, Options, Rng, Sensor};
+use std::error::Error;
+
+/// A drive of the simulator.
+pub struct Simulated {
+    drive: Drive,
+    rig: Rig,
+}
+
+impl Simulated {
+    /// Drive `index` of a seed.
+    pub fn drawn(seed: u64, index: u64, sweeps: usize) -> Simulated {
+        let mut rng = Rng::split(seed, index);
+        let options = Options {
+            sweeps,
+            density: rng.range(0.3, 1.3),
+            sensor: sensor(&mut rng),
+            threads: 1,
+            ..Options::default()
+        };
+        Simulated::new(Drive::new(rng.bits(), options))
+    }
+
+    /// A drive put together elsewhere.
+    pub fn new(drive: Drive) -> Simulated {
+        Simulated { rig: drive.rig(), drive }
+    }
+}
+
+/// An HDL-64E that differs a little from any other in noise, strength and pitch of its beams, so
+/// that what is learned does not come to rely on one copy of it.
+fn sensor(rng: &mut Rng) -> Sensor {
+    let base = Sensor::hdl64();
+    let mut beams = base.beams;
+    let pitch = rng.range(-0.005, 0.005);
+    beams.iter_mut().for_each(|b| b.elevation += pitch);
+    Sensor {
+        beams,
+        range_noise: rng.range(0.01, 0.05),
+        angle_noise: rng.range(2e-4, 1e-3),
+        dropout: rng.range(0.0, 0.15),
+        signal: base.signal * rng.range(0.4, 1.2),
+        ..base
+    }
+}
+
+fn kind(class: Class) -> Kind {
+    match class {
+        Class::Car => Kind::Car,
+        Class::Van => Kind::Van,
+        Class::Cyclist => Kind::Cyclist,
+        Class::Pedestrian => Kind::Pedestrian,
+        _ => Kind::Other,
+    }
+}
+
+impl Labelled for Simulated {
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn len(&self) -> usize {
+        self.drive.sweeps()
+    }
+
+    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Box<dyn Error>> {
+        let sweep = self.drive.sweep(index);
+        let vehicle_from_world = sweep.world_from_vehicle.inverse();
+        let states = self.drive.objects(sweep.stamp_s);
+        let place = |id: u32| states.binary_search_by_key(&id, |s| s.id).ok();
+        into.object_of_point.clear();
+        into.object_of_point.extend(
+            sweep.truth.iter().map(|t| place(t.object).map_or(NONE, |at| at as u32)),
+        );
+        into.objects.clear();
+        into.objects.extend(states.iter().map(|s| Seen {
+            id: s.id as usize,
+            kind: kind(s.class),
+            vehicle_from_box: vehicle_from_world * s.world_from_object,
+            size: s.size,
+        }));
+        into.data = SweepData {
+            frame: index as u64,
+            stamp_s: sweep.stamp_s,
+            points: sweep.points,
+            world_from_vehicle: sweep.world_from_vehicle,
+            twist: sweep.twist,
+            dropped: Dropped::default(),
+        };
+        Ok(())
+    }
+
+    fn sees(&self, _: DVec3) -> bool {
+        true
+    }
+}
