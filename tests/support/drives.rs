@@ -7,7 +7,7 @@ use raywake_core::occupancy_constancy;
 use raywake_core::params::Profile;
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_gpu::Options;
-use raywake_sim::{Drive, Ego, Scene, Sensor, SimSweep};
+use raywake_sim::{Drive, Ego, Scene, SensorRig, SimSweep};
 use std::sync::OnceLock;
 
 use crate::vulkan;
@@ -82,6 +82,6 @@ pub fn street() -> &'static [SimSweep] {
 
 /// Sweeps along a path (street frame) through a scene put together by hand, without noise.
 pub fn ideal(scene: Scene, path: raywake_sim::Path, sweeps: usize) -> Drive {
-    let options = raywake_sim::Options { sweeps, sensor: Sensor::ideal(), ..Default::default() };
+    let options = raywake_sim::Options { sweeps, rig: SensorRig::ideal(), ..Default::default() };
     Drive::through(scene, path, 1, options)
 }

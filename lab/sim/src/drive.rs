@@ -1,17 +1,16 @@
 //! A drive through a scene, sweep by sweep.
 
-use crate::cast::{Caster, Truth};
+use crate::cast::Caster;
 use crate::ego::Ego;
 use crate::path::Path;
+use crate::rig::{PERIOD_S, SensorRig, stamp_s};
 use crate::rng::Rng;
 use crate::scene::{ObjectState, Scene};
-use crate::sensor::Sensor;
-use glam::{DQuat, DVec3};
+use crate::still::Still;
+use crate::truth::Truth;
+use glam::DQuat;
 use raywake_core::pose::{Pose, Twist};
-use raywake_core::sweep::{Point, Rig, Timing};
-
-/// Sweeps per second.
-const RATE_HZ: f64 = 10.0;
+use raywake_core::sweep::{Point, Rig};
 
 /// What a drive is to be like.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +21,8 @@ pub struct Options {
     pub ego: Ego,
     /// Amount of traffic; 1 is a busy street, 0 an empty one.
     pub density: f64,
-    /// The sensor.
-    pub sensor: Sensor,
+    /// The sensors.
+    pub rig: SensorRig,
     /// Threads that cast rays; 0: as many as the machine runs at once. The sweeps are the same
     /// whatever the number.
     pub threads: usize,
@@ -31,14 +30,14 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { sweeps: 30, ego: Ego::Any, density: 1.0, sensor: Sensor::hdl64(), threads: 0 }
+        Options { sweeps: 30, ego: Ego::Any, density: 1.0, rig: SensorRig::hdl64(), threads: 0 }
     }
 }
 
 /// One simulated sweep with its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimSweep {
-    /// Time of the stamp, when the sensor looks forward, s from 0.
+    /// Time of the stamp, the middle of the sweep, s from 0.
     pub stamp_s: f64,
     /// Returns in the order of their times, each in the vehicle frame at its own time (distorted
     /// by the vehicle's motion), `offset_s` after the stamp.
@@ -55,6 +54,7 @@ pub struct SimSweep {
 #[derive(Clone, Debug)]
 pub struct Drive {
     scene: Scene,
+    still: Still,
     path: Path,
     options: Options,
     seed: u64,
@@ -64,16 +64,16 @@ pub struct Drive {
 impl Drive {
     /// A drive down a street that the seed draws.
     pub fn new(seed: u64, options: Options) -> Drive {
-        let duration_s = options.sweeps as f64 / RATE_HZ;
+        let duration_s = options.sweeps as f64 * PERIOD_S;
         let plan = options.ego.plan(seed, duration_s);
         let scene = Scene::around(seed, &plan, duration_s, options.density);
-        Drive { scene, path: plan.path, options, seed, next: 0 }
+        Drive::through(scene, plan.path, seed, options)
     }
 
     /// A drive along a path (street frame) through a given scene; the seed draws the noise, and
     /// the options' ego and density do not count.
     pub fn through(scene: Scene, path: Path, seed: u64, options: Options) -> Drive {
-        Drive { scene, path, options, seed, next: 0 }
+        Drive { still: Still::new(&scene), scene, path, options, seed, next: 0 }
     }
 
     /// What is driven through.
@@ -86,16 +86,9 @@ impl Drive {
         self.options.sweeps
     }
 
-    /// What is fixed about the sensor: the vehicle frame is the sensor's.
+    /// What is fixed about the sensors.
     pub fn rig(&self) -> Rig {
-        let span_s = self.options.sensor.turn_s;
-        Rig {
-            sensors: [Pose::IDENTITY].into_iter().collect(),
-            timing: Timing::Offset { from_s: -0.5 * span_s, span_s },
-            distorted: true,
-            ground_m: -self.options.sensor.height,
-            own_vehicle: None,
-        }
+        self.options.rig.declared()
     }
 
     /// The objects at a time, s, in the world frame.
@@ -103,7 +96,7 @@ impl Drive {
         self.scene.states(t)
     }
 
-    /// Pose of the vehicle (its frame lies in the sensor) at a time, s.
+    /// Pose of the vehicle at a time, s.
     pub fn world_from_vehicle(&self, t: f64) -> Pose {
         self.scene.world_from_street * self.street_from_vehicle(t)
     }
@@ -115,7 +108,7 @@ impl Drive {
         let swing = 0.003 * (state.speed.abs() / 8.0).min(1.0);
         let nod = DQuat::from_rotation_y(swing * (7.3 * t + 0.4).sin());
         let roll = DQuat::from_rotation_x(0.6 * swing * (9.1 * t).sin());
-        foot * Pose::new(nod * roll, DVec3::new(0.0, 0.0, self.options.sensor.height))
+        foot * Pose::new(nod * roll, self.options.rig.origin)
     }
 
     fn twist(&self, t: f64) -> Twist {
@@ -138,11 +131,11 @@ impl Drive {
 
     /// Sweep `index`, whichever sweeps were cast before.
     pub fn sweep(&self, index: usize) -> SimSweep {
-        let stamp_s = index as f64 / RATE_HZ;
-        let caster = Caster::new(&self.scene, &self.options.sensor);
+        let stamp_s = stamp_s(index);
+        let caster = Caster::new(&self.scene, &self.still, &self.options.rig);
         let seed = Rng::split(self.seed, 16 + index as u64).bits();
         let ego = |t: f64| self.street_from_vehicle(t);
-        let (points, truth) = caster.sweep(&ego, stamp_s, seed, self.threads());
+        let (points, truth) = caster.sweep(&ego, index, seed, self.threads());
         SimSweep {
             stamp_s,
             points,

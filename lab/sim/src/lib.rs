@@ -1,8 +1,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 //! A small deterministic LIDAR simulator: a street with buildings, trees, parked and moving
-//! traffic, seen by a spinning 64-beam sensor on a moving vehicle, with the exact truth of every
-//! return.
+//! traffic, seen by spinning sensors on a moving vehicle, with the exact truth of every return.
 //!
 //! [`Drive::new`] draws a street and iterates its sweeps; [`Drive::through`] takes a [`Scene`] put
 //! together by hand. The same seed gives the same bytes on the same machine, whatever the number
@@ -10,8 +9,8 @@
 //!
 //! Frames are right-handed, x forward, y left, z up; metres, seconds, radians. The street frame
 //! (x along the main road) lies anywhere and at any heading in the world frame; what leaves the
-//! crate is in the world or vehicle frame unless it says otherwise. The vehicle frame's origin is
-//! the sensor.
+//! crate is in the world or vehicle frame unless it says otherwise. Where the vehicle frame lies on
+//! the vehicle is the rig's choice ([`SensorRig::origin`]).
 
 mod cast;
 mod drive;
@@ -20,21 +19,25 @@ mod ground;
 pub mod models;
 mod object;
 mod path;
+mod rig;
 mod rng;
 mod scene;
 mod sensor;
 mod shape;
+mod still;
 mod street;
 mod target;
 mod traffic;
+mod truth;
 
-pub use cast::Truth;
 pub use drive::{Drive, Options, SimSweep};
 pub use ego::Ego;
 pub use ground::{Contact, Ground};
 pub use object::{Class, Fixture, Object, Part, Surface, Swing};
 pub use path::{Path, State};
+pub use rig::{Mount, SensorRig, UnknownRig};
 pub use rng::Rng;
 pub use scene::{ObjectState, Scene};
 pub use sensor::{Beam, Sensor};
 pub use shape::{Crossing, Shape};
+pub use truth::Truth;

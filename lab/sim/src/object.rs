@@ -25,10 +25,18 @@ pub enum Class {
     Car = 5,
     /// A van, parked or moving.
     Van = 6,
-    /// A cyclist.
-    Cyclist = 7,
+    /// A truck, rigid or with a semi-trailer.
+    Truck = 7,
+    /// A bus.
+    Bus = 8,
+    /// A tram.
+    Tram = 9,
+    /// A motorcycle with its rider; nothing of it moves against the rest.
+    Motorcycle = 10,
+    /// A cyclist, pedalling.
+    Cyclist = 11,
     /// Somebody on foot.
-    Pedestrian = 8,
+    Pedestrian = 12,
 }
 
 impl Class {

@@ -1,9 +1,7 @@
-//! A spinning 64-beam sensor in the manner of the HDL-64E.
+//! Spinning sensors: beams, turn, range and noise of some devices.
 
 use crate::rng::Rng;
-
-/// Columns of one turn: 0.176 degrees each, so that a sweep never exceeds 2^17 returns.
-const COLUMNS: usize = 2048;
+use std::f64::consts::PI;
 
 /// One laser.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,17 +12,15 @@ pub struct Beam {
     pub azimuth: f64,
 }
 
-/// A sensor that spins clockwise seen from above and starts and ends its turn at the rear.
+/// A sensor that spins clockwise seen from its own top and starts and ends its turn at the rear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
-    /// Lasers from top to bottom; all of a column fire at once.
+    /// Lasers; all of a column fire at once.
     pub beams: Vec<Beam>,
     /// Firings a turn.
     pub columns: usize,
     /// Duration of a turn, s.
     pub turn_s: f64,
-    /// Height above the ground, m.
-    pub height: f64,
     /// Nearest and farthest range that is reported, m.
     pub range: [f64; 2],
     /// Deviation of the range, m.
@@ -38,25 +34,66 @@ pub struct Sensor {
     pub signal: f64,
 }
 
+/// Elevation and azimuth offset of the VLP-32C's lasers in the order of their numbers, degrees
+/// (Velodyne, VLP-32C user manual 63-9325, table of laser channels).
+const VLP32C: [[f64; 2]; 32] = [
+    [-25.0, 1.4],
+    [-1.0, -4.2],
+    [-1.667, 1.4],
+    [-15.639, -1.4],
+    [-11.31, 1.4],
+    [0.0, -1.4],
+    [-0.667, 4.2],
+    [-8.843, -1.4],
+    [-7.254, 1.4],
+    [0.333, -4.2],
+    [-0.333, 1.4],
+    [-6.148, -1.4],
+    [-5.333, 4.2],
+    [1.333, -1.4],
+    [0.667, 4.2],
+    [-4.0, -1.4],
+    [-4.667, 1.4],
+    [1.667, -4.2],
+    [1.0, 1.4],
+    [-3.667, -4.2],
+    [-3.333, 4.2],
+    [3.333, -1.4],
+    [2.333, 1.4],
+    [-2.667, -1.4],
+    [-3.0, 1.4],
+    [7.0, -1.4],
+    [4.667, 1.4],
+    [-2.333, -4.2],
+    [-2.0, 4.2],
+    [15.0, -1.4],
+    [10.333, 1.4],
+    [-1.333, -1.4],
+];
+
+impl Beam {
+    fn degrees(elevation: f64, azimuth: f64) -> Beam {
+        Beam { elevation: elevation.to_radians(), azimuth: azimuth.to_radians() }
+    }
+}
+
 impl Sensor {
-    /// The HDL-64E on a car's roof: 32 beams from +2 to -8.33 degrees, 32 from -8.83 to -24.33
-    /// degrees, 10 turns a second, 120 m. Each laser sits a little off its place, as in any copy
-    /// of the device; the offsets are known to the calibration and the same in every simulation.
+    /// The HDL-64E: 32 beams from +2 to -8.33 degrees, 32 from -8.83 to -24.33 degrees, 10 turns a
+    /// second, 120 m. Each laser sits a little off its place, as in any copy of the device; the
+    /// offsets are known to the calibration and the same in every simulation. 2048 firings a turn:
+    /// 131,072 rays.
     pub fn hdl64() -> Sensor {
         let mut rng = Rng::new(0x64);
         let degrees = |i: usize| match i {
             0..32 => 2.0 - 10.33 * i as f64 / 31.0,
             _ => -8.83 - 15.5 * (i - 32) as f64 / 31.0,
         };
-        let mut beam = |i: usize| Beam {
-            elevation: (degrees(i) + rng.range(-0.04, 0.04)).to_radians(),
-            azimuth: rng.range(-0.08, 0.08f64).to_radians(),
-        };
+        let mut beam =
+            |i| Beam::degrees(degrees(i) + rng.range(-0.04, 0.04), rng.range(-0.08, 0.08));
         Sensor {
             beams: (0..64).map(&mut beam).collect(),
-            columns: COLUMNS,
+            columns: 2048,
             turn_s: 0.1,
-            height: 1.73,
             range: [1.0, 120.0],
             range_noise: 0.02,
             angle_noise: 3e-4,
@@ -65,7 +102,37 @@ impl Sensor {
         }
     }
 
-    /// The same sensor without noise and dropout, for comparison with closed forms.
+    /// The HDL-32E: 32 beams from +10.67 to -30.67 degrees in steps of 1.33, 100 m. 1000 firings a
+    /// turn, fewer than half of the device's at 10 turns a second, so that four of them stay within
+    /// a sweep.
+    pub fn hdl32() -> Sensor {
+        let beam = |i| Beam::degrees((32.0 - 4.0 * f64::from(i)) / 3.0, 0.0);
+        let beams = (0..32).map(beam).collect();
+        Sensor { beams, columns: 1000, range: [1.0, 100.0], ..Sensor::hdl64() }
+    }
+
+    /// The VLP-32C: 32 beams, dense around the horizon and sparse below, with their own azimuths,
+    /// 200 m; 1808 firings a turn as in the device at 10 turns a second (one in 55.296 us).
+    pub fn vlp32c() -> Sensor {
+        let beams = VLP32C.iter().map(|&[elevation, azimuth]| Beam::degrees(elevation, azimuth));
+        Sensor {
+            beams: beams.collect(),
+            columns: 1808,
+            range: [1.0, 200.0],
+            signal: 1.4e6,
+            ..Sensor::hdl64()
+        }
+    }
+
+    /// The Ouster OS1-128 in its mode 1024x10: 128 beams evenly from +22.5 to -22.5 degrees, four
+    /// azimuths in turn, 120 m; 131,072 rays.
+    pub fn os1_128() -> Sensor {
+        let beam =
+            |i: usize| Beam::degrees(22.5 - 45.0 * i as f64 / 127.0, [4.2, 1.4, -1.4, -4.2][i % 4]);
+        Sensor { beams: (0..128).map(beam).collect(), columns: 1024, ..Sensor::hdl64() }
+    }
+
+    /// The HDL-64E without noise and dropout, for comparison with closed forms.
     pub fn ideal() -> Sensor {
         let signal = f64::INFINITY;
         Sensor { range_noise: 0.0, angle_noise: 0.0, dropout: 0.0, signal, ..Sensor::hdl64() }
@@ -75,12 +142,14 @@ impl Sensor {
     /// forward and right.
     pub fn azimuth(&self, column: usize) -> f64 {
         let turned = (column as f64 + 0.5) / self.columns as f64;
-        std::f64::consts::PI * (1.0 - 2.0 * turned)
+        PI * (1.0 - 2.0 * turned)
     }
 
-    /// Time of a column after the moment the sensor looks forward, s.
-    pub fn offset_s(&self, column: usize) -> f64 {
-        self.turn_s * ((column as f64 + 0.5) / self.columns as f64 - 0.5)
+    /// How far a ray may lie beside its column's half plane, per metre ahead: the beams' own
+    /// azimuths and the most that [`Rng::bell`] strays.
+    pub(crate) fn spread(&self) -> f64 {
+        let widest = self.beams.iter().map(|b| b.azimuth.abs()).fold(0.0, f64::max);
+        1e-4 + 1.01 * (widest + 3.5 * self.angle_noise).tan()
     }
 }
 
@@ -88,17 +157,42 @@ impl Sensor {
 mod tests {
     use super::*;
 
+    fn elevations(s: &Sensor) -> Vec<f64> {
+        s.beams.iter().map(|b| b.elevation.to_degrees()).collect()
+    }
+
     #[test]
-    fn table_and_turn() {
+    fn hdl64_table_and_turn() {
         let s = Sensor::hdl64();
         assert_eq!(s.beams.len(), 64);
-        assert!(s.beams.len() * s.columns <= 131_072);
         assert!((s.beams[0].elevation.to_degrees() - 2.0).abs() < 0.05);
         assert!((s.beams[31].elevation.to_degrees() + 8.33).abs() < 0.05);
         assert!((s.beams[63].elevation.to_degrees() + 24.33).abs() < 0.05);
         assert!(s.beams.windows(2).all(|b| b[0].elevation > b[1].elevation));
         // A quarter into the turn it looks left, at three quarters right.
-        assert!((s.azimuth(511) - 1.5723).abs() < 1e-3 && (s.offset_s(511) + 0.025).abs() < 1e-4);
-        assert!((s.azimuth(1536) + 1.5723).abs() < 1e-3 && (s.offset_s(1536) - 0.025).abs() < 1e-4);
+        assert!((s.azimuth(511) - 1.5723).abs() < 1e-3 && (s.azimuth(1536) + 1.5723).abs() < 1e-3);
+    }
+
+    #[test]
+    fn tables_of_the_others() {
+        let e = elevations(&Sensor::hdl32());
+        assert!((e[0] - 10.67).abs() < 0.01 && (e[31] + 30.67).abs() < 0.01);
+        assert!(e.windows(2).all(|p| (p[0] - p[1] - 1.3333).abs() < 1e-3));
+        let mut e = elevations(&Sensor::vlp32c());
+        e.sort_by(f64::total_cmp);
+        assert!((e[0] + 25.0).abs() < 1e-9 && (e[31] - 15.0).abs() < 1e-9);
+        assert!(e.windows(2).all(|p| p[1] - p[0] > 0.33), "no elevation twice");
+        let near = e.iter().filter(|e| (-4.1..1.8).contains(*e)).count();
+        assert_eq!(near, 18, "a third of a degree apart around the horizon");
+        let s = Sensor::os1_128();
+        assert_eq!(s.beams.len(), 128);
+        assert!((elevations(&s)[127] + 22.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rays_stay_within_the_spread() {
+        let s = Sensor { angle_noise: 1e-3, ..Sensor::vlp32c() };
+        assert!(s.spread() > (4.2f64.to_radians() + 3.47e-3).tan());
+        assert!(Sensor::ideal().spread() < 2e-3);
     }
 }

@@ -60,6 +60,15 @@ impl Shape {
         }
     }
 
+    /// Half extents of the box along the axes that holds the solid, m.
+    pub fn half(&self) -> DVec3 {
+        match *self {
+            Shape::Cuboid { half } => half,
+            Shape::Cylinder { radius, half } => DVec3::new(radius, radius, half),
+            Shape::Ellipsoid { radii } => radii,
+        }
+    }
+
     /// Where the ray from `origin` along the unit vector `direction` crosses the solid, if it
     /// starts outside and meets it.
     pub fn cross(&self, origin: DVec3, direction: DVec3) -> Option<Crossing> {

@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 use raywake_core::sweep::Timing;
-use raywake_sim::{Class, Drive, Ego, Options, Path, Scene, Sensor, SimSweep, State, Surface};
+use raywake_sim::{
+    Class, Drive, Ego, Options, Path, Scene, Sensor, SensorRig, SimSweep, State, Surface,
+};
 use raywake_sim::{Shape, models};
 use std::collections::BTreeSet;
 
@@ -12,7 +14,7 @@ fn options(ego: Ego, sweeps: usize) -> Options {
 
 /// A drive without noise through a given scene.
 fn ideal(scene: Scene, path: Path) -> Drive {
-    Drive::through(scene, path, 1, Options { sensor: Sensor::ideal(), ..Options::default() })
+    Drive::through(scene, path, 1, Options { rig: SensorRig::ideal(), ..Options::default() })
 }
 
 fn vector(p: [f32; 3]) -> DVec3 {
@@ -124,7 +126,7 @@ fn no_ray_is_missed() {
     scene.put(Class::Fixture, ball, pose, Surface::matt(0.5));
     let drive = ideal(scene, Path::standing(0.0, 0.0, 0.0));
     let sensor = Sensor::ideal();
-    let eye = DVec3::new(0.0, 0.0, sensor.height);
+    let eye = DVec3::new(0.0, 0.0, SensorRig::ideal().origin.z);
     let rays = (0..sensor.columns).flat_map(|c| sensor.beams.iter().map(move |b| (c, b)));
     let expected = rays.filter(|&(column, beam)| {
         let ((sa, ca), (se, ce)) =
