@@ -6,7 +6,7 @@ use glam::DVec3;
 use raywake::source::{Dropped, SweepData};
 use raywake_core::record::NONE;
 use raywake_core::sweep::Rig;
-use raywake_sim::{Class, Drive, Options, Rng, Sensor};
+use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
 use std::error::Error;
 
 /// A drive of the simulator.
@@ -22,7 +22,7 @@ impl Simulated {
         let options = Options {
             sweeps,
             density: rng.range(0.3, 1.3),
-            sensor: sensor(&mut rng),
+            rig: rig(index, &mut rng),
             threads: 1,
             ..Options::default()
         };
@@ -35,21 +35,35 @@ impl Simulated {
     }
 }
 
-/// An HDL-64E that differs a little from any other in noise, strength and pitch of its beams, so
+/// Rigs by turns: every second drive has KITTI's, as the shipped numbers are for levels and ranges
+/// like its.
+const RIGS: [fn() -> SensorRig; 6] = [
+    SensorRig::hdl64,
+    SensorRig::vlp32x2,
+    SensorRig::hdl64,
+    SensorRig::hdl32x4,
+    SensorRig::hdl64,
+    SensorRig::beam128,
+];
+
+/// A rig whose sensors differ a little from any other's in noise, strength, pitch and height, so
 /// that what is learned does not come to rely on one copy of it.
-fn sensor(rng: &mut Rng) -> Sensor {
-    let base = Sensor::hdl64();
-    let mut beams = base.beams;
-    let pitch = rng.range(-0.005, 0.005);
-    beams.iter_mut().for_each(|b| b.elevation += pitch);
-    Sensor {
-        beams,
-        range_noise: rng.range(0.01, 0.05),
-        angle_noise: rng.range(2e-4, 1e-3),
-        dropout: rng.range(0.0, 0.15),
-        signal: base.signal * rng.range(0.4, 1.2),
-        ..base
+fn rig(index: u64, rng: &mut Rng) -> SensorRig {
+    let mut rig = RIGS[(index % RIGS.len() as u64) as usize]();
+    let higher = rng.range(-0.12, 0.2);
+    let noise = [rng.range(0.5, 2.5), rng.range(0.7, 3.0)];
+    let (dropout, signal) = (rng.range(0.0, 0.15), rng.range(0.4, 1.2));
+    for mount in &mut rig.mounts {
+        let sensor = &mut mount.sensor;
+        let pitch = rng.range(-0.005, 0.005);
+        sensor.beams.iter_mut().for_each(|b| b.elevation += pitch);
+        sensor.range_noise *= noise[0];
+        sensor.angle_noise *= noise[1];
+        sensor.dropout = dropout;
+        sensor.signal *= signal;
     }
+    rig.origin.z += higher;
+    rig
 }
 
 fn kind(class: Class) -> Kind {
