@@ -1,20 +1,16 @@
 //! `raywake-lab check-filter`: a filter against a recorded drive with labelled boxes.
 
 use crate::grid::Grid;
-use crate::labels::Footprint;
+use crate::labels::{self, Footprint, Labels, View};
 use crate::train::LEVELS;
 use glam::DVec3;
 use raywake::source::{OpenOptions, SweepData, open};
 use raywake_core::background_filter::{TABLE_WORDS, load, score};
 use raywake_core::params::Profile;
-use raywake_core::pose::Pose;
 use std::collections::{BTreeMap, HashMap};
 use std::error::Error;
 use std::fs;
-use std::path::{Path, PathBuf};
-
-/// Half of the camera's view in which KITTI has labels, degrees.
-const VIEW_DEG: f64 = 40.0;
+use std::path::PathBuf;
 
 /// Options of `check-filter`.
 #[derive(clap::Args)]
@@ -22,8 +18,7 @@ pub struct Args {
     /// Weights file.
     #[arg(long, value_name = "FILE")]
     filter: PathBuf,
-    /// Recorded drive, with boxes.csv (frame, track_id, class, x, y, z, l, w, h, yaw, ...; vehicle
-    /// frame, metres, radians).
+    /// Recorded drive with labels.
     #[arg(long, value_name = "FOLDER")]
     drive: PathBuf,
 }
@@ -67,8 +62,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut table = vec![0; TABLE_WORDS];
     load(&fs::read_to_string(&args.filter)?, LEVELS, &mut table)
         .map_err(|e| format!("{}: {e}", args.filter.display()))?;
-    let boxes = read_boxes(&args.drive.join("boxes.csv"))?;
     let mut source = open(&args.drive, &OpenOptions::default())?;
+    let labels = labels::open(&args.drive, source.as_ref())?;
+    labels.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let boxes = by_frame(&labels);
     let mut grid = Grid::new(Profile::hdl64());
     let mut sweep = SweepData::default();
     let mut tally = Tally::default();
@@ -79,7 +76,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
         let boxes = boxes.get(&sweep.frame).map_or(&[][..], Vec::as_slice);
         for column in grid.solid() {
             let marked = score(&grid.step, &table, &grid.columns, column) > 0;
-            tally.column(grid.centre(&window, column), boxes, marked);
+            tally.column(grid.centre(&window, column), labels.view, boxes, marked);
         }
     }
     tally.print();
@@ -87,9 +84,9 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
 }
 
 impl Tally {
-    fn column(&mut self, at: DVec3, boxes: &[Labelled], marked: bool) {
+    fn column(&mut self, at: DVec3, view: View, boxes: &[Labelled], marked: bool) {
         self.all.count(marked);
-        if at.x <= 0.0 || at.y.atan2(at.x).abs().to_degrees() > VIEW_DEG {
+        if !view.holds(at) {
             return;
         }
         match boxes.iter().find(|b| b.footprint.holds(at, 0.0)) {
@@ -116,36 +113,17 @@ impl Tally {
     }
 }
 
-fn read_boxes(path: &Path) -> Result<HashMap<u64, Vec<Labelled>>, Box<dyn Error>> {
-    let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let mut boxes: HashMap<u64, Vec<Labelled>> = HashMap::new();
-    for (n, line) in text.lines().enumerate().skip(1) {
-        let (frame, labelled) =
-            read_box(line).ok_or_else(|| format!("{}: line {}: no box", path.display(), n + 1))?;
-        boxes.entry(frame).or_default().push(labelled);
+/// The boxes of every frame.
+fn by_frame(labels: &Labels) -> HashMap<u64, Vec<Labelled>> {
+    let mut frames: HashMap<u64, Vec<Labelled>> = HashMap::new();
+    for track in &labels.tracks {
+        for (&frame, &pose) in &track.boxes {
+            let footprint = Footprint::new(pose, track.size[0], track.size[1]);
+            frames
+                .entry(frame)
+                .or_default()
+                .push(Labelled { class: track.class.clone(), footprint });
+        }
     }
-    Ok(boxes)
-}
-
-fn read_box(line: &str) -> Option<(u64, Labelled)> {
-    let fields: Vec<&str> = line.split(',').collect();
-    let number = |n: usize| fields.get(n)?.parse::<f64>().ok().filter(|v| v.is_finite());
-    let pose = Pose::planar(number(3)?, number(4)?, number(5)?, number(9)?);
-    let footprint = Footprint::new(pose, number(6)?, number(7)?);
-    Some((fields.first()?.parse().ok()?, Labelled { class: (*fields.get(2)?).into(), footprint }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boxes_are_read_or_refused() {
-        let (frame, b) = read_box("7,3,Van,10,2,-0.8,4,2,1.9,1.5707963,0,0,99").unwrap();
-        assert_eq!((frame, b.class.as_str()), (7, "Van"));
-        assert!(b.footprint.holds(DVec3::new(10.9, 3.9, 0.0), 0.0));
-        assert!(!b.footprint.holds(DVec3::new(11.1, 2.0, 0.0), 0.0));
-        assert!(read_box("7,3,Van,10,2,-0.8,4,2,1.9").is_none());
-        assert!(read_box("7,3,Van,NaN,2,-0.8,4,2,1.9,0").is_none());
-    }
+    frames
 }

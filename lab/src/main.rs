@@ -9,16 +9,12 @@ use std::process::ExitCode;
 #[derive(Parser)]
 #[command(version)]
 enum Command {
-
-
-    CheckX,
-    /// Measure a background filter on a recorded drive with boxes.csv.
+    /// Measure a background filter on a recorded drive with labels.
     CheckFilter(check::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
-        Command::CheckX => Ok(()),
         Command::CheckFilter(args) => check::run(&args),
     };
     match done {

@@ -147,6 +147,14 @@ impl Source for Argoverse {
         self.files[index].0
     }
 
+    fn stamp_s(&self, index: usize) -> f64 {
+        self.track.stamps_s[index]
+    }
+
+    fn pose(&self, index: usize) -> Pose {
+        self.track.poses[index]
+    }
+
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         self.read_points(index, into)?;
         into.frame = self.files[index].0;

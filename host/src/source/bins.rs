@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig};
 
 use super::poses::Track;
@@ -50,6 +51,14 @@ impl Source for Bins {
 
     fn frame(&self, index: usize) -> u64 {
         self.files[index].0
+    }
+
+    fn stamp_s(&self, index: usize) -> f64 {
+        self.track.stamps_s[index]
+    }
+
+    fn pose(&self, index: usize) -> Pose {
+        self.track.poses[index]
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

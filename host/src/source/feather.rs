@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type, UInt8Type, UInt64Type,
+    Float16Type, Float32Type, Float64Type, Int32Type, Int64Type, UInt8Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReaderBuilder;
@@ -17,7 +17,7 @@ use super::feather_check;
 use crate::error::Error;
 
 /// The columns of a file that were asked for.
-pub(super) struct Table {
+pub struct Table {
     path: PathBuf,
     batches: Vec<RecordBatch>,
 }
@@ -77,7 +77,7 @@ impl Table {
         })
     }
 
-    /// A column of integers (u8, i32, i64, u64). Fails at a null or a value beyond i64.
+    /// A column of integers (u8, u32, i32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
         let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
             match column.data_type() {
@@ -86,6 +86,9 @@ impl Table {
                 }
                 DataType::Int32 => {
                     out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
+                }
+                DataType::UInt32 => {
+                    out.extend(column.as_primitive::<UInt32Type>().iter().map(|v| v.map(i64::from)))
                 }
                 DataType::Int64 => out.extend(column.as_primitive::<Int64Type>().iter()),
                 DataType::UInt64 => out

@@ -14,7 +14,7 @@
 mod argoverse;
 mod bins;
 #[cfg(feature = "arrow")]
-mod feather;
+pub mod feather;
 #[cfg(feature = "arrow")]
 mod feather_check;
 mod kitti;
@@ -23,7 +23,7 @@ mod poses;
 mod recognise;
 #[cfg(feature = "demo")]
 pub mod simulated;
-mod text;
+pub mod text;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -109,6 +109,12 @@ pub trait Source {
 
     /// File number (or timestamp in ns) of sweep `index < len`.
     fn frame(&self, index: usize) -> u64;
+
+    /// Stamp of sweep `index < len`, s: [`SweepData::stamp_s`] without reading the cloud.
+    fn stamp_s(&self, index: usize) -> f64;
+
+    /// `world_from_vehicle` at the stamp of sweep `index < len`, without reading the cloud.
+    fn pose(&self, index: usize) -> Pose;
 
     /// Reads sweep `index < len`; the content of `into` is replaced and its memory reused.
     ///

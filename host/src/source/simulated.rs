@@ -1,5 +1,6 @@
 //! A simulated drive as a recording, with its truth.
 
+use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
 use raywake_sim::{Drive, Options, Truth};
 
@@ -62,6 +63,14 @@ impl Source for Simulated {
         index as u64
     }
 
+    fn stamp_s(&self, index: usize) -> f64 {
+        index as f64 / RATE_HZ
+    }
+
+    fn pose(&self, index: usize) -> Pose {
+        self.drive.world_from_vehicle(self.stamp_s(index))
+    }
+
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         let sweep = self.drive.sweep(index);
         *into = SweepData {
@@ -98,5 +107,6 @@ mod tests {
         assert!(!source.truth(1).is_empty() && source.truth(0).is_empty());
         assert_eq!((source.len(), source.frame(2), sweep.frame), (3, 2, 2));
         assert_eq!(sweep.stamp_s, 0.2);
+        assert_eq!((source.stamp_s(2), source.pose(2)), (0.2, sweep.world_from_vehicle));
     }
 }

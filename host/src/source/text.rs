@@ -6,18 +6,18 @@ use std::path::Path;
 use crate::error::Error;
 
 /// A text file as a string.
-pub(super) fn read(path: &Path) -> Result<String, Error> {
+pub fn read(path: &Path) -> Result<String, Error> {
     fs::read_to_string(path).map_err(Error::reading(path))
 }
 
 /// The lines that hold something, each with its number counted from 1.
-pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     numbered.filter(|(_, line)| !line.is_empty())
 }
 
 /// The numbers of one line, whatever their count.
-pub(super) fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, Error> {
+pub fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, Error> {
     text.split_ascii_whitespace()
         .map(|word| {
             word.parse().map_err(|_| {
@@ -28,11 +28,7 @@ pub(super) fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, 
 }
 
 /// Exactly `N` numbers from one line.
-pub(super) fn exactly<const N: usize>(
-    path: &Path,
-    line: usize,
-    text: &str,
-) -> Result<[f64; N], Error> {
+pub fn exactly<const N: usize>(path: &Path, line: usize, text: &str) -> Result<[f64; N], Error> {
     let found = numbers(path, line, text)?;
     found.try_into().map_err(|found: Vec<f64>| {
         let what = format!("{N} numbers expected, {} found", found.len());
@@ -42,7 +38,7 @@ pub(super) fn exactly<const N: usize>(
 
 /// The `N` numbers after `key` at the start of a line (`Tr: 1 2 …`), with the line's number;
 /// `None` where no line starts so.
-pub(super) fn keyed<const N: usize>(
+pub fn keyed<const N: usize>(
     path: &Path,
     text: &str,
     key: &str,

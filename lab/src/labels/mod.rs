@@ -1,9 +1,21 @@
 //! Labelled objects of a recorded or simulated drive: boxes over time, whatever file they are from.
 
+mod boxes_csv;
+mod feather;
 mod footprint;
+mod gather;
+mod kind;
+mod open;
+
+#[cfg(test)]
+mod tests;
 
 pub use footprint::Footprint;
+pub use kind::kind;
+pub use open::open;
+pub use raywake::error::Error;
 
+use glam::DVec3;
 use raywake_core::pose::Pose;
 use std::collections::BTreeMap;
 
@@ -55,6 +67,18 @@ pub enum View {
     Camera,
 }
 
+/// Half of the camera's view in which KITTI has labels for certain, degrees; at its border boxes
+/// are cut off.
+const CAMERA_DEG: f64 = 40.0;
+
+impl View {
+    /// Whether labels are complete at a point of the vehicle frame.
+    pub fn holds(self, at: DVec3) -> bool {
+        let ahead = || at.x > 0.0 && at.y.atan2(at.x).abs().to_degrees() <= CAMERA_DEG;
+        self == View::All || ahead()
+    }
+}
+
 /// All labels of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labels {
@@ -62,6 +86,8 @@ pub struct Labels {
     pub tracks: Vec<Track>,
     /// Where they are complete.
     pub view: View,
+    /// Whether they are a simulator's, without noise: nothing is gained by smoothing them.
+    pub exact: bool,
     /// What was left out, and why: one line each for people.
     pub notes: Vec<String>,
 }

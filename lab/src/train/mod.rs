@@ -12,7 +12,6 @@ pub mod pairs;
 pub mod recorded;
 pub mod simulated;
 mod solve;
-pub mod tmp_labels;
 pub mod weights_file;
 
 pub use features::LEVELS;

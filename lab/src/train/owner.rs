@@ -2,7 +2,7 @@
 
 use super::drives::{Labelled, LabelledSweep};
 use crate::grid::Grid;
-use crate::labels::Footprint;
+use crate::labels::{Footprint, Kind};
 use raywake_core::prepare::Window;
 use raywake_core::record::NONE;
 
@@ -17,7 +17,7 @@ pub enum Owner {
     Object(usize),
     /// Nothing that could move.
     Background,
-    /// At the rim of an object, or where nothing is labelled.
+    /// At the rim of an object, in one of no kind, or where nothing is labelled.
     Unknown,
 }
 
@@ -50,6 +50,7 @@ pub fn owners(
         }
         let within = |margin| footprints.iter().find(|(_, f)| f.holds(at, margin));
         match within(0.0) {
+            Some((n, _)) if sweep.objects[*n].kind == Kind::Other => Owner::Unknown,
             Some((n, _)) => Owner::Object(*n),
             None if within(DOUBT_M).is_some() || !drive.sees(at) => Owner::Unknown,
             None => Owner::Background,

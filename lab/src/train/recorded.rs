@@ -1,7 +1,7 @@
 //! Recorded drives with labels.
 
 use super::drives::{Labelled, LabelledSweep, Seen};
-use crate::labels::{Labels, View};
+use crate::labels::{self, Labels};
 use glam::DVec3;
 use raywake::source::{OpenOptions, Source, open};
 use raywake_core::sweep::Rig;
@@ -14,15 +14,11 @@ pub struct Recorded {
     labels: Labels,
 }
 
-/// Half of the camera's view in which KITTI has labels, degrees.
-const VIEW_DEG: f64 = 40.0;
-
 impl Recorded {
     /// Opens a folder; fails where the recording or its labels cannot be read.
     pub fn open(folder: &Path) -> Result<Recorded, Box<dyn Error>> {
-        let av2 = folder.to_string_lossy().contains("av2_7");
-        let source = open(if av2 { Path::new("/tmp/rwdata/av2_log/val") } else { folder }, &OpenOptions::default())?;
-        let labels = crate::train::tmp_labels::open(folder)?;
+        let source = open(folder, &OpenOptions::default())?;
+        let labels = labels::open(folder, source.as_ref())?;
         Ok(Recorded { source, labels })
     }
 }
@@ -41,7 +37,7 @@ impl Labelled for Recorded {
         into.object_of_point.clear();
         into.objects.clear();
         for (id, track) in self.labels.tracks.iter().enumerate() {
-            if let Some(&vehicle_from_box) = track.boxes.get(&(if into.data.frame > 1<<40 { index as u64 } else { into.data.frame })) {
+            if let Some(&vehicle_from_box) = track.boxes.get(&into.data.frame) {
                 let (kind, size) = (track.kind, track.size);
                 into.objects.push(Seen { id, kind, vehicle_from_box, size });
             }
@@ -50,9 +46,6 @@ impl Labelled for Recorded {
     }
 
     fn sees(&self, at: DVec3) -> bool {
-        match self.labels.view {
-            View::All => true,
-            View::Camera => at.x > 0.0 && at.y.atan2(at.x).abs().to_degrees() <= VIEW_DEG,
-        }
+        self.labels.view.holds(at)
     }
 }

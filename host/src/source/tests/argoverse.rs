@@ -112,6 +112,7 @@ fn a_log() {
     let second = read(source.as_mut(), 1).unwrap();
     assert!((second.stamp_s - 0.1).abs() < 1e-12);
     assert_eq!(second.world_from_vehicle.translation.x, 3.0);
+    assert_eq!((source.stamp_s(1), source.pose(1)), (second.stamp_s, second.world_from_vehicle));
     // From pose 1 to pose 3 in 0.1 s.
     assert!((second.twist.linear.x - 20.0).abs() < 1e-6);
 }

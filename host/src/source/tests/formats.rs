@@ -30,6 +30,7 @@ fn drive_with_poses() {
     assert_eq!(sweep.points[0].intensity, 0.25);
     assert!(near(sweep.world_from_vehicle.translation, [3.0, 0.0, 0.0]));
     assert!(near(sweep.twist.linear, [10.0, 0.0, 0.0]));
+    assert_eq!((source.stamp_s(2), source.pose(2)), (0.3, sweep.world_from_vehicle));
     let first = read(source.as_mut(), 0).unwrap();
     assert!(near(first.twist.linear, [10.0, 0.0, 0.0]) && first.dropped.sweeps_before == 0);
     assert_eq!(first.sweep().points.len(), 2);
