@@ -2,19 +2,23 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
-use raywake_lab::check;
+use raywake_lab::{check, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
 #[derive(Parser)]
 #[command(version)]
 enum Command {
+    /// Train learned numbers on labelled drives.
+    #[command(subcommand)]
+    Train(train::Command),
     /// Measure a background filter on a recorded drive with labels.
     CheckFilter(check::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
+        Command::Train(command) => train::run(&command).map_err(Into::into),
         Command::CheckFilter(args) => check::run(&args),
     };
     match done {

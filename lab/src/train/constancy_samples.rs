@@ -31,28 +31,42 @@ pub struct Sample {
     pub moving: bool,
 }
 
-/// For every match of a pair the true target, and `negatives` others drawn evenly from the search
-/// neighbourhood about the source, as far as it lies in the window.
-pub fn samples(pair: &Pair, negatives: usize, rng: &mut Rng, into: &mut Vec<Sample>) {
+/// Other columns drawn per match: evenly from the search neighbourhood about the source, and near
+/// the true column.
+#[derive(Clone, Copy, Debug)]
+pub struct Draw {
+    pub even: usize,
+    pub near: usize,
+    pub about_truth: usize,
+    pub radius: i32,
+}
+
+pub const DRAW: Draw = Draw { even: 4, near: 4, about_truth: 0, radius: 3 };
+
+/// For every match of a pair the true column and some others, as far as they lie in the window.
+pub fn samples(pair: &Pair, draw: Draw, rng: &mut Rng, into: &mut Vec<Sample>) {
     for m in &pair.matches {
         let mut push = |displacement: [i32; 2], same: bool| {
-            let target = target(pair.step.side, m.source, displacement)?;
-            let features = features(pair.before[m.source], pair.now[target]);
-            into.push(Sample { features, same, moving: m.moving });
-            Some(())
+            if let Some(target) = target(pair.step.side, m.source, displacement) {
+                let features = features(pair.before[m.source], pair.now[target]);
+                into.push(Sample { features, same, moving: m.moving });
+            }
         };
-        let _ = push(m.displacement, true);
-        for _ in 0..negatives {
-            let _ = push(other(m, rng), false);
+        push(m.displacement, true);
+        for (count, about, reach) in [(draw.even, [0; 2], REACH), (draw.near, m.displacement, draw.radius), (draw.about_truth, m.displacement, REACH)] {
+            for _ in 0..count {
+                push(other(m, about, reach, rng), false);
+            }
         }
     }
 }
 
-/// A displacement within the search that is not the true one.
-fn other(m: &Match, rng: &mut Rng) -> [i32; 2] {
+/// A displacement at most `reach` from `about` along either axis that is not the true one.
+fn other(m: &Match, about: [i32; 2], reach: i32, rng: &mut Rng) -> [i32; 2] {
     loop {
-        let mut draw = || rng.range(f64::from(-REACH), f64::from(REACH + 1)).floor() as i32;
-        let displacement = [draw(), draw()];
+        let displacement = about.map(|c| {
+            c + rng.range(f64::from(-reach), f64::from(reach + 1)).floor() as i32
+        });
         if displacement != m.displacement {
             return displacement;
         }

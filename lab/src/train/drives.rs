@@ -2,10 +2,10 @@
 
 use crate::labels::Kind;
 use glam::DVec3;
+use raywake::error::Error;
 use raywake::source::SweepData;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
-use std::error::Error;
 
 /// A labelled object as a sweep shows it.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,7 @@ pub trait Labelled {
     fn len(&self) -> usize;
 
     /// Reads a sweep; what `into` held is replaced.
-    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Box<dyn Error>>;
+    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error>;
 
     /// Whether objects are labelled at a place in the vehicle frame.
     fn sees(&self, at: DVec3) -> bool;

@@ -4,8 +4,8 @@ use super::drives::{Labelled, LabelledSweep};
 use super::features::{Features, features};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
+use raywake::error::Error;
 use raywake_sim::Rng;
-use std::error::Error;
 
 /// Share of the background columns that is kept.
 pub const BACKGROUND_KEPT: f64 = 0.2;
@@ -29,7 +29,7 @@ pub fn of_sweep(
     sweep: &mut LabelledSweep,
     rng: &mut Rng,
     samples: &mut Vec<Sample>,
-) -> Result<(), Box<dyn Error>> {
+) -> Result<(), Error> {
     drive.read(index, sweep)?;
     let window = grid.sweep(drive.rig(), &sweep.data.sweep());
     for (column, owner) in owners(grid, &window, drive, sweep) {

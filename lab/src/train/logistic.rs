@@ -1,6 +1,7 @@
 //! Logistic regression by Newton's method: a convex problem of few unknowns, solved exactly.
 
 use super::solve::cholesky;
+use serde::Serialize;
 
 /// Labelled rows of small counts.
 pub struct Data {
@@ -14,6 +15,15 @@ pub struct Data {
     pub weights: Vec<f32>,
     /// Half of this times the squared length of the weights, bias excepted, adds to the loss.
     pub ridge: f64,
+}
+
+/// Losses after a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Progress {
+    /// What is made small: with the weight of the squared weights.
+    pub training: f64,
+    /// Of data held out, without that.
+    pub held_out: f64,
 }
 
 /// Loss, its gradient and, where asked for, the lower triangle of its second derivatives.
@@ -36,8 +46,21 @@ impl Data {
         sum + weights[row.len()]
     }
 
-    /// The weights of least loss, bias last. `told` hears of the loss after every step.
-    pub fn fit(&self, told: &mut dyn FnMut(f64)) -> Vec<f64> {
+    /// Weights of rows under which both classes count the same and all sum up to 1.
+    pub fn balanced(labels: &[bool]) -> Vec<f32> {
+        let positive = labels.iter().filter(|l| **l).count();
+        let half = |count: usize| 0.5 / count.max(1) as f32;
+        let of_class = [half(labels.len() - positive), half(positive)];
+        labels.iter().map(|l| of_class[*l as usize]).collect()
+    }
+
+    /// The loss at some weights.
+    pub fn loss(&self, weights: &[f64]) -> f64 {
+        self.slope(weights, false).loss
+    }
+
+    /// The weights of least loss, bias last. `told` hears of weights and loss after every step.
+    pub fn fit(&self, told: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
         let mut weights = vec![0.0; self.width + 1];
         let mut here = self.slope(&weights, true);
         for _ in 0..STEPS_MAX {
@@ -55,7 +78,7 @@ impl Data {
             };
             weights = moved;
             here = self.slope(&weights, true);
-            told(here.loss);
+            told(&weights, here.loss);
             if before - here.loss < ENOUGH {
                 break;
             }
@@ -143,7 +166,7 @@ mod tests {
                 assert!((bend - here.hessian[j * 5 + i]).abs() < 1e-8);
             }
         }
-        let best = data.fit(&mut |_| ());
+        let best = data.fit(&mut |_, _| ());
         assert!(data.slope(&best, true).gradient.iter().all(|g| g.abs() < 1e-6));
     }
 
@@ -157,7 +180,7 @@ mod tests {
             weights: vec![0.125; 8],
             ridge: 0.0,
         };
-        let w = data.fit(&mut |_| ());
+        let w = data.fit(&mut |_, _| ());
         assert!((w[0] - 2.0 * 3f64.ln()).abs() < 1e-6 && (w[1] + 3f64.ln()).abs() < 1e-6);
     }
 
@@ -170,7 +193,7 @@ mod tests {
             weights: vec![0.25; 4],
             ridge: 1e-3,
         };
-        let w = data.fit(&mut |_| ());
+        let w = data.fit(&mut |_, _| ());
         for (row, label) in data.rows.chunks(2).zip(&data.labels) {
             assert_eq!(Data::score(&w, row) > 0.0, *label);
         }

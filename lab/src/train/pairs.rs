@@ -3,12 +3,12 @@
 use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
+use raywake::error::Error;
 use raywake_core::continuity::Limits;
 use raywake_core::grid::shift::shift;
 use raywake_core::params::REACH;
 use raywake_core::record::{Column, Step};
 use std::collections::HashMap;
-use std::error::Error;
 
 /// Over ground faster than this an object moves, m/s; labels of parked cars jitter below it.
 const MOVING_MPS: f64 = 1.0;
@@ -50,7 +50,7 @@ pub fn pair(
     drive: &mut dyn Labelled,
     index: usize,
     sweeps: &mut Sweeps,
-) -> Result<Option<Pair>, Box<dyn Error>> {
+) -> Result<Option<Pair>, Error> {
     let Sweeps { first, second } = sweeps;
     drive.read(index, first)?;
     drive.read(index + 1, second)?;

@@ -3,9 +3,9 @@
 use super::drives::{Labelled, LabelledSweep, Seen};
 use crate::labels::{self, Labels};
 use glam::DVec3;
+use raywake::error::Error;
 use raywake::source::{OpenOptions, Source, open};
 use raywake_core::sweep::Rig;
-use std::error::Error;
 use std::path::Path;
 
 /// A recorded drive.
@@ -16,7 +16,7 @@ pub struct Recorded {
 
 impl Recorded {
     /// Opens a folder; fails where the recording or its labels cannot be read.
-    pub fn open(folder: &Path) -> Result<Recorded, Box<dyn Error>> {
+    pub fn open(folder: &Path) -> Result<Recorded, Error> {
         let source = open(folder, &OpenOptions::default())?;
         let labels = labels::open(folder, source.as_ref())?;
         Ok(Recorded { source, labels })
@@ -32,7 +32,7 @@ impl Labelled for Recorded {
         self.source.len()
     }
 
-    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Box<dyn Error>> {
+    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error> {
         self.source.read(index, &mut into.data)?;
         into.object_of_point.clear();
         into.objects.clear();

@@ -2,17 +2,19 @@
 
 use super::drives::{Labelled, LabelledSweep, Seen};
 use crate::labels::Kind;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
+use raywake::error::Error;
 use raywake::source::{Dropped, SweepData};
+use raywake_core::pose::Pose;
 use raywake_core::record::NONE;
 use raywake_core::sweep::Rig;
 use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
-use std::error::Error;
 
 /// A drive of the simulator.
 pub struct Simulated {
     drive: Drive,
     rig: Rig,
+    tilt: Pose,
 }
 
 impl Simulated {
@@ -26,12 +28,13 @@ impl Simulated {
             threads: 1,
             ..Options::default()
         };
-        Simulated::new(Drive::new(rng.bits(), options))
+        let drive = Drive::new(rng.bits(), options);
+        Simulated { tilt: tilt(&mut rng), ..Simulated::new(drive) }
     }
 
     /// A drive put together elsewhere.
     pub fn new(drive: Drive) -> Simulated {
-        Simulated { rig: drive.rig(), drive }
+        Simulated { rig: drive.rig(), drive, tilt: Pose::IDENTITY }
     }
 }
 
@@ -66,6 +69,17 @@ fn rig(index: u64, rng: &mut Rng) -> SensorRig {
     rig
 }
 
+/// How far a street is tilted along either axis of the world, as a slope: hills, and poses that do
+/// not know exactly where up is.
+const SLOPE: f64 = 0.03;
+
+fn tilt(rng: &mut Rng) -> Pose {
+    let slope = std::env::var("TILT").ok().and_then(|s| s.parse().ok()).unwrap_or(SLOPE);
+    let [roll, pitch] = [0; 2].map(|_| rng.range(-slope, slope));
+    let turn = DQuat::from_rotation_x(roll) * DQuat::from_rotation_y(pitch);
+    Pose::new(turn, DVec3::ZERO)
+}
+
 fn kind(class: Class) -> Kind {
     match class {
         Class::Car => Kind::Car,
@@ -85,7 +99,7 @@ impl Labelled for Simulated {
         self.drive.sweeps()
     }
 
-    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Box<dyn Error>> {
+    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error> {
         let sweep = self.drive.sweep(index);
         let vehicle_from_world = sweep.world_from_vehicle.inverse();
         let states = self.drive.objects(sweep.stamp_s);
@@ -105,7 +119,7 @@ impl Labelled for Simulated {
             frame: index as u64,
             stamp_s: sweep.stamp_s,
             points: sweep.points,
-            world_from_vehicle: sweep.world_from_vehicle,
+            world_from_vehicle: self.tilt * sweep.world_from_vehicle,
             twist: sweep.twist,
             dropped: Dropped::default(),
         };

@@ -1,0 +1,150 @@
+//! `raywake-lab train constancy`: the occupancy constancy (section 3.5.1).
+
+use super::constancy_samples::{DRAW, Sample, WIDTH, samples};
+use super::curve::Curve;
+use super::features::LEVELS;
+use super::inputs::{Inputs, Visit};
+use super::logistic::{Data, Progress};
+use super::pairs::{Pair, Sweeps, pair};
+use super::ranking::{Ranker, Ranking};
+use super::report::{Counts, Outputs};
+use super::weights_file::{quantise, text};
+use raywake::backend::Tables;
+use raywake::error::Error;
+use raywake_core::params::Profile;
+use raywake_core::weights::Weights;
+use serde::Serialize;
+use std::fs;
+use std::path::PathBuf;
+
+/// Weights per unit: scores are indices of a table, so hundredths are what fits.
+const SCALE: f64 = 100.0;
+/// Weight of the squared weights.
+const RIDGE: f64 = 1e-4;
+
+/// Options of `train constancy`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    #[command(flatten)]
+    outputs: Outputs,
+    /// Other weights to measure on the same held-out drives.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    beside: Vec<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    inputs: String,
+    training: Counts,
+    held_out: Counts,
+    progress: Vec<Progress>,
+    /// The weights written first, then those to compare.
+    measured: Vec<Measured>,
+}
+
+/// Weights on held-out drives.
+#[derive(Serialize)]
+struct Measured {
+    name: String,
+    /// Mean negative log-likelihood, both classes counting the same, nats.
+    log_loss: f64,
+    auc: f64,
+    /// Columns of standing objects, the 3x3 window included.
+    standing: Ranking,
+    /// Columns of moving objects.
+    moving: Ranking,
+}
+
+/// What a drive yields: samples, and where it is held out its pairs.
+type Yield = (Vec<Sample>, Vec<Pair>);
+
+/// Trains, writes and reports.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let plan = args.inputs.plan()?;
+    let mut others = Vec::new();
+    for path in &args.beside {
+        others.push((path.display().to_string(), fs::read_to_string(path).map_err(Error::reading(path))?));
+    }
+    let (mut training, mut held_out, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
+    let drives = args.inputs.visit(&plan, &of_drive)?;
+    for ((samples, of_drive), planned) in drives.into_iter().zip(&plan) {
+        if planned.held_out {
+            held_out.extend(samples);
+            pairs.extend(of_drive);
+        } else {
+            training.extend(samples);
+        }
+    }
+    let counts = [&training, &held_out].map(|s| Counts::of(s.iter().map(|s| s.same)));
+    for (count, part) in counts.iter().zip(["training", "held-out"]) {
+        count.both(part, "columns of objects", "other columns to tell them from")?;
+    }
+    let (learned, checked) = (data(&training, RIDGE), data(&held_out, 0.0));
+    let mut progress = Vec::new();
+    let weights = learned.fit(&mut |weights, training| {
+        progress.push(Progress { training, held_out: checked.loss(weights) });
+    });
+    let integers = quantise(&weights, SCALE);
+    let inputs = args.inputs.provenance();
+    let write = |provenance: &str| text("constancy", &[3, LEVELS], SCALE, &integers, provenance);
+    let ours = measure("written", &write(""), &checked, &pairs)?;
+    let provenance = format!(
+        "raywake-lab train constancy, {inputs}, logistic regression, held-out log loss {:.4}, AUC \
+         {:.4}, moving columns whose true target costs least {:.3}",
+        ours.log_loss, ours.auc, ours.moving.first
+    );
+    let mut measured = vec![ours];
+    for (name, text) in &others {
+        measured.push(measure(name, text, &checked, &pairs)?);
+    }
+    let [training, held_out] = counts;
+    args.outputs
+        .write(&write(&provenance), &Report { inputs, training, held_out, progress, measured })
+}
+
+fn of_drive(mut visit: Visit) -> Result<Yield, Error> {
+    let (mut sweeps, mut of_drive, mut pairs) = (Sweeps::default(), Vec::new(), Vec::new());
+    for index in visit.sweeps {
+        if index + 1 == visit.drive.len() {
+            break;
+        }
+        if let Some(pair) = pair(visit.grid, visit.drive, index, &mut sweeps)? {
+            samples(&pair, DRAW, &mut visit.rng, &mut of_drive);
+            if visit.held_out {
+                pairs.push(pair);
+            }
+        }
+    }
+    Ok((of_drive, pairs))
+}
+
+fn data(samples: &[Sample], ridge: f64) -> Data {
+    let labels: Vec<bool> = samples.iter().map(|s| s.same).collect();
+    Data {
+        width: WIDTH,
+        rows: samples.iter().flat_map(|s| s.features).collect(),
+        weights: Data::balanced(&labels),
+        labels,
+        ridge,
+    }
+}
+
+fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measured, Error> {
+    let tables = Tables::load(&Profile::hdl64(), None, text)
+        .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
+    let mut counts = [Ranking::default(); 2];
+    let mut ranker = Ranker::new(Profile::hdl64().columns());
+    pairs.iter().for_each(|pair| ranker.add(&tables, pair, &mut counts));
+    let file = Weights::parse(text, "constancy", &[3, LEVELS])
+        .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
+    let weights: Vec<f64> =
+        file.values().map(|w| f64::from(w) / f64::from(file.scale)).collect();
+    let rows = data.rows.chunks_exact(WIDTH).zip(&data.labels);
+    let curve = Curve::of(rows.map(|(row, &same)| (Data::score(&weights, row), same, 1.0)))
+        .expect("both classes were counted");
+    let [standing, moving] = counts.map(Ranking::shares);
+    let log_loss = data.loss(&weights);
+    Ok(Measured { name: name.into(), log_loss, auc: curve.auc(), standing, moving })
+}
