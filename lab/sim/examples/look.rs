@@ -1,13 +1,15 @@
 //! Writes two pictures of a sweep, from above and as the sensor sees it:
-//! `look SEED SWEEP FOLDER`.
+//! `look SEED SWEEP FOLDER [RIG]`.
 
-use raywake_sim::{Class, Drive, Options, SimSweep};
+use raywake_sim::{Class, Drive, Options, SensorRig, SimSweep};
 use std::io::Write;
 
 const SIDE: usize = 1000;
 const PIXELS_PER_M: f32 = 8.0;
-const WIDE: usize = 2048;
-const ROW: usize = 5;
+/// Columns of the sensor's view, and rows of 0.2 degrees from `TOP` down.
+const WIDE: usize = 1800;
+const HIGH: usize = 240;
+const TOP: f32 = 20.0;
 
 fn colour(class: Class, fast: bool) -> [u8; 3] {
     match class {
@@ -36,20 +38,22 @@ fn from_above(sweep: &SimSweep) -> Vec<u8> {
     image
 }
 
-fn as_seen(sweep: &SimSweep) -> Vec<u8> {
-    let mut image = vec![0u8; WIDE * 64 * ROW * 3];
+/// From the point `eye` metres above the vehicle frame's origin, forward in the middle.
+fn as_seen(sweep: &SimSweep, eye: f32) -> Vec<u8> {
+    let mut image = vec![0u8; WIDE * HIGH * 3];
     for (p, t) in sweep.points.iter().zip(&sweep.truth) {
         let [x, y, z] = p.position;
-        let column = ((p.offset_s + 0.05) / 0.1 * WIDE as f32) as usize;
-        let down = 2.0 - z.atan2(x.hypot(y)).to_degrees();
-        let beam = if down < 10.58 { down * 31.0 / 10.33 } else { 32.0 + (down - 10.83) * 2.0 };
-        let beam = (beam.round().max(0.0) as usize).min(63);
+        let turned = 0.5 - y.atan2(x) / std::f32::consts::TAU;
+        let column = ((turned * WIDE as f32) as usize).min(WIDE - 1);
+        let down = 5.0 * (TOP - (z - eye).atan2(x.hypot(y)).to_degrees());
         let shade = 0.35 + 0.65 * (-x.hypot(y) / 30.0).exp();
         let fast = t.velocity_world.iter().map(|v| v * v).sum::<f32>() > 0.04;
         let rgb = colour(t.class, fast).map(|c| (f32::from(c) * shade) as u8);
-        for row in 0..ROW {
-            let at = 3 * ((beam * ROW + row) * WIDE + column.min(WIDE - 1));
-            image[at..at + 3].copy_from_slice(&rgb);
+        for row in [down as usize, down as usize + 1] {
+            if row < HIGH {
+                let at = 3 * (row * WIDE + column);
+                image[at..at + 3].copy_from_slice(&rgb);
+            }
         }
     }
     image
@@ -61,14 +65,17 @@ fn write(path: &str, wide: usize, rgb: &[u8]) -> std::io::Result<()> {
     file.write_all(rgb)
 }
 
-fn main() -> std::io::Result<()> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize| arguments.get(i).and_then(|a| a.parse().ok()).unwrap_or(0);
     let folder = arguments.get(2).map_or(".", String::as_str);
-    let drive = Drive::new(number(0), Options::default());
+    let rig: SensorRig = arguments.get(3).map_or("hdl64", String::as_str).parse()?;
+    let eye = rig.mounts.first().map_or(0.0, |m| m.vehicle_from_sensor.translation.z) as f32;
+    let drive = Drive::new(number(0), Options { rig, ..Options::default() });
     let begin = std::time::Instant::now();
     let sweep = drive.sweep(number(1) as usize);
     println!("{} returns in {:.0} ms", sweep.points.len(), 1e3 * begin.elapsed().as_secs_f64());
     write(&format!("{folder}/above.ppm"), SIDE, &from_above(&sweep))?;
-    write(&format!("{folder}/seen.ppm"), WIDE, &as_seen(&sweep))
+    write(&format!("{folder}/seen.ppm"), WIDE, &as_seen(&sweep, eye))?;
+    Ok(())
 }

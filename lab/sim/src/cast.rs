@@ -81,21 +81,13 @@ impl<'a> Caster<'a> {
     /// All beams of one column, fired at time `t` from a vehicle at `ego`.
     fn column(&self, firing: &Firing, t: f64, ego: Pose, mut rng: Rng, returns: &mut Returns) {
         let mount = &self.rig.mounts[firing.mount];
-        let (sensor, (beams, spread)) = (&mount.sensor, &self.beams[firing.mount]);
-        let (s, c) = firing.azimuth.sin_cos();
+        let sensor = &mount.sensor;
         let street_from_sensor = ego * mount.vehicle_from_sensor;
         let turn = street_from_sensor.matrix();
-        let fan = Fan {
-            origin: street_from_sensor.translation,
-            forward: turn * DVec3::new(c, s, 0.0),
-            across: turn * DVec3::new(-s, c, 0.0),
-            spread: *spread,
-            range: sensor.range[1],
-        };
+        let fan = self.fan(firing, street_from_sensor);
         let moving = self.moving_targets(&fan, t);
         let mut motions = Motions::at(self.scene, t);
-        for beam in beams {
-            let nominal = DVec3::new(beam.x * c - beam.y * s, beam.x * s + beam.y * c, beam.z);
+        for nominal in self.rays(firing) {
             let ray = Ray {
                 origin: fan.origin,
                 direction: turn * disturbed(sensor, nominal, &mut rng),
@@ -114,6 +106,25 @@ impl<'a> Caster<'a> {
                 sensor: firing.mount as u32,
             });
             returns.1.push(motions.truth(&hit, ray.origin + ray.direction * hit.range));
+        }
+    }
+
+    /// Nominal directions of a column's rays in the sensor's frame.
+    fn rays(&self, firing: &Firing) -> impl Iterator<Item = DVec3> {
+        let (s, c) = firing.azimuth.sin_cos();
+        let turned = move |b: &DVec3| DVec3::new(b.x * c - b.y * s, b.x * s + b.y * c, b.z);
+        self.beams[firing.mount].0.iter().map(turned)
+    }
+
+    fn fan(&self, firing: &Firing, street_from_sensor: Pose) -> Fan {
+        let (s, c) = firing.azimuth.sin_cos();
+        let turn = street_from_sensor.matrix();
+        Fan {
+            origin: street_from_sensor.translation,
+            forward: turn * DVec3::new(c, s, 0.0),
+            across: turn * DVec3::new(-s, c, 0.0),
+            spread: self.beams[firing.mount].1,
+            range: self.rig.mounts[firing.mount].sensor.range[1],
         }
     }
 
@@ -177,4 +188,42 @@ fn measured(sensor: &Sensor, hit: &Hit, rng: &mut Rng) -> Option<(f64, f64)> {
     }
     let intensity = surface.reflectivity * (0.4 + 0.6 * hit.cosine) + 0.02 * rng.bell();
     Some((range, intensity.clamp(0.0, 1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_moving_part_is_overlooked() {
+        let mut hits = 0;
+        for (name, seed) in SensorRig::NAMES.into_iter().zip(0..) {
+            let rig: SensorRig = name.parse().unwrap();
+            let (scene, mut rng) = (Scene::street(seed), Rng::new(seed));
+            let still = Still::new(&scene);
+            let caster = Caster::new(&scene, &still, &rig);
+            for firing in rig.firings(30).iter().step_by(31) {
+                let t = stamp_s(30) + firing.offset_s;
+                let mount = &rig.mounts[firing.mount];
+                let ego = Pose::planar(0.0, -1.75, 0.4, 0.1) * mount.vehicle_from_sensor;
+                let near = caster.moving_targets(&caster.fan(firing, ego), t);
+                let objects = scene.objects.iter().enumerate().filter(|(_, o)| !o.is_still());
+                let parts = objects.flat_map(|(i, o)| (0..o.parts.len()).map(move |p| (i, o, p)));
+                let place = |(i, o, p): (usize, &crate::Object, usize)| {
+                    Target::of_part(i, o, p, o.part_pose(p, &scene.ground, t), true)
+                };
+                let all: Vec<Target> = parts.map(place).collect();
+                for nominal in caster.rays(firing) {
+                    let direction = ego.matrix() * disturbed(&mount.sensor, nominal, &mut rng);
+                    let ray = Ray { origin: ego.translation, direction, seed: rng.bits() };
+                    let found = caster.nearest(&ray, &mount.sensor, &near);
+                    assert_eq!(found, caster.nearest(&ray, &mount.sensor, &all), "{name}");
+                    hits += usize::from(
+                        found.is_some_and(|h| h.target.is_some_and(|t| t.mover.is_some())),
+                    );
+                }
+            }
+        }
+        assert!(hits > 200, "{hits}");
+    }
 }

@@ -3,6 +3,8 @@
 //!
 //! Street frame: x along the main road, y left, z up.
 
+use crate::roughness::roughness;
+use crate::street::SIDEWALK;
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
 
@@ -24,6 +26,8 @@ pub struct Ground {
     crossing: Option<f64>,
     /// Height of the sidewalks above the road, m.
     kerb: f64,
+    /// Largest unevenness of the road, m.
+    bumps: f64,
 }
 
 /// Where a ray meets the ground.
@@ -38,7 +42,7 @@ pub struct Contact {
 impl Ground {
     /// The plane z = 0.
     pub fn flat() -> Ground {
-        Ground { planes: [DVec3::ZERO; 2], valley: true, crossing: None, kerb: 0.0 }
+        Ground { planes: [DVec3::ZERO; 2], valley: true, crossing: None, kerb: 0.0, bumps: 0.0 }
     }
 
     /// A street whose slope changes at `bend_m` from `slopes[0]` to `slopes[1]` (rise over run
@@ -56,7 +60,14 @@ impl Ground {
             valley: slopes[1] >= slopes[0],
             crossing: Some(crossing_m),
             kerb: kerb_m,
+            bumps: 0.0,
         }
+    }
+
+    /// The same with bumps of this height on the road (m), half as much again on the sidewalks and
+    /// several times as much beyond, for the laser alone: who stands on it does not notice.
+    pub fn uneven(self, bumps: f64) -> Ground {
+        Ground { bumps, ..self }
     }
 
     /// Distance into the sidewalk from its kerb, m; negative on the road.
@@ -90,7 +101,8 @@ impl Ground {
     /// Where the ray from `o` (above the ground) along the unit vector `d` meets the ground.
     pub fn contact(&self, o: DVec3, d: DVec3) -> Option<Contact> {
         let level = |range: f64| {
-            (range > 0.0 && range.is_finite()).then(|| Contact { range, cosine: self.cosine(d) })
+            let met = range > 0.0 && range.is_finite();
+            met.then(|| self.bumped(o, d, Contact { range, cosine: self.cosine(d) }))
         };
         let low = self.reach(o, d, 0.0);
         if self.crossing.is_none() {
@@ -115,6 +127,20 @@ impl Ground {
         let along_x =
             at.y.abs() - ROAD_HALF < (at.x - self.crossing.unwrap_or(0.0)).abs() - CROSS_HALF;
         Some(Contact { range: after, cosine: if along_x { d.y.abs() } else { d.x.abs() } })
+    }
+
+    /// The contact moved along the ray to where the bump at its place is met.
+    fn bumped(&self, o: DVec3, d: DVec3, contact: Contact) -> Contact {
+        if self.bumps == 0.0 {
+            return contact;
+        }
+        let at = o + d * contact.range;
+        let beyond = self.beyond_kerb(at.x, at.y);
+        let scale = 1.0 + 0.5 * beyond.clamp(0.0, 1.0) + (beyond - SIDEWALK).clamp(0.0, 2.5);
+        let height = self.bumps * scale * roughness(at.x, at.y);
+        // A grazing ray meets a bump long before it or flies over: no farther than its width.
+        let shift = (height / contact.cosine.max(1e-3)).clamp(-1.0, 1.0);
+        Contact { range: (contact.range - shift).max(0.5 * contact.range), ..contact }
     }
 
     /// Cosine of incidence; the planes differ too little for it to matter which one is met.
@@ -185,6 +211,23 @@ mod tests {
         assert!((face.y - ROAD_HALF).abs() < 1e-4 && (face.z - 0.07).abs() < 1e-4, "face");
         assert_eq!(g.height(0.0, 0.0), 0.0);
         assert_eq!(g.height(0.0, 7.0), 0.15);
+    }
+
+    #[test]
+    fn bumps_stay_small() {
+        let level = Ground::street([0.0, 0.0], 0.0, 0.0, 100.0, 0.15);
+        let g = level.clone().uneven(0.01);
+        let o = DVec3::new(0.0, 0.0, 1.5);
+        let (mut lowest, mut highest) = (0.0f64, 0.0f64);
+        for i in 0..500 {
+            let d = down(4.0 + 0.03 * f64::from(i), 0.2, -1.5);
+            let at = o + d * g.contact(o, d).unwrap().range;
+            lowest = lowest.min(at.z);
+            highest = highest.max(at.z);
+        }
+        assert!(lowest > -0.0101 && lowest < -0.003, "{lowest}");
+        assert!(highest < 0.0101 && highest > 0.003, "{highest}");
+        assert_eq!(level.height(3.0, 1.0), g.height(3.0, 1.0));
     }
 
     #[test]

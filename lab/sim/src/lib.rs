@@ -21,6 +21,7 @@ mod object;
 mod path;
 mod rig;
 mod rng;
+mod roughness;
 mod scene;
 mod sensor;
 mod shape;

@@ -49,7 +49,12 @@ impl Leg {
 impl Path {
     /// Straight on for ever, from this state at time 0.
     pub fn from(state: State) -> Path {
-        Path { legs: vec![Leg { start_s: 0.0, from: state, acceleration: 0.0, curvature: 0.0 }] }
+        Path::starting(0.0, state)
+    }
+
+    /// Straight on for ever, from this state at a time, s.
+    pub fn starting(start_s: f64, state: State) -> Path {
+        Path { legs: vec![Leg { start_s, from: state, acceleration: 0.0, curvature: 0.0 }] }
     }
 
     /// Standing still at this place.
@@ -86,6 +91,14 @@ impl Path {
     pub fn then_turn(self, angle: f64, radius: f64) -> Path {
         let speed = self.end().speed;
         self.then(angle.abs() * radius / speed, 0.0, 1.0f64.copysign(angle) / radius)
+    }
+
+    /// Appends a change of lane by `aside` (m, left positive) over `length` (m) of road at constant
+    /// speed, which must not be zero: two arcs, after which the heading is as before.
+    pub fn then_shift(self, aside: f64, length: f64) -> Path {
+        let angle = 2.0 * (aside / length).atan();
+        let radius = 0.5 * length / angle.abs().sin();
+        self.then_turn(angle, radius).then_turn(-angle, radius)
     }
 
     /// State when the last leg begins.
@@ -131,6 +144,16 @@ mod tests {
         let end = path.end();
         assert!((end.x - 34.0).abs() < 1e-9 && (end.y - 10.0).abs() < 1e-9);
         assert!((end.yaw - FRAC_PI_2).abs() < 1e-12 && end.speed == 5.0);
+    }
+
+    #[test]
+    fn changes_lane() {
+        let start = State { x: 3.0, y: -1.75, speed: 12.0, ..State::default() };
+        let path = Path::starting(-2.0, start).then(1.0, 0.0, 0.0).then_shift(3.5, 24.0);
+        assert_eq!(path.at(-2.0), start);
+        let end = path.end();
+        assert!((end.x - 39.0).abs() < 1e-9 && (end.y - 1.75).abs() < 1e-9);
+        assert!(end.yaw.abs() < 1e-12 && end.speed == 12.0);
     }
 
     #[test]

@@ -235,7 +235,7 @@ mod tests {
             let firings = rig.firings(index);
             firings.iter().find(|f| f.mount == mount).unwrap().azimuth
         };
-        let [a, b] = [0, 40].map(|i| (looks(i, 1) - looks(i, 0)).rem_euclid(6.2832));
+        let [a, b] = [0, 40].map(|i| (looks(i, 1) - looks(i, 0)).rem_euclid(std::f64::consts::TAU));
         assert!((a - b).abs() > 0.5, "{a} {b}");
     }
 }

@@ -70,6 +70,7 @@ impl Scene {
         let slopes = [rng.range(-0.025, 0.025), rng.range(-0.025, 0.025)];
         let (across, bend) = (rng.range(-0.012, 0.012), rng.range(-20.0, 60.0));
         let ground = Ground::street(slopes, across, bend, plan.crossing, rng.range(0.08, 0.16));
+        let ground = ground.uneven(rng.range(0.004, 0.02));
         let heading = rng.range(-std::f64::consts::PI, std::f64::consts::PI);
         let world_from_street =
             Pose::planar(rng.range(-200.0, 200.0), rng.range(-200.0, 200.0), 0.0, heading);

@@ -141,6 +141,46 @@ fn no_ray_is_missed() {
     assert_eq!(seen, expected);
 }
 
+#[test]
+fn every_sensor_of_every_rig_sees_the_same_planes() {
+    for name in SensorRig::NAMES {
+        let mut rig: SensorRig = name.parse().unwrap();
+        for m in &mut rig.mounts {
+            let Sensor { range_noise, angle_noise, dropout, signal, .. } = Sensor::ideal();
+            m.sensor = Sensor { range_noise, angle_noise, dropout, signal, ..m.sensor.clone() };
+        }
+        let mut scene = Scene::empty();
+        let pose = raywake_core::pose::Pose::planar(20.0, 0.0, 3.0, 0.0);
+        scene.put(Class::Building, Shape::cuboid(2.0, 60.0, 6.0), pose, Surface::matt(0.5));
+        let path = Path::from(State { speed: 12.0, yaw: 0.3, ..State::default() });
+        let drive = Drive::through(scene, path, 1, Options { rig, ..Options::default() });
+        let declared = drive.rig();
+        let mut seen = vec![[0, 0]; declared.sensors.len()];
+        let sweep = drive.sweep(2);
+        assert!(sweep.points.len() <= 131_072);
+        for (((p, t), point), truth) in
+            in_world(&drive, &sweep).zip(&sweep.points).zip(&sweep.truth)
+        {
+            // Of 0.1 s, in the order of time, above the ground as the rig says.
+            assert!((-0.05..0.05).contains(&point.offset_s));
+            let wall = usize::from(truth.class == Class::Building);
+            let here = drive.world_from_vehicle(t).inverse().transform(p);
+            if wall == 0 {
+                // The vehicle nods by 0.003 rad at most.
+                let up = (here.z - declared.ground_m).abs();
+                assert!(p.z.abs() < 1e-4 && up < 0.01 + 0.005 * here.length(), "{name}: {here}");
+            } else if p.z < 5.9999 {
+                let off = (p.x - 19.0).abs().min((p.y.abs() - 30.0).abs());
+                assert!(off < 1e-4, "{name}: {p}");
+            }
+            seen[point.sensor as usize][wall] += 1;
+        }
+        assert!(sweep.points.windows(2).all(|p| p[0].offset_s <= p[1].offset_s));
+        assert!(seen.iter().all(|s| s[0] > 5_000 && s[1] > 400), "{name}: {seen:?}");
+        assert_eq!(drive.sweep(2), sweep);
+    }
+}
+
 /// Scene with one of each in motion, one of them turning.
 fn movers() -> Scene {
     let mut scene = Scene::empty();
@@ -189,6 +229,69 @@ fn velocity_is_the_pose_s_derivative() {
     let exact = |t: &&&raywake_sim::Truth| (vector(t.velocity_world).length() - 1.4).abs() < 1e-4;
     let steady = torso.iter().filter(exact).count();
     assert!(steady > 20 && steady < torso.len(), "{steady} of {} on the torso", torso.len());
+}
+
+#[test]
+fn flow_is_the_material_s_displacement() {
+    let mut scene = movers();
+    let at = |x: f64, y: f64, yaw: f64, speed: f64| State { x, y, yaw, speed };
+    scene.add(models::truck, Path::from(at(20.0, 9.0, 0.3, 7.0)).then(9.0, -0.5, 0.03), 6);
+    scene.add(models::tram, Path::from(at(-10.0, -14.0, 0.1, 8.0)), 7);
+    scene.add(models::motorcycle, Path::from(at(6.0, 9.0, 2.0, 11.0)), 8);
+    let drive = ideal(scene, Path::from(State { speed: 5.0, ..State::default() }));
+    let sweep = drive.sweep(3);
+    let (mut seen, mut turned) = (BTreeSet::new(), 0.0f64);
+    for ((p, t), truth) in in_world(&drive, &sweep).zip(&sweep.truth) {
+        let flow = vector(truth.flow_world);
+        if truth.object == 0 || truth.object == 5 {
+            assert_eq!(truth.flow_world, [0.0; 3], "background and parked");
+            continue;
+        }
+        seen.insert(truth.object);
+        let object = &drive.scene().objects[truth.object as usize - 1];
+        // Street and world are the same here. Which part was hit is not said: one of them must
+        // have the point on its surface, and carry it to where the flow says.
+        let ground = &drive.scene().ground;
+        let off = (0..object.parts.len()).map(|part| {
+            let pose = |t: f64| object.part_pose(part, ground, t);
+            let fixed = pose(t).inverse().transform(p);
+            let out = (fixed.abs() - object.parts[part].shape.half()).max_element().max(0.0);
+            out + (pose(t + 0.1).transform(fixed) - p - flow).length()
+        });
+        assert!(off.fold(f64::INFINITY, f64::min) < 1e-3, "{truth:?} at {p}");
+        // Over 0.1 s speed times time is near, but misses what turns and brakes.
+        let straight = 0.1 * vector(truth.velocity_world);
+        if object.class <= Class::Tram {
+            assert!((flow - straight).length() < 0.08, "{flow} {straight}");
+            turned = turned.max((flow - straight).length());
+        }
+    }
+    assert_eq!(seen.len(), 7);
+    assert!(turned > 0.01, "{turned}");
+}
+
+#[test]
+fn objects_vanish_behind_others_and_come_back() {
+    let (mut vanished, mut back) = (0, 0);
+    for seed in 0..3 {
+        let drive = Drive::new(seed, options(Ego::Straight { speed: 6.0 }, 40));
+        let returns: Vec<Vec<usize>> = (0..40)
+            .step_by(4)
+            .map(|index| {
+                let mut count = vec![0; drive.scene().objects.len() + 1];
+                drive.sweep(index).truth.iter().for_each(|t| count[t.object as usize] += 1);
+                count
+            })
+            .collect();
+        for object in 1..returns[0].len() {
+            let mut seen = returns.iter().map(|r| r[object]).skip_while(|&n| n < 10);
+            if seen.any(|n| n == 0) {
+                vanished += 1;
+                back += usize::from(seen.any(|n| n >= 10));
+            }
+        }
+    }
+    assert!(vanished > 10 && back >= 3, "{vanished} vanish, {back} come back");
 }
 
 #[test]

@@ -1,0 +1,135 @@
+//! The street's background, block by block: closed rows of houses, houses behind gardens, green.
+
+mod fronts;
+mod furniture;
+mod green;
+mod houses;
+
+use crate::ground::{CROSS_HALF, ROAD_HALF};
+use crate::object::{Class, Surface};
+use crate::path::Path;
+use crate::rng::Rng;
+use crate::scene::Scene;
+use crate::shape::Shape;
+use glam::{DQuat, DVec3};
+use raywake_core::pose::Pose;
+
+/// Width of a sidewalk, m.
+pub(crate) const SIDEWALK: f64 = 4.3;
+/// Distance of the sidewalk's far edge from the main road's centre line, m.
+const EDGE: f64 = ROAD_HALF + SIDEWALK;
+/// How far around the vehicle's path there is something to see, m.
+const VIEW: f64 = 125.0;
+
+/// Part of the street frame that is furnished: minimum and maximum, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    pub(crate) x: [f64; 2],
+    pub(crate) y: [f64; 2],
+}
+
+impl Extent {
+    pub(crate) fn around(path: &Path, duration_s: f64) -> Extent {
+        let mut extent = Extent { x: [0.0; 2], y: [0.0; 2] };
+        let steps = (duration_s * 4.0).ceil() as u32;
+        for i in 0..=steps {
+            let s = path.at(f64::from(i) * 0.25);
+            extent.x = [extent.x[0].min(s.x), extent.x[1].max(s.x)];
+            extent.y = [extent.y[0].min(s.y), extent.y[1].max(s.y)];
+        }
+        let widen = |v: [f64; 2]| [v[0] - VIEW, v[1] + VIEW];
+        Extent { x: widen(extent.x), y: widen(extent.y) }
+    }
+}
+
+/// Builds the background into the scene.
+pub(crate) fn build(scene: &mut Scene, extent: Extent, crossing: f64, rng: &mut Rng) {
+    let mut yard = Yard { scene, crossing, rng };
+    for side in [-1.0, 1.0] {
+        yard.blocks(extent.x, side);
+        yard.houses_along_crossing(extent.y, side);
+        yard.kerb_side(extent.x, side);
+    }
+    yard.signals();
+}
+
+struct Yard<'a> {
+    scene: &'a mut Scene,
+    crossing: f64,
+    rng: &'a mut Rng,
+}
+
+impl Yard<'_> {
+    /// What lies beyond the sidewalk, in blocks of one kind each.
+    fn blocks(&mut self, x: [f64; 2], side: f64) {
+        let mut at = x[0];
+        while at < x[1] {
+            let end = at + self.rng.range(30.0, 80.0);
+            match (self.rng.unit() * 10.0) as u32 {
+                0..4 => {
+                    self.row_of_houses([at, end], side);
+                    self.house_side([at, end], side, [1.5, 12.0]);
+                }
+                4..8 => self.gardens([at, end], side),
+                _ => {
+                    self.park([at, end], side);
+                    self.house_side([at, end], side, [1.0, 8.0]);
+                }
+            }
+            at = end;
+        }
+    }
+
+    /// Puts a solid `height` tall with its foot at (x, y), `lift` above the ground.
+    fn put(
+        &mut self,
+        class: Class,
+        shape: Shape,
+        at: [f64; 3],
+        height: f64,
+        yaw: f64,
+        surface: Surface,
+    ) {
+        let z = self.scene.ground.height(at[0], at[1]) + at[2] + 0.5 * height;
+        self.scene.put(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
+    }
+
+    /// A box of this length, width and height that stands at (x, y).
+    fn cuboid(&mut self, class: Class, at: [f64; 2], size: [f64; 3], yaw: f64, surface: Surface) {
+        // Sunk a little, so that no ray passes beneath where the ground slopes.
+        let height = size[2] + 0.5;
+        let shape = Shape::cuboid(size[0], size[1], height);
+        self.put(class, shape, [at[0], at[1], -0.5], height, yaw, surface);
+    }
+
+    /// A box with its lower face `at[2]` above the ground.
+    fn raised(&mut self, class: Class, at: [f64; 3], size: [f64; 3], yaw: f64, surface: Surface) {
+        self.put(class, Shape::cuboid(size[0], size[1], size[2]), at, size[2], yaw, surface);
+    }
+
+    /// A clump of leaves of these full extents, its lower end `at[2]` above the ground.
+    fn leaves(&mut self, at: [f64; 3], size: [f64; 3], porosity: f64) {
+        let tilt = DQuat::from_rotation_y(self.rng.range(-0.3, 0.3));
+        let turn = DQuat::from_rotation_z(self.rng.range(0.0, 3.0));
+        let z = self.scene.ground.height(at[0], at[1]) + at[2] + 0.5 * size[2];
+        let pose = Pose::new(turn * tilt, DVec3::new(at[0], at[1], z));
+        let shape = Shape::ellipsoid(0.5 * size[0], 0.5 * size[1], 0.5 * size[2]);
+        let surface = Surface::porous(self.rng.range(0.3, 0.6), porosity);
+        self.scene.put(Class::Vegetation, shape, pose, surface);
+    }
+
+    fn pole(&mut self, x: f64, y: f64, radius: f64, height: f64) {
+        let shape = Shape::cylinder(radius, height + 0.2);
+        self.put(Class::Pole, shape, [x, y, -0.2], height + 0.2, 0.0, Surface::matt(0.4));
+    }
+
+    /// Whether (a stretch around) x lies where the crossing road or its sidewalks are.
+    fn in_crossing(&self, x: f64, half: f64) -> bool {
+        (x - self.crossing).abs() < CROSS_HALF + 3.0 + half
+    }
+
+    /// Whole number from `from` up to but excluding `to`.
+    fn count(&mut self, from: u32, to: u32) -> u32 {
+        from + (self.rng.unit() * f64::from(to - from)) as u32
+    }
+}

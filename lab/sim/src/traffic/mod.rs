@@ -1,0 +1,155 @@
+//! Traffic: vehicles of all kinds, parked and moving, and pedestrians, on paths that keep clear of
+//! each other and of the vehicle that carries the sensors.
+
+mod footprint;
+mod routes;
+
+use crate::ego::{LANE, Plan};
+use crate::ground::{CROSS_HALF, ROAD_HALF};
+use crate::models;
+use crate::object::Object;
+use crate::path::Path;
+use crate::rng::Rng;
+use crate::scene::Scene;
+use crate::street::Extent;
+use footprint::{Footprint, obstacle};
+use routes::Routes;
+use std::f64::consts::PI;
+
+type Model = fn(u32, Path, &mut Rng) -> Object;
+
+/// Tries to find a clear path for somebody.
+const TRIES: u32 = 12;
+
+/// Who drives: share of all that drive, model, and whether it is short enough to turn.
+const DRIVERS: [(f64, Model, bool); 6] = [
+    (0.62, models::car, true),
+    (0.12, models::van, true),
+    (0.07, models::motorcycle, true),
+    (0.09, models::truck, false),
+    (0.05, models::bus, false),
+    (0.05, models::tram, false),
+];
+
+/// Fills the scene with traffic; `density` 1 is a busy street.
+pub(crate) fn fill(
+    scene: &mut Scene,
+    extent: Extent,
+    plan: &Plan,
+    duration_s: f64,
+    density: f64,
+    rng: &mut Rng,
+) {
+    let mut taken = vec![Footprint::new(&plan.path, 4.6, 1.9, duration_s)];
+    taken.extend(scene.fixtures.iter().filter_map(obstacle));
+    let mut fill = Fill { scene, plan, duration_s, taken, rng };
+    fill.park(extent.x, density);
+    let amount =
+        |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
+    // First those that need most room.
+    for _ in 0..amount(2.0, 0.2) {
+        fill.overtaking();
+    }
+    for _ in 0..amount(12.0, 0.8) {
+        fill.driver();
+    }
+    for _ in 0..amount(5.0, 0.2) {
+        fill.mover(models::cyclist, |r| r.rider());
+    }
+    for _ in 0..amount(16.0, 0.5) {
+        fill.mover(models::pedestrian, |r| r.walker());
+    }
+}
+
+struct Fill<'a> {
+    scene: &'a mut Scene,
+    plan: &'a Plan,
+    duration_s: f64,
+    taken: Vec<Footprint>,
+    rng: &'a mut Rng,
+}
+
+impl Fill<'_> {
+    /// Adds the object if its path is clear.
+    fn offer(&mut self, model: Model, path: Path) -> bool {
+        let object = model(self.scene.objects.len() as u32 + 1, path, self.rng);
+        let footprint =
+            Footprint::new(&object.path, object.size[0], object.size[1], self.duration_s);
+        if self.taken.iter().any(|other| footprint.touches(other)) {
+            return false;
+        }
+        self.taken.push(footprint);
+        self.scene.objects.push(object);
+        true
+    }
+
+    fn routes(&mut self) -> Routes<'_> {
+        Routes { plan: self.plan, duration_s: self.duration_s, rng: self.rng }
+    }
+
+    /// Tries paths until one is clear; the path that was, if any.
+    fn mover(&mut self, model: Model, route: impl Fn(&mut Routes) -> Path) -> Option<Path> {
+        (0..TRIES).find_map(|_| {
+            let path = route(&mut self.routes());
+            self.offer(model, path.clone()).then_some(path)
+        })
+    }
+
+    /// One of [`DRIVERS`].
+    fn draw(&mut self) -> (Model, bool) {
+        let mut left = self.rng.unit();
+        let drawn = DRIVERS.iter().find(|(share, ..)| {
+            left -= share;
+            left < 0.0
+        });
+        let (_, model, nimble) = *drawn.unwrap_or(&DRIVERS[0]);
+        (model, nimble)
+    }
+
+    /// A vehicle on the main road, on the crossing road, or between the two.
+    fn driver(&mut self) {
+        let (model, nimble) = self.draw();
+        self.mover(model, |r| if nimble { r.driver() } else { r.heavy() });
+    }
+
+    /// Somebody slow and a car that passes it; in every third case the slow one is the vehicle
+    /// that carries the sensors.
+    fn overtaking(&mut self) {
+        let slow = if self.rng.chance(0.33) {
+            Some(self.plan.path.clone())
+        } else {
+            let (model, _) = self.draw();
+            self.mover(model, |r| r.along(LANE, 2.5, 6.5))
+        };
+        if let Some(slow) = slow {
+            self.mover(models::car, |r| r.past(&slow));
+        }
+    }
+
+    /// Parked vehicles on both parking strips, away from the crossing.
+    fn park(&mut self, x: [f64; 2], density: f64) {
+        for side in [-1.0, 1.0] {
+            let mut at = x[0];
+            while at < x[1] {
+                at += self.rng.range(5.4, 7.5);
+                if !self.rng.chance(0.5 * density)
+                    || (at - self.plan.crossing).abs() < CROSS_HALF + 8.0
+                {
+                    continue;
+                }
+                let against = if self.rng.chance(0.15) { PI } else { 0.0 };
+                let yaw = if side < 0.0 { 0.0 } else { PI } + against + 0.03 * self.rng.bell();
+                let y = side * (ROAD_HALF - 1.1 + self.rng.range(-0.08, 0.08));
+                let model: Model = match (self.rng.unit() * 20.0) as u32 {
+                    0..16 => models::car,
+                    16..19 => models::van,
+                    _ => models::truck,
+                };
+                self.offer(model, Path::standing(at, y, yaw));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

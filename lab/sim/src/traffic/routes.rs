@@ -1,0 +1,139 @@
+//! Paths that people take: along, across, turning, braking, overtaking.
+
+use crate::ego::{LANE, Plan};
+use crate::ground::ROAD_HALF;
+use crate::path::{Path, State};
+use crate::rng::Rng;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Draws paths that meet the vehicle's during a drive.
+pub(super) struct Routes<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) duration_s: f64,
+    pub(super) rng: &'a mut Rng,
+}
+
+impl Routes<'_> {
+    /// A time during the drive and a place abeam of the vehicle's then.
+    fn meeting(&mut self) -> (f64, f64) {
+        let t = self.rng.range(0.0, self.duration_s);
+        let reach = 20.0 + 45.0 * self.rng.unit();
+        (t, self.plan.path.at(t).x + self.rng.range(-reach, reach))
+    }
+
+    /// In either lane of the main road, on the crossing road, or turning.
+    pub(super) fn driver(&mut self) -> Path {
+        match (self.rng.unit() * 20.0) as u32 {
+            0..10 => self.along(LANE, 2.0, 18.0),
+            10..14 => self.changing(),
+            14..17 => self.turning(),
+            _ => self.crossing(LANE, 4.0, 12.0),
+        }
+    }
+
+    /// What is too long to turn stays on its road.
+    pub(super) fn heavy(&mut self) -> Path {
+        match (self.rng.unit() * 20.0) as u32 {
+            0..11 => self.along(LANE, 2.0, 13.0),
+            11..16 => self.changing(),
+            _ => self.crossing(LANE, 4.0, 10.0),
+        }
+    }
+
+    pub(super) fn rider(&mut self) -> Path {
+        if self.rng.chance(0.75) { self.along(3.1, 3.0, 6.0) } else { self.crossing(3.2, 3.0, 6.0) }
+    }
+
+    /// Straight along the main road, `beside` its centre line.
+    pub(super) fn along(&mut self, beside: f64, slow: f64, fast: f64) -> Path {
+        let (t, x) = self.meeting();
+        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
+        Path::from(State { x: x - way * speed * t, ..lane(way, beside, speed) })
+    }
+
+    /// Brakes or speeds up, beginning when it meets the vehicle.
+    fn changing(&mut self) -> Path {
+        let (t, x) = self.meeting();
+        let (way, speed) = (self.rng.sign(), self.rng.range(3.0, 14.0));
+        let later = if self.rng.chance(0.6) {
+            self.rng.range(0.0, 0.6 * speed)
+        } else {
+            self.rng.range(speed, 15.0f64.max(speed))
+        };
+        let rate = self.rng.range(1.0, 4.0);
+        let start = State { x: x - way * speed * t, ..lane(way, LANE, speed) };
+        // Half begin before the drive does.
+        let begin = (t - self.rng.range(0.0, 2.0)).max(0.0);
+        let path = Path::from(start).then(begin, 0.0, 0.0);
+        path.then_to_speed(if later < 0.8 { 0.0 } else { later }, rate)
+    }
+
+    /// Past somebody on the main road and back into the lane, a few m/s faster.
+    pub(super) fn past(&mut self, slow: &Path) -> Path {
+        let abreast = self.rng.range(0.0, self.duration_s);
+        let other = slow.at(abreast);
+        let way = if other.yaw.cos() < 0.0 { -1.0 } else { 1.0 };
+        let speed = (other.speed + self.rng.range(4.0, 8.0)).max(7.0);
+        let aside = self.rng.range(2.8, 3.5);
+        // The lane is left this far behind the other, and taken again this far ahead of it.
+        let (gap, change) = (self.rng.range(9.0, 14.0), self.rng.range(16.0, 24.0));
+        let before = gap / (speed - other.speed) + change / speed;
+        let start = State { x: other.x - way * speed * before, ..lane(way, LANE, speed) };
+        let path = Path::starting(abreast - before, start).then_shift(aside, change);
+        path.then(2.0 * gap / (speed - other.speed), 0.0, 0.0).then_shift(-aside, change)
+    }
+
+    /// From the main road into the crossing road, at constant yaw rate.
+    fn turning(&mut self) -> Path {
+        let (way, speed) = (self.rng.sign(), self.rng.range(3.5, 6.5));
+        let left = self.rng.chance(0.4);
+        let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
+        let before = self.rng.range(0.0, self.duration_s.max(2.0));
+        // Relative to the crossing and along the way: where the turn begins so that it ends in
+        // the right lane.
+        let begin = if left { LANE - radius } else { -LANE - radius };
+        let x = self.plan.crossing + way * (begin - speed * before);
+        let start = State { x, ..lane(way, LANE, speed) };
+        Path::from(start).then(before, 0.0, 0.0).then_turn(angle, radius)
+    }
+
+    /// Along the crossing road.
+    fn crossing(&mut self, beside: f64, slow: f64, fast: f64) -> Path {
+        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
+        let t = self.rng.range(-2.0, self.duration_s + 2.0);
+        let state = State {
+            x: self.plan.crossing + way * beside,
+            y: -way * speed * t,
+            yaw: way * FRAC_PI_2,
+            speed,
+        };
+        Path::from(state)
+    }
+
+    /// On a sidewalk, standing there, or crossing the main road.
+    pub(super) fn walker(&mut self) -> Path {
+        let (t, x) = self.meeting();
+        let (way, side) = (self.rng.sign(), self.rng.sign());
+        let speed = self.rng.range(0.8, 2.0);
+        let y = side * (ROAD_HALF + self.rng.range(1.4, 3.2));
+        let yaw = if way > 0.0 { 0.0 } else { PI };
+        match (self.rng.unit() * 10.0) as u32 {
+            0 => Path::standing(x, y, self.rng.range(-PI, PI)),
+            1..4 => {
+                let before = t * self.rng.unit();
+                let start = State { x: x - way * speed * before, y, yaw, speed };
+                // Left or right by a quarter onto the road, back along the other sidewalk.
+                let quarter = -side * way * FRAC_PI_2;
+                let path = Path::from(start).then(before, 0.0, 0.0).then_turn(quarter, 0.8);
+                let over = 2.0 * (y.abs() - 0.8);
+                path.then(over / speed, 0.0, 0.0).then_turn(-quarter, 0.8)
+            }
+            _ => Path::from(State { x: x - way * speed * t, y, yaw, speed }),
+        }
+    }
+}
+
+/// Start in a lane of the main road, heading along +x or -x, on the right side of it.
+fn lane(way: f64, beside: f64, speed: f64) -> State {
+    State { x: 0.0, y: -way * beside, yaw: if way > 0.0 { 0.0 } else { PI }, speed }
+}

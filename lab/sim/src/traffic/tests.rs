@@ -1,0 +1,69 @@
+//! That what traffic is to show occurs.
+
+use crate::ego::Ego;
+use crate::object::Class;
+use crate::path::State;
+use crate::scene::Scene;
+use std::collections::BTreeSet;
+
+const DURATION_S: f64 = 6.0;
+
+/// States of everybody every half second; the vehicle last.
+fn states(seed: u64) -> (Vec<Class>, Vec<Vec<State>>) {
+    let plan = Ego::Any.plan(seed, DURATION_S);
+    let scene = Scene::around(seed, &plan, DURATION_S, 1.0);
+    let times: Vec<f64> = (0..=12).map(|i| 0.5 * f64::from(i)).collect();
+    let paths = scene.objects.iter().map(|o| &o.path).chain([&plan.path]);
+    let states = paths.map(|p| times.iter().map(|&t| p.at(t)).collect()).collect();
+    (scene.objects.iter().map(|o| o.class).collect(), states)
+}
+
+/// Whether `a` gets from behind `b` to before it, both going the same way beside each other.
+fn passes(a: &[State], b: &[State]) -> bool {
+    let ahead = |i: usize| {
+        let (s, c) = b[i].yaw.sin_cos();
+        let (x, y) = (a[i].x - b[i].x, a[i].y - b[i].y);
+        let beside = (a[i].yaw - b[i].yaw).cos() > 0.9 && (c * y - s * x).abs() < 4.5;
+        (c * x + s * y, beside)
+    };
+    (1..a.len()).any(|i| {
+        let ((before, near), (after, still_near)) = (ahead(i - 1), ahead(i));
+        before < 0.0 && after > 0.0 && near && still_near
+    })
+}
+
+#[test]
+fn manoeuvres_of_all_kinds() {
+    let mut seen = BTreeSet::new();
+    let mut classes = BTreeSet::new();
+    for seed in 0..12 {
+        let (kinds, all) = states(seed);
+        classes.extend(kinds.iter().copied());
+        let ego = &all[kinds.len()];
+        for (class, path) in kinds.iter().zip(&all).filter(|(_, p)| p[0].speed > 1.0) {
+            let (first, last) = (path[0], path[path.len() - 1]);
+            let drives = *class <= Class::Motorcycle;
+            if drives && last.speed < first.speed - 2.0 {
+                seen.insert("brakes");
+            }
+            if drives && (last.yaw - first.yaw).abs() > 1.2 {
+                seen.insert("turns");
+            }
+            if drives && (first.yaw.cos().abs() < 0.1) && first.y * last.y < 0.0 {
+                seen.insert("crosses the main road");
+            }
+            if *class == Class::Pedestrian && first.y * last.y < 0.0 {
+                seen.insert("walks across");
+            }
+            if drives && passes(path, ego) {
+                seen.insert("overtakes the vehicle");
+            }
+            let moving = all[..kinds.len()].iter().filter(|p| p[0].speed > 1.0);
+            if drives && moving.into_iter().any(|other| passes(path, other)) {
+                seen.insert("overtakes another");
+            }
+        }
+    }
+    assert_eq!(seen.len(), 6, "{seen:?}");
+    assert_eq!(classes.len(), 8, "{classes:?}");
+}
