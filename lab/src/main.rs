@@ -18,7 +18,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
-        Command::Train(command) => train::run(&command).map_err(Into::into),
+        Command::Train(command) => train::run(&command),
         Command::CheckFilter(args) => check::run(&args),
     };
     match done {

@@ -57,25 +57,27 @@ struct Measured {
     moving: Ranking,
 }
 
-/// What a drive yields: samples, and where it is held out its pairs.
+/// What a drive yields: samples, and its pairs where it is held out.
 type Yield = (Vec<Sample>, Vec<Pair>);
 
 /// Trains, writes and reports.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let plan = args.inputs.plan()?;
-    let mut others = Vec::new();
-    for path in &args.beside {
-        others.push((path.display().to_string(), fs::read_to_string(path).map_err(Error::reading(path))?));
-    }
+    let read = |path: &PathBuf| {
+        let text = fs::read_to_string(path).map_err(Error::reading(path))?;
+        Ok((path.display().to_string(), text))
+    };
+    let beside: Vec<(String, String)> = args.beside.iter().map(read).collect::<Result<_, Error>>()?;
+    let (text, report) = learn(&args.inputs, &beside)?;
+    args.outputs.write(&text, &report)
+}
+
+/// The weights file, and how it came about; `beside` are names and texts of others.
+fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report), Error> {
+    let plan = inputs.plan()?;
     let (mut training, mut held_out, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
-    let drives = args.inputs.visit(&plan, &of_drive)?;
-    for ((samples, of_drive), planned) in drives.into_iter().zip(&plan) {
-        if planned.held_out {
-            held_out.extend(samples);
-            pairs.extend(of_drive);
-        } else {
-            training.extend(samples);
-        }
+    for ((samples, of_drive), planned) in inputs.visit(&plan, &of_drive)?.into_iter().zip(&plan) {
+        if planned.held_out { &mut held_out } else { &mut training }.extend(samples);
+        pairs.extend(of_drive);
     }
     let counts = [&training, &held_out].map(|s| Counts::of(s.iter().map(|s| s.same)));
     for (count, part) in counts.iter().zip(["training", "held-out"]) {
@@ -87,21 +89,20 @@ pub fn run(args: &Args) -> Result<(), Error> {
         progress.push(Progress { training, held_out: checked.loss(weights) });
     });
     let integers = quantise(&weights, SCALE);
-    let inputs = args.inputs.provenance();
+    let inputs = inputs.provenance();
     let write = |provenance: &str| text("constancy", &[3, LEVELS], SCALE, &integers, provenance);
-    let ours = measure("written", &write(""), &checked, &pairs)?;
+    let ours = measure("written", &write("untold"), &checked, &pairs)?;
     let provenance = format!(
         "raywake-lab train constancy, {inputs}, logistic regression, held-out log loss {:.4}, AUC \
-         {:.4}, moving columns whose true target costs least {:.3}",
-        ours.log_loss, ours.auc, ours.moving.first
+         {:.4}, true target first {:.3} standing {:.3} moving",
+        ours.log_loss, ours.auc, ours.standing.first, ours.moving.first
     );
     let mut measured = vec![ours];
-    for (name, text) in &others {
+    for (name, text) in beside {
         measured.push(measure(name, text, &checked, &pairs)?);
     }
     let [training, held_out] = counts;
-    args.outputs
-        .write(&write(&provenance), &Report { inputs, training, held_out, progress, measured })
+    Ok((write(&provenance), Report { inputs, training, held_out, progress, measured }))
 }
 
 fn of_drive(mut visit: Visit) -> Result<Yield, Error> {
@@ -147,4 +148,29 @@ fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measur
     let [standing, moving] = counts.map(Ranking::shares);
     let log_loss = data.loss(&weights);
     Ok(Measured { name: name.into(), log_loss, auc: curve.auc(), standing, moving })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_core::occupancy_constancy::SHIPPED;
+
+    #[test]
+    fn the_same_bytes_from_the_same_seed() {
+        let inputs = Inputs { drives: 5, sweeps: 1, seed: 3, ..Inputs::default() };
+        let shipped = [("shipped".to_string(), SHIPPED.to_string())];
+        let (text, report) = learn(&inputs, &shipped).unwrap();
+        let (again, _) = learn(&inputs, &[]).unwrap();
+        assert!(text == again);
+        let [ours, other] = &report.measured[..] else { panic!("two were measured") };
+        assert!(ours.log_loss < std::f64::consts::LN_2 && ours.log_loss != other.log_loss);
+        assert!(ours.standing.columns > 100 && ours.standing.first > 0.1, "{:?}", ours.standing);
+    }
+
+    #[test]
+    fn damaged_weights_beside_are_named() {
+        let checked = data(&[], 0.0);
+        let error = measure("old.txt", "nothing", &checked, &[]).unwrap_err().to_string();
+        assert!(error.contains("old.txt"), "{error}");
+    }
 }

@@ -79,3 +79,53 @@ fn target(side: i32, source: usize, [du, dv]: [i32; 2]) -> Option<usize> {
     let inside = (0..side).contains(&i) && (0..side).contains(&j);
     inside.then_some((i * side + j) as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake_core::record::Step;
+
+    #[test]
+    fn features_of_two_columns() {
+        let column = |free: u32, occupied: u32| [free | occupied << 16, 1];
+        let f = features(column(0b0111, 0b1000), column(0b1001, 0b0110));
+        assert_eq!(f[..4], [1, 0, 0, 0]);
+        assert_eq!(f[LEVELS..LEVELS + 4], [0, 0, 0, 0]);
+        assert_eq!(f[2 * LEVELS..2 * LEVELS + 4], [0, 1, 1, 1]);
+        assert_eq!(f.iter().map(|f| u32::from(*f)).sum::<u32>(), 4);
+        let same = features(column(0, 1 << 13), column(0, 1 << 13));
+        assert_eq!((same[2 * LEVELS - 1], same.iter().map(|f| u32::from(*f)).sum::<u32>()), (1, 1));
+    }
+
+    #[test]
+    fn one_true_pair_and_others_from_where_they_are_sought() {
+        // Every column is as unlike any other as 14 levels allow.
+        let mark = |n: u32| [(n & 0x3fff) | (!n & 0x3fff) << 16, 1];
+        let columns: Vec<Column> = (0..61 * 61).map(mark).collect();
+        let matches = vec![
+            Match { source: 30 * 61 + 30, displacement: [4, -3], moving: true },
+            Match { source: 0, displacement: [0, 0], moving: false },
+        ];
+        let step = Step { side: 61, levels: 14, ..Default::default() };
+        let pair = Pair { step, before: columns.clone(), now: columns, matches };
+        let mut found = Vec::new();
+        samples(&pair, &mut Rng::new(1), &mut found);
+        let first = found.iter().position(|s| !s.moving).unwrap();
+        let truth = features(mark(30 * 61 + 30), mark(34 * 61 + 27));
+        assert_eq!(found[0], Sample { features: truth, same: true, moving: true });
+        assert_eq!(first, 1 + EVEN + NEAR);
+        assert!(found[1..first].iter().all(|s| !s.same && s.features != truth));
+        // In the corner most others lie outside the window, and are left out.
+        assert!(found[first].same && found.len() < 2 * first);
+    }
+
+    #[test]
+    fn others_keep_to_their_square() {
+        let m = Match { source: 0, displacement: [1, 1], moving: false };
+        let mut rng = Rng::new(2);
+        let drawn: Vec<_> = (0..2000).map(|_| other(&m, [0, 2], 2, &mut rng)).collect();
+        let distinct: std::collections::HashSet<_> = drawn.iter().collect();
+        assert_eq!(distinct.len(), 24);
+        assert!(drawn.iter().all(|d| d[0].abs() <= 2 && (d[1] - 2).abs() <= 2 && *d != [1, 1]));
+    }
+}

@@ -51,8 +51,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !(0.5..1.0).contains(&args.keep) {
         return Err(Error::Usage("--keep must be at least 0.5 and below 1".into()));
     }
-    let plan = args.inputs.plan()?;
-    let drives = args.inputs.visit(&plan, &of_drive)?;
+    let (text, report) = learn(&args.inputs, args.keep)?;
+    args.outputs.write(&text, &report)
+}
+
+/// The weights file, and how it came about.
+fn learn(inputs: &Inputs, keep: f64) -> Result<(String, Report), Error> {
+    let plan = inputs.plan()?;
+    let drives = inputs.visit(&plan, &of_drive)?;
     let (mut training, mut held_out) = (Vec::new(), Vec::new());
     for (samples, planned) in drives.into_iter().zip(&plan) {
         if planned.held_out { &mut held_out } else { &mut training }.extend(samples);
@@ -67,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     });
 
     let curve = curve(&checked, |row| Data::score(&weights, row));
-    let cut = curve.at_recall(args.keep).threshold;
+    let cut = curve.at_recall(keep).threshold;
     let (auc, at_95) = (curve.auc(), curve.at_recall(DISSERTATION_KEPT));
     let curve = RECALLS.map(|r| curve.at_recall(r)).to_vec();
     // The threshold is part of the bias.
@@ -75,34 +81,36 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let integers = quantise(&weights, SCALE);
     let rounded: Vec<f64> = integers.iter().map(|w| f64::from(*w)).collect();
     let written = self::curve(&checked, |row| Data::score(&rounded, row)).above(0.0);
-    let inputs = args.inputs.provenance();
+    let inputs = inputs.provenance();
     let provenance = format!(
         "raywake-lab train filter, {inputs}, logistic regression, held-out recall {:.3}, \
          background accuracy {:.3}, precision {:.3}, AUC {auc:.4}",
         written.recall, written.background_accuracy, written.precision
     );
-    let mut all = expand(&integers[..WIDTH]);
-    all.push(integers[WIDTH]);
-    let text = text("background", &[PATCH * PATCH, 2, LEVELS], SCALE, &all, &provenance);
+    let text = file(&integers, &provenance);
     load(&text, LEVELS, &mut vec![0; TABLE_WORDS])
         .map_err(|e| Error::Usage(format!("the weights learned cannot be used: {e}")))?;
     let [training, held_out] = counts;
     let largest = integers.iter().map(|w| w.abs()).max().unwrap_or(0);
-    let largest_weight = f64::from(largest) / SCALE;
-    args.outputs.write(
-        &text,
-        &Report {
-            inputs,
-            training,
-            held_out,
-            progress,
-            auc,
-            at_95,
-            written,
-            curve,
-            largest_weight,
-        },
-    )
+    let report = Report {
+        inputs,
+        training,
+        held_out,
+        progress,
+        auc,
+        at_95,
+        written,
+        curve,
+        largest_weight: f64::from(largest) / SCALE,
+    };
+    Ok((text, report))
+}
+
+/// The weights file of integers per orbit, bias last.
+fn file(integers: &[i32], provenance: &str) -> String {
+    let mut all = expand(&integers[..WIDTH]);
+    all.push(integers[WIDTH]);
+    text("background", &[PATCH * PATCH, 2, LEVELS], SCALE, &all, provenance)
 }
 
 fn of_drive(mut visit: Visit) -> Result<Vec<Sample>, Error> {
@@ -131,4 +139,55 @@ fn curve(data: &Data, score: impl Fn(&[u8]) -> f64) -> Curve {
     let rows = data.rows.chunks_exact(WIDTH).zip(&data.labels);
     Curve::of(rows.map(|(row, &label)| (score(row), label, weight(label))))
         .expect("both classes were counted")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::features::features;
+    use raywake_core::background_filter::score;
+    use raywake_core::record::{Column, Step};
+
+    #[test]
+    fn the_same_bytes_from_the_same_seed() {
+        let inputs = |seed| Inputs { drives: 5, sweeps: 1, seed, ..Inputs::default() };
+        let (text, report) = learn(&inputs(3), 0.97).unwrap();
+        let (again, _) = learn(&inputs(3), 0.97).unwrap();
+        assert!(text == again);
+        assert!(learn(&inputs(4), 0.97).unwrap().0 != text);
+        assert!(text.contains("seed 3") && text.contains("held-out recall"));
+        assert!(report.auc > 0.8, "{}", report.auc);
+        let losses: Vec<f64> = report.progress.iter().map(|p| p.training).collect();
+        assert!(losses.len() > 2 && losses.is_sorted_by(|a, b| a >= b));
+        // The threshold within the bias, after rounding.
+        assert!((report.written.recall - 0.97).abs() < 0.005, "{:?}", report.written);
+    }
+
+    #[test]
+    fn read_back_with_identical_scores() {
+        let mut rng = raywake_sim::Rng::new(3);
+        let weights: Vec<f64> = (0..WIDTH + 1).map(|_| rng.range(-2.0, 2.0)).collect();
+        let integers = quantise(&weights, SCALE);
+        let mut table = vec![0; TABLE_WORDS];
+        load(&file(&integers, "test"), LEVELS, &mut table).unwrap();
+        let step = Step { side: 7, levels: 14, ..Default::default() };
+        let columns: Vec<Column> = (0..49)
+            .map(|_| {
+                let free = rng.bits() as u32 & 0x3fff;
+                [free | (!free & rng.bits() as u32 & 0x3fff) << 16, 1]
+            })
+            .collect();
+        for index in 0..49 {
+            let row = features(&step, &columns, index);
+            let sum: i32 = row.iter().zip(&integers).map(|(x, w)| i32::from(*x) * w).sum();
+            assert_eq!(score(&step, &table, &columns, index), sum + integers[WIDTH]);
+        }
+    }
+
+    #[test]
+    fn a_share_that_is_none_is_refused() {
+        let outputs = Outputs { out: "nowhere".into(), report: None };
+        let args = Args { inputs: Inputs::default(), outputs, keep: f64::NAN };
+        assert!(run(&args).unwrap_err().to_string().contains("--keep"));
+    }
 }

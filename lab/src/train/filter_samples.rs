@@ -17,8 +17,6 @@ pub struct Sample {
     pub features: Features,
     /// Whether it belongs to something that could move, even if it does not.
     pub foreground: bool,
-    /// Distance from the vehicle, m.
-    pub range_m: f32,
 }
 
 /// Samples of one sweep of a drive.
@@ -39,8 +37,41 @@ pub fn of_sweep(
             _ => continue,
         };
         let features = features(&grid.step, &grid.columns, column);
-        let range_m = grid.centre(&window, column).truncate().length() as f32;
-        samples.push(Sample { features, foreground, range_m });
+        samples.push(Sample { features, foreground });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::simulated::Simulated;
+    use raywake_core::params::Profile;
+    use raywake_sim::{Class, Drive, Options, Path, Scene, SensorRig, Shape, Surface};
+
+    #[test]
+    fn a_car_is_foreground_and_a_wall_is_not() {
+        let of = |car: bool, wall: bool| {
+            let mut scene = Scene::empty();
+            if car {
+                scene.add_car(Path::standing(10.0, 0.0, 0.3), 1);
+            }
+            if wall {
+                let pose = raywake_core::pose::Pose::planar(0.0, 9.0, 1.5, 0.0);
+                scene.put(Class::Building, Shape::cuboid(20.0, 0.5, 3.0), pose, Surface::matt(0.5));
+            }
+            let options = Options { sweeps: 1, rig: SensorRig::ideal(), ..Options::default() };
+            let path = Path::standing(0.0, 0.0, 0.0);
+            let mut drive = Simulated::new(Drive::through(scene, path, 1, options));
+            let (mut grid, mut samples) = (Grid::new(Profile::hdl64()), Vec::new());
+            let mut sweep = LabelledSweep::default();
+            of_sweep(&mut grid, &mut drive, 0, &mut sweep, &mut Rng::new(1), &mut samples).unwrap();
+            samples
+        };
+        let foreground = |samples: &[Sample]| samples.iter().filter(|s| s.foreground).count();
+        let (nothing, wall, car) = (of(false, false), of(false, true), of(true, false));
+        assert_eq!((foreground(&nothing), foreground(&wall)), (0, 0));
+        assert!((10..150).contains(&foreground(&car)), "{}", foreground(&car));
+        assert!(nothing.len() > 100);
+    }
 }

@@ -16,7 +16,7 @@ const STRIDE: usize = 7;
 const HELD_OUT: usize = 5;
 
 /// What to learn from.
-#[derive(clap::Args, Clone, Debug)]
+#[derive(clap::Args, Clone, Debug, Default)]
 pub struct Inputs {
     /// Simulated drives; every fifth is held out.
     #[arg(long, default_value_t = 125, value_parser = clap::value_parser!(u32).range(0..=10_000))]
@@ -148,5 +148,47 @@ impl Inputs {
             line += &format!(" and recorded drives {}", names.join(" "));
         }
         line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorded(data: &[&str], held_out: &[&str]) -> Inputs {
+        let data = data.iter().map(PathBuf::from).collect();
+        let held_out = held_out.iter().map(|n| n.to_string()).collect();
+        Inputs { data, held_out, sweeps: 1, ..Inputs::default() }
+    }
+
+    fn held_out(inputs: &Inputs) -> Vec<usize> {
+        let plan = inputs.plan().unwrap();
+        (0..plan.len()).filter(|n| plan[*n].held_out).collect()
+    }
+
+    #[test]
+    fn every_fifth_or_by_name() {
+        let mixed = Inputs { drives: 6, ..recorded(&["a/1", "a/2", "a/3", "a/4", "a/5"], &[]) };
+        assert_eq!(held_out(&mixed), [4, 10]);
+        let named = Inputs { drives: 6, ..recorded(&["a/1", "b/2"], &["1"]) };
+        assert_eq!(held_out(&named), [4, 6]);
+        assert_eq!(held_out(&recorded(&["a/1", "b/2"], &["2"])), [1]);
+    }
+
+    #[test]
+    fn parts_without_drives_are_refused() {
+        let error = |inputs: &Inputs| inputs.plan().unwrap_err().to_string();
+        assert!(error(&Inputs::default()).contains("to learn from"));
+        assert!(error(&Inputs { drives: 4, ..Inputs::default() }).contains("held out"));
+        assert!(error(&recorded(&["a/1"], &["1"])).contains("to learn from"));
+        assert!(error(&recorded(&["a/1", "a/2"], &["3"])).contains("--held-out 3"));
+    }
+
+    #[test]
+    fn an_unreadable_drive_is_named() {
+        let inputs = recorded(&["/nowhere/a", "/nowhere/b"], &["b"]);
+        let plan = inputs.plan().unwrap();
+        let error = inputs.visit(&plan, &|_| Ok(())).unwrap_err().to_string();
+        assert!(error.contains("/nowhere/a"), "{error}");
     }
 }

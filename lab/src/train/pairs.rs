@@ -7,6 +7,7 @@ use raywake::error::Error;
 use raywake_core::continuity::Limits;
 use raywake_core::grid::shift::shift;
 use raywake_core::params::REACH;
+use raywake_core::prepare::Window;
 use raywake_core::record::{Column, Step};
 use std::collections::HashMap;
 
@@ -84,7 +85,7 @@ pub fn pair(
 /// grid; those that go farther than the search are left out.
 fn displaced(
     grid: &Grid,
-    window: &raywake_core::prepare::Window,
+    window: &Window,
     drive: &dyn Labelled,
     first: &LabelledSweep,
     second: &LabelledSweep,
@@ -114,4 +115,47 @@ fn displaced(
         near.then_some(Match { source, displacement, moving })
     });
     moved.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::simulated::Simulated;
+    use raywake_core::params::Profile;
+    use raywake_sim::{Drive, Options, Path, Scene, SensorRig, State};
+
+    /// A car ahead at 9 m/s to the left, one parked, one that goes farther than the search; the
+    /// vehicle drives at `speed`.
+    fn scene(speed: f64) -> Simulated {
+        let mut scene = Scene::empty();
+        let way = |x, y, yaw, speed| Path::from(State { x, y, yaw, speed });
+        scene.add_car(way(12.0, 0.0, std::f64::consts::FRAC_PI_2, 9.0), 1);
+        scene.add_car(Path::standing(5.0, -8.0, 0.3), 2);
+        scene.add_car(way(-10.0, 6.0, 0.0, 55.0), 3);
+        let options = Options { sweeps: 3, rig: SensorRig::ideal(), ..Options::default() };
+        Simulated::new(Drive::through(scene, way(0.0, 0.0, 0.0, speed), 1, options))
+    }
+
+    #[test]
+    fn columns_of_a_scene_made_by_hand() {
+        for speed in [0.0, 8.0] {
+            let mut drive = scene(speed);
+            let mut grid = Grid::new(Profile::hdl64());
+            let pair = pair(&mut grid, &mut drive, 1, &mut Sweeps::default()).unwrap().unwrap();
+            let count = |wanted: &dyn Fn(&Match) -> bool| {
+                pair.matches.iter().filter(|m| wanted(m)).count()
+            };
+            // 0.9 m are three cells, whatever the vehicle does; a third of them seen.
+            assert!(count(&|m| m.moving) > 8 && count(&|m| !m.moving) > 8);
+            assert!(pair.matches.iter().all(|m| {
+                m.displacement == if m.moving { [0, 3] } else { [0, 0] }
+            }));
+            assert!(pair.matches.iter().all(|m| pair.before[m.source][1] != 0));
+            // Where the parked car's columns were, they still are.
+            let side = pair.step.side as usize;
+            let stays = count(&|m| !m.moving && pair.now[m.source][1] != 0);
+            assert!(stays * 10 > count(&|m| !m.moving) * 8);
+            assert!(pair.now.len() == side * side && pair.before.len() == side * side);
+        }
+    }
 }

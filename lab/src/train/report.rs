@@ -61,3 +61,18 @@ impl Counts {
         Err(Error::Usage(format!("the {part} drives hold no {missing}")))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_class_is_named() {
+        let counts = |labels: &[bool]| Counts::of(labels.iter().copied());
+        let error = |labels: &[bool]| counts(labels).both("held-out", "cars", "trees");
+        assert!(error(&[true, false]).is_ok());
+        assert!(error(&[false]).unwrap_err().to_string().contains("held-out drives hold no cars"));
+        assert!(error(&[true]).unwrap_err().to_string().contains("no trees"));
+        assert!(error(&[]).is_err());
+    }
+}

@@ -84,6 +84,10 @@ fn kind(class: Class) -> Kind {
     match class {
         Class::Car => Kind::Car,
         Class::Van => Kind::Van,
+        Class::Truck => Kind::Truck,
+        Class::Bus => Kind::Bus,
+        Class::Tram => Kind::Tram,
+        Class::Motorcycle => Kind::Motorcycle,
         Class::Cyclist => Kind::Cyclist,
         Class::Pedestrian => Kind::Pedestrian,
         _ => Kind::Other,
