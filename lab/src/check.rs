@@ -120,7 +120,16 @@ fn print(scored: &Scored, curve: &Curve) {
     println!("area under curve   {:.4}", curve.auc());
     for (kind, [missed, kept]) in by_kind {
         let share = kept as f64 / (kept + missed) as f64;
-        println!("  {:<16} {:>8} columns, {:.2} % kept", format!("{kind:?}"), kept + missed, percent(share));
+        println!(
+            "  {:<16} {:>8} columns, {:.2} % kept",
+            format!("{kind:?}"),
+            kept + missed,
+            percent(share)
+        );
     }
-    println!("solid per sweep    {:.0}, {:.0} of them marked", per_sweep(scored.solid), per_sweep(scored.marked));
+    println!(
+        "solid per sweep    {:.0}, {:.0} of them marked",
+        per_sweep(scored.solid),
+        per_sweep(scored.marked)
+    );
 }

@@ -62,9 +62,9 @@ impl Grid {
     /// Fills `columns` and `of_point` from a sweep; returns where the window lies.
     pub fn sweep(&mut self, rig: &Rig, sweep: &Sweep) -> Window {
         let pose = &sweep.world_from_vehicle;
-        let origin = self.lattice_origin.unwrap_or_else(|| {
-            place(&self.profile, rig, pose, None).lattice_origin + self.offset
-        });
+        let origin = self
+            .lattice_origin
+            .unwrap_or_else(|| place(&self.profile, rig, pose, None).lattice_origin + self.offset);
         self.lattice_origin = Some(origin);
         let window = place(&self.profile, rig, pose, Some(origin));
         let (count, _) = self.preparation.prepare(

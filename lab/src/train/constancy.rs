@@ -1,6 +1,6 @@
 //! `raywake-lab train constancy`: the occupancy constancy (section 3.5.1).
 
-use super::constancy_samples::{DRAW, Sample, WIDTH, samples};
+use super::constancy_samples::{Sample, WIDTH, samples};
 use super::curve::Curve;
 use super::features::LEVELS;
 use super::inputs::{Inputs, Visit};
@@ -34,7 +34,7 @@ pub struct Args {
     beside: Vec<PathBuf>,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct Report {
     inputs: String,
     training: Counts,
@@ -45,7 +45,7 @@ struct Report {
 }
 
 /// Weights on held-out drives.
-#[derive(Serialize)]
+#[derive(Debug, Serialize)]
 struct Measured {
     name: String,
     /// Mean negative log-likelihood, both classes counting the same, nats.
@@ -66,7 +66,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let text = fs::read_to_string(path).map_err(Error::reading(path))?;
         Ok((path.display().to_string(), text))
     };
-    let beside: Vec<(String, String)> = args.beside.iter().map(read).collect::<Result<_, Error>>()?;
+    let beside: Vec<(String, String)> =
+        args.beside.iter().map(read).collect::<Result<_, Error>>()?;
     let (text, report) = learn(&args.inputs, &beside)?;
     args.outputs.write(&text, &report)
 }
@@ -105,14 +106,14 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     Ok((write(&provenance), Report { inputs, training, held_out, progress, measured }))
 }
 
-fn of_drive(mut visit: Visit) -> Result<Yield, Error> {
+fn of_drive(visit: Visit) -> Result<Yield, Error> {
     let (mut sweeps, mut of_drive, mut pairs) = (Sweeps::default(), Vec::new(), Vec::new());
     for index in visit.sweeps {
         if index + 1 == visit.drive.len() {
             break;
         }
         if let Some(pair) = pair(visit.grid, visit.drive, index, &mut sweeps)? {
-            samples(&pair, DRAW, &mut visit.rng, &mut of_drive);
+            samples(&pair, &mut of_drive);
             if visit.held_out {
                 pairs.push(pair);
             }
@@ -126,7 +127,7 @@ fn data(samples: &[Sample], ridge: f64) -> Data {
     Data {
         width: WIDTH,
         rows: samples.iter().flat_map(|s| s.features).collect(),
-        weights: Data::balanced(&labels),
+        weights: Data::balanced(&labels, samples.iter().map(|_| 1.0)),
         labels,
         ridge,
     }
@@ -140,8 +141,7 @@ fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measur
     pairs.iter().for_each(|pair| ranker.add(&tables, pair, &mut counts));
     let file = Weights::parse(text, "constancy", &[3, LEVELS])
         .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
-    let weights: Vec<f64> =
-        file.values().map(|w| f64::from(w) / f64::from(file.scale)).collect();
+    let weights: Vec<f64> = file.values().map(|w| f64::from(w) / f64::from(file.scale)).collect();
     let rows = data.rows.chunks_exact(WIDTH).zip(&data.labels);
     let curve = Curve::of(rows.map(|(row, &same)| (Data::score(&weights, row), same, 1.0)))
         .expect("both classes were counted");

@@ -4,6 +4,7 @@ use super::drives::{Labelled, LabelledSweep};
 use super::features::{Features, features};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
+use crate::labels::Kind;
 use raywake::error::Error;
 use raywake_sim::Rng;
 
@@ -15,8 +16,15 @@ pub const BACKGROUND_KEPT: f64 = 0.2;
 pub struct Sample {
     /// What the classifier sees.
     pub features: Features,
-    /// Whether it belongs to something that could move, even if it does not.
-    pub foreground: bool,
+    /// What it belongs to, whether that moves or not; `None`: to the background.
+    pub kind: Option<Kind>,
+}
+
+impl Sample {
+    /// Whether it belongs to something that could move.
+    pub fn foreground(&self) -> bool {
+        self.kind.is_some()
+    }
 }
 
 /// Samples of one sweep of a drive.
@@ -31,13 +39,13 @@ pub fn of_sweep(
     drive.read(index, sweep)?;
     let window = grid.sweep(drive.rig(), &sweep.data.sweep());
     for (column, owner) in owners(grid, &window, drive, sweep) {
-        let foreground = match owner {
-            Owner::Object(_) => true,
-            Owner::Background if rng.chance(BACKGROUND_KEPT) => false,
+        let kind = match owner {
+            Owner::Object(n) => Some(sweep.objects[n].kind),
+            Owner::Background if rng.chance(BACKGROUND_KEPT) => None,
             _ => continue,
         };
         let features = features(&grid.step, &grid.columns, column);
-        samples.push(Sample { features, foreground });
+        samples.push(Sample { features, kind });
     }
     Ok(())
 }
@@ -68,7 +76,7 @@ mod tests {
             of_sweep(&mut grid, &mut drive, 0, &mut sweep, &mut Rng::new(1), &mut samples).unwrap();
             samples
         };
-        let foreground = |samples: &[Sample]| samples.iter().filter(|s| s.foreground).count();
+        let foreground = |samples: &[Sample]| samples.iter().filter(|s| s.foreground()).count();
         let (nothing, wall, car) = (of(false, false), of(false, true), of(true, false));
         assert_eq!((foreground(&nothing), foreground(&wall)), (0, 0));
         assert!((10..150).contains(&foreground(&car)), "{}", foreground(&car));

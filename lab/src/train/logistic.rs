@@ -46,12 +46,13 @@ impl Data {
         sum + weights[row.len()]
     }
 
-    /// Weights of rows under which both classes count the same and all sum up to 1.
-    pub fn balanced(labels: &[bool]) -> Vec<f32> {
-        let positive = labels.iter().filter(|l| **l).count();
-        let half = |count: usize| 0.5 / count.max(1) as f32;
-        let of_class = [half(labels.len() - positive), half(positive)];
-        labels.iter().map(|l| of_class[*l as usize]).collect()
+    /// Weights of rows, in proportion to `weights` within a class, under which both classes count
+    /// the same and all sum up to 1.
+    pub fn balanced(labels: &[bool], weights: impl Iterator<Item = f64>) -> Vec<f32> {
+        let mut sums = [0.0; 2];
+        let weights: Vec<f64> = weights.collect();
+        labels.iter().zip(&weights).for_each(|(l, w)| sums[*l as usize] += w);
+        labels.iter().zip(&weights).map(|(l, w)| (0.5 * w / sums[*l as usize]) as f32).collect()
     }
 
     /// The loss at some weights.
@@ -168,6 +169,12 @@ mod tests {
         }
         let best = data.fit(&mut |_, _| ());
         assert!(data.slope(&best, true).gradient.iter().all(|g| g.abs() < 1e-6));
+    }
+
+    #[test]
+    fn classes_are_balanced() {
+        let weights = Data::balanced(&[true, false, true, true], [1.0, 9.0, 2.0, 1.0].into_iter());
+        assert_eq!(weights, [0.125, 0.5, 0.25, 0.125]);
     }
 
     #[test]

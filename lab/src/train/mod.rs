@@ -1,23 +1,22 @@
 //! `raywake-lab train`: the learned numbers of chapter 3.
 
-#![allow(missing_docs)]
-pub mod constancy;
-pub mod constancy_samples;
+mod constancy;
+mod constancy_samples;
 pub mod curve;
-pub mod drives;
-pub mod features;
-pub mod filter;
-pub mod filter_samples;
-pub mod inputs;
-pub mod logistic;
-pub mod owner;
-pub mod pairs;
-pub mod ranking;
-pub mod recorded;
-pub mod report;
-pub mod simulated;
+mod drives;
+mod features;
+mod filter;
+mod filter_samples;
+mod inputs;
+mod logistic;
+mod owner;
+mod pairs;
+mod ranking;
+mod recorded;
+mod report;
+mod simulated;
 mod solve;
-pub mod weights_file;
+mod weights_file;
 
 use raywake::error::Error;
 

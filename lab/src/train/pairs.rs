@@ -142,14 +142,15 @@ mod tests {
             let mut drive = scene(speed);
             let mut grid = Grid::new(Profile::hdl64());
             let pair = pair(&mut grid, &mut drive, 1, &mut Sweeps::default()).unwrap().unwrap();
-            let count = |wanted: &dyn Fn(&Match) -> bool| {
-                pair.matches.iter().filter(|m| wanted(m)).count()
-            };
+            let count =
+                |wanted: &dyn Fn(&Match) -> bool| pair.matches.iter().filter(|m| wanted(m)).count();
             // 0.9 m are three cells, whatever the vehicle does; a third of them seen.
             assert!(count(&|m| m.moving) > 8 && count(&|m| !m.moving) > 8);
-            assert!(pair.matches.iter().all(|m| {
-                m.displacement == if m.moving { [0, 3] } else { [0, 0] }
-            }));
+            assert!(
+                pair.matches
+                    .iter()
+                    .all(|m| { m.displacement == if m.moving { [0, 3] } else { [0, 0] } })
+            );
             assert!(pair.matches.iter().all(|m| pair.before[m.source][1] != 0));
             // Where the parked car's columns were, they still are.
             let side = pair.step.side as usize;

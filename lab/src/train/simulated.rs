@@ -71,11 +71,10 @@ fn rig(index: u64, rng: &mut Rng) -> SensorRig {
 
 /// How far a street is tilted along either axis of the world, as a slope: hills, and poses that do
 /// not know exactly where up is.
-const SLOPE: f64 = 0.03;
+const SLOPE: f64 = 0.02;
 
 fn tilt(rng: &mut Rng) -> Pose {
-    let slope = std::env::var("TILT").ok().and_then(|s| s.parse().ok()).unwrap_or(SLOPE);
-    let [roll, pitch] = [0; 2].map(|_| rng.range(-slope, slope));
+    let [roll, pitch] = [0; 2].map(|_| rng.range(-SLOPE, SLOPE));
     let turn = DQuat::from_rotation_x(roll) * DQuat::from_rotation_y(pitch);
     Pose::new(turn, DVec3::ZERO)
 }
@@ -109,9 +108,8 @@ impl Labelled for Simulated {
         let states = self.drive.objects(sweep.stamp_s);
         let place = |id: u32| states.binary_search_by_key(&id, |s| s.id).ok();
         into.object_of_point.clear();
-        into.object_of_point.extend(
-            sweep.truth.iter().map(|t| place(t.object).map_or(NONE, |at| at as u32)),
-        );
+        into.object_of_point
+            .extend(sweep.truth.iter().map(|t| place(t.object).map_or(NONE, |at| at as u32)));
         into.objects.clear();
         into.objects.extend(states.iter().map(|s| Seen {
             id: s.id as usize,
