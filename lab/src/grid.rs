@@ -14,6 +14,7 @@ pub struct Grid {
     profile: Profile,
     preparation: Preparation,
     lattice_origin: Option<DVec3>,
+    offset: DVec3,
     rays: Vec<Ray>,
     origins: Vec<[i32; 4]>,
     slots: Vec<[u32; 2]>,
@@ -33,6 +34,7 @@ impl Grid {
         Grid {
             preparation: Preparation::new(),
             lattice_origin: None,
+            offset: DVec3::ZERO,
             rays: vec![[0; 2]; POINTS_MAX],
             origins: vec![[0; 4]; ORIGINS_MAX],
             slots: vec![[0; 2]; MERGE_SLOTS],
@@ -55,15 +57,21 @@ impl Grid {
         Grid { lattice_origin: Some(window.lattice_origin), ..Grid::new(profile) }
     }
 
-    /// Forgets where the lattice lies: another drive begins.
-    pub fn restart(&mut self) {
+    /// Another drive begins. Its lattice lies `offset` (m, along the world's axes) from where a run
+    /// would lay it: after some time on the road any offset within half a cell is as likely.
+    pub fn restart(&mut self, offset: DVec3) {
         self.lattice_origin = None;
+        self.offset = offset;
     }
 
     /// Fills `columns` and `of_point` from a sweep; returns where the window lies.
     pub fn sweep(&mut self, rig: &Rig, sweep: &Sweep) -> Window {
-        let window = place(&self.profile, rig, &sweep.world_from_vehicle, self.lattice_origin);
-        self.lattice_origin = Some(window.lattice_origin);
+        let pose = &sweep.world_from_vehicle;
+        let origin = self
+            .lattice_origin
+            .unwrap_or_else(|| place(&self.profile, rig, pose, None).lattice_origin + self.offset);
+        self.lattice_origin = Some(origin);
+        let window = place(&self.profile, rig, pose, Some(origin));
         let (count, _) = self.preparation.prepare(
             &self.profile,
             rig,
@@ -93,6 +101,16 @@ impl Grid {
     /// Indices of the solid columns.
     pub fn solid(&self) -> impl Iterator<Item = usize> + use<'_> {
         self.columns.iter().enumerate().filter(|(_, c)| c[1] != 0).map(|(n, _)| n)
+    }
+
+    /// Edge of a voxel, m.
+    pub fn voxel_m(&self) -> f64 {
+        self.profile.voxel_m
+    }
+
+    /// Radius of the circle around the window, m.
+    pub fn reach_m(&self) -> f64 {
+        0.5 * 2f64.sqrt() * self.profile.side as f64 * self.profile.voxel_m
     }
 
     /// Where a column's centre lies in the vehicle frame, m; the height is that of the anchor.

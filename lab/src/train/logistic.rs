@@ -1,6 +1,7 @@
 //! Logistic regression by Newton's method: a convex problem of few unknowns, solved exactly.
 
 use super::solve::cholesky;
+use serde::Serialize;
 
 /// Labelled rows of small counts.
 pub struct Data {
@@ -10,11 +11,19 @@ pub struct Data {
     pub rows: Vec<u8>,
     /// Label of every row.
     pub labels: Vec<bool>,
-    /// Weight of a row of the background and of the foreground; they are to sum up to about 1
-    /// over all rows.
-    pub weight: [f64; 2],
+    /// Weight of every row; they are to sum up to about 1.
+    pub weights: Vec<f32>,
     /// Half of this times the squared length of the weights, bias excepted, adds to the loss.
     pub ridge: f64,
+}
+
+/// Losses after a step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Progress {
+    /// What is made small: with the weight of the squared weights.
+    pub training: f64,
+    /// Of data held out, without that.
+    pub held_out: f64,
 }
 
 /// Loss, its gradient and, where asked for, the lower triangle of its second derivatives.
@@ -37,8 +46,22 @@ impl Data {
         sum + weights[row.len()]
     }
 
-    /// The weights of least loss, bias last. `told` hears of the loss after every step.
-    pub fn fit(&self, told: &mut dyn FnMut(f64)) -> Vec<f64> {
+    /// Weights of rows, in proportion to `weights` within a class, under which both classes count
+    /// the same and all sum up to 1.
+    pub fn balanced(labels: &[bool], weights: impl Iterator<Item = f64>) -> Vec<f32> {
+        let mut sums = [0.0; 2];
+        let weights: Vec<f64> = weights.collect();
+        labels.iter().zip(&weights).for_each(|(l, w)| sums[*l as usize] += w);
+        labels.iter().zip(&weights).map(|(l, w)| (0.5 * w / sums[*l as usize]) as f32).collect()
+    }
+
+    /// The loss at some weights.
+    pub fn loss(&self, weights: &[f64]) -> f64 {
+        self.slope(weights, false).loss
+    }
+
+    /// The weights of least loss, bias last. `told` hears of weights and loss after every step.
+    pub fn fit(&self, told: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
         let mut weights = vec![0.0; self.width + 1];
         let mut here = self.slope(&weights, true);
         for _ in 0..STEPS_MAX {
@@ -56,7 +79,7 @@ impl Data {
             };
             weights = moved;
             here = self.slope(&weights, true);
-            told(here.loss);
+            told(&weights, here.loss);
             if before - here.loss < ENOUGH {
                 break;
             }
@@ -94,7 +117,7 @@ impl Data {
         for r in rows {
             let row = &self.rows[r * self.width..][..self.width];
             let (label, score) = (self.labels[r], Data::score(weights, row));
-            let weight = self.weight[label as usize];
+            let weight = f64::from(self.weights[r]);
             let signed = if label { -score } else { score };
             sum.loss += weight * (signed.max(0.0) + (-signed.abs()).exp().ln_1p());
             if !second {
@@ -121,7 +144,8 @@ mod tests {
         let mut rng = raywake_sim::Rng::new(5);
         let labels: Vec<bool> = (0..200).map(|_| rng.chance(0.3)).collect();
         let rows = (0..200 * 4).map(|_| rng.range(0.0, 4.0) as u8).collect();
-        Data { width: 4, rows, labels, weight: [0.003, 0.008], ridge: 0.01 }
+        let weights = (0..200).map(|_| rng.range(0.0, 0.01) as f32).collect();
+        Data { width: 4, rows, labels, weights, ridge: 0.01 }
     }
 
     #[test]
@@ -143,8 +167,14 @@ mod tests {
                 assert!((bend - here.hessian[j * 5 + i]).abs() < 1e-8);
             }
         }
-        let best = data.fit(&mut |_| ());
+        let best = data.fit(&mut |_, _| ());
         assert!(data.slope(&best, true).gradient.iter().all(|g| g.abs() < 1e-6));
+    }
+
+    #[test]
+    fn classes_are_balanced() {
+        let weights = Data::balanced(&[true, false, true, true], [1.0, 9.0, 2.0, 1.0].into_iter());
+        assert_eq!(weights, [0.125, 0.5, 0.25, 0.125]);
     }
 
     #[test]
@@ -154,10 +184,10 @@ mod tests {
             width: 1,
             rows: vec![1, 1, 1, 1, 0, 0, 0, 0],
             labels: vec![true, true, true, false, true, false, false, false],
-            weight: [0.125; 2],
+            weights: vec![0.125; 8],
             ridge: 0.0,
         };
-        let w = data.fit(&mut |_| ());
+        let w = data.fit(&mut |_, _| ());
         assert!((w[0] - 2.0 * 3f64.ln()).abs() < 1e-6 && (w[1] + 3f64.ln()).abs() < 1e-6);
     }
 
@@ -167,10 +197,10 @@ mod tests {
             width: 2,
             rows: vec![2, 0, 3, 1, 0, 2, 1, 3],
             labels: vec![true, true, false, false],
-            weight: [0.25; 2],
+            weights: vec![0.25; 4],
             ridge: 1e-3,
         };
-        let w = data.fit(&mut |_| ());
+        let w = data.fit(&mut |_, _| ());
         for (row, label) in data.rows.chunks(2).zip(&data.labels) {
             assert_eq!(Data::score(&w, row) > 0.0, *label);
         }

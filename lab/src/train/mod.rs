@@ -1,25 +1,39 @@
 //! `raywake-lab train`: the learned numbers of chapter 3.
 
+mod constancy;
+mod constancy_samples;
+pub mod curve;
+mod drives;
 mod features;
 mod filter;
+mod filter_samples;
+mod inputs;
 mod logistic;
-mod samples;
+mod owner;
+mod pairs;
+mod ranking;
+mod recorded;
+mod report;
+mod simulated;
 mod solve;
 mod weights_file;
 
-use std::error::Error;
+use raywake::error::Error;
 
 /// What can be trained.
 #[derive(clap::Subcommand)]
 pub enum Command {
     /// The background filter (section 3.4.2).
     Filter(filter::Args),
+    /// The occupancy constancy (section 3.5.1).
+    Constancy(constancy::Args),
 }
 
 /// Trains, writes and reports.
-pub fn run(command: &Command) -> Result<(), Box<dyn Error>> {
+pub fn run(command: &Command) -> Result<(), Error> {
     match command {
         Command::Filter(args) => filter::run(args),
+        Command::Constancy(args) => constancy::run(args),
     }
 }
 

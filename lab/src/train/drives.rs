@@ -1,0 +1,55 @@
+//! Drives to learn from, simulated or recorded, behind one shape.
+
+use crate::labels::Kind;
+use glam::DVec3;
+use raywake::error::Error;
+use raywake::source::SweepData;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Rig;
+
+/// A labelled object as a sweep shows it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The same for the same object in every sweep of the drive.
+    pub id: usize,
+    /// What it is.
+    pub kind: Kind,
+    /// Its box's frame: centre, x forward, y left, z up.
+    pub vehicle_from_box: Pose,
+    /// Length, width and height, m.
+    pub size: [f64; 3],
+}
+
+/// A sweep and what is known of it.
+#[derive(Default)]
+pub struct LabelledSweep {
+    /// Returns, pose and times.
+    pub data: SweepData,
+    /// Labelled objects.
+    pub objects: Vec<Seen>,
+    /// What every return comes from: an index of `objects`, or [`raywake_core::record::NONE`] for
+    /// the background. Empty where only the boxes tell.
+    pub object_of_point: Vec<u32>,
+}
+
+impl LabelledSweep {
+    /// Pose of an object's box in the world.
+    pub fn world_from_box(&self, seen: &Seen) -> Pose {
+        self.data.world_from_vehicle * seen.vehicle_from_box
+    }
+}
+
+/// A drive with labels.
+pub trait Labelled {
+    /// Sensors, timing and frame of the vehicle.
+    fn rig(&self) -> &Rig;
+
+    /// Number of sweeps.
+    fn len(&self) -> usize;
+
+    /// Reads a sweep; what `into` held is replaced.
+    fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error>;
+
+    /// Whether objects are labelled at a place in the vehicle frame.
+    fn sees(&self, at: DVec3) -> bool;
+}

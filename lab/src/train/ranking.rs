@@ -1,0 +1,97 @@
+//! Where the true column stands among all that the search compares (3.13).
+
+use super::pairs::{Match, Pair};
+use raywake::backend::Tables;
+use raywake_core::compact::compact;
+use raywake_core::occupancy_constancy::occupancy_constancy;
+use raywake_core::params::{FOREGROUND_MAX, LINE, REACH, ROW};
+use raywake_core::record::Step;
+use raywake_core::window::window;
+use serde::Serialize;
+
+/// Counts over columns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Ranking {
+    /// Columns looked at.
+    pub columns: usize,
+    /// Columns whose true target costs least; a tie of n counts 1/n.
+    pub first: f64,
+    /// Columns where what costs least is at most a cell from the truth along either axis.
+    pub near: f64,
+}
+
+impl Ranking {
+    fn add(&mut self, (first, near): (f64, f64)) {
+        self.columns += 1;
+        self.first += first;
+        self.near += near;
+    }
+
+    /// Shares instead of counts.
+    pub fn shares(self) -> Ranking {
+        let all = self.columns.max(1) as f64;
+        Ranking { first: self.first / all, near: self.near / all, ..self }
+    }
+}
+
+/// Storage for one pair after another.
+pub struct Ranker {
+    rank: Vec<u32>,
+    list: Vec<u32>,
+    cost: Vec<u16>,
+    matching: Vec<u16>,
+}
+
+impl Ranker {
+    /// For windows of this many columns.
+    pub fn new(columns: usize) -> Ranker {
+        Ranker {
+            rank: vec![0; columns],
+            list: vec![0; FOREGROUND_MAX],
+            cost: vec![0; FOREGROUND_MAX * ROW],
+            matching: vec![0; FOREGROUND_MAX * ROW],
+        }
+    }
+
+    /// Adds the matches of a pair to the counts of standing and of moving objects. Every solid
+    /// column is foreground, so that no filter takes part.
+    pub fn add(&mut self, tables: &Tables, pair: &Pair, counts: &mut [Ranking; 2]) {
+        let step = Step { score_min: tables.scores.min, ..pair.step };
+        let marks: Vec<u32> = pair.before.iter().map(|c| (c[1] != 0) as u32).collect();
+        let (count, _) = compact(&marks, &mut self.rank, &mut self.list);
+        let solid = &self.list[..count];
+        let (weights, costs) = (&tables.constancy, &tables.costs);
+        let cost = &mut self.cost[..count * ROW];
+        occupancy_constancy(&step, weights, costs, solid, &pair.before, &pair.now, cost);
+        window(&step, solid, &self.rank, cost, &mut self.matching[..count * ROW]);
+        for m in &pair.matches {
+            let Some(row) = self.matching.chunks_exact(ROW).nth(self.rank[m.source] as usize)
+            else {
+                continue;
+            };
+            counts[m.moving as usize].add(standing(&step, m, row));
+        }
+    }
+}
+
+/// Shares of the first place that the true target, and those next to it, have.
+fn standing(step: &Step, m: &Match, row: &[u16]) -> (f64, f64) {
+    let (i, j) = (m.source as i32 / step.side, m.source as i32 % step.side);
+    let inside = |c: i32| (0..step.side).contains(&c);
+    let mut least = u16::MAX;
+    let (mut tied, mut first, mut near) = (0.0, 0.0, 0.0);
+    for (n, &cost) in row.iter().enumerate() {
+        let d = [(n / LINE) as i32 - REACH, (n % LINE) as i32 - REACH];
+        if d[1] > REACH || cost > least || !inside(i + d[0]) || !inside(j + d[1]) {
+            continue;
+        }
+        if cost < least {
+            (least, tied, first, near) = (cost, 0.0, 0.0, 0.0);
+        }
+        let off = (d[0] - m.displacement[0]).abs().max((d[1] - m.displacement[1]).abs());
+        tied += 1.0;
+        first += (off == 0) as u8 as f64;
+        near += (off <= 1) as u8 as f64;
+    }
+    (first / tied, near / tied)
+}
