@@ -2,7 +2,7 @@
 #![warn(missing_docs)]
 //! Everything off-board: simulated drives, training of the learned numbers, and evaluation.
 
-pub mod check;
+mod curve;
 pub mod eval;
 pub mod grid;
 pub mod labels;

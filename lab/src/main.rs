@@ -3,7 +3,7 @@
 
 use clap::Parser;
 use raywake_lab::metrics::grade;
-use raywake_lab::{check, eval, registration, simulate, train};
+use raywake_lab::{eval, registration, simulate, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -15,8 +15,6 @@ enum Command {
     Train(train::Command),
     /// Run labelled drives through the pipeline and compare flow and tracklets with the truth.
     Eval(Box<eval::Args>),
-    /// Measure a background filter on a recorded drive with labels.
-    CheckFilter(check::Args),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
     /// Ego motion of a drive by scan matching, against the drive's own poses.
@@ -27,9 +25,8 @@ enum Command {
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
-        Command::Train(command) => train::run(&command),
+        Command::Train(command) => train::run(&command).map_err(Into::into),
         Command::Eval(args) => eval::run(&args).map_err(Into::into),
-        Command::CheckFilter(args) => check::run(&args),
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => registration::command::run(&args),
         Command::Sim(args) => simulate::run(&args),

@@ -3,7 +3,7 @@
 use super::drive::{Files, Settings};
 use super::facts::Facts;
 use super::statistics::Weight;
-use super::tally::{Estimate, Group, Motion, Tally, Truth, curve};
+use super::tally::{Estimate, Group, Motion, Tally, Truth};
 use super::{figures, rows_file, tables};
 use crate::report::{Picture, Report, Table};
 use raywake::error::Error;
@@ -16,7 +16,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         let rows = Files::of(out, &facts.drive).rows;
         rows_file::read(&rows, |rows| rows.iter().for_each(|row| tally.row(row)))?;
     }
-    let curve = curve(&tally.scores);
+    let curve = tally.filter();
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
     headlines(&mut report, &tally, drives);
     facts(&mut report, drives, settings);
@@ -30,7 +30,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         bucketed,
         three_way,
         tables::accuracy(&scores),
-        tables::filter(&curve),
+        tables::filter(curve.as_ref()),
         tables::times(drives),
     ];
     let [raw, beside, settled, bucketed, three_way, accuracy, filter, times] = shown.clone();
@@ -56,7 +56,10 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         .table(bucketed)
         .table(three_way)
         .table(accuracy);
-    report.section("Background filter").table(filter).chart(figures::precision_recall(&curve));
+    report
+        .section("Background filter")
+        .table(filter)
+        .chart(figures::precision_recall(curve.as_ref()));
     report
         .section("Time")
         .table(times)

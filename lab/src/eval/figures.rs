@@ -3,7 +3,8 @@
 use super::facts::Facts;
 use super::statistics::{Sorted, Weight};
 use super::tables::{RECALL, stages};
-use super::tally::{Estimate, Group, Motion, Operating, Tally, Truth, at_recall, at_threshold};
+use super::tally::{Estimate, Group, Motion, Tally, Truth};
+use crate::curve::{Curve, Operating};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
@@ -25,24 +26,24 @@ fn groups(tally: &Tally) -> Vec<Group> {
 }
 
 /// Figure 3.6: precision over recall of the background filter.
-pub fn precision_recall(curve: &[Operating]) -> Chart {
-    let mark = |p: Option<Operating>, label: &str| {
-        p.map(|p| Mark { at: [p.recall, p.precision], label: label.into() })
-    };
-    let marks = [mark(at_threshold(curve, 0), "shipped"), mark(at_recall(curve, RECALL), "95 %")];
-    let thin = curve.len().div_ceil(4 * POINTS).max(1);
-    let points = curve.iter().step_by(thin).chain(curve.last());
-    let series = Series {
-        name: "background filter".into(),
-        points: points.map(|p| [p.recall, p.precision]).collect(),
-        style: Style::Line,
-        marks: marks.into_iter().flatten().collect(),
-    };
+pub fn precision_recall(curve: Option<&Curve>) -> Chart {
+    let mark =
+        |p: Operating, label: &str| Mark { at: [p.recall, p.precision], label: label.into() };
+    let series = curve.map(|curve| {
+        let all: Vec<_> = curve.points().collect();
+        let thin = all.len().div_ceil(4 * POINTS).max(1);
+        Series {
+            name: "background filter".into(),
+            points: all.iter().step_by(thin).map(|p| [p.recall, p.precision]).collect(),
+            style: Style::Line,
+            marks: vec![mark(curve.above(0.0), "shipped"), mark(curve.at_recall(RECALL), "95 %")],
+        }
+    });
     let mut lines = Lines::new(
         Axis::new("recall of labelled columns").range(0.0, 1.0),
         Axis::new("precision").range(0.0, 1.0),
     );
-    lines.series.push(series);
+    lines.series.extend(series);
     let caption = "Figure 3.6. Precision and recall of the background filter over solid columns in \
         view, for every threshold; foreground is the positive class.";
     Chart::new("figure-3-6", caption, Plot::Lines(lines))

@@ -3,7 +3,8 @@
 use super::facts::Facts;
 use super::points::{ESTIMATES, PointScores};
 use super::statistics::{Sorted, Weight};
-use super::tally::{Estimate, Group, Motion, Operating, Tally, Truth, at_recall, at_threshold};
+use super::tally::{Estimate, Group, Motion, Tally, Truth};
+use crate::curve::{Curve, Operating};
 use crate::metrics::{Class, Motion as PointMotion, Range};
 use crate::report::{Cell, Row, Table};
 use raywake::statistics::{BUDGET_MS, Spread};
@@ -164,15 +165,15 @@ fn published_tracklets(group: Group) -> Option<Row> {
 }
 
 /// The filter at its own threshold and at the dissertation's recall.
-pub fn filter(curve: &[Operating]) -> Table {
+pub fn filter(curve: Option<&Curve>) -> Table {
     let row = |name: &str, p: Option<Operating>| {
-        let values = p.map_or([f64::NAN; 3], |p| [p.recall, p.background, p.precision]);
+        let values = p.map_or([f64::NAN; 3], |p| [p.recall, p.background_accuracy, p.precision]);
         Row::new([Cell::from(name)].into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))))
     };
     let dissertation = ["dissertation".into(), Cell::Number(95.0, 1), Cell::Number(74.5, 1)];
     let rows = vec![
-        row("shipped threshold", at_threshold(curve, 0)),
-        row("at 95 % recall", at_recall(curve, RECALL)),
+        row("shipped threshold", curve.map(|c| c.above(0.0))),
+        row("at 95 % recall", curve.map(|c| c.at_recall(RECALL))),
         Row::reference(dissertation.into_iter().chain([Cell::Empty])),
     ];
     let columns = ["Operating point", "Recall, %", "Background accuracy, %", "Precision, %"];

@@ -2,6 +2,7 @@
 
 use super::row::{CLASSES, Row};
 use super::statistics::{Errors, Sorted, Weight};
+use crate::curve::Curve;
 
 /// From this age on a tracklet counts as settled (table 3.2).
 pub const SETTLED: u32 = 10;
@@ -158,8 +159,8 @@ pub struct Tally {
     /// Solid columns in view, and those with a settled tracklet.
     columns: [[u64; 3]; COUNT],
     covered: [[u64; 3]; COUNT],
-    /// Score of the filter and class of every solid column in view.
-    pub scores: Vec<(i32, u8)>,
+    /// Score of the filter of every solid column in view, and whether it is labelled.
+    scores: Vec<(i32, bool)>,
     /// Rows that do not count because labels are not complete there.
     pub out_of_view: u64,
 }
@@ -184,7 +185,7 @@ impl Tally {
             return;
         }
         let (class, motion) = (row.class as usize, row.motion as usize);
-        self.scores.push((row.score, row.class));
+        self.scores.push((row.score, row.class > 0));
         let (raw, smooth) = ([row.true_x, row.true_y], [row.smooth_x, row.smooth_y]);
         for (n, estimate) in Estimate::ALL.iter().enumerate() {
             // Of the background, by far the most, only what is shown is kept.
@@ -216,6 +217,12 @@ impl Tally {
         self.settled.smooth[class][motion].push(error, row.voxels);
         self.settled.raw[class][motion].push(distance(found, raw), row.voxels);
         self.settled.floor[class][motion].push(distance(truth, raw), row.voxels);
+    }
+
+    /// What the filter does at every threshold (figure 3.6); none where nothing is labelled, or
+    /// everything.
+    pub fn filter(&self) -> Option<Curve> {
+        Curve::of(self.scores.iter().map(|s| (f64::from(s.0), s.1, 1.0)))
     }
 
     /// Errors of displacement, m.
@@ -269,56 +276,6 @@ fn gather(of: &Cells, group: Group, motion: Motion) -> Errors {
     all
 }
 
-/// A point of the filter's precision-recall curve (figure 3.6).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Operating {
-    /// Columns with a score above this are foreground.
-    pub threshold: i32,
-    /// Share of the labelled columns that are kept.
-    pub recall: f64,
-    /// Share of the kept columns that are labelled.
-    pub precision: f64,
-    /// Share of the other columns that are rejected.
-    pub background: f64,
-}
-
-/// The curve over all thresholds from the strictest on: one point wherever the score changes.
-/// Empty where there are no labelled columns, or no others.
-pub fn curve(scores: &[(i32, u8)]) -> Vec<Operating> {
-    let mut ordered: Vec<(i32, bool)> = scores.iter().map(|s| (s.0, s.1 > 0)).collect();
-    ordered.sort_unstable_by(|a, b| b.cmp(a));
-    let positive = ordered.iter().filter(|s| s.1).count();
-    let negative = ordered.len() - positive;
-    if positive == 0 || negative == 0 {
-        return Vec::new();
-    }
-    let (mut kept, mut wrong) = (0usize, 0usize);
-    let mut points = Vec::new();
-    for (n, &(score, labelled)) in ordered.iter().enumerate() {
-        *(if labelled { &mut kept } else { &mut wrong }) += 1;
-        if ordered.get(n + 1).is_some_and(|next| next.0 == score) {
-            continue;
-        }
-        points.push(Operating {
-            threshold: score.saturating_sub(1),
-            recall: kept as f64 / positive as f64,
-            precision: kept as f64 / (kept + wrong) as f64,
-            background: 1.0 - wrong as f64 / negative as f64,
-        });
-    }
-    points
-}
-
-/// The strictest point that keeps at least `recall`.
-pub fn at_recall(curve: &[Operating], recall: f64) -> Option<Operating> {
-    curve.iter().copied().find(|p| p.recall >= recall)
-}
-
-/// The point of a threshold: what scores above it is kept.
-pub fn at_threshold(curve: &[Operating], threshold: i32) -> Option<Operating> {
-    curve.iter().copied().take_while(|p| p.threshold >= threshold).last()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -363,20 +320,7 @@ mod tests {
         assert!(near(tally.settled(Group::Labelled, Motion::Moving, Weight::Column).mean(), 1.0));
         assert!(near(tally.settled_raw(Group::Labelled, Motion::Any)[1].mean(), 0.0));
         assert_eq!(tally.at_age(3, Group::Labelled, Motion::Any).count(), 2);
-        assert_eq!((tally.out_of_view, tally.scores.len()), (1, 4));
-    }
-
-    #[test]
-    fn a_curve_by_hand() {
-        let points = curve(&[(5, 1), (3, 0), (3, 2), (1, 1), (-2, 0), (-4, 1)]);
-        let expected = [(4, 0.25, 1.0, 1.0), (2, 0.5, 2.0 / 3.0, 0.5), (0, 0.75, 0.75, 0.5)];
-        for (p, e) in points.iter().zip(expected) {
-            assert_eq!((p.threshold, p.recall, p.precision, p.background), e);
-        }
-        assert_eq!(points.len(), 5);
-        assert_eq!(at_recall(&points, 0.6).unwrap().threshold, 0);
-        assert_eq!(at_threshold(&points, 0).unwrap().recall, 0.75);
-        assert_eq!(at_threshold(&points, 9), None);
-        assert!(curve(&[(1, 1)]).is_empty() && curve(&[]).is_empty());
+        assert_eq!(tally.out_of_view, 1);
+        assert_eq!(tally.filter().unwrap().auc(), 0.5);
     }
 }

@@ -1,7 +1,6 @@
 //! `raywake-lab train constancy`: the occupancy constancy (section 3.5.1).
 
 use super::constancy_samples::{Sample, WIDTH, samples};
-use super::curve::Curve;
 use super::features::LEVELS;
 use super::inputs::{Inputs, Visit};
 use super::logistic::{Data, Progress};
@@ -9,6 +8,7 @@ use super::pairs::{Pair, Sweeps, pair};
 use super::ranking::{Ranker, Ranking};
 use super::report::{Counts, Outputs};
 use super::weights_file::{quantise, text};
+use crate::curve::Curve;
 use raywake::backend::Tables;
 use raywake::error::Error;
 use raywake_core::params::Profile;

@@ -1,6 +1,5 @@
 //! `raywake-lab train filter`: the background filter (section 3.4.2).
 
-use super::curve::{Curve, Operating};
 use super::drives::LabelledSweep;
 use super::features::{LEVELS, WIDTH, expand};
 use super::filter_samples::{BACKGROUND_KEPT, Sample, of_sweep};
@@ -8,6 +7,7 @@ use super::inputs::{Inputs, Visit};
 use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::{quantise, text};
+use crate::curve::{Curve, Operating};
 use crate::labels::Kind;
 use raywake::error::Error;
 use raywake_core::background_filter::{PATCH, TABLE_WORDS, load};

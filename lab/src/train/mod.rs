@@ -2,7 +2,6 @@
 
 mod constancy;
 mod constancy_samples;
-pub mod curve;
 mod drives;
 mod features;
 mod filter;

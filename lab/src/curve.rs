@@ -43,6 +43,11 @@ impl Curve {
         both.then_some(Curve { steps, total: [kept, wrong], area })
     }
 
+    /// What every threshold does, the strictest first.
+    pub fn points(&self) -> impl Iterator<Item = Operating> {
+        (0..self.steps.len()).map(|at| self.operating(at))
+    }
+
     /// Probability that foreground scores above background.
     pub fn auc(&self) -> f64 {
         self.area / (self.total[0] * self.total[1])
