@@ -87,7 +87,9 @@ const POINTS: &str = "Every return has the velocity of its column over the time 
 
 fn subtitle(drives: &[Facts]) -> String {
     let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
-    format!("{} drives, {pairs} pairs of sweeps", drives.len())
+    let drives =
+        if drives.len() == 1 { "1 drive".into() } else { format!("{} drives", drives.len()) };
+    format!("{drives}, {pairs} pairs of sweeps")
 }
 
 fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {

@@ -44,7 +44,7 @@ pub fn precision_recall(curve: Option<&Curve>) -> Chart {
         Axis::new("precision").range(0.0, 1.0),
     );
     lines.series.extend(series);
-    let caption = "Figure 3.6. Precision and recall of the background filter over solid columns in \
+    let caption = "As figure 3.6 of the dissertation: precision and recall of the background filter over solid columns in \
         view, for every threshold; foreground is the positive class.";
     Chart::new("figure-3-6", caption, Plot::Lines(lines))
 }
@@ -79,12 +79,12 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     [
         Chart::small_multiples(
             "figure-3-7",
-            "Figure 3.7. Errors of the raw flow by class; the dashed line is the size of a cell.",
+            "As figure 3.7 of the dissertation: errors of the raw flow by class; the dashed line is the size of a cell.",
             by_class.collect(),
         ),
         Chart::small_multiples(
             "figure-3-8",
-            "Figure 3.8. Errors of the raw flow of all labelled columns, moving and parked apart.",
+            "As figure 3.8 of the dissertation: errors of the raw flow of all labelled columns, moving and parked apart.",
             by_motion.into(),
         ),
     ]
@@ -106,8 +106,7 @@ pub fn references(tally: &Tally) -> Chart {
             .iter()
             .map(|e| {
                 let errors = tally.flow(*e, Truth::Raw, Group::Labelled, motion, Weight::Column);
-                let style = if e.is_reference() { Style::Reference } else { Style::Line };
-                Series { name: e.label().into(), ..cdf("", &errors, CDF_M, style) }
+                Series { name: e.label().into(), ..cdf("", &errors, CDF_M, Style::Line) }
             })
             .collect();
         (motion.label().to_string(), Plot::Lines(lines))
@@ -137,7 +136,7 @@ pub fn tracklets(tally: &Tally) -> Chart {
         (group.label().to_string(), Plot::Lines(lines))
     };
     let labelled = groups(tally).into_iter().filter(|g| *g != Group::Class(0));
-    let caption = "Figure 3.9. Errors of the velocity of tracklets after so many observations.";
+    let caption = "As figure 3.9 of the dissertation: errors of the velocity of tracklets after so many observations.";
     Chart::small_multiples("figure-3-9", caption, labelled.map(part).collect())
 }
 
@@ -189,6 +188,6 @@ pub fn time_by_points(drives: &[Facts]) -> Chart {
     if slowest > 0.5 * BUDGET_MS {
         lines.guides.push(Guide::Y(BUDGET_MS, "time between sweeps".into()));
     }
-    let caption = "Section B.4. Time of a pair of sweeps against its number of returns.";
+    let caption = "As section B.4 of the dissertation: time of a pair of sweeps against its number of returns.";
     Chart::new("figure-b-4", caption, Plot::Lines(lines))
 }

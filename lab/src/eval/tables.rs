@@ -75,7 +75,9 @@ pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
             ("table-3-1-voxels", "occupied voxels, as the dissertation's programs count")
         }
     };
-    let caption = format!("Table 3.1. Error of the raw flow of a pair of sweeps, by {of}.");
+    let caption = format!(
+        "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps, by {of}."
+    );
     table(id, &caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
 }
 
@@ -145,7 +147,7 @@ pub fn tracklets(tally: &Tally) -> Table {
         "Median against raw labels, m/s",
         "Raw labels' own floor, m/s",
     ];
-    let caption = "Table 3.2. Error of the velocity of tracklets of age 10 and more; truth: \
+    let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 and more; truth: \
         smoothed labels, parked objects at rest. Coverage: columns with such a tracklet, of all.";
     table("table-3-2", caption, &columns, rows)
 }
@@ -221,7 +223,7 @@ pub fn times(drives: &[Facts]) -> Table {
     let within = totals.iter().filter(|t| **t < BUDGET_MS).count();
     let share = 100.0 * within as f64 / totals.len().max(1) as f64;
     let caption = format!(
-        "Table 3.3. Time per pair of sweeps, {} pairs; {share:.1} % of them within 100 ms (the \
+        "As table 3.3 of the dissertation: time per pair of sweeps, {} pairs; {share:.1} % of them within 100 ms (the \
          dissertation: over 99 %).",
         totals.len(),
     );
