@@ -123,6 +123,9 @@ pub fn occupancy_constancy(
 /// The classifier shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../weights/constancy.txt");
 
+/// The author's published constants, for comparison: made for rays from 1.73 m above the sensor.
+pub const AUTHOR: &str = include_str!("../weights/author.txt");
+
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -181,6 +184,12 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_authors_constants_have_his_range() {
+        let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
+        let scores = load(AUTHOR, 14, &mut weights, &mut costs).unwrap();
         // The figures published beside the constants: scores of -537 to 2052.
         assert_eq!((scores.min, scores.min + scores.count - 1), (-537, 2052));
     }

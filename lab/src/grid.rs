@@ -149,4 +149,30 @@ mod tests {
             assert!(off.x.hypot(off.y) <= 0.3 * 0.5f64.sqrt() + 1e-6);
         }
     }
+
+    #[test]
+    fn a_drive_begins_anywhere_on_its_lattice() {
+        let rig = Rig {
+            sensors: [Pose::IDENTITY].into_iter().collect(),
+            timing: Timing::AtStamp,
+            distorted: false,
+            ground_m: -1.73,
+            own_vehicle: None,
+        };
+        let mut grid = Grid::new(Profile::hdl64());
+        let points = [Point { position: [11.3, -4.2, -0.5], ..Point::default() }];
+        let at = |x: f64| Sweep {
+            stamp_s: 0.0,
+            points: &points,
+            world_from_vehicle: Pose::planar(x, 0.0, 0.0, 0.0),
+            twist: Twist::ZERO,
+        };
+        for offset in [DVec3::ZERO, DVec3::new(0.1, -0.05, 0.12)] {
+            grid.restart(offset);
+            let first = grid.sweep(&rig, &at(3.0));
+            assert!((first.lattice_origin - DVec3::new(3.0, 0.0, 0.0) - offset).length() < 1e-9);
+            // It stays there.
+            assert_eq!(grid.sweep(&rig, &at(5.0)).lattice_origin, first.lattice_origin);
+        }
+    }
 }
