@@ -20,6 +20,9 @@ const DISSERTATION_KEPT: f64 = 0.95;
 /// Weight of the squared weights. Held-out drives of all rigs hardly tell 0.001 from 0.01.
 const RIDGE: f64 = 0.003;
 
+/// How fast weights fade with the distance from the threshold, per nat.
+const FOCUS: f64 = 0.7;
+
 /// Options of `train filter`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -27,8 +30,9 @@ pub struct Args {
     inputs: Inputs,
     #[command(flatten)]
     outputs: Outputs,
-    /// Share of the held-out foreground that the threshold keeps.
-    #[arg(long, default_value_t = 0.95, value_name = "SHARE")]
+    /// Share of the held-out foreground that the threshold keeps: the dissertation's 95 %, and
+    /// two more for what no simulation has.
+    #[arg(long, default_value_t = 0.97, value_name = "SHARE")]
     keep: f64,
 }
 
@@ -37,7 +41,8 @@ struct Report {
     inputs: String,
     training: Counts,
     held_out: Counts,
-    progress: Vec<Progress>,
+    /// Of the fit to all samples alike, and of that to those near its threshold.
+    progress: [Vec<Progress>; 2],
     auc: f64,
     /// At the dissertation's recall.
     at_95: Operating,
@@ -67,11 +72,11 @@ fn learn(inputs: &Inputs, keep: f64) -> Result<(String, Report), Error> {
     let counts = [&training, &held_out].map(|s| Counts::of(s.iter().map(|s| s.foreground())));
     counts[0].both("training", "columns of objects", "columns of the background")?;
     counts[1].both("held-out", "columns of objects", "columns of the background")?;
-    let (learned, checked) = (data(training, RIDGE), data(held_out, 0.0));
-    let mut progress = Vec::new();
-    let mut weights = learned.fit(&mut |weights, training| {
-        progress.push(Progress { training, held_out: checked.loss(weights) });
-    });
+    let (mut learned, checked) = (data(&training, RIDGE), data(&held_out, 0.0));
+    let mut progress = [Vec::new(), Vec::new()];
+    let first = fit(&learned, &checked, &mut progress[0]);
+    learned.weights = focused(&learned, &first, keep);
+    let mut weights = fit(&learned, &checked, &mut progress[1]);
 
     let curve = curve(&checked, |row| Data::score(&weights, row));
     let cut = curve.at_recall(keep).threshold;
@@ -122,8 +127,27 @@ fn of_drive(mut visit: Visit) -> Result<Vec<Sample>, Error> {
     Ok(samples)
 }
 
+fn fit(learned: &Data, checked: &Data, progress: &mut Vec<Progress>) -> Vec<f64> {
+    learned.fit(&mut |weights, training| {
+        progress.push(Progress { training, held_out: checked.loss(weights) });
+    })
+}
+
+/// Weights of rows that fade with the distance of a row's score from the threshold that keeps this
+/// share of the foreground: the threshold lies far from where the two classes are as likely, and
+/// what a linear score can tell is best spent there. It rejects more background at 95 % recall and
+/// above on held-out drives of every rig, and less at low recall.
+fn focused(data: &Data, weights: &[f64], keep: f64) -> Vec<f32> {
+    let score = |row: &[u8]| Data::score(weights, row);
+    let cut = curve(data, score).at_recall(keep).threshold;
+    let rows = data.rows.chunks_exact(WIDTH).zip(&data.weights);
+    let faded =
+        rows.map(|(row, weight)| f64::from(*weight) / (1.0 + (FOCUS * (score(row) - cut)).powi(2)));
+    Data::balanced(&data.labels, faded)
+}
+
 /// Both classes count the same.
-fn data(samples: Vec<Sample>, ridge: f64) -> Data {
+fn data(samples: &[Sample], ridge: f64) -> Data {
     let labels: Vec<bool> = samples.iter().map(|s| s.foreground()).collect();
     Data {
         width: WIDTH,
@@ -168,7 +192,7 @@ mod tests {
         assert!(learn(&inputs(4), 0.97).unwrap().0 != text);
         assert!(text.contains("seed 3") && text.contains("held-out recall"));
         assert!(report.auc > 0.8, "{}", report.auc);
-        let losses: Vec<f64> = report.progress.iter().map(|p| p.training).collect();
+        let losses: Vec<f64> = report.progress[0].iter().map(|p| p.training).collect();
         assert!(losses.len() > 2 && losses.is_sorted_by(|a, b| a >= b));
         // The threshold within the bias, after rounding.
         assert!((report.written.recall - 0.97).abs() < 0.005, "{:?}", report.written);
