@@ -6,15 +6,17 @@ use super::objects::Objects;
 use super::panels::Panels;
 use super::points::{PointScores, Points};
 use super::rows_file;
-use crate::labels::{self, View};
+use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
 use raywake::config::Weights;
 use raywake::engine::{self, Plan};
 use raywake::error::Error;
 use raywake::outputs::Kinds;
 use raywake::source::{self, OpenOptions, Source};
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use serde_json::json;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Instant;
@@ -57,8 +59,12 @@ impl Settings {
         }
     }
 
-    /// What decides the rows of a drive.
-    fn key(&self, source: &dyn Source) -> serde_json::Value {
+    /// What decides the rows of a drive. Of the drive itself: its poses, stamps and rig, which
+    /// depend on how it is opened too, and its labels.
+    fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
+        let moments =
+            (0..source.len()).map(|i| (source.frame(i), source.stamp_s(i), source.pose(i)));
+        let drive = format!("{:?}{:?}{labels:?}", source.rig(), moments.collect::<Vec<_>>());
         json!({
             "version": env!("CARGO_PKG_VERSION"),
             "profile": format!("{:?}", self.profile),
@@ -67,7 +73,7 @@ impl Settings {
             "margin_m": self.margin_m,
             "all_columns": self.all_columns,
             "sweeps": self.sweeps.min(source.len()),
-            "first_frame": source.frame(0),
+            "drive": format!("{:016x}", Digest::of(drive.as_bytes())),
         })
     }
 }
@@ -101,6 +107,17 @@ impl Files {
             panels: out.join("panels"),
         }
     }
+
+    /// Removes facts and rows of an earlier run.
+    fn forget(&self) -> Result<(), Error> {
+        for file in [&self.facts, &self.rows] {
+            match std::fs::remove_file(file) {
+                Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::writing(file)(e)),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Evaluates the drive at `path` unless that has been done with the same settings. Returns its
@@ -114,14 +131,16 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     let files = Files::of(out, name);
-    let key = settings.key(source.as_ref());
+    let labels = labels::open(path, source.as_ref())?;
+    let key = settings.key(source.as_ref(), &labels);
     if files.rows.is_file()
         && let Ok(facts) = Facts::read(&files.facts)
         && facts.settings == key
     {
         return Ok((facts, true));
     }
-    let labels = labels::open(path, source.as_ref())?;
+    // Rows of other settings must not pass for those of the facts that are there.
+    files.forget()?;
     let objects = Objects::new(&labels, source.as_ref());
     let mut facts = Facts {
         drive: name.to_string(),
@@ -181,18 +200,21 @@ fn run(
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
-            let _ = send.send(Seen::of(pair));
+            let _ = send.send(Some(Seen::of(pair)));
         });
+        if summary.as_ref().is_ok_and(|s| !s.interrupted) {
+            let _ = send.send(None);
+        }
         drop(send);
         (summary, rows.join().expect("the thread that makes rows panicked"))
     });
     let summary = summary?;
-    let collected = written?;
-    facts.scores = collected.scores;
-    facts.panels = collected.panels;
     if summary.interrupted {
         return Err(Error::Usage("interrupted".into()));
     }
+    let collected = written?;
+    facts.scores = collected.scores;
+    facts.panels = collected.panels;
     facts.sweeps = summary.sweeps;
     facts.pairs = summary.pairs;
     facts.digest = summary.digest;
@@ -204,17 +226,22 @@ fn run(
     Ok(())
 }
 
-/// Rows and scores of all pairs as they come.
+/// Rows and scores of all pairs as they come; `None` says that these were all. Without it there
+/// is no file of rows.
 fn collect(
     drive: &str,
     mut collector: Collector,
     mut points: Points,
-    pairs: &Receiver<Seen>,
+    pairs: &Receiver<Option<Seen>>,
     files: &Files,
 ) -> Result<Collected, Error> {
     let mut panels = Panels::default();
     rows_file::write(&files.rows, drive, || {
-        let Ok(seen) = pairs.recv() else { return Ok(None) };
+        let seen = match pairs.recv() {
+            Ok(Some(seen)) => seen,
+            Ok(None) => return Ok(None),
+            Err(_) => return Err(Error::Usage("interrupted".into())),
+        };
         let present = collector.present(&seen);
         points.pair(&seen, present)?;
         let rows = collector.rows(&seen);

@@ -78,7 +78,8 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     [
         Chart::small_multiples(
             "figure-3-7",
-            "Figure 3.7. Errors of the raw flow by class; the dashed line is the size of a cell.",
+            "Figure 3.7. Errors of the raw flow by class, moving and parked \
+             together; the dashed line is the size of a cell.",
             by_class.collect(),
         ),
         Chart::small_multiples(
@@ -136,7 +137,8 @@ pub fn tracklets(tally: &Tally) -> Chart {
         (group.label().to_string(), Plot::Lines(lines))
     };
     let labelled = groups(tally).into_iter().filter(|g| *g != Group::Class(0));
-    let caption = "Figure 3.9. Errors of the velocity of tracklets after so many observations.";
+    let caption = "Figure 3.9. Errors of the velocity of tracklets after exactly so many \
+        observations, moving and parked together. Age 0 has flow whose tracklet the gate ended too.";
     Chart::small_multiples("figure-3-9", caption, labelled.map(part).collect())
 }
 
