@@ -180,6 +180,11 @@ impl Weights {
         Ok(Weights { filter: filter.map(|f| f.1), constancy: constancy.1 })
     }
 
+    /// Whether there is a background filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
     /// The same without the background filter: every solid column is foreground.
     pub fn without_filter(self) -> Weights {
         Weights { filter: None, ..self }

@@ -8,10 +8,12 @@ use glam::DVec3;
 use raywake::engine::Pair;
 use raywake::source::SweepData;
 use raywake_core::background_filter::score;
+use raywake_core::grid::shift::shift;
 use raywake_core::output::{ColumnFlow, Origin, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
 use raywake_core::prepare::place;
+use raywake_core::record::{Column, Step};
 use raywake_core::sweep::Rig;
 
 /// A copy of a pair, for another thread.
@@ -61,6 +63,8 @@ pub struct Collector<'a> {
     margin_m: f64,
     objects: &'a Objects,
     grid: Grid,
+    /// Columns of the first sweep in the second's window, where the filter sees them.
+    before: Vec<Column>,
 }
 
 impl<'a> Collector<'a> {
@@ -75,7 +79,8 @@ impl<'a> Collector<'a> {
         margin_m: f64,
     ) -> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
-        Collector { profile, rig, filter, view, margin_m, objects, grid }
+        let before = vec![[0; 2]; profile.columns()];
+        Collector { profile, rig, filter, view, margin_m, objects, grid, before }
     }
 
     /// Edge of a column, m.
@@ -91,19 +96,18 @@ impl<'a> Collector<'a> {
     /// Rows of the first sweep's solid columns.
     pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
+        let next = place(&self.profile, &self.rig, &seen.then, Some(window.lattice_origin));
+        let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|a| next.corner[a] - window.corner[a]);
+        let step = Step { shift_x, shift_y, shift_z, ..self.grid.step };
+        shift(&step, &self.grid.columns, &mut self.before);
         let present = self.present(seen);
-        let side = self.profile.side as i32;
         let mut rows = Vec::with_capacity(seen.columns.len());
         for flow in &seen.columns {
-            let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
-            // A column of the window is within it, unless the lattices differ.
-            if !(0..side).contains(&i) || !(0..side).contains(&j) {
-                continue;
-            }
-            let column = (i * side + j) as usize;
-            let masks = self.grid.columns[column][0];
-            let score = score(&self.grid.step, &self.filter, &self.grid.columns, column);
-            rows.push(self.row(seen, flow, present, (masks >> 16).count_ones() as u8, score));
+            let [i, j] = [0, 1].map(|n| flow.cell[n] - next.corner[n]);
+            let column = (i * step.side + j) as usize;
+            let occupied = self.before[column][0] >> 16;
+            let score = score(&step, &self.filter, &self.before, column);
+            rows.push(self.row(seen, flow, present, occupied.count_ones() as u8, score));
         }
         rows
     }

@@ -5,6 +5,7 @@ use super::facts::Facts;
 use super::statistics::Weight;
 use super::tally::{Estimate, Group, Motion, Tally, Truth};
 use super::{figures, rows_file, tables};
+use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Table};
 use raywake::error::Error;
 use std::path::Path;
@@ -16,7 +17,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         let rows = Files::of(out, &facts.drive).rows;
         rows_file::read(&rows, |rows| rows.iter().for_each(|row| tally.row(row)))?;
     }
-    let curve = tally.filter();
+    let curve = if settings.weights.has_filter() { tally.filter() } else { None };
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
     headlines(&mut report, &tally, drives);
     facts(&mut report, drives, settings);
@@ -62,6 +63,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         .chart(figures::precision_recall(curve.as_ref()));
     report
         .section("Time")
+        .text(TIME)
         .table(times)
         .chart(figures::times(drives))
         .chart(figures::time_by_points(drives));
@@ -84,6 +86,9 @@ const POINTS: &str = "Every return has the velocity of its column over the time 
     stands. Without a map, returns without a label up to 0.3 m above the plane the vehicle stands \
     on count as ground, which is left out. For the graders' own truth and ground of an Argoverse \
     2 log see `raywake-lab grade`.";
+
+const TIME: &str = "From the sweep in memory to flow in memory, while another thread makes rows, and \
+    other drives run where `--jobs` says so; `raywake run` has the machine to itself.";
 
 fn subtitle(drives: &[Facts]) -> String {
     let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
@@ -164,7 +169,7 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
          lies in, seen from above, with a margin of {} m. {tracks} labelled objects have {boxes} \
          boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
-         labelled in a front camera's view, within 40 degrees of straight ahead; in the others, all \
+         labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the others, all \
          around. {} columns do not.\n\n\
          An object moves from {} m/s over ground on.\n\n\
          Columns without a valid match and columns that the filter rejects are scored with what \

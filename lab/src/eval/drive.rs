@@ -16,12 +16,16 @@ use raywake::source::{self, OpenOptions, Source};
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use serde_json::json;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Instant;
 
 /// Pairs that may wait for their rows: the pipeline waits where rows take longer.
 const WAITING: usize = 2;
+
+/// Counts changes of what rows and facts mean: those of another number are made anew.
+const ROWS: u32 = 1;
 
 /// What all drives of an evaluation have in common.
 pub struct Settings {
@@ -58,19 +62,21 @@ impl Settings {
         }
     }
 
-    /// What decides the rows of a drive.
+    /// What decides the rows of a drive. Of the drive itself: its poses, stamps and rig, which
+    /// depend on how it is opened too, and its labels.
     fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
+        let moments =
+            (0..source.len()).map(|i| (source.frame(i), source.stamp_s(i), source.pose(i)));
+        let drive = format!("{:?}{:?}{labels:?}", source.rig(), moments.collect::<Vec<_>>());
         json!({
-            "version": env!("CARGO_PKG_VERSION"),
+            "rows": ROWS,
             "profile": format!("{:?}", self.profile),
             "weights": self.weights_digest,
             "backend": format!("{:?}", self.backend.backend),
             "margin_m": self.margin_m,
             "all_columns": self.all_columns,
             "sweeps": self.sweeps.min(source.len()),
-            "recording": format!("{:?}", self.open),
-            "first_frame": source.frame(0),
-            "labels": format!("{:016x}", Digest::of(format!("{labels:?}").as_bytes())),
+            "drive": format!("{:016x}", Digest::of(drive.as_bytes())),
         })
     }
 }
@@ -104,6 +110,17 @@ impl Files {
             panels: out.join("panels"),
         }
     }
+
+    /// Removes facts and rows of an earlier run.
+    fn forget(&self) -> Result<(), Error> {
+        for file in [&self.facts, &self.rows] {
+            match std::fs::remove_file(file) {
+                Err(e) if e.kind() != ErrorKind::NotFound => return Err(Error::writing(file)(e)),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Evaluates the drive at `path` unless that has been done with the same settings. Returns its
@@ -125,6 +142,8 @@ pub fn evaluate(
     {
         return Ok((facts, true));
     }
+    // Rows of other settings must not pass for those of the facts that are there.
+    files.forget()?;
     let objects = Objects::new(&labels, source.as_ref());
     let mut facts = Facts {
         drive: name.to_string(),
@@ -184,18 +203,21 @@ fn run(
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
-            let _ = send.send(Seen::of(pair));
+            let _ = send.send(Some(Seen::of(pair)));
         });
+        if summary.as_ref().is_ok_and(|s| !s.interrupted) {
+            let _ = send.send(None);
+        }
         drop(send);
         (summary, rows.join().expect("the thread that makes rows panicked"))
     });
     let summary = summary?;
-    let collected = written?;
-    facts.scores = collected.scores;
-    facts.panels = collected.panels;
     if summary.interrupted {
         return Err(Error::Usage("interrupted".into()));
     }
+    let collected = written?;
+    facts.scores = collected.scores;
+    facts.panels = collected.panels;
     facts.sweeps = summary.sweeps;
     facts.pairs = summary.pairs;
     facts.digest = summary.digest;
@@ -207,17 +229,22 @@ fn run(
     Ok(())
 }
 
-/// Rows and scores of all pairs as they come.
+/// Rows and scores of all pairs as they come; `None` says that these were all. Without it there
+/// is no file of rows.
 fn collect(
     drive: &str,
     mut collector: Collector,
     mut points: Points,
-    pairs: &Receiver<Seen>,
+    pairs: &Receiver<Option<Seen>>,
     files: &Files,
 ) -> Result<Collected, Error> {
     let mut panels = Panels::default();
     rows_file::write(&files.rows, drive, || {
-        let Ok(seen) = pairs.recv() else { return Ok(None) };
+        let seen = match pairs.recv() {
+            Ok(Some(seen)) => seen,
+            Ok(None) => return Ok(None),
+            Err(_) => return Err(Error::Usage("interrupted".into())),
+        };
         let present = collector.present(&seen);
         points.pair(&seen, present)?;
         let rows = collector.rows(&seen);

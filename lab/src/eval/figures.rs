@@ -3,7 +3,7 @@
 use super::facts::Facts;
 use super::statistics::{Sorted, Weight};
 use super::tables::{RECALL, stages};
-use super::tally::{Estimate, Group, Motion, Tally, Truth};
+use super::tally::{Estimate, Group, Motion, SETTLED, Tally, Truth};
 use crate::curve::{Curve, Operating};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
@@ -23,6 +23,14 @@ const POINTS: usize = 200;
 fn groups(tally: &Tally) -> Vec<Group> {
     let some = |g: &Group| tally.coverage(*g, Motion::Any)[0] > 0;
     Group::labelled().chain([Group::Class(0)]).filter(some).collect()
+}
+
+/// Name of a part of a figure.
+fn title(group: Group, motion: Motion) -> String {
+    match motion {
+        Motion::Any => group.label().to_string(),
+        _ => format!("{}, {}", group.label(), motion.label()),
+    }
 }
 
 /// Figure 3.6: precision over recall of the background filter.
@@ -72,14 +80,16 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     let by_class = groups(tally)
         .into_iter()
         .filter(|g| *g != Group::Labelled)
-        .map(|g| (g.label().to_string(), of(g, Motion::Any)));
+        .flat_map(|g| Motion::of(g).iter().map(move |m| (g, *m)))
+        .filter(|(g, m)| tally.coverage(*g, *m)[0] > 0)
+        .map(|(g, m)| (title(g, m), of(g, m)));
     let motions = [Motion::Moving, Motion::Parked];
-    let by_motion =
-        motions.map(|m| (format!("All labelled, {}", m.label()), of(Group::Labelled, m)));
+    let by_motion = motions.map(|m| (title(Group::Labelled, m), of(Group::Labelled, m)));
     [
         Chart::small_multiples(
             "figure-3-7",
-            "As figure 3.7 of the dissertation: errors of the raw flow by class; the dashed line is the size of a cell.",
+            "As figure 3.7 of the dissertation: errors of the raw flow by class, moving and parked \
+             apart; the dashed line is the size of a cell.",
             by_class.collect(),
         ),
         Chart::small_multiples(
@@ -116,28 +126,33 @@ pub fn references(tally: &Tally) -> Chart {
     Chart::small_multiples("figure-references", caption, parts.into())
 }
 
-/// Figure 3.9: errors of tracklets by age, by class.
+/// Figure 3.9: errors of tracklets by age, by class: what moves, and all that is parked.
 pub fn tracklets(tally: &Tally) -> Chart {
-    let part = |group: Group| {
+    let part = |(group, motion): (Group, Motion)| {
         let mut lines = Lines::new(
             Axis::new("error, m/s").range(0.0, CDF_MPS),
             Axis::new("share of columns").range(0.0, 1.0),
         );
         lines.ordered = true;
-        lines.series = Tally::AGES
-            .iter()
-            .enumerate()
-            .map(|(n, age)| {
-                let errors = tally.at_age(n, group, Motion::Any);
-                let series = cdf("", &errors, CDF_MPS, Style::Line);
-                Series { name: format!("age {age}"), ..series }
-            })
+        let series = |name: String, errors: &Sorted| Series {
+            name,
+            ..cdf("", errors, CDF_MPS, Style::Line)
+        };
+        let ages = Tally::AGES.iter().enumerate();
+        lines.series = ages
+            .map(|(n, a)| series(format!("age {a}"), &tally.at_age(n, group, motion)))
             .collect();
-        (group.label().to_string(), Plot::Lines(lines))
+        let settled = tally.settled(group, motion, Weight::Column);
+        lines.series.push(series(format!("{SETTLED} and more"), &settled));
+        (title(group, motion), Plot::Lines(lines))
     };
-    let labelled = groups(tally).into_iter().filter(|g| *g != Group::Class(0));
-    let caption = "As figure 3.9 of the dissertation: errors of the velocity of tracklets after so many observations.";
-    Chart::small_multiples("figure-3-9", caption, labelled.map(part).collect())
+    let moving = groups(tally).into_iter().map(|g| (g, Motion::Moving));
+    let parts = moving.chain([(Group::Labelled, Motion::Parked)]);
+    let parts = parts.filter(|(g, m)| *g != Group::Class(0) && tally.coverage(*g, *m)[0] > 0);
+    let caption = "As figure 3.9 of the dissertation: errors of the velocity of tracklets after \
+        exactly so many observations, or so many and more. Age 0 has flow whose tracklet the gate \
+        ended too.";
+    Chart::small_multiples("figure-3-9", caption, parts.map(part).collect())
 }
 
 /// Settled tracklets, moving and parked apart.

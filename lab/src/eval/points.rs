@@ -11,6 +11,7 @@ use crate::simulate::truth;
 use glam::DVec3;
 use raywake::error::Error;
 use raywake::sink::argoverse::displacement;
+use raywake::source::recognise;
 use raywake_sim::Class;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -18,6 +19,9 @@ use std::path::{Path, PathBuf};
 /// Returns without a label up to this height above the plane the vehicle stands on count as
 /// ground, m, where no truth tells; the graders leave ground out.
 pub const GROUND_M: f64 = 0.3;
+
+/// Returns so close outside a box are not scored, m: to whom they belong cannot be told.
+const DOUBT_M: f64 = 0.3;
 
 /// The estimates that are scored.
 pub const ESTIMATES: [&str; 3] = ["raywake", "ego motion only", "truth rounded to cells"];
@@ -62,19 +66,23 @@ pub struct Points {
 impl Points {
     /// For the drive in a folder.
     pub fn new(drive: &Path, view: View, ground_m: f64, margin_m: f64, cell_m: f64) -> Points {
-        let simulated = truth::objects_path(drive).is_file().then(|| drive.to_path_buf());
+        // As the labels: in the only recording below the folder.
+        let drive = recognise(drive).map_or_else(|_| drive.to_path_buf(), |found| found.1);
+        let simulated = truth::objects_path(&drive).is_file().then_some(drive);
         Points { simulated, view, ground_m, margin_m, cell_m, scores: Default::default() }
     }
 
     /// Scores the first sweep of a pair. Fails where the file with its truth does not fit.
     pub fn pair(&mut self, seen: &Seen, present: &[Present]) -> Result<(), Error> {
         let now = seen.now();
-        let points = match &self.simulated {
+        let mut points: Vec<TruePoint> = match &self.simulated {
             Some(drive) => self.exact(drive, seen)?,
             None => {
                 seen.first.points.iter().map(|p| self.boxed(p.position, seen, present)).collect()
             }
         };
+        // The pipeline has left out what is beyond its capacity.
+        points.truncate(seen.points.len());
         let pair = Pair { points, second_from_first: seen.then.inverse() * now };
         let ours = seen.points.iter().map(|f| displacement(f, &now, seen.dt_s)).collect();
         let estimates: [Vec<[f32; 3]>; 3] =
@@ -125,6 +133,8 @@ impl Points {
         }
         let Some(object) = present.iter().find(|p| p.holds(at, self.margin_m)) else {
             point.ground = at.z < self.ground_m + GROUND_M;
+            // Noise and swinging limbs leave boxes; what is so close to one may belong to it.
+            point.valid = !present.iter().any(|p| p.holds(at, self.margin_m + DOUBT_M));
             return point;
         };
         let named = Kind::ALL[object.class as usize - 1];

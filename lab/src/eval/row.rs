@@ -169,6 +169,13 @@ row! {
     dt: f32,
 }
 
+impl Row {
+    /// Whether class and motion are among those there are; those read from a file need not be.
+    pub fn is_sound(&self) -> bool {
+        usize::from(self.class) < CLASSES.len() && self.motion <= 2
+    }
+}
+
 /// The columns of a file: `drive` and `kind` as text, then the fields of [`Row`].
 pub fn schema() -> Arc<Schema> {
     let text = || DataType::Dictionary(Box::new(DataType::UInt8), Box::new(DataType::Utf8));

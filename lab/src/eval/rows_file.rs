@@ -48,6 +48,10 @@ pub fn read(path: &Path, mut each: impl FnMut(&[Row])) -> Result<(), Error> {
         let batch = batch.map_err(|e| broken(&e))?;
         let rows = rows(&batch)
             .map_err(|column| Error::input(path, format!("column `{column}`"), "is missing"))?;
+        if let Some(row) = rows.iter().find(|r| !r.is_sound()) {
+            let what = format!("class {}, motion {}: no such", row.class, row.motion);
+            return Err(Error::input(path, format!("sweep {}", row.sweep), what));
+        }
         each(&rows);
     }
     Ok(())
@@ -71,6 +75,15 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, &whole[..whole.len() / 2]).unwrap();
         assert!(read(&path, |_| ()).unwrap_err().to_string().contains("rows.parquet"));
+    }
+
+    #[test]
+    fn classes_that_do_not_exist_are_refused() {
+        let scratch = Scratch::new();
+        let path = scratch.path().join("rows.parquet");
+        let mut batches = vec![vec![Row { motion: 3, ..Row::default() }]].into_iter();
+        write(&path, "a", || Ok(batches.next())).unwrap();
+        assert!(read(&path, |_| ()).unwrap_err().to_string().contains("motion 3"));
     }
 
     #[test]

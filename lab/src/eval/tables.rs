@@ -61,7 +61,8 @@ fn published_flow(group: Group) -> Option<Row> {
 pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
     let mut rows = Vec::new();
     for group in Group::labelled().chain([Group::Class(0)]) {
-        for motion in motions(group) {
+        let all = [Motion::Any].iter().filter(|_| group != Group::Class(0));
+        for motion in all.chain(Motion::of(group)) {
             let errors = tally.flow(Estimate::Ours, Truth::Raw, group, *motion, weight);
             if errors.count() > 0 {
                 rows.push(row([group.label(), motion.label()], flow_cells(&errors)));
@@ -79,11 +80,6 @@ pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
         "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps, by {of}."
     );
     table(id, &caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
-}
-
-/// Moving and parked are told apart for what is labelled.
-fn motions(group: Group) -> &'static [Motion] {
-    if group == Group::Class(0) { &[Motion::Any] } else { &Motion::ALL }
 }
 
 /// Every estimate beside every other, all labelled columns.
@@ -147,8 +143,9 @@ pub fn tracklets(tally: &Tally) -> Table {
         "Median against raw labels, m/s",
         "Raw labels' own floor, m/s",
     ];
-    let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 and more; truth: \
-        smoothed labels, parked objects at rest. Coverage: columns with such a tracklet, of all.";
+    let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 \
+        and more. Truth: smoothed labels, parked objects at rest; a simulator's labels are exact. \
+        Coverage: columns with such a tracklet, of all.";
     table("table-3-2", caption, &columns, rows)
 }
 
@@ -174,7 +171,7 @@ pub fn filter(curve: Option<&Curve>) -> Table {
     };
     let dissertation = ["dissertation".into(), Cell::Number(95.0, 1), Cell::Number(74.5, 1)];
     let rows = vec![
-        row("shipped threshold", curve.map(|c| c.above(0.0))),
+        row("threshold of the weights", curve.map(|c| c.above(0.0))),
         row("at 95 % recall", curve.map(|c| c.at_recall(RECALL))),
         Row::reference(dissertation.into_iter().chain([Cell::Empty])),
     ];

@@ -81,6 +81,11 @@ impl Motion {
     /// All of them.
     pub const ALL: [Motion; 4] = [Motion::Any, Motion::Moving, Motion::Slow, Motion::Parked];
 
+    /// Those told apart for a group: only what is labelled has any.
+    pub fn of(group: Group) -> &'static [Motion] {
+        if group == Group::Class(0) { &[Motion::Any] } else { &Motion::ALL[1..] }
+    }
+
     /// For people.
     pub fn label(self) -> &'static str {
         match self {

@@ -24,8 +24,11 @@ fn eval(words: &[&Path], options: &[&str]) -> Result<(), String> {
 
 /// A busy street in six sweeps, seen from a standing vehicle.
 fn drive(folder: &Path) -> PathBuf {
-    let (seed, sensor) = (3, "hdl64".to_string());
-    let recipe = Recipe { seed, sweeps: 6, sensor, motion: Motion::Standing, density: 1.0 };
+    drive_of(folder, Motion::Standing, 6)
+}
+
+fn drive_of(folder: &Path, motion: Motion, sweeps: usize) -> PathBuf {
+    let recipe = Recipe { seed: 3, sweeps, sensor: "hdl64".to_string(), motion, density: 1.0 };
     write(folder, &recipe, 1, 2, true).unwrap();
     folder.join("2000_01_01/2000_01_01_drive_0000_sync")
 }
@@ -138,4 +141,40 @@ fn drives_that_fail_are_named() {
     assert!(eval(&[&good, &twin, flag, &out], &[]).unwrap_err().contains("same name"));
     assert!(eval(&[Path::new("/nowhere"), flag, &out], &[]).unwrap_err().contains("/nowhere"));
     assert!(eval(&[&good, flag, &out], &["--margin", "9"]).unwrap_err().contains("--margin"));
+}
+
+#[test]
+fn a_moving_vehicle() {
+    let folder = Scratch::new();
+    let drive = drive_of(folder.path(), Motion::Straight, 4);
+    let [out, above] = ["out", "above"].map(|name| folder.path().join(name));
+    let flag: &Path = Path::new("--out");
+    eval(&[&drive, flag, &out], &[]).unwrap();
+    let rows_of = out.join("rows/2000_01_01_drive_0000_sync.parquet");
+    let all = rows(&rows_of);
+    // The window moves on between the sweeps, and scores are still those the filter saw.
+    assert!(all.iter().any(|r| r.carried_x.hypot(r.carried_y) > 0.3));
+    let other = all.iter().filter(|r| (r.origin > 0) != (r.score > 0)).count();
+    assert_eq!(other, 0, "of {}", all.len());
+
+    // Named by a folder above it, it has the same truth.
+    eval(&[folder.path(), flag, &above], &[]).unwrap();
+    let table = |out: &Path| fs::read_to_string(out.join("tables/three-way.csv")).unwrap();
+    assert_eq!(table(&above), table(&out));
+
+    // Opened in another way it is evaluated anew; where that fails, nothing old is left that could
+    // pass for it.
+    let settings = || facts(&out)["settings"].clone();
+    let before = settings();
+    eval(&[&drive, flag, &out], &["--ground", "-1.6"]).unwrap();
+    assert_ne!(settings(), before);
+    let cloud = drive.join("velodyne_points/data/0000000002.bin");
+    let whole = fs::read(&cloud).unwrap();
+    fs::write(&cloud, &whole[..whole.len() - 3]).unwrap();
+    let failed = eval(&[&drive, flag, &out], &[]).unwrap_err();
+    assert!(failed.contains("0000000002.bin"), "{failed}");
+    assert!(!rows_of.exists() && !out.join("drives/2000_01_01_drive_0000_sync.json").exists());
+    fs::write(&cloud, &whole).unwrap();
+    eval(&[&drive, flag, &out], &[]).unwrap();
+    assert_eq!((settings(), rows(&rows_of)), (before, all));
 }

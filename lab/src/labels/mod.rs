@@ -91,7 +91,7 @@ pub enum View {
 
 /// Half of the camera's view in which KITTI has labels for certain, degrees; at its border boxes
 /// are cut off.
-const CAMERA_DEG: f64 = 40.0;
+pub const CAMERA_DEG: f64 = 40.0;
 
 impl View {
     /// Whether labels are complete at a point of the vehicle frame.

@@ -89,6 +89,7 @@ impl Cell {
         match self {
             Cell::Text(text) => text.clone(),
             Cell::Count(count) => count.to_string(),
+            Cell::Number(value, _) if value.is_nan() => String::new(),
             Cell::Number(value, _) => value.to_string(),
             Cell::Empty => String::new(),
         }
