@@ -7,7 +7,7 @@
 //! sums over the window (3.13) and energies are integers on every machine.
 
 use crate::background_filter::fill_byte_table;
-use crate::params::{LEVELS_MAX, LINE, REACH, ROW};
+use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW};
 use crate::record::{Column, Step};
 use crate::weights::{Weights, WeightsError};
 
@@ -123,7 +123,17 @@ pub fn occupancy_constancy(
 /// The classifier shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../weights/constancy.txt");
 
-/// The author's published constants, for comparison: made for rays from 1.73 m above the sensor.
+/// What is shipped for a frame: ours is trained on a lattice in the world; in the sensor's frame,
+/// where everything moves as the vehicle does, the author's choices include his constants.
+pub fn shipped(frame: Frame) -> &'static str {
+    match frame {
+        Frame::Lattice => SHIPPED,
+        Frame::Sensor => AUTHOR,
+    }
+}
+
+/// The author's published constants: made in the sensor's frame, with rays from 1.73 m above the
+/// sensor.
 pub const AUTHOR: &str = include_str!("../weights/author.txt");
 
 #[cfg(test)]

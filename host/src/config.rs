@@ -167,7 +167,7 @@ impl Weights {
         };
         let constancy = match &learned.constancy {
             Some(path) => (Some(path), read(path)?),
-            None => (None, occupancy_constancy::SHIPPED.to_string()),
+            None => (None, occupancy_constancy::shipped(profile.frame).to_string()),
         };
         let levels = profile.levels as usize;
         if let Some((path, text)) = &filter {

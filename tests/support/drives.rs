@@ -33,7 +33,8 @@ impl Setup {
 
     /// The learned tables.
     pub fn tables(&self) -> Tables {
-        Tables::load(&self.profile, self.filter.as_deref(), occupancy_constancy::SHIPPED)
+        let constancy = occupancy_constancy::shipped(self.profile.frame);
+        Tables::load(&self.profile, self.filter.as_deref(), constancy)
             .unwrap_or_else(|e| panic!("{e}"))
     }
 
