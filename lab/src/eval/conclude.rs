@@ -83,7 +83,8 @@ const TRACKLETS: &str = "The error is the distance between the velocity over gro
 
 const POINTS: &str = "Every return has the velocity of its column over the time between the sweeps. \
     Truth is the simulator's, or the motion of the labelled box a return lies in; what is in none \
-    stands. Without a map, returns without a label up to 0.3 m above the plane the vehicle stands \
+    stands, but for what lies so close outside one (0.3 m) that it may belong to it, which is not \
+    scored. Without a map, returns without a label up to 0.3 m above the plane the vehicle stands \
     on count as ground, which is left out. For the graders' own truth and ground of an Argoverse \
     2 log see `raywake-lab grade`.";
 
