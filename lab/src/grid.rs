@@ -128,15 +128,19 @@ mod tests {
     use raywake_core::pose::{Pose, Twist};
     use raywake_core::sweep::{Point, Timing};
 
-    #[test]
-    fn a_point_lies_in_the_column_around_it() {
-        let rig = Rig {
+    fn rig() -> Rig {
+        Rig {
             sensors: [Pose::IDENTITY].into_iter().collect(),
             timing: Timing::AtStamp,
             distorted: false,
             ground_m: -1.73,
             own_vehicle: None,
-        };
+        }
+    }
+
+    #[test]
+    fn a_point_lies_in_the_column_around_it() {
+        let rig = rig();
         let mut grid = Grid::new(Profile::hdl64());
         for world_from_vehicle in [Pose::IDENTITY, Pose::planar(7.1, -3.4, 0.2, 0.6)] {
             let points = [Point { position: [11.3, -4.2, -0.5], ..Point::default() }];
@@ -152,13 +156,7 @@ mod tests {
 
     #[test]
     fn a_drive_begins_anywhere_on_its_lattice() {
-        let rig = Rig {
-            sensors: [Pose::IDENTITY].into_iter().collect(),
-            timing: Timing::AtStamp,
-            distorted: false,
-            ground_m: -1.73,
-            own_vehicle: None,
-        };
+        let rig = rig();
         let mut grid = Grid::new(Profile::hdl64());
         let points = [Point { position: [11.3, -4.2, -0.5], ..Point::default() }];
         let at = |x: f64| Sweep {

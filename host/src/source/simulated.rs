@@ -2,13 +2,10 @@
 
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
-use raywake_sim::{Drive, Options, Truth};
+use raywake_sim::{Drive, Options, Truth, stamp_s};
 
 use super::{Dropped, Source, SweepData};
 use crate::error::Error;
-
-/// Sweeps per second of the simulator.
-const RATE_HZ: f64 = 10.0;
 
 /// A drive through a street that a seed draws.
 pub struct Simulated {
@@ -55,7 +52,7 @@ impl Source for Simulated {
     }
 
     fn describe(&self) -> String {
-        let (sweeps, span_s) = (self.len(), (self.len() - 1) as f64 / RATE_HZ);
+        let (sweeps, span_s) = (self.len(), stamp_s(self.len() - 1));
         format!("simulated street, seed {}: {sweeps} sweeps, {span_s:.1} s, exact poses", self.seed)
     }
 
@@ -64,7 +61,7 @@ impl Source for Simulated {
     }
 
     fn stamp_s(&self, index: usize) -> f64 {
-        index as f64 / RATE_HZ
+        stamp_s(index)
     }
 
     fn pose(&self, index: usize) -> Pose {

@@ -73,10 +73,25 @@ impl Ego {
     fn drawn(rng: &mut Rng) -> Ego {
         match (rng.unit() * 8.0) as u32 {
             0 => Ego::Standing,
-            1..4 => Ego::Straight { speed: rng.range(2.0, 14.0) },
-            4 => Ego::StopAndGo { speed: rng.range(4.0, 10.0) },
-            _ => Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) },
+            1..4 => Ego::straight(rng),
+            4 => Ego::stop_and_go(rng),
+            _ => Ego::turn(rng),
         }
+    }
+
+    /// Straight on at a speed of city traffic.
+    pub fn straight(rng: &mut Rng) -> Ego {
+        Ego::Straight { speed: rng.range(2.0, 14.0) }
+    }
+
+    /// A stop from a speed of city traffic.
+    pub fn stop_and_go(rng: &mut Rng) -> Ego {
+        Ego::StopAndGo { speed: rng.range(4.0, 10.0) }
+    }
+
+    /// A turn to either side.
+    pub fn turn(rng: &mut Rng) -> Ego {
+        Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) }
     }
 }
 

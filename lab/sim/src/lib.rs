@@ -36,7 +36,7 @@ pub use ego::Ego;
 pub use ground::{Contact, Ground};
 pub use object::{Class, Fixture, Object, Part, Surface, Swing};
 pub use path::{Path, State};
-pub use rig::{Mount, SensorRig, UnknownRig};
+pub use rig::{Mount, PERIOD_S, SensorRig, UnknownRig, stamp_s};
 pub use rng::Rng;
 pub use scene::{ObjectState, Scene};
 pub use sensor::{Beam, Sensor};

@@ -9,10 +9,10 @@ use std::str::FromStr;
 
 /// Duration of a sweep, s: what all sensors fire from half of it before the stamp to half of it
 /// after.
-pub(crate) const PERIOD_S: f64 = 0.1;
+pub const PERIOD_S: f64 = 0.1;
 
 /// Stamp of sweep `index`, s.
-pub(crate) fn stamp_s(index: usize) -> f64 {
+pub fn stamp_s(index: usize) -> f64 {
     index as f64 / 10.0
 }
 

@@ -1,7 +1,7 @@
 //! From a pair of sweeps to rows: every solid column beside its truth.
 
 use super::objects::{Objects, Present};
-use super::row::Row;
+use super::row::{Row, class_of};
 use crate::grid::Grid;
 use crate::labels::{Motion, View};
 use glam::DVec3;
@@ -151,7 +151,7 @@ impl<'a> Collector<'a> {
             cell_j: flow.cell[1],
             x,
             y,
-            class: object.map_or(0, |p| p.class),
+            class: object.map_or(0, |p| class_of(p.kind)),
             track: object.map_or(0, |p| p.track + 1),
             in_view: !vanishes && ends.iter().all(|end| self.view.holds(*end)),
             motion: object.map_or(0, |p| motion(p.motion)),

@@ -2,6 +2,7 @@
 
 use super::drive::{Files, Settings};
 use super::facts::Facts;
+use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::{Estimate, Group, Motion, Tally, Truth};
 use super::{figures, rows_file, tables};
@@ -53,7 +54,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         .chart(figures::tracklets(&tally));
     report
         .section("Flow of single returns")
-        .text(POINTS)
+        .text(&about_returns())
         .table(bucketed)
         .table(three_way)
         .table(accuracy);
@@ -81,12 +82,17 @@ const RAW: &str = "The error is the distance between the displacement found for 
 const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
     tracklet and that of its object at the column's centre.";
 
-const POINTS: &str = "Every return has the velocity of its column over the time between the sweeps. \
+/// What the scores of returns are.
+fn about_returns() -> String {
+    format!(
+        "Every return has the velocity of its column over the time between the sweeps. \
     Truth is the simulator's, or the motion of the labelled box a return lies in; what is in none \
-    stands, but for what lies so close outside one (0.3 m) that it may belong to it, which is not \
-    scored. Without a map, returns without a label up to 0.3 m above the plane the vehicle stands \
+    stands, but for what lies so close outside one ({DOUBT_M} m) that it may belong to it, which is not \
+    scored. Without a map, returns without a label up to {GROUND_M} m above the plane the vehicle stands \
     on count as ground, which is left out. For the graders' own truth and ground of an Argoverse \
-    2 log see `raywake-lab grade`.";
+    2 log see `raywake-lab grade`."
+    )
+}
 
 const TIME: &str = "From the sweep in memory to flow in memory, while another thread makes rows, and \
     other drives run where `--jobs` says so; `raywake run` has the machine to itself.";

@@ -1,7 +1,6 @@
 //! The labelled objects of every sweep, with their motion to the next.
 
-use super::row::class_of;
-use crate::labels::{Footprint, Labels, Motion, trajectories};
+use crate::labels::{Footprint, Kind, Labels, Motion, trajectories};
 use glam::DVec3;
 use raywake::source::Source;
 use raywake_core::pose::Pose;
@@ -12,8 +11,8 @@ use std::collections::HashMap;
 pub struct Present {
     /// Index of the track.
     pub track: u32,
-    /// Index in [`super::row::CLASSES`].
-    pub class: u8,
+    /// What it is.
+    pub kind: Kind,
     /// From above, vehicle frame.
     pub footprint: Footprint,
     /// The box's frame lies in its centre.
@@ -63,7 +62,7 @@ impl Objects {
                 });
                 frames.entry(state.frame).or_default().push(Present {
                     track: index as u32,
-                    class: class_of(track.kind),
+                    kind: track.kind,
                     footprint: Footprint::new(now, track.size[0], track.size[1]),
                     vehicle_from_box: now,
                     size: track.size,

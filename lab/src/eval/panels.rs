@@ -5,7 +5,6 @@ use super::collect::Seen;
 use super::facts;
 use super::objects::Present;
 use super::row::Row;
-use crate::labels::Kind;
 use crate::report::{Column, Look, Outline, Panel, birds_eye};
 use glam::DVec3;
 use raywake::error::Error;
@@ -54,7 +53,7 @@ impl Panels {
             return;
         }
         let mean_m = labelled().map(|r| error_m(r).min(CLIP_M)).sum::<f32>() / count as f32;
-        let moving = labelled().filter(|r| r.motion == 2 && r.age >= AGE).count() as f32;
+        let moving = labelled().filter(|r| r.is_moving() && r.age >= AGE).count() as f32;
         for (kept, merit) in self.0.iter_mut().zip([mean_m, -mean_m, moving]) {
             if kept.as_ref().is_none_or(|c| merit > c.merit) {
                 let outlines = present.iter().map(outline).collect();
@@ -110,8 +109,7 @@ impl Panels {
 
 fn outline(present: &Present) -> Outline {
     let [length, width, _] = present.size;
-    let kind = Kind::ALL[present.class as usize - 1];
-    Outline { pose: present.vehicle_from_box, size: [length, width], kind }
+    Outline { pose: present.vehicle_from_box, size: [length, width], kind: present.kind }
 }
 
 fn error_m(row: &Row) -> f32 {
@@ -142,7 +140,7 @@ impl Candidate {
             at: [row.x, row.y].map(f64::from),
             error: labelled.then(|| f64::from(error_m(row))),
             truth: labelled.then(|| arrow(row.true_x, row.true_y)),
-            estimate: (row.origin == Origin::Matched as u8).then(|| arrow(row.flow_x, row.flow_y)),
+            estimate: row.is_matched().then(|| arrow(row.flow_x, row.flow_y)),
         }
     }
 

@@ -2,8 +2,7 @@
 
 use super::collect::Seen;
 use super::objects::Present;
-use super::row::CLASSES;
-use crate::labels::{Kind, View, kind};
+use crate::labels::{View, kind};
 use crate::metrics::{
     AccuracyTable, BucketedEpe, Category, Pair, Rules, ThreeWayEpe, TruePoint, reference,
 };
@@ -12,7 +11,7 @@ use glam::DVec3;
 use raywake::error::Error;
 use raywake::sink::argoverse::displacement;
 use raywake::source::recognise;
-use raywake_sim::Class;
+use raywake_sim::{Class, PERIOD_S};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -21,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub const GROUND_M: f64 = 0.3;
 
 /// Returns so close outside a box are not scored, m: to whom they belong cannot be told.
-const DOUBT_M: f64 = 0.3;
+pub const DOUBT_M: f64 = 0.3;
 
 /// The estimates that are scored.
 pub const ESTIMATES: [&str; 3] = ["raywake", "ego motion only", "truth rounded to cells"];
@@ -106,8 +105,8 @@ impl Points {
             let what = format!("{} rows for {} returns", rows.len(), seen.first.points.len());
             return Err(Error::input(&path, "", what));
         }
-        // Flow over 0.1 s; pairs may lie a little closer or farther apart.
-        let span = (seen.dt_s / truth::FLOW_S) as f32;
+        // Flow over one period; pairs may lie a little closer or farther apart.
+        let span = (seen.dt_s / PERIOD_S) as f32;
         let point = |(p, t): (&raywake_core::sweep::Point, &truth::PointTruth)| TruePoint {
             position_m: p.position,
             flow_m: t.flow.map(|v| v * span),
@@ -137,9 +136,7 @@ impl Points {
             point.valid = !present.iter().any(|p| p.holds(at, self.margin_m + DOUBT_M));
             return point;
         };
-        let named = Kind::ALL[object.class as usize - 1];
-        debug_assert_eq!(CLASSES[object.class as usize], format!("{named:?}"));
-        match (object.step, Category::of_kind(named)) {
+        match (object.step, Category::of_kind(object.kind)) {
             (Some(step), Some(category)) => {
                 let world = seen.now().transform(at);
                 let moved = step.raw.transform(world) - world;

@@ -10,6 +10,7 @@ use arrow_array::{
     StringArray, UInt8Array, UInt32Array, UInt64Array,
 };
 use arrow_schema::{DataType, Field, Schema};
+use raywake_core::output::Origin;
 use std::sync::Arc;
 
 /// Names of [`Row::class`]: what is in no labelled box, then the kinds of [`Kind`].
@@ -170,6 +171,16 @@ row! {
 }
 
 impl Row {
+    /// Whether the labelled object moves.
+    pub fn is_moving(&self) -> bool {
+        self.motion == 2
+    }
+
+    /// Whether the flow is that of a match.
+    pub fn is_matched(&self) -> bool {
+        self.origin == Origin::Matched as u8
+    }
+
     /// Whether class and motion are among those there are; those read from a file need not be.
     pub fn is_sound(&self) -> bool {
         usize::from(self.class) < CLASSES.len() && self.motion <= 2

@@ -47,7 +47,7 @@ impl Estimate {
     fn of(self, row: &Row) -> Option<[f32; 2]> {
         match self {
             Estimate::Ours => Some([row.flow_x, row.flow_y]),
-            Estimate::Matched => (row.origin == 2).then_some([row.flow_x, row.flow_y]),
+            Estimate::Matched => row.is_matched().then_some([row.flow_x, row.flow_y]),
             Estimate::Zero => Some([row.carried_x, row.carried_y]),
             Estimate::EgoOnly => Some([0.0; 2]),
             Estimate::Rounded => Some([row.rounded_x, row.rounded_y]),
@@ -202,7 +202,7 @@ impl Tally {
             self.smooth[n][class][motion].push(distance(flow, smooth), row.voxels);
         }
         self.columns[class][motion] += 1;
-        if row.origin == 2 {
+        if row.is_matched() {
             self.tracklet(row, class, motion);
         }
     }

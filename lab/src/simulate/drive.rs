@@ -58,9 +58,9 @@ impl Recipe {
         let ego = match self.motion {
             Motion::Any => Ego::Any,
             Motion::Standing => Ego::Standing,
-            Motion::Straight => Ego::Straight { speed: rng.range(2.0, 14.0) },
-            Motion::Turn => Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) },
-            Motion::StopAndGo => Ego::StopAndGo { speed: rng.range(4.0, 10.0) },
+            Motion::Straight => Ego::straight(&mut rng),
+            Motion::Turn => Ego::turn(&mut rng),
+            Motion::StopAndGo => Ego::stop_and_go(&mut rng),
         };
         let (sweeps, density, rig) = (self.sweeps, self.density, self.sensors()?);
         Ok(Drive::new(seed, Options { sweeps, ego, density, rig, threads }))

@@ -16,9 +16,6 @@ use raywake_core::pose::Pose;
 use raywake_sim::{Class, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
 
-/// Time that [`PointTruth::flow`] is over, s.
-pub const FLOW_S: f64 = 0.1;
-
 /// Step of the difference that gives turn rates, s.
 const STEP_S: f64 = 5e-4;
 
@@ -50,7 +47,7 @@ pub struct PointTruth {
     pub object: u32,
     /// What it is.
     pub class: Class,
-    /// How far over ground the point of the material moves within the 0.1 s after the return, along
+    /// How far over ground the point of the material moves within [`raywake_sim::PERIOD_S`] after the return, along
     /// the axes the vehicle has at the sweep's stamp, m.
     pub flow: [f32; 3],
 }
