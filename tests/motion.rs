@@ -16,8 +16,8 @@ const AGE: u32 = 10;
 const ENOUGH: usize = 50;
 /// Largest median error, m/s.
 const LIMIT: f64 = 0.5;
-/// The same of a van: its long smooth sides match themselves a cell back as well as in place, so
-/// that whole cells of flow come out slow.
+/// The same of a van: along its long smooth sides whole cells are hard to tell apart (0.65 m/s at
+/// most where this was set).
 const LIMIT_OF_VANS: f64 = 0.8;
 
 /// Objects at 3 to 15 m/s, each in a lane of its own, within sight for a few seconds.
