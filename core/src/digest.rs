@@ -40,12 +40,14 @@ impl Digest {
         self.word((v + 0.0).to_bits());
     }
 
-    /// Adds a column's flow: cell, origin, displacement, energy, velocity over ground, velocity
+    /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over ground, velocity
     /// relative to the vehicle, covariance, age.
     pub fn column(&mut self, c: &ColumnFlow) {
         c.cell.iter().for_each(|v| self.word(*v as u32));
         self.word(c.origin as u32);
         c.displacement_cells.iter().for_each(|v| self.word(*v as u32));
+        c.displacement_m.iter().for_each(|v| self.float(*v));
+        c.displacement_covariance.iter().for_each(|v| self.float(*v));
         self.word(c.energy as u32);
         c.velocity_world_mps.iter().for_each(|v| self.float(*v));
         c.velocity_ego_mps.iter().for_each(|v| self.float(*v));

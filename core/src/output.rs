@@ -5,7 +5,7 @@
 //! is relative to the moving vehicle, along the vehicle's axes (section 3.7).
 
 /// What is known of a column's flow.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Origin {
     /// Not foreground: the flow follows from odometry (section 3.4.2).
@@ -15,6 +15,9 @@ pub enum Origin {
     Unmatched = 1,
     /// Foreground with a valid match (section 3.5.2).
     Matched = 2,
+    /// Without a match of its own, but part of a thing that was found to move: the flow is that
+    /// thing's.
+    Joined = 3,
 }
 
 /// Flow of one solid column of the pair's first sweep.
@@ -29,6 +32,11 @@ pub struct ColumnFlow {
     pub position_vehicle_m: [f32; 2],
     /// Raw displacement in cells (3.14); meaningful where matched.
     pub displacement_cells: [i32; 2],
+    /// Displacement over ground until the second sweep, world axes, m: refined below the cell's
+    /// size, zero where the column was found to stand still.
+    pub displacement_m: [f32; 2],
+    /// Covariance of `displacement_m` (xx, xy, yy), m^2; zero for background and where unmatched.
+    pub displacement_covariance: [f32; 3],
     /// Energy of the match in thousandths of a nat; meaningful where matched.
     pub energy: i32,
     /// Velocity over ground along world axes, m/s.

@@ -35,6 +35,8 @@ pub const MERGE_SLOTS: usize = 2 * POINTS_MAX;
 pub const MERGE_PROBES: u32 = 64;
 /// Voxels a return may lie from the window's corner along an axis; farther ones are dropped.
 pub const EXTENT_VOXELS: i32 = 4095;
+/// Sweeps the refinement of the flow may look at.
+pub const REFINEMENT_SWEEPS_MAX: usize = 4;
 /// Updates (voxel, log-odds) of one band of the sparse map.
 pub const BAND_UPDATES: usize = 1 << 20;
 /// Threads of a workgroup of every one-dimensional kernel.
@@ -127,6 +129,9 @@ pub struct Profile {
     pub displacement_cost: u32,
     /// Cost of a window neighbour outside the grid, thousandths of a nat.
     pub outside_cost: u32,
+    /// Sweeps whose returns refine the flow below the cell's size, the pair's own two included, at
+    /// most [`REFINEMENT_SWEEPS_MAX`]; 0 leaves whole cells.
+    pub refinement_sweeps: u32,
     /// Tracklet filter.
     pub tracklet: TrackletParams,
     /// Beyond these two sweeps make no pair, and tracklets are dropped.
@@ -157,6 +162,7 @@ impl Profile {
             smoothing: 1000,
             displacement_cost: 1,
             outside_cost: COST_UNKNOWN,
+            refinement_sweeps: 0,
             tracklet: TrackletParams {
                 measurement_cells: 0.5,
                 speed_noise_mps2: 1.0,
@@ -227,7 +233,7 @@ impl Profile {
     pub fn check(&self) -> Result<(), ProfileError> {
         let (t, l) = (&self.tracklet, &self.limits);
         let positive = |v: f32| v.is_finite() && v > 0.0;
-        let rules: [(bool, &'static str, &'static str); 18] = [
+        let rules: [(bool, &'static str, &'static str); 20] = [
             (self.side % 2 == 1 && self.side >= 31, "side", "odd and at least 31"),
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
@@ -241,6 +247,17 @@ impl Profile {
             (self.smoothing <= 10_000, "smoothing", "at most 10,000 (10 nats per cell²)"),
             (self.displacement_cost <= 1000, "displacement_cost", "at most 1,000"),
             (self.outside_cost <= 100_000, "outside_cost", "at most 100,000"),
+            (
+                self.refinement_sweeps != 1
+                    && self.refinement_sweeps <= REFINEMENT_SWEEPS_MAX as u32,
+                "refinement_sweeps",
+                "0 or 2 to 4",
+            ),
+            (
+                self.refinement_sweeps == 0 || self.frame == Frame::Lattice,
+                "refinement_sweeps",
+                "0 where the frame is the sensor's",
+            ),
             (positive(t.measurement_cells), "measurement_cells", "above 0"),
             (positive(t.speed_noise_mps2), "speed_noise_mps2", "above 0"),
             (positive(t.turn_noise_radps2), "turn_noise_radps2", "above 0"),

@@ -371,6 +371,7 @@ impl Pipeline {
                     flow.origin = Origin::Matched;
                     flow.displacement_cells = flow_displacement(perceived.state[column]);
                     flow.energy = perceived.proposal[rank][1] as i32;
+                    self.set_displacement(&mut flow, before, current, at);
                     self.set_velocity(&mut flow, rank, dt, turned);
                 }
             }
@@ -388,6 +389,24 @@ impl Pipeline {
             count += 1;
         }
         (count, valid)
+    }
+
+    /// Displacement over ground of a matched column at `at` (first sweep's vehicle frame), from the
+    /// whole cells, with the covariance of two measured positions.
+    fn set_displacement(&self, flow: &mut ColumnFlow, before: &Side, current: &Side, at: DVec3) {
+        let r = self.profile.voxel_m;
+        let [x, y] = flow.displacement_cells.map(|c| c as f64 * r);
+        let by = match self.profile.frame {
+            Frame::Lattice => DVec3::new(x, y, 0.0),
+            Frame::Sensor => {
+                let by = DVec3::new(x, y, 0.0);
+                current.pose.transform(at + by) - before.pose.transform(at)
+            }
+        };
+        flow.displacement_m = [by.x as f32, by.y as f32];
+        let deviation = self.profile.tracklet.measurement_cells * r as f32;
+        let variance = 2.0 * deviation * deviation;
+        flow.displacement_covariance = [variance, 0.0, variance];
     }
 
     /// Velocity along the grid's axes of a matched column: its tracklet's, or, where the gate

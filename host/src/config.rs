@@ -30,6 +30,7 @@ struct Keys {
     smoothing: Option<u32>,
     displacement_cost: Option<u32>,
     outside_cost: Option<u32>,
+    refinement_sweeps: Option<u32>,
     gap_s: Option<f64>,
     jump_mps: Option<f64>,
     spin_radps: Option<f64>,
@@ -85,6 +86,7 @@ impl Keys {
         set(&mut p.smoothing, self.smoothing);
         set(&mut p.displacement_cost, self.displacement_cost);
         set(&mut p.outside_cost, self.outside_cost);
+        set(&mut p.refinement_sweeps, self.refinement_sweeps);
         set(&mut p.limits.gap_s, self.gap_s);
         set(&mut p.limits.jump_mps, self.jump_mps);
         set(&mut p.limits.spin_radps, self.spin_radps);

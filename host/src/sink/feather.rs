@@ -38,8 +38,10 @@ const COVARIANCE: [(&str, usize, usize); 15] = [
 ///
 /// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `vx_world_mps vy_world_mps`,
 /// `vx_ego_mps vy_ego_mps`, `cov_xx cov_xy cov_yy` ((m/s)^2, of the world velocity) float32;
-/// `displacement_i displacement_j` (cells), `energy_millinats` int32; `age` uint32; `foreground`
-/// (not explained by odometry) and `valid` (foreground with a match) bool.
+/// `displacement_i displacement_j` (whole cells), `energy_millinats` int32; `dx_world_m dy_world_m`
+/// (refined displacement over ground until the next sweep) and its covariance `cov_dx_dx cov_dx_dy
+/// cov_dy_dy` (m^2) float32; `age` uint32; `foreground` (not explained by odometry) and `valid`
+/// (with a match of its own or part of a thing that moves) bool.
 pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
     let mut t = Table::default();
     t.i32s("cell_i", columns, |c| c.cell[0]);
@@ -57,10 +59,15 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
     t.f32s("cov_yy", columns, |c| c.covariance[2]);
     t.i32s("displacement_i", columns, |c| c.displacement_cells[0]);
     t.i32s("displacement_j", columns, |c| c.displacement_cells[1]);
+    t.f32s("dx_world_m", columns, |c| c.displacement_m[0]);
+    t.f32s("dy_world_m", columns, |c| c.displacement_m[1]);
+    t.f32s("cov_dx_dx", columns, |c| c.displacement_covariance[0]);
+    t.f32s("cov_dx_dy", columns, |c| c.displacement_covariance[1]);
+    t.f32s("cov_dy_dy", columns, |c| c.displacement_covariance[2]);
     t.i32s("energy_millinats", columns, |c| c.energy);
     t.u32s("age", columns, |c| c.age);
     t.bools("foreground", columns, |c| c.origin != Origin::Background);
-    t.bools("valid", columns, |c| c.origin == Origin::Matched);
+    t.bools("valid", columns, |c| c.origin >= Origin::Matched);
     t.write(path, meta)
 }
 
@@ -90,7 +97,7 @@ pub fn write_points(
     t.f32s("cov_yy", flows, |f| f.covariance[2]);
     t.u32s("age", flows, |f| f.age);
     t.bools("foreground", flows, |f| f.origin != Origin::Background);
-    t.bools("valid", flows, |f| f.origin == Origin::Matched);
+    t.bools("valid", flows, |f| f.origin >= Origin::Matched);
     t.write(path, meta)
 }
 

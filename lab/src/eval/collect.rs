@@ -9,7 +9,7 @@ use raywake::engine::Pair;
 use raywake::source::SweepData;
 use raywake_core::background_filter::score;
 use raywake_core::grid::shift::shift;
-use raywake_core::output::{ColumnFlow, Origin, PointFlow};
+use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
 use raywake_core::prepare::place;
@@ -135,12 +135,7 @@ impl<'a> Collector<'a> {
         let moved = |by: Option<Pose>| by.map_or(world, |m| m.transform(world)) - world;
         let (truth, smooth) = (moved(step.map(|s| s.raw)), moved(step.map(|s| s.smooth)));
         let ends = [at, seen.then.inverse().transform(world + truth)];
-        let [cells_x, cells_y] = flow.displacement_cells.map(f64::from);
         let cell = self.profile.voxel_m;
-        let found = match flow.origin {
-            Origin::Matched => self.over_ground(seen, at, DVec3::new(cells_x, cells_y, 0.0) * cell),
-            _ => DVec3::ZERO,
-        };
         let carried = seen.then.transform(at) - world;
         let rounded = (self.in_grid(seen, at, truth) / cell).round() * cell;
         let rounded = self.over_ground(seen, at, DVec3::new(rounded.x, rounded.y, 0.0));
@@ -158,8 +153,8 @@ impl<'a> Collector<'a> {
             voxels,
             score,
             origin: flow.origin as u8,
-            flow_x: found.x as f32,
-            flow_y: found.y as f32,
+            flow_x: flow.displacement_m[0],
+            flow_y: flow.displacement_m[1],
             true_x: truth.x as f32,
             true_y: truth.y as f32,
             smooth_x: smooth.x as f32,
