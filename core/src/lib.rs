@@ -21,6 +21,7 @@ pub mod pose;
 pub mod prefix_sum;
 pub mod prepare;
 pub mod record;
+pub mod refinement;
 pub mod sweep;
 pub mod tracklet;
 pub mod weights;

@@ -37,6 +37,9 @@ pub const MERGE_PROBES: u32 = 64;
 pub const EXTENT_VOXELS: i32 = 4095;
 /// Sweeps the refinement of the flow may look at.
 pub const REFINEMENT_SWEEPS_MAX: usize = 4;
+/// Thinned returns of one sweep that the refinement keeps; those of the last columns are dropped
+/// and counted.
+pub const CLOUD_MAX: usize = 65_536;
 /// Updates (voxel, log-odds) of one band of the sparse map.
 pub const BAND_UPDATES: usize = 1 << 20;
 /// Threads of a workgroup of every one-dimensional kernel.

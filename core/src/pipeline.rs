@@ -24,6 +24,7 @@ use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
 use crate::prepare::{Dropped, Preparation, Window, central, place, step_of};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
+use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
 use crate::tracklet::{Tracklets, Turnover};
 use crate::window::window;
@@ -125,6 +126,9 @@ pub fn perceive<'a>(
     }
 }
 
+/// Standard deviation of the displacement of what stands, m.
+const STILL_M: f32 = 0.02;
+
 /// One sweep's side of a pair.
 #[derive(Clone, Copy, Debug)]
 struct Side {
@@ -177,6 +181,8 @@ pub struct Pipeline {
     tracklets: Tracklets,
     slot_of_source: [u32; FOREGROUND_MAX],
     column_of_point: [[u32; POINTS_MAX]; 2],
+    positions: [[f32; 3]; POINTS_MAX],
+    refinement: Refinement,
     flow_of_column: [u32; COLUMNS_MAX],
 }
 
@@ -204,6 +210,8 @@ impl Pipeline {
             tracklets: Tracklets::new(),
             slot_of_source: [NONE; FOREGROUND_MAX],
             column_of_point: [[NONE; POINTS_MAX]; 2],
+            positions: [[0.0; 3]; POINTS_MAX],
+            refinement: Refinement::new(),
             flow_of_column: [NONE; COLUMNS_MAX],
         }
     }
@@ -225,6 +233,7 @@ impl Pipeline {
         let reset = self.check_continuity(sweep);
         if reset.is_some() {
             self.tracklets.clear();
+            self.refinement.clear();
             self.before = None;
         }
         let window =
@@ -240,8 +249,20 @@ impl Pipeline {
             sweep,
             rays,
             &mut self.column_of_point[0],
+            &mut self.positions,
             origins,
         );
+        let taken = sweep.points.len().min(POINTS_MAX);
+        if self.profile.refinement_sweeps > 0 {
+            self.refinement.take(
+                &self.profile,
+                window.corner,
+                sweep.stamp_s,
+                &sweep.points[..taken],
+                &self.positions[..taken],
+                &self.column_of_point[0][..taken],
+            );
+        }
         self.current = Some(Side {
             window,
             pose: sweep.world_from_vehicle,
@@ -295,6 +316,14 @@ impl Pipeline {
         let dt = current.stamp_s - before.stamp_s;
         let moved = before.pose.inverse() * current.pose;
         let turned = moved.yaw_rad() as f32;
+        if self.profile.refinement_sweeps > 0 {
+            self.tracklets.place(step);
+            let (tracklets, r) = (&self.tracklets, self.profile.voxel_m as f32);
+            self.refinement.run(step, perceived.state, |c| {
+                let t = tracklets.at(c).filter(|t| t.age > 0)?;
+                Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
+            });
+        }
         let turnover = self.tracklets.update(
             &self.profile,
             step,
@@ -374,6 +403,19 @@ impl Pipeline {
                     self.set_displacement(&mut flow, before, current, at);
                     self.set_velocity(&mut flow, rank, dt, turned);
                 }
+            }
+            if self.profile.refinement_sweeps > 0 {
+                let r = self.profile.voxel_m as f32;
+                flow.displacement_m = [0.0; 2];
+                flow.displacement_covariance = [STILL_M * STILL_M, 0.0, STILL_M * STILL_M];
+                if let Some((by, covariance)) =
+                    self.refinement.of(step, column, perceived.state[column])
+                {
+                    flow.origin = flow.origin.max(Origin::Matched);
+                    flow.displacement_m = by.map(|v| v * r);
+                    flow.displacement_covariance = covariance.map(|v| v * r * r);
+                }
+                flow.velocity_world_mps = flow.displacement_m.map(|v| v / dt);
             }
             let planar = DVec3::new(at.x, at.y, 0.0);
             if flow.origin == Origin::Matched && self.profile.frame == Frame::Sensor {

@@ -162,6 +162,7 @@ impl Preparation {
         sweep: &Sweep,
         rays: &mut [Ray],
         columns: &mut [u32],
+        positions: &mut [[f32; 3]],
         origins: &mut [[i32; 4]],
     ) -> (usize, Dropped) {
         assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
@@ -185,7 +186,9 @@ impl Preparation {
         let taken = sweep.points.len().min(POINTS_MAX);
         dropped.over_capacity = (sweep.points.len() - taken) as u64;
         let mut count = 0;
-        for (point, column) in sweep.points[..taken].iter().zip(columns.iter_mut()) {
+        let centre_f = centre.map(|c| c as f32);
+        for (n, (point, column)) in sweep.points[..taken].iter().zip(columns.iter_mut()).enumerate()
+        {
             *column = NONE;
             let p = point.position;
             if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
@@ -202,7 +205,8 @@ impl Preparation {
                 continue;
             }
             let slot = if moving { self.slot(rig, point) } else { 0 };
-            let end = add(voxel(&to_voxel[slot], p), centre);
+            let at = in_voxels(&to_voxel[slot], p);
+            let end = add(voxel(at), centre);
             if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
                 dropped.too_far += 1;
                 continue;
@@ -214,6 +218,9 @@ impl Preparation {
             let [i, j, k] = end.map(|v| v as u32);
             if i < side && j < side && k < levels && !own {
                 *column = i * side + j;
+                if let Some(position) = positions.get_mut(n) {
+                    *position = [0, 1, 2].map(|a| at[a] + centre_f[a]);
+                }
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
             count += 1;
@@ -272,12 +279,19 @@ fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
     })
 }
 
-/// Voxel of a point. Values beyond 32 bits saturate and are then too far.
+/// A point in voxels from the window's central one. Values far beyond any window saturate.
 #[inline]
-fn voxel(m: &ToVoxel, p: [f32; 3]) -> [i32; 3] {
+fn in_voxels(m: &ToVoxel, p: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|a| {
         let v = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
-        let v = v.clamp(-1e6, 1e6);
+        v.clamp(-1e6, 1e6)
+    })
+}
+
+/// Voxel of a point in voxels.
+#[inline]
+fn voxel(at: [f32; 3]) -> [i32; 3] {
+    at.map(|v| {
         let cut = v as i32;
         // Truncation rounds up below zero.
         cut - ((cut as f32) > v) as i32
@@ -366,6 +380,7 @@ mod tests {
             &sweep,
             &mut rays,
             &mut columns,
+            &mut [],
             &mut origins,
         );
         rays.truncate(count);

@@ -4,6 +4,7 @@
 use std::alloc::System;
 use std::io::{Write, stderr};
 use std::process::ExitCode;
+use std::thread;
 
 use clap::Parser;
 use raywake::args::{Args, Command};
@@ -18,8 +19,13 @@ const INTERRUPTED: u8 = 130;
 #[global_allocator]
 static ALLOCATOR: Guard<System> = Guard(System);
 
+/// The pipeline is made on the stack before it moves to the heap, and is larger than the main
+/// thread's on most systems.
+const STACK: usize = 64 << 20;
+
 fn main() -> ExitCode {
-    let code = match execute(Args::parse().command) {
+    let command = Args::parse().command;
+    let work = || match execute(command) {
         Ok(code) => code,
         Err(e) => {
             // Nobody is left to tell where standard error is closed.
@@ -27,7 +33,10 @@ fn main() -> ExitCode {
             e.exit_code()
         }
     };
-    ExitCode::from(code)
+    let worker = thread::Builder::new().stack_size(STACK).spawn(work);
+    let code = worker.expect("the system has threads").join();
+    // A panic has said what it had to say; 101 is what Rust ends with.
+    ExitCode::from(code.unwrap_or(101))
 }
 
 fn execute(command: Command) -> Result<u8, Error> {

@@ -79,6 +79,7 @@ impl Grid {
             sweep,
             &mut self.rays,
             &mut self.of_point,
+            &mut [],
             &mut self.origins,
         );
         self.step.rays = count as i32;

@@ -23,8 +23,16 @@ impl Rays {
         let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
         let preparation = Preparation::new();
-        let (count, _) =
-            preparation.prepare(profile, rig, window, sweep, &mut rays, &mut columns, &mut origins);
+        let (count, _) = preparation.prepare(
+            profile,
+            rig,
+            window,
+            sweep,
+            &mut rays,
+            &mut columns,
+            &mut [],
+            &mut origins,
+        );
         rays.truncate(count);
         let step = Step {
             side: profile.side as i32,

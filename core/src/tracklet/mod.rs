@@ -152,7 +152,11 @@ impl Tracklets {
     }
 
     /// Finds the tracklets' columns in the new window. Returns how many are no longer in it.
-    fn place(&mut self, step: &Step) -> u32 {
+    pub(crate) fn at(&self, column: usize) -> Option<&Tracklet> {
+        self.now.get(self.slot_of_column[column] as usize)
+    }
+
+    pub(crate) fn place(&mut self, step: &Step) -> u32 {
         let side = step.side;
         self.slot_of_column.fill(NONE);
         let mut left = 0;

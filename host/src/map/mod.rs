@@ -108,6 +108,7 @@ impl Mapper {
             sweep,
             rays,
             &mut self.columns,
+            &mut [],
             origins,
         );
         self.backend.map(&step_of(&self.profile, count), put)?;

@@ -1,0 +1,290 @@
+//! How a thing moved between sweeps: its returns laid over those of the other sweeps.
+
+use super::cloud::Cloud;
+use crate::params::COLUMNS_MAX;
+use nalgebra::{Matrix3, Vector3};
+
+/// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
+pub const SAMPLES: usize = 128;
+/// Steps of Gauss and Newton.
+const STEPS: usize = 8;
+/// The first steps, with the wide kernel.
+const WIDE_STEPS: usize = 3;
+/// Width of the kernel of Geman and McClure, voxels: in the first steps, and then.
+const KERNEL: [f32; 2] = [1.0, 0.35];
+/// Standard deviation of a return, voxels.
+pub const NOISE: f32 = 0.15;
+/// Share of the information of a pair of returns that is its own: neighbours err alike.
+const INFORMATION: f32 = 0.25;
+/// Standard deviation of the turn between two sweeps, rad.
+const TURN: f32 = 0.03;
+/// Distance from which on a return counts as missed, voxels.
+const MISSED: f32 = 0.5;
+
+/// A return of a thing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Voxels from the window's corner of its sweep.
+    pub at: [f32; 3],
+    /// Sensor that saw it.
+    pub sensor: u32,
+    /// Inverse covariance of the returns around it and of their noise, relative to the noise's: 1
+    /// across a surface, little along it.
+    pub weight: Matrix3<f32>,
+}
+
+impl Sample {
+    /// Squared distance across the surface, voxels².
+    fn square(&self, d: [f32; 3]) -> f32 {
+        let d = Vector3::from(d);
+        (d.transpose() * self.weight * d)[0]
+    }
+}
+
+/// Another sweep: where its window lies seen from the first one's, and how much of the motion has
+/// happened by then.
+#[derive(Clone, Copy)]
+pub struct Other<'a> {
+    pub cloud: &'a Cloud,
+    pub offset: [f32; 3],
+    pub scale: f32,
+}
+
+/// Rigid motion in the plane over one pair of sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// Displacement of the centre, voxels, and turn about it, rad.
+    pub by: Vector3<f32>,
+    /// Centre, voxels from the first sweep's window corner.
+    pub centre: [f32; 2],
+    /// Covariance of `by`.
+    pub covariance: Matrix3<f32>,
+}
+
+impl Motion {
+    /// No motion of what lies around a centre.
+    pub fn around(centre: [f32; 2]) -> Motion {
+        Motion { centre, ..Motion::default() }
+    }
+
+    /// The same, displaced.
+    pub fn by(self, by: [f32; 2]) -> Motion {
+        Motion { by: Vector3::new(by[0], by[1], 0.0), ..self }
+    }
+
+    /// Displacement of a place, voxels.
+    pub fn of(&self, at: [f32; 2]) -> [f32; 2] {
+        let [x, y] = [at[0] - self.centre[0], at[1] - self.centre[1]];
+        [self.by.x - self.by.z * y, self.by.y + self.by.z * x]
+    }
+
+    fn jacobian(&self, at: [f32; 3]) -> Matrix3<f32> {
+        let [x, y] = [at[0] - self.centre[0], at[1] - self.centre[1]];
+        Matrix3::new(1.0, 0.0, -y, 0.0, 1.0, x, 0.0, 0.0, 0.0)
+    }
+
+    /// Covariance of the displacement of a place (xx, xy, yy), voxels².
+    pub fn covariance_of(&self, at: [f32; 2]) -> [f32; 3] {
+        let j = self.jacobian([at[0], at[1], 0.0]);
+        let c = j * self.covariance * j.transpose();
+        [c[(0, 0)], c[(0, 1)], c[(1, 1)]]
+    }
+}
+
+type Samples = heapless::Vec<Sample, SAMPLES>;
+
+/// A thing: its columns and some of its returns, and what they are laid over.
+pub struct Thing<'a> {
+    pub first: &'a Cloud,
+    pub others: &'a [Other<'a>],
+    pub columns: &'a [u32],
+    /// Some of its returns, evenly taken.
+    pub samples: Samples,
+    /// Their mean, voxels from the first sweep's window corner.
+    pub centre: [f32; 2],
+    /// Largest extent along an axis, voxels.
+    pub extent: f32,
+}
+
+/// Marks columns that were seen, by number of the visit.
+pub struct Visits {
+    visit: u32,
+    of: [u32; COLUMNS_MAX],
+}
+
+impl Visits {
+    pub(super) const fn new() -> Visits {
+        Visits { visit: 0, of: [0; COLUMNS_MAX] }
+    }
+    fn start(&mut self) {
+        self.visit = self.visit.wrapping_add(1);
+        if self.visit == 0 {
+            self.of.fill(0);
+            self.visit = 1;
+        }
+    }
+    fn first(&mut self, column: usize) -> bool {
+        core::mem::replace(&mut self.of[column], self.visit) != self.visit
+    }
+}
+
+fn moved(s: &Sample, motion: &Motion, other: &Other) -> [f32; 3] {
+    let d = motion.of([s.at[0], s.at[1]]);
+    [
+        s.at[0] + other.scale * d[0] + other.offset[0],
+        s.at[1] + other.scale * d[1] + other.offset[1],
+        s.at[2] + other.offset[2],
+    ]
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+impl<'a> Thing<'a> {
+    /// Of some columns.
+    pub fn new(first: &'a Cloud, others: &'a [Other<'a>], columns: &'a [u32]) -> Thing<'a> {
+        let returns = || columns.iter().flat_map(|c| first.column(*c as usize));
+        let stride = returns().count().div_ceil(SAMPLES).max(1);
+        // As many as there is room for.
+        let samples: Samples = returns().step_by(stride).map(|r| first.sample(r)).collect();
+        let count = samples.len() as f32;
+        let along = |a: usize| samples.iter().map(move |s| s.at[a]);
+        let centre = [0, 1].map(|a| along(a).sum::<f32>() / count);
+        let extent = [0, 1].map(|a| {
+            along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
+        });
+        Thing {
+            first,
+            others,
+            columns,
+            samples: samples.clone(),
+            centre,
+            extent: extent[0].max(extent[1]),
+        }
+    }
+
+    /// Returns of the newest sweep where the thing would be.
+    fn there(&self, motion: &Motion, visits: &mut Visits) -> Samples {
+        let other = &self.others[0];
+        let side = self.first.side;
+        let mut there = Samples::new();
+        visits.start();
+        let mut list = heapless::Vec::<u32, 1024>::new();
+        let mut total = 0;
+        for &c in self.columns {
+            let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
+            let d = motion.of(at);
+            let i = (at[0] + d[0] + other.offset[0]) as i32;
+            let j = (at[1] + d[1] + other.offset[1]) as i32;
+            for a in (i - 1).max(0)..(i + 2).min(side as i32) {
+                for b in (j - 1).max(0)..(j + 2).min(side as i32) {
+                    let column = a as usize * side + b as usize;
+                    let n = other.cloud.column(column).len();
+                    if n > 0 && visits.first(column) {
+                        total += n;
+                        let _ = list.push(column as u32);
+                    }
+                }
+            }
+        }
+        let stride = total.div_ceil(SAMPLES).max(1);
+        let mut seen = 0;
+        for &c in &list {
+            for p in other.cloud.column(c as usize) {
+                if seen % stride == 0 {
+                    let _ = there.push(other.cloud.sample(p));
+                }
+                seen += 1;
+            }
+        }
+        there
+    }
+
+    /// Where a return of the newest sweep was, voxels of the first sweep's window.
+    fn back(&self, q: &Sample, motion: &Motion) -> [f32; 3] {
+        let at = minus(q.at, self.others[0].offset);
+        let d = motion.of([at[0] - motion.by.x, at[1] - motion.by.y]);
+        [at[0] - d[0], at[1] - d[1], at[2]]
+    }
+
+    /// Mean truncated squared distance, 0 (all lie on something) to 1 (none does).
+    pub fn misfit(&self, motion: &Motion, visits: &mut Visits) -> f32 {
+        let truncated = |s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>| {
+            found.map_or(1.0, |n| (s.square(minus(n.1, at)) / (MISSED * MISSED)).min(1.0))
+        };
+        let (mut sum, mut count) = (0.0, 0.0f32);
+        for other in self.others {
+            for s in &self.samples {
+                let at = moved(s, motion, other);
+                sum += truncated(s, at, other.cloud.nearest(at, s.sensor));
+                count += 1.0;
+            }
+        }
+        let still = Motion::default();
+        for q in &self.there(motion, visits) {
+            let at = self.back(q, motion);
+            let off = truncated(q, at, self.first.nearest(at, q.sensor));
+            if off > 0.5 {
+                // What stands there was there before.
+                let at = self.back(q, &still);
+                let stood = self.first.nearest(at, q.sensor);
+                if stood.is_some_and(|n| n.0 < MISSED * MISSED) {
+                    continue;
+                }
+            }
+            sum += off;
+            count += 1.0;
+        }
+        sum / count.max(1.0)
+    }
+
+    /// Lays the thing over the others, starting at `motion`.
+    pub fn align(&self, mut motion: Motion, visits: &mut Visits) -> Motion {
+        let mut there = Samples::new();
+        for step in 0..STEPS {
+            if step == 0 || step == WIDE_STEPS {
+                there = self.there(&motion, visits);
+            }
+            let kernel = KERNEL[(step >= WIDE_STEPS) as usize];
+            let mut h = Matrix3::zeros();
+            h[(2, 2)] = 1.0 / (TURN * TURN);
+            let mut g = Vector3::new(0.0, 0.0, -motion.by.z / (TURN * TURN));
+            let mut pair = |s: &Sample, source: [f32; 3], off: [f32; 3], scale: f32| {
+                let d2 = s.square(off);
+                let fall = 1.0 / (1.0 + d2 / (kernel * kernel));
+                let m = s.weight * (fall * fall * INFORMATION / (NOISE * NOISE));
+                let j = motion.jacobian(source) * scale;
+                let jm = j.transpose() * m;
+                h += jm * j;
+                g += jm * Vector3::from(off);
+            };
+            for other in self.others {
+                for s in &self.samples {
+                    let at = moved(s, &motion, other);
+                    if let Some((_, q)) = other.cloud.nearest(at, s.sensor) {
+                        pair(s, s.at, minus(q, at), other.scale);
+                    }
+                }
+            }
+            for q in &there {
+                let at = self.back(q, &motion);
+                if let Some((_, p)) = self.first.nearest(at, q.sensor) {
+                    pair(q, p, minus(at, p), 1.0);
+                }
+            }
+            // Something to hold on to where all is missed.
+            for n in 0..2 {
+                h[(n, n)] += 1e-3;
+            }
+            let Some(inverse) = h.try_inverse() else { break };
+            let by = inverse * g;
+            motion.by += by;
+            motion.covariance = inverse;
+            if by.norm_squared() < 1e-6 && step > WIDE_STEPS {
+                break;
+            }
+        }
+        motion
+    }
+}

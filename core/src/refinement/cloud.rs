@@ -1,0 +1,252 @@
+//! The returns of a sweep that rise above the ground, thinned and sorted by column.
+
+use super::align::{NOISE, Sample};
+use crate::params::{CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
+use crate::record::NONE;
+use crate::sweep::{Point, SENSORS_MAX};
+use nalgebra::{Matrix3, Vector3};
+
+/// Columns along an axis of a cell of the ground: 1.5 m at 0.30 m.
+const GROUND_CELL: usize = 5;
+/// Ground cells along an axis at most.
+const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
+/// Returns higher above the ground than this belong to things, voxels.
+pub const GROUND_HEIGHT: f32 = 0.7;
+/// By how much the ground may fall from one of its cells to the next, voxels: 10 %.
+const GROUND_FALL: f32 = 0.5;
+/// Returns so near tell which way the surface faces, voxels.
+const AROUND: f32 = 1.5;
+/// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.
+const THINNED: f32 = 3.0;
+/// Words of a mask of the sub-voxels of a column: 3 x 3 x 3 x 16.
+const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
+
+/// Height of the ground, by cells of [`GROUND_CELL`] columns.
+pub struct Ground {
+    side: usize,
+    lowest: [f32; GROUND_SIDE * GROUND_SIDE],
+    height: [f32; GROUND_SIDE * GROUND_SIDE],
+}
+
+impl Ground {
+    pub(super) const fn new() -> Ground {
+        let none = [f32::INFINITY; GROUND_SIDE * GROUND_SIDE];
+        Ground { side: 0, lowest: none, height: none }
+    }
+
+    fn cell(&self, side: usize, column: usize) -> usize {
+        column / side / GROUND_CELL * self.side + column % side / GROUND_CELL
+    }
+
+    /// The lowest return of each cell, or of its neighbours if the ground falls that way.
+    fn estimate(&mut self, side: usize, positions: &[[f32; 3]], columns: &[u32]) {
+        self.side = side.div_ceil(GROUND_CELL);
+        self.lowest.fill(f32::INFINITY);
+        for (p, &column) in positions.iter().zip(columns) {
+            if column != NONE {
+                let low = &mut self.lowest[self.cell(side, column as usize)];
+                *low = low.min(p[2]);
+            }
+        }
+        let n = self.side;
+        for i in 0..n {
+            for j in 0..n {
+                let mut height = self.lowest[i * n + j];
+                for a in i.saturating_sub(1)..(i + 2).min(n) {
+                    for b in j.saturating_sub(1)..(j + 2).min(n) {
+                        height = height.min(self.lowest[a * n + b] + GROUND_FALL);
+                    }
+                }
+                self.height[i * n + j] = height;
+            }
+        }
+    }
+
+    /// Height above the ground of a return in a column, voxels.
+    pub fn above(&self, side: usize, column: u32, z: f32) -> f32 {
+        z - self.height[self.cell(side, column as usize)]
+    }
+}
+
+/// A return above the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Return {
+    /// Voxels from the window's corner.
+    pub at: [f32; 3],
+    /// Sensor that saw it: each sees a thing at a time of its own.
+    pub sensor: u32,
+}
+
+/// Thinned returns of one sweep, voxels from the window's corner.
+pub struct Cloud {
+    /// Columns along an axis of the window.
+    pub side: usize,
+    /// Lattice index of the window's first voxel.
+    pub corner: [i32; 3],
+    /// Time of the sweep, s.
+    pub stamp_s: f64,
+    points: heapless::Vec<Return, CLOUD_MAX>,
+    start: [u32; COLUMNS_MAX + 1],
+    /// Levels of each column in which something was hit.
+    levels: [u16; COLUMNS_MAX],
+}
+
+impl Cloud {
+    pub(super) const fn new() -> Cloud {
+        Cloud {
+            side: 0,
+            corner: [0; 3],
+            stamp_s: 0.0,
+            points: heapless::Vec::new(),
+            start: [0; COLUMNS_MAX + 1],
+            levels: [0; COLUMNS_MAX],
+        }
+    }
+
+    /// Takes over a sweep. `order` is scratch, one element per return. Returns how many returns
+    /// were left out for want of room: those of the last columns.
+    pub(super) fn fill(
+        &mut self,
+        profile: &Profile,
+        ground: &mut Ground,
+        points: &[Point],
+        positions: &[[f32; 3]],
+        columns: &[u32],
+        order: &mut [u32],
+    ) -> usize {
+        let side = profile.side as usize;
+        self.side = side;
+        ground.estimate(side, positions, columns);
+        let is_thing = |n: usize| {
+            columns[n] != NONE && ground.above(side, columns[n], positions[n][2]) > GROUND_HEIGHT
+        };
+        // A counting sort keeps the source's order within a column.
+        let columns_used = side * side;
+        let start = &mut self.start[..columns_used + 1];
+        start.fill(0);
+        for n in 0..columns.len() {
+            if is_thing(n) {
+                start[columns[n] as usize + 1] += 1;
+            }
+        }
+        for c in 0..columns_used {
+            start[c + 1] += start[c];
+        }
+        for n in 0..columns.len() {
+            if is_thing(n) {
+                let at = &mut start[columns[n] as usize];
+                order[*at as usize] = n as u32;
+                *at += 1;
+            }
+        }
+        // Each start has become its end; what is kept is written from the front again.
+        self.points.clear();
+        let (mut from, mut dropped) = (0, 0);
+        for (c, end) in start[..columns_used].iter_mut().enumerate() {
+            let listed = &order[from..*end as usize];
+            from = *end as usize;
+            *end = self.points.len() as u32;
+            self.levels[c] = 0;
+            let corner = [(c / side) as f32, (c % side) as f32];
+            let sensors = listed.iter().fold(0u32, |s, n| s | 1 << points[*n as usize].sensor);
+            for sensor in (0..SENSORS_MAX as u32).filter(|s| sensors & 1 << s != 0) {
+                let mut taken = [0u32; MASK_WORDS];
+                for &n in listed {
+                    if points[n as usize].sensor != sensor {
+                        continue;
+                    }
+                    let p = positions[n as usize];
+                    let part = |v: f32| (v * THINNED).clamp(0.0, THINNED - 1.0) as usize;
+                    let level = (p[2] * THINNED) as usize;
+                    let bit = (level * 3 + part(p[0] - corner[0])) * 3 + part(p[1] - corner[1]);
+                    let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
+                    if *word & 1 << (bit % 32) == 0 {
+                        *word |= 1 << (bit % 32);
+                        self.levels[c] |= 1 << (p[2] as u32).min(LEVELS_MAX as u32 - 1);
+                        dropped += self.points.push(Return { at: p, sensor }).is_err() as usize;
+                    }
+                }
+            }
+        }
+        start[columns_used] = self.points.len() as u32;
+        dropped
+    }
+
+    /// Levels of a column in which something was hit, a bit each.
+    pub fn levels(&self, column: usize) -> u16 {
+        self.levels[column]
+    }
+
+    /// Whether something was hit in the voxel of a place.
+    pub fn is_hit(&self, at: [f32; 3]) -> bool {
+        let side = self.side as f32;
+        let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
+        let in_levels = at[2] >= 0.0 && at[2] < LEVELS_MAX as f32;
+        inside
+            && in_levels
+            && self.levels[at[0] as usize * self.side + at[1] as usize] >> at[2] as u32 & 1 != 0
+    }
+
+    /// Thinned returns in a column.
+    pub fn column(&self, column: usize) -> &[Return] {
+        &self.points[self.start[column] as usize..self.start[column + 1] as usize]
+    }
+
+    /// Thinned returns of columns `j_from..j_to` of row `i`: they lie side by side.
+    pub fn row(&self, i: usize, j_from: usize, j_to: usize) -> &[Return] {
+        let row = i * self.side;
+        &self.points[self.start[row + j_from] as usize..self.start[row + j_to] as usize]
+    }
+
+    /// The nearest return closer than a voxel's edge to `at`: its squared distance (voxels) and
+    /// itself; of two as near the first in order.
+    pub fn nearest(&self, at: [f32; 3], sensor: u32) -> Option<(f32, [f32; 3])> {
+        let side = self.side as f32;
+        if !(at[0] > -1.0 && at[0] < side && at[1] > -1.0 && at[1] < side) {
+            return None;
+        }
+        // One beyond the window on either side would still have neighbours inside.
+        let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
+        let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
+        let mut best = (1.0, [0.0; 3]);
+        let mut found = false;
+        let in_row = at[0] + 1.0 - i as f32;
+        // The row it lies in first: what is found there often excludes the others.
+        for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
+            let row = row.wrapping_sub(1);
+            if row >= self.side || gap * gap >= best.0 {
+                continue;
+            }
+            for Return { at: p, sensor: by } in self.row(row, j_from, j_to) {
+                let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
+                let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                if d2 < best.0 && *by == sensor {
+                    (best, found) = ((d2, *p), true);
+                }
+            }
+        }
+        found.then_some(best)
+    }
+
+    /// A return and what the returns around it tell about the surface it lies on.
+    pub fn sample(&self, of: &Return) -> Sample {
+        let [i, j] = [of.at[0] as usize, of.at[1] as usize];
+        let (mut n, mut mean, mut square) = (0.0f32, Vector3::zeros(), Matrix3::zeros());
+        for a in i.saturating_sub(1)..(i + 2).min(self.side) {
+            for p in self.row(a, j.saturating_sub(1), (j + 2).min(self.side)) {
+                let d = Vector3::from(p.at) - Vector3::from(of.at);
+                if p.sensor == of.sensor && d.norm_squared() < AROUND * AROUND {
+                    n += 1.0;
+                    mean += d;
+                    square += d * d.transpose();
+                }
+            }
+        }
+        mean /= n;
+        let noise = Matrix3::from_diagonal_element(NOISE * NOISE);
+        let spread = square / n - mean * mean.transpose() + noise;
+        // Positive definite by the noise.
+        let weight = spread.try_inverse().unwrap_or_default() * (NOISE * NOISE);
+        Sample { at: of.at, sensor: of.sensor, weight }
+    }
+}

@@ -1,0 +1,325 @@
+//! Refinement of the flow below the cell's size: things, and how each of them moved.
+//!
+//! Cells of 0.3 m bound what whole displacements can tell (design.md, section 5): this stage goes
+//! back to the returns. Returns above the ground are thinned ([`cloud`]); columns that touch make
+//! things ([`segments`]); each thing is laid over the other sweep, and over earlier ones where
+//! [`crate::params::Profile::refinement_sweeps`] allows, starting from standing still, from what its
+//! tracklets predict, from the displacements most of its columns found by energy minimisation, and,
+//! where none of these fits, from a search ([`align`]). It moves where that explains the returns far
+//! better than standing still does. Then all its columns move with it, those that the background
+//! filter took or that found no match too.
+
+mod align;
+mod cloud;
+mod search;
+mod segments;
+
+use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
+use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
+use crate::sweep::Point;
+use align::{Motion, Other, Thing, Visits};
+use cloud::{Cloud, Ground};
+use segments::Segments;
+
+/// Displacements that many columns found, tried as starts.
+const STARTS: usize = 3;
+/// A thing that fits its place so well stands: misfits are shares of what could be missed.
+const STANDS: f32 = 0.06;
+/// A start that fits so badly calls for a search.
+const UNFIT: f32 = 0.3;
+/// Gain over standing still from which on a thing moves, see [`gain`].
+const GAIN: f32 = 0.15;
+/// Displacement from which on a thing moves, voxels.
+const LEAST: f32 = 0.13;
+/// Larger things stand, voxels: 30 m.
+const EXTENT_MAX: f32 = 100.0;
+/// How far a fragment may lie from a moving thing that takes it along, columns.
+const NEAR: usize = 4;
+/// Moving things near a fragment that are tried.
+const NEIGHBOURS: usize = 8;
+
+/// How well the explanation of a thing's returns by a motion beats that by standing still.
+fn gain(still: f32, moved: f32) -> f32 {
+    if moved < still { (1.0 - moved / still) * libm::sqrtf(still - moved) } else { 0.0 }
+}
+
+/// What became of a thing.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    /// How it moved, if it did.
+    motion: Option<Motion>,
+    /// Misfit of standing still.
+    still: f32,
+    /// Largest extent along an axis, voxels.
+    extent: f32,
+}
+
+/// Its state between sweeps.
+pub struct Refinement {
+    ground: Ground,
+    clouds: [Cloud; REFINEMENT_SWEEPS_MAX],
+    /// Sweeps held in `clouds`.
+    held: usize,
+    /// Where the newest is.
+    newest: usize,
+    segments: Segments,
+    order: [u32; POINTS_MAX],
+    /// Segment of each column of the first sweep's window.
+    segment: [u32; COLUMNS_MAX],
+    found: heapless::Vec<Found, COLUMNS_MAX>,
+    visits: Visits,
+}
+
+/// Index of the cloud `age` sweeps before the newest.
+fn index(newest: usize, age: usize) -> usize {
+    (newest + REFINEMENT_SWEEPS_MAX - age) % REFINEMENT_SWEEPS_MAX
+}
+
+impl Refinement {
+    pub(crate) const fn new() -> Refinement {
+        Refinement {
+            ground: Ground::new(),
+            clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
+            held: 0,
+            newest: 0,
+            segments: Segments::new(),
+            order: [0; POINTS_MAX],
+            segment: [NONE; COLUMNS_MAX],
+            found: heapless::Vec::new(),
+            visits: Visits::new(),
+        }
+    }
+
+    /// Forgets all sweeps.
+    pub(crate) fn clear(&mut self) {
+        self.held = 0;
+    }
+
+    /// Takes over a sweep: its returns, where they lie in voxels from the window's corner, and in
+    /// which column. Returns how many had no room.
+    pub(crate) fn take(
+        &mut self,
+        profile: &Profile,
+        corner: [i32; 3],
+        stamp_s: f64,
+        points: &[Point],
+        positions: &[[f32; 3]],
+        columns: &[u32],
+    ) -> usize {
+        self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
+        self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
+        let cloud = &mut self.clouds[self.newest];
+        cloud.corner = corner;
+        cloud.stamp_s = stamp_s;
+        cloud.fill(profile, &mut self.ground, points, positions, columns, &mut self.order)
+    }
+
+    /// Motion of the things of the pair's first sweep. `state` is the flow of the columns of the new
+    /// window, `predicted` the displacement a column's tracklet predicts, voxels.
+    pub(crate) fn run(
+        &mut self,
+        step: &Step,
+        state: &[Flow],
+        predicted: impl Fn(usize) -> Option<[f32; 2]>,
+    ) {
+        self.found.clear();
+        self.segment.fill(NONE);
+        if self.held < 2 {
+            return;
+        }
+        let newest = self.newest;
+        let first = &self.clouds[index(newest, 1)];
+        let side = first.side;
+        let now = |c: usize| {
+            let (i, j) = ((c / side) as i32 - step.shift_x, (c % side) as i32 - step.shift_y);
+            let inside = (0..step.side).contains(&i) && (0..step.side).contains(&j);
+            inside.then_some((i * step.side + j) as usize)
+        };
+        let flow = |c: usize| now(c).map_or(0, |c| state[c]);
+        let predicted = |c: usize| now(c).and_then(&predicted);
+        self.segments.find(first, flow);
+        let span = self.clouds[newest].stamp_s - first.stamp_s;
+        let mut others = heapless::Vec::<Other, REFINEMENT_SWEEPS_MAX>::new();
+        for age in (0..self.held).filter(|a| *a != 1) {
+            let cloud = &self.clouds[index(newest, age)];
+            // There are fewer than the capacity.
+            let _ = others.push(Other {
+                cloud,
+                offset: core::array::from_fn(|a| (first.corner[a] - cloud.corner[a]) as f32),
+                scale: ((cloud.stamp_s - first.stamp_s) / span) as f32,
+            });
+        }
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
+            let thing = Thing::new(first, &others, columns);
+            let found = motion(&thing, flow, predicted, &mut self.visits);
+            let _ = self.found.push(found);
+        }
+        for n in 0..self.segments.len() {
+            let found = self.found[n];
+            if found.motion.is_some() || found.still < STANDS || found.extent > EXTENT_MAX {
+                continue;
+            }
+            let columns = self.segments.columns(n);
+            let near = neighbours(side, columns, &self.segment, &self.found[..]);
+            let thing = Thing::new(first, &others, columns);
+            let mut best = found.still;
+            for m in &near {
+                let Some(motion) = self.found[*m as usize].motion else { continue };
+                let misfit = thing.misfit(&motion, &mut self.visits);
+                if misfit < best && gain(found.still, misfit) > GAIN {
+                    best = misfit;
+                    self.found[n].motion = Some(motion);
+                }
+            }
+        }
+    }
+
+    /// How a column of the new window moved, voxels, with its covariance; nothing where it stands or
+    /// is of the ground.
+    pub(crate) fn of(
+        &self,
+        step: &Step,
+        column: usize,
+        flow: Flow,
+    ) -> Option<([f32; 2], [f32; 3])> {
+        let side = step.side;
+        let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
+        let segment = |i: i32, j: i32| {
+            let inside = (0..side).contains(&i) && (0..side).contains(&j);
+            let segment = if inside { self.segment[(i * side + j) as usize] } else { NONE };
+            (segment != NONE).then(|| &self.found[segment as usize])
+        };
+        let at = [i as f32 + 0.5, j as f32 + 0.5];
+        if let Some(own) = segment(i, j) {
+            return own.motion.map(|m| (m.of(at), m.covariance_of(at)));
+        }
+        // Nothing but low returns: the lower edge of a thing, where the match says so.
+        if flow & VALID == 0 {
+            return None;
+        }
+        let cells = flow_displacement(flow);
+        for (di, dj) in (-2..=2).flat_map(|a| (-2..=2).map(move |b| (a, b))) {
+            let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
+            let by = motion.of(at);
+            if (0..2).all(|a| (cells[a] as f32 - by[a]).abs() <= 1.0) {
+                return Some((by, motion.covariance_of(at)));
+            }
+        }
+        None
+    }
+}
+
+/// The best motion of a thing, if any beats standing still.
+fn motion(
+    thing: &Thing,
+    flow: impl Fn(usize) -> Flow,
+    predicted: impl Fn(usize) -> Option<[f32; 2]>,
+    visits: &mut Visits,
+) -> Found {
+    let still = Motion::around(thing.centre);
+    let mut found =
+        Found { motion: None, still: thing.misfit(&still, visits), extent: thing.extent };
+    if found.still < STANDS || thing.extent > EXTENT_MAX {
+        return found;
+    }
+    let mut best = (found.still, still);
+    let mut start = |by: [f32; 2]| {
+        let motion = thing.align(still.by([by[0], by[1]]), visits);
+        let misfit = thing.misfit(&motion, visits);
+        if misfit < best.0 {
+            best = (misfit, motion);
+        }
+        best.0
+    };
+    start([0.0; 2]);
+    if let Some(by) = mean(thing.columns.iter().filter_map(|c| predicted(*c as usize))) {
+        start(by);
+    }
+    let mut votes = Votes::new(thing.columns.iter().map(|c| flow(*c as usize)));
+    let mut misfit = 1.0;
+    for _ in 0..STARTS {
+        let Some(by) = votes.next() else { break };
+        misfit = start(by);
+    }
+    if misfit > UNFIT {
+        start(search::search(thing));
+    }
+    let (misfit, motion) = best;
+    let by = motion.by.xy().norm();
+    if gain(found.still, misfit) > GAIN && by > LEAST {
+        found.motion = Some(motion);
+    }
+    found
+}
+
+fn mean(of: impl Iterator<Item = [f32; 2]>) -> Option<[f32; 2]> {
+    let (mut n, mut sum) = (0.0, [0.0; 2]);
+    for v in of {
+        n += 1.0;
+        sum = [sum[0] + v[0], sum[1] + v[1]];
+    }
+    (n > 0.0).then(|| sum.map(|s| s / n))
+}
+
+/// Displacements of matched columns, counted.
+struct Votes([[u16; SIDE]; SIDE]);
+
+impl Votes {
+    fn new(flows: impl Iterator<Item = Flow>) -> Votes {
+        let mut votes = [[0u16; SIDE]; SIDE];
+        for flow in flows.filter(|f| f & VALID != 0) {
+            let [u, v] = flow_displacement(flow).map(|d| (d + REACH) as usize);
+            votes[u][v] = votes[u][v].saturating_add(1);
+        }
+        Votes(votes)
+    }
+
+    /// The mean of the most frequent displacement and its neighbours, which are counted no more.
+    fn next(&mut self) -> Option<[f32; 2]> {
+        let mut top = (0, 0, 0);
+        for (u, line) in self.0.iter().enumerate() {
+            for (v, &count) in line.iter().enumerate() {
+                if count > top.0 {
+                    top = (count, u, v);
+                }
+            }
+        }
+        let (_, u, v) = (top.0 > 0).then_some(top)?;
+        let (mut sum, mut at) = (0.0, [0.0; 2]);
+        for a in u.saturating_sub(1)..(u + 2).min(SIDE) {
+            for b in v.saturating_sub(1)..(v + 2).min(SIDE) {
+                let count = core::mem::take(&mut self.0[a][b]) as f32;
+                sum += count;
+                at[0] += count * (a as i32 - REACH) as f32;
+                at[1] += count * (b as i32 - REACH) as f32;
+            }
+        }
+        Some(at.map(|v| v / sum))
+    }
+}
+
+/// Moving things near a fragment.
+fn neighbours(
+    side: usize,
+    columns: &[u32],
+    segment: &[u32],
+    found: &[Found],
+) -> heapless::Vec<u32, NEIGHBOURS> {
+    let mut near = heapless::Vec::new();
+    for &c in columns {
+        let (i, j) = (c as usize / side, c as usize % side);
+        for a in i.saturating_sub(NEAR)..(i + NEAR + 1).min(side) {
+            for b in j.saturating_sub(NEAR)..(j + NEAR + 1).min(side) {
+                let other = segment[a * side + b];
+                let moves = found.get(other as usize).is_some_and(|f| f.motion.is_some());
+                if moves && !near.contains(&other) {
+                    // Beyond the capacity: the first ones are enough.
+                    let _ = near.push(other);
+                }
+            }
+        }
+    }
+    near
+}
