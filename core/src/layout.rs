@@ -96,6 +96,7 @@ buffers! {
     Proposal "proposal" Device "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "flow and energy each foreground column proposes";
     Least "least" Device "vec2<u32>" * 2, |_p| FOREGROUND_MAX, "least energy of a foreground column, and where";
     CountersOut "counters_out" Readback "u32" * 1, |_p| COUNTERS, "counts";
+    NowOut "columns_now_out" Readback "vec2<u32>" * 2, |p| p.columns(), "columns of this sweep";
     BeforeOut "columns_before_out" Readback "vec2<u32>" * 2, |p| p.columns(), "columns of the sweep before";
     ForegroundOut "foreground_out" Readback "u32" * 1, |_p| FOREGROUND_MAX, "foreground columns";
     StateOut "state_out" Readback "u32" * 1, |p| p.columns(), "flow of every column";

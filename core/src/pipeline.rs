@@ -67,6 +67,8 @@ pub struct Storage<'a> {
 pub struct Perceived<'a> {
     /// Columns of the sweep before, in the new window.
     pub before: &'a [Column],
+    /// Columns of the new sweep.
+    pub now: &'a [Column],
     /// Foreground columns, ascending.
     pub foreground: &'a [u32],
     /// Foreground columns found, those beyond the capacity included.
@@ -118,6 +120,7 @@ pub fn perceive<'a>(
     lap("flow");
     Perceived {
         before: s.before,
+        now: s.now,
         foreground,
         marked,
         rays: used,
@@ -319,7 +322,7 @@ impl Pipeline {
         if self.profile.refinement_sweeps > 0 {
             self.tracklets.place(step);
             let (tracklets, r) = (&self.tracklets, self.profile.voxel_m as f32);
-            self.refinement.run(step, perceived.state, |c| {
+            self.refinement.run(step, perceived, |c| {
                 let t = tracklets.at(c).filter(|t| t.age > 0)?;
                 Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
             });

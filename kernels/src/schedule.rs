@@ -66,6 +66,7 @@ pub fn flow(profile: &Profile) -> Program {
     }
     ops.extend([
         copy(Counters, CountersOut),
+        copy(Now, NowOut),
         copy(Before, BeforeOut),
         copy(Foreground, ForegroundOut),
         copy(State, StateOut),

@@ -1,7 +1,8 @@
 //! How a thing moved between sweeps: its returns laid over those of the other sweeps.
 
 use super::cloud::Cloud;
-use crate::params::COLUMNS_MAX;
+use crate::params::{COLUMNS_MAX, LEVELS_MAX};
+use crate::record::Column;
 use nalgebra::{Matrix3, Vector3};
 
 /// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
@@ -93,10 +94,44 @@ impl Motion {
 
 type Samples = heapless::Vec<Sample, SAMPLES>;
 
+/// What a thing is laid over.
+#[derive(Clone, Copy)]
+pub struct Sweeps<'a> {
+    /// The pair's first sweep, which the things are of.
+    pub first: &'a Cloud,
+    /// The pair's second sweep, then earlier ones.
+    pub others: &'a [Other<'a>],
+    /// Columns of the first sweep in the second's window.
+    pub before: &'a [Column],
+    /// Columns of the second sweep.
+    pub now: &'a [Column],
+}
+
+impl Sweeps<'_> {
+    /// Whether rays passed through the voxel of a place of the second sweep's window, and none ended
+    /// there: what was there is gone, or has come.
+    fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {
+        let side = self.first.side as f32;
+        let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
+        let in_levels = at[2] >= 0.0 && at[2] < LEVELS_MAX as f32;
+        inside
+            && in_levels
+            && columns[at[0] as usize * self.first.side + at[1] as usize][0] >> at[2] as u32 & 1
+                != 0
+    }
+
+    /// Misfit of a return of the first sweep, if it stood: nothing where it cannot be seen.
+    pub fn standing(&self, s: &Sample) -> Option<f32> {
+        let other = &self.others[0];
+        let at = moved(s, &Motion::default(), other);
+        let found = other.cloud.nearest(at, s.sensor);
+        (found.is_some() || self.is_free(self.now, at)).then(|| truncated(s, at, found))
+    }
+}
+
 /// A thing: its columns and some of its returns, and what they are laid over.
 pub struct Thing<'a> {
-    pub first: &'a Cloud,
-    pub others: &'a [Other<'a>],
+    pub sweeps: Sweeps<'a>,
     pub columns: &'a [u32],
     /// Some of its returns, evenly taken.
     pub samples: Samples,
@@ -141,33 +176,56 @@ fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+/// A mean as it grows, 0 of nothing.
+#[derive(Default)]
+pub struct Mean {
+    sum: f32,
+    count: f32,
+}
+
+impl Mean {
+    pub fn add(&mut self, value: f32) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    pub fn value(&self) -> f32 {
+        self.sum / self.count.max(1.0)
+    }
+}
+
+/// Truncated squared distance of a moved return from what another sweep has there, 0 to 1.
+pub fn off(s: &Sample, motion: &Motion, other: &Other) -> f32 {
+    let at = moved(s, motion, other);
+    truncated(s, at, other.cloud.nearest(at, s.sensor))
+}
+
+fn truncated(s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>) -> f32 {
+    found.map_or(1.0, |n| (s.square(minus(n.1, at)) / (MISSED * MISSED)).min(1.0))
+}
+
 impl<'a> Thing<'a> {
     /// Of some columns.
-    pub fn new(first: &'a Cloud, others: &'a [Other<'a>], columns: &'a [u32]) -> Thing<'a> {
+    pub fn new(sweeps: Sweeps<'a>, columns: &'a [u32]) -> Thing<'a> {
+        let first = sweeps.first;
         let returns = || columns.iter().flat_map(|c| first.column(*c as usize));
         let stride = returns().count().div_ceil(SAMPLES).max(1);
         // As many as there is room for.
-        let samples: Samples = returns().step_by(stride).map(|r| first.sample(r)).collect();
+        let samples: Samples = returns().step_by(stride).map(|n| first.sample(n)).collect();
         let count = samples.len() as f32;
         let along = |a: usize| samples.iter().map(move |s| s.at[a]);
         let centre = [0, 1].map(|a| along(a).sum::<f32>() / count);
         let extent = [0, 1].map(|a| {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
-        Thing {
-            first,
-            others,
-            columns,
-            samples: samples.clone(),
-            centre,
-            extent: extent[0].max(extent[1]),
-        }
+        let extent = extent[0].max(extent[1]);
+        Thing { sweeps, columns, samples: samples.clone(), centre, extent }
     }
 
     /// Returns of the newest sweep where the thing would be.
     fn there(&self, motion: &Motion, visits: &mut Visits) -> Samples {
-        let other = &self.others[0];
-        let side = self.first.side;
+        let other = &self.sweeps.others[0];
+        let side = self.sweeps.first.side;
         let mut there = Samples::new();
         visits.start();
         let mut list = heapless::Vec::<u32, 1024>::new();
@@ -191,9 +249,9 @@ impl<'a> Thing<'a> {
         let stride = total.div_ceil(SAMPLES).max(1);
         let mut seen = 0;
         for &c in &list {
-            for p in other.cloud.column(c as usize) {
+            for n in other.cloud.column(c as usize) {
                 if seen % stride == 0 {
-                    let _ = there.push(other.cloud.sample(p));
+                    let _ = there.push(other.cloud.sample(n));
                 }
                 seen += 1;
             }
@@ -203,40 +261,55 @@ impl<'a> Thing<'a> {
 
     /// Where a return of the newest sweep was, voxels of the first sweep's window.
     fn back(&self, q: &Sample, motion: &Motion) -> [f32; 3] {
-        let at = minus(q.at, self.others[0].offset);
+        let at = minus(q.at, self.sweeps.others[0].offset);
         let d = motion.of([at[0] - motion.by.x, at[1] - motion.by.y]);
         [at[0] - d[0], at[1] - d[1], at[2]]
     }
 
     /// Mean truncated squared distance, 0 (all lie on something) to 1 (none does).
     pub fn misfit(&self, motion: &Motion, visits: &mut Visits) -> f32 {
-        let truncated = |s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>| {
-            found.map_or(1.0, |n| (s.square(minus(n.1, at)) / (MISSED * MISSED)).min(1.0))
-        };
-        let (mut sum, mut count) = (0.0, 0.0f32);
-        for other in self.others {
-            for s in &self.samples {
-                let at = moved(s, motion, other);
-                sum += truncated(s, at, other.cloud.nearest(at, s.sensor));
-                count += 1.0;
-            }
+        let mut mean = Mean::default();
+        for other in self.sweeps.others {
+            self.samples.iter().for_each(|s| mean.add(off(s, motion, other)));
         }
-        let still = Motion::default();
         for q in &self.there(motion, visits) {
             let at = self.back(q, motion);
-            let off = truncated(q, at, self.first.nearest(at, q.sensor));
-            if off > 0.5 {
-                // What stands there was there before.
-                let at = self.back(q, &still);
-                let stood = self.first.nearest(at, q.sensor);
-                if stood.is_some_and(|n| n.0 < MISSED * MISSED) {
-                    continue;
+            let off = truncated(q, at, self.sweeps.first.nearest(at, q.sensor));
+            // What stands there was there before.
+            if off < 0.5 || !self.stood(q) {
+                mean.add(off);
+            }
+        }
+        mean.value()
+    }
+
+    /// The same if it stood, by what can be seen: 0 where nothing can.
+    pub fn standing(&self, visits: &mut Visits) -> f32 {
+        let mut mean = Mean::default();
+        self.samples.iter().filter_map(|s| self.sweeps.standing(s)).for_each(|m| mean.add(m));
+        for other in &self.sweeps.others[1..] {
+            let still = Motion::default();
+            for s in &self.samples {
+                let at = moved(s, &still, other);
+                if let Some(found) = other.cloud.nearest(at, s.sensor) {
+                    mean.add(truncated(s, at, Some(found)));
                 }
             }
-            sum += off;
-            count += 1.0;
         }
-        sum / count.max(1.0)
+        let still = Motion::around(self.centre);
+        for q in &self.there(&still, visits) {
+            let at = self.back(q, &still);
+            let found = self.sweeps.first.nearest(at, q.sensor);
+            if found.is_some() || self.sweeps.is_free(self.sweeps.before, q.at) {
+                mean.add(truncated(q, at, found));
+            }
+        }
+        mean.value()
+    }
+
+    fn stood(&self, q: &Sample) -> bool {
+        let at = self.back(q, &Motion::default());
+        self.sweeps.first.nearest(at, q.sensor).is_some_and(|n| n.0 < MISSED * MISSED)
     }
 
     /// Lays the thing over the others, starting at `motion`.
@@ -259,7 +332,7 @@ impl<'a> Thing<'a> {
                 h += jm * j;
                 g += jm * Vector3::from(off);
             };
-            for other in self.others {
+            for other in self.sweeps.others {
                 for s in &self.samples {
                     let at = moved(s, &motion, other);
                     if let Some((_, q)) = other.cloud.nearest(at, s.sensor) {
@@ -269,7 +342,7 @@ impl<'a> Thing<'a> {
             }
             for q in &there {
                 let at = self.back(q, &motion);
-                if let Some((_, p)) = self.first.nearest(at, q.sensor) {
+                if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor) {
                     pair(q, p, minus(at, p), 1.0);
                 }
             }
@@ -281,7 +354,7 @@ impl<'a> Thing<'a> {
             let by = inverse * g;
             motion.by += by;
             motion.covariance = inverse;
-            if by.norm_squared() < 1e-6 && step > WIDE_STEPS {
+            if by.norm_squared() < 1e-4 && step > WIDE_STEPS {
                 break;
             }
         }

@@ -4,12 +4,16 @@ use super::align::{NOISE, Sample};
 use crate::params::{CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
-use nalgebra::{Matrix3, Vector3};
+use core::cell::Cell;
+use core::ops::Range;
+use nalgebra::Matrix3;
 
 /// Columns along an axis of a cell of the ground: 1.5 m at 0.30 m.
 const GROUND_CELL: usize = 5;
 /// Ground cells along an axis at most.
 const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
+/// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
+const GROUND_PASSES: usize = 3;
 /// Returns higher above the ground than this belong to things, voxels.
 pub const GROUND_HEIGHT: f32 = 0.7;
 /// By how much the ground may fall from one of its cells to the next, voxels: 10 %.
@@ -49,22 +53,25 @@ impl Ground {
             }
         }
         let n = self.side;
-        for i in 0..n {
-            for j in 0..n {
-                let mut height = self.lowest[i * n + j];
-                for a in i.saturating_sub(1)..(i + 2).min(n) {
-                    for b in j.saturating_sub(1)..(j + 2).min(n) {
-                        height = height.min(self.lowest[a * n + b] + GROUND_FALL);
+        for _ in 0..GROUND_PASSES {
+            for i in 0..n {
+                for j in 0..n {
+                    let mut height = self.lowest[i * n + j];
+                    for a in i.saturating_sub(1)..(i + 2).min(n) {
+                        for b in j.saturating_sub(1)..(j + 2).min(n) {
+                            height = height.min(self.lowest[a * n + b] + GROUND_FALL);
+                        }
                     }
+                    self.height[i * n + j] = height;
                 }
-                self.height[i * n + j] = height;
             }
+            core::mem::swap(&mut self.lowest, &mut self.height);
         }
     }
 
     /// Height above the ground of a return in a column, voxels.
     pub fn above(&self, side: usize, column: u32, z: f32) -> f32 {
-        z - self.height[self.cell(side, column as usize)]
+        z - self.lowest[self.cell(side, column as usize)]
     }
 }
 
@@ -87,6 +94,8 @@ pub struct Cloud {
     pub stamp_s: f64,
     points: heapless::Vec<Return, CLOUD_MAX>,
     start: [u32; COLUMNS_MAX + 1],
+    /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
+    weights: [Cell<[f32; 6]>; CLOUD_MAX],
     /// Levels of each column in which something was hit.
     levels: [u16; COLUMNS_MAX],
 }
@@ -99,6 +108,7 @@ impl Cloud {
             stamp_s: 0.0,
             points: heapless::Vec::new(),
             start: [0; COLUMNS_MAX + 1],
+            weights: [const { Cell::new([f32::NAN; 6]) }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
@@ -169,6 +179,7 @@ impl Cloud {
             }
         }
         start[columns_used] = self.points.len() as u32;
+        self.weights[..self.points.len()].iter().for_each(|w| w.set([f32::NAN; 6]));
         dropped
     }
 
@@ -187,9 +198,9 @@ impl Cloud {
             && self.levels[at[0] as usize * self.side + at[1] as usize] >> at[2] as u32 & 1 != 0
     }
 
-    /// Thinned returns in a column.
-    pub fn column(&self, column: usize) -> &[Return] {
-        &self.points[self.start[column] as usize..self.start[column + 1] as usize]
+    /// Indices of the thinned returns in a column.
+    pub fn column(&self, column: usize) -> Range<usize> {
+        self.start[column] as usize..self.start[column + 1] as usize
     }
 
     /// Thinned returns of columns `j_from..j_to` of row `i`: they lie side by side.
@@ -211,6 +222,7 @@ impl Cloud {
         let mut best = (1.0, [0.0; 3]);
         let mut found = false;
         let in_row = at[0] + 1.0 - i as f32;
+        let in_row = at[0] + 1.0 - i as f32;
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
             let row = row.wrapping_sub(1);
@@ -229,24 +241,39 @@ impl Cloud {
     }
 
     /// A return and what the returns around it tell about the surface it lies on.
-    pub fn sample(&self, of: &Return) -> Sample {
-        let [i, j] = [of.at[0] as usize, of.at[1] as usize];
-        let (mut n, mut mean, mut square) = (0.0f32, Vector3::zeros(), Matrix3::zeros());
+    pub fn sample(&self, n: usize) -> Sample {
+        let Return { at, sensor } = self.points[n];
+        let mut known = self.weights[n].get();
+        if known[0].is_nan() {
+            known = self.surface(at, sensor);
+            self.weights[n].set(known);
+        }
+        let [xx, xy, xz, yy, yz, zz] = known;
+        Sample { at, sensor, weight: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) }
+    }
+
+    /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.
+    fn surface(&self, at: [f32; 3], sensor: u32) -> [f32; 6] {
+        let [i, j] = [at[0] as usize, at[1] as usize];
+        let (mut n, mut mean, mut square) = (0.0f32, [0.0f32; 3], [0.0f32; 6]);
         for a in i.saturating_sub(1)..(i + 2).min(self.side) {
             for p in self.row(a, j.saturating_sub(1), (j + 2).min(self.side)) {
-                let d = Vector3::from(p.at) - Vector3::from(of.at);
-                if p.sensor == of.sensor && d.norm_squared() < AROUND * AROUND {
+                let [x, y, z] = [0, 1, 2].map(|a| p.at[a] - at[a]);
+                if p.sensor == sensor && x * x + y * y + z * z < AROUND * AROUND {
                     n += 1.0;
-                    mean += d;
-                    square += d * d.transpose();
+                    mean = [mean[0] + x, mean[1] + y, mean[2] + z];
+                    let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+                    square = core::array::from_fn(|k| square[k] + products[k]);
                 }
             }
         }
-        mean /= n;
-        let noise = Matrix3::from_diagonal_element(NOISE * NOISE);
-        let spread = square / n - mean * mean.transpose() + noise;
+        let [x, y, z] = mean.map(|m| m / n);
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
+        let spread = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         // Positive definite by the noise.
-        let weight = spread.try_inverse().unwrap_or_default() * (NOISE * NOISE);
-        Sample { at: of.at, sensor: of.sensor, weight }
+        let noise = Matrix3::from_diagonal_element(NOISE * NOISE);
+        let w = (spread + noise).try_inverse().unwrap_or_default() * (NOISE * NOISE);
+        [w[(0, 0)], w[(0, 1)], w[(0, 2)], w[(1, 1)], w[(1, 2)], w[(2, 2)]]
     }
 }

@@ -15,9 +15,10 @@ mod search;
 mod segments;
 
 use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
+use crate::pipeline::Perceived;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
-use align::{Motion, Other, Thing, Visits};
+use align::{Mean, Motion, Other, Sweeps, Thing, Visits};
 use cloud::{Cloud, Ground};
 use segments::Segments;
 
@@ -31,6 +32,12 @@ const UNFIT: f32 = 0.3;
 const GAIN: f32 = 0.15;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
+/// Mean misfit of a column's returns from which on it may be part of something that moves.
+const RESTLESS: f32 = 0.25;
+/// Returns of a column that are looked at for that.
+const PROBES: usize = 4;
+/// Returns a thing must have for a search: fewer fit anywhere.
+const SEARCHED: usize = 12;
 /// Larger things stand, voxels: 30 m.
 const EXTENT_MAX: f32 = 100.0;
 /// How far a fragment may lie from a moving thing that takes it along, columns.
@@ -119,7 +126,7 @@ impl Refinement {
     pub(crate) fn run(
         &mut self,
         step: &Step,
-        state: &[Flow],
+        perceived: &Perceived,
         predicted: impl Fn(usize) -> Option<[f32; 2]>,
     ) {
         self.found.clear();
@@ -127,17 +134,17 @@ impl Refinement {
         if self.held < 2 {
             return;
         }
+        let Perceived { state, before, now, .. } = *perceived;
         let newest = self.newest;
         let first = &self.clouds[index(newest, 1)];
         let side = first.side;
-        let now = |c: usize| {
+        let shifted = |c: usize| {
             let (i, j) = ((c / side) as i32 - step.shift_x, (c % side) as i32 - step.shift_y);
             let inside = (0..step.side).contains(&i) && (0..step.side).contains(&j);
             inside.then_some((i * step.side + j) as usize)
         };
-        let flow = |c: usize| now(c).map_or(0, |c| state[c]);
-        let predicted = |c: usize| now(c).and_then(&predicted);
-        self.segments.find(first, flow);
+        let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
+        let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span = self.clouds[newest].stamp_s - first.stamp_s;
         let mut others = heapless::Vec::<Other, REFINEMENT_SWEEPS_MAX>::new();
         for age in (0..self.held).filter(|a| *a != 1) {
@@ -149,28 +156,52 @@ impl Refinement {
                 scale: ((cloud.stamp_s - first.stamp_s) / span) as f32,
             });
         }
+        let sweeps = Sweeps { first, others: &others, before, now };
+        self.segments.find(first, |_| true, flow);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
-            let thing = Thing::new(first, &others, columns);
+            let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
             let _ = self.found.push(found);
         }
+        // What stands as a whole may have a part that does not.
+        let stands = |c: usize| stands_still(&self.segment, &self.found, c);
+        self.segments.find(
+            first,
+            |c| stands(c) && flow(c) & VALID != 0 && restless(sweeps, c),
+            flow,
+        );
         for n in 0..self.segments.len() {
-            let found = self.found[n];
-            if found.motion.is_some() || found.still < STANDS || found.extent > EXTENT_MAX {
+            let columns = self.segments.columns(n);
+            let thing = Thing::new(sweeps, columns);
+            let found = motion(&thing, flow, predicted, &mut self.visits);
+            if found.motion.is_some() {
+                let id = self.found.len() as u32;
+                columns.iter().for_each(|c| self.segment[*c as usize] = id);
+                let _ = self.found.push(found);
+            }
+        }
+        self.segments.find(
+            first,
+            |c| self.segment[c] != NONE && stands_still(&self.segment, &self.found, c),
+            flow,
+        );
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            let found = self.found[self.segment[columns[0] as usize] as usize];
+            if found.still < STANDS || found.extent > EXTENT_MAX {
                 continue;
             }
-            let columns = self.segments.columns(n);
             let near = neighbours(side, columns, &self.segment, &self.found[..]);
-            let thing = Thing::new(first, &others, columns);
+            let thing = Thing::new(sweeps, columns);
             let mut best = found.still;
             for m in &near {
                 let Some(motion) = self.found[*m as usize].motion else { continue };
                 let misfit = thing.misfit(&motion, &mut self.visits);
                 if misfit < best && gain(found.still, misfit) > GAIN {
                     best = misfit;
-                    self.found[n].motion = Some(motion);
+                    columns.iter().for_each(|c| self.segment[*c as usize] = *m);
                 }
             }
         }
@@ -219,8 +250,7 @@ fn motion(
     visits: &mut Visits,
 ) -> Found {
     let still = Motion::around(thing.centre);
-    let mut found =
-        Found { motion: None, still: thing.misfit(&still, visits), extent: thing.extent };
+    let mut found = Found { motion: None, still: thing.standing(visits), extent: thing.extent };
     if found.still < STANDS || thing.extent > EXTENT_MAX {
         return found;
     }
@@ -243,7 +273,7 @@ fn motion(
         let Some(by) = votes.next() else { break };
         misfit = start(by);
     }
-    if misfit > UNFIT {
+    if misfit > UNFIT && thing.samples.len() >= SEARCHED {
         start(search::search(thing));
     }
     let (misfit, motion) = best;
@@ -252,6 +282,21 @@ fn motion(
         found.motion = Some(motion);
     }
     found
+}
+
+/// Whether a column is part of something that stands.
+fn stands_still(segment: &[u32], found: &[Found], column: usize) -> bool {
+    found.get(segment[column] as usize).is_some_and(|f| f.motion.is_none())
+}
+
+/// Whether the returns of a column do not lie where they would if it stood.
+fn restless(sweeps: Sweeps, column: usize) -> bool {
+    let returns = sweeps.first.column(column);
+    let stride = returns.len().div_ceil(PROBES).max(1);
+    let mut mean = Mean::default();
+    let samples = returns.step_by(stride).map(|n| sweeps.first.sample(n));
+    samples.filter_map(|s| sweeps.standing(&s)).for_each(|m| mean.add(m));
+    mean.value() > RESTLESS
 }
 
 fn mean(of: impl Iterator<Item = [f32; 2]>) -> Option<[f32; 2]> {

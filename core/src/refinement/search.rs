@@ -8,7 +8,7 @@ const REACH: i32 = 10;
 /// The displacement that puts most of the thing's returns on returns of the newest sweep; what
 /// stood there before counts half. The first of those as good.
 pub fn search(thing: &Thing) -> [f32; 2] {
-    let other = &thing.others[0];
+    let other = &thing.sweeps.others[0];
     let mut best = (0, [0.0; 2]);
     for du in -REACH..=REACH {
         for dv in -REACH..=REACH {
@@ -18,7 +18,7 @@ pub fn search(thing: &Thing) -> [f32; 2] {
                 let at = [s.at[0] + by[0], s.at[1] + by[1], s.at[2]];
                 let there = core::array::from_fn(|a| at[a] + other.offset[a]);
                 if other.cloud.is_hit(there) {
-                    score += 2 - thing.first.is_hit(at) as u32;
+                    score += 2 - thing.sweeps.first.is_hit(at) as u32;
                 }
             }
             if score > best.0 {

@@ -24,15 +24,20 @@ impl Segments {
         }
     }
 
-    /// Segments of a cloud. `flow` tells the flow of a column, as far as there is one.
-    pub(super) fn find(&mut self, cloud: &Cloud, flow: impl Fn(usize) -> Flow) {
+    /// Segments of the columns of a cloud that may be `part` of any. `flow` tells the flow of a column, as far as there is one.
+    pub(super) fn find(
+        &mut self,
+        cloud: &Cloud,
+        part: impl Fn(usize) -> bool,
+        flow: impl Fn(usize) -> Flow,
+    ) {
         let side = cloud.side;
         for c in 0..side * side {
-            self.parent[c] = if cloud.levels(c) == 0 { NONE } else { c as u32 };
+            self.parent[c] = if cloud.levels(c) != 0 && part(c) { c as u32 } else { NONE };
         }
         for c in 0..side * side {
             let near = cloud.levels(c);
-            if near == 0 {
+            if self.parent[c] == NONE {
                 continue;
             }
             let near = near | near << 1 | near >> 1;
@@ -45,7 +50,10 @@ impl Segments {
                     continue;
                 }
                 let other = (i - di) * side + b as usize;
-                if cloud.levels(other) & near != 0 && together(flow(c), flow(other)) {
+                if self.parent[other] != NONE
+                    && cloud.levels(other) & near != 0
+                    && together(flow(c), flow(other))
+                {
                     self.join(c as u32, other as u32);
                 }
             }

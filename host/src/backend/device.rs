@@ -84,6 +84,7 @@ impl Device {
         // A device that answers nonsense yields no flow, not a panic.
         let count = (counters[FOREGROUND_COUNT] as usize).min(FOREGROUND_MAX);
         Ok(Perceived {
+            now: bytemuck::cast_slice(read(Buffer::NowOut)),
             before: bytemuck::cast_slice(read(Buffer::BeforeOut)),
             foreground: &read(Buffer::ForegroundOut)[..count],
             marked: counters[FOREGROUND_MARKED] as usize,
