@@ -6,6 +6,7 @@
 //! the report; any engine that reads Parquet can do the same over more drives than one machine
 //! holds.
 
+mod calibration;
 mod collect;
 mod conclude;
 mod drive;
@@ -21,6 +22,7 @@ mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod verdicts;
 
 use conclude::conclude;
 use drive::Settings;

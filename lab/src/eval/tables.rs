@@ -22,6 +22,11 @@ fn table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>) -> Table {
     Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
 }
 
+/// A table with a note below it.
+pub fn noted_table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>, note: &str) -> Table {
+    Table { notes: vec![note.into()], ..table(id, caption, columns, rows) }
+}
+
 /// Count, median, mean and share within 30 cm of displacements.
 fn flow_cells(errors: &Sorted) -> [Cell; 4] {
     [

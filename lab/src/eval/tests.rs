@@ -81,7 +81,7 @@ fn a_simulated_drive() {
         );
     }
     assert!(labelled.iter().any(|r| r.motion == 2) && labelled.iter().any(|r| r.motion == 0));
-    for r in rows.iter().filter(|r| r.origin != 2) {
+    for r in rows.iter().filter(|r| !r.is_matched()) {
         assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
     }
     // Whatever the filter rejects scored no more than 0.
