@@ -1,13 +1,13 @@
 //! From the rows of all drives to tables, figures and the report.
 
 use super::calibration::{self, Calibration};
-use super::drive::{Files, Settings};
+use super::drive::Settings;
 use super::facts::Facts;
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::{Estimate, Group, Motion, Tally, Truth};
 use super::verdicts::Verdicts;
-use super::{figures, rows_file, tables};
+use super::{figures, read_rows, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Table};
 use raywake::error::Error;
@@ -17,15 +17,11 @@ use std::path::Path;
 pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec<Table>, Error> {
     let mut tally = Tally::new();
     let (mut calibration, mut verdicts) = (Calibration::default(), Verdicts::default());
-    for facts in drives {
-        rows_file::read(&Files::of(out, &facts.drive).rows, |rows| {
-            for row in rows {
-                tally.row(row);
-                calibration.row(row, facts.exact);
-                verdicts.row(row, facts.exact);
-            }
-        })?;
-    }
+    read_rows(drives, out, |facts, row| {
+        tally.row(row);
+        calibration.row(row, facts.exact);
+        verdicts.row(row, facts.exact);
+    })?;
     let curve = if settings.weights.has_filter() { tally.filter() } else { None };
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
     headlines(&mut report, &tally, drives);

@@ -28,6 +28,7 @@ const WAITING: usize = 2;
 const ROWS: u32 = 2;
 
 /// What all drives of an evaluation have in common.
+#[derive(Clone)]
 pub struct Settings {
     /// Checked.
     pub profile: Profile,

@@ -10,7 +10,7 @@ use crate::report::{Cell, Row, Table};
 use raywake::statistics::{BUDGET_MS, Spread};
 
 /// Errors below this count as "within 30 cm" (table 3.1).
-const WITHIN_M: f64 = 0.3;
+pub const WITHIN_M: f64 = 0.3;
 /// The dissertation's share of the foreground that the filter keeps (section 3.4.2).
 pub const RECALL: f64 = 0.95;
 
