@@ -15,6 +15,8 @@ enum Command {
     Train(train::Command),
     /// Run labelled drives through the pipeline and compare flow and tracklets with the truth.
     Eval(Box<eval::Args>),
+    /// Evaluate variants of a profile, one thing changed in each: one table.
+    Ablate(Box<eval::ablate::Args>),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
     /// Ego motion of a drive by scan matching, against the drive's own poses.
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command).map_err(Into::into),
         Command::Eval(args) => eval::run(&args).map_err(Into::into),
+        Command::Ablate(args) => eval::ablate::run(&args).map_err(Into::into),
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => registration::command::run(&args),
         Command::Sim(args) => simulate::run(&args),

@@ -1,11 +1,13 @@
 //! From the rows of all drives to tables, figures and the report.
 
-use super::drive::{Files, Settings};
+use super::calibration::{self, Calibration};
+use super::drive::Settings;
 use super::facts::Facts;
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::{Estimate, Group, Motion, Tally, Truth};
-use super::{figures, rows_file, tables};
+use super::verdicts::Verdicts;
+use super::{figures, read_rows, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Table};
 use raywake::error::Error;
@@ -14,10 +16,12 @@ use std::path::Path;
 /// Reads the rows of all drives, writes the report and returns the tables for the screen.
 pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec<Table>, Error> {
     let mut tally = Tally::new();
-    for facts in drives {
-        let rows = Files::of(out, &facts.drive).rows;
-        rows_file::read(&rows, |rows| rows.iter().for_each(|row| tally.row(row)))?;
-    }
+    let (mut calibration, mut verdicts) = (Calibration::default(), Verdicts::default());
+    read_rows(drives, out, |facts, row| {
+        tally.row(row);
+        calibration.row(row, facts.exact);
+        verdicts.row(row, facts.exact);
+    })?;
     let curve = if settings.weights.has_filter() { tally.filter() } else { None };
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
     headlines(&mut report, &tally, drives);
@@ -29,13 +33,16 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         tables::raw_flow(&tally, Weight::Column),
         tables::references(&tally, Truth::Raw),
         tables::tracklets(&tally),
+        verdicts.table(),
+        calibration::table(&calibration),
         bucketed,
         three_way,
         tables::accuracy(&scores),
         tables::filter(curve.as_ref()),
         tables::times(drives),
     ];
-    let [raw, beside, settled, bucketed, three_way, accuracy, filter, times] = shown.clone();
+    let [raw, beside, settled, moving, claims, bucketed, three_way, accuracy, filter, times] =
+        shown.clone();
     report
         .section("Raw scene flow")
         .text(RAW)
@@ -52,6 +59,12 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
         .table(settled)
         .chart(figures::settled(&tally))
         .chart(figures::tracklets(&tally));
+    report.section("Moving or not").table(moving);
+    report
+        .section("Uncertainty")
+        .text(UNCERTAINTY)
+        .table(claims)
+        .chart(calibration::reliability(&calibration));
     report
         .section("Flow of single returns")
         .text(&about_returns())
@@ -81,6 +94,11 @@ const RAW: &str = "The error is the distance between the displacement found for 
 
 const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
     tracklet and that of its object at the column's centre.";
+
+const UNCERTAINTY: &str = "Every displacement and every velocity has a covariance. It means \
+    something where so many of the true values lie in its ellipses as it claims. Truth is the \
+    simulator's, or the smoothed labels, whose own errors count as ours; what is parked, and what \
+    no label holds, is at rest.";
 
 /// What the scores of returns are.
 fn about_returns() -> String {

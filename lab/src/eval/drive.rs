@@ -25,9 +25,10 @@ use std::time::Instant;
 const WAITING: usize = 2;
 
 /// Counts changes of what rows and facts mean: those of another number are made anew.
-const ROWS: u32 = 1;
+const ROWS: u32 = 2;
 
 /// What all drives of an evaluation have in common.
+#[derive(Clone)]
 pub struct Settings {
     /// Checked.
     pub profile: Profile,
@@ -149,6 +150,7 @@ pub fn evaluate(
         drive: name.to_string(),
         settings: key,
         view: view(labels.view).into(),
+        exact: labels.exact,
         tracks: labels.tracks.len(),
         boxes: labels.tracks.iter().map(|t| t.boxes.len()).sum(),
         notes: [source.notes(), &labels.notes].concat(),

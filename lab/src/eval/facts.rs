@@ -36,7 +36,9 @@ pub struct Facts {
     pub settings: serde_json::Value,
     /// Where objects are labelled.
     pub view: String,
-    /// Labelled objects and their boxes.
+    /// Whether labels are a simulator's, without noise.
+    pub exact: bool,
+    /// Labelled objects.
     pub tracks: usize,
     /// Boxes of all of them.
     pub boxes: usize,

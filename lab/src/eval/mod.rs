@@ -6,6 +6,8 @@
 //! the report; any engine that reads Parquet can do the same over more drives than one machine
 //! holds.
 
+pub mod ablate;
+mod calibration;
 mod collect;
 mod conclude;
 mod drive;
@@ -21,27 +23,29 @@ mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod verdicts;
 
 use conclude::conclude;
-use drive::Settings;
+use drive::{Files, Settings};
 use facts::Facts;
 use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
 use raywake::config::{self, Weights};
 use raywake::engine::interrupted;
 use raywake::error::Error;
 use raywake::sink::atomic;
+use row::Row;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// `raywake-lab eval`.
+/// What is evaluated, and how.
 #[derive(clap::Args)]
-pub struct Args {
+struct Inputs {
     /// Labelled drives: simulated, KITTI or Argoverse 2
     #[arg(required = true, value_name = "DRIVE")]
     drives: Vec<PathBuf>,
-    /// Folder of results: report.html, rows/DRIVE.parquet, drives/DRIVE.json, charts
+    /// Folder of results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -56,6 +60,37 @@ pub struct Args {
     /// 3) and 0.3 (chapter 4)
     #[arg(long, value_name = "M", default_value_t = 0.0)]
     margin: f64,
+    /// Stop after this many sweeps of every drive
+    #[arg(short = 'n', value_name = "COUNT")]
+    count: Option<usize>,
+}
+
+impl Inputs {
+    /// Reads profile and learned numbers.
+    fn settings(&self) -> Result<Settings, Error> {
+        if !(0.0..=2.0).contains(&self.margin) {
+            return Err(Error::Usage("--margin must be 0 to 2 m".into()));
+        }
+        let profile = config::profile(&self.profile)?;
+        let weights = Weights::read(&self.learned, &profile)?;
+        Ok(Settings {
+            weights_digest: weights.digest(),
+            weights,
+            profile,
+            backend: self.backend.clone(),
+            open: self.recording.options(),
+            margin_m: self.margin,
+            sweeps: self.count.unwrap_or(usize::MAX),
+            all_columns: false,
+        })
+    }
+}
+
+/// `raywake-lab eval`: report.html, rows/DRIVE.parquet, drives/DRIVE.json and charts.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
     /// Drives at a time; each keeps two cores busy
     #[arg(long, value_name = "N", default_value_t = 1)]
     jobs: usize,
@@ -65,51 +100,43 @@ pub struct Args {
     /// Leave rows and facts only: for many processes that share a folder, the report coming last
     #[arg(long)]
     rows_only: bool,
-    /// Stop after this many sweeps of every drive
-    #[arg(short = 'n', value_name = "COUNT")]
-    count: Option<usize>,
 }
 
 /// Evaluates, writes and prints. Drives that fail are named at the end; the others are evaluated.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if !(0.0..=2.0).contains(&args.margin) {
-        return Err(Error::Usage("--margin must be 0 to 2 m".into()));
-    }
-    let profile = config::profile(&args.profile)?;
-    let weights = Weights::read(&args.learned, &profile)?;
-    let settings = Settings {
-        weights_digest: weights.digest(),
-        weights,
-        profile,
-        backend: args.backend.clone(),
-        open: args.recording.options(),
-        margin_m: args.margin,
-        sweeps: args.count.unwrap_or(usize::MAX),
-        all_columns: args.all_columns,
-    };
-    let names = names(&args.drives)?;
-    for folder in ["rows", "drives", "panels"] {
-        atomic::create_folder(&args.out.join(folder))?;
-    }
-    raywake::engine::listen();
-    let (done, failed) = all(&names, &settings, &args.out, args.jobs.max(1));
-    if interrupted() {
-        return Err(Error::Usage("interrupted; the drives that were finished stay".into()));
-    }
+    let settings = Settings { all_columns: args.all_columns, ..args.inputs.settings()? };
+    let (names, out) = (names(&args.inputs.drives)?, &args.inputs.out);
+    let (done, failed) = all(&names, &settings, out, args.jobs.max(1))?;
     if !done.is_empty() && !args.rows_only {
-        for table in conclude(&done, &settings, &args.out)? {
+        for table in conclude(&done, &settings, out)? {
             println!("{}", table.text());
         }
-        println!("report: {}", args.out.join("report.html").display());
+        println!("report: {}", out.join("report.html").display());
     }
-    match failed.first() {
-        None => Ok(()),
-        Some(_) => {
-            let list = failed.iter().map(|(name, e)| format!("{name}: {e}"));
-            let list = list.collect::<Vec<_>>().join("\n  ");
-            Err(Error::Usage(format!("{} drives failed:\n  {list}", failed.len())))
-        }
+    failures("drives", &failed)
+}
+
+/// What failed, where anything did.
+fn failures(what: &str, failed: &[(String, Error)]) -> Result<(), Error> {
+    if failed.is_empty() {
+        return Ok(());
     }
+    let list = failed.iter().map(|(name, e)| format!("{name}: {e}"));
+    let list = list.collect::<Vec<_>>().join("\n  ");
+    Err(Error::Usage(format!("{} {what} failed:\n  {list}", failed.len())))
+}
+
+/// Hands the rows of all drives in a folder of results to `each`.
+fn read_rows(
+    drives: &[Facts],
+    out: &Path,
+    mut each: impl FnMut(&Facts, &Row),
+) -> Result<(), Error> {
+    for facts in drives {
+        let file = Files::of(out, &facts.drive).rows;
+        rows_file::read(&file, |rows| rows.iter().for_each(|row| each(facts, row)))?;
+    }
+    Ok(())
 }
 
 /// A name for every drive: its folder's.
@@ -130,13 +157,21 @@ fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
 /// to the heap.
 const STACK: usize = 64 << 20;
 
-/// Evaluates all drives, `jobs` at a time.
+/// Drives that were evaluated, and those that failed.
+type Outcome = (Vec<Facts>, Vec<(String, Error)>);
+
+/// Evaluates all drives into the folder `out`, `jobs` at a time. Fails where the folder cannot be
+/// made, and after a signal: the drives that were finished stay.
 fn all(
     names: &BTreeMap<String, &Path>,
     settings: &Settings,
     out: &Path,
     jobs: usize,
-) -> (Vec<Facts>, Vec<(String, Error)>) {
+) -> Result<Outcome, Error> {
+    for folder in ["rows", "drives", "panels"] {
+        atomic::create_folder(&out.join(folder))?;
+    }
+    raywake::engine::listen();
     let list: Vec<_> = names.iter().collect();
     let (next, done) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -156,6 +191,9 @@ fn all(
             thread.spawn_scoped(scope, work).expect("the system has threads");
         }
     });
+    if interrupted() {
+        return Err(Error::Usage("interrupted; the drives that were finished stay".into()));
+    }
     let (mut good, mut bad) = (Vec::new(), Vec::new());
     for (name, result) in done.into_inner().expect("no thread panicked with it") {
         match result {
@@ -163,7 +201,7 @@ fn all(
             Err(e) => bad.push((name, e)),
         }
     }
-    (good, bad)
+    Ok((good, bad))
 }
 
 fn say(result: &Result<(Facts, bool), Error>, name: &str, n: usize, of: usize) {

@@ -150,7 +150,7 @@ impl Candidate {
             true => self.arrow(c.velocity_world_mps.map(f64::from)),
             false => c.velocity_ego_mps.map(|v| ARROW_S * f64::from(v)),
         };
-        let old = self.seen.columns.iter().filter(|c| c.origin == Origin::Matched && c.age >= AGE);
+        let old = self.seen.columns.iter().filter(|c| c.origin >= Origin::Matched && c.age >= AGE);
         let columns = old.map(|c| Column {
             at: c.position_vehicle_m.map(f64::from),
             error: None,

@@ -131,12 +131,18 @@ row! {
     voxels: u8,
     /// Score of the background filter, in the weights' integers; foreground above 0.
     score: i32,
-    /// [`raywake_core::output::Origin`]: 0 background, 1 unmatched, 2 matched.
+    /// [`raywake_core::output::Origin`]: 0 background, 1 unmatched, 2 matched, 3 joined.
     origin: u8,
     /// Estimated displacement over ground until the next sweep, world axes, m.
     flow_x: f32,
     /// See `flow_x`.
     flow_y: f32,
+    /// Covariance of that displacement, m^2; zero where there is no match.
+    flow_cov_xx: f32,
+    /// See `flow_cov_xx`.
+    flow_cov_xy: f32,
+    /// See `flow_cov_xx`.
+    flow_cov_yy: f32,
     /// True displacement by the labels as they are, m.
     true_x: f32,
     /// See `true_x`.
@@ -176,9 +182,14 @@ impl Row {
         self.motion == 2
     }
 
-    /// Whether the flow is that of a match.
+    /// Whether the flow is that of a match, the column's own or its thing's.
     pub fn is_matched(&self) -> bool {
-        self.origin == Origin::Matched as u8
+        self.origin >= Origin::Matched as u8
+    }
+
+    /// Whether a displacement over ground was put out.
+    pub fn is_put_out_moving(&self) -> bool {
+        self.flow_x != 0.0 || self.flow_y != 0.0
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.

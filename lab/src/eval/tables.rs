@@ -10,7 +10,7 @@ use crate::report::{Cell, Row, Table};
 use raywake::statistics::{BUDGET_MS, Spread};
 
 /// Errors below this count as "within 30 cm" (table 3.1).
-const WITHIN_M: f64 = 0.3;
+pub const WITHIN_M: f64 = 0.3;
 /// The dissertation's share of the foreground that the filter keeps (section 3.4.2).
 pub const RECALL: f64 = 0.95;
 
@@ -20,6 +20,11 @@ const FLOW: [&str; 4] = ["Count", "Median, cm", "Mean, cm", "Within 30 cm, %"];
 fn table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>) -> Table {
     let columns = columns.iter().map(|c| (*c).to_string()).collect();
     Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
+}
+
+/// A table with a note below it.
+pub fn noted_table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>, note: &str) -> Table {
+    Table { notes: vec![note.into()], ..table(id, caption, columns, rows) }
 }
 
 /// Count, median, mean and share within 30 cm of displacements.

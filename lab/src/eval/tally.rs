@@ -137,7 +137,8 @@ impl Group {
     }
 }
 
-const COUNT: usize = CLASSES.len();
+/// Classes, what is in no box among them.
+pub const COUNT: usize = CLASSES.len();
 /// Errors by class, then by [`Row::motion`].
 type Cells = [[Errors; 3]; COUNT];
 
@@ -270,7 +271,7 @@ impl Tally {
 }
 
 /// Indices of the cells that a group and a motion name.
-fn cells(group: Group, motion: Motion) -> impl Iterator<Item = (usize, usize)> {
+pub fn cells(group: Group, motion: Motion) -> impl Iterator<Item = (usize, usize)> {
     let classes = (0..COUNT).filter(move |c| group.holds(*c));
     classes.flat_map(move |c| (0..3).filter(move |m| motion.holds(*m)).map(move |m| (c, m)))
 }

@@ -1,25 +1,34 @@
 //! Drives evaluated from end to end.
 
 use super::row::{CLASSES, Row};
-use super::{Args, rows_file, run};
+use super::{Args, ablate, rows_file, run};
 use crate::scratch::Scratch;
 use crate::simulate::{Motion, Recipe, write};
 use clap::Parser;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 #[derive(Parser)]
-struct Command {
-    #[command(flatten)]
-    args: Args,
+enum Command {
+    Eval(Args),
+    Ablate(ablate::Args),
 }
 
-/// `raywake-lab eval` with these words.
-fn eval(words: &[&Path], options: &[&str]) -> Result<(), String> {
+/// `raywake-lab COMMAND` with these words.
+fn command(name: &str, words: &[&Path], options: &[&str]) -> Result<(), String> {
     let words = words.iter().map(|w| w.as_os_str());
-    let options = ["--backend", "scalar"].iter().chain(options).map(std::ffi::OsStr::new);
-    let all = [std::ffi::OsStr::new("eval")].into_iter().chain(words).chain(options);
-    run(&Command::parse_from(all).args).map_err(|e| e.to_string())
+    let options = ["--backend", "scalar"].iter().chain(options).map(OsStr::new);
+    let all = ["raywake-lab", name].into_iter().map(OsStr::new).chain(words).chain(options);
+    match Command::parse_from(all) {
+        Command::Eval(args) => run(&args),
+        Command::Ablate(args) => ablate::run(&args),
+    }
+    .map_err(|e| e.to_string())
+}
+
+fn eval(words: &[&Path], options: &[&str]) -> Result<(), String> {
+    command("eval", words, options)
 }
 
 /// A busy street in six sweeps, seen from a standing vehicle.
@@ -81,7 +90,7 @@ fn a_simulated_drive() {
         );
     }
     assert!(labelled.iter().any(|r| r.motion == 2) && labelled.iter().any(|r| r.motion == 0));
-    for r in rows.iter().filter(|r| r.origin != 2) {
+    for r in rows.iter().filter(|r| !r.is_matched()) {
         assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
     }
     // Whatever the filter rejects scored no more than 0.
@@ -177,4 +186,43 @@ fn a_moving_vehicle() {
     fs::write(&cloud, &whole).unwrap();
     eval(&[&drive, flag, &out], &[]).unwrap();
     assert_eq!((settings(), rows(&rows_of)), (before, all));
+}
+
+#[test]
+fn variants_in_one_table() {
+    let folder = Scratch::new();
+    let drive = drive_of(folder.path(), Motion::Standing, 4);
+    let [out, author] = ["out", "author"].map(|name| folder.path().join(name));
+    let flag: &Path = Path::new("--out");
+    let lines = |out: &Path| -> Vec<Vec<String>> {
+        let text = fs::read_to_string(out.join("tables/ablations.csv")).unwrap();
+        text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect()
+    };
+    let only = ["--only", "filter-off,base,rounds-20"];
+    command("ablate", &[&drive, flag, &out], &only).unwrap();
+    let table = lines(&out);
+    assert_eq!([&table[0][0], &table[1][0], &table[2][0]], ["base", "rounds-20", "filter-off"]);
+    // Of the same rows: the base has as many rounds.
+    assert_eq!(table[0][2..], table[1][2..]);
+    assert!(out.join("filter-off/rows").is_dir() && !out.join("rounds-20").exists());
+    let number = |row: usize, column: usize| table[row][column].parse::<f64>().unwrap();
+    // Without the filter more of the background is found to move.
+    assert!(number(2, 9) < number(0, 9), "{table:?}");
+    assert!(number(0, 13) > number(0, 14) && number(0, 14) > 0.0, "{table:?}");
+    // A variant's folder is one of `eval`, which finds it done and has the same figures.
+    let base = out.join("base");
+    let before = facts(&base);
+    eval(&[&drive, flag, &base], &[]).unwrap();
+    assert_eq!(facts(&base), before);
+    let flows = fs::read_to_string(base.join("tables/references-raw.csv")).unwrap();
+    let moving = flows.lines().find(|l| l.starts_with("moving,raywake,")).unwrap();
+    assert_eq!(moving.split(',').skip(2).collect::<Vec<_>>(), table[0][2..6]);
+
+    // One that cannot run is named, and the others are there.
+    let only = ["--profile", "dissertation", "--only", "base,refine-2", "-n", "2"];
+    let failed = command("ablate", &[&drive, flag, &author], &only).unwrap_err();
+    assert!(failed.contains("refine-2: refinement_sweeps"), "{failed}");
+    let table = lines(&author);
+    assert!(!table[0][2].is_empty() && table[1][0] == "refine-2" && table[1][2].is_empty());
+    assert!(fs::read_to_string(author.join("report.html")).unwrap().contains("refinement_sweeps"));
 }

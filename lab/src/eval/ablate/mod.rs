@@ -1,0 +1,105 @@
+//! `raywake-lab ablate`: what every choice of a profile is worth, in one table.
+
+mod table;
+mod variants;
+
+use super::drive::Settings;
+use super::tally::Tally;
+use super::{Inputs, all, failures, names, read_rows};
+use crate::report::{self, Report};
+use clap::builder::PossibleValuesParser;
+use raywake::args::Learned;
+use raywake::config::Weights;
+use raywake::engine::interrupted;
+use raywake::error::Error;
+use raywake_core::params::Profile;
+use std::collections::BTreeMap;
+use std::path::Path;
+use variants::{BASE, Numbers, VARIANTS, Variant};
+
+/// `raywake-lab ablate`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    inputs: Inputs,
+    /// Only these variants, in the order of the table
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    #[arg(value_parser = PossibleValuesParser::new(table::names()))]
+    only: Vec<String>,
+}
+
+/// Evaluates every variant, then writes and prints the table. Variants that fail are named at the
+/// end; the others are in the table.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let (inputs, base) = (&args.inputs, args.inputs.settings()?);
+    let names = names(&inputs.drives)?;
+    let (mut rows, mut failed) = (Vec::new(), Vec::new());
+    let wanted = |v: &&Variant| args.only.is_empty() || args.only.iter().any(|n| n == v.name);
+    for variant in VARIANTS.iter().filter(wanted) {
+        eprintln!("{}: {}", variant.name, variant.what);
+        let name = if variant.is_base(&base.profile) { BASE } else { variant.name };
+        let out = inputs.out.join(name);
+        let row = settings(variant, &base, &inputs.learned)
+            .and_then(|settings| row(variant, &settings, &names, &out));
+        match row {
+            Ok(row) => rows.push(row),
+            Err(e) if interrupted() => return Err(e),
+            Err(e) => {
+                eprintln!("{}: failed: {e}", variant.name);
+                rows.push(table::failed(variant));
+                failed.push((variant.name.to_string(), e));
+            }
+        }
+    }
+    let why: Vec<String> = failed.iter().map(|(name, e)| format!("`{name}`: {e}")).collect();
+    let table = table::table(rows, &why);
+    println!("{}", table.text());
+    write(&base, &names, table, &inputs.out)?;
+    println!("report: {}", inputs.out.join("report.html").display());
+    failures("variants", &failed)
+}
+
+/// The base with a variant's change.
+fn settings(variant: &Variant, base: &Settings, learned: &Learned) -> Result<Settings, Error> {
+    let profile = variant.profile(&base.profile);
+    profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.must)))?;
+    let weights = match variant.numbers {
+        Numbers::Base => base.weights.clone(),
+        Numbers::NoFilter => base.weights.clone().without_filter(),
+        // What is shipped for his profile is his.
+        Numbers::Author => {
+            let learned = Learned { filter: learned.filter.clone(), constancy: None };
+            Weights::read(&learned, &Profile::dissertation())?
+        }
+    };
+    Ok(Settings { weights_digest: weights.digest(), weights, profile, ..base.clone() })
+}
+
+/// Evaluates a variant into a folder of its own and reads its rows.
+fn row(
+    variant: &Variant,
+    settings: &Settings,
+    names: &BTreeMap<String, &Path>,
+    out: &Path,
+) -> Result<report::Row, Error> {
+    let (done, failed) = all(names, settings, out, 1)?;
+    failures("drives", &failed)?;
+    let mut tally = Tally::new();
+    read_rows(&done, out, |_, row| tally.row(row))?;
+    Ok(table::row(variant, &settings.profile, &tally, &done))
+}
+
+fn write(
+    base: &Settings,
+    names: &BTreeMap<String, &Path>,
+    table: report::Table,
+    out: &Path,
+) -> Result<(), Error> {
+    let mut report = Report::new("Ablations", "What every choice is worth");
+    report.fact("Base", &base.profile.name);
+    report.fact("Weights", &base.weights_digest);
+    report.fact("Backend", &format!("{:?}", base.backend.backend).to_lowercase());
+    report.fact("Drives", &names.keys().cloned().collect::<Vec<_>>().join(", "));
+    report.section("Variants").table(table);
+    report.write(out)
+}

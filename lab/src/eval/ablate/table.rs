@@ -1,0 +1,132 @@
+//! One row a variant.
+
+use super::variants::{VARIANTS, Variant};
+use crate::eval::facts::Facts;
+use crate::eval::statistics::Weight;
+use crate::eval::tables::{WITHIN_M, noted_table};
+use crate::eval::tally::{Estimate, Group, Motion, Tally, Truth};
+use crate::report::{Cell, Row, Table};
+use raywake::budget::device_bytes;
+use raywake::statistics::Spread;
+use raywake_core::params::Profile;
+
+const COLUMNS: [&str; 18] = [
+    "Variant",
+    "What",
+    "Moving columns",
+    "Moving: median, cm",
+    "Moving: mean, cm",
+    "Moving: within 30 cm, %",
+    "Parked: median, cm",
+    "Parked: mean, cm",
+    "Parked: within 30 cm, %",
+    "Background: within 30 cm, %",
+    "Tracklets, moving: median, m/s",
+    "Tracklets, parked: median, m/s",
+    "Tracklets: coverage, %",
+    "Total, ms",
+    "Constancy and window, ms",
+    "Flow, ms",
+    "Follow, ms",
+    "Device, MB",
+];
+
+/// Stages of a pair that are shown together, by either backend's names.
+const PARTS: [&[&str]; 3] =
+    [&["occupancy_constancy", "window"], &["flow", "expectation", "maximisation"], &["follow"]];
+
+/// The row of a variant: what its rows and facts tell.
+pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]) -> Row {
+    let mut cells = vec![Cell::from(variant.name), variant.what.into()];
+    let flow =
+        |group, motion| tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column);
+    let percent = |share: f64| Cell::Number(100.0 * share, 1);
+    for motion in [Motion::Moving, Motion::Parked] {
+        let errors = flow(Group::Labelled, motion);
+        if motion == Motion::Moving {
+            cells.push(Cell::Count(errors.count()));
+        }
+        cells.extend([
+            Cell::Number(100.0 * errors.quantile(0.5), 1),
+            Cell::Number(100.0 * errors.mean(), 1),
+            percent(errors.share_below(WITHIN_M)),
+        ]);
+    }
+    cells.push(percent(flow(Group::Class(0), Motion::Any).share_below(WITHIN_M)));
+    for motion in [Motion::Moving, Motion::Parked] {
+        let errors = tally.settled(Group::Labelled, motion, Weight::Column);
+        cells.push(Cell::Number(errors.quantile(0.5), 2));
+    }
+    let [all, covered] = tally.coverage(Group::Labelled, Motion::Any);
+    cells.push(percent(covered as f64 / all as f64));
+    cells.push(median(drives.iter().flat_map(|d| &d.totals).copied()));
+    cells.extend(PARTS.map(|names| median(drives.iter().flat_map(|d| part(d, names)))));
+    cells.push(Cell::Number(device_bytes(profile) as f64 / 1e6, 1));
+    Row::new(cells)
+}
+
+/// The row of a variant that has no figures.
+pub fn failed(variant: &Variant) -> Row {
+    let head = [variant.name, variant.what].map(Cell::from).into_iter();
+    Row::new(head.chain(std::iter::repeat_n(Cell::Empty, COLUMNS.len() - 2)))
+}
+
+/// Time of some stages together, by pair, ms.
+fn part<'a>(facts: &'a Facts, names: &'a [&str]) -> impl Iterator<Item = f64> + 'a {
+    let stages = || facts.stages.iter().filter(|s| names.contains(&s.name.as_str()));
+    (0..facts.totals.len()).map(move |n| stages().filter_map(|s| s.ms.get(n)).sum())
+}
+
+fn median(ms: impl Iterator<Item = f64>) -> Cell {
+    let ms: Vec<f64> = ms.collect();
+    Cell::Number(Spread::of(&ms).map_or(f64::NAN, |s| s.median), 1)
+}
+
+/// The table of all rows; `failures`: why variants have no figures.
+pub fn table(rows: Vec<Row>, failures: &[String]) -> Table {
+    let caption = "Variants of the base, one thing changed in each: error of the raw flow of \
+        labelled columns (labels as they are) and of the background, median error of the velocity \
+        of tracklets of age 10 and more (smoothed labels), columns with such a tracklet, median \
+        times of a pair of sweeps, bytes of the device's heaps.";
+    let note = "Times of one table are of one machine, one variant and one drive at a time, while \
+        another thread makes rows. Voxels are cubes: with smaller cells the levels of a column \
+        shrink too, though the learned numbers are for levels of 0.30 m; and columns and their \
+        truth are those of the variant's own grid, so that rows of one window are compared. The \
+        search has 15 cells either way, which is fixed at compile time: its metres are the cell's \
+        doing. So is the window of 3 x 3 columns that costs are summed over. In the sensor's frame \
+        nothing is refined below a cell: its row stands beside `refine-0`.";
+    let mut table = noted_table("ablations", caption, &COLUMNS, rows, note);
+    table.notes.extend_from_slice(failures);
+    table
+}
+
+/// Names of the variants.
+pub fn names() -> [&'static str; VARIANTS.len()] {
+    VARIANTS.map(|v| v.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::facts::Stage;
+
+    #[test]
+    fn stages_of_a_part_are_summed_by_pair() {
+        let stage = |name: &str, ms: [f64; 3]| Stage { name: name.into(), ms: ms.into() };
+        let facts = Facts {
+            stages: vec![
+                stage("window", [1.0, 2.0, 3.0]),
+                stage("flow", [9.0; 3]),
+                stage("occupancy_constancy", [30.0, 10.0, 20.0]),
+            ],
+            totals: vec![40.0, 21.0, 32.0],
+            ..Facts::default()
+        };
+        assert_eq!(part(&facts, PARTS[0]).collect::<Vec<_>>(), [31.0, 12.0, 23.0]);
+        assert_eq!(median(part(&facts, PARTS[0])), Cell::Number(23.0, 1));
+        assert_eq!(median(part(&facts, PARTS[2])), Cell::Number(0.0, 1));
+        let row = row(&VARIANTS[0], &Profile::hdl64(), &Tally::new(), &[facts]);
+        let whole = table(vec![row, failed(&VARIANTS[1])], &["refine-0: why".into()]);
+        assert!(whole.text().contains("refine-0") && whole.notes.len() == 2);
+    }
+}
