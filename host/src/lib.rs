@@ -16,6 +16,7 @@ pub mod laps;
 pub mod map;
 pub mod outputs;
 pub mod progress;
+pub mod registration;
 pub mod report;
 pub mod run;
 pub mod sink;

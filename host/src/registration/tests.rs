@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::{DQuat, DVec3};
-use raywake::source::{OpenOptions, SweepData, open};
+use crate::source::{OpenOptions, SweepData, open};
 use raywake_sim::Rng;
 
 /// Walls, a ground and a slope, every 0.3 m.

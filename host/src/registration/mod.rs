@@ -7,9 +7,7 @@
 //! far off. Same input, same bits: nothing is random and nothing depends on threads.
 
 mod cloud;
-pub mod command;
 mod deskew;
-mod differences;
 mod eigen;
 mod sequence;
 mod step;

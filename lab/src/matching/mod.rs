@@ -1,7 +1,9 @@
 //! `raywake-lab match`: ego motion of a drive by scan matching, against the drive's own poses.
 
-use super::differences::{Differences, quantile};
-use super::{Matched, Matcher, Options};
+mod differences;
+
+use differences::{Differences, quantile};
+use raywake::registration::{Matched, Matcher, Options};
 use raywake::sink::atomic;
 use raywake::source::simulated::Simulated;
 use raywake::source::{OpenOptions, Source, SweepData, open};
