@@ -12,6 +12,7 @@ pub mod demo;
 pub mod drive;
 pub mod engine;
 pub mod error;
+pub mod flow;
 pub mod laps;
 pub mod map;
 pub mod outputs;
