@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use raywake_core::params::POINTS_MAX;
+
 use super::{BackendChoice, Learned, ProfileChoice, seconds};
 
 const ABOUT: &str = "\
@@ -23,7 +25,8 @@ Columns of --out FILE.feather, a row per point of A in its order, points without
     valid                            matched, or part of a thing that moves
 Flow and motion are NaN where a coordinate is. FILE.bin holds flow and motion alone, 6 little-endian
 float32 a row. The file's metadata has dt_s, ground_m and a_from_b, the motion found (3x4 numbers,
-row by row: the pose of B's frame in A's).";
+row by row: the pose of B's frame in A's).
+Points outside the profile's window, and those of A after its first";
 
 /// `raywake flow`.
 #[derive(Debug, clap::Args)]
@@ -67,7 +70,7 @@ pub struct Flow {
 
 /// What `--help` ends with.
 pub(super) fn after_help(exit_codes: &str) -> String {
-    format!("{FILES}\n\n{exit_codes}")
+    format!("{FILES} {POINTS_MAX}, count as standing still.\n\n{exit_codes}")
 }
 
 /// Three finite numbers with commas between them.

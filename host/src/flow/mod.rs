@@ -8,7 +8,6 @@ mod motion;
 mod rows;
 
 use std::path::Path;
-use std::time::Instant;
 
 use glam::DVec3;
 use raywake_core::output::{Origin, PointFlow};
@@ -22,6 +21,7 @@ use crate::config::{self, Weights};
 use crate::drive::Drive;
 use crate::engine::say;
 use crate::error::Error;
+use crate::laps::Laps;
 use crate::source::{SweepData, pose_row, read_cloud, read_pose};
 use crate::statistics::{Dropped, in_words};
 
@@ -39,14 +39,14 @@ pub fn flow(args: &args::Flow) -> Result<(), Error> {
     let profile = config::profile(&args.profile)?;
     let weights = Weights::read(&args.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
-    let mut clock = Clock(Instant::now());
+    let mut laps = Laps::start();
 
     let dt_s = args.dt.as_secs_f64();
     let first = cloud(&args.first, 0.0)?;
     let mut second = cloud(&args.second, dt_s)?;
     let (rig, place) = rig(args, &first)?;
     say(&place)?;
-    let read_ms = clock.lap();
+    laps.lap("read");
 
     let (motion, text) = match &args.pose {
         Some(path) => motion::given(read_pose(path)?),
@@ -55,7 +55,7 @@ pub fn flow(args: &args::Flow) -> Result<(), Error> {
     };
     second.world_from_vehicle = motion;
     say(&text)?;
-    let registration_ms = clock.lap();
+    laps.lap("registration");
 
     let (flows, left_out) = points(args, &profile, &weights, &rig, [&first, &second], &say)?;
     let second_from_first = motion.inverse();
@@ -66,7 +66,7 @@ pub fn flow(args: &args::Flow) -> Result<(), Error> {
         .map(|(point, flow)| Row::new(point, flow, &second_from_first, dt_s))
         .collect();
     say(&census(&rows, dt_s, &left_out))?;
-    let flow_ms = clock.lap();
+    laps.lap("flow");
 
     let meta = [
         ("dt_s", dt_s.to_string()),
@@ -74,22 +74,9 @@ pub fn flow(args: &args::Flow) -> Result<(), Error> {
         ("a_from_b", pose_row(&motion)),
     ];
     form.write(&args.out, &rows, &meta)?;
-    let write_ms = clock.lap();
-    say(&format!(
-        "times      read {read_ms:.0} ms, registration {registration_ms:.0} ms, flow {flow_ms:.0} \
-         ms, write {write_ms:.0} ms\n"
-    ))
-}
-
-/// Milliseconds from lap to lap.
-struct Clock(Instant);
-
-impl Clock {
-    fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        let past = now - std::mem::replace(&mut self.0, now);
-        past.as_secs_f64() * 1e3
-    }
+    laps.lap("write");
+    let times: Vec<_> = laps.stages().map(|(name, ms)| format!("{name} {ms:.0} ms")).collect();
+    say(&format!("times      {}\n", times.join(", ")))
 }
 
 /// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.

@@ -88,17 +88,15 @@ impl Form {
 
 fn table(rows: &[Row]) -> Table {
     let mut t = Table::default();
-    let triples: [(_, fn(&Row) -> [f32; 3]); 4] = [
-        (["x_m", "y_m", "z_m"], |r| r.position),
-        (["flow_x_m", "flow_y_m", "flow_z_m"], |r| r.flow),
-        (["motion_x_m", "motion_y_m", "motion_z_m"], |r| r.motion),
-        (["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], |r| r.covariance),
-    ];
-    for (names, of) in triples {
+    let mut triple = |names: [&str; 3], of: fn(&Row) -> [f32; 3]| {
         for (n, name) in names.iter().enumerate() {
             t.f32s(name, rows, |r| of(r)[n]);
         }
-    }
+    };
+    triple(["x_m", "y_m", "z_m"], |r| r.position);
+    triple(["flow_x_m", "flow_y_m", "flow_z_m"], |r| r.flow);
+    triple(["motion_x_m", "motion_y_m", "motion_z_m"], |r| r.motion);
+    triple(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], |r| r.covariance);
     t.bools("foreground", rows, |r| r.origin != Origin::Background);
     t.bools("valid", rows, Row::valid);
     t
