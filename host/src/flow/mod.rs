@@ -25,7 +25,7 @@ use crate::laps::Laps;
 use crate::source::{SweepData, pose_row, read_cloud, read_pose};
 use crate::statistics::{Dropped, in_words};
 
-pub use rows::{Form, Row};
+use rows::{Form, Row};
 
 /// A sensor is not mounted this near to the ground, m: such clouds are in a vehicle's frame, with
 /// its origin at an axle or below.

@@ -74,8 +74,8 @@ impl Source for Clouds {
     }
 }
 
-/// Replaces `points` by the returns of a file, whose extension tells the format: one of the
-/// [`EXTENSIONS`], or `feather` with columns `x`, `y` and `z`; returns whether they have times.
+/// Replaces `points` by the returns of a file, whose extension tells the format: `bin`, `pcd`,
+/// `ply`, or `feather` with columns `x`, `y` and `z`; returns whether they have times.
 ///
 /// Fails, leaving no points, where the extension is another one, and where the file cannot be read
 /// or is damaged.
