@@ -1,5 +1,6 @@
 //! The command line.
 
+mod flow;
 mod sweeps;
 
 use std::ops::Range;
@@ -12,6 +13,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use crate::error::Error;
 use crate::source::{Format, OpenOptions, PosesFrame};
 
+pub use flow::Flow;
 pub use sweeps::Sweeps;
 
 const EXIT_CODES: &str = "\
@@ -39,6 +41,9 @@ pub enum Command {
     /// Estimate the flow of a recorded drive
     #[command(after_help = EXIT_CODES)]
     Run(Box<Run>),
+    #[allow(missing_docs)]
+    #[command(after_help = EXIT_CODES, after_long_help = flow::after_help(EXIT_CODES))]
+    Flow(Box<Flow>),
     /// Map the occupancy of every sweep over the sensor's whole range
     Map(Box<Map>),
     /// Run on a small simulated drive and compare with its truth

@@ -69,14 +69,19 @@ pub struct ResetAt {
 
 impl ResetAt {
     fn new(sweep: usize, frame: u64, reset: Reset) -> ResetAt {
-        let (reason, text) = match reset {
-            Reset::First => ("first", "first sweep".to_string()),
-            Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the sweep before")),
-            Reset::Gap(dt) => ("gap", format!("gap of {dt:.3} s")),
-            Reset::Jump(mps) => ("jump", format!("poses jump at {mps:.0} m/s")),
-            Reset::Spin(radps) => ("spin", format!("poses turn at {radps:.1} rad/s")),
-        };
+        let (reason, text) = in_words(reset);
         ResetAt { sweep, frame, reason, text }
+    }
+}
+
+/// A key for a reset, and its reason in words.
+pub fn in_words(reset: Reset) -> (&'static str, String) {
+    match reset {
+        Reset::First => ("first", "first sweep".to_string()),
+        Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the sweep before")),
+        Reset::Gap(dt) => ("gap", format!("gap of {dt:.3} s")),
+        Reset::Jump(mps) => ("jump", format!("poses jump at {mps:.0} m/s")),
+        Reset::Spin(radps) => ("spin", format!("poses turn at {radps:.1} rad/s")),
     }
 }
 

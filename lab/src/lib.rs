@@ -6,8 +6,8 @@ mod curve;
 pub mod eval;
 pub mod grid;
 pub mod labels;
+pub mod matching;
 pub mod metrics;
-pub mod registration;
 pub mod report;
 #[cfg(test)]
 mod scratch;

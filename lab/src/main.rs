@@ -3,7 +3,7 @@
 
 use clap::Parser;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, registration, simulate, train};
+use raywake_lab::{eval, matching, simulate, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -20,7 +20,7 @@ enum Command {
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
     /// Ego motion of a drive by scan matching, against the drive's own poses.
-    Match(registration::command::Args),
+    Match(matching::Args),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
 }
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args).map_err(Into::into),
         Command::Ablate(args) => eval::ablate::run(&args).map_err(Into::into),
         Command::Grade(args) => grade::run(&args),
-        Command::Match(args) => registration::command::run(&args),
+        Command::Match(args) => matching::run(&args),
         Command::Sim(args) => simulate::run(&args),
     };
     match done {

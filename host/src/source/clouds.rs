@@ -74,15 +74,41 @@ impl Source for Clouds {
     }
 }
 
-/// Replaces `points` by the returns of a file of one of the [`EXTENSIONS`]; returns whether they
-/// have times. Fails, leaving no points, where the file cannot be read or is damaged.
-pub(super) fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
+/// Replaces `points` by the returns of a file, whose extension tells the format: `bin`, `pcd`,
+/// `ply`, or `feather` with columns `x`, `y` and `z`; returns whether they have times.
+///
+/// Fails, leaving no points, where the extension is another one, and where the file cannot be read
+/// or is damaged.
+pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
+    points.clear();
     match path.extension().and_then(|e| e.to_str()) {
+        Some("bin") => bin::read(path, points).map(|()| false),
         Some("pcd") => pcd::read(path, points),
         Some("ply") => ply::read(path, points),
-        _ => bin::read(path, points).map(|()| false),
+        Some("feather") => read_feather(path, points).map(|()| false),
+        _ => {
+            let what = "no cloud by its name, which ends in .bin, .pcd, .ply or .feather";
+            Err(Error::input(path, "", what))
+        }
     }
 }
 
-/// Names of files of clouds end so.
+#[cfg(feature = "arrow")]
+fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
+    let table = super::feather::Table::read(path, &["x", "y", "z"])?;
+    let [x, y, z] = [table.floats("x")?, table.floats("y")?, table.floats("z")?];
+    points.extend((0..table.rows()).map(|row| Point {
+        position: [x[row] as f32, y[row] as f32, z[row] as f32],
+        ..Point::default()
+    }));
+    Ok(())
+}
+
+#[cfg(not(feature = "arrow"))]
+fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
+    let what = "is a feather file, and this build lacks the feature `arrow` to read it";
+    Err(Error::Unsupported(format!("{} {what}", path.display())))
+}
+
+/// Names of files of clouds end so in a folder of clouds.
 pub(super) const EXTENSIONS: [&str; 3] = ["bin", "pcd", "ply"];

@@ -42,6 +42,8 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 
 use crate::error::Error;
 
+pub use clouds::read_cloud;
+pub use poses::{pose_row, read_pose};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again, so that its memory is reused.

@@ -103,6 +103,24 @@ pub(super) fn read_rows(path: &Path, sweeps: usize) -> Result<Vec<Pose>, Error> 
     Ok(poses)
 }
 
+/// The pose in a file of one row.
+///
+/// Fails where the file cannot be read, or has no row, several, or one that is no pose.
+pub fn read_pose(path: &Path) -> Result<Pose, Error> {
+    let poses = read_rows(path, 1)?;
+    Ok(poses[0])
+}
+
+/// A pose as such a row: 3x4 numbers that read back as they are.
+pub fn pose_row(pose: &Pose) -> String {
+    let (m, t) = (pose.matrix(), pose.translation);
+    let rows = [0, 1, 2].map(|i| {
+        let r = m.row(i);
+        format!("{:?} {:?} {:?} {:?}", r.x, r.y, r.z, t[i])
+    });
+    rows.join(" ")
+}
+
 /// `camera_from_velodyne`, the line `Tr:` of an odometry sequence's `calib.txt`.
 pub(super) fn read_camera(path: &Path) -> Result<Pose, Error> {
     let text = text::read(path)?;

@@ -1,4 +1,4 @@
-//! Registration of sweeps: the rigid motion between two clouds, and ego motion of whole drives.
+//! Registration of clouds: the rigid motion between them.
 //!
 //! The ground truth of section 3.8.3 takes the vehicle's motion from scan matching (generalised
 //! ICP, Segal, Haehnel and Thrun 2009). Here points are matched to planes: nearest neighbours in a
@@ -7,16 +7,13 @@
 //! far off. Same input, same bits: nothing is random and nothing depends on threads.
 
 mod cloud;
-pub mod command;
 mod deskew;
-mod differences;
 mod eigen;
-mod sequence;
 mod step;
 mod tree;
 
 pub use cloud::{Cloud, thin};
-pub use sequence::{Matched, Matcher};
+pub use deskew::{Thinned, VOXEL_M, span_s};
 
 use raywake_core::pose::Pose;
 use step::{Pair, solve};
@@ -57,6 +54,9 @@ pub struct Registration {
     pub rms: f64,
     /// Pairs of the last step whose residual is below the kernel's width.
     pub inliers: usize,
+    /// Their share (0..1) of the source's points that were to be matched: how much of the one cloud
+    /// the other one shows.
+    pub overlap: f64,
     /// Least eigenvalue of the normal matrix (dimensionless, at most 1/3): zero where some motion
     /// leaves every residual alone.
     pub least_eigenvalue: f64,
@@ -88,6 +88,7 @@ pub fn register(source: &Cloud, target: &Cloud, initial: Pose, options: &Options
         iterations: 0,
         rms: 0.0,
         inliers: 0,
+        overlap: 0.0,
         least_eigenvalue: 0.0,
         unobserved: 6,
     };
@@ -115,7 +116,7 @@ pub fn register(source: &Cloud, target: &Cloud, initial: Pose, options: &Options
                 break;
             }
         }
-        judge(&pairs, kernel_m, &mut result);
+        judge(&pairs, source.flat.len().div_ceil(stride), kernel_m, &mut result);
     }
     result.converged &= result.inliers >= PAIRS_MIN && result.unobserved < 6;
     result
@@ -147,11 +148,12 @@ fn match_points(
     }
 }
 
-/// Counts the inliers and how far they are off.
-fn judge(pairs: &[Pair], kernel_m: f64, result: &mut Registration) {
+/// Counts the inliers, also as a share of the points tried, and how far they are off.
+fn judge(pairs: &[Pair], tried: usize, kernel_m: f64, result: &mut Registration) {
     let squares = pairs.iter().map(|p| p.residual().powi(2)).filter(|r2| *r2 < kernel_m * kernel_m);
     let (count, sum) = squares.fold((0, 0.0), |(n, sum), r2| (n + 1, sum + r2));
     result.inliers = count;
+    result.overlap = count as f64 / tried.max(1) as f64;
     result.rms = (sum / count.max(1) as f64).sqrt();
 }
 

@@ -1,13 +1,17 @@
 //! `raywake-lab match`: ego motion of a drive by scan matching, against the drive's own poses.
 
-use super::differences::{Differences, quantile};
-use super::{Matched, Matcher, Options};
+mod differences;
+mod sequence;
+
+use differences::{Differences, quantile};
+use raywake::registration::Options;
 use raywake::sink::atomic;
 use raywake::source::simulated::Simulated;
-use raywake::source::{OpenOptions, Source, SweepData, open};
+use raywake::source::{OpenOptions, Source, SweepData, open, pose_row};
 use raywake_core::pose::Pose;
+use sequence::{Matched, Matcher};
 use std::error::Error;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -153,16 +157,7 @@ impl Chain {
 
 /// Writes poses as rows of 3x4 numbers that read back as they are.
 fn write(path: &Path, poses: &[Pose]) -> Result<(), raywake::error::Error> {
-    atomic::write(path, |to| poses.iter().try_for_each(|pose| write_row(to, pose)))
-}
-
-fn write_row(to: &mut impl Write, pose: &Pose) -> io::Result<()> {
-    let (m, t) = (pose.matrix(), pose.translation);
-    let rows = [0, 1, 2].map(|i| {
-        let r = m.row(i);
-        format!("{:?} {:?} {:?} {:?}", r.x, r.y, r.z, t[i])
-    });
-    writeln!(to, "{}", rows.join(" "))
+    atomic::write(path, |to| poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose))))
 }
 
 #[cfg(test)]
@@ -178,10 +173,8 @@ mod tests {
         let report = chain.report().unwrap();
         assert!(report.contains("converged       2 of 2 pairs"), "{report}");
         for pose in &chain.poses {
-            let mut row = Vec::new();
-            write_row(&mut row, pose).unwrap();
-            let text = String::from_utf8(row).unwrap();
-            let numbers: Vec<f64> = text.split_whitespace().map(|w| w.parse().unwrap()).collect();
+            let numbers: Vec<f64> =
+                pose_row(pose).split_whitespace().map(|w| w.parse().unwrap()).collect();
             let back = Pose::from_rows(&numbers.try_into().unwrap()).unwrap();
             assert!((back.translation - pose.translation).length() == 0.0);
             assert!(back.rotation.dot(pose.rotation).abs() > 1.0 - 1e-14);

@@ -1,8 +1,9 @@
 //! Ego motion of a drive: each sweep registered with the few before it.
 
-use super::deskew::{Thinned, VOXEL_M, span_s};
-use super::{Cloud, Options, Registration, register, thin};
 use glam::DVec3;
+use raywake::registration::{
+    Cloud, Options, Registration, Thinned, VOXEL_M, register, span_s, thin,
+};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig};
 use std::collections::VecDeque;
@@ -113,6 +114,8 @@ impl Matcher {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
+    use raywake::source::{OpenOptions, SweepData, open};
     use raywake_sim::{Drive, Ego, Options as Sim};
 
     #[test]
@@ -144,5 +147,38 @@ mod tests {
         let nan = Point { position: [f32::NAN; 3], ..Point::default() };
         let found = matcher.next(0.1, &[nan; 1000], initial).unwrap();
         assert!(!found.registration.converged && found.motion == initial);
+    }
+
+    /// Pairs of the drive against its given poses, from near and from as far off as is promised.
+    #[test]
+    #[ignore = "needs RAYWAKE_DATA"]
+    fn pairs_of_a_recorded_drive() {
+        let folder = std::env::var_os("RAYWAKE_DATA").expect("RAYWAKE_DATA names a folder");
+        let drive = std::path::Path::new(&folder).join("kitti_raw_0005");
+        let mut source = open(&drive, &OpenOptions::default()).unwrap();
+        let [mut first, mut second] = [SweepData::default(), SweepData::default()];
+        for index in [5, 60, 100, 140] {
+            source.read(index, &mut first).unwrap();
+            source.read(index + 1, &mut second).unwrap();
+            let given = first.world_from_vehicle.inverse() * second.world_from_vehicle;
+            let off = [
+                Pose::IDENTITY,
+                given.inverse(),
+                Pose::planar(2.0, 0.5, 0.0, 5f64.to_radians()),
+                Pose::planar(-2.0, -0.5, 0.1, -5f64.to_radians()),
+                Pose::new(DQuat::from_rotation_x(2f64.to_radians()), DVec3::new(2.9, 0.0, 0.0)),
+            ];
+            for (n, off) in off.iter().enumerate() {
+                let mut matcher = Matcher::new(source.rig(), Options::default());
+                assert!(matcher.next(first.stamp_s, &first.points, Pose::IDENTITY).is_none());
+                let found = matcher.next(second.stamp_s, &second.points, given * *off).unwrap();
+                let apart = (given.inverse() * found.motion).twist(1.0);
+                let (metres, degrees) =
+                    (apart.linear.length(), apart.angular.length().to_degrees());
+                println!("pair {index}, start {n}: {metres:.4} m, {degrees:.4} deg, {found:?}");
+                assert!(found.registration.converged && found.registration.unobserved == 0);
+                assert!(metres < 0.02 && degrees < 0.08, "pair {index}, start {n}");
+            }
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 /// Sweeps over all off-diagonal elements; six bring any matrix of size six to rounding.
 const SWEEPS: usize = 12;
+/// An element this small beside those of the diagonal is rounding.
+const NOTHING: f64 = 1e-17;
 
 /// Eigenvalues in rising order and their unit eigenvectors (`vectors[k]` belongs to `values[k]`) of
 /// a symmetric matrix with finite elements.
@@ -12,10 +14,14 @@ pub fn symmetric<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; 
         row[i] = 1.0;
     }
     for _ in 0..SWEEPS {
+        let mut rotated = false;
         for p in 0..N {
             for q in p + 1..N {
-                rotate(&mut a, &mut v, p, q);
+                rotated |= rotate(&mut a, &mut v, p, q);
             }
+        }
+        if !rotated {
+            break;
         }
     }
     let mut order: [usize; N] = std::array::from_fn(|i| i);
@@ -23,10 +29,16 @@ pub fn symmetric<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; 
     (order.map(|i| a[i][i]), order.map(|i| v[i]))
 }
 
-/// One rotation in the plane of axes p and q that makes element (p, q) zero.
-fn rotate<const N: usize>(a: &mut [[f64; N]; N], v: &mut [[f64; N]; N], p: usize, q: usize) {
-    if a[p][q] == 0.0 {
-        return;
+/// One rotation in the plane of axes p and q that makes element (p, q) zero, unless it is nothing
+/// beside the diagonal already. Returns whether it was needed.
+fn rotate<const N: usize>(
+    a: &mut [[f64; N]; N],
+    v: &mut [[f64; N]; N],
+    p: usize,
+    q: usize,
+) -> bool {
+    if a[p][q].abs() <= NOTHING * (a[p][p].abs() + a[q][q].abs()) {
+        return false;
     }
     let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
     let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
@@ -39,6 +51,7 @@ fn rotate<const N: usize>(a: &mut [[f64; N]; N], v: &mut [[f64; N]; N], p: usize
         (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
         (v[p][k], v[q][k]) = (c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]);
     }
+    true
 }
 
 #[cfg(test)]

@@ -1,0 +1,81 @@
+//! The height of the ground in a cloud.
+
+use std::collections::HashMap;
+
+use raywake_core::sweep::Point;
+
+/// Farthest from the vertical axis that the ground is looked for, m.
+const REACH_M: f32 = 20.0;
+/// Cells that are asked, the nearest to the axis: a circle of 8 m where all are seen. Farther off,
+/// a road rises and falls.
+const CELLS_MAX: usize = 200;
+/// Side of the cells that tell one height each, m.
+const CELL_M: f32 = 1.0;
+/// The ground is the most frequent height within this width, m: what slopes, kerbs and noise leave
+/// of a plane.
+const WIDTH_M: f32 = 0.3;
+/// Fewest cells that tell the ground.
+const CELLS_MIN: usize = 20;
+
+/// Height of the ground around the vertical axis, m, in the cloud's frame (z up): the median of the
+/// most frequent heights of the lowest returns of cells. `None` where too few cells agree.
+pub fn find(points: &[Point]) -> Option<f64> {
+    let mut lowest = HashMap::<[i32; 2], f32>::new();
+    for [x, y, z] in points.iter().map(|p| p.position) {
+        if z.is_finite() && x.hypot(y) < REACH_M {
+            let low = lowest.entry([x, y].map(|v| (v / CELL_M).floor() as i32)).or_insert(z);
+            *low = low.min(z);
+        }
+    }
+    let mut cells: Vec<_> = lowest.into_iter().collect();
+    // The index breaks ties, so that the hash map's order does not matter.
+    cells.sort_by_key(|([i, j], _)| (i * i + j * j, *i, *j));
+    let mut heights: Vec<f32> = cells.iter().take(CELLS_MAX).map(|c| c.1).collect();
+    heights.sort_by(f32::total_cmp);
+    let within = |from: usize| {
+        let count = heights[from..].partition_point(|h| *h <= heights[from] + WIDTH_M);
+        (count, from)
+    };
+    // The lowest where several widths hold as many.
+    let (count, from) = (0..heights.len()).map(within).rev().max_by_key(|w| w.0)?;
+    (count >= CELLS_MIN).then(|| f64::from(heights[from + count / 2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f32, y: f32, z: f32) -> Point {
+        Point { position: [x, y, z], ..Point::default() }
+    }
+
+    fn plane(height: impl Fn(f32, f32) -> f32) -> Vec<Point> {
+        let at = |n: i32| ((n % 60) as f32 * 0.5 - 15.0, (n / 60) as f32 * 0.5 - 15.0);
+        (0..3600).map(at).map(|(x, y)| point(x, y, height(x, y))).collect()
+    }
+
+    #[test]
+    fn ground_under_walls_roofs_and_strays() {
+        let mut points = plane(|x, y| -1.7 + 0.003 * x + 0.01 * ((x * y) as i32 % 5) as f32);
+        // A wall, a canopy wider than what is seen of the ground in any cell, strays below.
+        points.extend((0..2000).map(|n| point(8.0, (n % 40) as f32 * 0.5 - 10.0, n as f32 * 1e-3)));
+        points.extend(plane(|_, _| 3.0));
+        points.extend((0..15).map(|n| point(n as f32, 2.0, -4.0 - n as f32 * 0.02)));
+        points.extend([f32::NAN, f32::INFINITY].map(|bad| point(bad, 0.0, -9.0)));
+        points.extend([f32::NAN, f32::NEG_INFINITY].map(|bad| point(0.0, 0.0, bad)));
+        let found = find(&points).unwrap();
+        assert!((found + 1.69).abs() < 0.06, "{found}");
+    }
+
+    #[test]
+    fn no_ground() {
+        assert_eq!(find(&[]), None);
+        assert_eq!(find(&[point(f32::NAN, 0.0, 0.0), point(1.0, 0.0, 0.0)]), None);
+        // A pole is no ground, nor is what is far away.
+        let pole: Vec<_> = (0..1000).map(|n| point(3.0, 0.0, n as f32 * 0.01)).collect();
+        assert_eq!(find(&pole), None);
+        let far: Vec<_> =
+            plane(|_, _| -1.7).iter().map(|p| point(p.position[0] + 50.0, 0.0, -1.7)).collect();
+        assert_eq!(find(&far), None);
+    }
+}

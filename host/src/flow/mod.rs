@@ -1,0 +1,171 @@
+//! `raywake flow`: flow between two clouds alone.
+//!
+//! The second cloud is registered with the first, then both go through the pipeline as the two
+//! sweeps of a drive whose world is the first cloud's frame.
+
+mod ground;
+mod motion;
+mod rows;
+
+use std::path::Path;
+
+use glam::DVec3;
+use raywake_core::output::{Origin, PointFlow};
+use raywake_core::params::{ANCHOR_ABOVE_GROUND_M, Profile};
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Rig, Timing};
+
+use crate::args;
+use crate::choose;
+use crate::config::{self, Weights};
+use crate::drive::Drive;
+use crate::engine::say;
+use crate::error::Error;
+use crate::laps::Laps;
+use crate::source::{SweepData, pose_row, read_cloud, read_pose};
+use crate::statistics::{Dropped, in_words};
+
+use rows::{Form, Row};
+
+/// A sensor is not mounted this near to the ground, m: such clouds are in a vehicle's frame, with
+/// its origin at an axle or below.
+const MOUNTED_MIN_M: f64 = 0.6;
+/// From this speed over ground on a point counts as moving, m/s.
+const MOVING_MPS: f64 = 0.5;
+
+/// Reads, registers, finds the flow and writes it.
+pub fn flow(args: &args::Flow) -> Result<(), Error> {
+    let form = Form::of(&args.out)?;
+    let profile = config::profile(&args.profile)?;
+    let weights = Weights::read(&args.learned, &profile)?;
+    let say = |text: &str| say(args.quiet, text);
+    let mut laps = Laps::start();
+
+    let dt_s = args.dt.as_secs_f64();
+    let first = cloud(&args.first, 0.0)?;
+    let mut second = cloud(&args.second, dt_s)?;
+    let (rig, place) = rig(args, &first)?;
+    say(&place)?;
+    laps.lap("read");
+
+    let (motion, text) = match &args.pose {
+        Some(path) => motion::given(read_pose(path)?),
+        None => motion::find([&first.points, &second.points], &rig)
+            .map_err(|why| Error::input(&args.second, "", why))?,
+    };
+    second.world_from_vehicle = motion;
+    say(&text)?;
+    laps.lap("registration");
+
+    let (flows, left_out) = points(args, &profile, &weights, &rig, [&first, &second], &say)?;
+    let second_from_first = motion.inverse();
+    let rows: Vec<Row> = first
+        .points
+        .iter()
+        .zip(&flows)
+        .map(|(point, flow)| Row::new(point, flow, &second_from_first, dt_s))
+        .collect();
+    say(&census(&rows, dt_s, &left_out))?;
+    laps.lap("flow");
+
+    let meta = [
+        ("dt_s", dt_s.to_string()),
+        ("ground_m", rig.ground_m.to_string()),
+        ("a_from_b", pose_row(&motion)),
+    ];
+    form.write(&args.out, &rows, &meta)?;
+    laps.lap("write");
+    let times: Vec<_> = laps.stages().map(|(name, ms)| format!("{name} {ms:.0} ms")).collect();
+    say(&format!("times      {}\n", times.join(", ")))
+}
+
+/// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.
+fn cloud(path: &Path, stamp_s: f64) -> Result<SweepData, Error> {
+    let mut sweep = SweepData { stamp_s, ..SweepData::default() };
+    read_cloud(path, &mut sweep.points)?;
+    let there = |p: &[f32; 3]| p.iter().all(|v| v.is_finite());
+    match sweep.points.iter().any(|p| there(&p.position)) {
+        true => Ok(sweep),
+        false => {
+            let what = format!("{} returns, none with finite coordinates", sweep.points.len());
+            Err(Error::input(path, "", what))
+        }
+    }
+}
+
+/// Sensor and ground as the user says, or as the first cloud tells; and a line about them.
+fn rig(args: &args::Flow, first: &SweepData) -> Result<(Rig, String), Error> {
+    let (ground_m, how) = match args.ground {
+        Some(given) if given.is_finite() => (given, "given"),
+        Some(_) => return Err(Error::Usage("the height of the ground is not finite".into())),
+        None => {
+            let found = ground::find(&first.points).ok_or_else(|| {
+                let what = "no ground is found in it: give its height with --ground";
+                Error::input(&args.first, "", what)
+            })?;
+            (found, "found")
+        }
+    };
+    let (place, why) = match args.sensor {
+        Some(place) => (DVec3::from_array(place), "given"),
+        None if ground_m < -MOUNTED_MIN_M => (DVec3::ZERO, "taken to be the clouds' origin"),
+        None => {
+            let height = ground_m + ANCHOR_ABOVE_GROUND_M;
+            (DVec3::new(0.0, 0.0, height), "assumed, as the origin is too near to the ground")
+        }
+    };
+    let rig = Rig {
+        sensors: [Pose { translation: place, ..Pose::IDENTITY }].into_iter().collect(),
+        timing: Timing::AtStamp,
+        distorted: false,
+        ground_m,
+        own_vehicle: None,
+    };
+    let DVec3 { x, y, z } = place;
+    let text = format!(
+        "ground     at {ground_m:.2} m ({how})\nsensor     at ({x:.2}, {y:.2}, {z:.2}) m ({why})\n"
+    );
+    Ok((rig, text))
+}
+
+/// Flow of every point of the first sweep, those over the pipeline's capacity included, and what
+/// the pipeline left out of both.
+fn points(
+    args: &args::Flow,
+    profile: &Profile,
+    weights: &Weights,
+    rig: &Rig,
+    [first, second]: [&SweepData; 2],
+    say: &impl Fn(&str) -> Result<(), Error>,
+) -> Result<(Vec<PointFlow>, Dropped), Error> {
+    let tables = weights.tables(profile)?;
+    let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
+    if let Some(note) = &chosen.note {
+        say(&format!("note: {note}\n"))?;
+    }
+    let mut drive = Drive::new(profile, rig, &tables, chosen.backend);
+    let mut returns = drive.step(&first.sweep(), &[])?.prepared.dropped;
+    let stepped = drive.step(&second.sweep(), &first.points)?;
+    returns += stepped.prepared.dropped;
+    if let Some(reset) = stepped.prepared.reset {
+        let [a, b] = [&args.first, &args.second].map(|path| path.display());
+        return Err(Error::Usage(format!("{b} does not follow {a}: {}", in_words(reset).1)));
+    }
+    let mut flows = stepped.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
+    flows.resize(first.points.len(), PointFlow::default());
+    Ok((flows, Dropped { returns, ..Dropped::default() }))
+}
+
+/// A line on what was found.
+fn census(rows: &[Row], dt_s: f64, left_out: &Dropped) -> String {
+    let count = |of: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| of(row)).count();
+    let moving = |row: &Row| f64::from(row.motion[0].hypot(row.motion[1])) >= MOVING_MPS * dt_s;
+    format!(
+        "flow       {} points: {} foreground, {} of them matched, {} moving over ground at \
+         {MOVING_MPS} m/s or more\nleft out   {left_out}\n",
+        rows.len(),
+        count(&|row| row.origin != Origin::Background),
+        count(&Row::valid),
+        count(&moving),
+    )
+}

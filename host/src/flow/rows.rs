@@ -1,0 +1,137 @@
+//! Flow of single points as rows, and their files.
+
+use std::io::Write;
+use std::path::Path;
+
+use glam::Vec3;
+use raywake_core::output::{Origin, PointFlow};
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
+
+use crate::error::Error;
+use crate::sink::argoverse::displacement;
+use crate::sink::table::Table;
+use crate::sink::{Meta, atomic};
+
+/// What is put out for a point of the first cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Where it is, m, in the first cloud's frame.
+    pub position: [f32; 3],
+    /// Where it is in the second cloud's frame less `position`, m.
+    pub flow: [f32; 3],
+    /// Motion over ground along the axes of the first cloud, m.
+    pub motion: [f32; 3],
+    /// Covariance of the motion (xx, xy, yy), m^2; zero where not matched.
+    pub covariance: [f32; 3],
+    /// Where the motion comes from.
+    pub origin: Origin,
+}
+
+impl Row {
+    /// Of a point and the flow found for it in `dt_s`; `second_from_first` is the inverse of the
+    /// sensor's motion.
+    pub fn new(point: &Point, flow: &PointFlow, second_from_first: &Pose, dt_s: f64) -> Row {
+        let at = Vec3::from_array(point.position);
+        let measured = if at.is_finite() { 1.0 } else { f32::NAN };
+        let motion = displacement(flow, &Pose::IDENTITY, dt_s).map(|v| v * measured);
+        let then = second_from_first.transform((at + Vec3::from_array(motion)).as_dvec3());
+        Row {
+            position: point.position,
+            flow: (then - at.as_dvec3()).as_vec3().to_array(),
+            motion,
+            covariance: flow.covariance.map(|v| v * (dt_s * dt_s) as f32),
+            origin: flow.origin,
+        }
+    }
+
+    /// Matched, or part of a thing that moves.
+    pub fn valid(&self) -> bool {
+        self.origin >= Origin::Matched
+    }
+}
+
+/// How rows are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A table.
+    Feather,
+    /// Little-endian float32: flow and motion of every row.
+    Bin,
+}
+
+impl Form {
+    /// By a file's extension. Fails where it is another one, or this build cannot write it.
+    pub fn of(path: &Path) -> Result<Form, Error> {
+        let unable = |what: &str| format!("--out {}: {what}", path.display());
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("feather") if cfg!(feature = "arrow") => Ok(Form::Feather),
+            Some("feather") => Err(Error::Unsupported(unable(
+                "this build lacks the feature `arrow` to write feather files; name a .bin",
+            ))),
+            Some("bin") => Ok(Form::Bin),
+            _ => Err(Error::Usage(unable("the name ends neither in .feather nor in .bin"))),
+        }
+    }
+
+    /// Writes the rows, whole or not at all; `meta` goes to a table's metadata.
+    pub fn write(self, path: &Path, rows: &[Row], meta: Meta<'_>) -> Result<(), Error> {
+        match self {
+            Form::Feather => table(rows).write(path, meta),
+            Form::Bin => atomic::write(path, |out| {
+                let numbers = rows.iter().flat_map(|r| [r.flow, r.motion]).flatten();
+                numbers.into_iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))
+            }),
+        }
+    }
+}
+
+fn table(rows: &[Row]) -> Table {
+    let mut t = Table::default();
+    let mut triple = |names: [&str; 3], of: fn(&Row) -> [f32; 3]| {
+        for (n, name) in names.iter().enumerate() {
+            t.f32s(name, rows, |r| of(r)[n]);
+        }
+    };
+    triple(["x_m", "y_m", "z_m"], |r| r.position);
+    triple(["flow_x_m", "flow_y_m", "flow_z_m"], |r| r.flow);
+    triple(["motion_x_m", "motion_y_m", "motion_z_m"], |r| r.motion);
+    triple(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], |r| r.covariance);
+    t.bools("foreground", rows, |r| r.origin != Origin::Background);
+    t.bools("valid", rows, Row::valid);
+    t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn flow_has_the_sensors_motion_and_motion_has_not() {
+        // The sensor goes a metre forward and turns left.
+        let second_from_first = Pose::planar(1.0, 0.0, 0.0, FRAC_PI_2).inverse();
+        let row = |position, velocity_world_mps| {
+            let flow = PointFlow {
+                velocity_world_mps,
+                covariance: [4.0, 1.0, 2.0],
+                origin: Origin::Matched,
+                ..PointFlow::default()
+            };
+            let point = Point { position, ..Point::default() };
+            Row::new(&point, &flow, &second_from_first, 0.5)
+        };
+        let near =
+            |a: [f32; 3], b: [f32; 3]| (Vec3::from_array(a) - Vec3::from_array(b)).length() < 1e-5;
+        let still = row([5.0, 2.0, 1.0], [0.0; 2]);
+        assert!(near(still.flow, [-3.0, -6.0, 0.0]) && still.motion == [0.0; 3], "{still:?}");
+        let moving = row([5.0, 2.0, 1.0], [6.0, -4.0]);
+        assert!(near(moving.motion, [3.0, -2.0, 0.0]), "{moving:?}");
+        assert!(near(moving.flow, [0.0 - 5.0, -7.0 - 2.0, 0.0]), "{moving:?}");
+        assert_eq!((moving.covariance, moving.valid()), ([1.0, 0.25, 0.5], true));
+        for bad in [f32::NAN, f32::INFINITY] {
+            let row = row([5.0, bad, 1.0], [6.0, -4.0]);
+            assert!(row.flow.iter().chain(&row.motion).all(|v| v.is_nan()), "{row:?}");
+        }
+    }
+}
