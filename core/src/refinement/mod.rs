@@ -38,6 +38,9 @@ const RESTLESS: f32 = 0.25;
 const PROBES: usize = 4;
 /// Returns a thing must have for a search: fewer fit anywhere.
 const SEARCHED: usize = 12;
+/// By how much more than standing still the motion of its larger part may misfit what is left of a
+/// thing.
+const REST: f32 = 0.05;
 /// Larger things stand, voxels: 30 m.
 const EXTENT_MAX: f32 = 100.0;
 /// How far a fragment may lie from a moving thing that takes it along, columns.
@@ -59,6 +62,8 @@ struct Found {
     still: f32,
     /// Largest extent along an axis, voxels.
     extent: f32,
+    /// The thing it is a part of.
+    whole: u32,
 }
 
 /// Its state between sweeps.
@@ -170,36 +175,36 @@ impl Refinement {
         self.segments.find(
             first,
             |c| stands(c) && flow(c) & VALID != 0 && restless(sweeps, c),
-            flow,
+            |_| 0,
         );
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
             if found.motion.is_some() {
-                let id = self.found.len() as u32;
+                let (id, whole) = (self.found.len() as u32, self.segment[columns[0] as usize]);
                 columns.iter().for_each(|c| self.segment[*c as usize] = id);
-                let _ = self.found.push(found);
+                let _ = self.found.push(Found { whole, ..found });
             }
         }
-        self.segments.find(
-            first,
-            |c| self.segment[c] != NONE && stands_still(&self.segment, &self.found, c),
-            flow,
-        );
+        // What is left of it, and fragments of other things that move.
+        self.segments.find(first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
-            let found = self.found[self.segment[columns[0] as usize] as usize];
-            if found.still < STANDS || found.extent > EXTENT_MAX {
+            let thing = Thing::new(sweeps, columns);
+            if thing.extent > EXTENT_MAX {
                 continue;
             }
-            let near = neighbours(side, columns, &self.segment, &self.found[..]);
-            let thing = Thing::new(sweeps, columns);
-            let mut best = found.still;
-            for m in &near {
-                let Some(motion) = self.found[*m as usize].motion else { continue };
+            let still = thing.standing(&mut self.visits);
+            let whole = self.segment[columns[0] as usize];
+            let mut best = 1.0;
+            for m in &neighbours(side, columns, &self.segment, &self.found) {
+                let found = self.found[*m as usize];
+                let Some(motion) = found.motion else { continue };
                 let misfit = thing.misfit(&motion, &mut self.visits);
-                if misfit < best && gain(found.still, misfit) > GAIN {
+                let rest = found.whole == whole && found.extent > 0.5 * self.found[whole as usize].extent;
+                let joins = gain(still, misfit) > GAIN || rest && misfit < still + REST;
+                if joins && misfit < best {
                     best = misfit;
                     columns.iter().for_each(|c| self.segment[*c as usize] = *m);
                 }
@@ -250,7 +255,7 @@ fn motion(
     visits: &mut Visits,
 ) -> Found {
     let still = Motion::around(thing.centre);
-    let mut found = Found { motion: None, still: thing.standing(visits), extent: thing.extent };
+    let mut found = Found { still: thing.standing(visits), extent: thing.extent, ..Found::default() };
     if found.still < STANDS || thing.extent > EXTENT_MAX {
         return found;
     }
