@@ -6,7 +6,7 @@ use crate::record::Column;
 use nalgebra::{Matrix3, Vector3};
 
 /// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
-pub const SAMPLES: usize = 128;
+pub const SAMPLES: usize = 64;
 /// Steps of Gauss and Newton.
 const STEPS: usize = 8;
 /// The first steps, with the wide kernel.
@@ -19,8 +19,17 @@ pub const NOISE: f32 = 0.15;
 const INFORMATION: f32 = 0.25;
 /// Standard deviation of the turn between two sweeps, rad.
 const TURN: f32 = 0.03;
+/// Information on the displacement where nothing is near, voxels^-2.
+const HOLD: f32 = 1e-3;
 /// Distance from which on a return counts as missed, voxels.
 const MISSED: f32 = 0.5;
+/// Distance up to which a return counts as met, voxels.
+const TOUCHING: f32 = 0.1;
+
+/// What a return tells of the surface it lies on, the upper half of a symmetric matrix: the inverse
+/// covariance of the returns around it and of their noise, relative to the noise's. 1 across a
+/// surface, little along it.
+pub type Weight = [f32; 6];
 
 /// A return of a thing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,17 +38,14 @@ pub struct Sample {
     pub at: [f32; 3],
     /// Sensor that saw it.
     pub sensor: u32,
-    /// Inverse covariance of the returns around it and of their noise, relative to the noise's: 1
-    /// across a surface, little along it.
-    pub weight: Matrix3<f32>,
+    /// Its index in the cloud of its sweep.
+    pub index: u32,
 }
 
-impl Sample {
-    /// Squared distance across the surface, voxels².
-    fn square(&self, d: [f32; 3]) -> f32 {
-        let d = Vector3::from(d);
-        (d.transpose() * self.weight * d)[0]
-    }
+/// Squared distance across the surface, voxels².
+fn square(weight: &Weight, [x, y, z]: [f32; 3]) -> f32 {
+    let [xx, xy, xz, yy, yz, zz] = *weight;
+    x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z
 }
 
 /// Another sweep: where its window lies seen from the first one's, and how much of the motion has
@@ -125,7 +131,7 @@ impl Sweeps<'_> {
         let other = &self.others[0];
         let at = moved(s, &Motion::default(), other);
         let found = other.cloud.nearest(at, s.sensor);
-        (found.is_some() || self.is_free(self.now, at)).then(|| truncated(s, at, found))
+        (found.is_some() || self.is_free(self.now, at)).then(|| truncated(self.first, s, at, found))
     }
 }
 
@@ -195,13 +201,20 @@ impl Mean {
 }
 
 /// Truncated squared distance of a moved return from what another sweep has there, 0 to 1.
-pub fn off(s: &Sample, motion: &Motion, other: &Other) -> f32 {
+fn off(of: &Cloud, s: &Sample, motion: &Motion, other: &Other) -> f32 {
     let at = moved(s, motion, other);
-    truncated(s, at, other.cloud.nearest(at, s.sensor))
+    truncated(of, s, at, other.cloud.nearest(at, s.sensor))
 }
 
-fn truncated(s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>) -> f32 {
-    found.map_or(1.0, |n| (s.square(minus(n.1, at)) / (MISSED * MISSED)).min(1.0))
+/// Squared distance of a return of the cloud `of` from what was found, 0 to 1: all that is missed
+/// counts the same.
+fn truncated(of: &Cloud, s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>) -> f32 {
+    let Some((d2, q)) = found else { return 1.0 };
+    // So near that the surface hardly matters.
+    if d2 < TOUCHING * TOUCHING {
+        return 0.0;
+    }
+    (square(&of.weight(s.index), minus(q, at)) / (MISSED * MISSED)).min(1.0)
 }
 
 impl<'a> Thing<'a> {
@@ -270,11 +283,14 @@ impl<'a> Thing<'a> {
     pub fn misfit(&self, motion: &Motion, visits: &mut Visits) -> f32 {
         let mut mean = Mean::default();
         for other in self.sweeps.others {
-            self.samples.iter().for_each(|s| mean.add(off(s, motion, other)));
+            for s in &self.samples {
+                mean.add(off(self.sweeps.first, s, motion, other));
+            }
         }
         for q in &self.there(motion, visits) {
             let at = self.back(q, motion);
-            let off = truncated(q, at, self.sweeps.first.nearest(at, q.sensor));
+            let found = self.sweeps.first.nearest(at, q.sensor);
+            let off = truncated(self.sweeps.others[0].cloud, q, at, found);
             // What stands there was there before.
             if off < 0.5 || !self.stood(q) {
                 mean.add(off);
@@ -292,7 +308,7 @@ impl<'a> Thing<'a> {
             for s in &self.samples {
                 let at = moved(s, &still, other);
                 if let Some(found) = other.cloud.nearest(at, s.sensor) {
-                    mean.add(truncated(s, at, Some(found)));
+                    mean.add(truncated(self.sweeps.first, s, at, Some(found)));
                 }
             }
         }
@@ -301,7 +317,7 @@ impl<'a> Thing<'a> {
             let at = self.back(q, &still);
             let found = self.sweeps.first.nearest(at, q.sensor);
             if found.is_some() || self.sweeps.is_free(self.sweeps.before, q.at) {
-                mean.add(truncated(q, at, found));
+                mean.add(truncated(self.sweeps.others[0].cloud, q, at, found));
             }
         }
         mean.value()
@@ -320,38 +336,48 @@ impl<'a> Thing<'a> {
                 there = self.there(&motion, visits);
             }
             let kernel = KERNEL[(step >= WIDE_STEPS) as usize];
-            let mut h = Matrix3::zeros();
-            h[(2, 2)] = 1.0 / (TURN * TURN);
-            let mut g = Vector3::new(0.0, 0.0, -motion.by.z / (TURN * TURN));
-            let mut pair = |s: &Sample, source: [f32; 3], off: [f32; 3], scale: f32| {
-                let d2 = s.square(off);
-                let fall = 1.0 / (1.0 + d2 / (kernel * kernel));
-                let m = s.weight * (fall * fall * INFORMATION / (NOISE * NOISE));
-                let j = motion.jacobian(source) * scale;
-                let jm = j.transpose() * m;
-                h += jm * j;
-                g += jm * Vector3::from(off);
+            // Something to hold on to where all is missed, and the turn that is likely.
+            let mut h = [HOLD, 0.0, 0.0, HOLD, 0.0, 1.0 / (TURN * TURN)];
+            let mut g = [0.0, 0.0, -motion.by.z / (TURN * TURN)];
+            let mut pair = |weight: &Weight, source: [f32; 3], off: [f32; 3], scale: f32| {
+                let fall = 1.0 / (1.0 + square(weight, off) / (kernel * kernel));
+                let w = fall * fall * scale * INFORMATION / (NOISE * NOISE);
+                let [xx, xy, xz, yy, yz, _] = weight.map(|v| v * w);
+                // Rows of the transposed Jacobian: x, y and the turn about the centre.
+                let [a, b] = [motion.centre[1] - source[1], source[0] - motion.centre[0]];
+                let (tx, ty) = (xx * a + xy * b, xy * a + yy * b);
+                h[0] += scale * xx;
+                h[1] += scale * xy;
+                h[2] += scale * tx;
+                h[3] += scale * yy;
+                h[4] += scale * ty;
+                h[5] += scale * (a * tx + b * ty);
+                let fx = xx * off[0] + xy * off[1] + xz * off[2];
+                let fy = xy * off[0] + yy * off[1] + yz * off[2];
+                g[0] += fx;
+                g[1] += fy;
+                g[2] += a * fx + b * fy;
             };
             for other in self.sweeps.others {
                 for s in &self.samples {
                     let at = moved(s, &motion, other);
                     if let Some((_, q)) = other.cloud.nearest(at, s.sensor) {
-                        pair(s, s.at, minus(q, at), other.scale);
+                        let weight = self.sweeps.first.weight(s.index);
+                        pair(&weight, s.at, minus(q, at), other.scale);
                     }
                 }
             }
             for q in &there {
                 let at = self.back(q, &motion);
                 if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor) {
-                    pair(q, p, minus(at, p), 1.0);
+                    let weight = self.sweeps.others[0].cloud.weight(q.index);
+                    pair(&weight, p, minus(at, p), 1.0);
                 }
             }
-            // Something to hold on to where all is missed.
-            for n in 0..2 {
-                h[(n, n)] += 1e-3;
-            }
+            let [xx, xy, xt, yy, yt, tt] = h;
+            let h = Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt);
             let Some(inverse) = h.try_inverse() else { break };
-            let by = inverse * g;
+            let by = inverse * Vector3::from(g);
             motion.by += by;
             motion.covariance = inverse;
             if by.norm_squared() < 1e-4 && step > WIDE_STEPS {

@@ -1,6 +1,6 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
-use super::align::{NOISE, Sample};
+use super::align::{NOISE, Sample, Weight};
 use crate::params::{CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
@@ -95,7 +95,7 @@ pub struct Cloud {
     points: heapless::Vec<Return, CLOUD_MAX>,
     start: [u32; COLUMNS_MAX + 1],
     /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
-    weights: [Cell<[f32; 6]>; CLOUD_MAX],
+    weights: [Cell<Weight>; CLOUD_MAX],
     /// Levels of each column in which something was hit.
     levels: [u16; COLUMNS_MAX],
 }
@@ -229,7 +229,12 @@ impl Cloud {
             if row >= self.side || gap * gap >= best.0 {
                 continue;
             }
-            for Return { at: p, sensor: by } in self.row(row, j_from, j_to) {
+            // So far from its column nothing can be nearer.
+            let reach = libm::sqrtf(best.0 - gap * gap);
+            let (low, high) = (at[1] + 1.0 - reach, at[1] + 1.0 + reach);
+            let (j_from, j_to) =
+                ((low as usize).saturating_sub(1).max(j_from), (high as usize).min(j_to));
+            for Return { at: p, sensor: by } in self.row(row, j_from, j_to.max(j_from)) {
                 let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 if d2 < best.0 && *by == sensor {
@@ -240,20 +245,26 @@ impl Cloud {
         found.then_some(best)
     }
 
-    /// A return and what the returns around it tell about the surface it lies on.
+    /// A return.
     pub fn sample(&self, n: usize) -> Sample {
         let Return { at, sensor } = self.points[n];
-        let mut known = self.weights[n].get();
-        if known[0].is_nan() {
-            known = self.surface(at, sensor);
-            self.weights[n].set(known);
+        Sample { at, sensor, index: n as u32 }
+    }
+
+    /// What the returns around a return tell about the surface it lies on.
+    pub fn weight(&self, n: u32) -> Weight {
+        let known = self.weights[n as usize].get();
+        if !known[0].is_nan() {
+            return known;
         }
-        let [xx, xy, xz, yy, yz, zz] = known;
-        Sample { at, sensor, weight: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) }
+        let Return { at, sensor } = self.points[n as usize];
+        let weight = self.surface(at, sensor);
+        self.weights[n as usize].set(weight);
+        weight
     }
 
     /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.
-    fn surface(&self, at: [f32; 3], sensor: u32) -> [f32; 6] {
+    fn surface(&self, at: [f32; 3], sensor: u32) -> Weight {
         let [i, j] = [at[0] as usize, at[1] as usize];
         let (mut n, mut mean, mut square) = (0.0f32, [0.0f32; 3], [0.0f32; 6]);
         for a in i.saturating_sub(1)..(i + 2).min(self.side) {
