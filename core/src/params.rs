@@ -104,6 +104,10 @@ pub struct TrackletParams {
     pub gate_d2: f32,
     /// Where a tracklet is born.
     pub birth: Birth,
+    /// Whether a tracklet whose cell was not observed takes over an observed column beside it.
+    pub takes_over: bool,
+    /// Sweeps a tracklet lives on without an observation (5.2.2).
+    pub coast_sweeps: u32,
 }
 
 /// Everything that distinguishes one run of the flow pipeline from another.
@@ -173,6 +177,8 @@ impl Profile {
                 turn_birth_radps: 0.2,
                 gate_d2: 9.2103,
                 birth: Birth::Target,
+                takes_over: true,
+                coast_sweeps: 0,
             },
             limits: Limits::DEFAULT,
         }
@@ -198,6 +204,8 @@ impl Profile {
                 // His gate compares the distance itself with the quantile 5.9915.
                 gate_d2: 5.9915 * 5.9915,
                 birth: Birth::Source,
+                takes_over: false,
+                coast_sweeps: 0,
                 ..base.tracklet
             },
             ..base
@@ -236,7 +244,7 @@ impl Profile {
     pub fn check(&self) -> Result<(), ProfileError> {
         let (t, l) = (&self.tracklet, &self.limits);
         let positive = |v: f32| v.is_finite() && v > 0.0;
-        let rules: [(bool, &'static str, &'static str); 20] = [
+        let rules: [(bool, &'static str, &'static str); 21] = [
             (self.side % 2 == 1 && self.side >= 31, "side", "odd and at least 31"),
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
@@ -266,6 +274,7 @@ impl Profile {
             (positive(t.turn_noise_radps2), "turn_noise_radps2", "above 0"),
             (positive(t.turn_birth_radps), "turn_birth_radps", "above 0"),
             (positive(t.gate_d2), "gate_d2", "above 0"),
+            (t.coast_sweeps <= 20, "coast_sweeps", "at most 20"),
             (l.gap_s > 0.0 && l.gap_s <= 10.0, "gap_s", "above 0, at most 10"),
             (l.jump_mps > 0.0 && l.jump_mps <= 1000.0, "jump_mps", "above 0, at most 1,000"),
             (l.spin_radps > 0.0 && l.spin_radps <= 100.0, "spin_radps", "above 0, at most 100"),

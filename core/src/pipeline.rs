@@ -26,7 +26,7 @@ use crate::prepare::{Dropped, Preparation, Window, central, place, step_of};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
-use crate::tracklet::{Tracklets, Turnover};
+use crate::tracklet::{Observation, Tracklet, Tracklets, Turnover};
 use crate::window::window;
 use glam::DVec3;
 
@@ -182,7 +182,7 @@ pub struct Pipeline {
     before: Option<Side>,
     current: Option<Side>,
     tracklets: Tracklets,
-    slot_of_source: [u32; FOREGROUND_MAX],
+    observed: heapless::Vec<Observation, FOREGROUND_MAX>,
     column_of_point: [[u32; POINTS_MAX]; 2],
     positions: [[f32; 3]; POINTS_MAX],
     refinement: Refinement,
@@ -211,7 +211,7 @@ impl Pipeline {
             before: None,
             current: None,
             tracklets: Tracklets::new(),
-            slot_of_source: [NONE; FOREGROUND_MAX],
+            observed: heapless::Vec::new(),
             column_of_point: [[NONE; POINTS_MAX]; 2],
             positions: [[0.0; 3]; POINTS_MAX],
             refinement: Refinement::new(),
@@ -319,23 +319,17 @@ impl Pipeline {
         let dt = current.stamp_s - before.stamp_s;
         let moved = before.pose.inverse() * current.pose;
         let turned = moved.yaw_rad() as f32;
+        let left = self.tracklets.place(step);
         if self.profile.refinement_sweeps > 0 {
-            self.tracklets.place(step);
             let (tracklets, r) = (&self.tracklets, self.profile.voxel_m as f32);
             self.refinement.run(step, perceived, |c| {
                 let t = tracklets.at(c).filter(|t| t.age > 0)?;
                 Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
             });
         }
-        let turnover = self.tracklets.update(
-            &self.profile,
-            step,
-            dt as f32,
-            turned,
-            perceived.foreground,
-            perceived.state,
-            &mut self.slot_of_source,
-        );
+        self.observe(step, perceived);
+        let turnover =
+            self.tracklets.update(&self.profile, step, dt as f32, turned, left, &mut self.observed);
         // The odometry flow of the pair: the vehicle's motion from the one sweep to the other.
         let ego = EgoMotion::new(&before.pose, &moved.twist(dt));
         let (count, valid) = self.flow_of_columns(
@@ -359,6 +353,36 @@ impl Pipeline {
         })
     }
 
+    /// Lists how solid columns moved: those with a match, and those that a moving thing took along.
+    fn observe(&mut self, step: &Step, perceived: &Perceived) {
+        let refined = self.profile.refinement_sweeps > 0;
+        let r = self.profile.voxel_m as f32;
+        let of_cells = self.profile.tracklet.measurement_cells * r;
+        self.observed.clear();
+        for (column, record) in perceived.before.iter().enumerate() {
+            let flow = perceived.state[column];
+            if record[1] == 0 {
+                continue;
+            }
+            let found = if refined { self.refinement.of(step, column, flow) } else { None };
+            let (moved, covariance) = match found {
+                Some((by, covariance)) => (by.map(|v| v * r), covariance.map(|v| v * r * r)),
+                None if flow & VALID == 0 => continue,
+                None if refined => ([0.0; 2], [STILL_M * STILL_M, 0.0, STILL_M * STILL_M]),
+                None => {
+                    let variance = 2.0 * of_cells * of_cells;
+                    let cells = flow_displacement(flow);
+                    (cells.map(|c| c as f32 * r), [variance, 0.0, variance])
+                }
+            };
+            let o = Observation { column: column as u32, moved, covariance, slot: NONE };
+            if self.observed.push(o).is_err() {
+                // As many as there may be foreground columns: those of the last rows stay without.
+                break;
+            }
+        }
+    }
+
     /// Writes one record per solid column of the first sweep; returns how many, and how many of
     /// them are matched.
     fn flow_of_columns(
@@ -380,6 +404,7 @@ impl Pipeline {
         grid_from_vehicle.translation += DVec3::from_array(moved);
         let vehicle_from_grid = grid_from_vehicle.inverse();
         let mut foreground = perceived.foreground.iter().enumerate().peekable();
+        let mut observed = self.observed.iter().peekable();
         let (mut count, mut valid) = (0, 0);
         for (column, record) in perceived.before.iter().enumerate() {
             let rank = foreground.next_if(|(_, c)| **c as usize == column).map(|(n, _)| n);
@@ -403,25 +428,15 @@ impl Pipeline {
                     flow.origin = Origin::Matched;
                     flow.displacement_cells = flow_displacement(perceived.state[column]);
                     flow.energy = perceived.proposal[rank][1] as i32;
-                    self.set_displacement(&mut flow, before, current, at);
-                    self.set_velocity(&mut flow, rank, dt, turned);
                 }
             }
-            if self.profile.refinement_sweeps > 0 {
-                let r = self.profile.voxel_m as f32;
-                flow.displacement_m = [0.0; 2];
-                flow.displacement_covariance = [STILL_M * STILL_M, 0.0, STILL_M * STILL_M];
-                if let Some((by, covariance)) =
-                    self.refinement.of(step, column, perceived.state[column])
-                {
-                    flow.origin = flow.origin.max(Origin::Matched);
-                    flow.displacement_m = by.map(|v| v * r);
-                    flow.displacement_covariance = covariance.map(|v| v * r * r);
-                }
-                flow.velocity_world_mps = flow.displacement_m.map(|v| v / dt);
+            if let Some(observation) = observed.next_if(|o| o.column as usize == column) {
+                flow.origin =
+                    if flow.origin == Origin::Matched { Origin::Matched } else { Origin::Joined };
+                self.set_flow(&mut flow, observation, before, current, at, dt, turned);
             }
             let planar = DVec3::new(at.x, at.y, 0.0);
-            if flow.origin == Origin::Matched && self.profile.frame == Frame::Sensor {
+            if flow.origin >= Origin::Matched && self.profile.frame == Frame::Sensor {
                 let relative = flow.velocity_ego_mps;
                 flow.velocity_world_mps = ego.world_from_ego(planar, relative);
                 flow.covariance = ego.turn_covariance(flow.covariance);
@@ -436,49 +451,40 @@ impl Pipeline {
         (count, valid)
     }
 
-    /// Displacement over ground of a matched column at `at` (first sweep's vehicle frame), from the
-    /// whole cells, with the covariance of two measured positions.
-    fn set_displacement(&self, flow: &mut ColumnFlow, before: &Side, current: &Side, at: DVec3) {
-        let r = self.profile.voxel_m;
-        let [x, y] = flow.displacement_cells.map(|c| c as f64 * r);
-        let by = match self.profile.frame {
-            Frame::Lattice => DVec3::new(x, y, 0.0),
-            Frame::Sensor => {
-                let by = DVec3::new(x, y, 0.0);
-                current.pose.transform(at + by) - before.pose.transform(at)
-            }
-        };
-        flow.displacement_m = [by.x as f32, by.y as f32];
-        let deviation = self.profile.tracklet.measurement_cells * r as f32;
-        let variance = 2.0 * deviation * deviation;
-        flow.displacement_covariance = [variance, 0.0, variance];
-    }
-
-    /// Velocity along the grid's axes of a matched column: its tracklet's, or, where the gate
-    /// ended that, the raw flow's with the covariance of two measured positions.
-    fn set_velocity(&self, flow: &mut ColumnFlow, rank: usize, dt: f32, turned: f32) {
-        let r = self.profile.voxel_m as f32;
-        let (velocity, covariance) = match self.slot_of_source[rank] {
-            NONE => {
-                let deviation = self.profile.tracklet.measurement_cells * r / dt;
-                let variance = 2.0 * deviation * deviation;
-                (flow.displacement_cells.map(|c| c as f32 * r / dt), [variance, 0.0, variance])
-            }
-            slot => {
-                let t = &self.tracklets.all()[slot as usize];
-                flow.age = t.age;
-                let (velocity, covariance) = t.ekf.velocity();
-                match self.profile.frame {
-                    Frame::Lattice => (velocity, covariance),
-                    // The tracklet has gone over to the second sweep's axes.
-                    Frame::Sensor => turn(turned, velocity, covariance),
-                }
-            }
-        };
-        flow.covariance = covariance;
+    /// Displacement and velocity of an observed column at `at` (first sweep's vehicle frame): its
+    /// tracklet's velocity, or, where there was no room for one, that of the displacement.
+    fn set_flow(
+        &self,
+        flow: &mut ColumnFlow,
+        o: &Observation,
+        before: &Side,
+        current: &Side,
+        at: DVec3,
+        dt: f32,
+        turned: f32,
+    ) {
+        flow.displacement_m = o.moved;
+        flow.displacement_covariance = o.covariance;
+        let of_pair = (o.moved.map(|v| v / dt), o.covariance.map(|v| v / (dt * dt)));
+        let tracklet = self.tracklets.all().get(o.slot as usize);
+        flow.age = tracklet.map_or(0, |t| t.age);
         match self.profile.frame {
-            Frame::Lattice => flow.velocity_world_mps = velocity,
-            Frame::Sensor => flow.velocity_ego_mps = velocity,
+            Frame::Lattice => {
+                let (velocity, covariance) = tracklet.map_or(of_pair, |t| t.ekf.velocity());
+                (flow.velocity_world_mps, flow.covariance) = (velocity, covariance);
+            }
+            Frame::Sensor => {
+                let by = DVec3::new(o.moved[0] as f64, o.moved[1] as f64, 0.0);
+                let by = current.pose.transform(at + by) - before.pose.transform(at);
+                flow.displacement_m = [by.x as f32, by.y as f32];
+                // The tracklet has gone over to the second sweep's axes.
+                let turned_back = |t: &Tracklet| {
+                    let (velocity, covariance) = t.ekf.velocity();
+                    turn(turned, velocity, covariance)
+                };
+                let (velocity, covariance) = tracklet.map_or(of_pair, turned_back);
+                (flow.velocity_ego_mps, flow.covariance) = (velocity, covariance);
+            }
         }
     }
 
@@ -525,8 +531,9 @@ impl Pipeline {
     fn state_of(&self, t: &crate::tracklet::Tracklet, current: &Side) -> TrackletState {
         let side = self.profile.side as i32;
         let (i, j) = (t.column as i32 / side, t.column as i32 % side);
-        let grid =
-            self.centre_of(i, j) + DVec3::new(t.ekf.mean[0] as f64, t.ekf.mean[1] as f64, 0.0);
+        let r = self.profile.voxel_m;
+        let place = |a: usize| (t.place[a] as f64 - 0.5) * r + t.ekf.mean[a] as f64;
+        let grid = self.centre_of(i, j) + DVec3::new(place(0), place(1), 0.0);
         let at = current.window.grid_from_vehicle.inverse().transform(grid);
         let world = current.pose.transform(at);
         let ego = EgoMotion::new(&current.pose, &current.twist);

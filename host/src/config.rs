@@ -47,6 +47,8 @@ struct TrackletKeys {
     turn_birth_radps: Option<f32>,
     gate_d2: Option<f32>,
     birth: Option<BirthKey>,
+    takes_over: Option<bool>,
+    coast_sweeps: Option<u32>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -101,6 +103,8 @@ impl Keys {
             BirthKey::Source => Birth::Source,
         };
         set(&mut t.birth, keys.birth.map(birth));
+        set(&mut t.takes_over, keys.takes_over);
+        set(&mut t.coast_sweeps, keys.coast_sweeps);
     }
 }
 

@@ -23,12 +23,12 @@ const HEADING_UNKNOWN: f32 = 3.289_868;
 
 impl Ekf {
     /// A tracklet born from the displacement `moved` (m) of its first match over `dt` seconds, as
-    /// seen from the cell it moved to.
+    /// seen from where it moved to; `noise` is the covariance of a measured position, m².
     ///
-    /// At the target: position and velocity follow from two measured positions of variance R, so
+    /// At the target: position and velocity follow from two measured positions of covariance R, so
     /// their errors are correlated: var(v) = 2 R / dt², cov(x, v) = R / dt, turned into heading and
     /// speed. At the source: the author's start, one step late.
-    pub fn birth(params: &TrackletParams, voxel_m: f32, moved: [f32; 2], dt: f32) -> Ekf {
+    pub fn birth(params: &TrackletParams, noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> Ekf {
         let distance = libm::sqrtf(moved[0] * moved[0] + moved[1] * moved[1]);
         let (heading, speed) = (libm::atan2f(moved[1], moved[0]), distance / dt);
         let mut mean = Vector5::new(0.0, 0.0, heading, speed, 0.0);
@@ -39,27 +39,30 @@ impl Ekf {
                 p.set_diagonal(&Vector5::from(BIRTH_SOURCE.map(|s| s * s)));
             }
             Birth::Target => {
-                let r = measurement_variance(params, voxel_m);
-                let (cos, sin) = if distance > 0.0 {
-                    (moved[0] / distance, moved[1] / distance)
+                let ahead = if distance > 0.0 {
+                    Vector2::new(moved[0] / distance, moved[1] / distance)
                 } else {
-                    (1.0, 0.0)
+                    Vector2::new(1.0, 0.0)
                 };
-                let of_speed = 2.0 * r / (dt * dt);
-                let of_heading =
-                    if speed > 0.0 { of_speed / (speed * speed) } else { HEADING_UNKNOWN };
+                let aside = Vector2::new(-ahead.y, ahead.x);
+                let (along, across) = (noise * ahead / dt, noise * aside / dt);
+                let of_speed = 2.0 * ahead.dot(&along) / dt;
+                let of_heading = 2.0 * aside.dot(&across) / (dt * speed * speed);
                 let known = of_heading < HEADING_UNKNOWN;
-                let (along, across) = (r / dt, if known { r / (dt * speed) } else { 0.0 });
-                p.set_diagonal(&Vector5::new(
-                    r,
-                    r,
-                    of_heading.min(HEADING_UNKNOWN),
-                    of_speed,
-                    params.turn_birth_radps * params.turn_birth_radps,
-                ));
-                for (axis, ahead, aside) in [(0, cos, -sin), (1, sin, cos)] {
-                    (p[(axis, 3)], p[(3, axis)]) = (along * ahead, along * ahead);
-                    (p[(axis, 2)], p[(2, axis)]) = (across * aside, across * aside);
+                p.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise);
+                p[(2, 2)] = if known { of_heading } else { HEADING_UNKNOWN };
+                p[(3, 3)] = of_speed;
+                p[(4, 4)] = params.turn_birth_radps * params.turn_birth_radps;
+                for axis in 0..2 {
+                    (p[(axis, 3)], p[(3, axis)]) = (along[axis], along[axis]);
+                    if known {
+                        let c = across[axis] / speed;
+                        (p[(axis, 2)], p[(2, axis)]) = (c, c);
+                    }
+                }
+                if known {
+                    let c = 2.0 * aside.dot(&along) / (dt * speed);
+                    (p[(2, 3)], p[(3, 2)]) = (c, c);
                 }
             }
         }
@@ -78,16 +81,16 @@ impl Ekf {
     pub fn depart(
         &self,
         params: &TrackletParams,
-        voxel_m: f32,
+        noise: Matrix2<f32>,
         moved: [f32; 2],
         elapsed: f32,
         dt: f32,
     ) -> Option<Ekf> {
         let p = &self.covariance;
         let ahead = p[(0, 0)] + (2.0 * p[(0, 3)] + p[(3, 3)] * dt) * dt;
-        let d2 = (moved[0] * moved[0] + moved[1] * moved[1])
-            / (ahead + measurement_variance(params, voxel_m));
-        (d2 <= params.gate_d2).then(|| Ekf::birth(params, voxel_m, moved, elapsed))
+        let measured = noise[(0, 0)].max(noise[(1, 1)]);
+        let d2 = (moved[0] * moved[0] + moved[1] * moved[1]) / (ahead + measured);
+        (d2 <= params.gate_d2).then(|| Ekf::birth(params, noise, moved, elapsed))
     }
 
     /// Prediction over `dt` seconds (3.16, 3.20, 3.21).
@@ -109,9 +112,9 @@ impl Ekf {
 
     /// Observes a position (3.22-3.24, Joseph form) unless it lies beyond the gate (3.25): then
     /// nothing changes and `false` comes back.
-    pub fn update(&mut self, params: &TrackletParams, voxel_m: f32, seen: [f32; 2]) -> bool {
+    pub fn update(&mut self, params: &TrackletParams, noise: Matrix2<f32>, seen: [f32; 2]) -> bool {
         let p = &self.covariance;
-        let r = Matrix2::identity() * measurement_variance(params, voxel_m);
+        let r = noise;
         let innovation = Vector2::new(seen[0] - self.mean[0], seen[1] - self.mean[1]);
         let s = p.fixed_view::<2, 2>(0, 0) + r;
         let determinant = s[(0, 0)] * s[(1, 1)] - s[(0, 1)] * s[(1, 0)];
@@ -175,11 +178,6 @@ impl Ekf {
         };
         ([speed * cos, speed * sin], [product(a, a), product(a, b), product(b, b)])
     }
-}
-
-fn measurement_variance(params: &TrackletParams, voxel_m: f32) -> f32 {
-    let deviation = params.measurement_cells * voxel_m;
-    deviation * deviation
 }
 
 /// An angle in (-pi, pi]; the argument lies within three turns.

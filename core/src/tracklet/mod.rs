@@ -1,25 +1,45 @@
 //! Flow tracklets (section 3.6.2): a filter for every column that is seen to move with the flow.
 //!
-//! One step: every tracklet with a valid flow at its cell is predicted, gated and updated, and
-//! moves to the cell the flow leads to; a valid flow where there is no tracklet gives birth to one;
-//! tracklets without a valid flow, or beyond the gate, end. Flows never share a target
-//! (section 3.5.2.2), so no two tracklets can meet in a cell.
+//! A tracklet follows a place on a thing from cell to cell: the middle of the column it was born in,
+//! moved by every displacement since. One step: every tracklet whose cell was observed is predicted,
+//! gated and updated, and moves on; one whose cell was not takes over the nearest observed column
+//! beside it that no other has; an observed column without a tracklet gives birth to one; what is
+//! left waits for [`crate::params::TrackletParams::coast_sweeps`], then ends. Two tracklets that come
+//! to lie in one cell become the older of them.
 
 pub mod ekf;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile};
-use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
+use crate::record::{NONE, Step};
 use ekf::Ekf;
+use nalgebra::Matrix2;
 
 /// A flow tracklet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracklet {
-    /// Filter; positions from the centre of `column`, axes of the grid.
+    /// Filter; positions from the place it follows, axes of the grid.
     pub ekf: Ekf,
     /// Observations after birth.
     pub age: u32,
+    /// Sweeps since the last one.
+    pub missed: u32,
     /// Column of the window.
     pub column: u32,
+    /// The place it follows, from the column's corner, cells: 0 to 1.
+    pub place: [f32; 2],
+}
+
+/// How a column of the pair's first sweep moved.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation {
+    /// Column of the new window.
+    pub column: u32,
+    /// Displacement along the grid's axes, m.
+    pub moved: [f32; 2],
+    /// Its covariance (xx, xy, yy), m².
+    pub covariance: [f32; 3],
+    /// Index of its tracklet in [`Tracklets::all`] after the step, or [`NONE`].
+    pub slot: u32,
 }
 
 /// What happened to tracklets in a step.
@@ -31,45 +51,57 @@ pub struct Turnover {
     pub updated: u32,
     /// Ended by the gate.
     pub gated: u32,
-    /// Ended without a valid flow at their cell.
+    /// Waiting unobserved.
+    pub waiting: u32,
+    /// Ended for another one in the same cell.
+    pub merged: u32,
+    /// Ended unobserved.
     pub lost: u32,
     /// Ended because their cell left the window.
     pub left: u32,
 }
 
 /// Sweeps over which the first displacement of a tracklet at rest is taken to have happened, at
-/// most: what stood for long and starts is not slow.
+/// most: what stood for long and starts is not slow. Whole cells only: finer ones tell at once.
 const DEPARTURE_SWEEPS: u32 = 10;
 
-/// Predicts and updates a tracklet with a displacement, and puts it into its new cell. Returns
-/// whether it passed the gate.
+/// Predicts and updates a tracklet with a displacement. Returns whether it passed the gate.
 pub(crate) fn observe(
     t: &mut Tracklet,
     profile: &Profile,
-    r: f32,
     moved: [f32; 2],
+    covariance: [f32; 3],
     dt: f32,
 ) -> bool {
     let params = &profile.tracklet;
+    let noise = position_noise(covariance);
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
         // From the sweep before its birth to this one.
-        let elapsed = dt * (t.age + 2).min(DEPARTURE_SWEEPS) as f32;
-        let departed = t.ekf.depart(params, r, moved, elapsed, dt);
+        let sweeps = if profile.refinement_sweeps > 0 { 1 } else { t.age + 2 };
+        let elapsed = dt * sweeps.min(DEPARTURE_SWEEPS) as f32;
+        let departed = t.ekf.depart(params, noise, moved, elapsed, dt);
         t.ekf = departed.unwrap_or(t.ekf);
         return departed.is_some();
     }
     t.ekf.predict(params, dt);
-    let passed = t.ekf.update(params, r, moved);
+    let passed = t.ekf.update(params, noise, moved);
     t.ekf.mean[0] -= moved[0];
     t.ekf.mean[1] -= moved[1];
     passed
 }
 
-/// All tracklets: fixed capacity, one per foreground column at most.
+/// A displacement lies between two positions that err alike: half its covariance is each one's.
+fn position_noise([xx, xy, yy]: [f32; 3]) -> Matrix2<f32> {
+    Matrix2::new(xx, xy, xy, yy) * 0.5
+}
+
+/// All tracklets: fixed capacity; beyond it none are born.
 pub struct Tracklets {
     now: heapless::Vec<Tracklet, FOREGROUND_MAX>,
     next: heapless::Vec<Tracklet, FOREGROUND_MAX>,
     slot_of_column: [u32; COLUMNS_MAX],
+    observation_of_column: [u32; COLUMNS_MAX],
+    claimed: [bool; FOREGROUND_MAX],
 }
 
 impl Default for Tracklets {
@@ -85,6 +117,8 @@ impl Tracklets {
             now: heapless::Vec::new(),
             next: heapless::Vec::new(),
             slot_of_column: [NONE; COLUMNS_MAX],
+            observation_of_column: [NONE; COLUMNS_MAX],
+            claimed: [false; FOREGROUND_MAX],
         }
     }
 
@@ -93,82 +127,194 @@ impl Tracklets {
         &self.now
     }
 
+    /// The tracklet in a column of the new window, once placed there.
+    pub(crate) fn at(&self, column: usize) -> Option<&Tracklet> {
+        self.now.get(self.slot_of_column[column] as usize)
+    }
+
     /// Drops all.
     pub fn clear(&mut self) {
         self.now.clear();
     }
 
-    /// One step over `dt` seconds with the flows of `foreground` columns; `turned` is by how much
-    /// the grid's axes turned since the sweep before, rad. `slot_of_source`, one element per
-    /// foreground column, receives the index of its tracklet in [`Tracklets::all`] or [`NONE`].
-    pub fn update(
+    /// One step over `dt` seconds, after [`Tracklets::place`], with the observed columns, ascending;
+    /// `left` is what that returned, `turned` by how much the grid's axes turned since the sweep
+    /// before, rad.
+    pub(crate) fn update(
         &mut self,
         profile: &Profile,
         step: &Step,
         dt: f32,
         turned: f32,
-        foreground: &[u32],
-        state: &[Flow],
-        slot_of_source: &mut [u32],
+        left: u32,
+        observed: &mut [Observation],
     ) -> Turnover {
-        let mut turnover = Turnover::default();
-        let before = self.now.len() as u32;
-        turnover.left = self.place(step);
-        self.next.clear();
-        for (&column, slot) in foreground.iter().zip(slot_of_source) {
-            *slot = NONE;
-            let flow = state[column as usize];
-            if flow & VALID == 0 {
-                continue;
-            }
-            let cells = flow_displacement(flow);
-            let r = profile.voxel_m as f32;
-            let moved = cells.map(|c| c as f32 * r);
-            let known = self.slot_of_column[column as usize];
-            let (mut ekf, age) = if known == NONE {
-                turnover.born += 1;
-                (Ekf::birth(&profile.tracklet, r, moved, dt), 0)
-            } else {
-                let mut t = self.now[known as usize];
-                if !observe(&mut t, profile, r, moved, dt) {
-                    turnover.gated += 1;
-                    continue;
-                }
-                turnover.updated += 1;
-                (t.ekf, t.age + 1)
-            };
-            if profile.frame == Frame::Sensor {
-                ekf.turn_axes(turned);
-            }
-            let column = crate::flow::target(step, column, cells) as u32;
-            // As many as there are foreground columns at most: there is room.
-            if self.next.push(Tracklet { ekf, age, column }).is_ok() {
-                *slot = self.next.len() as u32 - 1;
+        let mut turnover = Turnover { left, ..Turnover::default() };
+        self.observation_of_column.fill(NONE);
+        self.claimed.fill(false);
+        for (n, o) in observed.iter_mut().enumerate() {
+            o.slot = self.slot_of_column[o.column as usize];
+            self.observation_of_column[o.column as usize] = n as u32;
+            if let Some(claimed) = self.claimed.get_mut(o.slot as usize) {
+                *claimed = true;
             }
         }
-        turnover.lost = before - turnover.left - turnover.updated - turnover.gated;
+        if profile.tracklet.takes_over {
+            self.take_over(step, observed);
+        }
+        self.next.clear();
+        // From here on that of the cells moved to.
+        self.slot_of_column.fill(NONE);
+        for o in observed {
+            let known = core::mem::replace(&mut o.slot, NONE);
+            let mut t = match self.now.get(known as usize) {
+                None => {
+                    turnover.born += 1;
+                    born(profile, o, dt)
+                }
+                Some(known) => {
+                    let mut t = *known;
+                    if observe(&mut t, profile, o.moved, o.covariance, dt) {
+                        turnover.updated += 1;
+                        Tracklet { age: t.age + 1, missed: 0, ..t }
+                    } else {
+                        turnover.gated += 1;
+                        if profile.tracklet.birth == Birth::Source {
+                            continue;
+                        }
+                        turnover.born += 1;
+                        born(profile, o, dt)
+                    }
+                }
+            };
+            if profile.frame == Frame::Sensor {
+                t.ekf.turn_axes(turned);
+            }
+            let by = o.moved.map(|v| v / profile.voxel_m as f32);
+            o.slot = self.put(step, o.column, by, t, &mut turnover);
+        }
+        self.wait(profile, step, dt, &mut turnover);
         core::mem::swap(&mut self.now, &mut self.next);
         turnover
     }
 
-    /// Finds the tracklets' columns in the new window. Returns how many are no longer in it.
-    pub(crate) fn at(&self, column: usize) -> Option<&Tracklet> {
-        self.now.get(self.slot_of_column[column] as usize)
+    /// Tracklets whose cell was not observed take the nearest column beside it that was.
+    fn take_over(&mut self, step: &Step, observed: &mut [Observation]) {
+        let side = step.side;
+        for (slot, t) in self.now.iter_mut().enumerate() {
+            if t.column == NONE || self.claimed[slot] {
+                continue;
+            }
+            let (i, j) = (t.column as i32 / side, t.column as i32 % side);
+            let mut best = (f32::INFINITY, NONE);
+            for (di, dj) in (-1..=1).flat_map(|a| (-1..=1).map(move |b| (a, b))) {
+                if !(0..side).contains(&(i + di)) || !(0..side).contains(&(j + dj)) {
+                    continue;
+                }
+                let n = self.observation_of_column[((i + di) * side + j + dj) as usize];
+                let free = observed.get(n as usize).is_some_and(|o| o.slot == NONE);
+                let [x, y] = [di as f32 + 0.5 - t.place[0], dj as f32 + 0.5 - t.place[1]];
+                if free && x * x + y * y < best.0 {
+                    best = (x * x + y * y, n);
+                }
+            }
+            if let Some(o) = observed.get_mut(best.1 as usize) {
+                o.slot = slot as u32;
+                self.claimed[slot] = true;
+                let by = [o.column as i32 / side - i, o.column as i32 % side - j];
+                // The nearest place of that column.
+                t.place = [0, 1].map(|a| (t.place[a] - by[a] as f32).clamp(0.0, INSIDE));
+            }
+        }
     }
 
+    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Returns its slot,
+    /// or that of the older one there.
+    fn put(
+        &mut self,
+        step: &Step,
+        column: u32,
+        by: [f32; 2],
+        t: Tracklet,
+        turnover: &mut Turnover,
+    ) -> u32 {
+        let side = step.side;
+        let from = [column as i32 / side, column as i32 % side];
+        let at: [f32; 2] = core::array::from_fn(|a| t.place[a] + by[a]);
+        let cells = at.map(|v| libm::floorf(v) as i32);
+        let [i, j] = [from[0] + cells[0], from[1] + cells[1]];
+        if !(0..side).contains(&i) || !(0..side).contains(&j) {
+            turnover.left += 1;
+            return NONE;
+        }
+        let column = (i * side + j) as u32;
+        let place = core::array::from_fn(|a| (at[a] - cells[a] as f32).clamp(0.0, INSIDE));
+        let t = Tracklet { column, place, ..t };
+        let there = self.slot_of_column[column as usize];
+        if let Some(other) = self.next.get_mut(there as usize) {
+            turnover.merged += 1;
+            if t.age > other.age {
+                *other = t;
+            }
+            return there;
+        }
+        if self.next.push(t).is_err() {
+            return NONE;
+        }
+        let slot = self.next.len() as u32 - 1;
+        self.slot_of_column[column as usize] = slot;
+        slot
+    }
+
+    /// Unobserved tracklets go on as predicted for a while, their covariance growing (5.2.2).
+    fn wait(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut Turnover) {
+        for slot in 0..self.now.len() {
+            let t = self.now[slot];
+            let waits = t.missed < profile.tracklet.coast_sweeps && t.age > t.missed;
+            if t.column == NONE || self.claimed[slot] {
+                continue;
+            }
+            if !waits {
+                turnover.lost += 1;
+                continue;
+            }
+            let mut t = Tracklet { missed: t.missed + 1, ..t };
+            t.ekf.predict(&profile.tracklet, dt);
+            let by = [t.ekf.mean[0], t.ekf.mean[1]];
+            t.ekf.mean[0] = 0.0;
+            t.ekf.mean[1] = 0.0;
+            turnover.waiting += 1;
+            let cells = by.map(|v| v / profile.voxel_m as f32);
+            self.put(step, t.column, cells, t, turnover);
+        }
+    }
+
+    /// Finds the tracklets' columns in the new window. Returns how many are no longer in it; those
+    /// have [`NONE`] for a column.
     pub(crate) fn place(&mut self, step: &Step) -> u32 {
         let side = step.side;
         self.slot_of_column.fill(NONE);
         let mut left = 0;
-        for (slot, t) in self.now.iter().enumerate() {
+        for (slot, t) in self.now.iter_mut().enumerate() {
             let i = t.column as i32 / side - step.shift_x;
             let j = t.column as i32 % side - step.shift_y;
+            t.column = NONE;
             if (0..side).contains(&i) && (0..side).contains(&j) {
-                self.slot_of_column[(i * side + j) as usize] = slot as u32;
+                t.column = (i * side + j) as u32;
+                self.slot_of_column[t.column as usize] = slot as u32;
             } else {
                 left += 1;
             }
         }
         left
     }
+}
+
+/// Largest place inside a cell: below 1.
+const INSIDE: f32 = 1.0 - f32::EPSILON;
+
+fn born(profile: &Profile, o: &Observation, dt: f32) -> Tracklet {
+    let noise = position_noise(o.covariance);
+    let ekf = Ekf::birth(&profile.tracklet, noise, o.moved, dt);
+    Tracklet { ekf, age: 0, missed: 0, column: o.column, place: [0.5; 2] }
 }
