@@ -169,7 +169,7 @@ impl Profile {
             smoothing: 1000,
             displacement_cost: 1,
             outside_cost: COST_UNKNOWN,
-            refinement_sweeps: 0,
+            refinement_sweeps: 3,
             tracklet: TrackletParams {
                 measurement_cells: 0.5,
                 speed_noise_mps2: 1.0,
@@ -178,7 +178,7 @@ impl Profile {
                 gate_d2: 9.2103,
                 birth: Birth::Target,
                 takes_over: true,
-                coast_sweeps: 0,
+                coast_sweeps: 2,
             },
             limits: Limits::DEFAULT,
         }
@@ -196,6 +196,7 @@ impl Profile {
             name: short("dissertation"),
             frame: Frame::Sensor,
             deskew: false,
+            refinement_sweeps: 0,
             // 14 log(p q + (1 - p)(1 - q)) with p, q at the clip bounds -1 and 3.
             outside_cost: 17_289,
             tracklet: TrackletParams {

@@ -132,6 +132,9 @@ pub fn perceive<'a>(
 /// Standard deviation of the displacement of what stands, m.
 const STILL_M: f32 = 0.02;
 
+/// Returns lower than this above the ground belong to it, voxels: 0.1 m at 0.30 m.
+const GROUND_VOXELS: f32 = 0.35;
+
 /// One sweep's side of a pair.
 #[derive(Clone, Copy, Debug)]
 struct Side {
@@ -184,6 +187,7 @@ pub struct Pipeline {
     tracklets: Tracklets,
     observed: heapless::Vec<Observation, FOREGROUND_MAX>,
     column_of_point: [[u32; POINTS_MAX]; 2],
+    is_ground: [[bool; POINTS_MAX]; 2],
     positions: [[f32; 3]; POINTS_MAX],
     refinement: Refinement,
     flow_of_column: [u32; COLUMNS_MAX],
@@ -213,6 +217,7 @@ impl Pipeline {
             tracklets: Tracklets::new(),
             observed: heapless::Vec::new(),
             column_of_point: [[NONE; POINTS_MAX]; 2],
+            is_ground: [[false; POINTS_MAX]; 2],
             positions: [[0.0; 3]; POINTS_MAX],
             refinement: Refinement::new(),
             flow_of_column: [NONE; COLUMNS_MAX],
@@ -245,6 +250,7 @@ impl Pipeline {
             self.lattice_origin = Some(window.lattice_origin);
         }
         self.column_of_point.swap(0, 1);
+        self.is_ground.swap(0, 1);
         let (count, dropped) = self.preparation.prepare(
             &self.profile,
             &self.rig,
@@ -265,6 +271,11 @@ impl Pipeline {
                 &self.positions[..taken],
                 &self.column_of_point[0][..taken],
             );
+            for n in 0..taken {
+                let (column, z) = (self.column_of_point[0][n], self.positions[n][2]);
+                self.is_ground[0][n] = column != NONE
+                    && self.refinement.above_ground(self.profile.side, column, z) < GROUND_VOXELS;
+            }
         }
         self.current = Some(Side {
             window,
@@ -342,7 +353,7 @@ impl Pipeline {
             turned,
             output.columns,
         );
-        self.flow_of_points(step, points, &ego, &output.columns[..count], output.points);
+        self.flow_of_points(step, points, &ego, &output.columns[..count], dt as f32, output.points);
         Some(Flows {
             columns: &output.columns[..count],
             points: &output.points[..before.points],
@@ -496,20 +507,32 @@ impl Pipeline {
         points: &[Point],
         ego: &EgoMotion,
         columns: &[ColumnFlow],
+        dt: f32,
         out: &mut [PointFlow],
     ) {
+        let refined = self.profile.refinement_sweeps > 0;
+        let r = self.profile.voxel_m as f32;
         let side = step.side;
-        for ((&column, point), out) in self.column_of_point[1].iter().zip(points).zip(out) {
+        let places = self.column_of_point[1].iter().zip(&self.is_ground[1]);
+        for (((&column, &is_ground), point), out) in places.zip(points).zip(out) {
             let i = (column / side as u32) as i32 - step.shift_x;
             let j = (column % side as u32) as i32 - step.shift_y;
             let seen = column != NONE && (0..side).contains(&i) && (0..side).contains(&j);
             let flow = if seen { self.flow_of_column[(i * side + j) as usize] } else { NONE };
             *out = PointFlow::default();
-            if let Some(flow) = columns.get(flow as usize) {
+            if let Some(flow) = columns.get(flow as usize).filter(|_| !is_ground) {
                 out.velocity_world_mps = flow.velocity_world_mps;
                 out.covariance = flow.covariance;
                 out.age = flow.age;
                 out.origin = flow.origin;
+            } else if refined && !is_ground && column != NONE {
+                // Its column is not solid, but part of a thing.
+                let at = [column / side as u32, column % side as u32].map(|c| c as f32 + 0.5);
+                if let Some((by, covariance)) = self.refinement.at(column, at) {
+                    out.velocity_world_mps = by.map(|v| v * r / dt);
+                    out.covariance = covariance.map(|v| v * (r / dt) * (r / dt));
+                    out.origin = Origin::Joined;
+                }
             }
             let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });
             out.velocity_ego_mps = ego.ego_from_world(DVec3::new(x, y, z), out.velocity_world_mps);

@@ -126,6 +126,11 @@ impl Sweeps<'_> {
                 != 0
     }
 
+    /// Misfit of a return of the first sweep, if it moved.
+    pub fn moving(&self, s: &Sample, motion: &Motion) -> f32 {
+        off(self.first, s, motion, &self.others[0])
+    }
+
     /// Misfit of a return of the first sweep, if it stood: nothing where it cannot be seen.
     pub fn standing(&self, s: &Sample) -> Option<f32> {
         let other = &self.others[0];

@@ -18,7 +18,7 @@ use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_M
 use crate::pipeline::Perceived;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
-use align::{Mean, Motion, Other, Sweeps, Thing, Visits};
+use align::{Mean, Motion, Other, Sample, Sweeps, Thing, Visits};
 use cloud::{Cloud, Ground};
 use segments::Segments;
 
@@ -37,11 +37,13 @@ const GAIN: f32 = 0.15;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
 /// Mean misfit of a column's returns from which on it may be part of something that moves.
-const RESTLESS: f32 = 0.25;
+const RESTLESS: f32 = 0.15;
 /// Returns of a column that are looked at for that.
 const PROBES: usize = 4;
 /// Returns a thing must have for a search: fewer fit anywhere.
 const SEARCHED: usize = 12;
+/// By how much more than standing still a motion may misfit a column beside those it was found for.
+const AS_WELL: f32 = 0.03;
 /// By how much more than standing still the motion of its larger part may misfit what is left of a
 /// thing.
 const REST: f32 = 0.05;
@@ -178,16 +180,23 @@ impl Refinement {
         let stands = |c: usize| stands_still(&self.segment, &self.found, c);
         self.segments.find(
             first,
-            |c| stands(c) && flow(c) & VALID != 0 && restless(sweeps, c),
+            |c| {
+                stands(c)
+                    && flow(c) & VALID != 0
+                    && misfit_of(sweeps, c, |s| sweeps.standing(s)) > RESTLESS
+            },
             |_| 0,
         );
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
-            if found.motion.is_some() {
+            if let Some(motion) = found.motion {
                 let (id, whole) = (self.found.len() as u32, self.segment[columns[0] as usize]);
                 columns.iter().for_each(|c| self.segment[*c as usize] = id);
+                for &c in columns {
+                    grow(sweeps, c as usize, &motion, whole, id, &mut self.segment);
+                }
                 let _ = self.found.push(Found { whole, ..found });
             }
         }
@@ -215,6 +224,19 @@ impl Refinement {
                 }
             }
         }
+    }
+
+    /// How a place in a column of the first sweep's window moved, if it is part of a thing that moves:
+    /// voxels, with its covariance.
+    pub(crate) fn at(&self, column: u32, at: [f32; 2]) -> Option<([f32; 2], [f32; 3])> {
+        let segment = *self.segment.get(column as usize)?;
+        let motion = self.found.get(segment as usize)?.motion?;
+        Some((motion.of(at), motion.covariance_of(at)))
+    }
+
+    /// Height above the ground of a return of the newest sweep, voxels.
+    pub(crate) fn above_ground(&self, side: u32, column: u32, z: f32) -> f32 {
+        self.ground.above(side as usize, column, z)
     }
 
     /// How a column of the new window moved, voxels, with its covariance; nothing where it stands or
@@ -305,14 +327,32 @@ fn stands_still(segment: &[u32], found: &[Found], column: usize) -> bool {
     found.get(segment[column] as usize).is_some_and(|f| f.motion.is_none())
 }
 
-/// Whether the returns of a column do not lie where they would if it stood.
-fn restless(sweeps: Sweeps, column: usize) -> bool {
+/// Takes columns beside one of a moving part along if their returns fit its motion as well as
+/// standing still.
+fn grow(sweeps: Sweeps, column: usize, motion: &Motion, whole: u32, id: u32, segment: &mut [u32]) {
+    let side = sweeps.first.side;
+    let (i, j) = (column / side, column % side);
+    for a in i.saturating_sub(1)..(i + 2).min(side) {
+        for b in j.saturating_sub(1)..(j + 2).min(side) {
+            let beside = a * side + b;
+            if segment[beside] == whole {
+                let moved = misfit_of(sweeps, beside, |s| Some(sweeps.moving(s, motion)));
+                if moved < misfit_of(sweeps, beside, |s| sweeps.standing(s)) + AS_WELL {
+                    segment[beside] = id;
+                }
+            }
+        }
+    }
+}
+
+/// Mean misfit of some returns of a column, 0 where it cannot be told.
+fn misfit_of(sweeps: Sweeps, column: usize, misfit: impl Fn(&Sample) -> Option<f32>) -> f32 {
     let returns = sweeps.first.column(column);
     let stride = returns.len().div_ceil(PROBES).max(1);
     let mut mean = Mean::default();
     let samples = returns.step_by(stride).map(|n| sweeps.first.sample(n));
-    samples.filter_map(|s| sweeps.standing(&s)).for_each(|m| mean.add(m));
-    mean.value() > RESTLESS
+    samples.filter_map(|s| misfit(&s)).for_each(|m| mean.add(m));
+    mean.value()
 }
 
 fn mean(of: impl Iterator<Item = [f32; 2]>) -> Option<[f32; 2]> {
