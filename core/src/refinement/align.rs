@@ -304,10 +304,12 @@ impl<'a> Thing<'a> {
         mean.value()
     }
 
-    /// The same if it stood, by what can be seen: 0 where nothing can.
-    pub fn standing(&self, visits: &mut Visits) -> f32 {
+    /// The same if it stood, by what can be seen, 0 where nothing can; and the share of its returns
+    /// that can be seen in the second sweep.
+    pub fn standing(&self, visits: &mut Visits) -> (f32, f32) {
         let mut mean = Mean::default();
         self.samples.iter().filter_map(|s| self.sweeps.standing(s)).for_each(|m| mean.add(m));
+        let seen = mean.count / self.samples.len().max(1) as f32;
         for other in &self.sweeps.others[1..] {
             let still = Motion::default();
             for s in &self.samples {
@@ -325,7 +327,7 @@ impl<'a> Thing<'a> {
                 mean.add(truncated(self.sweeps.others[0].cloud, q, at, found));
             }
         }
-        mean.value()
+        (mean.value(), seen)
     }
 
     fn stood(&self, q: &Sample) -> bool {

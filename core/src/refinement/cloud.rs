@@ -17,7 +17,7 @@ const GROUND_PASSES: usize = 3;
 /// Returns higher above the ground than this belong to things, voxels.
 pub const GROUND_HEIGHT: f32 = 0.7;
 /// By how much the ground may fall from one of its cells to the next, voxels: 10 %.
-const GROUND_FALL: f32 = 0.5;
+const GROUND_FALL: f32 = 0.2;
 /// Returns so near tell which way the surface faces, voxels.
 const AROUND: f32 = 1.5;
 /// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.

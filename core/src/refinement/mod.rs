@@ -40,6 +40,8 @@ const LEAST: f32 = 0.13;
 const RESTLESS: f32 = 0.15;
 /// Returns of a column that are looked at for that.
 const PROBES: usize = 4;
+/// Returns a thing must have to move by itself.
+const ENOUGH: usize = 5;
 /// Returns a thing must have for a search: fewer fit anywhere.
 const SEARCHED: usize = 12;
 /// By how much more than standing still a motion may misfit a column beside those it was found for.
@@ -47,6 +49,8 @@ const AS_WELL: f32 = 0.03;
 /// By how much more than standing still the motion of its larger part may misfit what is left of a
 /// thing.
 const REST: f32 = 0.05;
+/// Share of returns to be seen before standing still is believed.
+const SEEN: f32 = 0.5;
 /// Larger things stand, voxels: 30 m.
 const EXTENT_MAX: f32 = 100.0;
 /// How far a fragment may lie from a moving thing that takes it along, columns.
@@ -208,7 +212,7 @@ impl Refinement {
             if thing.extent > EXTENT_MAX {
                 continue;
             }
-            let still = thing.standing(&mut self.visits);
+            let (still, seen) = thing.standing(&mut self.visits);
             let whole = self.segment[columns[0] as usize];
             let mut best = 1.0;
             for m in &neighbours(side, columns, &self.segment, &self.found) {
@@ -217,7 +221,9 @@ impl Refinement {
                 let misfit = thing.misfit(&motion, &mut self.visits);
                 let rest =
                     found.whole == whole && found.extent > 0.5 * self.found[whole as usize].extent;
-                let joins = gain(still, misfit) > GAIN || rest && misfit < still + REST;
+                let hidden = seen < SEEN && misfit < UNFIT;
+                let joins =
+                    gain(still, misfit) > GAIN || hidden || rest && misfit < still + REST;
                 if joins && misfit < best {
                     best = misfit;
                     columns.iter().for_each(|c| self.segment[*c as usize] = *m);
@@ -283,7 +289,7 @@ fn motion(
 ) -> Found {
     let still = Motion::around(thing.centre);
     let mut found =
-        Found { still: thing.standing(visits), extent: thing.extent, ..Found::default() };
+        Found { still: thing.standing(visits).0, extent: thing.extent, ..Found::default() };
     if found.still < STANDS || thing.extent > EXTENT_MAX {
         return found;
     }
@@ -316,7 +322,7 @@ fn motion(
     }
     let (misfit, motion) = best;
     let by = motion.by.xy().norm();
-    if gain(found.still, misfit) > GAIN && by > LEAST {
+    if gain(found.still, misfit) > GAIN && by > LEAST && thing.samples.len() >= ENOUGH {
         found.motion = Some(motion);
     }
     found
