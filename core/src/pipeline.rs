@@ -132,9 +132,6 @@ pub fn perceive<'a>(
 /// Standard deviation of the displacement of what stands, m.
 const STILL_M: f32 = 0.02;
 
-/// Returns lower than this above the ground belong to it, voxels: 0.1 m at 0.30 m.
-const GROUND_VOXELS: f32 = 0.35;
-
 /// One sweep's side of a pair.
 #[derive(Clone, Copy, Debug)]
 struct Side {
@@ -187,7 +184,7 @@ pub struct Pipeline {
     tracklets: Tracklets,
     observed: heapless::Vec<Observation, FOREGROUND_MAX>,
     column_of_point: [[u32; POINTS_MAX]; 2],
-    is_ground: [[bool; POINTS_MAX]; 2],
+    is_apart: [[bool; POINTS_MAX]; 2],
     positions: [[f32; 3]; POINTS_MAX],
     refinement: Refinement,
     flow_of_column: [u32; COLUMNS_MAX],
@@ -217,7 +214,7 @@ impl Pipeline {
             tracklets: Tracklets::new(),
             observed: heapless::Vec::new(),
             column_of_point: [[NONE; POINTS_MAX]; 2],
-            is_ground: [[false; POINTS_MAX]; 2],
+            is_apart: [[false; POINTS_MAX]; 2],
             positions: [[0.0; 3]; POINTS_MAX],
             refinement: Refinement::new(),
             flow_of_column: [NONE; COLUMNS_MAX],
@@ -250,7 +247,7 @@ impl Pipeline {
             self.lattice_origin = Some(window.lattice_origin);
         }
         self.column_of_point.swap(0, 1);
-        self.is_ground.swap(0, 1);
+        self.is_apart.swap(0, 1);
         let (count, dropped) = self.preparation.prepare(
             &self.profile,
             &self.rig,
@@ -261,21 +258,8 @@ impl Pipeline {
             &mut self.positions,
             origins,
         );
-        let taken = sweep.points.len().min(POINTS_MAX);
         if self.profile.refinement_sweeps > 0 {
-            self.refinement.take(
-                &self.profile,
-                window.corner,
-                sweep.stamp_s,
-                &sweep.points[..taken],
-                &self.positions[..taken],
-                &self.column_of_point[0][..taken],
-            );
-            for n in 0..taken {
-                let (column, z) = (self.column_of_point[0][n], self.positions[n][2]);
-                self.is_ground[0][n] = column != NONE
-                    && self.refinement.above_ground(self.profile.side, column, z) < GROUND_VOXELS;
-            }
+            self.take(sweep, window.corner);
         }
         self.current = Some(Side {
             window,
@@ -305,6 +289,27 @@ impl Pipeline {
             ..step_of(&self.profile, count)
         };
         Prepared { step, dropped, reset }
+    }
+
+    /// Hands a sweep to the refinement. Things on slopes reach out of the window's levels: their
+    /// returns belong to its columns all the same.
+    fn take(&mut self, sweep: &Sweep, corner: [i32; 3]) {
+        let taken = sweep.points.len().min(POINTS_MAX);
+        let side = self.profile.side as f32;
+        let inside = |v: f32| v >= 0.0 && v < side;
+        let columns = &mut self.column_of_point[0][..taken];
+        for (column, [x, y, _]) in columns.iter_mut().zip(&self.positions) {
+            if *column == NONE && inside(*x) && inside(*y) {
+                *column = *x as u32 * self.profile.side + *y as u32;
+            }
+        }
+        let positions = &self.positions[..taken];
+        let points = &sweep.points[..taken];
+        self.refinement.take(&self.profile, corner, sweep.stamp_s, points, positions, columns);
+        for (n, &column) in columns.iter().enumerate() {
+            self.is_apart[0][n] =
+                column != NONE && self.refinement.is_apart(column, positions[n][2]);
+        }
     }
 
     /// Whether the sweep continues the one before.
@@ -513,19 +518,19 @@ impl Pipeline {
         let refined = self.profile.refinement_sweeps > 0;
         let r = self.profile.voxel_m as f32;
         let side = step.side;
-        let places = self.column_of_point[1].iter().zip(&self.is_ground[1]);
-        for (((&column, &is_ground), point), out) in places.zip(points).zip(out) {
+        let places = self.column_of_point[1].iter().zip(&self.is_apart[1]);
+        for (((&column, &is_apart), point), out) in places.zip(points).zip(out) {
             let i = (column / side as u32) as i32 - step.shift_x;
             let j = (column % side as u32) as i32 - step.shift_y;
             let seen = column != NONE && (0..side).contains(&i) && (0..side).contains(&j);
             let flow = if seen { self.flow_of_column[(i * side + j) as usize] } else { NONE };
             *out = PointFlow::default();
-            if let Some(flow) = columns.get(flow as usize).filter(|_| !is_ground) {
+            if let Some(flow) = columns.get(flow as usize).filter(|_| !is_apart) {
                 out.velocity_world_mps = flow.velocity_world_mps;
                 out.covariance = flow.covariance;
                 out.age = flow.age;
                 out.origin = flow.origin;
-            } else if refined && !is_ground && column != NONE {
+            } else if refined && !is_apart && column != NONE {
                 // Its column is not solid, but part of a thing.
                 let at = [column / side as u32, column % side as u32].map(|c| c as f32 + 0.5);
                 if let Some((by, covariance)) = self.refinement.at(column, at) {

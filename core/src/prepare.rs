@@ -190,6 +190,9 @@ impl Preparation {
         for (n, (point, column)) in sweep.points[..taken].iter().zip(columns.iter_mut()).enumerate()
         {
             *column = NONE;
+            if let Some(position) = positions.get_mut(n) {
+                *position = [f32::NAN; 3];
+            }
             let p = point.position;
             if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
                 dropped.not_finite += 1;
@@ -218,9 +221,9 @@ impl Preparation {
             let [i, j, k] = end.map(|v| v as u32);
             if i < side && j < side && k < levels && !own {
                 *column = i * side + j;
-                if let Some(position) = positions.get_mut(n) {
-                    *position = [0, 1, 2].map(|a| at[a] + centre_f[a]);
-                }
+            }
+            if let Some(position) = positions.get_mut(n).filter(|_| !own) {
+                *position = [0, 1, 2].map(|a| at[a] + centre_f[a]);
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
             count += 1;

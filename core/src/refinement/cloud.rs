@@ -1,7 +1,8 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
 use super::align::{NOISE, Sample, Weight};
-use crate::params::{CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
+use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
+use crate::prepare::central;
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
 use core::cell::Cell;
@@ -12,10 +13,18 @@ use nalgebra::Matrix3;
 const GROUND_CELL: usize = 5;
 /// Ground cells along an axis at most.
 const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
+/// How far below the vehicle's ground another may begin, voxels, and by how much it may fall from
+/// there: what lies lower is mirrored.
+const STEP: f32 = 1.5;
+const SLOPE: f32 = 0.1;
 /// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
 const GROUND_PASSES: usize = 3;
 /// Returns higher above the ground than this belong to things, voxels.
 pub const GROUND_HEIGHT: f32 = 0.7;
+/// Returns lower than this above the ground belong to it in any column, voxels.
+const GROUND_RETURN: f32 = 0.35;
+/// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
+const THING_HEIGHT: f32 = 14.0;
 /// By how much the ground may fall from one of its cells to the next, voxels: 10 %.
 const GROUND_FALL: f32 = 0.2;
 /// Returns so near tell which way the surface faces, voxels.
@@ -26,52 +35,70 @@ const THINNED: f32 = 3.0;
 const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
 
 /// Height of the ground, by cells of [`GROUND_CELL`] columns.
-pub struct Ground {
+struct Ground {
     side: usize,
-    lowest: [f32; GROUND_SIDE * GROUND_SIDE],
+    /// The three lowest returns of each.
+    lowest: [[f32; 3]; GROUND_SIDE * GROUND_SIDE],
     height: [f32; GROUND_SIDE * GROUND_SIDE],
+    followed: [f32; GROUND_SIDE * GROUND_SIDE],
 }
 
 impl Ground {
-    pub(super) const fn new() -> Ground {
+    const fn new() -> Ground {
         let none = [f32::INFINITY; GROUND_SIDE * GROUND_SIDE];
-        Ground { side: 0, lowest: none, height: none }
+        let lowest = [[f32::INFINITY; 3]; GROUND_SIDE * GROUND_SIDE];
+        Ground { side: 0, lowest, height: none, followed: none }
     }
 
     fn cell(&self, side: usize, column: usize) -> usize {
         column / side / GROUND_CELL * self.side + column % side / GROUND_CELL
     }
 
-    /// The lowest return of each cell, or of its neighbours if the ground falls that way.
-    fn estimate(&mut self, side: usize, positions: &[[f32; 3]], columns: &[u32]) {
+    /// The third-lowest return of each cell, or of its neighbours if the ground falls that way:
+    /// mirrored returns come from below, but seldom together.
+    fn estimate(&mut self, profile: &Profile, positions: &[[f32; 3]], columns: &[u32]) {
+        let side = profile.side as usize;
         self.side = side.div_ceil(GROUND_CELL);
-        self.lowest.fill(f32::INFINITY);
+        self.lowest.fill([f32::INFINITY; 3]);
+        let middle = central(profile).map(|c| c as f32 + 0.5);
+        let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
         for (p, &column) in positions.iter().zip(columns) {
-            if column != NONE {
-                let low = &mut self.lowest[self.cell(side, column as usize)];
-                *low = low.min(p[2]);
+            if column == NONE {
+                continue;
             }
+            let away = (p[0] - middle[0]).abs().max((p[1] - middle[1]).abs());
+            if p[2] < level - STEP - SLOPE * away {
+                continue;
+            }
+            let cell = self.cell(side, column as usize);
+            let mut z = p[2];
+            for low in &mut self.lowest[cell] {
+                (*low, z) = (low.min(z), low.max(z));
+            }
+        }
+        for (height, lowest) in self.height.iter_mut().zip(&self.lowest) {
+            *height = lowest[2];
         }
         let n = self.side;
         for _ in 0..GROUND_PASSES {
             for i in 0..n {
                 for j in 0..n {
-                    let mut height = self.lowest[i * n + j];
+                    let mut height = self.height[i * n + j];
                     for a in i.saturating_sub(1)..(i + 2).min(n) {
                         for b in j.saturating_sub(1)..(j + 2).min(n) {
-                            height = height.min(self.lowest[a * n + b] + GROUND_FALL);
+                            height = height.min(self.height[a * n + b] + GROUND_FALL);
                         }
                     }
-                    self.height[i * n + j] = height;
+                    self.followed[i * n + j] = height;
                 }
             }
-            core::mem::swap(&mut self.lowest, &mut self.height);
+            core::mem::swap(&mut self.height, &mut self.followed);
         }
     }
 
-    /// Height above the ground of a return in a column, voxels.
-    pub fn above(&self, side: usize, column: u32, z: f32) -> f32 {
-        z - self.lowest[self.cell(side, column as usize)]
+    /// Height above the ground of a place in a column, voxels.
+    fn above(&self, side: usize, column: usize, z: f32) -> f32 {
+        z - self.height[self.cell(side, column)]
     }
 }
 
@@ -92,11 +119,12 @@ pub struct Cloud {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
+    ground: Ground,
     points: heapless::Vec<Return, CLOUD_MAX>,
     start: [u32; COLUMNS_MAX + 1],
     /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
     weights: [Cell<Weight>; CLOUD_MAX],
-    /// Levels of each column in which something was hit.
+    /// Levels above the ground of each column in which something was hit, a bit each.
     levels: [u16; COLUMNS_MAX],
 }
 
@@ -106,6 +134,7 @@ impl Cloud {
             side: 0,
             corner: [0; 3],
             stamp_s: 0.0,
+            ground: Ground::new(),
             points: heapless::Vec::new(),
             start: [0; COLUMNS_MAX + 1],
             weights: [const { Cell::new([f32::NAN; 6]) }; CLOUD_MAX],
@@ -118,7 +147,6 @@ impl Cloud {
     pub(super) fn fill(
         &mut self,
         profile: &Profile,
-        ground: &mut Ground,
         points: &[Point],
         positions: &[[f32; 3]],
         columns: &[u32],
@@ -126,10 +154,11 @@ impl Cloud {
     ) -> usize {
         let side = profile.side as usize;
         self.side = side;
-        ground.estimate(side, positions, columns);
-        let is_thing = |n: usize| {
-            columns[n] != NONE && ground.above(side, columns[n], positions[n][2]) > GROUND_HEIGHT
-        };
+        self.ground.estimate(profile, positions, columns);
+        let ground = &self.ground;
+        let height = |n: usize| ground.above(side, columns[n] as usize, positions[n][2]);
+        let is_thing =
+            |n: usize| columns[n] != NONE && (GROUND_HEIGHT..THING_HEIGHT).contains(&height(n));
         // A counting sort keeps the source's order within a column.
         let columns_used = side * side;
         let start = &mut self.start[..columns_used + 1];
@@ -167,12 +196,12 @@ impl Cloud {
                     }
                     let p = positions[n as usize];
                     let part = |v: f32| (v * THINNED).clamp(0.0, THINNED - 1.0) as usize;
-                    let level = (p[2] * THINNED) as usize;
+                    let level = (height(n as usize) * THINNED) as usize;
                     let bit = (level * 3 + part(p[0] - corner[0])) * 3 + part(p[1] - corner[1]);
                     let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
                     if *word & 1 << (bit % 32) == 0 {
                         *word |= 1 << (bit % 32);
-                        self.levels[c] |= 1 << (p[2] as u32).min(LEVELS_MAX as u32 - 1);
+                        self.levels[c] |= 1 << height(n as usize) as u32;
                         dropped += self.points.push(Return { at: p, sensor }).is_err() as usize;
                     }
                 }
@@ -192,10 +221,18 @@ impl Cloud {
     pub fn is_hit(&self, at: [f32; 3]) -> bool {
         let side = self.side as f32;
         let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
-        let in_levels = at[2] >= 0.0 && at[2] < LEVELS_MAX as f32;
-        inside
-            && in_levels
-            && self.levels[at[0] as usize * self.side + at[1] as usize] >> at[2] as u32 & 1 != 0
+        if !inside {
+            return false;
+        }
+        let column = at[0] as usize * self.side + at[1] as usize;
+        let height = self.ground.above(self.side, column, at[2]);
+        (0.0..LEVELS_MAX as f32).contains(&height) && self.levels[column] >> height as u32 & 1 != 0
+    }
+
+    /// Whether a return in a column is of the ground, or higher than things are.
+    pub fn is_apart(&self, column: u32, z: f32) -> bool {
+        let height = self.ground.above(self.side, column as usize, z);
+        !(GROUND_RETURN..THING_HEIGHT).contains(&height)
     }
 
     /// Indices of the thinned returns in a column.

@@ -19,7 +19,7 @@ use crate::pipeline::Perceived;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
 use align::{Mean, Motion, Other, Sample, Sweeps, Thing, Visits};
-use cloud::{Cloud, Ground};
+use cloud::Cloud;
 use segments::Segments;
 
 /// Displacements that many columns found, tried as starts.
@@ -78,7 +78,6 @@ struct Found {
 
 /// Its state between sweeps.
 pub struct Refinement {
-    ground: Ground,
     clouds: [Cloud; REFINEMENT_SWEEPS_MAX],
     /// Sweeps held in `clouds`.
     held: usize,
@@ -100,7 +99,6 @@ fn index(newest: usize, age: usize) -> usize {
 impl Refinement {
     pub(crate) const fn new() -> Refinement {
         Refinement {
-            ground: Ground::new(),
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             held: 0,
             newest: 0,
@@ -133,7 +131,7 @@ impl Refinement {
         let cloud = &mut self.clouds[self.newest];
         cloud.corner = corner;
         cloud.stamp_s = stamp_s;
-        cloud.fill(profile, &mut self.ground, points, positions, columns, &mut self.order)
+        cloud.fill(profile, points, positions, columns, &mut self.order)
     }
 
     /// Motion of the things of the pair's first sweep. `state` is the flow of the columns of the new
@@ -222,8 +220,7 @@ impl Refinement {
                 let rest =
                     found.whole == whole && found.extent > 0.5 * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;
-                let joins =
-                    gain(still, misfit) > GAIN || hidden || rest && misfit < still + REST;
+                let joins = gain(still, misfit) > GAIN || hidden || rest && misfit < still + REST;
                 if joins && misfit < best {
                     best = misfit;
                     columns.iter().for_each(|c| self.segment[*c as usize] = *m);
@@ -240,9 +237,9 @@ impl Refinement {
         Some((motion.of(at), motion.covariance_of(at)))
     }
 
-    /// Height above the ground of a return of the newest sweep, voxels.
-    pub(crate) fn above_ground(&self, side: u32, column: u32, z: f32) -> f32 {
-        self.ground.above(side as usize, column, z)
+    /// Whether a return of the newest sweep is of the ground, or higher than things are.
+    pub(crate) fn is_apart(&self, column: u32, z: f32) -> bool {
+        self.clouds[self.newest].is_apart(column, z)
     }
 
     /// How a column of the new window moved, voxels, with its covariance; nothing where it stands or
