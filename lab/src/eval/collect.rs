@@ -1,9 +1,11 @@
 //! From a pair of sweeps to rows: every solid column beside its truth.
 
+use super::exact::owners;
 use super::objects::{Objects, Present};
 use super::row::{Row, class_of};
 use crate::grid::Grid;
 use crate::labels::{Motion, View};
+use crate::simulate::truth::PointTruth;
 use glam::DVec3;
 use raywake::engine::Pair;
 use raywake::source::SweepData;
@@ -12,7 +14,7 @@ use raywake_core::grid::shift::shift;
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
-use raywake_core::prepare::place;
+use raywake_core::prepare::{Window, place};
 use raywake_core::record::{Column, Step};
 use raywake_core::sweep::Rig;
 
@@ -93,9 +95,12 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
-    /// Rows of the first sweep's solid columns.
-    pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
+    /// Rows of the first sweep's solid columns. They belong to what their returns hit where there is
+    /// exact truth of these, else to the box that their centre lies in.
+    pub fn rows(&mut self, seen: &Seen, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
+        let columns = self.grid.columns.len();
+        let owners = exact.map(|returns| owners(&self.grid.of_point, returns, columns));
         let next = place(&self.profile, &self.rig, &seen.then, Some(window.lattice_origin));
         let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|a| next.corner[a] - window.corner[a]);
         let step = Step { shift_x, shift_y, shift_z, ..self.grid.step };
@@ -103,11 +108,21 @@ impl<'a> Collector<'a> {
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
         for flow in &seen.columns {
-            let [i, j] = [0, 1].map(|n| flow.cell[n] - next.corner[n]);
-            let column = (i * step.side + j) as usize;
+            let column = |window: &Window| {
+                let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
+                (i * step.side + j) as usize
+            };
+            let owner = match &owners {
+                Some(owners) => {
+                    let id = Some(owners[column(&window)]);
+                    present.iter().find(|p| p.id == id)
+                }
+                None => present.iter().find(|p| p.footprint.holds(flat(flow), self.margin_m)),
+            };
+            let column = column(&next);
             let occupied = self.before[column][0] >> 16;
             let score = score(&step, &self.filter, &self.before, column);
-            rows.push(self.row(seen, flow, present, occupied.count_ones() as u8, score));
+            rows.push(self.row(seen, flow, owner, occupied.count_ones() as u8, score));
         }
         rows
     }
@@ -116,13 +131,11 @@ impl<'a> Collector<'a> {
         &self,
         seen: &Seen,
         flow: &ColumnFlow,
-        present: &[Present],
+        object: Option<&Present>,
         voxels: u8,
         score: i32,
     ) -> Row {
-        let [x, y] = flow.position_vehicle_m;
-        let flat = DVec3::new(f64::from(x), f64::from(y), 0.0);
-        let object = present.iter().find(|p| p.footprint.holds(flat, self.margin_m));
+        let ([x, y], flat) = (flow.position_vehicle_m, flat(flow));
         // Flow is planar; the height matters where the vehicle nods, a little.
         let at = DVec3::new(
             flat.x,
@@ -191,6 +204,12 @@ impl<'a> Collector<'a> {
             Frame::Sensor => seen.then.inverse().transform(seen.now().transform(at) + by) - at,
         }
     }
+}
+
+/// Centre of a column on the plane of the vehicle frame, m.
+fn flat(flow: &ColumnFlow) -> DVec3 {
+    let [x, y] = flow.position_vehicle_m.map(f64::from);
+    DVec3::new(x, y, 0.0)
 }
 
 /// As [`Row::motion`] has it.
