@@ -220,3 +220,81 @@ fn motion(motion: Motion) -> u8 {
         Motion::Moving => 2,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::row::CLASSES;
+    use crate::labels::{Kind, Labels, Track};
+    use raywake::source::Source;
+    use raywake::source::simulated::Simulated;
+    use raywake_core::background_filter::TABLE;
+    use raywake_core::output::Origin;
+    use raywake_core::sweep::Point;
+    use raywake_sim::Class;
+
+    /// A truck of 8 m that goes 0.6 m on, and returns within its footprint and beside it.
+    #[test]
+    fn what_is_seen_beneath_a_truck_is_not_the_truck() {
+        let source = Simulated::new(1, 2);
+        let [now, then] = [0, 1].map(|n| source.pose(n));
+        let ahead = now.rotation * DVec3::new(0.6, 0.0, 0.0);
+        let truck = Pose { translation: DVec3::new(12.0, 4.0, 0.3), ..Pose::IDENTITY };
+        let moved = now * truck;
+        let moved = then.inverse() * Pose { translation: moved.translation + ahead, ..moved };
+        let track = Track {
+            id: "7".into(),
+            class: "Truck".into(),
+            kind: Kind::Truck,
+            size: [8.0, 2.4, 3.2],
+            boxes: [(0, truck), (1, moved)].into(),
+        };
+        let (tracks, notes) = (vec![track], Vec::new());
+        let objects =
+            Objects::new(&Labels { tracks, view: View::All, exact: true, notes }, &source);
+        let seen = [
+            ([12.0, 4.0, -1.6], 0, Class::Ground),
+            ([10.0, 3.2, 0.2], 7, Class::Truck),
+            ([14.0, 4.8, -1.0], 0, Class::Fixture),
+            ([11.0, -4.0, -1.0], 0, Class::Pole),
+        ];
+        let truth = seen.map(|(_, object, class)| PointTruth {
+            offset_s: 0.0,
+            sensor: 0,
+            object,
+            class,
+            flow: [0.0; 3],
+        });
+        let points = seen.map(|(position, ..)| Point { position, ..Point::default() }).to_vec();
+        let first = SweepData { points, world_from_vehicle: now, ..SweepData::default() };
+        let profile = Profile::hdl64();
+        let filter = vec![0; TABLE + 1];
+        let rig = source.rig().clone();
+        let mut collector =
+            Collector::new(profile, rig.clone(), now, filter, &objects, View::All, 0.0);
+        let window = collector.grid.sweep(&rig, &first.sweep());
+        let column = |n: usize| {
+            let column = collector.grid.of_point[n] as i32;
+            let side = collector.grid.step.side;
+            let at = collector.grid.centre(&window, column as usize);
+            ColumnFlow {
+                cell: [column / side + window.corner[0], column % side + window.corner[1]],
+                position_vehicle_m: [at.x as f32, at.y as f32],
+                origin: Origin::Unmatched,
+                ..ColumnFlow::default()
+            }
+        };
+        let columns = (0..4).map(column).collect();
+        let seen = Seen { index: 0, first, then, dt_s: 0.1, columns, points: Vec::new() };
+        let classes =
+            |rows: &[Row]| rows.iter().map(|r| CLASSES[r.class as usize]).collect::<Vec<_>>();
+        let rows = collector.rows(&seen, Some(&truth));
+        assert_eq!(classes(&rows), ["Background", "Truck", "Background", "Background"]);
+        let motion: Vec<_> = rows.iter().map(|r| (r.motion, r.true_x.hypot(r.true_y))).collect();
+        assert!(motion[1].0 == 2 && (motion[1].1 - 0.6).abs() < 1e-4, "{motion:?}");
+        assert!([0, 2, 3].iter().all(|&n| motion[n] == (0, 0.0)), "{motion:?}");
+        // By the boxes alone.
+        let rows = collector.rows(&seen, None);
+        assert_eq!(classes(&rows), ["Truck", "Truck", "Truck", "Background"]);
+    }
+}
