@@ -228,7 +228,7 @@ mod tests {
     use crate::labels::{Kind, Labels, Track};
     use raywake::source::Source;
     use raywake::source::simulated::Simulated;
-    use raywake_core::background_filter::TABLE;
+    use raywake_core::background_filter::TABLE_WORDS;
     use raywake_core::output::Origin;
     use raywake_core::sweep::Point;
     use raywake_sim::Class;
@@ -268,7 +268,7 @@ mod tests {
         let points = seen.map(|(position, ..)| Point { position, ..Point::default() }).to_vec();
         let first = SweepData { points, world_from_vehicle: now, ..SweepData::default() };
         let profile = Profile::hdl64();
-        let filter = vec![0; TABLE + 1];
+        let filter = vec![0; TABLE_WORDS];
         let rig = source.rig().clone();
         let mut collector =
             Collector::new(profile, rig.clone(), now, filter, &objects, View::All, 0.0);
@@ -291,7 +291,8 @@ mod tests {
         let rows = collector.rows(&seen, Some(&truth));
         assert_eq!(classes(&rows), ["Background", "Truck", "Background", "Background"]);
         let motion: Vec<_> = rows.iter().map(|r| (r.motion, r.true_x.hypot(r.true_y))).collect();
-        assert!(motion[1].0 == 2 && (motion[1].1 - 0.6).abs() < 1e-4, "{motion:?}");
+        // The street slopes a little.
+        assert!(motion[1].0 == 2 && (motion[1].1 - 0.6).abs() < 1e-3, "{motion:?}");
         assert!([0, 2, 3].iter().all(|&n| motion[n] == (0, 0.0)), "{motion:?}");
         // By the boxes alone.
         let rows = collector.rows(&seen, None);
