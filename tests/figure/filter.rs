@@ -41,7 +41,7 @@ fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
 #[test]
 fn where_nothing_may_move_all_flow_is_odometry() {
     for profile in [Profile::hdl64(), Profile::dissertation()] {
-        let all = run(&profile, Some(weights::closed_filter(14)), 4);
+        let all = run(&profile, Some(weights::closed_filter(14)), 6);
         for (pair, stages) in street().windows(2).zip(&all[1..]) {
             let [before, next] = pair else { unreachable!("pairs") };
             assert!(before.twist.linear.length() > 4.0, "the vehicle moves");
@@ -49,7 +49,7 @@ fn where_nothing_may_move_all_flow_is_odometry() {
             assert!(stages.tracklets.is_empty() && stages.words("compact").is_empty());
             check_odometry(before, next, stages);
         }
-        assert!(street()[3].twist.angular.length() > 0.3, "and turns");
+        assert!(street()[5].twist.angular.z > 0.1, "and turns");
     }
 }
 

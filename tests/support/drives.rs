@@ -71,7 +71,7 @@ pub fn pairs(sweeps: &[SimSweep]) -> impl Iterator<Item = (&SimSweep, Option<&Si
     sweeps.iter().zip(before)
 }
 
-/// A busy street: ten sweeps, turning left from the third on.
+/// A busy street: ten sweeps, from the third on turning left more and more.
 pub fn street() -> &'static [SimSweep] {
     static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
     SWEEPS.get_or_init(|| {

@@ -111,7 +111,8 @@ impl Drive {
         foot * Pose::new(nod * roll, self.options.rig.origin)
     }
 
-    fn twist(&self, t: f64) -> Twist {
+    /// Velocity of the vehicle at a time, s, in its frame.
+    pub fn twist(&self, t: f64) -> Twist {
         const STEP_S: f64 = 1e-3;
         let here = self.street_from_vehicle(t).inverse();
         let [back, on] =

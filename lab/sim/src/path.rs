@@ -1,4 +1,5 @@
-//! Planar motion in closed form: legs of constant acceleration and constant curvature.
+//! Planar motion, leg by leg: acceleration and curvature are constant or change evenly, the one with
+//! time, the other along the way (clothoids, by which real vehicles enter a bend).
 
 /// Where something is and how it moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,13 +14,35 @@ pub struct State {
     pub speed: f64,
 }
 
+/// What a leg does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Course {
+    /// At its start, m/s^2.
+    acceleration: f64,
+    /// m/s^3.
+    jerk: f64,
+    /// At its start, 1/m, left positive.
+    curvature: f64,
+    /// Change of curvature along the way, 1/m^2.
+    sharpness: f64,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Leg {
     start_s: f64,
     from: State,
-    acceleration: f64,
-    curvature: f64,
+    course: Course,
 }
+
+/// Places and weights of Gauss and Legendre's quadrature over 0 to 1: better than a micrometre where
+/// a clothoid turns by less than a right angle.
+const QUADRATURE: [[f64; 2]; 5] = [
+    [0.046_910_077_030_668, 0.118_463_442_528_095],
+    [0.230_765_344_947_158, 0.239_314_335_249_683],
+    [0.5, 0.284_444_444_444_444],
+    [0.769_234_655_052_842, 0.239_314_335_249_683],
+    [0.953_089_922_969_332, 0.118_463_442_528_095],
+];
 
 /// A motion for all times: the first leg reaches back without end, and after the last leg it goes
 /// straight on at constant speed.
@@ -31,17 +54,26 @@ pub struct Path {
 impl Leg {
     fn at(&self, t: f64) -> State {
         let dt = t - self.start_s;
-        let along = self.from.speed * dt + 0.5 * self.acceleration * dt * dt;
-        let turned = self.curvature * along;
-        // Chord of the arc: sin(a/2)/(a/2) long, half way between the headings.
-        let half = 0.5 * turned;
-        let chord = if half.abs() < 1e-9 { along } else { along * half.sin() / half };
-        let (s, c) = (self.from.yaw + half).sin_cos();
+        let Course { acceleration, jerk, curvature, sharpness } = self.course;
+        let along = self.from.speed * dt + 0.5 * acceleration * dt * dt + jerk * dt * dt * dt / 6.0;
+        let heading = |along: f64| curvature * along + 0.5 * sharpness * along * along;
+        let (dx, dy) = if sharpness == 0.0 {
+            // Chord of the arc: sin(a/2)/(a/2) long, half way between the headings.
+            let half = 0.5 * heading(along);
+            let chord = if half.abs() < 1e-9 { along } else { along * half.sin() / half };
+            let (s, c) = (self.from.yaw + half).sin_cos();
+            (chord * c, chord * s)
+        } else {
+            QUADRATURE.iter().fold((0.0, 0.0), |(x, y), [at, weight]| {
+                let (s, c) = (self.from.yaw + heading(at * along)).sin_cos();
+                (x + weight * along * c, y + weight * along * s)
+            })
+        };
         State {
-            x: self.from.x + chord * c,
-            y: self.from.y + chord * s,
-            yaw: self.from.yaw + turned,
-            speed: self.from.speed + self.acceleration * dt,
+            x: self.from.x + dx,
+            y: self.from.y + dy,
+            yaw: self.from.yaw + heading(along),
+            speed: self.from.speed + acceleration * dt + 0.5 * jerk * dt * dt,
         }
     }
 }
@@ -54,7 +86,7 @@ impl Path {
 
     /// Straight on for ever, from this state at a time, s.
     pub fn starting(start_s: f64, state: State) -> Path {
-        Path { legs: vec![Leg { start_s, from: state, acceleration: 0.0, curvature: 0.0 }] }
+        Path { legs: vec![Leg { start_s, from: state, course: Course::default() }] }
     }
 
     /// Standing still at this place.
@@ -64,13 +96,17 @@ impl Path {
 
     /// Appends a leg of this duration (s), acceleration (m/s^2) and curvature (1/m, left
     /// positive).
-    pub fn then(mut self, duration: f64, acceleration: f64, curvature: f64) -> Path {
+    pub fn then(self, duration: f64, acceleration: f64, curvature: f64) -> Path {
+        self.follow(duration, Course { acceleration, curvature, ..Course::default() })
+    }
+
+    /// Appends a leg of this duration, s.
+    fn follow(mut self, duration: f64, course: Course) -> Path {
         if let Some(leg) = self.legs.last_mut() {
-            leg.acceleration = acceleration;
-            leg.curvature = curvature;
+            leg.course = course;
             let start_s = leg.start_s + duration;
             let from = leg.at(start_s);
-            self.legs.push(Leg { start_s, from, acceleration: 0.0, curvature: 0.0 });
+            self.legs.push(Leg { start_s, from, course: Course::default() });
         }
         self
     }
@@ -78,12 +114,28 @@ impl Path {
     /// Appends a leg along which the speed changes to `speed` (m/s) at `rate` (m/s^2 > 0).
     pub fn then_to_speed(self, speed: f64, rate: f64) -> Path {
         let change = speed - self.end().speed;
-        let mut path = self.then(change.abs() / rate, rate.copysign(change), 0.0);
-        // Free of rounding, so that a stop is a stop.
-        if let Some(leg) = path.legs.last_mut() {
+        self.then(change.abs() / rate, rate.copysign(change), 0.0).at_speed(speed)
+    }
+
+    /// The same, with the acceleration growing to `rate` and fading again over `ease_s` each, > 0.
+    /// The speed must change.
+    pub fn then_ease_to_speed(self, speed: f64, rate: f64, ease_s: f64) -> Path {
+        let change = speed - self.end().speed;
+        let (time, rate) = (change.abs() / rate, rate.copysign(change));
+        let ease_s = ease_s.min(time);
+        let jerk = rate / ease_s;
+        self.follow(ease_s, Course { jerk, ..Course::default() })
+            .then(time - ease_s, rate, 0.0)
+            .follow(ease_s, Course { acceleration: rate, jerk: -jerk, ..Course::default() })
+            .at_speed(speed)
+    }
+
+    /// Rids the speed at the end of rounding, so that a stop is a stop.
+    fn at_speed(mut self, speed: f64) -> Path {
+        if let Some(leg) = self.legs.last_mut() {
             leg.from.speed = speed;
         }
-        path
+        self
     }
 
     /// Appends a turn by `angle` (rad, left positive) of this radius (m) at constant speed, which
@@ -91,6 +143,22 @@ impl Path {
     pub fn then_turn(self, angle: f64, radius: f64) -> Path {
         let speed = self.end().speed;
         self.then(angle.abs() * radius / speed, 0.0, 1.0f64.copysign(angle) / radius)
+    }
+
+    /// The same, with the curvature growing to that of the radius and fading again over `ease_s`
+    /// each, > 0.
+    pub fn then_ease_turn(self, angle: f64, radius: f64, ease_s: f64) -> Path {
+        let speed = self.end().speed;
+        let whole_m = angle.abs() * radius;
+        let ease_m = (speed * ease_s).min(whole_m);
+        let curvature = 1.0f64.copysign(angle) / radius;
+        let sharpness = curvature / ease_m;
+        self.follow(ease_m / speed, Course { sharpness, ..Course::default() })
+            .then((whole_m - ease_m) / speed, 0.0, curvature)
+            .follow(
+                ease_m / speed,
+                Course { curvature, sharpness: -sharpness, ..Course::default() },
+            )
     }
 
     /// Appends a change of lane by `aside` (m, left positive) over `length` (m) of road at constant
@@ -123,7 +191,8 @@ impl Path {
 
     /// Whether it never moves.
     pub fn is_still(&self) -> bool {
-        self.legs.iter().all(|leg| leg.from.speed == 0.0 && leg.acceleration == 0.0)
+        let rests = |c: &Course| c.acceleration == 0.0 && c.jerk == 0.0;
+        self.legs.iter().all(|leg| leg.from.speed == 0.0 && rests(&leg.course))
     }
 }
 
@@ -156,15 +225,73 @@ mod tests {
         assert!(end.yaw.abs() < 1e-12 && end.speed == 12.0);
     }
 
+    /// That heading and speed are the derivative of the place at a time.
+    fn check_derivative(path: &Path, t: f64) {
+        let h = 1e-5;
+        let (a, b, m) = (path.at(t - h), path.at(t + h), path.at(t));
+        let (vx, vy) = ((b.x - a.x) / (2.0 * h), (b.y - a.y) / (2.0 * h));
+        assert!((vx - m.speed * m.yaw.cos()).abs() < 1e-7, "{t}: {vx}, {m:?}");
+        assert!((vy - m.speed * m.yaw.sin()).abs() < 1e-7, "{t}: {vy}, {m:?}");
+    }
+
     #[test]
     fn heading_and_speed_are_the_derivative() {
         let start = State { speed: 6.0, ..State::default() };
         let path = Path::from(start).then(4.0, 1.0, -0.05);
+        check_derivative(&path, 2.3);
         let (h, t) = (1e-5, 2.3);
-        let (a, b, m) = (path.at(t - h), path.at(t + h), path.at(t));
-        let (vx, vy) = ((b.x - a.x) / (2.0 * h), (b.y - a.y) / (2.0 * h));
-        assert!((vx - m.speed * m.yaw.cos()).abs() < 1e-8);
-        assert!((vy - m.speed * m.yaw.sin()).abs() < 1e-8);
-        assert!(((b.yaw - a.yaw) / (2.0 * h) + 0.05 * m.speed).abs() < 1e-8);
+        let turned = (path.at(t + h).yaw - path.at(t - h).yaw) / (2.0 * h);
+        assert!((turned + 0.05 * path.at(t).speed).abs() < 1e-8);
+    }
+
+    /// Acceleration and turn rate at a time, m/s^2 and rad/s.
+    fn rates(path: &Path, t: f64) -> [f64; 2] {
+        let h = 1e-4;
+        let [a, b] = [path.at(t - h), path.at(t + h)];
+        [(b.speed - a.speed) / (2.0 * h), (b.yaw - a.yaw) / (2.0 * h)]
+    }
+
+    #[test]
+    fn eased_motion_has_no_jolts() {
+        let start = State { speed: 6.0, ..State::default() };
+        let path = Path::from(start)
+            .then(0.5, 0.0, 0.0)
+            .then_ease_turn(-FRAC_PI_2, 8.0, 1.0)
+            .then_ease_to_speed(0.0, 3.0, 0.5)
+            .then(1.0, 0.0, 0.0)
+            .then_ease_to_speed(6.0, 2.0, 0.5);
+        let times: Vec<f64> = (0..900).map(|i| 0.01 * f64::from(i)).collect();
+        let (mut most, mut before) = ([0.0f64; 2], [0.0; 2]);
+        for &t in &times {
+            check_derivative(&path, t);
+            let now = rates(&path, t);
+            // 3 m/s^2 grow in half a second, 6 m/s on 8 m in one second.
+            for (n, limit) in [6.0, 0.75].into_iter().enumerate() {
+                assert!((now[n] - before[n]).abs() < 1.01 * limit * 0.01, "{t}: {now:?}");
+                most[n] = most[n].max(now[n].abs());
+            }
+            before = now;
+        }
+        assert!((most[0] - 3.0).abs() < 1e-6 && (most[1] - 0.75).abs() < 1e-6, "{most:?}");
+        let end = path.end();
+        assert!((end.yaw + FRAC_PI_2).abs() < 1e-12 && end.speed == 6.0);
+        // Braking at 3 m/s^2 takes 2 s and half a second more, the turn 1 s more than its arc.
+        let stopped = 0.5 + (8.0 * FRAC_PI_2) / 6.0 + 1.0 + 2.5;
+        assert_eq!((path.at(stopped).speed, path.at(stopped + 0.9).speed), (0.0, 0.0));
+        assert!(path.at(stopped - 0.1).speed > 0.0 && path.at(stopped + 1.1).speed > 0.0);
+        assert!(!path.is_still());
+    }
+
+    #[test]
+    fn short_changes_are_eased_all_the_way() {
+        let start = State { speed: 10.0, ..State::default() };
+        let turned = Path::from(start).then_ease_turn(0.2, 20.0, 1.0).end();
+        assert!((turned.yaw - 0.2).abs() < 1e-12);
+        // Curvature grows and fades over 4 m each: half of the turn lies to either side.
+        let half = Path::from(start).then_ease_turn(0.2, 20.0, 1.0).at(0.4);
+        assert!((half.yaw - 0.1).abs() < 1e-12);
+        let slower = Path::from(start).then_ease_to_speed(9.5, 2.0, 1.0);
+        assert_eq!(slower.end().speed, 9.5);
+        assert!((slower.at(0.25).speed - 9.75).abs() < 1e-12);
     }
 }

@@ -95,6 +95,30 @@ fn rig_and_time() {
 }
 
 #[test]
+fn the_twist_at_the_stamp_stands_for_the_sweep() {
+    let egos = [true, false].map(|left| Ego::Turn { left, speed: 6.0 });
+    for ego in egos.into_iter().chain([Ego::StopAndGo { speed: 10.0 }]) {
+        let drive = Drive::new(7, Options { density: 0.0, ..options(ego, 100) });
+        let mut turned = 0.0f64;
+        for n in 0..drive.sweeps() {
+            let stamp_s = raywake_sim::stamp_s(n);
+            let at = |s: f64| drive.world_from_vehicle(stamp_s + s);
+            let twist = drive.twist(stamp_s);
+            for s in [-0.05, 0.05] {
+                // Where the two take what lies 20 m ahead, and beside.
+                for p in [DVec3::X, DVec3::Y].map(|axis| 20.0 * axis) {
+                    let off = (at(0.0) * twist.over(s)).transform(p) - at(s).transform(p);
+                    assert!(off.length() < 0.03, "{ego:?}, sweep {n}: {} m", off.length());
+                }
+            }
+            turned = turned.max(twist.angular.z.abs());
+        }
+        let stops = matches!(ego, Ego::StopAndGo { .. });
+        assert!(stops || turned > 0.5, "{ego:?}: {turned} rad/s");
+    }
+}
+
+#[test]
 fn ground_and_wall_are_planes() {
     let mut scene = Scene::empty();
     let pose = raywake_core::pose::Pose::planar(20.0, 0.0, 2.0, 0.0);

@@ -1,9 +1,11 @@
 //! From a pair of sweeps to rows: every solid column beside its truth.
 
+use super::exact::owners;
 use super::objects::{Objects, Present};
 use super::row::{Row, class_of};
 use crate::grid::Grid;
 use crate::labels::{Motion, View};
+use crate::simulate::truth::PointTruth;
 use glam::DVec3;
 use raywake::engine::Pair;
 use raywake::source::SweepData;
@@ -12,7 +14,7 @@ use raywake_core::grid::shift::shift;
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
-use raywake_core::prepare::place;
+use raywake_core::prepare::{Window, place};
 use raywake_core::record::{Column, Step};
 use raywake_core::sweep::Rig;
 
@@ -93,9 +95,12 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
-    /// Rows of the first sweep's solid columns.
-    pub fn rows(&mut self, seen: &Seen) -> Vec<Row> {
+    /// Rows of the first sweep's solid columns. They belong to what their returns hit where there is
+    /// exact truth of these, else to the box that their centre lies in.
+    pub fn rows(&mut self, seen: &Seen, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
+        let columns = self.grid.columns.len();
+        let owners = exact.map(|returns| owners(&self.grid.of_point, returns, columns));
         let next = place(&self.profile, &self.rig, &seen.then, Some(window.lattice_origin));
         let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|a| next.corner[a] - window.corner[a]);
         let step = Step { shift_x, shift_y, shift_z, ..self.grid.step };
@@ -103,11 +108,21 @@ impl<'a> Collector<'a> {
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
         for flow in &seen.columns {
-            let [i, j] = [0, 1].map(|n| flow.cell[n] - next.corner[n]);
-            let column = (i * step.side + j) as usize;
+            let column = |window: &Window| {
+                let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
+                (i * step.side + j) as usize
+            };
+            let owner = match &owners {
+                Some(owners) => {
+                    let id = Some(owners[column(&window)]);
+                    present.iter().find(|p| p.id == id)
+                }
+                None => present.iter().find(|p| p.footprint.holds(flat(flow), self.margin_m)),
+            };
+            let column = column(&next);
             let occupied = self.before[column][0] >> 16;
             let score = score(&step, &self.filter, &self.before, column);
-            rows.push(self.row(seen, flow, present, occupied.count_ones() as u8, score));
+            rows.push(self.row(seen, flow, owner, occupied.count_ones() as u8, score));
         }
         rows
     }
@@ -116,13 +131,11 @@ impl<'a> Collector<'a> {
         &self,
         seen: &Seen,
         flow: &ColumnFlow,
-        present: &[Present],
+        object: Option<&Present>,
         voxels: u8,
         score: i32,
     ) -> Row {
-        let [x, y] = flow.position_vehicle_m;
-        let flat = DVec3::new(f64::from(x), f64::from(y), 0.0);
-        let object = present.iter().find(|p| p.footprint.holds(flat, self.margin_m));
+        let ([x, y], flat) = (flow.position_vehicle_m, flat(flow));
         // Flow is planar; the height matters where the vehicle nods, a little.
         let at = DVec3::new(
             flat.x,
@@ -193,11 +206,96 @@ impl<'a> Collector<'a> {
     }
 }
 
+/// Centre of a column on the plane of the vehicle frame, m.
+fn flat(flow: &ColumnFlow) -> DVec3 {
+    let [x, y] = flow.position_vehicle_m.map(f64::from);
+    DVec3::new(x, y, 0.0)
+}
+
 /// As [`Row::motion`] has it.
 fn motion(motion: Motion) -> u8 {
     match motion {
         Motion::Parked => 0,
         Motion::Slow => 1,
         Motion::Moving => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eval::row::CLASSES;
+    use crate::labels::{Kind, Labels, Track};
+    use raywake::source::Source;
+    use raywake::source::simulated::Simulated;
+    use raywake_core::background_filter::TABLE_WORDS;
+    use raywake_core::output::Origin;
+    use raywake_core::sweep::Point;
+    use raywake_sim::Class;
+
+    /// A truck of 8 m that goes 0.6 m on, and returns within its footprint and beside it.
+    #[test]
+    fn what_is_seen_beneath_a_truck_is_not_the_truck() {
+        let source = Simulated::new(1, 2);
+        let [now, then] = [0, 1].map(|n| source.pose(n));
+        let ahead = now.rotation * DVec3::new(0.6, 0.0, 0.0);
+        let truck = Pose { translation: DVec3::new(12.0, 4.0, 0.3), ..Pose::IDENTITY };
+        let moved = now * truck;
+        let moved = then.inverse() * Pose { translation: moved.translation + ahead, ..moved };
+        let track = Track {
+            id: "7".into(),
+            class: "Truck".into(),
+            kind: Kind::Truck,
+            size: [8.0, 2.4, 3.2],
+            boxes: [(0, truck), (1, moved)].into(),
+        };
+        let (tracks, notes) = (vec![track], Vec::new());
+        let objects =
+            Objects::new(&Labels { tracks, view: View::All, exact: true, notes }, &source);
+        let seen = [
+            ([12.0, 4.0, -1.6], 0, Class::Ground),
+            ([10.0, 3.2, 0.2], 7, Class::Truck),
+            ([14.0, 4.8, -1.0], 0, Class::Fixture),
+            ([11.0, -4.0, -1.0], 0, Class::Pole),
+        ];
+        let truth = seen.map(|(_, object, class)| PointTruth {
+            offset_s: 0.0,
+            sensor: 0,
+            object,
+            class,
+            flow: [0.0; 3],
+        });
+        let points = seen.map(|(position, ..)| Point { position, ..Point::default() }).to_vec();
+        let first = SweepData { points, world_from_vehicle: now, ..SweepData::default() };
+        let profile = Profile::hdl64();
+        let filter = vec![0; TABLE_WORDS];
+        let rig = source.rig().clone();
+        let mut collector =
+            Collector::new(profile, rig.clone(), now, filter, &objects, View::All, 0.0);
+        let window = collector.grid.sweep(&rig, &first.sweep());
+        let column = |n: usize| {
+            let column = collector.grid.of_point[n] as i32;
+            let side = collector.grid.step.side;
+            let at = collector.grid.centre(&window, column as usize);
+            ColumnFlow {
+                cell: [column / side + window.corner[0], column % side + window.corner[1]],
+                position_vehicle_m: [at.x as f32, at.y as f32],
+                origin: Origin::Unmatched,
+                ..ColumnFlow::default()
+            }
+        };
+        let columns = (0..4).map(column).collect();
+        let seen = Seen { index: 0, first, then, dt_s: 0.1, columns, points: Vec::new() };
+        let classes =
+            |rows: &[Row]| rows.iter().map(|r| CLASSES[r.class as usize]).collect::<Vec<_>>();
+        let rows = collector.rows(&seen, Some(&truth));
+        assert_eq!(classes(&rows), ["Background", "Truck", "Background", "Background"]);
+        let motion: Vec<_> = rows.iter().map(|r| (r.motion, r.true_x.hypot(r.true_y))).collect();
+        // The street slopes a little.
+        assert!(motion[1].0 == 2 && (motion[1].1 - 0.6).abs() < 1e-3, "{motion:?}");
+        assert!([0, 2, 3].iter().all(|&n| motion[n] == (0, 0.0)), "{motion:?}");
+        // By the boxes alone.
+        let rows = collector.rows(&seen, None);
+        assert_eq!(classes(&rows), ["Truck", "Truck", "Truck", "Background"]);
     }
 }

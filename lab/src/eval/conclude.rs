@@ -88,7 +88,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
 }
 
 const RAW: &str = "The error is the distance between the displacement found for a solid column from \
-    one sweep to the next and that of the labelled box its centre lies in. Columns that the filter \
+    one sweep to the next and that of the labelled object it belongs to. Columns that the filter \
     takes for background, and columns without a match, put out no motion over ground and are \
     scored as such.";
 
@@ -190,9 +190,11 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
     let tracks: usize = drives.iter().map(|d| d.tracks).sum();
     let section = report.section("What is counted");
     section.text(&format!(
-        "A column belongs to the first labelled box, in the order of the labels, that its centre \
-         lies in, seen from above, with a margin of {} m. {tracks} labelled objects have {boxes} \
-         boxes.\n\n\
+        "Where the truth of every return is known, in simulated drives, a column belongs to what \
+         most of its returns above the ground hit, and to the background where it has none: \
+         ground seen beneath a truck is not the truck. In the others it belongs to the first \
+         labelled box, in the order of the labels, that its centre lies in, seen from above, with \
+         a margin of {} m. {tracks} labelled objects have {boxes} boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
          labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the others, all \
          around. {} columns do not.\n\n\

@@ -1,6 +1,7 @@
 //! One drive: the pipeline on one thread, rows and pictures on another.
 
 use super::collect::{Collector, Seen};
+use super::exact::Exact;
 use super::facts::{Facts, Panel};
 use super::objects::Objects;
 use super::panels::Panels;
@@ -25,7 +26,7 @@ use std::time::Instant;
 const WAITING: usize = 2;
 
 /// Counts changes of what rows and facts mean: those of another number are made anew.
-const ROWS: u32 = 2;
+const ROWS: u32 = 3;
 
 /// What all drives of an evaluation have in common.
 #[derive(Clone)]
@@ -166,13 +167,13 @@ pub fn evaluate(
         settings.margin_m,
     );
     let points = Points::new(
-        path,
         labels.view,
         source.rig().ground_m,
         settings.margin_m,
         settings.profile.voxel_m,
     );
-    run(source.as_mut(), settings, &files, collector, points, &mut facts)?;
+    let exact = Exact::of(path);
+    run(source.as_mut(), settings, &files, collector, points, exact, &mut facts)?;
     if settings.all_columns {
         facts.unfiltered = unfiltered(source.as_mut(), settings)?;
     }
@@ -195,13 +196,14 @@ fn run(
     files: &Files,
     collector: Collector,
     points: Points,
+    exact: Option<Exact>,
     facts: &mut Facts,
 ) -> Result<(), Error> {
     let plan = settings.plan(source, settings.weights.clone());
     let (send, receive) = sync_channel(WAITING);
     let drive = facts.drive.clone();
     let (summary, written) = std::thread::scope(|scope| {
-        let rows = scope.spawn(move || collect(&drive, collector, points, &receive, files));
+        let rows = scope.spawn(move || collect(&drive, collector, points, exact, &receive, files));
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
@@ -237,6 +239,7 @@ fn collect(
     drive: &str,
     mut collector: Collector,
     mut points: Points,
+    exact: Option<Exact>,
     pairs: &Receiver<Option<Seen>>,
     files: &Files,
 ) -> Result<Collected, Error> {
@@ -248,8 +251,9 @@ fn collect(
             Err(_) => return Err(Error::Usage("interrupted".into())),
         };
         let present = collector.present(&seen);
-        points.pair(&seen, present)?;
-        let rows = collector.rows(&seen);
+        let returns = exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;
+        points.pair(&seen, present, returns.as_deref())?;
+        let rows = collector.rows(&seen, returns.as_deref());
         panels.consider(&seen, &rows, present);
         Ok(Some(rows))
     })?;

@@ -11,6 +11,7 @@ mod calibration;
 mod collect;
 mod conclude;
 mod drive;
+mod exact;
 mod facts;
 mod figures;
 mod objects;
@@ -56,8 +57,8 @@ struct Inputs {
     backend: BackendChoice,
     #[command(flatten)]
     recording: Recording,
-    /// By how much a box reaches beyond its sides, m: the dissertation's programs have 0 (chapter
-    /// 3) and 0.3 (chapter 4)
+    /// By how much a box reaches beyond its sides, m, where no exact truth tells what is in it: the
+    /// dissertation's programs have 0 (chapter 3) and 0.3 (chapter 4)
     #[arg(long, value_name = "M", default_value_t = 0.0)]
     margin: f64,
     /// Stop after this many sweeps of every drive

@@ -11,6 +11,8 @@ use std::collections::HashMap;
 pub struct Present {
     /// Index of the track.
     pub track: u32,
+    /// Id in the truth of a simulated drive's returns.
+    pub id: Option<u32>,
     /// What it is.
     pub kind: Kind,
     /// From above, vehicle frame.
@@ -51,6 +53,9 @@ impl Objects {
         let mut frames: HashMap<u64, Vec<Present>> = HashMap::new();
         let all = trajectories(labels, source);
         for (index, (track, trajectory)) in labels.tracks.iter().zip(&all).enumerate() {
+            // Parts of a track that was cut are named after the whole.
+            let id = track.id.split('/').next().filter(|_| labels.exact);
+            let id = id.and_then(|id| id.parse().ok());
             let states = trajectory.states();
             for (n, state) in states.iter().enumerate() {
                 let now = track.boxes[&state.frame];
@@ -62,6 +67,7 @@ impl Objects {
                 });
                 frames.entry(state.frame).or_default().push(Present {
                     track: index as u32,
+                    id,
                     kind: track.kind,
                     footprint: Footprint::new(now, track.size[0], track.size[1]),
                     vehicle_from_box: now,

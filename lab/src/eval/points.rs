@@ -6,14 +6,13 @@ use crate::labels::{View, kind};
 use crate::metrics::{
     AccuracyTable, BucketedEpe, Category, Pair, Rules, ThreeWayEpe, TruePoint, reference,
 };
-use crate::simulate::truth;
+use crate::simulate::truth::{self, PointTruth};
 use glam::DVec3;
 use raywake::error::Error;
 use raywake::sink::argoverse::displacement;
-use raywake::source::recognise;
+use raywake_core::sweep::Point;
 use raywake_sim::{Class, PERIOD_S};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
 
 /// Returns without a label up to this height above the plane the vehicle stands on count as
 /// ground, m, where no truth tells; the graders leave ground out.
@@ -52,8 +51,6 @@ impl PointScores {
 
 /// Scores the returns of one drive.
 pub struct Points {
-    /// Folder of a simulated drive, whose files tell the truth of every return.
-    simulated: Option<PathBuf>,
     view: View,
     ground_m: f64,
     margin_m: f64,
@@ -63,19 +60,22 @@ pub struct Points {
 }
 
 impl Points {
-    /// For the drive in a folder.
-    pub fn new(drive: &Path, view: View, ground_m: f64, margin_m: f64, cell_m: f64) -> Points {
-        // As the labels: in the only recording below the folder.
-        let drive = recognise(drive).map_or_else(|_| drive.to_path_buf(), |found| found.1);
-        let simulated = truth::objects_path(&drive).is_file().then_some(drive);
-        Points { simulated, view, ground_m, margin_m, cell_m, scores: Default::default() }
+    /// Nothing scored yet.
+    pub fn new(view: View, ground_m: f64, margin_m: f64, cell_m: f64) -> Points {
+        Points { view, ground_m, margin_m, cell_m, scores: Default::default() }
     }
 
-    /// Scores the first sweep of a pair. Fails where the file with its truth does not fit.
-    pub fn pair(&mut self, seen: &Seen, present: &[Present]) -> Result<(), Error> {
+    /// Scores the first sweep of a pair, by the exact truth of its returns where there is any.
+    /// Fails where the graders would.
+    pub fn pair(
+        &mut self,
+        seen: &Seen,
+        present: &[Present],
+        exact: Option<&[PointTruth]>,
+    ) -> Result<(), Error> {
         let now = seen.now();
-        let mut points: Vec<TruePoint> = match &self.simulated {
-            Some(drive) => self.exact(drive, seen)?,
+        let mut points: Vec<TruePoint> = match exact {
+            Some(returns) => simulated(seen, returns),
             None => {
                 seen.first.points.iter().map(|p| self.boxed(p.position, seen, present)).collect()
             }
@@ -95,26 +95,6 @@ impl Points {
             scores.three_way.add(&scored);
         }
         Ok(())
-    }
-
-    /// By the simulator.
-    fn exact(&self, drive: &Path, seen: &Seen) -> Result<Vec<TruePoint>, Error> {
-        let path = truth::points_path(drive, seen.first.frame);
-        let rows = truth::read_points(&path)?;
-        if rows.len() != seen.first.points.len() {
-            let what = format!("{} rows for {} returns", rows.len(), seen.first.points.len());
-            return Err(Error::input(&path, "", what));
-        }
-        // Flow over one period; pairs may lie a little closer or farther apart.
-        let span = (seen.dt_s / PERIOD_S) as f32;
-        let point = |(p, t): (&raywake_core::sweep::Point, &truth::PointTruth)| TruePoint {
-            position_m: p.position,
-            flow_m: t.flow.map(|v| v * span),
-            category: category(t.class),
-            valid: p.position.iter().all(|v| v.is_finite()),
-            ground: t.class == Class::Ground,
-        };
-        Ok(seen.first.points.iter().zip(&rows).map(point).collect())
     }
 
     /// By the box around it: what is in none stands.
@@ -146,6 +126,20 @@ impl Points {
             _ => TruePoint { valid: false, ..point },
         }
     }
+}
+
+/// By the simulator.
+fn simulated(seen: &Seen, returns: &[PointTruth]) -> Vec<TruePoint> {
+    // Flow over one period; pairs may lie a little closer or farther apart.
+    let span = (seen.dt_s / PERIOD_S) as f32;
+    let point = |(p, t): (&Point, &PointTruth)| TruePoint {
+        position_m: p.position,
+        flow_m: t.flow.map(|v| v * span),
+        category: category(t.class),
+        valid: p.position.iter().all(|v| v.is_finite()),
+        ground: t.class == Class::Ground,
+    };
+    seen.first.points.iter().zip(returns).map(point).collect()
 }
 
 /// The category of what the simulator shows.

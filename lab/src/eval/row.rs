@@ -13,7 +13,7 @@ use arrow_schema::{DataType, Field, Schema};
 use raywake_core::output::Origin;
 use std::sync::Arc;
 
-/// Names of [`Row::class`]: what is in no labelled box, then the kinds of [`Kind`].
+/// Names of [`Row::class`]: what belongs to no labelled object, then the kinds of [`Kind`].
 pub const CLASSES: [&str; 10] = [
     "Background",
     "Car",
@@ -125,7 +125,7 @@ row! {
     track: u32,
     /// Where labels are complete, at both ends of the true motion.
     in_view: bool,
-    /// 0: parked, or in no box; 1: slow; 2: moving ([`crate::labels::Motion`]).
+    /// 0: parked, or of no object; 1: slow; 2: moving ([`crate::labels::Motion`]).
     motion: u8,
     /// Occupied voxels of the column: its weight in the dissertation's tables.
     voxels: u8,

@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn the_same_bytes_from_the_same_seed() {
-        let inputs = Inputs { drives: 5, sweeps: 1, seed: 3, ..Inputs::default() };
+        let inputs = Inputs { drives: 5, sweeps: 3, seed: 3, ..Inputs::default() };
         let shipped = [("shipped".to_string(), SHIPPED.to_string())];
         let (text, report) = learn(&inputs, &shipped).unwrap();
         let (again, _) = learn(&inputs, &[]).unwrap();
