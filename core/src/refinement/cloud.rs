@@ -20,7 +20,7 @@ const SLOPE: f32 = 0.1;
 /// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
 const GROUND_PASSES: usize = 3;
 /// Returns higher above the ground than this belong to things, voxels.
-pub const GROUND_HEIGHT: f32 = 0.7;
+pub const GROUND_HEIGHT: f32 = 0.6;
 /// Returns lower than this above the ground belong to it in any column, voxels.
 const GROUND_RETURN: f32 = 0.35;
 /// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
@@ -258,7 +258,6 @@ impl Cloud {
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
         let mut best = (1.0, [0.0; 3]);
         let mut found = false;
-        let in_row = at[0] + 1.0 - i as f32;
         let in_row = at[0] + 1.0 - i as f32;
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {

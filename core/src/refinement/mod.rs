@@ -269,7 +269,7 @@ impl Refinement {
         for (di, dj) in (-2..=2).flat_map(|a| (-2..=2).map(move |b| (a, b))) {
             let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
             let by = motion.of(at);
-            if (0..2).all(|a| (cells[a] as f32 - by[a]).abs() <= 1.0) {
+            if (0..2).all(|a| (cells[a] as f32 - by[a]).abs() <= 1.5) {
                 return Some((by, motion.covariance_of(at)));
             }
         }
