@@ -24,7 +24,7 @@ const HOLD: f32 = 1e-3;
 /// Distance from which on a return counts as missed, voxels.
 const MISSED: f32 = 0.5;
 /// Distance up to which a return counts as met, voxels.
-const TOUCHING: f32 = 0.1;
+const TOUCHING: f32 = 0.15;
 
 /// What a return tells of the surface it lies on, the upper half of a symmetric matrix: the inverse
 /// covariance of the returns around it and of their noise, relative to the noise's. 1 across a

@@ -206,6 +206,10 @@ impl Refinement {
         self.segments.find(first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
+            let near = neighbours(side, columns, &self.segment, &self.found);
+            if near.is_empty() {
+                continue;
+            }
             let thing = Thing::new(sweeps, columns);
             if thing.extent > EXTENT_MAX {
                 continue;
@@ -213,7 +217,7 @@ impl Refinement {
             let (still, seen) = thing.standing(&mut self.visits);
             let whole = self.segment[columns[0] as usize];
             let mut best = 1.0;
-            for m in &neighbours(side, columns, &self.segment, &self.found) {
+            for m in &near {
                 let found = self.found[*m as usize];
                 let Some(motion) = found.motion else { continue };
                 let misfit = thing.misfit(&motion, &mut self.visits);
