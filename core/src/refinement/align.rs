@@ -7,10 +7,12 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
 pub const SAMPLES: usize = 64;
-/// Steps of Gauss and Newton.
+/// Steps of Gauss and Newton at most.
 const STEPS: usize = 8;
-/// The first steps, with the wide kernel.
+/// The first steps, with the wide kernel, at most.
 const WIDE_STEPS: usize = 3;
+/// A step that moves by less is the last with its kernel, voxels and radians.
+const SMALL: f32 = 0.01;
 /// Width of the kernel of Geman and McClure, voxels: in the first steps, and then.
 const KERNEL: [f32; 2] = [1.0, 0.35];
 /// Standard deviation of a return, voxels.
@@ -337,12 +339,13 @@ impl<'a> Thing<'a> {
 
     /// Lays the thing over the others, starting at `motion`.
     pub fn align(&self, mut motion: Motion, visits: &mut Visits) -> Motion {
-        let mut there = Samples::new();
-        for step in 0..STEPS {
-            if step == 0 || step == WIDE_STEPS {
-                there = self.there(&motion, visits);
-            }
-            let kernel = KERNEL[(step >= WIDE_STEPS) as usize];
+        let mut there = self.there(&motion, visits);
+        let mut wide = WIDE_STEPS;
+        for _ in 0..STEPS {
+            let kernel = KERNEL[(wide == 0) as usize];
+            // Earlier sweeps help once it is nearly right.
+            let others =
+                &self.sweeps.others[..if wide == 0 { self.sweeps.others.len() } else { 1 }];
             // Something to hold on to where all is missed, and the turn that is likely.
             let mut h = [HOLD, 0.0, 0.0, HOLD, 0.0, 1.0 / (TURN * TURN)];
             let mut g = [0.0, 0.0, -motion.by.z / (TURN * TURN)];
@@ -365,7 +368,7 @@ impl<'a> Thing<'a> {
                 g[1] += fy;
                 g[2] += a * fx + b * fy;
             };
-            for other in self.sweeps.others {
+            for other in others {
                 for s in &self.samples {
                     let at = moved(s, &motion, other);
                     if let Some((_, q)) = other.cloud.nearest(at, s.sensor) {
@@ -387,8 +390,15 @@ impl<'a> Thing<'a> {
             let by = inverse * Vector3::from(g);
             motion.by += by;
             motion.covariance = inverse;
-            if by.norm_squared() < 1e-4 && step > WIDE_STEPS {
+            let small = by.norm_squared() < SMALL * SMALL;
+            if wide == 0 && small {
                 break;
+            }
+            if wide > 0 {
+                wide = if small { 0 } else { wide - 1 };
+                if wide == 0 {
+                    there = self.there(&motion, visits);
+                }
             }
         }
         motion
