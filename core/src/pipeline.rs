@@ -129,9 +129,6 @@ pub fn perceive<'a>(
     }
 }
 
-/// Standard deviation of the displacement of what stands, m.
-const STILL_M: f32 = 0.02;
-
 /// One sweep's side of a pair.
 #[derive(Clone, Copy, Debug)]
 struct Side {
@@ -380,16 +377,19 @@ impl Pipeline {
             if record[1] == 0 {
                 continue;
             }
-            let found = if refined { self.refinement.of(step, column, flow) } else { None };
-            let (moved, covariance) = match found {
-                Some((by, covariance)) => (by.map(|v| v * r), covariance.map(|v| v * r * r)),
-                None if flow & VALID == 0 => continue,
-                None if refined => ([0.0; 2], [STILL_M * STILL_M, 0.0, STILL_M * STILL_M]),
-                None => {
-                    let variance = 2.0 * of_cells * of_cells;
-                    let cells = flow_displacement(flow);
-                    (cells.map(|c| c as f32 * r), [variance, 0.0, variance])
+            let valid = flow & VALID != 0;
+            let (moved, covariance) = if refined {
+                let found = self.refinement.of(step, column, flow);
+                if !found.moves && !valid {
+                    continue;
                 }
+                (found.by.map(|v| v * r), found.covariance.map(|v| v * r * r))
+            } else if valid {
+                let variance = 2.0 * of_cells * of_cells;
+                let cells = flow_displacement(flow);
+                (cells.map(|c| c as f32 * r), [variance, 0.0, variance])
+            } else {
+                continue;
             };
             let o = Observation { column: column as u32, moved, covariance, slot: NONE };
             if self.observed.push(o).is_err() {
@@ -532,10 +532,9 @@ impl Pipeline {
                 out.origin = flow.origin;
             } else if refined && !is_apart && column != NONE {
                 // Its column is not solid, but part of a thing.
-                let at = [column / side as u32, column % side as u32].map(|c| c as f32 + 0.5);
-                if let Some((by, covariance)) = self.refinement.at(column, at) {
-                    out.velocity_world_mps = by.map(|v| v * r / dt);
-                    out.covariance = covariance.map(|v| v * (r / dt) * (r / dt));
+                if let Some(found) = self.refinement.at(column) {
+                    out.velocity_world_mps = found.by.map(|v| v * r / dt);
+                    out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
                     out.origin = Origin::Joined;
                 }
             }

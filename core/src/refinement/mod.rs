@@ -34,6 +34,11 @@ const SAME: f32 = 0.75;
 const UNFIT: f32 = 0.3;
 /// Gain over standing still from which on a thing moves, see [`gain`].
 const GAIN: f32 = 0.15;
+/// Standard deviation of what stands, before [`doubt`], voxels.
+const STILL: f32 = 0.1;
+/// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
+const CONFIDENCE: f32 = 0.15;
+const DOUBTFUL: f32 = 0.012;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
 /// Mean misfit of a column's returns from which on it may be part of something that moves.
@@ -61,6 +66,35 @@ const NEIGHBOURS: usize = 8;
 /// How well the explanation of a thing's returns by a motion beats that by standing still.
 fn gain(still: f32, moved: f32) -> f32 {
     if moved < still { (1.0 - moved / still) * libm::sqrtf(still - moved) } else { 0.0 }
+}
+
+/// How a column moved over the pair, voxels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Refined {
+    /// Displacement; zero where it stands.
+    pub by: [f32; 2],
+    /// Its covariance (xx, xy, yy).
+    pub covariance: [f32; 3],
+    /// Whether it is part of a thing that moves.
+    pub moves: bool,
+}
+
+impl Refined {
+    fn moving(motion: &Motion, at: [f32; 2]) -> Refined {
+        Refined { by: motion.of(at), covariance: motion.covariance_of(at), moves: true }
+    }
+
+    fn standing(misfit: f32) -> Refined {
+        let variance = STILL * STILL * doubt(misfit);
+        Refined { by: [0.0; 2], covariance: [variance, 0.0, variance], moves: false }
+    }
+}
+
+/// By how much more uncertain a motion is than its returns say, for how ill it fits them: measured
+/// on simulated drives, so that ellipses hold what they claim.
+fn doubt(misfit: f32) -> f32 {
+    let ill = misfit / DOUBTFUL;
+    CONFIDENCE * (1.0 + ill * ill)
 }
 
 /// What became of a thing.
@@ -233,12 +267,13 @@ impl Refinement {
         }
     }
 
-    /// How a place in a column of the first sweep's window moved, if it is part of a thing that moves:
-    /// voxels, with its covariance.
-    pub(crate) fn at(&self, column: u32, at: [f32; 2]) -> Option<([f32; 2], [f32; 3])> {
+    /// How a column of the first sweep's window moved, as part of a thing that does.
+    pub(crate) fn at(&self, column: u32) -> Option<Refined> {
         let segment = *self.segment.get(column as usize)?;
         let motion = self.found.get(segment as usize)?.motion?;
-        Some((motion.of(at), motion.covariance_of(at)))
+        let side = self.clouds[index(self.newest, 1)].side as u32;
+        let at = [column / side, column % side].map(|c| c as f32 + 0.5);
+        Some(Refined::moving(&motion, at))
     }
 
     /// Whether a return of the newest sweep is of the ground, or higher than things are.
@@ -246,14 +281,8 @@ impl Refinement {
         self.clouds[self.newest].is_apart(column, z)
     }
 
-    /// How a column of the new window moved, voxels, with its covariance; nothing where it stands or
-    /// is of the ground.
-    pub(crate) fn of(
-        &self,
-        step: &Step,
-        column: usize,
-        flow: Flow,
-    ) -> Option<([f32; 2], [f32; 3])> {
+    /// How a column of the new window moved, or that it stands.
+    pub(crate) fn of(&self, step: &Step, column: usize, flow: Flow) -> Refined {
         let side = step.side;
         let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
         let segment = |i: i32, j: i32| {
@@ -263,21 +292,24 @@ impl Refinement {
         };
         let at = [i as f32 + 0.5, j as f32 + 0.5];
         if let Some(own) = segment(i, j) {
-            return own.motion.map(|m| (m.of(at), m.covariance_of(at)));
+            return match own.motion {
+                Some(motion) => Refined::moving(&motion, at),
+                None => Refined::standing(own.still),
+            };
         }
         // Nothing but low returns: the lower edge of a thing, where the match says so.
         if flow & VALID == 0 {
-            return None;
+            return Refined::standing(0.0);
         }
         let cells = flow_displacement(flow);
         for (di, dj) in (-2..=2).flat_map(|a| (-2..=2).map(move |b| (a, b))) {
             let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
-            let by = motion.of(at);
-            if (0..2).all(|a| (cells[a] as f32 - by[a]).abs() <= 1.5) {
-                return Some((by, motion.covariance_of(at)));
+            let refined = Refined::moving(&motion, at);
+            if (0..2).all(|a| (cells[a] as f32 - refined.by[a]).abs() <= 1.5) {
+                return refined;
             }
         }
-        None
+        Refined::standing(0.0)
     }
 }
 
@@ -324,7 +356,8 @@ fn motion(
     let (misfit, motion) = best;
     let by = motion.by.xy().norm();
     if gain(found.still, misfit) > GAIN && by > LEAST && thing.samples.len() >= ENOUGH {
-        found.motion = Some(motion);
+        let covariance = motion.covariance * doubt(misfit);
+        found.motion = Some(Motion { covariance, ..motion });
     }
     found
 }
