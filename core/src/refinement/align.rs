@@ -137,7 +137,7 @@ impl Sweeps<'_> {
     pub fn standing(&self, s: &Sample) -> Option<f32> {
         let other = &self.others[0];
         let at = moved(s, &Motion::default(), other);
-        let found = other.cloud.nearest(at, s.sensor);
+        let found = other.cloud.nearest(at, s.sensor, TOUCHING);
         (found.is_some() || self.is_free(self.now, at)).then(|| truncated(self.first, s, at, found))
     }
 }
@@ -210,7 +210,7 @@ impl Mean {
 /// Truncated squared distance of a moved return from what another sweep has there, 0 to 1.
 fn off(of: &Cloud, s: &Sample, motion: &Motion, other: &Other) -> f32 {
     let at = moved(s, motion, other);
-    truncated(of, s, at, other.cloud.nearest(at, s.sensor))
+    truncated(of, s, at, other.cloud.nearest(at, s.sensor, TOUCHING))
 }
 
 /// Squared distance of a return of the cloud `of` from what was found, 0 to 1: all that is missed
@@ -296,7 +296,7 @@ impl<'a> Thing<'a> {
         }
         for q in &self.there(motion, visits) {
             let at = self.back(q, motion);
-            let found = self.sweeps.first.nearest(at, q.sensor);
+            let found = self.sweeps.first.nearest(at, q.sensor, TOUCHING);
             let off = truncated(self.sweeps.others[0].cloud, q, at, found);
             // What stands there was there before.
             if off < 0.5 || !self.stood(q) {
@@ -316,7 +316,7 @@ impl<'a> Thing<'a> {
             let still = Motion::default();
             for s in &self.samples {
                 let at = moved(s, &still, other);
-                if let Some(found) = other.cloud.nearest(at, s.sensor) {
+                if let Some(found) = other.cloud.nearest(at, s.sensor, TOUCHING) {
                     mean.add(truncated(self.sweeps.first, s, at, Some(found)));
                 }
             }
@@ -324,7 +324,7 @@ impl<'a> Thing<'a> {
         let still = Motion::around(self.centre);
         for q in &self.there(&still, visits) {
             let at = self.back(q, &still);
-            let found = self.sweeps.first.nearest(at, q.sensor);
+            let found = self.sweeps.first.nearest(at, q.sensor, TOUCHING);
             if found.is_some() || self.sweeps.is_free(self.sweeps.before, q.at) {
                 mean.add(truncated(self.sweeps.others[0].cloud, q, at, found));
             }
@@ -334,7 +334,7 @@ impl<'a> Thing<'a> {
 
     fn stood(&self, q: &Sample) -> bool {
         let at = self.back(q, &Motion::default());
-        self.sweeps.first.nearest(at, q.sensor).is_some_and(|n| n.0 < MISSED * MISSED)
+        self.sweeps.first.nearest(at, q.sensor, TOUCHING).is_some_and(|n| n.0 < MISSED * MISSED)
     }
 
     /// Lays the thing over the others, starting at `motion`.
@@ -371,7 +371,7 @@ impl<'a> Thing<'a> {
             for other in others {
                 for s in &self.samples {
                     let at = moved(s, &motion, other);
-                    if let Some((_, q)) = other.cloud.nearest(at, s.sensor) {
+                    if let Some((_, q)) = other.cloud.nearest(at, s.sensor, 0.0) {
                         let weight = self.sweeps.first.weight(s.index);
                         pair(&weight, s.at, minus(q, at), other.scale);
                     }
@@ -379,7 +379,7 @@ impl<'a> Thing<'a> {
             }
             for q in &there {
                 let at = self.back(q, &motion);
-                if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor) {
+                if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor, 0.0) {
                     let weight = self.sweeps.others[0].cloud.weight(q.index);
                     pair(&weight, p, minus(at, p), 1.0);
                 }

@@ -246,9 +246,10 @@ impl Cloud {
         &self.points[self.start[row + j_from] as usize..self.start[row + j_to] as usize]
     }
 
-    /// The nearest return closer than a voxel's edge to `at`: its squared distance (voxels) and
-    /// itself; of two as near the first in order.
-    pub fn nearest(&self, at: [f32; 3], sensor: u32) -> Option<(f32, [f32; 3])> {
+    /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
+    /// (voxels) and itself; of two as near the first in order. The first one closer than `enough`
+    /// will do.
+    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, [f32; 3])> {
         let side = self.side as f32;
         if !(at[0] > -1.0 && at[0] < side && at[1] > -1.0 && at[1] < side) {
             return None;
@@ -275,6 +276,9 @@ impl Cloud {
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 if d2 < best.0 && *by == sensor {
                     (best, found) = ((d2, *p), true);
+                    if d2 < enough * enough {
+                        return Some(best);
+                    }
                 }
             }
         }

@@ -37,8 +37,8 @@ const GAIN: f32 = 0.15;
 /// Standard deviation of what stands, before [`doubt`], voxels.
 const STILL: f32 = 0.1;
 /// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
-const CONFIDENCE: f32 = 0.15;
-const DOUBTFUL: f32 = 0.012;
+const CONFIDENCE: f32 = 0.05;
+const DOUBTFUL: f32 = 0.008;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
 /// Mean misfit of a column's returns from which on it may be part of something that moves.
