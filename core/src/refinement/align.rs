@@ -6,7 +6,7 @@ use crate::record::Column;
 use nalgebra::{Matrix3, Vector3};
 
 /// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
-pub const SAMPLES: usize = 64;
+pub const SAMPLES: usize = 96;
 /// Steps of Gauss and Newton at most.
 const STEPS: usize = 8;
 /// The first steps, with the wide kernel, at most.

@@ -33,11 +33,11 @@ const SAME: f32 = 0.75;
 /// A start that fits so badly calls for a search.
 const UNFIT: f32 = 0.3;
 /// Gain over standing still from which on a thing moves, see [`gain`].
-const GAIN: f32 = 0.15;
+const GAIN: f32 = 0.12;
 /// Standard deviation of what stands, before [`doubt`], voxels.
 const STILL: f32 = 0.1;
 /// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
-const CONFIDENCE: f32 = 0.05;
+const CONFIDENCE: f32 = 0.06;
 const DOUBTFUL: f32 = 0.008;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
@@ -355,7 +355,10 @@ fn motion(
     }
     let (misfit, motion) = best;
     let by = motion.by.xy().norm();
-    if gain(found.still, misfit) > GAIN && by > LEAST && thing.samples.len() >= ENOUGH {
+    // A motion that fits ill is left to the thing's parts unless it explains much.
+    let gained = gain(found.still, misfit);
+    let convinces = gained > if misfit < UNFIT { GAIN } else { 2.0 * GAIN };
+    if convinces && by > LEAST && thing.samples.len() >= ENOUGH {
         let covariance = motion.covariance * doubt(misfit);
         found.motion = Some(Motion { covariance, ..motion });
     }
