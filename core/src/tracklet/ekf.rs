@@ -199,6 +199,7 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::params::Profile;
+    use crate::random::Random;
     use std::vec::Vec;
 
     const DT: f32 = 0.1;
@@ -206,18 +207,6 @@ mod tests {
     /// Half a cell of 0.3 m.
     fn noise() -> Matrix2<f32> {
         Matrix2::from_diagonal_element(0.15 * 0.15)
-    }
-
-    struct Random(u64);
-    impl Random {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        }
-        fn normal(&mut self) -> f64 {
-            let (a, b) = (self.uniform(), self.uniform());
-            (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-        }
     }
 
     /// One object seen `steps` times with half a cell of noise; speed error and normalised squared
