@@ -20,6 +20,8 @@ pub mod pipeline;
 pub mod pose;
 pub mod prefix_sum;
 pub mod prepare;
+#[cfg(test)]
+mod random;
 pub mod record;
 pub mod refinement;
 pub mod sweep;

@@ -240,9 +240,10 @@ mod tests {
     fn every_key() {
         let text = "base = \"wide\"\nname = \"mine\"\nside = 101\nlevels = 12\nvoxel_m = 0.4\n\
             range_m = 80\nframe = \"sensor\"\ndeskew = false\nem_rounds = 5\nsmoothing = 7\n\
-            displacement_cost = 8\noutside_cost = 9\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
+            displacement_cost = 8\noutside_cost = 9\nrefinement_sweeps = 0\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
             measurement_cells = 0.75\nspeed_noise_mps2 = 2.0\nturn_noise_radps2 = 3.0\n\
-            turn_birth_radps = 4.0\ngate_d2 = 5.0\nbirth = \"source\"\n";
+            turn_birth_radps = 4.0\ngate_d2 = 5.0\nbirth = \"source\"\n\
+            takes_over = false\ncoast_sweeps = 6\n";
         let p = parsed(text).unwrap();
         assert_eq!((p.name.as_str(), p.side, p.levels), ("mine", 101, 12));
         assert_eq!((p.voxel_m, p.range_m, p.frame, p.deskew), (0.4, 80.0, Frame::Sensor, false));
@@ -257,6 +258,7 @@ mod tests {
             (0.75, 2.0, 3.0)
         );
         assert_eq!((t.turn_birth_radps, t.gate_d2), (4.0, 5.0));
+        assert_eq!((p.refinement_sweeps, t.takes_over, t.coast_sweeps), (0, false, 6));
         let p = parsed("base = \"dissertation\"").unwrap();
         assert_eq!(Profile { name: Profile::dissertation().name, ..p }, Profile::dissertation());
     }

@@ -251,7 +251,8 @@ impl Cloud {
     /// will do.
     pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, [f32; 3])> {
         let side = self.side as f32;
-        if !(at[0] > -1.0 && at[0] < side && at[1] > -1.0 && at[1] < side) {
+        let near = |v: f32| v > -1.0 && v < side + 1.0;
+        if !(near(at[0]) && near(at[1])) {
             return None;
         }
         // One beyond the window on either side would still have neighbours inside.

@@ -13,6 +13,8 @@ mod align;
 mod cloud;
 mod search;
 mod segments;
+#[cfg(test)]
+mod tests;
 
 use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
 use crate::pipeline::Perceived;

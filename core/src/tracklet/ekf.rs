@@ -199,20 +199,14 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::params::Profile;
+    use crate::random::Random;
     use std::vec::Vec;
 
     const DT: f32 = 0.1;
 
-    struct Random(u64);
-    impl Random {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        }
-        fn normal(&mut self) -> f64 {
-            let (a, b) = (self.uniform(), self.uniform());
-            (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-        }
+    /// Half a cell of 0.3 m.
+    fn noise() -> Matrix2<f32> {
+        Matrix2::from_diagonal_element(0.15 * 0.15)
     }
 
     /// One object seen `steps` times with half a cell of noise; speed error and normalised squared
@@ -242,13 +236,13 @@ mod tests {
         // Positions are kept relative to the last one seen, as the tracklets' cells do.
         let mut cell = see(&truth, &mut random);
         let moved = [(cell[0] - first[0]) as f32, (cell[1] - first[1]) as f32];
-        let mut ekf = Ekf::birth(&open, 0.3, moved, DT);
+        let mut ekf = Ekf::birth(&open, noise(), moved, DT);
         for _ in 0..steps {
             advance(&mut truth, &mut random);
             let seen = see(&truth, &mut random);
             let z = [(seen[0] - cell[0]) as f32, (seen[1] - cell[1]) as f32];
             ekf.predict(&open, DT);
-            if !ekf.update(&open, 0.3, z) {
+            if !ekf.update(&open, noise(), z) {
                 return None;
             }
             ekf.mean[0] -= z[0];
@@ -301,7 +295,8 @@ mod tests {
     #[test]
     fn slow_walkers_in_any_direction() {
         use crate::tracklet::{Tracklet, observe};
-        let profile = Profile::hdl64();
+        let profile = Profile { refinement_sweeps: 0, ..Profile::hdl64() };
+        let variance = 2.0 * noise()[(0, 0)];
         for speed in [0.8f32, 1.5] {
             let mut survived = [0; 4];
             let mut errors = [const { Vec::new() }; 4];
@@ -314,11 +309,13 @@ mod tests {
                         direction.map(|d| (d * along + 0.5).floor() as i32)
                     };
                     let moved = |n: i32| [0, 1].map(|a| (at(n + 1)[a] - at(n)[a]) as f32 * 0.3);
-                    let born = Ekf::birth(&profile.tracklet, 0.3, moved(0), DT);
-                    let mut t = Tracklet { ekf: born, age: 0, column: 0 };
+                    let born = Ekf::birth(&profile.tracklet, noise(), moved(0), DT);
+                    let mut t =
+                        Tracklet { ekf: born, age: 0, missed: 0, column: 0, place: [0.5; 2] };
+                    let covariance = [variance, 0.0, variance];
                     let mut alive = true;
                     for n in 1..20 {
-                        alive = alive && observe(&mut t, &profile, 0.3, moved(n), DT);
+                        alive = alive && observe(&mut t, &profile, moved(n), covariance, DT);
                         t.age += 1;
                     }
                     if alive {
@@ -336,7 +333,7 @@ mod tests {
                 assert!(e[e.len() / 2] < 0.4, "{speed} m/s: {}", e[e.len() / 2]);
             }
         }
-        let rest = Ekf::birth(&profile.tracklet, 0.3, [0.0, 0.0], DT);
+        let rest = Ekf::birth(&profile.tracklet, noise(), [0.0, 0.0], DT);
         let (_, [xx, xy, yy]) = rest.velocity();
         assert!(xx == yy && xx > 1.0 && xy == 0.0);
     }
@@ -348,22 +345,22 @@ mod tests {
         // Noise-free, 10 and 15 m/s straight ahead; his start is a step late.
         for (params, speed, kept) in [(&ours, 15.0, true), (&his, 10.0, true), (&his, 15.0, false)]
         {
-            let mut ekf = Ekf::birth(params, 0.3, [speed * DT, 0.0], DT);
+            let mut ekf = Ekf::birth(params, noise(), [speed * DT, 0.0], DT);
             // The next match leads one step further: measured from the cell of birth.
             ekf.predict(params, DT);
-            assert_eq!(ekf.update(params, 0.3, [speed * DT, 0.0]), kept, "{speed} m/s");
+            assert_eq!(ekf.update(params, noise(), [speed * DT, 0.0]), kept, "{speed} m/s");
         }
         // His published figures: the first update raises the speed by 41 %.
-        let mut ekf = Ekf::birth(&his, 0.3, [1.0, 0.0], DT);
+        let mut ekf = Ekf::birth(&his, noise(), [1.0, 0.0], DT);
         ekf.predict(&his, DT);
-        ekf.update(&his, 0.3, [1.0, 0.0]);
+        ekf.update(&his, noise(), [1.0, 0.0]);
         assert!((ekf.mean[3] - 14.09).abs() < 0.02, "{}", ekf.mean[3]);
     }
 
     #[test]
     fn turned_axes_turn_back() {
         let params = Profile::hdl64().tracklet;
-        let born = Ekf::birth(&params, 0.3, [0.6, 0.9], DT);
+        let born = Ekf::birth(&params, noise(), [0.6, 0.9], DT);
         let mut ekf = born;
         ekf.turn_axes(0.3);
         assert!((ekf.mean[2] - (born.mean[2] - 0.3)).abs() < 1e-6);

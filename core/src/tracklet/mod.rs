@@ -8,6 +8,8 @@
 //! to lie in one cell become the older of them.
 
 pub mod ekf;
+#[cfg(test)]
+mod tests;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile};
 use crate::record::{NONE, Step};

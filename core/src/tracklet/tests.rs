@@ -1,0 +1,224 @@
+//! What becomes of tracklets from step to step.
+
+extern crate std;
+use super::*;
+use crate::random::Random;
+use std::boxed::Box;
+use std::collections::BTreeSet;
+use std::vec::Vec;
+
+const SIDE: i32 = 31;
+const DT: f32 = 0.1;
+
+fn profile() -> Profile {
+    Profile { side: SIDE as u32, ..Profile::hdl64() }
+}
+
+fn step(side: i32, shift: [i32; 2]) -> Step {
+    Step { side, shift_x: shift[0], shift_y: shift[1], ..Step::default() }
+}
+
+/// A column that moves by cells.
+fn seen(column: i32, by: [f32; 2]) -> Observation {
+    let variance = 0.03 * 0.03;
+    Observation {
+        column: column as u32,
+        moved: by.map(|v| v * 0.3),
+        covariance: [variance, 0.0, variance],
+        slot: NONE,
+    }
+}
+
+/// One step in a window that moved; also how many tracklets' cells it left behind.
+fn advance(
+    tracklets: &mut Tracklets,
+    profile: &Profile,
+    shift: [i32; 2],
+    observed: &mut [Observation],
+) -> (Turnover, u32) {
+    let step = step(profile.side as i32, shift);
+    let left = tracklets.place(&step);
+    (tracklets.update(profile, &step, DT, 0.0, left, observed), left)
+}
+
+fn new() -> Box<Tracklets> {
+    Box::new(Tracklets::new())
+}
+
+fn cell(i: i32, j: i32) -> i32 {
+    i * SIDE + j
+}
+
+#[test]
+fn a_column_beside_takes_the_tracklet_over() {
+    for (takes_over, age) in [(true, 1), (false, 0)] {
+        let mut profile = profile();
+        profile.tracklet.takes_over = takes_over;
+        profile.tracklet.coast_sweeps = 0;
+        // Where it goes on from: the middle, or the edge of the column it takes.
+        for (by, to) in [([0, 1], 14), ([-1, -1], 14), ([1, 0], 15)] {
+            let mut tracklets = new();
+            advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(10, 10), [2.0, 0.0])]);
+            let mut observed = [seen(cell(12 + by[0], 10 + by[1]), [2.4, 0.0])];
+            let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut observed);
+            assert_eq!((turnover.updated, turnover.born), (age, 1 - age));
+            assert_eq!(tracklets.all().len(), 1);
+            assert_eq!((tracklets.all()[0].age, observed[0].slot), (age, 0));
+            let to = if takes_over { to } else { 14 + by[0] };
+            assert_eq!(tracklets.all()[0].column as i32, cell(to, 10 + by[1]));
+        }
+        // Two cells off is not beside.
+        let mut tracklets = new();
+        advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(10, 10), [2.0, 0.0])]);
+        let far = &mut [seen(cell(14, 10), [2.0, 0.0])];
+        assert_eq!(advance(&mut tracklets, &profile, [0, 0], far).0.born, 1);
+    }
+}
+
+#[test]
+fn of_several_columns_beside_the_nearest_is_taken() {
+    let mut tracklets = new();
+    // The place it follows comes to lie at the upper edge of cell (12, 10) along y.
+    let (first, second) = ([2.0, 0.4], [2.0, 0.0]);
+    advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), first)]);
+    let mut observed = [seen(cell(12, 9), second), seen(cell(12, 11), second)];
+    let (turnover, _) = advance(&mut tracklets, &profile(), [0, 0], &mut observed);
+    assert_eq!((turnover.updated, turnover.born), (1, 1));
+    let ages = observed.map(|o| tracklets.all()[o.slot as usize].age);
+    assert_eq!(ages, [0, 1]);
+}
+
+#[test]
+fn what_meets_in_one_cell_becomes_the_older() {
+    let mut tracklets = new();
+    advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), [1.0, 0.0])]);
+    // The first goes on to (12, 10); the second comes there from the side.
+    let mut observed = [seen(cell(11, 10), [1.0, 0.0]), seen(cell(12, 9), [0.0, 1.0])];
+    let (turnover, _) = advance(&mut tracklets, &profile(), [0, 0], &mut observed);
+    assert_eq!((turnover.born, turnover.updated, turnover.merged), (1, 1, 1));
+    assert_eq!(observed[0].slot, observed[1].slot);
+    assert_eq!(tracklets.all().len(), 1);
+    assert_eq!(tracklets.all()[0].age, 1);
+}
+
+#[test]
+fn unobserved_tracklets_wait_ever_less_sure() {
+    for coast_sweeps in [0, 1, 2, 5] {
+        let mut profile = profile();
+        profile.tracklet.coast_sweeps = coast_sweeps;
+        let mut tracklets = new();
+        for n in 0..8 {
+            advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(4 + n, 10), [1.0, 0.0])]);
+        }
+        assert_eq!(tracklets.all()[0].age, 7);
+        let (mut last, mut column) = (tracklets.all()[0].ekf, tracklets.all()[0].column);
+        for n in 1..=coast_sweeps {
+            let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut []);
+            assert_eq!(turnover, Turnover { waiting: 1, ..Turnover::default() });
+            let t = tracklets.all()[0];
+            assert_eq!((t.missed, t.age), (n, 7));
+            for k in 0..5 {
+                assert!(t.ekf.covariance[(k, k)] >= last.covariance[(k, k)], "{n}: {k}");
+            }
+            assert!(t.ekf.covariance[(0, 0)] > last.covariance[(0, 0)]);
+            // It goes on at its speed.
+            assert_eq!(t.column, column + SIDE as u32);
+            (last, column) = (t.ekf, t.column);
+        }
+        let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut []);
+        assert_eq!(turnover, Turnover { lost: 1, ..Turnover::default() });
+        assert!(tracklets.all().is_empty());
+    }
+}
+
+#[test]
+fn a_newborn_does_not_wait() {
+    let mut tracklets = new();
+    advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), [1.0, 0.0])]);
+    assert_eq!(advance(&mut tracklets, &profile(), [0, 0], &mut []).0.lost, 1);
+}
+
+#[test]
+fn what_leaves_the_window_is_counted() {
+    // By its own motion.
+    let mut tracklets = new();
+    let outwards = &mut [seen(cell(0, 10), [-1.0, 0.0]), seen(cell(10, 30), [0.0, 0.8])];
+    let (turnover, _) = advance(&mut tracklets, &profile(), [0, 0], outwards);
+    assert_eq!((turnover.born, turnover.left), (2, 2));
+    assert!(tracklets.all().is_empty() && outwards.iter().all(|o| o.slot == NONE));
+    // By that of the window.
+    advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(2, 10), [0.0, 0.0])]);
+    let (turnover, left) = advance(&mut tracklets, &profile(), [3, 0], &mut []);
+    assert_eq!((turnover, left), (Turnover { left: 1, ..Turnover::default() }, 1));
+    assert!(tracklets.all().is_empty());
+}
+
+/// Where every tracklet went, and where those that are there came from.
+fn check_counts(before: usize, after: usize, turnover: &Turnover, left_behind: u32) {
+    let t = turnover;
+    let ends = left_behind + t.updated + t.gated + t.waiting + t.lost;
+    assert_eq!(before as u32, ends, "{t:?}");
+    let went_out = t.left - left_behind;
+    assert_eq!(after as u32, t.born + t.updated + t.waiting - t.merged - went_out, "{t:?}");
+}
+
+#[test]
+fn counts_add_up_and_no_two_share_a_cell() {
+    let late_start = Profile { side: SIDE as u32, ..Profile::dissertation() };
+    for profile in [profile(), late_start] {
+        let mut random = Random(11);
+        let mut tracklets = new();
+        let mut total = Turnover::default();
+        for _ in 0..300 {
+            let share = random.between(0.0, 0.4) as f64;
+            let mut observed: Vec<Observation> = (0..SIDE * SIDE)
+                .filter(|_| random.uniform() < share)
+                .collect::<Vec<_>>()
+                .into_iter()
+                .map(|c| seen(c, [0; 2].map(|_| random.between(-2.0, 2.0))))
+                .collect();
+            let shift = [0; 2].map(|_| random.below(3) as i32 - 1);
+            let before = tracklets.all().len();
+            let (turnover, left) = advance(&mut tracklets, &profile, shift, &mut observed);
+            check_counts(before, tracklets.all().len(), &turnover, left);
+            let cells: BTreeSet<u32> = tracklets.all().iter().map(|t| t.column).collect();
+            assert_eq!(cells.len(), tracklets.all().len());
+            assert!(cells.iter().all(|c| *c < (SIDE * SIDE) as u32));
+            for t in tracklets.all() {
+                assert!(t.place.iter().all(|v| (0.0..1.0).contains(v)), "{:?}", t.place);
+                assert!(t.ekf.mean.iter().chain(&t.ekf.covariance).all(|v| v.is_finite()));
+            }
+            for o in observed.iter().filter(|o| o.slot != NONE) {
+                assert!((o.slot as usize) < tracklets.all().len());
+            }
+            total.gated += turnover.gated;
+            total.waiting += turnover.waiting;
+            total.merged += turnover.merged;
+            total.lost += turnover.lost;
+            total.left += turnover.left;
+        }
+        let t = total;
+        let waits = profile.tracklet.coast_sweeps > 0;
+        assert!(t.gated > 0 && t.merged > 0 && t.lost > 0 && t.left > 0, "{t:?}");
+        assert_eq!(t.waiting > 0, waits, "{t:?}");
+    }
+}
+
+#[test]
+fn beyond_the_capacity_none_are_born() {
+    let side = 255;
+    let profile = Profile { side, ..Profile::hdl64() };
+    let mut tracklets = new();
+    let of_half = |half: i32| -> Vec<Observation> {
+        let columns = (0..FOREGROUND_MAX as i32).map(|n| half * 30_000 + 2 * n);
+        columns.map(|c| seen(c, [0.0; 2])).collect()
+    };
+    for half in [0, 0, 1] {
+        let mut observed = of_half(half);
+        advance(&mut tracklets, &profile, [0, 0], &mut observed);
+        assert_eq!(tracklets.all().len(), FOREGROUND_MAX);
+        assert!(observed.iter().all(|o| o.slot != NONE));
+    }
+    // The old ones, waiting, found no room beside as many new ones.
+    assert!(tracklets.all().iter().all(|t| t.age == 0));
+}
