@@ -99,7 +99,7 @@ fn nearest_is_the_nearest() {
             };
             let of_sensor = all.iter().filter(|r| r.sensor == sensor);
             let least = of_sensor.map(|r| distance(r.at)).fold(f32::INFINITY, f32::min);
-            match cloud.nearest(at, sensor) {
+            match cloud.nearest(at, sensor, 0.0) {
                 Some((d2, p)) => {
                     assert!(d2 == least && distance(p) == d2, "{at:?}: {d2}, not {least}");
                     assert!(all.iter().any(|r| r.at == p && r.sensor == sensor));
@@ -320,8 +320,7 @@ type Moved = Option<([f32; 2], [f32; 3])>;
 
 /// How every column moved.
 fn motions(refinement: &Refinement) -> Vec<Moved> {
-    let middle = |c: usize| [(c / SIDE) as f32 + 0.5, (c % SIDE) as f32 + 0.5];
-    (0..SIDE * SIDE).map(|c| refinement.at(c as u32, middle(c))).collect()
+    (0..SIDE * SIDE).map(|c| refinement.at(c as u32).map(|r| (r.by, r.covariance))).collect()
 }
 
 fn check_sane(found: &[Moved]) {
