@@ -148,6 +148,8 @@ pub struct Prepared {
     pub dropped: Dropped,
     /// Set where this sweep has no usable predecessor.
     pub reset: Option<Reset>,
+    /// Returns beyond the capacity of the refinement: it does not see them.
+    pub unrefined: usize,
 }
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
@@ -255,9 +257,8 @@ impl Pipeline {
             &mut self.positions,
             origins,
         );
-        if self.profile.refinement_sweeps > 0 {
-            self.take(sweep, window.corner);
-        }
+        let refines = self.profile.refinement_sweeps > 0;
+        let unrefined = if refines { self.take(sweep, window.corner) } else { 0 };
         self.current = Some(Side {
             window,
             pose: sweep.world_from_vehicle,
@@ -285,12 +286,12 @@ impl Pipeline {
             score_min: self.scores.min,
             ..step_of(&self.profile, count)
         };
-        Prepared { step, dropped, reset }
+        Prepared { step, dropped, reset, unrefined }
     }
 
     /// Hands a sweep to the refinement. Things on slopes reach out of the window's levels: their
-    /// returns belong to its columns all the same.
-    fn take(&mut self, sweep: &Sweep, corner: [i32; 3]) {
+    /// returns belong to its columns all the same. Returns how many it had no room for.
+    fn take(&mut self, sweep: &Sweep, corner: [i32; 3]) -> usize {
         let taken = sweep.points.len().min(POINTS_MAX);
         let side = self.profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
@@ -302,11 +303,14 @@ impl Pipeline {
         }
         let positions = &self.positions[..taken];
         let points = &sweep.points[..taken];
-        self.refinement.take(&self.profile, corner, sweep.stamp_s, points, positions, columns);
+        let refinement = &mut self.refinement;
+        let unrefined =
+            refinement.take(&self.profile, corner, sweep.stamp_s, points, positions, columns);
         for (n, &column) in columns.iter().enumerate() {
             self.is_apart[0][n] =
                 column != NONE && self.refinement.is_apart(column, positions[n][2]);
         }
+        unrefined
     }
 
     /// Whether the sweep continues the one before.
@@ -318,7 +322,8 @@ impl Pipeline {
         self.profile.limits.broken(&before.pose, &sweep.world_from_vehicle, dt_s)
     }
 
-    /// From the flow of columns to velocities: tracklets, motion compensation, columns and points.
+    /// From the flow of columns to velocities: refinement, tracklets, motion compensation, columns
+    /// and points. `lap` is called with the name of the refinement when that is done.
     /// `points` are those of the pair's first sweep, `output` must hold one element per solid
     /// column and per point. After a reset there is no pair and nothing comes back.
     pub fn follow<'o>(
@@ -327,6 +332,7 @@ impl Pipeline {
         perceived: &Perceived,
         points: &[Point],
         output: Output<'o>,
+        lap: &mut dyn FnMut(&'static str),
     ) -> Option<Flows<'o>> {
         let (before, current) = (self.before?, self.current?);
         let dt = current.stamp_s - before.stamp_s;
@@ -339,6 +345,7 @@ impl Pipeline {
                 let t = tracklets.at(c).filter(|t| t.age > 0)?;
                 Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
             });
+            lap("refinement");
         }
         self.observe(step, perceived);
         let turnover =

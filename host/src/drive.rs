@@ -71,7 +71,8 @@ impl Drive {
             let rounds = self.pipeline.profile().em_rounds;
             let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps)?;
             let output = Output { columns: &mut self.columns, points: &mut self.points };
-            let flows = self.pipeline.follow(&prepared.step, &perceived, before, output);
+            let lap = &mut |name| laps.lap(name);
+            let flows = self.pipeline.follow(&prepared.step, &perceived, before, output, lap);
             laps.lap("follow");
             let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
             Ok(Stepped { prepared, flows, foreground, rays, laps })

@@ -78,8 +78,8 @@ fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
     let t = &s.tracklet_turnover;
     writeln!(
         out,
-        "           {} born, {} updates; ended: {} without flow, {} by the gate, {} out of the window",
-        t.born, t.updated, t.lost, t.gated, t.left
+        "           {} born, {} updates, {} waits; ended: {} unobserved, {} by the gate, {} merged, {} out of the window",
+        t.born, t.updated, t.waiting, t.lost, t.gated, t.merged, t.left
     )
 }
 

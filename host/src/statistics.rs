@@ -96,6 +96,8 @@ pub struct Dropped {
     pub missing_sweeps: u64,
     /// Solid columns beyond the capacity for foreground.
     pub foreground: u64,
+    /// Returns beyond the capacity of the refinement.
+    pub unrefined: u64,
 }
 
 impl Dropped {
@@ -105,6 +107,7 @@ impl Dropped {
             ("null_rows", "null rows", self.null_rows),
             ("missing_sweeps", "sweeps missing", self.missing_sweeps),
             ("foreground", "foreground columns over the capacity", self.foreground),
+            ("unrefined", "returns the refinement had no room for", self.unrefined),
         ])
     }
 }
@@ -132,7 +135,11 @@ pub struct Tally {
     pub updated: u64,
     /// Ended by the gate.
     pub gated: u64,
-    /// Ended without a valid flow at their cell.
+    /// Waited for an observation, a count for every sweep.
+    pub waiting: u64,
+    /// Ended for another one in the same cell.
+    pub merged: u64,
+    /// Ended unobserved.
     pub lost: u64,
     /// Ended because their cell left the window.
     pub left: u64,
@@ -144,6 +151,8 @@ impl Tally {
             (&mut self.born, t.born),
             (&mut self.updated, t.updated),
             (&mut self.gated, t.gated),
+            (&mut self.waiting, t.waiting),
+            (&mut self.merged, t.merged),
             (&mut self.lost, t.lost),
             (&mut self.left, t.left),
         ];
@@ -204,6 +213,7 @@ impl Statistics {
     /// Counts a sweep; its columns go to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
         self.dropped.returns += stepped.prepared.dropped;
+        self.dropped.unrefined += stepped.prepared.unrefined as u64;
         self.dropped.null_rows += u64::from(data.dropped.null_rows);
         if self.sweeps > 0 {
             self.dropped.missing_sweeps += data.dropped.sweeps_before;

@@ -62,7 +62,9 @@ impl Side {
         let mut points = vec![PointFlow::default(); POINTS_MAX];
         let output = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
-        if let Some(flows) = self.pipeline.follow(&prepared.step, &perceived, seen, output) {
+        if let Some(flows) =
+            self.pipeline.follow(&prepared.step, &perceived, seen, output, &mut |_| ())
+        {
             (stages.columns, stages.points) = (flows.columns.to_vec(), flows.points.to_vec());
         }
         stages.tracklets = self.pipeline.tracklets().collect();

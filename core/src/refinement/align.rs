@@ -3,10 +3,12 @@
 use super::cloud::Cloud;
 use crate::params::{COLUMNS_MAX, LEVELS_MAX};
 use crate::record::Column;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Vector3};
 
 /// Returns of a thing that are laid over, at most; as many of the other sweep are laid back.
 pub const SAMPLES: usize = 96;
+/// Columns of the other sweep that are looked at, at most.
+const THERE: usize = 1024;
 /// Steps of Gauss and Newton at most.
 const STEPS: usize = 8;
 /// The first steps, with the wide kernel, at most.
@@ -87,14 +89,10 @@ impl Motion {
         [self.by.x - self.by.z * y, self.by.y + self.by.z * x]
     }
 
-    fn jacobian(&self, at: [f32; 3]) -> Matrix3<f32> {
-        let [x, y] = [at[0] - self.centre[0], at[1] - self.centre[1]];
-        Matrix3::new(1.0, 0.0, -y, 0.0, 1.0, x, 0.0, 0.0, 0.0)
-    }
-
     /// Covariance of the displacement of a place (xx, xy, yy), voxels².
     pub fn covariance_of(&self, at: [f32; 2]) -> [f32; 3] {
-        let j = self.jacobian([at[0], at[1], 0.0]);
+        let [x, y] = [at[0] - self.centre[0], at[1] - self.centre[1]];
+        let j = Matrix2x3::new(1.0, 0.0, -y, 0.0, 1.0, x);
         let c = j * self.covariance * j.transpose();
         [c[(0, 0)], c[(0, 1)], c[(1, 1)]]
     }
@@ -239,7 +237,7 @@ impl<'a> Thing<'a> {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
         let extent = extent[0].max(extent[1]);
-        Thing { sweeps, columns, samples: samples.clone(), centre, extent }
+        Thing { sweeps, columns, samples, centre, extent }
     }
 
     /// Returns of the newest sweep where the thing would be.
@@ -248,7 +246,7 @@ impl<'a> Thing<'a> {
         let side = self.sweeps.first.side;
         let mut there = Samples::new();
         visits.start();
-        let mut list = heapless::Vec::<u32, 1024>::new();
+        let mut list = heapless::Vec::<u32, THERE>::new();
         let mut total = 0;
         for &c in self.columns {
             let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
@@ -260,8 +258,8 @@ impl<'a> Thing<'a> {
                     let column = a as usize * side + b as usize;
                     let n = other.cloud.column(column).len();
                     if n > 0 && visits.first(column) {
-                        total += n;
-                        let _ = list.push(column as u32);
+                        // Of a thing as large as that the first columns tell enough.
+                        total += list.push(column as u32).map_or(0, |()| n);
                     }
                 }
             }

@@ -32,8 +32,11 @@ const COLUMNS: [&str; 18] = [
 ];
 
 /// Stages of a pair that are shown together, by either backend's names.
-const PARTS: [&[&str]; 3] =
-    [&["occupancy_constancy", "window"], &["flow", "expectation", "maximisation"], &["follow"]];
+const PARTS: [&[&str]; 3] = [
+    &["occupancy_constancy", "window"],
+    &["flow", "expectation", "maximisation"],
+    &["refinement", "follow"],
+];
 
 /// The row of a variant: what its rows and facts tell.
 pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]) -> Row {
