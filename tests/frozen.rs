@@ -15,7 +15,15 @@ static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 /// What a device may hold for a window of 50 m.
 const DEVICE_BYTES: u64 = 64 << 20;
 
+/// Stack of the thread that works, bytes: as the program's, it holds the core's state for a moment.
+const STACK: usize = 64 << 20;
+
 fn main() {
+    let worker = std::thread::Builder::new().stack_size(STACK).spawn(run);
+    worker.expect("a thread").join().expect("all pass");
+}
+
+fn run() {
     the_guard_sees();
     let mut passed = 1;
     for filter in [None, Some(background_filter::SHIPPED.to_string())] {

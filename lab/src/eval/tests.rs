@@ -5,6 +5,7 @@ use super::{Args, ablate, rows_file, run};
 use crate::scratch::Scratch;
 use crate::simulate::{Motion, Recipe, write};
 use clap::Parser;
+use raywake_core::output::Origin;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,6 +59,11 @@ fn same(a: f32, b: f32) -> bool {
     (a - b).abs() < 1e-4
 }
 
+/// Whether a column moves with its thing, whatever the filter and the match said.
+fn joined(row: &Row) -> bool {
+    row.origin == Origin::Joined as u8
+}
+
 #[test]
 fn a_simulated_drive() {
     let folder = Scratch::new();
@@ -94,7 +100,7 @@ fn a_simulated_drive() {
         assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
     }
     // Whatever the filter rejects scored no more than 0.
-    assert!(rows.iter().all(|r| (r.origin > 0) == (r.score > 0)));
+    assert!(rows.iter().filter(|r| !joined(r)).all(|r| (r.origin > 0) == (r.score > 0)));
 
     let first = facts(&out);
     assert_eq!((&first["pairs"], &first["sweeps"]), (&5.into(), &6.into()));
@@ -179,7 +185,7 @@ fn a_moving_vehicle() {
     let all = rows(&rows_of);
     // The window moves on between the sweeps, and scores are still those the filter saw.
     assert!(all.iter().any(|r| r.carried_x.hypot(r.carried_y) > 0.3));
-    let other = all.iter().filter(|r| (r.origin > 0) != (r.score > 0)).count();
+    let other = all.iter().filter(|r| !joined(r) && (r.origin > 0) != (r.score > 0)).count();
     assert_eq!(other, 0, "of {}", all.len());
 
     // Named by a folder above it, it has the same truth.
@@ -214,16 +220,18 @@ fn variants_in_one_table() {
         let text = fs::read_to_string(out.join("tables/ablations.csv")).unwrap();
         text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect()
     };
-    let only = ["--only", "filter-off,base,rounds-20"];
+    let only = ["--only", "filter-off,base,rounds-20,refine-0"];
     command("ablate", &[&drive, flag, &out], &only).unwrap();
     let table = lines(&out);
-    assert_eq!([&table[0][0], &table[1][0], &table[2][0]], ["base", "rounds-20", "filter-off"]);
+    let names: Vec<&String> = table.iter().map(|row| &row[0]).collect();
+    assert_eq!(names, ["base", "refine-0", "rounds-20", "filter-off"]);
     // Of the same rows: the base has as many rounds.
-    assert_eq!(table[0][2..], table[1][2..]);
+    assert_eq!(table[0][2..], table[2][2..]);
     assert!(out.join("filter-off/rows").is_dir() && !out.join("rounds-20").exists());
     let number = |row: usize, column: usize| table[row][column].parse::<f64>().unwrap();
-    // Without the filter more of the background is found to move.
-    assert!(number(2, 9) < number(0, 9), "{table:?}");
+    // Whole cells are farther off what moves, and the filter changes what is found.
+    assert!(number(1, 3) > 2.0 * number(0, 3), "{table:?}");
+    assert_ne!(table[3][3..10], table[0][3..10]);
     assert!(number(0, 13) > number(0, 14) && number(0, 14) > 0.0, "{table:?}");
     // A variant's folder is one of `eval`, which finds it done and has the same figures.
     let base = out.join("base");
