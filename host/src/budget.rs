@@ -7,6 +7,7 @@ use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
 use raywake_core::map::Bands;
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::Pipeline;
+use raywake_core::refinement::Refinement;
 use raywake_core::sweep::Point;
 use raywake_core::tracklet::Tracklets;
 use raywake_core::{background_filter, occupancy_constancy};
@@ -100,14 +101,15 @@ fn part(name: &'static str, kind: &'static str, bytes: usize) -> Part {
 
 /// [`host_parts`] of `raywake run`.
 fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
-    let tracklets = size_of::<Tracklets>();
+    let (tracklets, refinement) = (size_of::<Tracklets>(), size_of::<Refinement>());
     let pipeline = size_of::<Pipeline>();
     let words = background_filter::TABLE_WORDS
         + occupancy_constancy::WEIGHT_WORDS
         + occupancy_constancy::SCORES_MAX;
     let mut parts = vec![
         part("tracklets", "Tracklets", tracklets),
-        part("rest of the pipeline", "Pipeline", pipeline - tracklets),
+        part("things and their returns", "Refinement", refinement),
+        part("rest of the pipeline", "Pipeline", pipeline - tracklets - refinement),
         part(
             "flow of columns and returns",
             "ColumnFlow, PointFlow",
