@@ -153,7 +153,9 @@ impl Preparation {
     ///
     /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
     /// the number of rays and what was left out. `columns[p]` becomes the column in which point
-    /// `p` of the sweep lies, or [`NONE`]; `origins` the voxel of every ray origin.
+    /// `p` of the sweep lies, or [`NONE`]; `positions[p]`, as far as there is room, its place in
+    /// voxels from the window's corner, or NaN where it was left out; `origins` the voxel of every
+    /// ray origin.
     pub fn prepare(
         &self,
         profile: &Profile,

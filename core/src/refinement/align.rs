@@ -253,8 +253,8 @@ impl<'a> Thing<'a> {
             let d = motion.of(at);
             let i = (at[0] + d[0] + other.offset[0]) as i32;
             let j = (at[1] + d[1] + other.offset[1]) as i32;
-            for a in (i - 1).max(0)..(i + 2).min(side as i32) {
-                for b in (j - 1).max(0)..(j + 2).min(side as i32) {
+            for a in i.saturating_sub(1).max(0)..i.saturating_add(2).min(side as i32) {
+                for b in j.saturating_sub(1).max(0)..j.saturating_add(2).min(side as i32) {
                     let column = a as usize * side + b as usize;
                     let n = other.cloud.column(column).len();
                     if n > 0 && visits.first(column) {

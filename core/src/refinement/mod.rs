@@ -58,7 +58,7 @@ const AS_WELL: f32 = 0.03;
 const REST: f32 = 0.05;
 /// Share of returns to be seen before standing still is believed.
 const SEEN: f32 = 0.5;
-/// Larger things stand, voxels: 30 m.
+/// Larger things stand, voxels: 30 m at 0.30 m.
 const EXTENT_MAX: f32 = 100.0;
 /// How far a fragment may lie from a moving thing that takes it along, columns.
 const NEAR: usize = 4;
@@ -170,8 +170,8 @@ impl Refinement {
         cloud.fill(profile, points, positions, columns, &mut self.order)
     }
 
-    /// Motion of the things of the pair's first sweep. `state` is the flow of the columns of the new
-    /// window, `predicted` the displacement a column's tracklet predicts, voxels.
+    /// Motion of the things of the pair's first sweep. `predicted` is the displacement that the
+    /// tracklet of a column of the new window predicts, voxels.
     pub(crate) fn run(
         &mut self,
         step: &Step,
@@ -289,8 +289,8 @@ impl Refinement {
         let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
         let segment = |i: i32, j: i32| {
             let inside = (0..side).contains(&i) && (0..side).contains(&j);
-            let segment = if inside { self.segment[(i * side + j) as usize] } else { NONE };
-            (segment != NONE).then(|| &self.found[segment as usize])
+            let segment = inside.then(|| self.segment[(i * side + j) as usize])?;
+            self.found.get(segment as usize)
         };
         let at = [i as f32 + 0.5, j as f32 + 0.5];
         if let Some(own) = segment(i, j) {

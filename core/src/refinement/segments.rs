@@ -24,7 +24,8 @@ impl Segments {
         }
     }
 
-    /// Segments of the columns of a cloud that may be `part` of any. `flow` tells the flow of a column, as far as there is one.
+    /// Segments of the columns of a cloud that may be `part` of any. `flow` tells the flow of a
+    /// column, as far as there is one.
     pub(super) fn find(
         &mut self,
         cloud: &Cloud,

@@ -244,7 +244,8 @@ impl Tracklets {
         let from = [column as i32 / side, column as i32 % side];
         let at: [f32; 2] = core::array::from_fn(|a| t.place[a] + by[a]);
         let cells = at.map(|v| libm::floorf(v) as i32);
-        let [i, j] = [from[0] + cells[0], from[1] + cells[1]];
+        // Two sweeps a nanosecond apart let a speed grow beyond all cells.
+        let [i, j] = [0, 1].map(|a| from[a].saturating_add(cells[a]));
         if !(0..side).contains(&i) || !(0..side).contains(&j) {
             turnover.left += 1;
             return NONE;

@@ -222,3 +222,19 @@ fn beyond_the_capacity_none_are_born() {
     // The old ones, waiting, found no room beside as many new ones.
     assert!(tracklets.all().iter().all(|t| t.age == 0));
 }
+
+#[test]
+fn a_speed_beyond_all_cells_leaves_the_window() {
+    let profile = profile();
+    let mut tracklets = new();
+    let mut step_over = |dt: f32, observed: &mut [Observation]| {
+        let step = step(SIDE, [0, 0]);
+        let left = tracklets.place(&step);
+        tracklets.update(&profile, &step, dt, 0.0, left, observed)
+    };
+    // Stamps a nanosecond apart, then none of it is seen for half a second.
+    step_over(1e-9, &mut [seen(cell(1, 10), [14.0, 0.0])]);
+    assert_eq!(step_over(1e-9, &mut [seen(cell(15, 10), [14.0, 0.0])]).updated, 1);
+    let turnover = step_over(0.5, &mut []);
+    assert_eq!((turnover.waiting, turnover.left), (1, 1));
+}
