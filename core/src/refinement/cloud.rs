@@ -25,8 +25,8 @@ pub const GROUND_HEIGHT: f32 = 0.6;
 const GROUND_RETURN: f32 = 0.35;
 /// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
 const THING_HEIGHT: f32 = 14.0;
-/// By how much the ground may fall from one of its cells to the next, voxels: 10 %.
-const GROUND_FALL: f32 = 0.2;
+/// By how much the ground may fall from one of its cells to the next, voxels: 7 %.
+const GROUND_FALL: f32 = 0.33;
 /// Returns so near tell which way the surface faces, voxels.
 const AROUND: f32 = 1.5;
 /// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.
