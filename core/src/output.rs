@@ -35,7 +35,7 @@ pub struct ColumnFlow {
     /// Displacement over ground until the second sweep, world axes, m: refined below the cell's
     /// size, zero where the column was found to stand still.
     pub displacement_m: [f32; 2],
-    /// Covariance of `displacement_m` (xx, xy, yy), m^2; zero for background and where unmatched.
+    /// Covariance of `displacement_m` (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub displacement_covariance: [f32; 3],
     /// Energy of the match in thousandths of a nat; meaningful where matched.
     pub energy: i32,
@@ -43,7 +43,7 @@ pub struct ColumnFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 2],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where not matched.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
     /// Observations of the tracklet after its birth (section 3.6.2).
     pub age: u32,
@@ -58,7 +58,7 @@ pub struct PointFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 3],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where not matched.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
     /// Age of the column's tracklet.
     pub age: u32,

@@ -34,7 +34,8 @@ pub struct Stepped<'a> {
 }
 
 impl Drive {
-    /// Allocates for a checked profile.
+    /// Allocates for a checked profile. The pipeline is made on the stack before it moves to the
+    /// heap: call it on a thread with 64 MiB of stack.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
         Drive {
             pipeline: Box::new(Pipeline::new(

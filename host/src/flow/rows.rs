@@ -22,7 +22,7 @@ pub struct Row {
     pub flow: [f32; 3],
     /// Motion over ground along the axes of the first cloud, m.
     pub motion: [f32; 3],
-    /// Covariance of the motion (xx, xy, yy), m^2; zero where not matched.
+    /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
     /// Where the motion comes from.
     pub origin: Origin,
