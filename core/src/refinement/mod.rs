@@ -108,7 +108,7 @@ struct Found {
     still: f32,
     /// Largest extent along an axis, voxels.
     extent: f32,
-    /// The thing it is a part of.
+    /// The thing it is a part of, or itself.
     whole: u32,
 }
 
@@ -212,7 +212,7 @@ impl Refinement {
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
             let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
-            let _ = self.found.push(found);
+            let _ = self.found.push(Found { whole: n as u32, ..found });
         }
         // What stands as a whole may have a part that does not.
         let stands = |c: usize| stands_still(&self.segment, &self.found, c);
