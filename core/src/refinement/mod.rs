@@ -1,6 +1,6 @@
 //! Refinement of the flow below the cell's size: things, and how each of them moved.
 //!
-//! Cells of 0.3 m bound what whole displacements can tell (design.md, section 5): this stage goes
+//! Cells of 0.3 m bound what whole displacements can tell: this stage goes
 //! back to the returns. Returns above the ground are thinned ([`cloud`]); columns that touch make
 //! things ([`segments`]); each thing is laid over the other sweep, and over earlier ones where
 //! [`crate::params::Profile::refinement_sweeps`] allows, starting from standing still, from what its
