@@ -1,6 +1,6 @@
 //! Refinement of the flow below the cell's size: things, and how each of them moved.
 //!
-//! Cells of 0.3 m bound what whole displacements can tell (design.md, section 5): this stage goes
+//! Cells of 0.3 m bound what whole displacements can tell: this stage goes
 //! back to the returns. Returns above the ground are thinned ([`cloud`]); columns that touch make
 //! things ([`segments`]); each thing is laid over the other sweep, and over earlier ones where
 //! [`crate::params::Profile::refinement_sweeps`] allows, starting from standing still, from what its
@@ -108,7 +108,7 @@ struct Found {
     still: f32,
     /// Largest extent along an axis, voxels.
     extent: f32,
-    /// The thing it is a part of.
+    /// The thing it is a part of, or itself.
     whole: u32,
 }
 
@@ -212,7 +212,7 @@ impl Refinement {
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
             let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
-            let _ = self.found.push(found);
+            let _ = self.found.push(Found { whole: n as u32, ..found });
         }
         // What stands as a whole may have a part that does not.
         let stands = |c: usize| stands_still(&self.segment, &self.found, c);
