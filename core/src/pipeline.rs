@@ -165,7 +165,8 @@ pub struct Flows<'a> {
     pub turnover: Turnover,
     /// Matched columns.
     pub valid: usize,
-    /// Solid columns beyond the capacity for foreground, which count as background.
+    /// Solid columns beyond the capacity for foreground, which count as background, and those beyond
+    /// as many that moved, which count as unmatched.
     pub foreground_dropped: usize,
 }
 
@@ -182,6 +183,7 @@ pub struct Pipeline {
     current: Option<Side>,
     tracklets: Tracklets,
     observed: heapless::Vec<Observation, FOREGROUND_MAX>,
+    unobserved: usize,
     column_of_point: [[u32; POINTS_MAX]; 2],
     is_apart: [[bool; POINTS_MAX]; 2],
     positions: [[f32; 3]; POINTS_MAX],
@@ -212,6 +214,7 @@ impl Pipeline {
             current: None,
             tracklets: Tracklets::new(),
             observed: heapless::Vec::new(),
+            unobserved: 0,
             column_of_point: [[NONE; POINTS_MAX]; 2],
             is_apart: [[false; POINTS_MAX]; 2],
             positions: [[0.0; 3]; POINTS_MAX],
@@ -369,7 +372,7 @@ impl Pipeline {
             dt_s: dt,
             turnover,
             valid,
-            foreground_dropped: perceived.marked - perceived.foreground.len(),
+            foreground_dropped: perceived.marked - perceived.foreground.len() + self.unobserved,
         })
     }
 
@@ -379,6 +382,7 @@ impl Pipeline {
         let r = self.profile.voxel_m as f32;
         let of_cells = self.profile.tracklet.measurement_cells * r;
         self.observed.clear();
+        self.unobserved = 0;
         for (column, record) in perceived.before.iter().enumerate() {
             let flow = perceived.state[column];
             if record[1] == 0 {
@@ -399,10 +403,8 @@ impl Pipeline {
                 continue;
             };
             let o = Observation { column: column as u32, moved, covariance, slot: NONE };
-            if self.observed.push(o).is_err() {
-                // As many as there may be foreground columns: those of the last rows stay without.
-                break;
-            }
+            // As many as there may be foreground columns: the last ones put out no motion.
+            self.unobserved += self.observed.push(o).is_err() as usize;
         }
     }
 
@@ -444,18 +446,17 @@ impl Pipeline {
                 position_vehicle_m: [at.x as f32, at.y as f32],
                 ..Default::default()
             };
-            if let Some(rank) = rank {
+            if rank.is_some() {
                 flow.origin = Origin::Unmatched;
-                if perceived.state[column] & VALID != 0 {
-                    valid += 1;
-                    flow.origin = Origin::Matched;
-                    flow.displacement_cells = flow_displacement(perceived.state[column]);
-                    flow.energy = perceived.proposal[rank][1] as i32;
-                }
+            }
+            let matched = rank.filter(|_| perceived.state[column] & VALID != 0);
+            if let Some(rank) = matched {
+                valid += 1;
+                flow.displacement_cells = flow_displacement(perceived.state[column]);
+                flow.energy = perceived.proposal[rank][1] as i32;
             }
             if let Some(observation) = observed.next_if(|o| o.column as usize == column) {
-                flow.origin =
-                    if flow.origin == Origin::Matched { Origin::Matched } else { Origin::Joined };
+                flow.origin = if matched.is_some() { Origin::Matched } else { Origin::Joined };
                 self.set_flow(&mut flow, observation, before, current, at, dt, turned);
             }
             let planar = DVec3::new(at.x, at.y, 0.0);

@@ -335,8 +335,8 @@ impl<'a> Thing<'a> {
         self.sweeps.first.nearest(at, q.sensor, TOUCHING).is_some_and(|n| n.0 < MISSED * MISSED)
     }
 
-    /// Lays the thing over the others, starting at `motion`.
-    pub fn align(&self, mut motion: Motion, visits: &mut Visits) -> Motion {
+    /// Lays the thing over the others, starting at `motion`, by every so many of its samples.
+    pub fn align(&self, mut motion: Motion, every: usize, visits: &mut Visits) -> Motion {
         let mut there = self.there(&motion, visits);
         let mut wide = WIDE_STEPS;
         for _ in 0..STEPS {
@@ -367,7 +367,7 @@ impl<'a> Thing<'a> {
                 g[2] += a * fx + b * fy;
             };
             for other in others {
-                for s in &self.samples {
+                for s in self.samples.iter().step_by(every) {
                     let at = moved(s, &motion, other);
                     if let Some((_, q)) = other.cloud.nearest(at, s.sensor, 0.0) {
                         let weight = self.sweeps.first.weight(s.index);
@@ -375,7 +375,7 @@ impl<'a> Thing<'a> {
                     }
                 }
             }
-            for q in &there {
+            for q in there.iter().step_by(every) {
                 let at = self.back(q, &motion);
                 if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor, 0.0) {
                     let weight = self.sweeps.others[0].cloud.weight(q.index);

@@ -37,6 +37,9 @@ const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
 /// Height of the ground, by cells of [`GROUND_CELL`] columns.
 struct Ground {
     side: usize,
+    /// Columns along an axis of the window that `cell` is for.
+    columns: usize,
+    cell: [u16; COLUMNS_MAX],
     /// The three lowest returns of each.
     lowest: [[f32; 3]; GROUND_SIDE * GROUND_SIDE],
     height: [f32; GROUND_SIDE * GROUND_SIDE],
@@ -47,18 +50,28 @@ impl Ground {
     const fn new() -> Ground {
         let none = [f32::INFINITY; GROUND_SIDE * GROUND_SIDE];
         let lowest = [[f32::INFINITY; 3]; GROUND_SIDE * GROUND_SIDE];
-        Ground { side: 0, lowest, height: none, followed: none }
+        Ground { side: 0, columns: 0, cell: [0; COLUMNS_MAX], lowest, height: none, followed: none }
     }
 
-    fn cell(&self, side: usize, column: usize) -> usize {
-        column / side / GROUND_CELL * self.side + column % side / GROUND_CELL
+    /// Lists the cell of every column: divisions take longer than looking it up.
+    fn list_cells(&mut self, side: usize) {
+        if self.columns == side {
+            return;
+        }
+        self.columns = side;
+        self.side = side.div_ceil(GROUND_CELL);
+        for i in 0..side {
+            for j in 0..side {
+                let cell = i / GROUND_CELL * self.side + j / GROUND_CELL;
+                self.cell[i * side + j] = cell as u16;
+            }
+        }
     }
 
     /// The third-lowest return of each cell, or of its neighbours if the ground falls that way:
     /// mirrored returns come from below, but seldom together.
     fn estimate(&mut self, profile: &Profile, positions: &[[f32; 3]], columns: &[u32]) {
-        let side = profile.side as usize;
-        self.side = side.div_ceil(GROUND_CELL);
+        self.list_cells(profile.side as usize);
         self.lowest.fill([f32::INFINITY; 3]);
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
@@ -70,7 +83,7 @@ impl Ground {
             if p[2] < level - STEP - SLOPE * away {
                 continue;
             }
-            let cell = self.cell(side, column as usize);
+            let cell = self.cell[column as usize] as usize;
             let mut z = p[2];
             for low in &mut self.lowest[cell] {
                 (*low, z) = (low.min(z), low.max(z));
@@ -97,8 +110,8 @@ impl Ground {
     }
 
     /// Height above the ground of a place in a column, voxels.
-    fn above(&self, side: usize, column: usize, z: f32) -> f32 {
-        z - self.height[self.cell(side, column)]
+    fn above(&self, column: usize, z: f32) -> f32 {
+        z - self.height[self.cell[column] as usize]
     }
 }
 
@@ -156,7 +169,7 @@ impl Cloud {
         self.side = side;
         self.ground.estimate(profile, positions, columns);
         let ground = &self.ground;
-        let height = |n: usize| ground.above(side, columns[n] as usize, positions[n][2]);
+        let height = |n: usize| ground.above(columns[n] as usize, positions[n][2]);
         let is_thing =
             |n: usize| columns[n] != NONE && (GROUND_HEIGHT..THING_HEIGHT).contains(&height(n));
         // A counting sort keeps the source's order within a column.
@@ -225,13 +238,13 @@ impl Cloud {
             return false;
         }
         let column = at[0] as usize * self.side + at[1] as usize;
-        let height = self.ground.above(self.side, column, at[2]);
+        let height = self.ground.above(column, at[2]);
         (0.0..LEVELS_MAX as f32).contains(&height) && self.levels[column] >> height as u32 & 1 != 0
     }
 
     /// Whether a return in a column is of the ground, or higher than things are.
     pub fn is_apart(&self, column: u32, z: f32) -> bool {
-        let height = self.ground.above(self.side, column as usize, z);
+        let height = self.ground.above(column as usize, z);
         !(GROUND_RETURN..THING_HEIGHT).contains(&height)
     }
 

@@ -28,6 +28,10 @@ use segments::Segments;
 const STARTS: usize = 3;
 /// A thing that fits its place so well stands: misfits are shares of what could be missed.
 const STANDS: f32 = 0.08;
+/// A start is first tried by every so many samples, and by all of them where that leads to no worse
+/// a fit than the best so far, this much apart.
+const FEW: usize = 3;
+const PROMISING: f32 = 0.0;
 /// A start that leads to so good a fit is the last.
 const FITS: f32 = 0.05;
 /// Starts as near to each other lead to the same, voxels.
@@ -335,10 +339,13 @@ fn motion(
         if !tried.iter().any(known) {
             // There is room for every start.
             let _ = tried.push(by);
-            let motion = thing.align(still.by(by), visits);
-            let misfit = thing.misfit(&motion, visits);
-            if misfit < best.0 {
-                best = (misfit, motion);
+            let motion = thing.align(still.by(by), FEW, visits);
+            if thing.misfit(&motion, visits) < best.0 + PROMISING {
+                let motion = thing.align(motion, 1, visits);
+                let misfit = thing.misfit(&motion, visits);
+                if misfit < best.0 {
+                    best = (misfit, motion);
+                }
             }
         }
         best.0
