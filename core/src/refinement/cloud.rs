@@ -115,6 +115,9 @@ impl Ground {
     }
 }
 
+/// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
+const UNKNOWN: Weight = [0.0; 6];
+
 /// A return above the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Return {
@@ -150,7 +153,7 @@ impl Cloud {
             ground: Ground::new(),
             points: heapless::Vec::new(),
             start: [0; COLUMNS_MAX + 1],
-            weights: [const { Cell::new([f32::NAN; 6]) }; CLOUD_MAX],
+            weights: [const { Cell::new(UNKNOWN) }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
@@ -221,7 +224,7 @@ impl Cloud {
             }
         }
         start[columns_used] = self.points.len() as u32;
-        self.weights[..self.points.len()].iter().for_each(|w| w.set([f32::NAN; 6]));
+        self.weights[..self.points.len()].iter().for_each(|w| w.set(UNKNOWN));
         dropped
     }
 
@@ -308,7 +311,7 @@ impl Cloud {
     /// What the returns around a return tell about the surface it lies on.
     pub fn weight(&self, n: u32) -> Weight {
         let known = self.weights[n as usize].get();
-        if !known[0].is_nan() {
+        if known != UNKNOWN {
             return known;
         }
         let Return { at, sensor } = self.points[n as usize];

@@ -1,7 +1,7 @@
 //! Refinement of the flow below the cell's size: things, and how each of them moved.
 //!
-//! Cells of 0.3 m bound what whole displacements can tell: this stage goes
-//! back to the returns. Returns above the ground are thinned ([`cloud`]); columns that touch make
+//! Cells of 0.3 m bound what whole displacements can tell: this stage goes back to the returns.
+//! Returns above the ground are thinned ([`cloud`]); columns that touch make
 //! things ([`segments`]); each thing is laid over the other sweep, and over earlier ones where
 //! [`crate::params::Profile::refinement_sweeps`] allows, starting from standing still, from what its
 //! tracklets predict, from the displacements most of its columns found by energy minimisation, and,
@@ -28,10 +28,9 @@ use segments::Segments;
 const STARTS: usize = 3;
 /// A thing that fits its place so well stands: misfits are shares of what could be missed.
 const STANDS: f32 = 0.08;
-/// A start is first tried by every so many samples, and by all of them where that leads to no worse
-/// a fit than the best so far, this much apart.
+/// A start is first tried by every so many samples, and by all of them where that leads to a better
+/// fit than the best so far.
 const FEW: usize = 3;
-const PROMISING: f32 = 0.0;
 /// A start that leads to so good a fit is the last.
 const FITS: f32 = 0.05;
 /// Starts as near to each other lead to the same, voxels.
@@ -144,7 +143,7 @@ impl Refinement {
             newest: 0,
             segments: Segments::new(),
             order: [0; POINTS_MAX],
-            segment: [NONE; COLUMNS_MAX],
+            segment: [0; COLUMNS_MAX],
             found: heapless::Vec::new(),
             visits: Visits::new(),
         }
@@ -340,7 +339,7 @@ fn motion(
             // There is room for every start.
             let _ = tried.push(by);
             let motion = thing.align(still.by(by), FEW, visits);
-            if thing.misfit(&motion, visits) < best.0 + PROMISING {
+            if thing.misfit(&motion, visits) < best.0 {
                 let motion = thing.align(motion, 1, visits);
                 let misfit = thing.misfit(&motion, visits);
                 if misfit < best.0 {

@@ -18,7 +18,7 @@ pub struct Segments {
 impl Segments {
     pub(super) const fn new() -> Segments {
         Segments {
-            parent: [NONE; COLUMNS_MAX],
+            parent: [0; COLUMNS_MAX],
             columns: heapless::Vec::new(),
             ends: heapless::Vec::new(),
         }

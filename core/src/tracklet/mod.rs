@@ -119,7 +119,7 @@ impl Tracklets {
             now: heapless::Vec::new(),
             next: heapless::Vec::new(),
             slot_of_column: [NONE; COLUMNS_MAX],
-            observation_of_column: [NONE; COLUMNS_MAX],
+            observation_of_column: [0; COLUMNS_MAX],
             claimed: [false; FOREGROUND_MAX],
         }
     }
