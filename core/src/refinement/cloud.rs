@@ -48,8 +48,8 @@ struct Ground {
 
 impl Ground {
     const fn new() -> Ground {
-        let none = [f32::INFINITY; GROUND_SIDE * GROUND_SIDE];
-        let lowest = [[f32::INFINITY; 3]; GROUND_SIDE * GROUND_SIDE];
+        let none = [0.0; GROUND_SIDE * GROUND_SIDE];
+        let lowest = [[0.0; 3]; GROUND_SIDE * GROUND_SIDE];
         Ground { side: 0, columns: 0, cell: [0; COLUMNS_MAX], lowest, height: none, followed: none }
     }
 
