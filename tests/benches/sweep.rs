@@ -155,7 +155,15 @@ fn map(sweeps: &[SimSweep]) {
     table("sparse map, profile map, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
 }
 
+/// The pipeline is made on the stack before it moves to the heap.
+const STACK: usize = 64 << 20;
+
 fn main() {
+    let worker = std::thread::Builder::new().stack_size(STACK).spawn(run);
+    worker.expect("the system has threads").join().expect("the thread that measures panicked");
+}
+
+fn run() {
     let given = |argument: &str| std::env::args().any(|a| a == argument);
     let count = if given("--bench") && !given("--test") { 20 } else { 2 };
     let ego = Ego::Turn { left: true, speed: 6.0 };
