@@ -217,8 +217,11 @@ impl Cloud {
                     let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
                     if *word & 1 << (bit % 32) == 0 {
                         *word |= 1 << (bit % 32);
-                        self.levels[c] |= 1 << height(n as usize) as u32;
-                        dropped += self.points.push(Return { at: p, sensor }).is_err() as usize;
+                        if self.points.push(Return { at: p, sensor }).is_ok() {
+                            self.levels[c] |= 1 << height(n as usize) as u32;
+                        } else {
+                            dropped += 1;
+                        }
                     }
                 }
             }

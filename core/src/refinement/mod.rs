@@ -59,10 +59,16 @@ const AS_WELL: f32 = 0.03;
 /// By how much more than standing still the motion of its larger part may misfit what is left of a
 /// thing.
 const REST: f32 = 0.05;
+/// Share of a thing's extent that a part must have to take the rest along.
+const MOST: f32 = 0.5;
 /// Share of returns to be seen before standing still is believed.
 const SEEN: f32 = 0.5;
 /// Larger things stand, voxels: 30 m at 0.30 m.
 const EXTENT_MAX: f32 = 100.0;
+/// How far a column of low returns may lie from a moving thing whose edge it is, columns, and how
+/// far its match from that thing's motion, cells.
+const EDGE: i32 = 2;
+const ALIKE: f32 = 1.5;
 /// How far a fragment may lie from a moving thing that takes it along, columns.
 const NEAR: usize = 4;
 /// Moving things near a fragment that are tried.
@@ -122,8 +128,13 @@ pub struct Refinement {
     held: usize,
     /// Where the newest is.
     newest: usize,
-    segments: Segments,
     order: [u32; POINTS_MAX],
+    things: Things,
+}
+
+/// The things of a pair's first sweep, and what became of them.
+struct Things {
+    segments: Segments,
     /// Segment of each column of the first sweep's window.
     segment: [u32; COLUMNS_MAX],
     found: heapless::Vec<Found, COLUMNS_MAX>,
@@ -141,11 +152,13 @@ impl Refinement {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             held: 0,
             newest: 0,
-            segments: Segments::new(),
             order: [0; POINTS_MAX],
-            segment: [0; COLUMNS_MAX],
-            found: heapless::Vec::new(),
-            visits: Visits::new(),
+            things: Things {
+                segments: Segments::new(),
+                segment: [0; COLUMNS_MAX],
+                found: heapless::Vec::new(),
+                visits: Visits::new(),
+            },
         }
     }
 
@@ -181,8 +194,9 @@ impl Refinement {
         perceived: &Perceived,
         predicted: impl Fn(usize) -> Option<[f32; 2]>,
     ) {
-        self.found.clear();
-        self.segment.fill(NONE);
+        let things = &mut self.things;
+        things.found.clear();
+        things.segment.fill(NONE);
         if self.held < 2 {
             return;
         }
@@ -209,7 +223,66 @@ impl Refinement {
             });
         }
         let sweeps = Sweeps { first, others: &others, before, now };
-        self.segments.find(first, |_| true, flow);
+        things.wholes(sweeps, flow, predicted);
+        things.parts(sweeps, flow, predicted);
+        things.rest(sweeps);
+    }
+
+    /// How a column of the first sweep's window moved, as part of a thing that does.
+    pub(crate) fn at(&self, column: u32) -> Option<Refined> {
+        let segment = *self.things.segment.get(column as usize)?;
+        let motion = self.things.found.get(segment as usize)?.motion?;
+        let side = self.clouds[index(self.newest, 1)].side as u32;
+        let at = [column / side, column % side].map(|c| c as f32 + 0.5);
+        Some(Refined::moving(&motion, at))
+    }
+
+    /// Whether a return of the newest sweep is of the ground, or higher than things are.
+    pub(crate) fn is_apart(&self, column: u32, z: f32) -> bool {
+        self.clouds[self.newest].is_apart(column, z)
+    }
+
+    /// How a column of the new window moved, or that it stands.
+    pub(crate) fn of(&self, step: &Step, column: usize, flow: Flow) -> Refined {
+        let side = step.side;
+        let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
+        let segment = |i: i32, j: i32| {
+            let inside = (0..side).contains(&i) && (0..side).contains(&j);
+            let segment = inside.then(|| self.things.segment[(i * side + j) as usize])?;
+            self.things.found.get(segment as usize)
+        };
+        let at = [i as f32 + 0.5, j as f32 + 0.5];
+        if let Some(own) = segment(i, j) {
+            return match own.motion {
+                Some(motion) => Refined::moving(&motion, at),
+                None => Refined::standing(own.still),
+            };
+        }
+        // Nothing but low returns: the lower edge of a thing, where the match says so.
+        if flow & VALID == 0 {
+            return Refined::standing(0.0);
+        }
+        let cells = flow_displacement(flow);
+        for (di, dj) in (-EDGE..=EDGE).flat_map(|a| (-EDGE..=EDGE).map(move |b| (a, b))) {
+            let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
+            let refined = Refined::moving(&motion, at);
+            if (0..2).all(|a| (cells[a] as f32 - refined.by[a]).abs() <= ALIKE) {
+                return refined;
+            }
+        }
+        Refined::standing(0.0)
+    }
+}
+
+impl Things {
+    /// Things as they touch: the best motion of each.
+    fn wholes(
+        &mut self,
+        sweeps: Sweeps,
+        flow: impl Fn(usize) -> Flow + Copy,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+    ) {
+        self.segments.find(sweeps.first, |_| true, flow);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
@@ -217,10 +290,18 @@ impl Refinement {
             let found = motion(&thing, flow, predicted, &mut self.visits);
             let _ = self.found.push(Found { whole: n as u32, ..found });
         }
-        // What stands as a whole may have a part that does not.
+    }
+
+    /// What stands as a whole may have a part that does not.
+    fn parts(
+        &mut self,
+        sweeps: Sweeps,
+        flow: impl Fn(usize) -> Flow + Copy,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+    ) {
         let stands = |c: usize| stands_still(&self.segment, &self.found, c);
         self.segments.find(
-            first,
+            sweeps.first,
             |c| {
                 stands(c)
                     && flow(c) & VALID != 0
@@ -241,11 +322,14 @@ impl Refinement {
                 let _ = self.found.push(Found { whole, ..found });
             }
         }
-        // What is left of it, and fragments of other things that move.
-        self.segments.find(first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
+    }
+
+    /// What is left of such a thing, and fragments beside others that move.
+    fn rest(&mut self, sweeps: Sweeps) {
+        self.segments.find(sweeps.first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
-            let near = neighbours(side, columns, &self.segment, &self.found);
+            let near = neighbours(sweeps.first.side, columns, &self.segment, &self.found);
             if near.is_empty() {
                 continue;
             }
@@ -261,7 +345,7 @@ impl Refinement {
                 let Some(motion) = found.motion else { continue };
                 let misfit = thing.misfit(&motion, &mut self.visits);
                 let rest =
-                    found.whole == whole && found.extent > 0.5 * self.found[whole as usize].extent;
+                    found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;
                 let joins = gain(still, misfit) > GAIN || hidden || rest && misfit < still + REST;
                 if joins && misfit < best {
@@ -270,51 +354,6 @@ impl Refinement {
                 }
             }
         }
-    }
-
-    /// How a column of the first sweep's window moved, as part of a thing that does.
-    pub(crate) fn at(&self, column: u32) -> Option<Refined> {
-        let segment = *self.segment.get(column as usize)?;
-        let motion = self.found.get(segment as usize)?.motion?;
-        let side = self.clouds[index(self.newest, 1)].side as u32;
-        let at = [column / side, column % side].map(|c| c as f32 + 0.5);
-        Some(Refined::moving(&motion, at))
-    }
-
-    /// Whether a return of the newest sweep is of the ground, or higher than things are.
-    pub(crate) fn is_apart(&self, column: u32, z: f32) -> bool {
-        self.clouds[self.newest].is_apart(column, z)
-    }
-
-    /// How a column of the new window moved, or that it stands.
-    pub(crate) fn of(&self, step: &Step, column: usize, flow: Flow) -> Refined {
-        let side = step.side;
-        let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
-        let segment = |i: i32, j: i32| {
-            let inside = (0..side).contains(&i) && (0..side).contains(&j);
-            let segment = inside.then(|| self.segment[(i * side + j) as usize])?;
-            self.found.get(segment as usize)
-        };
-        let at = [i as f32 + 0.5, j as f32 + 0.5];
-        if let Some(own) = segment(i, j) {
-            return match own.motion {
-                Some(motion) => Refined::moving(&motion, at),
-                None => Refined::standing(own.still),
-            };
-        }
-        // Nothing but low returns: the lower edge of a thing, where the match says so.
-        if flow & VALID == 0 {
-            return Refined::standing(0.0);
-        }
-        let cells = flow_displacement(flow);
-        for (di, dj) in (-2..=2).flat_map(|a| (-2..=2).map(move |b| (a, b))) {
-            let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
-            let refined = Refined::moving(&motion, at);
-            if (0..2).all(|a| (cells[a] as f32 - refined.by[a]).abs() <= 1.5) {
-                return refined;
-            }
-        }
-        Refined::standing(0.0)
     }
 }
 

@@ -466,10 +466,10 @@ fn a_wall_that_seems_to_move_stands() {
     };
     let step = Step { side: 167, ..Step::default() };
     refinement.run(&step, &perceived, |_| Some([10.0, 0.0]));
-    let longest = refinement.found.iter().map(|f| f.extent).fold(0.0, f32::max);
+    let longest = refinement.things.found.iter().map(|f| f.extent).fold(0.0, f32::max);
     assert!(longest > EXTENT_MAX, "{longest}");
     let moves = |f: &Found| f.extent > EXTENT_MAX && f.motion.is_some();
-    assert!(!refinement.found.iter().any(moves));
+    assert!(!refinement.things.found.iter().any(moves));
 }
 
 #[test]
