@@ -266,7 +266,7 @@ impl Cloud {
     }
 
     /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
-    /// (voxels) and itself; of two as near the first in order. The first one closer than `enough`
+    /// (voxels) and itself; of two as near one, always the same. The first one closer than `enough`
     /// will do.
     pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, [f32; 3])> {
         let side = self.side as f32;

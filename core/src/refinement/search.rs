@@ -3,15 +3,15 @@
 use super::align::Thing;
 
 /// Displacements searched either way, voxels: 30 m/s at 0.30 m and 10 Hz.
-const REACH: i32 = 10;
+const FARTHEST: i32 = 10;
 
 /// The displacement that puts most of the thing's returns on returns of the newest sweep; what
 /// stood there before counts half. The first of those as good.
 pub fn search(thing: &Thing) -> [f32; 2] {
     let other = &thing.sweeps.others[0];
     let mut best = (0, [0.0; 2]);
-    for du in -REACH..=REACH {
-        for dv in -REACH..=REACH {
+    for du in -FARTHEST..=FARTHEST {
+        for dv in -FARTHEST..=FARTHEST {
             let by = [du as f32, dv as f32];
             let mut score = 0;
             for s in &thing.samples {
