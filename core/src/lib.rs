@@ -13,6 +13,7 @@ pub mod grid;
 pub mod layout;
 pub mod map;
 pub mod motion_compensation;
+pub mod objects;
 pub mod occupancy_constancy;
 pub mod output;
 pub mod params;

@@ -1,0 +1,36 @@
+//! Object tracks with shape (chapter 2): what the returns of one object say of its trajectory and
+//! its shape, together and in continuous time.
+//!
+//! A track has an anchor, a place in the world near its birth, and a start, the time of its birth.
+//! Positions of a track are metres from its anchor along the world's axes (z up), times seconds
+//! after its start: single precision then holds a return wherever and whenever one drives.
+
+/// One return of an object.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ObjectReturn {
+    /// Where the ray ended, m from the track's anchor.
+    pub position: [f32; 3],
+    /// Where the ray began, m from the track's anchor.
+    pub origin: [f32; 3],
+    /// When, s after the track's start.
+    pub time_s: f32,
+    /// Sensor that saw it, index in [`crate::sweep::Rig::sensors`].
+    pub sensor: u32,
+}
+
+/// State of an object at a time (2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ObjectState {
+    /// s after the track's start.
+    pub time_s: f64,
+    /// Origin of the object's frame, m from the track's anchor.
+    pub position: [f64; 3],
+    /// Direction of its x axis about +z, rad, unwrapped: no jump by a turn along a track.
+    pub heading: f64,
+    /// Speed along its x axis, m/s.
+    pub speed: f64,
+    /// Speed upwards, m/s.
+    pub climb: f64,
+    /// Turning rate, rad/s.
+    pub turn_rate: f64,
+}
