@@ -385,8 +385,10 @@ impl Estimator {
             if begun {
                 self.descend(params, GROWTH_M, 2, None);
             }
-            self.extract(params.model / 2, GROWTH_M);
-            self.descend(params, GROWTH_M, if begun { 1 } else { 6 }, None);
+            for _ in 0..if begun { 1 } else { 6 } {
+                self.extract(params.model / 2, GROWTH_M);
+                self.descend(params, GROWTH_M, if begun { 2 } else { 6 }, None);
+            }
             if from <= first && to >= last {
                 break;
             }
