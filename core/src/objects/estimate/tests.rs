@@ -19,13 +19,16 @@ fn experiment() {
     let variants = [
         ("dissertation", EstimateParams::dissertation()),
         ("default", d),
-        ("loose .3", EstimateParams { loose_m: 0.3, ..d }),
-        ("loose .3 1 stage", EstimateParams { loose_m: 0.3, stages: 1, ..d }),
+        ("default it 5", EstimateParams { iterations: 5, ..d }),
+        ("stages 1 it 6", EstimateParams { iterations: 6, stages: 1, ..d }),
+        ("robust 5", EstimateParams { robust: 5.0, ..d }),
+        ("undamped", EstimateParams { damping: false, ..d }),
     ];
     let mut estimator = Box::new(Estimator::new());
-    for (set, plan) in [("moving", synthetic::moving as fn(u64) -> synthetic::Plan)] {
-        let drives: Vec<synthetic::Drive> =
-            [2, 6, 8, 9, 10, 19, 21, 23].map(|seed| drive(plan(seed))).into();
+    for (set, plan) in
+        [("parked", synthetic::parked as fn(u64) -> synthetic::Plan), ("moving", synthetic::moving)]
+    {
+        let drives: Vec<synthetic::Drive> = (0..16).map(|seed| drive(plan(seed))).collect();
         let counts: Vec<usize> = drives.iter().map(|d| d.returns.len()).collect();
         println!("{set} {counts:?}");
         let base: Vec<Errors> = drives.iter().map(history_errors).collect();
