@@ -17,6 +17,7 @@
 //! eliminates the model. Everything is in double precision but the places of returns and model points:
 //! `Q_u^-1` reaches 1e6 beside `R_z^-1` of 4.
 
+mod ends;
 mod nearest;
 mod normal;
 mod process;
@@ -35,6 +36,7 @@ use core::ops::Range;
 
 use super::spline::{BASES_MAX, Knots, Laid};
 use super::{ObjectReturn, ObjectState};
+use ends::Ends;
 use nearest::{Nearest, square_distance};
 use normal::{Equations, Seen, Surface};
 use process::Weights;
@@ -98,6 +100,8 @@ pub struct EstimateParams {
     pub loose_m: f64,
     /// The start is smoothed with the process model, and one at rest is tried beside it.
     pub starts: bool,
+    /// Deviation of a return at an end of the object, m; 0 to leave ends out, see [`ends`].
+    pub ends_m: f64,
     /// The start grows from the middle of the track, see [`Estimator::grow`].
     pub grows: bool,
 }
@@ -120,6 +124,7 @@ impl EstimateParams {
             surfaces: false,
             loose_m: 0.0,
             starts: false,
+            ends_m: 0.0,
             grows: false,
         }
     }
@@ -136,6 +141,7 @@ impl Default for EstimateParams {
             surfaces: true,
             loose_m: 0.5,
             starts: true,
+            ends_m: 0.1,
             grows: true,
             ..EstimateParams::dissertation()
         }
@@ -211,6 +217,8 @@ struct Solution {
     model: [[f32; 3]; MODEL_MAX],
     surfaces: [Surface; MODEL_MAX],
     points: usize,
+    /// Front and rear, m along the object.
+    ends: [f32; 2],
 }
 
 impl Solution {
@@ -219,11 +227,13 @@ impl Solution {
         model: [[0.0; 3]; MODEL_MAX],
         surfaces: [Surface::NONE; MODEL_MAX],
         points: 0,
+        ends: [0.0; 2],
     };
 
     fn copy(&mut self, other: &Solution) {
         self.weights = other.weights;
         self.points = other.points;
+        self.ends = other.ends;
         self.model[..other.points].copy_from_slice(&other.model[..other.points]);
         self.surfaces[..other.points].copy_from_slice(&other.surfaces[..other.points]);
     }
@@ -253,6 +263,7 @@ pub struct Estimator {
     order: [u16; RETURNS_MAX],
     starts: [u16; MODEL_MAX + 1],
     nearest: Nearest<MODEL_MAX>,
+    ends: Ends,
     equations: Equations,
     step: [Weights; BASES_MAX],
 }
@@ -278,6 +289,7 @@ impl Estimator {
             order: [0; RETURNS_MAX],
             starts: [0; MODEL_MAX + 1],
             nearest: Nearest::new(),
+            ends: Ends::new(),
             equations: Equations::new(),
             step: [[0.0; 7]; BASES_MAX],
         }
@@ -437,6 +449,8 @@ impl Estimator {
         };
         self.now.surfaces[..points].fill(surface);
         self.now.points = points;
+        self.ends.find(kept, &self.seen, params.ends_m);
+        self.now.ends = self.ends.begin();
     }
 
     /// Gauss-Newton iterations with one deviation.
@@ -586,6 +600,9 @@ impl Estimator {
             cost.residual_m += f64::from(libm::sqrtf(square_distance(model, &place)));
         }
         cost.residual_m /= count as f64;
+        let kept = &self.returns.all()[self.active.clone()];
+        self.ends.find(kept, &self.seen[..count], params.ends_m);
+        cost.returns += self.ends.lay(&self.now.ends);
         cost
     }
 
@@ -602,6 +619,7 @@ impl Estimator {
             let (model, surface) = (&now.model[number], &now.surfaces[number]);
             self.equations.eliminate(order, kept, &self.seen, model, surface);
         }
+        self.ends.add(&now.ends, &mut self.equations);
         self.equations.planar.damp(damping);
         self.equations.vertical.damp(damping);
         let step = &mut self.step[..n];
@@ -614,6 +632,7 @@ impl Estimator {
                 *value = (f64::from(*value) + by) as f32;
             }
         }
+        self.ends.follow(&mut now.ends, step);
         for (weights, step) in now.weights.iter_mut().zip(step) {
             for (weight, step) in weights.iter_mut().zip(step) {
                 *weight += *step;

@@ -102,7 +102,7 @@ pub(super) struct Seen {
     turning: [f64; 2],
     /// By how much it misses the model, m, and how precisely, 1/m², along every axis.
     miss: [f64; 3],
-    precision: [f64; 3],
+    pub precision: [f64; 3],
 }
 
 impl Seen {
@@ -129,6 +129,12 @@ impl Seen {
     pub fn place(&self) -> [f64; 3] {
         let [x, y, z] = self.arm;
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
+    }
+
+    /// A place in the world, seen in the object's plane from the object's origin at the same time.
+    pub fn view(&self, origin: [f32; 3], at: [f32; 3]) -> [f64; 2] {
+        let [x, y] = [0, 1].map(|d| f64::from(origin[d]) - f64::from(at[d]) + self.arm[d]);
+        [self.cos * x + self.sin * y, self.cos * y - self.sin * x]
     }
 
     /// Squared distance from the object's origin, m².

@@ -14,13 +14,18 @@ const TICKS_PER_PART: usize = TICKS / PARTS;
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
     pub position: [f32; 3],
+    pub origin: [f32; 3],
     pub time_s: f32,
     pub basis: Basis,
 }
 
 impl Kept {
-    pub const NONE: Kept =
-        Kept { position: [0.0; 3], time_s: 0.0, basis: Basis { first: 0, values: [0.0; 5] } };
+    pub const NONE: Kept = Kept {
+        position: [0.0; 3],
+        origin: [0.0; 3],
+        time_s: 0.0,
+        basis: Basis { first: 0, values: [0.0; 5] },
+    };
 }
 
 /// They, in the order of time.
@@ -103,8 +108,12 @@ impl Returns {
             if (rank + 1) * kept / count > nth {
                 let place = (places[part] + nth as u32) as usize;
                 if place < RETURNS_MAX {
-                    self.kept[place] =
-                        Kept { position: seen.position, time_s: seen.time_s, ..Kept::NONE };
+                    self.kept[place] = Kept {
+                        position: seen.position,
+                        origin: seen.origin,
+                        time_s: seen.time_s,
+                        ..Kept::NONE
+                    };
                 }
             }
         }

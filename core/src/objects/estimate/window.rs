@@ -123,6 +123,8 @@ impl FixedLag {
         returns: &[ObjectReturn],
         baseline: &ObjectState,
     ) -> ObjectState {
+        // So few returns of a sweep do not reach the object's ends.
+        let params = &EstimateParams { ends_m: 0.0, ..*params };
         let sound = || returns.iter().filter(|seen| returns::finite(seen));
         let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
         if start::finite(baseline) {
@@ -215,6 +217,7 @@ impl FixedLag {
                 position: held.position,
                 time_s: held.time_s,
                 basis: self.knots.basis(f64::from(held.time_s)),
+                ..super::returns::Kept::NONE
             };
             let place = Seen::look(&self.weights, &kept).place();
             point.held = (point.held + 1.0).min(HELD_RETURNS);

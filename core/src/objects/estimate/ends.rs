@@ -1,0 +1,153 @@
+//! Where an object ends, and what that says of its motion.
+//!
+//! Along a smooth side all trajectories explain the returns alike: a long vehicle that passes by then
+//! seems to stand, and its side grows instead (the failure of figure 2.9). But a ray beyond its end
+//! passes: in every part of the track the foremost and the hindmost return lie at the same two places
+//! of the object, unless something hides them. Both places are unknowns, eliminated as a model point
+//! is. A return that falls short of its end counts for less than one beyond it, as the end may be
+//! hidden; hardly at all where the sensor looks along the object from its other end.
+
+use super::normal::{Equations, Seen, Surface, follow};
+use super::process::Weights;
+use super::returns::Kept;
+
+/// A part of the track, s.
+const PART_S: f32 = 0.2;
+/// Parts at most; later ones tell nothing.
+const PARTS: usize = 160;
+/// Returns of a part that tell where it ends.
+const ENOUGH: usize = 6;
+/// A return further off than this counts no more for being further, m.
+const BOUND_M: f64 = 0.3;
+/// Share that counts of one that falls short.
+const SHORT: f64 = 0.3;
+/// Slope of the view, across to along, from which on the far end is believed to be seen.
+const SLOPE: f64 = 0.3;
+/// Precision of an end without returns, 1/m²: none.
+const LOOSE: f64 = 1e-6;
+
+/// The returns that are foremost and hindmost in their part of the track.
+pub(super) struct Ends {
+    kept: [[Kept; PARTS]; 2],
+    seen: [[Seen; PARTS]; 2],
+    order: [u16; PARTS],
+    count: usize,
+    precision: f64,
+}
+
+impl Ends {
+    pub const fn new() -> Ends {
+        let mut order = [0; PARTS];
+        let mut n = 0;
+        while n < PARTS {
+            order[n] = n as u16;
+            n += 1;
+        }
+        Ends {
+            kept: [[Kept::NONE; PARTS]; 2],
+            seen: [[Seen::NONE; PARTS]; 2],
+            order,
+            count: 0,
+            precision: 0.0,
+        }
+    }
+
+    /// Takes them from all returns, in the order of time.
+    pub fn find(&mut self, kept: &[Kept], seen: &[Seen], deviation_m: f64) {
+        self.count = 0;
+        self.precision = if deviation_m > 0.0 { 1.0 / (deviation_m * deviation_m) } else { 0.0 };
+        if deviation_m <= 0.0 {
+            return;
+        }
+        let mut from = 0;
+        while from < kept.len() && self.count < PARTS {
+            let until = kept[from].time_s + PART_S;
+            let to = from + kept[from..].partition_point(|kept| kept.time_s < until).max(1);
+            if to - from >= ENOUGH {
+                let along = |i: usize| seen[i].place()[0];
+                let (mut last, mut first) = (from, from);
+                for i in from..to {
+                    if along(i) > along(last) {
+                        last = i;
+                    }
+                    if along(i) < along(first) {
+                        first = i;
+                    }
+                }
+                for (end, i) in [last, first].into_iter().enumerate() {
+                    self.kept[end][self.count] = kept[i];
+                    self.seen[end][self.count] = seen[i];
+                }
+                self.count += 1;
+            }
+            from = to;
+        }
+    }
+
+    /// Where the ends are at first: beyond all but a fifth of them.
+    pub fn begin(&self) -> [f32; 2] {
+        let mut places = [0.0f32; PARTS];
+        let fifth = self.count / 5;
+        core::array::from_fn(|end| {
+            for (place, seen) in places.iter_mut().zip(&self.seen[end][..self.count]) {
+                *place = seen.place()[0] as f32;
+            }
+            let places = &mut places[..self.count];
+            places.sort_unstable_by(f32::total_cmp);
+            let nth = if end == 0 { self.count.saturating_sub(1 + fifth) } else { fifth };
+            places.get(nth).copied().unwrap_or(0.0)
+        })
+    }
+
+    /// Lays them over the ends; their cost.
+    pub fn lay(&mut self, ends: &[f32; 2]) -> f64 {
+        let mut cost = 0.0;
+        for (end, &at) in ends.iter().enumerate() {
+            let surface = self.surface(at);
+            let forward = if end == 0 { 1.0 } else { -1.0 };
+            let all = self.seen[end].iter_mut().zip(&self.kept[end]);
+            for (seen, kept) in all.take(self.count) {
+                seen.lay(&[at, 0.0, 0.0], &surface, 0.0);
+                let miss = forward * (seen.place()[0] - f64::from(at));
+                let [x, y] = seen.view(kept.origin, kept.position);
+                let ahead = forward * (x - f64::from(at));
+                // Seen from its own side, or from the side.
+                let slope = if ahead < 0.0 { libm::fabs(y) / -ahead } else { SLOPE };
+                let view = (slope / SLOPE).min(1.0);
+                let counts = view * view * if miss < 0.0 { SHORT } else { 1.0 };
+                let off = libm::fabs(miss);
+                let bound = (BOUND_M / off.max(BOUND_M)).min(1.0);
+                let precision = self.precision * counts;
+                seen.precision = [precision * bound, 0.0, 0.0];
+                let square =
+                    if off < BOUND_M { off * off } else { BOUND_M * (2.0 * off - BOUND_M) };
+                cost += 0.5 * precision * square;
+            }
+        }
+        cost
+    }
+
+    /// Adds them to the equations, the ends eliminated.
+    pub fn add(&self, ends: &[f32; 2], equations: &mut Equations) {
+        for (end, &at) in ends.iter().enumerate() {
+            let (kept, seen) = (&self.kept[end][..self.count], &self.seen[end][..self.count]);
+            equations.add_returns(kept, seen);
+            let order = &self.order[..self.count];
+            equations.eliminate(order, kept, seen, &[at, 0.0, 0.0], &self.surface(at));
+        }
+    }
+
+    /// Moves the ends with a step of the splines.
+    pub fn follow(&self, ends: &mut [f32; 2], step: &[Weights]) {
+        for (end, at) in ends.iter_mut().enumerate() {
+            let (kept, seen) = (&self.kept[end][..self.count], &self.seen[end][..self.count]);
+            let order = &self.order[..self.count];
+            let by = follow(order, kept, seen, &[*at, 0.0, 0.0], &self.surface(*at), step);
+            *at += by[0] as f32;
+        }
+    }
+
+    fn surface(&self, at: f32) -> Surface {
+        Surface { held: LOOSE, mean: [at, 0.0, 0.0], ..Surface::NONE }
+    }
+}
