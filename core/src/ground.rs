@@ -6,13 +6,13 @@ use crate::params::COLUMNS_MAX;
 const GROUND_CELL: usize = 5;
 /// Ground cells along an axis at most.
 const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
-/// How far below the vehicle's ground another may begin, voxels, and by how much it may fall from
+/// How far below the vehicle's ground another may begin, and by how much it may fall from
 /// there: what lies lower is mirrored.
 const STEP: f32 = 1.5;
 const SLOPE: f32 = 0.1;
 /// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
 const GROUND_PASSES: usize = 3;
-/// By how much the ground may fall from one of its cells to the next, voxels: 7 %.
+/// By how much the ground may fall from one of its cells to the next: 7 %.
 const GROUND_FALL: f32 = 0.33;
 
 /// Height of the ground, by cells of [`GROUND_CELL`] columns.
@@ -91,8 +91,13 @@ impl Ground {
         }
     }
 
-    /// Height above the ground of a place in a column, voxels.
+    /// Height of the ground under a column; infinite where nothing tells it.
+    pub fn height(&self, column: usize) -> f32 {
+        self.height[self.cell[column] as usize]
+    }
+
+    /// Height above the ground of a place in a column.
     pub fn above(&self, column: usize, z: f32) -> f32 {
-        z - self.height[self.cell[column] as usize]
+        z - self.height(column)
     }
 }

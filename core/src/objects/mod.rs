@@ -6,6 +6,7 @@
 //! after its start: single precision then holds a return wherever and whenever one drives.
 
 pub mod centroid_ekf;
+pub mod front_end;
 
 /// One return of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
