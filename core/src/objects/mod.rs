@@ -6,7 +6,9 @@
 //! after its start: single precision then holds a return wherever and whenever one drives.
 
 pub mod centroid_ekf;
+pub mod estimate;
 pub mod front_end;
+pub mod spline;
 
 /// One return of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
