@@ -51,7 +51,7 @@ pub fn track(args: &args::Track) -> Result<bool, Error> {
             Some(Drive::new(&profile, source.rig(), &tables, backend))
         }
     };
-    let mut tracker = Tracker::new(source.rig(), drive);
+    let mut tracker = Tracker::new(source.rig(), &profile, drive);
     let budget = bytes(Tracker::bytes() as u64);
     say(args.quiet, &format!("memory budget: {budget} of tracks and front end\n"))?;
 

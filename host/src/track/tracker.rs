@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use raywake_core::objects::estimate::{EstimateParams, Estimator, Report};
 use raywake_core::objects::front_end::{
-    FrontEnd, FrontEndParams, Life, TRACKS_MAX, Track, Turnover,
+    Flows, FrontEnd, FrontEndParams, Life, TRACKS_MAX, Track, Turnover,
 };
-use raywake_core::output::PointFlow;
+use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_gpu::GpuError;
 use raywake_gpu::guard::guarded;
@@ -21,19 +21,22 @@ pub struct Tracker {
     rig: Rig,
     params: FrontEndParams,
     drive: Option<Drive>,
+    reach_m: f64,
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
     estimator: Box<Estimator>,
 }
 
 impl Tracker {
-    /// Tracks of a rig's sweeps, with the flow where there is a drive to find it. Call it on a thread
-    /// with 64 MiB of stack, as [`Drive::new`].
-    pub fn new(rig: &Rig, drive: Option<Drive>) -> Tracker {
+    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it. Call it
+    /// on a thread with 64 MiB of stack, as [`Drive::new`].
+    pub fn new(rig: &Rig, profile: &Profile, drive: Option<Drive>) -> Tracker {
         Tracker {
             rig: rig.clone(),
             params: FrontEndParams::street(),
             drive,
+            // The window's columns, but for one at the edge.
+            reach_m: (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m,
             front_end: Box::new(FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
             estimator: Box::new(Estimator::new()),
@@ -52,8 +55,8 @@ impl Tracker {
         now: &SweepData,
         before: Option<&SweepData>,
     ) -> Result<Option<Turnover>, GpuError> {
-        let Tracker { rig, params, drive, front_end, tracks, .. } = self;
-        let mut step = |sweep: &SweepData, flows: Option<&[PointFlow]>| {
+        let Tracker { rig, params, drive, reach_m, front_end, tracks, .. } = self;
+        let mut step = |sweep: &SweepData, flows: Option<Flows>| {
             guarded(|| {
                 front_end.take(rig, &sweep.sweep(), flows);
                 front_end.step(params, None, tracks)
@@ -62,7 +65,8 @@ impl Tracker {
         let Some(drive) = drive else { return Ok(Some(step(now, None))) };
         let points = before.map_or(&[][..], |b| &b.points);
         let flows = drive.step(&now.sweep(), points)?.flows;
-        Ok(before.map(|before| step(before, flows.map(|f| f.points))))
+        let flows = flows.map(|f| Flows { of: f.points, reach_m: *reach_m });
+        Ok(before.map(|before| step(before, flows)))
     }
 
     /// The last sweep, where it still waits for its flow, which will not come.

@@ -6,7 +6,7 @@ use crate::objects::{ObjectReturn, ObjectState};
 /// States of the filter that a track keeps.
 pub const HISTORY_MAX: usize = 512;
 /// Returns that a track keeps.
-pub const RETURNS_MAX: usize = 10_240;
+pub const RETURNS_MAX: usize = 8192;
 
 /// Every k-th of a sequence, with k doubled whenever there is no room for more.
 #[derive(Clone, Debug)]
