@@ -27,6 +27,11 @@ mod synthetic;
 mod system;
 #[cfg(test)]
 mod tests;
+mod window;
+
+pub use window::FixedLag;
+
+use core::ops::Range;
 
 use super::spline::{BASES_MAX, Knots, Laid};
 use super::{ObjectReturn, ObjectState};
@@ -46,6 +51,19 @@ pub const ITERATIONS_MAX: usize = 64;
 const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
+
+/// Growth from the middle of a track: how far it reaches at first and with every step, s; deviation
+/// of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
+/// dense one holds it.
+const GROWTH_FIRST_S: f64 = 0.4;
+const GROWTH_S: f64 = 0.2;
+const GROWTH_M: f64 = 0.15;
+const GROWTH_POINTS: usize = 75;
+/// Models that are made of what is seen by then, and iterations with each.
+const GROWTH_FIRST_ROUNDS: usize = 6;
+const GROWTH_FIRST_ITERATIONS: usize = 6;
+const GROWTH_ROUNDS: usize = 2;
+const GROWTH_ITERATIONS: usize = 2;
 
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +94,12 @@ pub struct EstimateParams {
     pub damping: bool,
     /// Returns weigh across the surface that their model point stands for, little along it.
     pub surfaces: bool,
+    /// Additional deviation along a surface, m.
+    pub loose_m: f64,
     /// The start is smoothed with the process model, and one at rest is tried beside it.
     pub starts: bool,
+    /// The start grows from the middle of the track, see [`Estimator::grow`].
+    pub grows: bool,
 }
 
 impl EstimateParams {
@@ -96,7 +118,9 @@ impl EstimateParams {
             robust: 0.0,
             damping: false,
             surfaces: false,
+            loose_m: 0.0,
             starts: false,
+            grows: false,
         }
     }
 }
@@ -104,12 +128,15 @@ impl EstimateParams {
 impl Default for EstimateParams {
     fn default() -> EstimateParams {
         EstimateParams {
-            deviation_m: 0.1,
+            deviation_m: 0.05,
             stages: 2,
-            robust: 3.0,
+            first_deviation_m: 0.2,
+            robust: 0.0,
             damping: true,
             surfaces: true,
+            loose_m: 0.5,
             starts: true,
+            grows: true,
             ..EstimateParams::dissertation()
         }
     }
@@ -202,10 +229,22 @@ impl Solution {
     }
 }
 
+/// A state known with a precision.
+#[derive(Clone, Copy)]
+struct Known {
+    time_s: f64,
+    state: Weights,
+    precision: Weights,
+}
+
 /// The workspace of an estimate, and its result.
 pub struct Estimator {
     knots: Knots,
     returns: Returns,
+    /// Those that the equations are made of.
+    active: Range<usize>,
+    /// What is known of the state at a time, beside the returns.
+    known: Option<Known>,
     now: Solution,
     before: Solution,
     best: Solution,
@@ -230,6 +269,8 @@ impl Estimator {
         Estimator {
             knots: Knots::NONE,
             returns: Returns::new(),
+            active: 0..0,
+            known: None,
             now: Solution::NONE,
             before: Solution::NONE,
             best: Solution::NONE,
@@ -252,6 +293,7 @@ impl Estimator {
     ) -> Report {
         let mut report = Report::default();
         self.knots = Knots::NONE;
+        self.known = None;
         self.best.weights.fill([0.0; 7]);
         self.best.points = 0;
         let Some(taken) = self.returns.take(returns, params.returns) else {
@@ -268,6 +310,9 @@ impl Estimator {
         (report.compressed, report.stretched) = (compressed, stretched);
 
         report.no_history = !self.start(params, history);
+        if params.grows {
+            self.grow(params);
+        }
         self.run(params, &mut report);
         self.best.copy(&self.now);
         if params.starts && !report.no_history {
@@ -287,14 +332,7 @@ impl Estimator {
     /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end.
     pub fn state(&self, time_s: f64) -> ObjectState {
         let inside = time_s.clamp(self.knots.start(), self.knots.end());
-        let [mut x, mut y, z, heading, speed, climb, turn_rate] =
-            self.knots.value(&self.best.weights, inside);
-        let beyond = time_s - inside;
-        let (sin, cos) = libm::sincos(heading);
-        x += beyond * speed * cos;
-        y += beyond * speed * sin;
-        let position = [x, y, z + beyond * climb];
-        ObjectState { time_s, position, heading, speed, climb, turn_rate }
+        state(&self.knots, &self.best.weights, inside, time_s)
     }
 
     /// Model points, m, in the object's frame.
@@ -307,14 +345,7 @@ impl Estimator {
         let n = self.knots.bases();
         let weights = &mut self.now.weights[..n];
         if !start::fit(&self.knots, history, &mut self.equations, weights, &mut self.step) {
-            let mut mean = [0.0; 7];
-            for kept in self.returns.all() {
-                for (sum, value) in mean.iter_mut().zip(kept.position) {
-                    *sum += f64::from(value);
-                }
-            }
-            let count = self.returns.all().len() as f64;
-            weights.fill(mean.map(|sum| sum / count));
+            self.stand_at_mean();
             return false;
         }
         if params.starts {
@@ -331,59 +362,107 @@ impl Estimator {
         true
     }
 
+    /// At rest where the returns are on average.
+    fn stand_at_mean(&mut self) {
+        let mut mean = [0.0; 7];
+        for kept in self.returns.all() {
+            for (sum, value) in mean.iter_mut().zip(kept.position) {
+                *sum += f64::from(value);
+            }
+        }
+        let count = self.returns.all().len() as f64;
+        self.now.weights[..self.knots.bases()].fill(mean.map(|sum| sum / count));
+    }
+
     /// All stages of a solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
         report.iterations = 0;
+        self.active = 0..self.returns.all().len();
         let ratio = params.first_deviation_m / params.deviation_m;
         for stage in (0..=params.stages).rev() {
             let share = stage as f64 / params.stages.max(1) as f64;
             let deviation = params.deviation_m * libm::pow(ratio, share);
-            self.extract(params.model, deviation);
-            report.stop = self.descend(params, deviation, report);
+            self.extract(params, params.model, deviation);
+            report.stop = self.descend(params, deviation, params.iterations, Some(report));
+        }
+    }
+
+    /// From the middle of the returns outwards: what is seen next is laid over the model of what was
+    /// seen so far, starting where the process model puts it.
+    fn grow(&mut self, params: &EstimateParams) {
+        let all = self.returns.all();
+        let time = |i: usize| f64::from(all[i].time_s);
+        let middle = time(all.len() / 2);
+        let (first, last) = (self.knots.start(), self.knots.end());
+        let mut reach = GROWTH_FIRST_S;
+        let mut begun = false;
+        loop {
+            let all = self.returns.all();
+            let (from, to) = (middle - reach, middle + reach);
+            self.active = all.partition_point(|kept| f64::from(kept.time_s) < from)
+                ..all.partition_point(|kept| f64::from(kept.time_s) <= to);
+            if begun {
+                self.descend(params, GROWTH_M, GROWTH_ITERATIONS, None);
+            }
+            let rounds = if begun { GROWTH_ROUNDS } else { GROWTH_FIRST_ROUNDS };
+            for _ in 0..rounds {
+                self.extract(params, GROWTH_POINTS, GROWTH_M);
+                let iterations = if begun { GROWTH_ITERATIONS } else { GROWTH_FIRST_ITERATIONS };
+                self.descend(params, GROWTH_M, iterations, None);
+            }
+            if from <= first && to >= last {
+                break;
+            }
+            begun = true;
+            reach += GROWTH_S;
         }
     }
 
     /// Model points from the returns: so many of them, evenly in the order of time.
-    fn extract(&mut self, points: usize, deviation: f64) {
-        let kept = self.returns.all();
+    fn extract(&mut self, params: &EstimateParams, points: usize, deviation: f64) {
+        let kept = &self.returns.all()[self.active.clone()];
         let points = points.clamp(1, MODEL_MAX).min(kept.len());
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
-            *seen = look(&self.now.weights, kept);
+            *seen = Seen::look(&self.now.weights, kept);
         }
         for (i, model) in self.now.model[..points].iter_mut().enumerate() {
             let nth = (2 * i + 1) * kept.len() / (2 * points);
             *model = self.seen[nth].place().map(|value| value as f32);
         }
-        self.now.surfaces[..points].fill(Surface::round(1.0 / (deviation * deviation)));
+        let surface = Surface {
+            precision: [1.0 / (deviation * deviation); 3],
+            held: 1.0 / (params.extent_m * params.extent_m),
+            ..Surface::NONE
+        };
+        self.now.surfaces[..points].fill(surface);
         self.now.points = points;
     }
 
     /// Gauss-Newton iterations with one deviation.
-    fn descend(&mut self, params: &EstimateParams, deviation: f64, report: &mut Report) -> Stop {
-        let precision = precision(params);
-        let prior = 1.0 / (params.extent_m * params.extent_m);
-        let n = self.knots.bases();
-        self.associate(params, deviation);
-        self.equations.clear(n);
-        let mut cost = self.cost(params, deviation);
-        cost.process =
-            process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+    fn descend(
+        &mut self,
+        params: &EstimateParams,
+        deviation: f64,
+        iterations: usize,
+        report: Option<&mut Report>,
+    ) -> Stop {
+        let mut unreported = Report::default();
+        let report = report.unwrap_or(&mut unreported);
+        let mut cost = self.associate(params, deviation);
+        cost.process = self.begin(params);
         if report.costs.is_empty() {
             _ = report.costs.push(cost);
         }
         let mut damping = if params.damping { 1e-4 } else { 0.0 };
-        for _ in 0..params.iterations {
+        for _ in 0..iterations {
             if report.iterations == ITERATIONS_MAX {
                 return Stop::Iterations;
             }
             self.before.copy(&self.now);
-            let Some(()) = self.step(damping, prior) else { return Stop::NotFinite };
-            self.associate(params, deviation);
-            self.equations.clear(n);
-            let mut next = self.cost(params, deviation);
-            next.process =
-                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+            let Some(()) = self.step(damping) else { return Stop::NotFinite };
+            let mut next = self.associate(params, deviation);
+            next.process = self.begin(params);
             report.iterations += 1;
             let gain = cost.total() - next.total();
             let worse = params.damping && gain < 0.0;
@@ -394,8 +473,7 @@ impl Estimator {
                 }
                 _ = report.costs.push(cost);
                 self.associate(params, deviation);
-                self.equations.clear(n);
-                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+                self.begin(params);
                 damping *= 10.0;
                 continue;
             }
@@ -410,15 +488,33 @@ impl Estimator {
         Stop::Iterations
     }
 
-    /// Finds every return's model point at the trajectory in `now`.
-    fn associate(&mut self, params: &EstimateParams, deviation: f64) {
-        let kept = self.returns.all();
+    /// Begins the equations with what is known without returns; its cost.
+    fn begin(&mut self, params: &EstimateParams) -> f64 {
+        let n = self.knots.bases();
+        let weights = &self.now.weights[..n];
+        self.equations.clear(n);
+        let mut cost = process::add(&self.knots, weights, &precision(params), &mut self.equations);
+        if let Some(known) = &self.known {
+            let now = self.knots.value(weights, known.time_s);
+            let miss: Weights = core::array::from_fn(|d| known.state[d] - now[d]);
+            for (miss, precision) in miss.iter().zip(known.precision) {
+                cost += 0.5 * precision * miss * miss;
+            }
+            let basis = self.knots.basis(known.time_s);
+            start::observe(&mut self.equations, &basis, &miss, &known.precision);
+        }
+        cost
+    }
+
+    /// Finds every return's model point at the trajectory in `now`; the cost, but for the process.
+    fn associate(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
+        let kept = &self.returns.all()[self.active.clone()];
         let model = &self.now.model[..self.now.points];
         self.nearest.fill(model);
         self.starts[..=model.len()].fill(0);
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
             let guess = usize::from(seen.nearest);
-            *seen = look(&self.now.weights, kept);
+            *seen = Seen::look(&self.now.weights, kept);
             let place = seen.place().map(|value| value as f32);
             let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &place));
             let Some((number, _)) = self.nearest.find(place, far) else { continue };
@@ -438,42 +534,23 @@ impl Estimator {
         }
         self.starts[0] = 0;
         if params.surfaces {
-            self.find_surfaces(deviation);
+            self.find_surfaces(params, deviation);
         }
-        if params.robust > 0.0 {
-            let limit = params.robust * params.robust;
-            for seen in &mut self.seen[..self.returns.all().len()] {
-                let number = usize::from(seen.nearest);
-                let (model, surface) = (&self.now.model[number], &self.now.surfaces[number]);
-                let square = normal::square(seen, model, surface);
-                let share = 1.0 / (1.0 + square / limit);
-                seen.share = share * share;
-            }
-        }
+        self.cost(params, deviation)
     }
 
-    /// Precisions from how the returns of a model point scatter about it.
-    fn find_surfaces(&mut self, deviation: f64) {
+    /// The patch of each model point, from how its returns scatter.
+    fn find_surfaces(&mut self, params: &EstimateParams, deviation: f64) {
         let least = deviation * deviation;
         for number in 0..self.now.points {
             let order =
                 &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
-            let model = self.now.model[number].map(f64::from);
-            // As if a few more returns lay about it alike in every direction.
-            let few = 4.0;
-            let (mut xx, mut xy, mut yy, mut zz) = (0.0, 0.0, 0.0, 0.0);
+            let mut scatter = self.now.surfaces[number].scatter;
             for &i in order {
-                let [x, y, z] = self.seen[usize::from(i)].place();
-                let [x, y, z] = [x - model[0], y - model[1], z - model[2]];
-                xx += x * x;
-                xy += x * y;
-                yy += y * y;
-                zz += z * z;
+                scatter.add(self.seen[usize::from(i)].place(), self.now.model[number]);
             }
-            let count = order.len() as f64 + few;
-            let round = few * 0.04;
-            let [xx, xy, yy, zz] =
-                [(xx + round) / count, xy / count, (yy + round) / count, (zz + round) / count];
+            let count = f64::from(scatter.count);
+            let [xx, xy, yy, zz] = scatter.sums.map(|sum| f64::from(sum) / count);
             let half = 0.5 * (xx - yy);
             let spread = libm::sqrt(half * half + xy * xy);
             let middle = 0.5 * (xx + yy);
@@ -481,30 +558,30 @@ impl Estimator {
             let (nx, ny) = if half < 0.0 { (spread - half, -xy) } else { (-xy, spread + half) };
             let length = libm::sqrt(nx * nx + ny * ny);
             let normal = if length > 0.0 { [nx / length, ny / length] } else { [1.0, 0.0] };
-            self.now.surfaces[number] = Surface {
-                normal,
-                across: 1.0 / (least + (middle - spread).max(0.0)),
-                along: 1.0 / (least + middle + spread),
-                up: 1.0 / (least + zz),
-            };
+            let small = (middle - spread).max(0.0);
+            let loose = params.loose_m * params.loose_m;
+            let flat = small * small / (small * small + zz * zz);
+            let variances =
+                [small + loose * flat, middle + spread + loose, zz + loose * (1.0 - flat)];
+            let precision = variances.map(|variance| 1.0 / (least + variance));
+            let surface = &mut self.now.surfaces[number];
+            (surface.normal, surface.precision) = (normal, precision);
         }
     }
 
-    /// The cost at the associations, but for the process.
-    fn cost(&self, params: &EstimateParams, deviation: f64) -> Cost {
-        let prior = 1.0 / (params.extent_m * params.extent_m);
-        let limit = params.robust * params.robust;
+    /// Lays the returns over their model points; the cost, but for the process.
+    fn cost(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
+        let robust = params.robust * params.robust;
         let mut cost = Cost { deviation_m: deviation, ..Cost::default() };
-        for model in &self.now.model[..self.now.points] {
-            cost.model += 0.5 * prior * f64::from(square_distance(model, &[0.0; 3]));
+        let points = self.now.model[..self.now.points].iter().zip(&self.now.surfaces);
+        for (model, surface) in points {
+            cost.model += 0.5 * surface.held * f64::from(square_distance(model, &surface.mean));
         }
-        let count = self.returns.all().len();
-        for seen in &self.seen[..count] {
+        let count = self.active.len();
+        for seen in &mut self.seen[..count] {
             let number = usize::from(seen.nearest);
             let model = &self.now.model[number];
-            let square = normal::square(seen, model, &self.now.surfaces[number]);
-            cost.returns +=
-                0.5 * if limit > 0.0 { square / (1.0 + square / limit) } else { square };
+            cost.returns += seen.lay(model, &self.now.surfaces[number], robust);
             let place = seen.place().map(|value| value as f32);
             cost.residual_m += f64::from(libm::sqrtf(square_distance(model, &place)));
         }
@@ -513,17 +590,17 @@ impl Estimator {
     }
 
     /// One step of trajectory and model; `equations` hold the process term.
-    fn step(&mut self, damping: f64, prior: f64) -> Option<()> {
-        let kept = self.returns.all();
+    fn step(&mut self, damping: f64) -> Option<()> {
+        let kept = &self.returns.all()[self.active.clone()];
         let n = self.knots.bases();
         let now = &mut self.now;
-        self.equations.add_returns(kept, &self.seen, &now.model, &now.surfaces);
+        self.equations.add_returns(kept, &self.seen);
         let orders =
             |number: usize| usize::from(self.starts[number])..usize::from(self.starts[number + 1]);
         for number in 0..now.points {
             let order = &self.order[orders(number)];
             let (model, surface) = (&now.model[number], &now.surfaces[number]);
-            self.equations.eliminate(order, kept, &self.seen, model, surface, prior);
+            self.equations.eliminate(order, kept, &self.seen, model, surface);
         }
         self.equations.planar.damp(damping);
         self.equations.vertical.damp(damping);
@@ -532,7 +609,7 @@ impl Estimator {
         for number in 0..now.points {
             let order = &self.order[orders(number)];
             let (model, surface) = (&mut now.model[number], &now.surfaces[number]);
-            let by = normal::follow(order, kept, &self.seen, model, surface, prior, step);
+            let by = normal::follow(order, kept, &self.seen, model, surface, step);
             for (value, by) in model.iter_mut().zip(by) {
                 *value = (f64::from(*value) + by) as f32;
             }
@@ -547,21 +624,23 @@ impl Estimator {
 
     /// Returns that took part and lie beyond `extent_m` from the object's origin.
     fn outside(&self, extent_m: f64) -> usize {
-        let square = |seen: Seen| seen.arm.iter().map(|v| v * v).sum::<f64>();
-        let far = |seen: &Seen| square(*seen) > extent_m * extent_m;
-        self.returns.all().iter().filter(|kept| far(&look(&self.best.weights, kept))).count()
+        let far = |kept: &&returns::Kept| {
+            Seen::look(&self.best.weights, kept).square_range() > extent_m * extent_m
+        };
+        self.returns.all().iter().filter(far).count()
     }
+}
+
+/// State at `time_s`, as it goes on from `inside`.
+fn state(knots: &Knots, weights: &[Weights], inside: f64, time_s: f64) -> ObjectState {
+    let [x, y, z, heading, speed, climb, turn_rate] = knots.value(weights, inside);
+    let beyond = time_s - inside;
+    let (sin, cos) = libm::sincos(heading);
+    let position = [x + beyond * speed * cos, y + beyond * speed * sin, z + beyond * climb];
+    ObjectState { time_s, position, heading, speed, climb, turn_rate }
 }
 
 /// `Q_u^-1`.
 fn precision(params: &EstimateParams) -> Weights {
     params.process.map(|deviation| 1.0 / (deviation * deviation))
-}
-
-/// A return from the object's place and heading at its time.
-fn look(weights: &[Weights], kept: &returns::Kept) -> Seen {
-    let [x, y, z, heading] = normal::pose(weights, kept);
-    let (sin, cos) = libm::sincos(heading);
-    let [u, v, w] = kept.position.map(f64::from);
-    Seen { arm: [u - x, v - y, w - z], cos, sin, ..Seen::NONE }
 }

@@ -24,7 +24,7 @@ pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectS
     })
 }
 
-fn finite(state: &ObjectState) -> bool {
+pub(super) fn finite(state: &ObjectState) -> bool {
     let rest = [state.time_s, state.heading, state.speed, state.climb, state.turn_rate];
     state.position.iter().chain(&rest).all(|value| value.is_finite())
 }

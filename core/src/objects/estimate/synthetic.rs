@@ -41,6 +41,13 @@ pub struct Drive {
     pub truth: Vec<ObjectState>,
     /// Returns up to the end of each sweep.
     pub until: Vec<usize>,
+    pub plan: Plan,
+}
+
+impl Drive {
+    pub fn truth_at(&self, time: f64) -> ObjectState {
+        path(&self.plan)(time)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -117,8 +124,13 @@ pub fn drive(plan: Plan) -> Drive {
     let boxes = boxes(plan.length, plan.width, plan.height);
     let mounts = [[0.8, 0.7, 1.7], [0.8, -0.7, 1.7], [-0.6, 0.7, 1.7], [-0.6, -0.7, 1.7]];
     let sweeps = (plan.seconds / SWEEP_S) as usize;
-    let mut out =
-        Drive { returns: Vec::new(), history: Vec::new(), truth: Vec::new(), until: Vec::new() };
+    let mut out = Drive {
+        returns: Vec::new(),
+        history: Vec::new(),
+        truth: Vec::new(),
+        until: Vec::new(),
+        plan,
+    };
     let mut tracker = None;
     let anchor = plan.position;
     for sweep in 0..sweeps {
