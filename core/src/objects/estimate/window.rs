@@ -9,7 +9,7 @@ use super::normal::{Scatter, Seen, Surface};
 use super::process::Weights;
 use super::returns;
 use super::start;
-use super::{EstimateParams, Estimator, Known, precision};
+use super::{Cost, EstimateParams, Estimator, Known, Report, precision};
 use crate::objects::spline::{DEGREE, Knots};
 use crate::objects::{ObjectReturn, ObjectState};
 use heapless::Vec;
@@ -256,6 +256,9 @@ impl FixedLag {
         estimator.active = 0..self.returns.len();
         if self.newest_s - self.born_s < YOUNG_S {
             self.estimate_young(estimator, params);
+            for (kept, seen) in estimator.returns.all().iter().zip(&mut estimator.seen) {
+                *seen = Seen::look(&self.weights, kept);
+            }
             self.model.clear();
             self.add_points(estimator, self.returns.len());
         } else {
@@ -284,28 +287,26 @@ impl FixedLag {
     /// The first window: from the history alone, and with models of what is seen by then.
     fn estimate_young(&mut self, estimator: &mut Estimator, params: &EstimateParams) {
         let weights = &mut estimator.now.weights[..BASES];
-        let begun = start::fit(
-            &self.knots,
-            &self.history,
-            &mut estimator.equations,
-            weights,
-            &mut estimator.step,
-        ) && start::smooth(
-            &self.knots,
-            &self.history,
-            &precision(params),
-            &mut estimator.equations,
-            weights,
-            &mut estimator.step,
-        );
+        let begun = start::stand(&self.history, weights)
+            && start::smooth(
+                &self.knots,
+                &self.history,
+                &precision(params),
+                &mut estimator.equations,
+                weights,
+                &mut estimator.step,
+            );
         if !begun {
             estimator.stand_at_mean();
         }
-        for _ in 0..YOUNG_ROUNDS {
-            estimator.extract(params, YOUNG_MODEL, YOUNG_M);
-            estimator.descend(params, YOUNG_M, YOUNG_ITERATIONS, None);
-        }
+        let moving = young(estimator, params);
         self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+        if begun {
+            start::stand(&self.history, &mut estimator.now.weights[..BASES]);
+            if young(estimator, params) < moving {
+                self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+            }
+        }
     }
 
     /// Makes model points of the last `fresh` returns where there are none near, and notes which
@@ -365,4 +366,16 @@ impl FixedLag {
             self.model.truncate(kept);
         }
     }
+}
+
+/// Models of what is seen by then; the cost in the end.
+fn young(estimator: &mut Estimator, params: &EstimateParams) -> f64 {
+    let mut cost = f64::MAX;
+    for _ in 0..YOUNG_ROUNDS {
+        let mut report = Report::default();
+        estimator.extract(params, YOUNG_MODEL, YOUNG_M);
+        estimator.descend(params, YOUNG_M, YOUNG_ITERATIONS, Some(&mut report));
+        cost = report.costs.last().map_or(cost, Cost::total);
+    }
+    cost
 }
