@@ -16,7 +16,7 @@ const JOINS_S: f32 = 0.05;
 const LINKS_M: f32 = 0.7;
 const LINKS_UP_M: f32 = 1.0;
 /// Velocities of one thing differ by no more than so much, m/s, and this share of the speed.
-const ALIKE_MPS: f32 = 1.0;
+const ALIKE_MPS: f32 = 0.5;
 const ALIKE: f32 = 0.25;
 
 const _: () = assert!(LINKS_M <= 2.0 * CELL_M && JOINS_M <= CELL_M);
