@@ -137,6 +137,9 @@ fn cars_are_followed_far_from_the_origin() {
         // Before it departed it was the same car.
         assert!((track.history()[0].heading - state.heading).abs() < 0.3);
         assert!(track.returns_seen() > 3000 && track.history_every() == 1);
+        assert_eq!(track.state(), Some(state));
+        assert!(track.latest().len() > 100);
+        assert!(track.latest().iter().all(|r| (r.time_s as f64 - state.time_s).abs() < 1e-6));
         for r in track.returns() {
             let moved = thing.velocity[0] * r.time_s as f64;
             assert!((r.position[0] as f64 - moved).abs() < 2.1, "{r:?}");
