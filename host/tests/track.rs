@@ -26,7 +26,7 @@ fn cloud(n: usize) -> Vec<u8> {
     for middle in [[20.0, 4.0], [10.0 + n as f32 * 0.8, -3.0]] {
         for k in 0..7 {
             for i in 0..=20 {
-                for j in [0, 9] {
+                for j in (0..=9).filter(|j| i % 20 == 0 || j % 9 == 0) {
                     let [x, y] = [i as f32 * 0.2 - 2.0, j as f32 * 0.2 - 0.9];
                     let place = [middle[0] + x - own, middle[1] + y, k as f32 * 0.2 - 1.5];
                     points.push([place[0], place[1], place[2], 0.5]);
