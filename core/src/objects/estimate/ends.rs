@@ -10,6 +10,9 @@
 use super::normal::{Equations, Seen, Surface, follow};
 use super::process::Weights;
 use super::returns::Kept;
+use crate::objects::ObjectState;
+use crate::objects::spline::Knots;
+use heapless::Vec;
 
 /// A part of the track, s.
 const PART_S: f32 = 0.2;
@@ -82,6 +85,23 @@ impl Ends {
             }
             from = to;
         }
+    }
+
+    /// States in the middle between both ends of every part.
+    pub fn middles(&self, knots: &Knots, weights: &[Weights]) -> Vec<ObjectState, PARTS> {
+        let [fronts, rears] = &self.kept;
+        let parts = fronts.iter().zip(rears).zip(self.seen[0].iter().zip(&self.seen[1]));
+        parts
+            .take(self.count)
+            .map(|((front, rear), (ahead, behind))| {
+                let time_s = 0.5 * (f64::from(front.time_s) + f64::from(rear.time_s));
+                let state = super::state(knots, weights, time_s, time_s);
+                let by = 0.5 * (ahead.place()[0] + behind.place()[0]);
+                let (sin, cos) = libm::sincos(state.heading);
+                let [x, y, z] = state.position;
+                ObjectState { position: [x + by * cos, y + by * sin, z], ..state }
+            })
+            .collect()
     }
 
     /// Where the ends are at first: beyond all but a fifth of them.

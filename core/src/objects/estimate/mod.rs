@@ -100,7 +100,8 @@ pub struct EstimateParams {
     pub loose_m: f64,
     /// The start is smoothed with the process model, and one at rest is tried beside it.
     pub starts: bool,
-    /// Deviation of a return at an end of the object, m; 0 to leave ends out, see [`ends`].
+    /// Deviation of a return at an end of the object, m, in all stages but the last, as returns know
+    /// small things better; 0 to leave ends out. See [`ends`].
     pub ends_m: f64,
     /// The start grows from the middle of the track, see [`Estimator::grow`].
     pub grows: bool,
@@ -132,6 +133,9 @@ impl EstimateParams {
 
 impl Default for EstimateParams {
     fn default() -> EstimateParams {
+        let mut process = EstimateParams::dissertation().process;
+        // Town traffic turns into a bend within a second.
+        process[6] = 0.3;
         EstimateParams {
             deviation_m: 0.05,
             stages: 2,
@@ -141,8 +145,9 @@ impl Default for EstimateParams {
             surfaces: true,
             loose_m: 0.5,
             starts: true,
-            ends_m: 0.1,
+            ends_m: 0.2,
             grows: true,
+            process,
             ..EstimateParams::dissertation()
         }
     }
@@ -184,6 +189,18 @@ pub enum Stop {
     NotFinite,
 }
 
+/// Where a solve starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// The tracker's history.
+    #[default]
+    History,
+    /// At rest.
+    Rest,
+    /// The middle of what is seen.
+    Middles,
+}
+
 /// How a solve went.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
@@ -207,8 +224,8 @@ pub struct Report {
     pub stretched: bool,
     /// There was no history: the start stands at the returns' mean.
     pub no_history: bool,
-    /// The estimate comes from the start at rest.
-    pub from_rest: bool,
+    /// Which start led to it.
+    pub from: Start,
 }
 
 /// A trajectory with its shape.
@@ -323,22 +340,48 @@ impl Estimator {
 
         report.no_history = !self.start(params, history);
         if params.grows {
-            self.grow(params);
+            self.grow(&EstimateParams { ends_m: 0.0, ..*params });
         }
         self.run(params, &mut report);
         self.best.copy(&self.now);
         if params.starts && !report.no_history {
-            let mut rest = report.clone();
-            start::stand(history, &mut self.now.weights[..knots.bases()]);
-            self.run(params, &mut rest);
-            let cost = |report: &Report| report.costs.last().map_or(f64::MAX, Cost::total);
-            if cost(&rest) < cost(&report) {
-                report = Report { from_rest: true, ..rest };
-                self.best.copy(&self.now);
+            for from in [Start::Rest, Start::Middles] {
+                let n = knots.bases();
+                match from {
+                    Start::Rest => _ = start::stand(history, &mut self.now.weights[..n]),
+                    _ if !self.start_from_middles(params, history) => continue,
+                    _ => {}
+                }
+                let mut other = Report { from, ..report.clone() };
+                self.run(params, &mut other);
+                let cost = |report: &Report| report.costs.last().map_or(f64::MAX, Cost::total);
+                if cost(&other) < cost(&report) {
+                    report = other;
+                    self.best.copy(&self.now);
+                }
             }
+        }
+        if params.starts {
+            self.face_forward();
         }
         report.outside = self.outside(params.extent_m);
         report
+    }
+
+    /// Backwards at one heading is forwards at the opposite one: of the two, the way it goes for most
+    /// of its track.
+    fn face_forward(&mut self) {
+        let weights = &mut self.best.weights[..self.knots.bases()];
+        let speed: f64 = weights.iter().map(|weights| weights[4]).sum();
+        if speed < 0.0 {
+            for weights in weights {
+                weights[3] += core::f64::consts::PI;
+                weights[4] = -weights[4];
+            }
+            for [x, y, _] in &mut self.best.model[..self.best.points] {
+                (*x, *y) = (-*x, -*y);
+            }
+        }
     }
 
     /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end.
@@ -374,6 +417,30 @@ impl Estimator {
         true
     }
 
+    /// First trajectory by what lies in the middle of the returns of every part of the track: they
+    /// are where the object is, wherever on it most of them are. False where there are none.
+    fn start_from_middles(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
+        self.start(params, history);
+        self.active = 0..self.returns.all().len();
+        let kept = self.returns.all();
+        for (kept, seen) in kept.iter().zip(&mut self.seen) {
+            *seen = Seen::look(&self.now.weights, kept);
+        }
+        self.ends.find(kept, &self.seen, params.ends_m);
+        let n = self.knots.bases();
+        let middles = self.ends.middles(&self.knots, &self.now.weights);
+        let weights = &mut self.now.weights[..n];
+        !middles.is_empty()
+            && start::smooth(
+                &self.knots,
+                &middles,
+                &precision(params),
+                &mut self.equations,
+                weights,
+                &mut self.step,
+            )
+    }
+
     /// At rest where the returns are on average.
     fn stand_at_mean(&mut self) {
         let mut mean = [0.0; 7];
@@ -395,6 +462,8 @@ impl Estimator {
         for stage in (0..=params.stages).rev() {
             let share = stage as f64 / params.stages.max(1) as f64;
             let deviation = params.deviation_m * libm::pow(ratio, share);
+            let ends_m = if stage > 0 { params.ends_m } else { 0.0 };
+            let params = &EstimateParams { ends_m, ..*params };
             self.extract(params, params.model, deviation);
             report.stop = self.descend(params, deviation, params.iterations, Some(report));
         }

@@ -39,7 +39,7 @@ fn experiment() {
             for drive in &drives {
                 let report = estimator.solve(params, &drive.returns, &drive.history);
                 iterations += report.iterations;
-                rest += usize::from(report.from_rest);
+                rest += usize::from((report.from == Start::Rest));
                 all.push(errors(&drive.truth, |time| estimator.state(time)));
             }
             let better = all.iter().zip(&base).filter(|(a, b)| a[0] < b[0]).count();
