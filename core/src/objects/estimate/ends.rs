@@ -129,7 +129,7 @@ impl Ends {
             for (seen, kept) in all.take(self.count) {
                 seen.lay(&[at, 0.0, 0.0], &surface, 0.0);
                 let miss = forward * (seen.place()[0] - f64::from(at));
-                let [x, y] = seen.view(kept.origin, kept.position);
+                let [x, y, _] = seen.frame(kept.origin_from_return());
                 let ahead = forward * (x - f64::from(at));
                 // Seen from its own side, or from the side.
                 let slope = if ahead < 0.0 { libm::fabs(y) / -ahead } else { SLOPE };
