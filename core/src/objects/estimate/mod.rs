@@ -91,7 +91,7 @@ const SHARE: usize = 8;
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimateParams {
-    /// Returns that take part, evenly in the order of time.
+    /// Returns that take part, evenly in time as far as there are as many.
     pub returns: usize,
     /// Model points (`n_m`).
     pub model: usize,
@@ -118,7 +118,7 @@ pub struct EstimateParams {
     pub starts: bool,
     /// Model points that rays went through are taken away, and the rest is estimated again.
     pub carves: bool,
-    /// The start grows from the middle of the track, see [`Estimator::grow`].
+    /// The start grows from the middle of the track, over a sparse model.
     pub grows: bool,
 }
 
@@ -496,9 +496,9 @@ impl Estimator {
             }
         }
         let mut left = 0;
-        for number in 0..self.now.points {
+        for (number, &through) in through[..self.now.points].iter().enumerate() {
             let returns = usize::from(self.starts[number + 1] - self.starts[number]);
-            if usize::from(through[number]) * every * SHARE < returns.max(1) {
+            if usize::from(through) * every * SHARE < returns.max(1) {
                 self.now.model[left] = self.now.model[number];
                 self.now.surfaces[left] = self.now.surfaces[number];
                 left += 1;
