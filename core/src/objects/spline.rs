@@ -143,9 +143,9 @@ fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
     values[0] = 1.0;
     for p in 1..=P {
         let mut carried = 0.0;
-        for r in 0..p {
-            let share = values[r] / p as f64;
-            values[r] = carried + ((r + 1) as f64 - u) * share;
+        for (r, value) in values[..p].iter_mut().enumerate() {
+            let share = *value / p as f64;
+            *value = carried + ((r + 1) as f64 - u) * share;
             carried = (u + (p - r - 1) as f64) * share;
         }
         values[p] = carried;

@@ -51,9 +51,7 @@ impl<const N: usize> Nearest<N> {
         self.cell_m = by_count.max(by_side).max(0.01);
         self.per_m = 1.0 / self.cell_m;
         self.low = low;
-        for axis in 0..2 {
-            self.size[axis] = ((extent[axis] * self.per_m) as usize + 1).min(SIDE);
-        }
+        self.size = extent.map(|extent| ((extent * self.per_m) as usize + 1).min(SIDE));
         let cells = self.size[0] * self.size[1];
         self.starts[..=cells].fill(0);
         for point in points {
@@ -93,7 +91,7 @@ impl<const N: usize> Nearest<N> {
         }
         let (mut best, mut number) = (f32::MAX, u16::MAX);
         let mut reach = libm::sqrtf(guess).min(self.cell_m);
-        let whole = self.cell_m * (2 * SIDE) as f32 + reach + self.outside(at);
+        let whole = (self.cell_m * (2 * SIDE) as f32 + reach + self.outside(at)).min(f32::MAX);
         loop {
             // A little wider than the reach, for what rounding does to distances and cells.
             let wide = reach * 1.0001 + 1e-5;
@@ -111,7 +109,7 @@ impl<const N: usize> Nearest<N> {
                     }
                 }
             }
-            if best <= reach * reach || !(reach <= whole) {
+            if best <= reach * reach || reach > whole {
                 return Some((number, best));
             }
             // The nearest of all is no further than the best of these.
@@ -125,9 +123,9 @@ impl<const N: usize> Nearest<N> {
     /// How far `at` lies outside the grid, m.
     fn outside(&self, at: [f32; 3]) -> f32 {
         let mut far = 0f32;
-        for axis in 0..2 {
-            let high = self.low[axis] + self.size[axis] as f32 * self.cell_m;
-            far = far.max(self.low[axis] - at[axis]).max(at[axis] - high);
+        for ((low, size), at) in self.low.iter().zip(self.size).zip(at) {
+            let high = low + size as f32 * self.cell_m;
+            far = far.max(low - at).max(at - high);
         }
         far
     }

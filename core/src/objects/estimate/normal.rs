@@ -514,8 +514,8 @@ mod tests {
                 all.push(c * off[2]);
             }
             for (m, surface) in model.chunks(3).zip(&self.surfaces) {
-                for d in 0..3 {
-                    all.push(surface.held.sqrt() * (m[d] - f64::from(surface.mean[d])));
+                for (m, mean) in m.iter().zip(surface.mean) {
+                    all.push(surface.held.sqrt() * (m - f64::from(mean)));
                 }
             }
             all

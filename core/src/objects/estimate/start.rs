@@ -75,30 +75,26 @@ pub(super) fn observe(
 /// Adds a resistance to bending and to growing of the weights.
 fn hold(equations: &mut Equations, weights: &[Weights]) {
     let n = equations.bases;
-    for d in 0..7 {
-        let mut add = |i: usize, j: usize, value: f64, pull: f64| {
-            if d == Z || d == CLIMB {
-                equations.vertical.add(vertical(n, i, d), vertical(n, j, d), value);
-                if i == j {
-                    equations.vertical.vector[vertical(n, i, d)] += pull;
-                }
-            } else {
-                equations.planar.add(planar(n, i, d), planar(n, j, d), value);
-                if i == j {
-                    equations.planar.vector[planar(n, i, d)] += pull;
-                }
-            }
-        };
-        for k in 0..n {
-            add(k, k, LEAST, 0.0);
+    let mut add = |i: usize, j: usize, d: usize, value: f64, pull: f64| {
+        if d == Z || d == CLIMB {
+            equations.vertical.add(vertical(n, i, d), vertical(n, j, d), value);
+            equations.vertical.vector[vertical(n, i, d)] += pull;
+        } else {
+            equations.planar.add(planar(n, i, d), planar(n, j, d), value);
+            equations.planar.vector[planar(n, i, d)] += pull;
         }
-        for k in 2..n {
-            let bent = weights[k][d] - 2.0 * weights[k - 1][d] + weights[k - 2][d];
-            for (i, a) in [(k - 2, 1.0), (k - 1, -2.0), (k, 1.0)] {
-                for (j, b) in [(k - 2, 1.0), (k - 1, -2.0), (k, 1.0)] {
-                    if i >= j {
-                        add(i, j, BENDING * a * b, -BENDING * a * bent);
-                    }
+    };
+    for k in 0..n {
+        (0..7).for_each(|d| add(k, k, d, LEAST, 0.0));
+    }
+    for (k, three) in weights.windows(3).enumerate() {
+        for (d, last) in three[2].iter().enumerate() {
+            let bent = last - 2.0 * three[1][d] + three[0][d];
+            let row = [1.0, -2.0, 1.0];
+            for (i, a) in row.iter().enumerate() {
+                add(k + i, k + i, d, BENDING * a * a, -BENDING * a * bent);
+                for (j, b) in row[..i].iter().enumerate() {
+                    add(k + i, k + j, d, BENDING * a * b, 0.0);
                 }
             }
         }

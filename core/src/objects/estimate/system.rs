@@ -152,9 +152,9 @@ pub(super) mod tests {
                     }
                 }
             }
-            for i in 0..n {
-                rows[i][n] = random.normal();
-                system.vector[i] = rows[i][n];
+            for (row, value) in rows.iter_mut().zip(&mut system.vector) {
+                row[n] = random.normal();
+                *value = row[n];
             }
             assert!(system.solve(1e-12));
             for (ours, known) in system.vector.iter().zip(gauss(rows)) {

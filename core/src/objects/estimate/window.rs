@@ -305,7 +305,7 @@ impl FixedLag {
         self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
         if begun {
             start::stand(&self.history, &mut estimator.now.weights[..BASES]);
-            if young(estimator, params) < moving {
+            if young(estimator, params) < super::RESTS * moving {
                 self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
             }
         }
