@@ -10,6 +10,8 @@ pub mod continuity;
 pub mod digest;
 pub mod flow;
 pub mod grid;
+mod ground;
+mod groups;
 pub mod layout;
 pub mod map;
 pub mod motion_compensation;

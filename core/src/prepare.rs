@@ -104,6 +104,28 @@ impl core::ops::AddAssign for Dropped {
 }
 
 impl Dropped {
+    /// Whether a return tells something, and if so whether it lies on the own vehicle, which is not
+    /// counted here; one that tells nothing is counted.
+    pub(crate) fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
+        let p = point.position;
+        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
+            self.not_finite += 1;
+            return None;
+        }
+        if p == [0.0; 3] {
+            self.no_return += 1;
+            return None;
+        }
+        if point.sensor as usize >= rig.sensors.len() {
+            self.unknown_sensor += 1;
+            return None;
+        }
+        let own = |[low, high]: [[f32; 2]; 2]| {
+            p[0] > low[0] && p[0] < high[0] && p[1] > low[1] && p[1] < high[1]
+        };
+        Some(rig.own_vehicle.is_some_and(own))
+    }
+
     /// Every count with the name of its field and a name for people.
     pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
         [
@@ -174,11 +196,7 @@ impl Preparation {
         let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
         place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
         for (slot, matrix) in to_voxel.iter_mut().enumerate() {
-            let moved = if deskew && moving {
-                sweep.twist.over(slot_time(rig, slot))
-            } else {
-                Pose::IDENTITY
-            };
+            let moved = if deskew && moving { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
             *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
         }
 
@@ -195,20 +213,8 @@ impl Preparation {
             if let Some(position) = positions.get_mut(n) {
                 *position = [f32::NAN; 3];
             }
-            let p = point.position;
-            if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
-                dropped.not_finite += 1;
-                continue;
-            }
-            if p == [0.0; 3] {
-                dropped.no_return += 1;
-                continue;
-            }
-            let sensor = point.sensor as usize;
-            if sensor >= rig.sensors.len() {
-                dropped.unknown_sensor += 1;
-                continue;
-            }
+            let Some(own) = dropped.admit(rig, point) else { continue };
+            let (p, sensor) = (point.position, point.sensor as usize);
             let slot = if moving { self.slot(rig, point) } else { 0 };
             let at = in_voxels(&to_voxel[slot], p);
             let end = add(voxel(at), centre);
@@ -216,9 +222,6 @@ impl Preparation {
                 dropped.too_far += 1;
                 continue;
             }
-            let own = rig.own_vehicle.is_some_and(|[low, high]| {
-                p[0] > low[0] && p[0] < high[0] && p[1] > low[1] && p[1] < high[1]
-            });
             dropped.own_vehicle += own as u64;
             let [i, j, k] = end.map(|v| v as u32);
             if i < side && j < side && k < levels && !own {
@@ -235,7 +238,7 @@ impl Preparation {
 
     /// Time slot of a return.
     #[inline]
-    fn slot(&self, rig: &Rig, point: &Point) -> usize {
+    pub(crate) fn slot(&self, rig: &Rig, point: &Point) -> usize {
         let last = (SLOTS - 1) as f32;
         match rig.timing {
             Timing::AtStamp => 0,
@@ -265,13 +268,18 @@ fn pseudo_angle(x: f32, y: f32) -> f32 {
 }
 
 /// Middle of a slot, s after the stamp.
-fn slot_time(rig: &Rig, slot: usize) -> f64 {
+pub(crate) fn slot_time(rig: &Rig, slot: usize) -> f64 {
     let turn = (slot as f64 + 0.5) / SLOTS as f64;
     match rig.timing {
         Timing::AtStamp => 0.0,
         Timing::Offset { from_s, span_s } => from_s + turn * span_s,
         Timing::Azimuth { span_s } => (turn - 0.5) * span_s,
     }
+}
+
+/// The vehicle at the middle of a slot, in its frame at the stamp.
+pub(crate) fn moved_by(rig: &Rig, sweep: &Sweep, slot: usize) -> Pose {
+    sweep.twist.over(slot_time(rig, slot))
 }
 
 fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
@@ -321,8 +329,7 @@ fn place_origins(
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved =
-                if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            let moved = if moving { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m)
                 .to_array()

@@ -5,6 +5,11 @@
 //! Positions of a track are metres from its anchor along the world's axes (z up), times seconds
 //! after its start: single precision then holds a return wherever and whenever one drives.
 
+pub mod centroid_ekf;
+pub mod estimate;
+pub mod front_end;
+pub mod spline;
+
 /// One return of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectReturn {

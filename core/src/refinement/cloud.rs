@@ -1,6 +1,7 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
 use super::align::{NOISE, Sample, Weight};
+use crate::ground::Ground;
 use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
 use crate::prepare::central;
 use crate::record::NONE;
@@ -9,111 +10,18 @@ use core::cell::Cell;
 use core::ops::Range;
 use nalgebra::Matrix3;
 
-/// Columns along an axis of a cell of the ground: 1.5 m at 0.30 m.
-const GROUND_CELL: usize = 5;
-/// Ground cells along an axis at most.
-const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
-/// How far below the vehicle's ground another may begin, voxels, and by how much it may fall from
-/// there: what lies lower is mirrored.
-const STEP: f32 = 1.5;
-const SLOPE: f32 = 0.1;
-/// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
-const GROUND_PASSES: usize = 3;
 /// Returns higher above the ground than this belong to things, voxels.
 pub const GROUND_HEIGHT: f32 = 0.6;
 /// Returns lower than this above the ground belong to it in any column, voxels.
 const GROUND_RETURN: f32 = 0.35;
 /// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
 const THING_HEIGHT: f32 = 14.0;
-/// By how much the ground may fall from one of its cells to the next, voxels: 7 %.
-const GROUND_FALL: f32 = 0.33;
 /// Returns so near tell which way the surface faces, voxels.
 const AROUND: f32 = 1.5;
 /// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.
 const THINNED: f32 = 3.0;
 /// Words of a mask of the sub-voxels of a column: 3 x 3 x 3 x 16.
 const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
-
-/// Height of the ground, by cells of [`GROUND_CELL`] columns.
-struct Ground {
-    side: usize,
-    /// Columns along an axis of the window that `cell` is for.
-    columns: usize,
-    cell: [u16; COLUMNS_MAX],
-    /// The three lowest returns of each.
-    lowest: [[f32; 3]; GROUND_SIDE * GROUND_SIDE],
-    height: [f32; GROUND_SIDE * GROUND_SIDE],
-    followed: [f32; GROUND_SIDE * GROUND_SIDE],
-}
-
-impl Ground {
-    const fn new() -> Ground {
-        let none = [0.0; GROUND_SIDE * GROUND_SIDE];
-        let lowest = [[0.0; 3]; GROUND_SIDE * GROUND_SIDE];
-        Ground { side: 0, columns: 0, cell: [0; COLUMNS_MAX], lowest, height: none, followed: none }
-    }
-
-    /// Lists the cell of every column: divisions take longer than looking it up.
-    fn list_cells(&mut self, side: usize) {
-        if self.columns == side {
-            return;
-        }
-        self.columns = side;
-        self.side = side.div_ceil(GROUND_CELL);
-        for i in 0..side {
-            for j in 0..side {
-                let cell = i / GROUND_CELL * self.side + j / GROUND_CELL;
-                self.cell[i * side + j] = cell as u16;
-            }
-        }
-    }
-
-    /// The third-lowest return of each cell, or of its neighbours if the ground falls that way:
-    /// mirrored returns come from below, but seldom together.
-    fn estimate(&mut self, profile: &Profile, positions: &[[f32; 3]], columns: &[u32]) {
-        self.list_cells(profile.side as usize);
-        self.lowest.fill([f32::INFINITY; 3]);
-        let middle = central(profile).map(|c| c as f32 + 0.5);
-        let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
-        for (p, &column) in positions.iter().zip(columns) {
-            if column == NONE {
-                continue;
-            }
-            let away = (p[0] - middle[0]).abs().max((p[1] - middle[1]).abs());
-            if p[2] < level - STEP - SLOPE * away {
-                continue;
-            }
-            let cell = self.cell[column as usize] as usize;
-            let mut z = p[2];
-            for low in &mut self.lowest[cell] {
-                (*low, z) = (low.min(z), low.max(z));
-            }
-        }
-        for (height, lowest) in self.height.iter_mut().zip(&self.lowest) {
-            *height = lowest[2];
-        }
-        let n = self.side;
-        for _ in 0..GROUND_PASSES {
-            for i in 0..n {
-                for j in 0..n {
-                    let mut height = self.height[i * n + j];
-                    for a in i.saturating_sub(1)..(i + 2).min(n) {
-                        for b in j.saturating_sub(1)..(j + 2).min(n) {
-                            height = height.min(self.height[a * n + b] + GROUND_FALL);
-                        }
-                    }
-                    self.followed[i * n + j] = height;
-                }
-            }
-            core::mem::swap(&mut self.height, &mut self.followed);
-        }
-    }
-
-    /// Height above the ground of a place in a column, voxels.
-    fn above(&self, column: usize, z: f32) -> f32 {
-        z - self.height[self.cell[column] as usize]
-    }
-}
 
 /// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
 const UNKNOWN: Weight = [0.0; 6];
@@ -170,7 +78,11 @@ impl Cloud {
     ) -> usize {
         let side = profile.side as usize;
         self.side = side;
-        self.ground.estimate(profile, positions, columns);
+        let middle = central(profile).map(|c| c as f32 + 0.5);
+        let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
+        let placed = columns.iter().zip(positions).filter(|(column, _)| **column != NONE);
+        let placed = placed.map(|(column, at)| (*column as usize, *at));
+        self.ground.estimate(side, [middle[0], middle[1], level], placed);
         let ground = &self.ground;
         let height = |n: usize| ground.above(columns[n] as usize, positions[n][2]);
         let is_thing =

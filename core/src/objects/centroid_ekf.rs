@@ -1,0 +1,431 @@
+//! The baseline of 2.4: an extended Kalman filter that takes the centroid of an object's returns for
+//! its position.
+//!
+//! State (2.2): x, y, z, heading, speed, speed upwards, turning rate; the process is the unicycle of
+//! (2.6). Positions are metres from the track's anchor, times seconds after its start. The first
+//! centroid tells no velocity, and a polar state without speed could only ever learn motion along
+//! its own heading: the filter rests until a centroid lies farther from the first than noise
+//! explains, or for [`CentroidParams::start_s`], and is then born of both.
+
+use super::ObjectState;
+use crate::tracklet::ekf::Start;
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
+
+/// Elements of the state.
+pub const STATE: usize = 7;
+type Mean = SVector<f64, STATE>;
+type Covariance = SMatrix<f64, STATE, STATE>;
+
+/// 99 % quantile of chi-square with two degrees of freedom.
+const DEPARTED_D2: f64 = 9.2103;
+/// Standard deviations from zero from which on the sign of a speed is sure.
+const SURE: f64 = 3.0;
+
+/// The filter's numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CentroidParams {
+    /// Process noise of the state per square root of a second: m, m, m, rad, m/s, m/s, rad/s.
+    pub process: [f64; STATE],
+    /// Standard deviation of a centroid along each axis, m.
+    pub centroid_m: f64,
+    /// Standard deviation of the velocity of what was seen once, along x and y each, m/s.
+    pub speed_birth_mps: f64,
+    /// Of its speed upwards, m/s.
+    pub climb_birth_mps: f64,
+    /// Of its turning rate, rad/s.
+    pub turn_birth_radps: f64,
+    /// The longest it rests after its first centroid, s.
+    pub start_s: f64,
+}
+
+impl CentroidParams {
+    /// The process noise is Q_u of 2.6.2, its entries read as standard deviations after a second.
+    /// The dissertation does not give the rest.
+    pub const fn dissertation() -> CentroidParams {
+        CentroidParams {
+            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
+            centroid_m: 0.2,
+            speed_birth_mps: 10.0,
+            climb_birth_mps: 0.5,
+            turn_birth_radps: 0.2,
+            start_s: 0.5,
+        }
+    }
+}
+
+/// What an update says of the states before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Revision {
+    /// Nothing.
+    None,
+    /// The filter left its rest: heading and speed were these all along.
+    Departed,
+    /// The filter had its object backwards.
+    Turned,
+}
+
+impl Revision {
+    /// Revises the states of a track before `now`, the state after the update.
+    pub fn revise(self, now: &ObjectState, before: &mut [ObjectState]) {
+        for state in before {
+            match self {
+                Revision::None => {}
+                Revision::Departed => (state.heading, state.speed) = (now.heading, now.speed),
+                Revision::Turned => {
+                    state.heading += core::f64::consts::PI;
+                    state.speed = -state.speed;
+                }
+            }
+        }
+    }
+}
+
+/// How much of the motion is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// Nothing: where and when the first centroid was seen.
+    Resting { first: [f64; 2], since_s: f64 },
+    /// It may still be backwards.
+    Moving,
+    /// Its heading has been seen to lead forwards: from now on a negative speed is reversing.
+    Facing,
+}
+
+/// The filter of one track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CentroidEkf {
+    time_s: f64,
+    mean: Mean,
+    covariance: Covariance,
+    phase: Phase,
+}
+
+impl CentroidEkf {
+    /// Of an object first seen at `centroid` at `time_s`.
+    pub fn birth(params: &CentroidParams, time_s: f64, centroid: [f64; 3]) -> CentroidEkf {
+        let [x, y, z] = centroid;
+        let measured = params.centroid_m;
+        let deviations = [
+            measured,
+            measured,
+            measured,
+            0.0,
+            params.speed_birth_mps,
+            params.climb_birth_mps,
+            params.turn_birth_radps,
+        ];
+        CentroidEkf {
+            time_s,
+            mean: Mean::from([x, y, z, 0.0, 0.0, 0.0, 0.0]),
+            covariance: Covariance::from_diagonal(&Mean::from(deviations.map(|s| s * s))),
+            phase: Phase::Resting { first: [x, y], since_s: time_s },
+        }
+    }
+
+    /// Prediction until `time_s`; nothing happens where that is not later.
+    pub fn predict(&mut self, params: &CentroidParams, time_s: f64) {
+        let dt = time_s - self.time_s;
+        if dt.is_nan() || dt <= 0.0 {
+            return;
+        }
+        self.time_s = time_s;
+        let mut transition = if let Phase::Resting { .. } = self.phase {
+            // Any direction is as likely.
+            let spread = params.speed_birth_mps * params.speed_birth_mps * dt * dt;
+            self.covariance[(0, 0)] += spread;
+            self.covariance[(1, 1)] += spread;
+            Covariance::identity()
+        } else {
+            jacobian(&self.mean, dt)
+        };
+        transition[(2, 5)] = dt;
+        // Noise that enters all along, half of it carried on: exact to the second order.
+        let noise =
+            Covariance::from_diagonal(&Mean::from(params.process.map(|s| 0.5 * s * s * dt)));
+        self.covariance = transition * (self.covariance + noise) * transition.transpose() + noise;
+        self.mean = advance(&self.mean, dt);
+    }
+
+    /// Squared Mahalanobis distance between a centroid and where it is expected: chi-square with
+    /// three degrees of freedom.
+    pub fn distance2(&self, params: &CentroidParams, centroid: [f64; 3]) -> f64 {
+        let innovation = self.innovation(centroid);
+        (innovation.transpose() * self.weight(params) * innovation)[0]
+    }
+
+    /// Observes a centroid (Joseph form).
+    pub fn update(&mut self, params: &CentroidParams, centroid: [f64; 3]) -> Revision {
+        if let Phase::Resting { first, since_s } = self.phase {
+            return self.rest(params, centroid, first, since_s);
+        }
+        let r = params.centroid_m * params.centroid_m;
+        let innovation = self.innovation(centroid);
+        let gain = self.covariance.fixed_view::<STATE, 3>(0, 0) * self.weight(params);
+        self.mean += gain * innovation;
+        let mut keep = Covariance::identity();
+        let mut seen_part = keep.fixed_view_mut::<STATE, 3>(0, 0);
+        seen_part -= gain;
+        let joseph = keep * self.covariance * keep.transpose() + gain * gain.transpose() * r;
+        self.covariance = (joseph + joseph.transpose()) * 0.5;
+        self.face()
+    }
+
+    /// Time of the state, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// The state; the heading does not jump by a turn.
+    pub fn state(&self) -> ObjectState {
+        let m = &self.mean;
+        ObjectState {
+            time_s: self.time_s,
+            position: [m[0], m[1], m[2]],
+            heading: m[3],
+            speed: m[4],
+            climb: m[5],
+            turn_rate: m[6],
+        }
+    }
+
+    /// Covariance of the state, in the order of [`CentroidParams::process`].
+    pub fn covariance(&self) -> &SMatrix<f64, STATE, STATE> {
+        &self.covariance
+    }
+
+    /// Velocity along x and y, m/s, and its covariance (xx, xy, yy).
+    pub fn velocity(&self) -> ([f64; 2], [f64; 3]) {
+        let (sin, cos) = (libm::sin(self.mean[3]), libm::cos(self.mean[3]));
+        let (p, speed) = (&self.covariance, self.mean[4]);
+        if let Phase::Resting { .. } = self.phase {
+            return ([0.0; 2], [p[(4, 4)], 0.0, p[(4, 4)]]);
+        }
+        let (a, b) = ([-speed * sin, cos], [speed * cos, sin]);
+        let product = |l: [f64; 2], r: [f64; 2]| {
+            l[0] * r[0] * p[(3, 3)]
+                + (l[0] * r[1] + l[1] * r[0]) * p[(3, 4)]
+                + l[1] * r[1] * p[(4, 4)]
+        };
+        ([speed * cos, speed * sin], [product(a, a), product(a, b), product(b, b)])
+    }
+
+    fn innovation(&self, centroid: [f64; 3]) -> Vector3<f64> {
+        Vector3::from(centroid) - self.mean.fixed_rows::<3>(0)
+    }
+
+    /// Inverse covariance of a centroid where it is expected.
+    fn weight(&self, params: &CentroidParams) -> Matrix3<f64> {
+        let measured = Matrix3::from_diagonal_element(params.centroid_m * params.centroid_m);
+        // Positive definite by the noise.
+        (self.covariance.fixed_view::<3, 3>(0, 0) + measured).try_inverse().unwrap_or_default()
+    }
+
+    /// A further centroid of what rests, and whether it departs.
+    fn rest(
+        &mut self,
+        params: &CentroidParams,
+        centroid: [f64; 3],
+        first: [f64; 2],
+        since_s: f64,
+    ) -> Revision {
+        let born = CentroidEkf::birth(params, self.time_s, centroid);
+        let (elapsed, measured) = (self.time_s - since_s, params.centroid_m * params.centroid_m);
+        let moved = [centroid[0] - first[0], centroid[1] - first[1]];
+        let moved2 = moved[0] * moved[0] + moved[1] * moved[1];
+        let departs = moved2 > 2.0 * measured * DEPARTED_D2 || elapsed >= params.start_s;
+        if !departs || elapsed <= 0.0 || moved2 == 0.0 {
+            *self = CentroidEkf { phase: self.phase, ..born };
+            return Revision::None;
+        }
+        *self = CentroidEkf { phase: Phase::Moving, ..born };
+        let start = Start::of(
+            Matrix2::from_diagonal_element(measured as f32),
+            moved.map(|v| v as f32),
+            elapsed as f32,
+        );
+        (self.mean[3], self.mean[4]) = (start.heading as f64, start.speed as f64);
+        for (a, to) in [0, 1, 3, 4].into_iter().enumerate() {
+            for (b, and) in [0, 1, 3, 4].into_iter().enumerate() {
+                self.covariance[(to, and)] = start.covariance[(a, b)] as f64;
+            }
+        }
+        Revision::Departed
+    }
+
+    /// Once the sign of the speed is sure, the heading leads forwards.
+    fn face(&mut self) -> Revision {
+        let (speed, variance) = (self.mean[4], self.covariance[(4, 4)]);
+        if self.phase == Phase::Facing || speed * speed <= SURE * SURE * variance {
+            return Revision::None;
+        }
+        self.phase = Phase::Facing;
+        if speed > 0.0 {
+            return Revision::None;
+        }
+        self.mean[4] = -speed;
+        self.mean[3] += core::f64::consts::PI;
+        for n in (0..STATE).filter(|n| *n != 4) {
+            self.covariance[(4, n)] = -self.covariance[(4, n)];
+            self.covariance[(n, 4)] = -self.covariance[(n, 4)];
+        }
+        Revision::Turned
+    }
+}
+
+/// The unicycle of (2.6) after `dt` seconds: along the chord of its arc, whose length is taken to be
+/// that of the arc.
+fn advance(m: &Mean, dt: f64) -> Mean {
+    let way = m[3] + 0.5 * dt * m[6];
+    let mut next = *m;
+    next[0] += m[4] * libm::cos(way) * dt;
+    next[1] += m[4] * libm::sin(way) * dt;
+    next[2] += m[5] * dt;
+    next[3] += m[6] * dt;
+    next
+}
+
+/// Derivative of [`advance`] by the state.
+fn jacobian(m: &Mean, dt: f64) -> Covariance {
+    let way = m[3] + 0.5 * dt * m[6];
+    let (along_x, along_y) = (libm::cos(way) * dt, libm::sin(way) * dt);
+    let mut f = Covariance::identity();
+    (f[(0, 3)], f[(0, 4)], f[(0, 6)]) = (-m[4] * along_y, along_x, -0.5 * dt * m[4] * along_y);
+    (f[(1, 3)], f[(1, 4)], f[(1, 6)]) = (m[4] * along_x, along_y, 0.5 * dt * m[4] * along_x);
+    f[(2, 5)] = dt;
+    f[(3, 6)] = dt;
+    f
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::random::Random;
+    use std::vec::Vec;
+
+    const PARAMS: CentroidParams = CentroidParams::dissertation();
+
+    #[test]
+    fn the_jacobian_is_that_of_the_motion() {
+        let at = Mean::from([3.0, -2.0, 0.5, 2.1, 8.0, -0.4, 0.7]);
+        for dt in [0.01, 0.1, 0.9] {
+            let jacobian = jacobian(&at, dt);
+            for n in 0..STATE {
+                let (mut low, mut high) = (at, at);
+                (low[n], high[n]) = (at[n] - 1e-5, at[n] + 1e-5);
+                let difference = (advance(&high, dt) - advance(&low, dt)) / 2e-5;
+                assert!((difference - jacobian.column(n)).amax() < 1e-8, "{dt}: {n}");
+            }
+        }
+    }
+
+    /// States after every update, history revised.
+    fn follow(truth: impl Fn(f64) -> [f64; 3], seed: u64, noise: f64) -> Vec<ObjectState> {
+        let mut random = Random(seed);
+        let mut see = |t: f64| truth(t).map(|v| v + noise * random.normal());
+        let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, see(0.0));
+        let mut states = Vec::from([ekf.state()]);
+        for n in 1..60 {
+            let t = n as f64 * 0.1;
+            ekf.predict(&PARAMS, t);
+            let revision = ekf.update(&PARAMS, see(t));
+            revision.revise(&ekf.state(), &mut states);
+            states.push(ekf.state());
+            assert!(ekf.covariance().iter().all(|v| v.is_finite()));
+            assert!((0..STATE).all(|n| ekf.covariance()[(n, n)] >= 0.0));
+        }
+        states
+    }
+
+    fn off(from: f64, to: f64) -> f64 {
+        use std::f64::consts::{PI, TAU};
+        ((from - to + PI).rem_euclid(TAU) - PI).abs()
+    }
+
+    #[test]
+    fn straight_whichever_way() {
+        for speed in [1.5, 5.0, 15.0] {
+            for way in 0..12 {
+                let heading = way as f64 * 0.5 - 3.0;
+                let truth =
+                    |t: f64| [speed * t * heading.cos(), speed * t * heading.sin(), 0.2 * t];
+                let states = follow(truth, 5 + way, 0.1);
+                let last = states[59];
+                assert!(off(last.heading, heading) < 0.5 / speed, "{speed}, {heading}: {last:?}");
+                assert!((last.speed - speed).abs() < 0.6, "{speed}, {heading}: {last:?}");
+                assert!((last.climb - 0.2).abs() < 0.2, "{last:?}");
+                // No jump by half a turn, from first to last.
+                for pair in states.windows(2) {
+                    assert!((pair[1].heading - pair[0].heading).abs() < 1.0, "{speed}: {pair:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_circle_unwraps_the_heading() {
+        let (radius, rate) = (10.0, 1.2);
+        for way in [1.0, -1.0] {
+            let truth = |t: f64| {
+                let angle = rate * t;
+                [radius * angle.sin(), way * radius * (1.0 - angle.cos()), 0.0]
+            };
+            let last = follow(truth, 3, 0.05)[59];
+            assert!((last.heading - way * rate * 5.9).abs() < 0.2, "{last:?}");
+            assert!((last.turn_rate - way * rate).abs() < 0.2, "{last:?}");
+            assert!((last.speed - radius * rate).abs() < 0.6, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn what_stands_stays() {
+        // Exactly, without ever a heading.
+        let states = follow(|_| [4.0, 5.0, 6.0], 1, 0.0);
+        assert!(states.iter().all(|s| s.position == [4.0, 5.0, 6.0] && s.speed == 0.0));
+        // Within its noise.
+        for seed in 0..50 {
+            let last = follow(|_| [4.0, 5.0, 6.0], seed, 0.1)[59];
+            assert!((last.position[0] - 4.0).hypot(last.position[1] - 5.0) < 0.4, "{last:?}");
+            assert!(last.speed.abs() < 1.2 && last.turn_rate.abs() < 1.0, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn backwards_is_turned_once_and_reversing_stays() {
+        let mut random = Random(4);
+        // It reverses after three seconds.
+        let truth = |t: f64| [if t < 3.0 { 4.0 * t } else { 24.0 - 4.0 * t }, 0.0, 0.0];
+        let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, truth(0.0));
+        // Two bad centroids first: it starts the wrong way.
+        for n in 1..60 {
+            let t = n as f64 * 0.1;
+            ekf.predict(&PARAMS, t);
+            let [x, y, z] = truth(t);
+            let wrong = if n < 2 { -1.5 } else { 0.05 * random.normal() };
+            ekf.update(&PARAMS, [x + wrong, y + 0.05 * random.normal(), z]);
+            if n == 28 {
+                let s = ekf.state();
+                assert!(off(s.heading, 0.0) < 0.2 && (s.speed - 4.0).abs() < 0.5, "{s:?}");
+            }
+        }
+        let s = ekf.state();
+        let velocity = ekf.velocity().0;
+        assert!((velocity[0] + 4.0).abs() < 1.0 && velocity[1].abs() < 1.0, "{s:?}");
+    }
+
+    #[test]
+    fn the_covariance_opens_in_a_gap_and_time_never_runs_back() {
+        let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, [0.0; 3]);
+        let near = ekf.distance2(&PARAMS, [1.0, 0.0, 0.0]);
+        ekf.predict(&PARAMS, 0.3);
+        assert!(ekf.distance2(&PARAMS, [1.0, 0.0, 0.0]) < near);
+        // As far either way while nothing of its motion is known.
+        let apart = |c| ekf.distance2(&PARAMS, c);
+        assert!((apart([1.0, 0.0, 0.0]) - apart([0.0, 1.0, 0.0])).abs() < 1e-12);
+        let before = ekf;
+        for t in [0.3, 0.1, -5.0, f64::NAN] {
+            ekf.predict(&PARAMS, t);
+            assert_eq!(ekf, before);
+        }
+    }
+}

@@ -1,0 +1,567 @@
+//! Trajectory and shape of an object together, in continuous time (2.5).
+//!
+//! What is estimated is the maximum of the posterior (2.1): of `p(x) p(m) p(z | x, m)`, that is the
+//! minimum of
+//!
+//! ```text
+//! J_m = 1/2 Σ m' R_m^-1 m            R_m = extent² I
+//! J_u = 1/2 ∫ e_u' Q_u^-1 e_u dt     e_u = dx/dt - f(x)
+//! J_z = 1/2 Σ e_z' R_z^-1 e_z        e_z = R(φ)'(z - p) - m,  R_z = deviation² I
+//! ```
+//!
+//! The dissertation prints (2.7) without the minus and the half, (2.23) with `R_m` for its inverse,
+//! (2.24) and (2.25) without the half, (2.25) with `R_z` for its inverse and `R_z = σ_z I` for
+//! `σ_z² I`; the above follows from Bayes' rule and from what a Gaussian is.
+//!
+//! Both the splines' weights and the model are unknowns of each Gauss-Newton step; [`normal`]
+//! eliminates the model. Everything is in double precision but the places of returns and model points:
+//! `Q_u^-1` reaches 1e6 beside `R_z^-1` of 4.
+
+mod nearest;
+mod normal;
+mod process;
+mod returns;
+mod start;
+#[cfg(test)]
+mod synthetic;
+mod system;
+#[cfg(test)]
+mod tests;
+
+use super::spline::{BASES_MAX, Knots, Laid};
+use super::{ObjectReturn, ObjectState};
+use nearest::{Nearest, square_distance};
+use normal::{Equations, Seen, Surface};
+use process::Weights;
+use returns::Returns;
+
+/// Returns that take part in an estimate at most.
+pub const RETURNS_MAX: usize = 8192;
+/// Model points at most.
+pub const MODEL_MAX: usize = 3000;
+/// Iterations of a solve at most.
+pub const ITERATIONS_MAX: usize = 64;
+
+/// See [`system::System::solve`].
+const LEAST_PIVOT: f64 = 1e-10;
+/// A solve has converged when an iteration gains no more than this share of the cost.
+const CONVERGED: f64 = 1e-4;
+
+/// The choices of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimateParams {
+    /// Returns that take part, evenly in the order of time.
+    pub returns: usize,
+    /// Model points (`n_m`).
+    pub model: usize,
+    /// Time for each basis function, s.
+    pub basis_s: f64,
+    /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
+    /// rate (rad/s).
+    pub process: [f64; 7],
+    /// Standard deviation of a model point about the origin, m.
+    pub extent_m: f64,
+    /// Standard deviation of a return about its model point (`σ_z`), m.
+    pub deviation_m: f64,
+    /// Iterations at that deviation, at most.
+    pub iterations: usize,
+    /// Stages before, each with a model of its own: the deviation falls evenly from
+    /// `first_deviation_m` to `deviation_m`.
+    pub stages: usize,
+    /// See `stages`, m.
+    pub first_deviation_m: f64,
+    /// A return further off than so many deviations counts for a quarter; 0 for no robust loss.
+    pub robust: f64,
+    /// Steps that raise the cost are taken back and damped (Levenberg and Marquardt).
+    pub damping: bool,
+    /// Returns weigh across the surface that their model point stands for, little along it.
+    pub surfaces: bool,
+    /// The start is smoothed with the process model, and one at rest is tried beside it.
+    pub starts: bool,
+}
+
+impl EstimateParams {
+    /// The dissertation's (2.6.2).
+    pub const fn dissertation() -> EstimateParams {
+        EstimateParams {
+            returns: 5000,
+            model: 300,
+            basis_s: 0.5,
+            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
+            extent_m: 10.0,
+            deviation_m: 0.5,
+            iterations: 10,
+            stages: 0,
+            first_deviation_m: 0.5,
+            robust: 0.0,
+            damping: false,
+            surfaces: false,
+            starts: false,
+        }
+    }
+}
+
+impl Default for EstimateParams {
+    fn default() -> EstimateParams {
+        EstimateParams {
+            deviation_m: 0.1,
+            stages: 2,
+            robust: 3.0,
+            damping: true,
+            surfaces: true,
+            starts: true,
+            ..EstimateParams::dissertation()
+        }
+    }
+}
+
+/// What the terms of the cost are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// `J_m`.
+    pub model: f64,
+    /// `J_u`.
+    pub process: f64,
+    /// `J_z`.
+    pub returns: f64,
+    /// Mean distance of a return from its model point, m.
+    pub residual_m: f64,
+    /// Standard deviation of a return that this was reckoned with, m.
+    pub deviation_m: f64,
+}
+
+impl Cost {
+    /// Their sum.
+    pub fn total(&self) -> f64 {
+        self.model + self.process + self.returns
+    }
+}
+
+/// Why a solve stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stop {
+    /// No return is finite: there is no estimate.
+    #[default]
+    NoReturns,
+    /// The cost fell no more.
+    Converged,
+    /// It made as many iterations as it may.
+    Iterations,
+    /// A step had no finite solution; the estimate is that before it.
+    NotFinite,
+}
+
+/// How a solve went.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Iterations that led to the estimate.
+    pub iterations: usize,
+    /// Cost at the start and after each of them.
+    pub costs: heapless::Vec<Cost, { ITERATIONS_MAX + 1 }>,
+    /// Returns that took part.
+    pub returns: usize,
+    /// Returns left out because there were more.
+    pub thinned: usize,
+    /// Returns left out because they or their times are not finite.
+    pub not_finite: usize,
+    /// Returns that took part, and lie further from the object's origin than the prior's `extent_m`.
+    pub outside: usize,
+    /// The knots are nearer together than asked for: the track is short.
+    pub compressed: bool,
+    /// They are further apart: the track is long.
+    pub stretched: bool,
+    /// There was no history: the start stands at the returns' mean.
+    pub no_history: bool,
+    /// The estimate comes from the start at rest.
+    pub from_rest: bool,
+}
+
+/// A trajectory with its shape.
+struct Solution {
+    weights: [Weights; BASES_MAX],
+    model: [[f32; 3]; MODEL_MAX],
+    surfaces: [Surface; MODEL_MAX],
+    points: usize,
+}
+
+impl Solution {
+    const NONE: Solution = Solution {
+        weights: [[0.0; 7]; BASES_MAX],
+        model: [[0.0; 3]; MODEL_MAX],
+        surfaces: [Surface::NONE; MODEL_MAX],
+        points: 0,
+    };
+
+    fn copy(&mut self, other: &Solution) {
+        self.weights = other.weights;
+        self.points = other.points;
+        self.model[..other.points].copy_from_slice(&other.model[..other.points]);
+        self.surfaces[..other.points].copy_from_slice(&other.surfaces[..other.points]);
+    }
+}
+
+/// The workspace of an estimate, and its result.
+pub struct Estimator {
+    knots: Knots,
+    returns: Returns,
+    now: Solution,
+    before: Solution,
+    best: Solution,
+    seen: [Seen; RETURNS_MAX],
+    /// Returns by their model points.
+    order: [u16; RETURNS_MAX],
+    starts: [u16; MODEL_MAX + 1],
+    nearest: Nearest<MODEL_MAX>,
+    equations: Equations,
+    step: [Weights; BASES_MAX],
+}
+
+impl Default for Estimator {
+    fn default() -> Estimator {
+        Estimator::new()
+    }
+}
+
+impl Estimator {
+    /// An empty one.
+    pub const fn new() -> Estimator {
+        Estimator {
+            knots: Knots::NONE,
+            returns: Returns::new(),
+            now: Solution::NONE,
+            before: Solution::NONE,
+            best: Solution::NONE,
+            seen: [Seen::NONE; RETURNS_MAX],
+            order: [0; RETURNS_MAX],
+            starts: [0; MODEL_MAX + 1],
+            nearest: Nearest::new(),
+            equations: Equations::new(),
+            step: [[0.0; 7]; BASES_MAX],
+        }
+    }
+
+    /// Estimates trajectory and model from the returns of an object (any number, in any order) and
+    /// the history of the tracker that found them.
+    pub fn solve(
+        &mut self,
+        params: &EstimateParams,
+        returns: &[ObjectReturn],
+        history: &[ObjectState],
+    ) -> Report {
+        let mut report = Report::default();
+        self.knots = Knots::NONE;
+        self.best.weights.fill([0.0; 7]);
+        self.best.points = 0;
+        let Some(taken) = self.returns.take(returns, params.returns) else {
+            report.not_finite = returns.len();
+            return report;
+        };
+        let (knots, Laid { compressed, stretched }) =
+            Knots::over(f64::from(taken.first_s), f64::from(taken.last_s), params.basis_s);
+        self.knots = knots;
+        self.returns.lay(&knots);
+        report.returns = self.returns.all().len();
+        report.not_finite = taken.not_finite;
+        report.thinned = returns.len() - taken.not_finite - report.returns;
+        (report.compressed, report.stretched) = (compressed, stretched);
+
+        report.no_history = !self.start(params, history);
+        self.run(params, &mut report);
+        self.best.copy(&self.now);
+        if params.starts && !report.no_history {
+            let mut rest = report.clone();
+            start::stand(history, &mut self.now.weights[..knots.bases()]);
+            self.run(params, &mut rest);
+            let cost = |report: &Report| report.costs.last().map_or(f64::MAX, Cost::total);
+            if cost(&rest) < cost(&report) {
+                report = Report { from_rest: true, ..rest };
+                self.best.copy(&self.now);
+            }
+        }
+        report.outside = self.outside(params.extent_m);
+        report
+    }
+
+    /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end.
+    pub fn state(&self, time_s: f64) -> ObjectState {
+        let inside = time_s.clamp(self.knots.start(), self.knots.end());
+        let [mut x, mut y, z, heading, speed, climb, turn_rate] =
+            self.knots.value(&self.best.weights, inside);
+        let beyond = time_s - inside;
+        let (sin, cos) = libm::sincos(heading);
+        x += beyond * speed * cos;
+        y += beyond * speed * sin;
+        let position = [x, y, z + beyond * climb];
+        ObjectState { time_s, position, heading, speed, climb, turn_rate }
+    }
+
+    /// Model points, m, in the object's frame.
+    pub fn model(&self) -> &[[f32; 3]] {
+        &self.best.model[..self.best.points]
+    }
+
+    /// First trajectory of a solve. False where there is no history.
+    fn start(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
+        let n = self.knots.bases();
+        let weights = &mut self.now.weights[..n];
+        if !start::fit(&self.knots, history, &mut self.equations, weights, &mut self.step) {
+            let mut mean = [0.0; 7];
+            for kept in self.returns.all() {
+                for (sum, value) in mean.iter_mut().zip(kept.position) {
+                    *sum += f64::from(value);
+                }
+            }
+            let count = self.returns.all().len() as f64;
+            weights.fill(mean.map(|sum| sum / count));
+            return false;
+        }
+        if params.starts {
+            let precision = precision(params);
+            start::smooth(
+                &self.knots,
+                history,
+                &precision,
+                &mut self.equations,
+                weights,
+                &mut self.step,
+            );
+        }
+        true
+    }
+
+    /// All stages of a solve from the trajectory in `now`.
+    fn run(&mut self, params: &EstimateParams, report: &mut Report) {
+        report.costs.clear();
+        report.iterations = 0;
+        let ratio = params.first_deviation_m / params.deviation_m;
+        for stage in (0..=params.stages).rev() {
+            let share = stage as f64 / params.stages.max(1) as f64;
+            let deviation = params.deviation_m * libm::pow(ratio, share);
+            self.extract(params.model, deviation);
+            report.stop = self.descend(params, deviation, report);
+        }
+    }
+
+    /// Model points from the returns: so many of them, evenly in the order of time.
+    fn extract(&mut self, points: usize, deviation: f64) {
+        let kept = self.returns.all();
+        let points = points.clamp(1, MODEL_MAX).min(kept.len());
+        for (kept, seen) in kept.iter().zip(&mut self.seen) {
+            *seen = look(&self.now.weights, kept);
+        }
+        for (i, model) in self.now.model[..points].iter_mut().enumerate() {
+            let nth = (2 * i + 1) * kept.len() / (2 * points);
+            *model = self.seen[nth].place().map(|value| value as f32);
+        }
+        self.now.surfaces[..points].fill(Surface::round(1.0 / (deviation * deviation)));
+        self.now.points = points;
+    }
+
+    /// Gauss-Newton iterations with one deviation.
+    fn descend(&mut self, params: &EstimateParams, deviation: f64, report: &mut Report) -> Stop {
+        let precision = precision(params);
+        let prior = 1.0 / (params.extent_m * params.extent_m);
+        let n = self.knots.bases();
+        self.associate(params, deviation);
+        self.equations.clear(n);
+        let mut cost = self.cost(params, deviation);
+        cost.process =
+            process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+        if report.costs.is_empty() {
+            _ = report.costs.push(cost);
+        }
+        let mut damping = if params.damping { 1e-4 } else { 0.0 };
+        for _ in 0..params.iterations {
+            if report.iterations == ITERATIONS_MAX {
+                return Stop::Iterations;
+            }
+            self.before.copy(&self.now);
+            let Some(()) = self.step(damping, prior) else { return Stop::NotFinite };
+            self.associate(params, deviation);
+            self.equations.clear(n);
+            let mut next = self.cost(params, deviation);
+            next.process =
+                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+            report.iterations += 1;
+            let gain = cost.total() - next.total();
+            let worse = params.damping && gain < 0.0;
+            if !next.total().is_finite() || worse {
+                self.now.copy(&self.before);
+                if !params.damping {
+                    return Stop::NotFinite;
+                }
+                _ = report.costs.push(cost);
+                self.associate(params, deviation);
+                self.equations.clear(n);
+                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+                damping *= 10.0;
+                continue;
+            }
+            _ = report.costs.push(next);
+            damping *= 0.3;
+            let converged = libm::fabs(gain) <= CONVERGED * cost.total();
+            cost = next;
+            if converged {
+                return Stop::Converged;
+            }
+        }
+        Stop::Iterations
+    }
+
+    /// Finds every return's model point at the trajectory in `now`.
+    fn associate(&mut self, params: &EstimateParams, deviation: f64) {
+        let kept = self.returns.all();
+        let model = &self.now.model[..self.now.points];
+        self.nearest.fill(model);
+        self.starts[..=model.len()].fill(0);
+        for (kept, seen) in kept.iter().zip(&mut self.seen) {
+            let guess = usize::from(seen.nearest);
+            *seen = look(&self.now.weights, kept);
+            let place = seen.place().map(|value| value as f32);
+            let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &place));
+            let Some((number, _)) = self.nearest.find(place, far) else { continue };
+            seen.nearest = number;
+            self.starts[usize::from(number) + 1] += 1;
+        }
+        for i in 0..model.len() {
+            self.starts[i + 1] += self.starts[i];
+        }
+        for (i, seen) in self.seen[..kept.len()].iter().enumerate() {
+            let at = &mut self.starts[usize::from(seen.nearest)];
+            self.order[usize::from(*at)] = i as u16;
+            *at += 1;
+        }
+        for i in (1..=model.len()).rev() {
+            self.starts[i] = self.starts[i - 1];
+        }
+        self.starts[0] = 0;
+        if params.surfaces {
+            self.find_surfaces(deviation);
+        }
+        if params.robust > 0.0 {
+            let limit = params.robust * params.robust;
+            for seen in &mut self.seen[..self.returns.all().len()] {
+                let number = usize::from(seen.nearest);
+                let (model, surface) = (&self.now.model[number], &self.now.surfaces[number]);
+                let square = normal::square(seen, model, surface);
+                let share = 1.0 / (1.0 + square / limit);
+                seen.share = share * share;
+            }
+        }
+    }
+
+    /// Precisions from how the returns of a model point scatter about it.
+    fn find_surfaces(&mut self, deviation: f64) {
+        let least = deviation * deviation;
+        for number in 0..self.now.points {
+            let order =
+                &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
+            let model = self.now.model[number].map(f64::from);
+            // As if a few more returns lay about it alike in every direction.
+            let few = 4.0;
+            let (mut xx, mut xy, mut yy, mut zz) = (0.0, 0.0, 0.0, 0.0);
+            for &i in order {
+                let [x, y, z] = self.seen[usize::from(i)].place();
+                let [x, y, z] = [x - model[0], y - model[1], z - model[2]];
+                xx += x * x;
+                xy += x * y;
+                yy += y * y;
+                zz += z * z;
+            }
+            let count = order.len() as f64 + few;
+            let round = few * 0.04;
+            let [xx, xy, yy, zz] =
+                [(xx + round) / count, xy / count, (yy + round) / count, (zz + round) / count];
+            let half = 0.5 * (xx - yy);
+            let spread = libm::sqrt(half * half + xy * xy);
+            let middle = 0.5 * (xx + yy);
+            // Of the smaller eigenvalue.
+            let (nx, ny) = if half < 0.0 { (spread - half, -xy) } else { (-xy, spread + half) };
+            let length = libm::sqrt(nx * nx + ny * ny);
+            let normal = if length > 0.0 { [nx / length, ny / length] } else { [1.0, 0.0] };
+            self.now.surfaces[number] = Surface {
+                normal,
+                across: 1.0 / (least + (middle - spread).max(0.0)),
+                along: 1.0 / (least + middle + spread),
+                up: 1.0 / (least + zz),
+            };
+        }
+    }
+
+    /// The cost at the associations, but for the process.
+    fn cost(&self, params: &EstimateParams, deviation: f64) -> Cost {
+        let prior = 1.0 / (params.extent_m * params.extent_m);
+        let limit = params.robust * params.robust;
+        let mut cost = Cost { deviation_m: deviation, ..Cost::default() };
+        for model in &self.now.model[..self.now.points] {
+            cost.model += 0.5 * prior * f64::from(square_distance(model, &[0.0; 3]));
+        }
+        let count = self.returns.all().len();
+        for seen in &self.seen[..count] {
+            let number = usize::from(seen.nearest);
+            let model = &self.now.model[number];
+            let square = normal::square(seen, model, &self.now.surfaces[number]);
+            cost.returns +=
+                0.5 * if limit > 0.0 { square / (1.0 + square / limit) } else { square };
+            let place = seen.place().map(|value| value as f32);
+            cost.residual_m += f64::from(libm::sqrtf(square_distance(model, &place)));
+        }
+        cost.residual_m /= count as f64;
+        cost
+    }
+
+    /// One step of trajectory and model; `equations` hold the process term.
+    fn step(&mut self, damping: f64, prior: f64) -> Option<()> {
+        let kept = self.returns.all();
+        let n = self.knots.bases();
+        let now = &mut self.now;
+        self.equations.add_returns(kept, &self.seen, &now.model, &now.surfaces);
+        let orders =
+            |number: usize| usize::from(self.starts[number])..usize::from(self.starts[number + 1]);
+        for number in 0..now.points {
+            let order = &self.order[orders(number)];
+            let (model, surface) = (&now.model[number], &now.surfaces[number]);
+            self.equations.eliminate(order, kept, &self.seen, model, surface, prior);
+        }
+        self.equations.planar.damp(damping);
+        self.equations.vertical.damp(damping);
+        let step = &mut self.step[..n];
+        self.equations.solve(LEAST_PIVOT, step)?;
+        for number in 0..now.points {
+            let order = &self.order[orders(number)];
+            let (model, surface) = (&mut now.model[number], &now.surfaces[number]);
+            let by = normal::follow(order, kept, &self.seen, model, surface, prior, step);
+            for (value, by) in model.iter_mut().zip(by) {
+                *value = (f64::from(*value) + by) as f32;
+            }
+        }
+        for (weights, step) in now.weights.iter_mut().zip(step) {
+            for (weight, step) in weights.iter_mut().zip(step) {
+                *weight += *step;
+            }
+        }
+        Some(())
+    }
+
+    /// Returns that took part and lie beyond `extent_m` from the object's origin.
+    fn outside(&self, extent_m: f64) -> usize {
+        let square = |seen: Seen| seen.arm.iter().map(|v| v * v).sum::<f64>();
+        let far = |seen: &Seen| square(*seen) > extent_m * extent_m;
+        self.returns.all().iter().filter(|kept| far(&look(&self.best.weights, kept))).count()
+    }
+}
+
+/// `Q_u^-1`.
+fn precision(params: &EstimateParams) -> Weights {
+    params.process.map(|deviation| 1.0 / (deviation * deviation))
+}
+
+/// A return from the object's place and heading at its time.
+fn look(weights: &[Weights], kept: &returns::Kept) -> Seen {
+    let [x, y, z, heading] = normal::pose(weights, kept);
+    let (sin, cos) = libm::sincos(heading);
+    let [u, v, w] = kept.position.map(f64::from);
+    Seen { arm: [u - x, v - y, w - z], cos, sin, ..Seen::NONE }
+}

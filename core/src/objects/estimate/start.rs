@@ -1,0 +1,201 @@
+//! First guess of the trajectory (2.5.3): splines fitted to the history of another tracker.
+
+use super::normal::{CLIMB, Equations, Z, planar, vertical};
+use super::process::{self, Weights};
+use crate::objects::ObjectState;
+use crate::objects::spline::{Basis, Knots};
+
+/// Precision of the bending of the splines (second differences of their weights) in a fit: it decides
+/// where the history says nothing, and hardly elsewhere.
+const BENDING: f64 = 1e-3;
+/// Precision of every weight about zero, after subtracting the first state.
+const LEAST: f64 = 1e-9;
+
+/// A finite state of the history, its heading unwrapped.
+pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectState> {
+    let mut last: Option<f64> = None;
+    history.iter().filter(|state| finite(state)).map(move |state| {
+        let heading = match last {
+            Some(last) => last + turn(state.heading - last),
+            None => turn(state.heading),
+        };
+        last = Some(heading);
+        ObjectState { heading, ..*state }
+    })
+}
+
+fn finite(state: &ObjectState) -> bool {
+    let rest = [state.time_s, state.heading, state.speed, state.climb, state.turn_rate];
+    state.position.iter().chain(&rest).all(|value| value.is_finite())
+}
+
+/// An angle within half a turn of zero.
+pub(super) fn turn(angle: f64) -> f64 {
+    angle - core::f64::consts::TAU * libm::round(angle / core::f64::consts::TAU)
+}
+
+fn elements(state: &ObjectState) -> Weights {
+    let [x, y, z] = state.position;
+    [x, y, z, state.heading, state.speed, state.climb, state.turn_rate]
+}
+
+/// Adds the observation that splines are off by `miss` at a time.
+pub(super) fn observe(
+    equations: &mut Equations,
+    basis: &Basis,
+    miss: &Weights,
+    precision: &Weights,
+) {
+    let n = equations.bases;
+    for (i, own) in basis.values.iter().enumerate() {
+        for (d, (miss, precision)) in miss.iter().zip(precision).enumerate() {
+            let factor = precision * own;
+            let at = basis.first + i;
+            for (j, other) in basis.values[..=i].iter().enumerate() {
+                let before = basis.first + j;
+                if d == Z || d == CLIMB {
+                    let (i, j) = (vertical(n, at, d), vertical(n, before, d));
+                    equations.vertical.add(i, j, factor * other);
+                } else {
+                    equations.planar.add(planar(n, at, d), planar(n, before, d), factor * other);
+                }
+            }
+            if d == Z || d == CLIMB {
+                equations.vertical.vector[vertical(n, at, d)] += factor * miss;
+            } else {
+                equations.planar.vector[planar(n, at, d)] += factor * miss;
+            }
+        }
+    }
+}
+
+/// Adds a resistance to bending and to growing of the weights.
+fn hold(equations: &mut Equations, weights: &[Weights]) {
+    let n = equations.bases;
+    for d in 0..7 {
+        let mut add = |i: usize, j: usize, value: f64, pull: f64| {
+            if d == Z || d == CLIMB {
+                equations.vertical.add(vertical(n, i, d), vertical(n, j, d), value);
+                if i == j {
+                    equations.vertical.vector[vertical(n, i, d)] += pull;
+                }
+            } else {
+                equations.planar.add(planar(n, i, d), planar(n, j, d), value);
+                if i == j {
+                    equations.planar.vector[planar(n, i, d)] += pull;
+                }
+            }
+        };
+        for k in 0..n {
+            add(k, k, LEAST, 0.0);
+        }
+        for k in 2..n {
+            let bent = weights[k][d] - 2.0 * weights[k - 1][d] + weights[k - 2][d];
+            for (i, a) in [(k - 2, 1.0), (k - 1, -2.0), (k, 1.0)] {
+                for (j, b) in [(k - 2, 1.0), (k - 1, -2.0), (k, 1.0)] {
+                    if i >= j {
+                        add(i, j, BENDING * a * b, -BENDING * a * bent);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Least-squares fit of the splines to every state's elements. False where there is no history.
+pub(super) fn fit(
+    knots: &Knots,
+    history: &[ObjectState],
+    equations: &mut Equations,
+    weights: &mut [Weights],
+    step: &mut [Weights],
+) -> bool {
+    let Some(first) = unwrapped(history).next() else { return false };
+    weights.fill(elements(&first));
+    equations.clear(knots.bases());
+    for state in unwrapped(history) {
+        let mut miss = elements(&state);
+        for (own, start) in miss.iter_mut().zip(elements(&first)) {
+            *own -= start;
+        }
+        observe(equations, &knots.basis(state.time_s), &miss, &[1.0; 7]);
+    }
+    hold(equations, weights);
+    apply(equations, weights, step)
+}
+
+/// Deviations with which [`smooth`] believes a history: m, m/s.
+const POSITION_M: f64 = 0.3;
+const HEADING: f64 = 0.1;
+/// Speed from which on it believes a heading, m/s.
+const HEADS_MPS: f64 = 2.0;
+const SMOOTHINGS: usize = 6;
+
+/// Trajectory that a history of positions and the process model make together. What moves slowly has
+/// no heading in it but noise.
+pub(super) fn smooth(
+    knots: &Knots,
+    history: &[ObjectState],
+    precision: &Weights,
+    equations: &mut Equations,
+    weights: &mut [Weights],
+    step: &mut [Weights],
+) -> bool {
+    for _ in 0..SMOOTHINGS {
+        equations.clear(knots.bases());
+        process::add(knots, weights, precision, equations);
+        for state in unwrapped(history) {
+            let now = knots.value(weights, state.time_s);
+            let mut miss = elements(&state);
+            for (own, now) in miss.iter_mut().zip(now) {
+                *own -= now;
+            }
+            let moves = state.speed * state.speed;
+            let heads = moves / (moves + HEADS_MPS * HEADS_MPS) / (HEADING * HEADING);
+            let place = 1.0 / (POSITION_M * POSITION_M);
+            observe(
+                equations,
+                &knots.basis(state.time_s),
+                &miss,
+                &[place, place, place, heads, 0.0, 0.0, 0.0],
+            );
+        }
+        hold(equations, weights);
+        if !apply(equations, weights, step) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Everything at rest where the history is on average.
+pub(super) fn stand(history: &[ObjectState], weights: &mut [Weights]) -> bool {
+    let mut sum = [0.0; 4];
+    let mut count = 0.0;
+    for state in unwrapped(history) {
+        let [x, y, z, heading, ..] = elements(&state);
+        for (sum, value) in sum.iter_mut().zip([x, y, z, heading]) {
+            *sum += value;
+        }
+        count += 1.0;
+    }
+    if count == 0.0 {
+        return false;
+    }
+    let [x, y, z, heading] = sum.map(|sum| sum / count);
+    weights.fill([x, y, z, heading, 0.0, 0.0, 0.0]);
+    true
+}
+
+fn apply(equations: &mut Equations, weights: &mut [Weights], step: &mut [Weights]) -> bool {
+    let step = &mut step[..weights.len()];
+    if equations.solve(super::LEAST_PIVOT, step).is_none() {
+        return false;
+    }
+    for (weights, step) in weights.iter_mut().zip(step) {
+        for (weight, step) in weights.iter_mut().zip(step) {
+            *weight += *step;
+        }
+    }
+    true
+}

@@ -1,0 +1,103 @@
+//! A symmetric system of equations, dense: small once the model points are eliminated.
+
+/// `A x = b` of a size set at run time, at most `N`; `L` is `N * N`.
+pub(super) struct System<const N: usize, const L: usize> {
+    size: usize,
+    /// Lower triangle by rows; after [`System::solve`] its Cholesky factor.
+    matrix: [f64; L],
+    /// Right-hand side; after [`System::solve`] the solution.
+    pub vector: [f64; N],
+    scale: [f64; N],
+}
+
+impl<const N: usize, const L: usize> System<N, L> {
+    pub const fn new() -> System<N, L> {
+        assert!(N * N == L);
+        System { size: 0, matrix: [0.0; L], vector: [0.0; N], scale: [0.0; N] }
+    }
+
+    pub fn clear(&mut self, size: usize) {
+        self.size = size;
+        self.matrix[..size * size].fill(0.0);
+        self.vector[..size].fill(0.0);
+    }
+
+    /// Adds to an element and its mirror image.
+    pub fn add(&mut self, i: usize, j: usize, value: f64) {
+        self.matrix[i.max(j) * self.size + i.min(j)] += value;
+    }
+
+    /// Takes `row row' / by` from the block that begins at `from` on the diagonal.
+    pub fn eliminate(&mut self, from: usize, row: &[f64], by: f64) {
+        for (i, &own) in row.iter().enumerate() {
+            let factor = own / by;
+            let at = (from + i) * self.size + from;
+            for (element, other) in self.matrix[at..=at + i].iter_mut().zip(row) {
+                *element -= factor * other;
+            }
+        }
+    }
+
+    /// Multiplies the diagonal by `1 + share`.
+    pub fn damp(&mut self, share: f64) {
+        for i in 0..self.size {
+            let at = i * self.size + i;
+            self.matrix[at] *= 1.0 + share;
+        }
+    }
+
+    /// Solves by Cholesky's factorisation after scaling the diagonal to ones. A pivot that rounding
+    /// leaves at nothing, of a direction that nothing determines, is raised to `least` of its scale:
+    /// the solution then hardly goes there. False where the system is not finite.
+    pub fn solve(&mut self, least: f64) -> bool {
+        let n = self.size;
+        for i in 0..n {
+            let diagonal = self.matrix[i * n + i];
+            self.scale[i] = if diagonal > 0.0 { 1.0 / libm::sqrt(diagonal) } else { 1.0 };
+        }
+        for i in 0..n {
+            let (above, rest) = self.matrix.split_at_mut(i * n);
+            let row = &mut rest[..=i];
+            for (element, scale) in row.iter_mut().zip(&self.scale) {
+                *element *= scale * self.scale[i];
+            }
+            for j in 0..i {
+                let other = &above[j * n..=j * n + j];
+                let sum = row[j] - dot(&row[..j], &other[..j]);
+                row[j] = sum * other[j];
+            }
+            let pivot = row[i] - dot(&row[..i], &row[..i]);
+            // The reciprocal of the factor's diagonal stands in its place.
+            row[i] = 1.0 / libm::sqrt(if pivot > least { pivot } else { least });
+        }
+        for i in 0..n {
+            let row = &self.matrix[i * n..=i * n + i];
+            let sum = self.vector[i] * self.scale[i] - dot(&row[..i], &self.vector[..i]);
+            self.vector[i] = sum * row[i];
+        }
+        for i in (0..n).rev() {
+            let solved = self.vector[i] * self.matrix[i * n + i];
+            self.vector[i] = solved;
+            for j in 0..i {
+                self.vector[j] -= self.matrix[i * n + j] * solved;
+            }
+        }
+        for (value, scale) in self.vector[..n].iter_mut().zip(&self.scale) {
+            *value *= scale;
+        }
+        self.vector[..n].iter().all(|value| value.is_finite())
+    }
+}
+
+/// Four sums at once, so that no addition waits for the one before.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        for i in 0..4 {
+            sums[i] += x[i] * y[i];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}

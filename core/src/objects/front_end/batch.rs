@@ -1,0 +1,157 @@
+//! The returns of some 100 ms, of any number of sensors, in the world.
+
+use super::{CELL_M, SIDE};
+use crate::output::PointFlow;
+use crate::params::{POINTS_MAX, SLOTS};
+use crate::pose::Pose;
+use crate::prepare::{Dropped, Preparation, moved_by, slot_time};
+use crate::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
+use glam::{DMat3, DVec3};
+
+/// A return in the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Seen {
+    /// m from the batch's corner.
+    pub at: [f32; 3],
+    /// Where its ray began, m from there.
+    pub origin: [f32; 3],
+    /// s after the batch's stamp.
+    pub time_s: f32,
+    /// Index of the sensor.
+    pub sensor: u32,
+    /// Over ground by the flow, m/s.
+    pub velocity: [f32; 2],
+}
+
+impl Seen {
+    /// Index of the cell it lies in.
+    pub fn cell(&self) -> usize {
+        let [i, j] = cell(self.at);
+        i * SIDE + j
+    }
+}
+
+/// Indices of the cell of a place in the window.
+pub(super) fn cell(at: [f32; 3]) -> [usize; 2] {
+    [at[0], at[1]].map(|v| ((v / CELL_M) as usize).min(SIDE - 1))
+}
+
+/// What has been taken since the last step.
+pub(super) struct Batch {
+    preparation: Preparation,
+    /// Stamp of the first sweep taken, s.
+    pub stamp_s: Option<f64>,
+    /// World position of the corner of the window: a corner of the lattice along x and y, the
+    /// ground under the vehicle along z.
+    pub corner: DVec3,
+    pub returns: heapless::Vec<Seen, POINTS_MAX>,
+    /// Left out since the last step.
+    pub dropped: Dropped,
+    /// Whether the returns have velocities.
+    pub flows: bool,
+}
+
+impl Batch {
+    pub fn new() -> Batch {
+        Batch {
+            preparation: Preparation::new(),
+            stamp_s: None,
+            corner: DVec3::ZERO,
+            returns: heapless::Vec::new(),
+            dropped: Dropped::default(),
+            flows: false,
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.stamp_s = None;
+        self.returns.clear();
+        self.dropped = Dropped::default();
+        self.flows = false;
+    }
+
+    /// Adds the returns of a sweep. Those of a sweep without a finite stamp or pose are not finite.
+    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<&[PointFlow]>) {
+        let Pose { rotation, translation } = sweep.world_from_vehicle;
+        let twist = [sweep.twist.linear, sweep.twist.angular];
+        let finite = sweep.stamp_s.is_finite()
+            && rotation.is_finite()
+            && translation.is_finite()
+            && twist.iter().all(|v| v.is_finite());
+        if !finite {
+            self.dropped.not_finite += sweep.points.len() as u64;
+            return;
+        }
+        let under = sweep.world_from_vehicle.transform(DVec3::new(0.0, 0.0, rig.ground_m));
+        if self.stamp_s.is_none() {
+            self.stamp_s = Some(sweep.stamp_s);
+            let first =
+                |v: f64| (libm::floor(v / CELL_M as f64) - (SIDE / 2) as f64) * CELL_M as f64;
+            self.corner = DVec3::new(first(under.x), first(under.y), under.z);
+        }
+        let after_s = sweep.stamp_s - self.stamp_s.unwrap_or(sweep.stamp_s);
+        self.flows |= flows.is_some();
+
+        let timed = rig.timing != Timing::AtStamp;
+        let mut places = [Place::default(); SLOTS];
+        for (slot, place) in places[..if timed { SLOTS } else { 1 }].iter_mut().enumerate() {
+            let moved = if timed { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
+            let then = sweep.world_from_vehicle * moved;
+            let at = if rig.distorted { then } else { sweep.world_from_vehicle };
+            place.turn = at.matrix();
+            place.at = at.translation - self.corner;
+            place.time_s = after_s + if timed { slot_time(rig, slot) } else { 0.0 };
+            for (origin, mounted) in place.origins.iter_mut().zip(&rig.sensors) {
+                *origin = metres((then * *mounted).translation - self.corner);
+            }
+        }
+        let edge = SIDE as f32 * CELL_M;
+        for (n, point) in sweep.points.iter().enumerate() {
+            match self.dropped.admit(rig, point) {
+                Some(false) => {}
+                Some(true) => {
+                    self.dropped.own_vehicle += 1;
+                    continue;
+                }
+                None => continue,
+            }
+            let slot = if timed { self.preparation.slot(rig, point) } else { 0 };
+            let place = &places[slot];
+            let [x, y, z] = point.position.map(f64::from);
+            let at = metres(place.turn * DVec3::new(x, y, z) + place.at);
+            if !at[..2].iter().all(|v| *v >= 0.0 && *v < edge) {
+                self.dropped.too_far += 1;
+                continue;
+            }
+            let time_s = match rig.timing {
+                Timing::Offset { .. } => after_s + point.offset_s as f64,
+                _ => place.time_s,
+            };
+            let velocity = flows.and_then(|f| f.get(n)).map_or([0.0; 2], |f| f.velocity_world_mps);
+            let seen = Seen {
+                at,
+                origin: place.origins[point.sensor as usize],
+                time_s: time_s as f32,
+                sensor: point.sensor,
+                velocity,
+            };
+            self.dropped.over_capacity += self.returns.push(seen).is_err() as u64;
+        }
+    }
+}
+
+/// The vehicle in one time slot.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    turn: DMat3,
+    /// m from the corner.
+    at: DVec3,
+    /// s after the batch's stamp.
+    time_s: f64,
+    /// Of the sensors, m from the corner.
+    origins: [[f32; 3]; SENSORS_MAX],
+}
+
+fn metres(v: DVec3) -> [f32; 3] {
+    v.to_array().map(|c| c as f32)
+}

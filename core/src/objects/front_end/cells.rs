@@ -1,0 +1,113 @@
+//! Which returns belong to objects: 2-D cells, and the variance of z in each.
+
+use super::batch::{Batch, Seen};
+use super::{CELL_M, CELLS, FrontEndParams, SIDE};
+use crate::ground::Ground;
+use crate::params::{COLUMNS_MAX, POINTS_MAX};
+
+/// Heights of the ground on a grid of square cells, made beforehand.
+#[derive(Clone, Copy, Debug)]
+pub struct GroundMap<'a> {
+    /// World position of the corner of the first cell, m.
+    pub corner: [f64; 2],
+    /// Edge of a cell, m.
+    pub cell_m: f64,
+    /// Cells along x; as many as fit along y.
+    pub columns: usize,
+    /// Heights in the world, m, rows of equal y one after the other; NaN where unknown.
+    pub heights: &'a [f32],
+}
+
+impl GroundMap<'_> {
+    /// Height of the ground at a place, m, where it is known.
+    pub fn height(&self, x: f64, y: f64) -> Option<f32> {
+        let [i, j] = [(x - self.corner[0]) / self.cell_m, (y - self.corner[1]) / self.cell_m];
+        if !(i >= 0.0 && i < self.columns as f64 && j >= 0.0) {
+            return None;
+        }
+        let height = self.heights.get((j as usize).checked_mul(self.columns)? + i as usize)?;
+        height.is_finite().then_some(*height)
+    }
+}
+
+/// Count, mean and sum of squared deviations of z, m.
+#[derive(Clone, Copy)]
+struct Spread {
+    count: f32,
+    mean: f32,
+    squares: f32,
+}
+
+pub(super) struct Cells {
+    ground: Ground,
+    /// Of the ground above the batch's corner, m; infinite where unknown.
+    height: [f32; COLUMNS_MAX],
+    spread: [Spread; COLUMNS_MAX],
+    is_object: [bool; POINTS_MAX],
+}
+
+impl Cells {
+    pub const fn new() -> Cells {
+        Cells {
+            ground: Ground::new(),
+            height: [0.0; COLUMNS_MAX],
+            spread: [Spread { count: 0.0, mean: 0.0, squares: 0.0 }; COLUMNS_MAX],
+            is_object: [false; POINTS_MAX],
+        }
+    }
+
+    /// Finds the returns of objects: those of cells whose z varies and those well above the ground.
+    /// What the flow has moving is an object's in any cell. Ground and what is overhead are none's,
+    /// as far as the ground is known.
+    pub fn label(&mut self, params: &FrontEndParams, batch: &Batch, map: Option<&GroundMap>) {
+        self.find_ground(batch, map);
+        self.spread[..CELLS].fill(Spread { count: 0.0, mean: 0.0, squares: 0.0 });
+        for seen in &batch.returns {
+            let cell = seen.cell();
+            if self.above(cell, seen).is_none_or(|h| h < params.high_m) {
+                let s = &mut self.spread[cell];
+                let off = seen.at[2] - s.mean;
+                s.count += 1.0;
+                s.mean += off / s.count;
+                s.squares += off * (seen.at[2] - s.mean);
+            }
+        }
+        for (n, seen) in batch.returns.iter().enumerate() {
+            let cell = seen.cell();
+            let varies = self.spread[cell].squares > params.variance_m2 * self.spread[cell].count;
+            self.is_object[n] = match self.above(cell, seen) {
+                None => varies || params.moves(seen.velocity),
+                Some(h) if (params.low_m..params.high_m).contains(&h) => {
+                    varies || h >= params.raised_m || params.moves(seen.velocity)
+                }
+                Some(_) => false,
+            };
+        }
+    }
+
+    /// Whether a return of the batch belongs to an object.
+    pub fn is_object(&self, n: usize) -> bool {
+        self.is_object[n]
+    }
+
+    fn find_ground(&mut self, batch: &Batch, map: Option<&GroundMap>) {
+        let cells = batch.returns.iter().map(|s| (s.cell(), s.at.map(|v| v / CELL_M)));
+        let middle = 0.5 * SIDE as f32;
+        self.ground.estimate(SIDE, [middle, middle, 0.0], cells);
+        for cell in 0..CELLS {
+            let centre = |n: usize| (n as f64 + 0.5) * CELL_M as f64;
+            let at = [batch.corner.x + centre(cell / SIDE), batch.corner.y + centre(cell % SIDE)];
+            let mapped = map.and_then(|m| m.height(at[0], at[1]));
+            self.height[cell] = match mapped {
+                Some(z) => (z as f64 - batch.corner.z) as f32,
+                None => self.ground.height(cell) * CELL_M,
+            };
+        }
+    }
+
+    /// Height above the ground, m, where that is known.
+    fn above(&self, cell: usize, seen: &Seen) -> Option<f32> {
+        let ground = self.height[cell];
+        ground.is_finite().then(|| seen.at[2] - ground)
+    }
+}

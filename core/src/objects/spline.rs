@@ -1,0 +1,154 @@
+//! B-splines of degree 4 on uniform knots (2.5.2.1).
+//!
+//! The knots run on evenly for four spacings beyond either end of the splines' domain, so that every
+//! basis function has the same shape and every time of the domain has five of them. One over `n` basis
+//! functions has `n - 4` pieces.
+
+/// Degree of the polynomials.
+pub const DEGREE: usize = 4;
+/// Basis functions that are not zero at a time.
+pub const SUPPORT: usize = DEGREE + 1;
+/// Basis functions of the longest splines.
+pub const BASES_MAX: usize = 64;
+/// Shortest domain, s: what happens at one time still has a basis.
+pub const DOMAIN_MIN_S: f64 = 0.1;
+
+/// Evenly spaced knots.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Knots {
+    start: f64,
+    spacing: f64,
+    pieces: usize,
+}
+
+/// What the basis functions are at a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Basis {
+    /// Number of the first that is not zero there.
+    pub first: usize,
+    /// Its value, and that of the four after it.
+    pub values: [f64; SUPPORT],
+}
+
+/// How the knots were laid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Laid {
+    /// The domain is too short for five basis functions: the knots are nearer than asked for.
+    pub compressed: bool,
+    /// It is too long for [`BASES_MAX`]: they are further apart.
+    pub stretched: bool,
+}
+
+impl Knots {
+    /// No knots, of a place that waits for them.
+    pub const NONE: Knots = Knots { start: 0.0, spacing: 1.0, pieces: 1 };
+
+    /// One basis function for each `every` seconds from `start` to `end`, five at least and
+    /// [`BASES_MAX`] at most.
+    pub fn over(start: f64, end: f64, every: f64) -> (Knots, Laid) {
+        let domain = (end - start).max(DOMAIN_MIN_S);
+        let wanted = libm::ceil(domain / every - 1e-9);
+        let bases = wanted.clamp(SUPPORT as f64, BASES_MAX as f64);
+        let pieces = bases as usize - DEGREE;
+        let laid = Laid {
+            compressed: domain / every < SUPPORT as f64 - 1e-9,
+            stretched: wanted > BASES_MAX as f64,
+        };
+        (Knots { start, spacing: domain / pieces as f64, pieces }, laid)
+    }
+
+    /// So many pieces of a given length.
+    pub fn pieces(start: f64, spacing: f64, pieces: usize) -> Knots {
+        Knots { start, spacing, pieces: pieces.clamp(1, BASES_MAX - DEGREE) }
+    }
+
+    /// Basis functions.
+    pub fn bases(&self) -> usize {
+        self.pieces + DEGREE
+    }
+
+    /// Polynomial pieces of the domain.
+    pub fn spans(&self) -> usize {
+        self.pieces
+    }
+
+    /// Length of a piece, s.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// First time of the domain, s.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Last time of the domain, s.
+    pub fn end(&self) -> f64 {
+        self.start + self.pieces as f64 * self.spacing
+    }
+
+    /// Knot `i` of `bases() + 5`, s.
+    pub fn knot(&self, i: usize) -> f64 {
+        self.start + (i as f64 - DEGREE as f64) * self.spacing
+    }
+
+    /// The piece that `time` falls into, and how far into it, 0 to 1. The domain's ends hold what is
+    /// outside it.
+    fn locate(&self, time: f64) -> (usize, f64) {
+        let at = ((time - self.start) / self.spacing).clamp(0.0, self.pieces as f64);
+        let piece = (at as usize).min(self.pieces - 1);
+        (piece, at - piece as f64)
+    }
+
+    /// Basis functions at `time` (2.16, 2.17).
+    pub fn basis(&self, time: f64) -> Basis {
+        let (first, u) = self.locate(time);
+        Basis { first, values: cox_de_boor::<DEGREE>(u) }
+    }
+
+    /// Their values and derivatives (1/s) at the place `u`, 0 to 1, of every piece.
+    pub fn shape(&self, u: f64) -> ([f64; SUPPORT], [f64; SUPPORT]) {
+        let lower = cox_de_boor::<{ DEGREE - 1 }>(u);
+        let rate = 1.0 / self.spacing;
+        let mut slopes = [0.0; SUPPORT];
+        for (i, slope) in slopes.iter_mut().enumerate() {
+            let before = if i > 0 { lower[i - 1] } else { 0.0 };
+            let after = if i < DEGREE { lower[i] } else { 0.0 };
+            *slope = (before - after) * rate;
+        }
+        (cox_de_boor::<DEGREE>(u), slopes)
+    }
+
+    /// Splines with the given weights at `time`, by de Boor's algorithm (2.19 to 2.21).
+    pub fn value<const D: usize>(&self, weights: &[[f64; D]], time: f64) -> [f64; D] {
+        let (first, u) = self.locate(time);
+        let mut d: [[f64; D]; SUPPORT] = core::array::from_fn(|i| weights[first + i]);
+        for r in 1..=DEGREE {
+            for i in (r..=DEGREE).rev() {
+                let alpha = (u + (DEGREE - i) as f64) / (SUPPORT - r) as f64;
+                let before = d[i - 1];
+                for (own, before) in d[i].iter_mut().zip(before) {
+                    *own = (1.0 - alpha) * before + alpha * *own;
+                }
+            }
+        }
+        d[DEGREE]
+    }
+}
+
+/// Basis functions of degree `P` that are not zero at the place `u`, 0 to 1, of a piece, in order,
+/// and zeros.
+fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
+    let mut values = [0.0; SUPPORT];
+    values[0] = 1.0;
+    for p in 1..=P {
+        let mut carried = 0.0;
+        for r in 0..p {
+            let share = values[r] / p as f64;
+            values[r] = carried + ((r + 1) as f64 - u) * share;
+            carried = (u + (p - r - 1) as f64) * share;
+        }
+        values[p] = carried;
+    }
+    values
+}
