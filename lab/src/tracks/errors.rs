@@ -32,6 +32,12 @@ impl Alignment {
         Alignment { offset: offset / track.len().max(1) as f64, heading: way.y.atan2(way.x) }
     }
 
+    /// A point of the tracker's frame in the true one.
+    pub fn bring(&self, at: DVec3) -> DVec3 {
+        let off = at - self.offset;
+        DVec2::from_angle(-self.heading).rotate(off.truncate()).extend(off.z)
+    }
+
     /// The same motion at the true origin.
     pub fn apply(&self, moment: &Moment) -> Moment {
         let turned = DVec2::from_angle(moment.heading).rotate(self.offset.truncate());

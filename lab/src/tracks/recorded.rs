@@ -164,8 +164,7 @@ fn object(
         }));
         object.batches.push(from..object.returns.len());
     }
-    let smooth: Vec<_> =
-        states.iter().map(|s| (s.stamp_s, s.world_from_box, s.velocity)).collect();
+    let smooth: Vec<_> = states.iter().map(|s| (s.stamp_s, s.world_from_box, s.velocity)).collect();
     object.truth = moments(&smooth, anchor, start_s);
     let raw = |s: &labels::trajectory::State| {
         (s.stamp_s, s.world_from_vehicle * track.boxes[&s.frame], DVec3::ZERO)
@@ -196,10 +195,8 @@ fn moments(states: &[(f64, Pose, DVec3)], anchor: DVec3, start_s: f64) -> Vec<Mo
     let rate = |(a, b): (Moment, Moment)| (b.heading - a.heading) / (b.time_s - a.time_s);
     // A single one tells no rate.
     let rates: Vec<f64> = (0..moments.len()).map(|n| rate(between(n))).collect();
-    let turning = |(m, rate): (Moment, f64)| Moment {
-        turn_rate: if last > 0 { rate } else { 0.0 },
-        ..m
-    };
+    let turning =
+        |(m, rate): (Moment, f64)| Moment { turn_rate: if last > 0 { rate } else { 0.0 }, ..m };
     moments.into_iter().zip(rates).map(turning).collect()
 }
 
@@ -244,7 +241,13 @@ mod tests {
         assert_eq!(found.stationary.len() + found.moving.len() + found.left_out, 15);
         for object in found.stationary.iter().chain(&found.moving) {
             let cloud = object.batches().map(centroid);
-            println!("{}: {:?}, {} returns, {:.1} s", object.name, object.kind, object.returns.len(), object.span_s());
+            println!(
+                "{}: {:?}, {} returns, {:.1} s",
+                object.name,
+                object.kind,
+                object.returns.len(),
+                object.span_s()
+            );
             for (time_s, at) in cloud {
                 let really = super::super::object::moment_at(&object.truth, time_s);
                 let off = really.project(at);

@@ -27,8 +27,8 @@ const RETURNS: usize = 2000;
 /// What moves goes so far at least, m.
 const MOVED_M: f64 = 2.0;
 
-/// Parked objects of one drive at most, so that they are of many streets.
-const PARKED_PER_DRIVE: usize = 6;
+/// Parked objects of one drive at most, and moving ones of a kind, so that they are of many streets.
+const PER_DRIVE: [usize; 2] = [6, 2];
 
 /// Between two samples of the truth, s.
 const TRUTH_S: f64 = 0.01;
@@ -70,12 +70,14 @@ impl Wanted {
         self.parked == 0 && self.moving.iter().all(|m| m.1 == 0)
     }
 
-    /// Takes one off, if one such is wanted.
-    fn take(&mut self, kind: Kind, stationary: bool) -> bool {
-        let left = match self.moving.iter_mut().find(|m| m.0 == kind) {
-            _ if stationary => &mut self.parked,
-            Some(moving) => &mut moving.1,
-            None => return false,
+    /// Takes one off, parked or moving of a kind, if such a one is wanted.
+    fn take(&mut self, moving: Option<Kind>) -> bool {
+        let left = match moving {
+            None => &mut self.parked,
+            Some(kind) => match self.moving.iter_mut().find(|m| m.0 == kind) {
+                Some(moving) => &mut moving.1,
+                None => return false,
+            },
         };
         let wanted = *left > 0;
         *left -= usize::from(wanted);
@@ -88,6 +90,18 @@ impl Wanted {
         let moves = |o: &raywake_sim::Object| !o.path.is_still() && lacks(of_class(o.class));
         self.parked > 0 || drive.scene().objects.iter().any(moves)
     }
+}
+
+/// Which objects are taken, for people.
+pub fn rule() -> String {
+    let ([least, most], [parked, of_a_kind]) = (BATCHES, PER_DRIVE);
+    format!(
+        "{RETURNS} returns at least, over the longest stretch of sweeps with {BATCH_RETURNS} \
+         returns at least and no gap of more than {GAP_BATCHES} sweeps, which is {least} sweeps \
+         long at least and cut to {most} about the sweep of most returns. Up to {parked} parked \
+         vehicles of a drive and {of_a_kind} moving objects of a kind, which go {MOVED_M} m at \
+         least."
+    )
 }
 
 /// The kind of a class.
@@ -117,16 +131,18 @@ pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
         if !wanted.may_have(&drive) {
             continue;
         }
-        let mut parked = 0;
+        let [parked, of_a_kind] = PER_DRIVE;
+        let mut taken = HashMap::new();
         for object in objects(&drive, number) {
-            if object.stationary && parked == PARKED_PER_DRIVE
-                || !wanted.take(object.kind, object.stationary)
-            {
-                continue;
+            let (sort, set, most) = match object.stationary {
+                true => (None, &mut sets.stationary, parked),
+                false => (Some(object.kind), &mut sets.moving, of_a_kind),
+            };
+            let taken = taken.entry(sort).or_insert(0);
+            if *taken < most && wanted.take(sort) {
+                *taken += 1;
+                set.push(object);
             }
-            parked += usize::from(object.stationary);
-            let set = if object.stationary { &mut sets.stationary } else { &mut sets.moving };
-            set.push(object);
         }
     }
     sets
@@ -140,8 +156,7 @@ fn drive(seed: u64, number: u64) -> Drive {
         3 => Ego::turn(&mut rng),
         _ => Ego::stop_and_go(&mut rng),
     };
-    let options =
-        Options { sweeps: SWEEPS, ego, rig: SensorRig::hdl32x4(), ..Options::default() };
+    let options = Options { sweeps: SWEEPS, ego, rig: SensorRig::hdl32x4(), ..Options::default() };
     Drive::new(rng.bits(), options)
 }
 
@@ -162,20 +177,19 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
         if stationary && !matches!(kind, Kind::Car | Kind::Van | Kind::Truck) {
             continue;
         }
-        let Some(batches) = window(&returns) else { continue };
-        let start_s = (batches.start as f64 - 0.5) * PERIOD_S;
-        let within = |r: &&Seen| batches.contains(&batch(r.2));
+        let Some(window) = window(&returns) else { continue };
+        let start_s = (window.start as f64 - 0.5) * PERIOD_S;
+        let within = |r: &&Seen| window.contains(&batch(r.2));
         let returns: Vec<Seen> = returns.iter().filter(within).copied().collect();
         if returns.len() < RETURNS {
             continue;
         }
         let anchor = returns[0].0.round();
-        let truth = truth(drive, id, anchor, start_s, batches.len());
+        let truth = truth(drive, id, anchor, start_s, window.len());
         let moved = (truth[truth.len() - 1].position - truth[0].position).length();
         if !stationary && moved < MOVED_M {
             continue;
         }
-        let batches = batches(&returns);
         let local = |at: DVec3| (at - anchor).as_vec3().to_array();
         found.push(Object {
             name: format!("drive {number}, object {id}"),
@@ -193,7 +207,7 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
                     sensor,
                 })
                 .collect(),
-            batches,
+            batches: batches(&returns),
             truth,
         });
     }
@@ -250,7 +264,8 @@ fn window(returns: &[Seen]) -> Option<Range<usize>> {
         return None;
     }
     let fullest = *longest.iter().max_by_key(|&&b| counts[b])?;
-    let begin = fullest.saturating_sub(most / 2).max(first).min(end.saturating_sub(most).max(first));
+    let begin =
+        fullest.saturating_sub(most / 2).max(first).min(end.saturating_sub(most).max(first));
     Some(begin..end.min(begin + most))
 }
 

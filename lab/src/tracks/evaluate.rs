@@ -1,0 +1,160 @@
+//! Every tracker over every object.
+
+use super::entropy::entropy;
+use super::errors::Errors;
+use super::extent::extent;
+use super::object::{Object, moment_at};
+use super::tracker::{Track, baseline, motion};
+use crate::labels::Kind;
+use raywake_core::objects::ObjectReturn;
+use raywake_core::objects::centroid_ekf::CentroidParams;
+use raywake_core::objects::estimate::{Cost, EstimateParams, Estimator, Stop};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// A tracker with its numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// The extended Kalman filter of centroids.
+    Baseline,
+    /// Trajectory and shape together.
+    Proposed(EstimateParams),
+}
+
+/// The trackers of the tables and their names.
+pub fn methods() -> [(&'static str, Method); 5] {
+    let of =
+        |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
+    let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
+    [
+        ("baseline EKF", Method::Baseline),
+        ("as printed, n_m = 300", of(printed, 300)),
+        ("as printed, n_m = 3000", of(printed, 3000)),
+        ("ours, n_m = 300", of(ours, 300)),
+        ("ours, n_m = 3000", of(ours, 3000)),
+    ]
+}
+
+/// Index of our tracker of 300 points in [`methods`].
+pub const OURS: usize = 3;
+
+/// How one tracker did on one object.
+#[derive(Clone, Debug)]
+pub struct Score {
+    /// Against what is known.
+    pub errors: Errors,
+    /// Of the whole cloud, nats.
+    pub entropy: f64,
+    /// Length, width, height of the cloud, m.
+    pub extent: [f64; 3],
+    /// At the start and after each iteration; empty for the baseline.
+    pub costs: Vec<Cost>,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Time of the estimate, s.
+    pub seconds: f64,
+}
+
+/// How all trackers did on one object.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Drive and number.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+    /// Length, width and height of its box, m.
+    pub size: [f64; 3],
+    /// Whether it stands.
+    pub stationary: bool,
+    /// Its returns.
+    pub returns: usize,
+    /// Seen for so long, s.
+    pub span_s: f64,
+    /// Mean range of its returns, m.
+    pub range_m: f64,
+    /// Entropy of its cloud by its true trajectory, nats.
+    pub entropy: f64,
+    /// Extent of that cloud, m.
+    pub extent: [f64; 3],
+    /// In the order of [`methods`].
+    pub scores: Vec<Score>,
+}
+
+/// Runs a tracker; costs and the reason of its end where it iterates.
+pub fn track(
+    object: &Object,
+    method: &Method,
+    estimator: &mut Estimator,
+) -> (Track, Vec<Cost>, Stop) {
+    let history = baseline(object, &CentroidParams::dissertation());
+    match method {
+        Method::Baseline => (Track::of(object, motion(&history)), Vec::new(), Stop::default()),
+        Method::Proposed(params) => {
+            let report = estimator.solve(params, &object.returns, &history);
+            let track = Track::of(object, |t| estimator.state(t).into());
+            (track, report.costs.to_vec(), report.stop)
+        }
+    }
+}
+
+/// What a tracker makes of an object, measured.
+fn score(object: &Object, method: &Method, estimator: &mut Estimator) -> Score {
+    let begin = Instant::now();
+    let (track, costs, stop) = track(object, method, estimator);
+    let seconds = begin.elapsed().as_secs_f64();
+    let errors = match object.stationary {
+        true => Errors::standing(&track.moments),
+        false => Errors::moving(&track.moments, &object.truth),
+    };
+    let (entropy, extent) = (entropy(&track.cloud), extent(&track.cloud));
+    Score { errors, entropy, extent, costs, stop, seconds }
+}
+
+fn outcome(object: &Object, estimator: &mut Estimator) -> Outcome {
+    let really = Track::of(object, |t| moment_at(&object.truth, t));
+    let range = |r: &ObjectReturn| {
+        let [x, y, z] = [0, 1, 2].map(|i| f64::from(r.position[i] - r.origin[i]));
+        (x * x + y * y + z * z).sqrt()
+    };
+    let ranges: f64 = object.returns.iter().map(range).sum();
+    Outcome {
+        name: object.name.clone(),
+        kind: object.kind,
+        size: object.size,
+        stationary: object.stationary,
+        returns: object.returns.len(),
+        span_s: object.span_s(),
+        range_m: ranges / object.returns.len() as f64,
+        entropy: entropy(&really.cloud),
+        extent: extent(&really.cloud),
+        scores: methods().iter().map(|(_, m)| score(object, m, estimator)).collect(),
+    }
+}
+
+/// Stack of a thread that estimates: unoptimised builds make the estimator there before it moves to
+/// the heap.
+const STACK: usize = 64 << 20;
+
+/// Evaluates all trackers on all objects, `jobs` at a time; in the order of the objects.
+pub fn evaluate(objects: &[Object], jobs: usize) -> Vec<Outcome> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        let mut estimator = Box::new(Estimator::new());
+        loop {
+            let n = next.fetch_add(1, Ordering::Relaxed);
+            let Some(object) = objects.get(n) else { return };
+            let outcome = outcome(object, &mut estimator);
+            done.lock().expect("no thread panics with it").push((n, outcome));
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, objects.len().max(1)) {
+            let thread = std::thread::Builder::new().stack_size(STACK);
+            thread.spawn_scoped(scope, work).expect("the system has threads");
+        }
+    });
+    let mut done = done.into_inner().expect("no thread panicked with it");
+    done.sort_by_key(|(n, _)| *n);
+    done.into_iter().map(|(_, outcome)| outcome).collect()
+}
