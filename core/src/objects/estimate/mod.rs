@@ -28,6 +28,8 @@ mod system;
 #[cfg(test)]
 mod tests;
 
+use core::ops::Range;
+
 use super::spline::{BASES_MAX, Knots, Laid};
 use super::{ObjectReturn, ObjectState};
 use nearest::{Nearest, square_distance};
@@ -46,6 +48,12 @@ pub const ITERATIONS_MAX: usize = 64;
 const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
+
+/// Growth from the middle of a track: how far it reaches at first and with every step, s, and the
+/// deviation of returns meanwhile, m.
+const GROWTH_FIRST_S: f64 = 0.4;
+const GROWTH_S: f64 = 0.2;
+const GROWTH_M: f64 = 0.15;
 
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +84,12 @@ pub struct EstimateParams {
     pub damping: bool,
     /// Returns weigh across the surface that their model point stands for, little along it.
     pub surfaces: bool,
+    /// Additional deviation along a surface, m.
+    pub loose_m: f64,
     /// The start is smoothed with the process model, and one at rest is tried beside it.
     pub starts: bool,
+    /// The start grows from the middle of the track, see [`Estimator::grow`].
+    pub grows: bool,
 }
 
 impl EstimateParams {
@@ -96,7 +108,9 @@ impl EstimateParams {
             robust: 0.0,
             damping: false,
             surfaces: false,
+            loose_m: 0.0,
             starts: false,
+            grows: false,
         }
     }
 }
@@ -106,10 +120,13 @@ impl Default for EstimateParams {
         EstimateParams {
             deviation_m: 0.1,
             stages: 2,
-            robust: 3.0,
+            first_deviation_m: 0.2,
+            robust: 0.0,
             damping: true,
             surfaces: true,
+            loose_m: 0.5,
             starts: true,
+            grows: true,
             ..EstimateParams::dissertation()
         }
     }
@@ -206,6 +223,8 @@ impl Solution {
 pub struct Estimator {
     knots: Knots,
     returns: Returns,
+    /// Those that the equations are made of.
+    active: Range<usize>,
     now: Solution,
     before: Solution,
     best: Solution,
@@ -230,6 +249,7 @@ impl Estimator {
         Estimator {
             knots: Knots::NONE,
             returns: Returns::new(),
+            active: 0..0,
             now: Solution::NONE,
             before: Solution::NONE,
             best: Solution::NONE,
@@ -268,6 +288,9 @@ impl Estimator {
         (report.compressed, report.stretched) = (compressed, stretched);
 
         report.no_history = !self.start(params, history);
+        if params.grows {
+            self.grow(params);
+        }
         self.run(params, &mut report);
         self.best.copy(&self.now);
         if params.starts && !report.no_history {
@@ -335,18 +358,46 @@ impl Estimator {
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
         report.iterations = 0;
+        self.active = 0..self.returns.all().len();
         let ratio = params.first_deviation_m / params.deviation_m;
         for stage in (0..=params.stages).rev() {
             let share = stage as f64 / params.stages.max(1) as f64;
             let deviation = params.deviation_m * libm::pow(ratio, share);
             self.extract(params.model, deviation);
-            report.stop = self.descend(params, deviation, report);
+            report.stop = self.descend(params, deviation, params.iterations, Some(report));
+        }
+    }
+
+    /// From the middle of the returns outwards: what is seen next is laid over the model of what was
+    /// seen so far, starting where the process model puts it.
+    fn grow(&mut self, params: &EstimateParams) {
+        let all = self.returns.all();
+        let time = |i: usize| f64::from(all[i].time_s);
+        let middle = time(all.len() / 2);
+        let (first, last) = (self.knots.start(), self.knots.end());
+        let mut reach = GROWTH_FIRST_S;
+        let mut begun = false;
+        loop {
+            let all = self.returns.all();
+            let (from, to) = (middle - reach, middle + reach);
+            self.active = all.partition_point(|kept| f64::from(kept.time_s) < from)
+                ..all.partition_point(|kept| f64::from(kept.time_s) <= to);
+            if begun {
+                self.descend(params, GROWTH_M, 2, None);
+            }
+            self.extract(params.model / 2, GROWTH_M);
+            self.descend(params, GROWTH_M, if begun { 1 } else { 6 }, None);
+            if from <= first && to >= last {
+                break;
+            }
+            begun = true;
+            reach += GROWTH_S;
         }
     }
 
     /// Model points from the returns: so many of them, evenly in the order of time.
     fn extract(&mut self, points: usize, deviation: f64) {
-        let kept = self.returns.all();
+        let kept = &self.returns.all()[self.active.clone()];
         let points = points.clamp(1, MODEL_MAX).min(kept.len());
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
             *seen = look(&self.now.weights, kept);
@@ -360,7 +411,15 @@ impl Estimator {
     }
 
     /// Gauss-Newton iterations with one deviation.
-    fn descend(&mut self, params: &EstimateParams, deviation: f64, report: &mut Report) -> Stop {
+    fn descend(
+        &mut self,
+        params: &EstimateParams,
+        deviation: f64,
+        iterations: usize,
+        report: Option<&mut Report>,
+    ) -> Stop {
+        let mut unreported = Report::default();
+        let report = report.unwrap_or(&mut unreported);
         let precision = precision(params);
         let prior = 1.0 / (params.extent_m * params.extent_m);
         let n = self.knots.bases();
@@ -373,7 +432,7 @@ impl Estimator {
             _ = report.costs.push(cost);
         }
         let mut damping = if params.damping { 1e-4 } else { 0.0 };
-        for _ in 0..params.iterations {
+        for _ in 0..iterations {
             if report.iterations == ITERATIONS_MAX {
                 return Stop::Iterations;
             }
@@ -412,7 +471,7 @@ impl Estimator {
 
     /// Finds every return's model point at the trajectory in `now`.
     fn associate(&mut self, params: &EstimateParams, deviation: f64) {
-        let kept = self.returns.all();
+        let kept = &self.returns.all()[self.active.clone()];
         let model = &self.now.model[..self.now.points];
         self.nearest.fill(model);
         self.starts[..=model.len()].fill(0);
@@ -438,11 +497,11 @@ impl Estimator {
         }
         self.starts[0] = 0;
         if params.surfaces {
-            self.find_surfaces(deviation);
+            self.find_surfaces(params, deviation);
         }
         if params.robust > 0.0 {
             let limit = params.robust * params.robust;
-            for seen in &mut self.seen[..self.returns.all().len()] {
+            for seen in &mut self.seen[..self.active.len()] {
                 let number = usize::from(seen.nearest);
                 let (model, surface) = (&self.now.model[number], &self.now.surfaces[number]);
                 let square = normal::square(seen, model, surface);
@@ -453,14 +512,14 @@ impl Estimator {
     }
 
     /// Precisions from how the returns of a model point scatter about it.
-    fn find_surfaces(&mut self, deviation: f64) {
+    fn find_surfaces(&mut self, params: &EstimateParams, deviation: f64) {
         let least = deviation * deviation;
         for number in 0..self.now.points {
             let order =
                 &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
             let model = self.now.model[number].map(f64::from);
-            // As if a few more returns lay about it alike in every direction.
-            let few = 4.0;
+            // As if one more return lay about it alike in every direction.
+            let few = 1.0;
             let (mut xx, mut xy, mut yy, mut zz) = (0.0, 0.0, 0.0, 0.0);
             for &i in order {
                 let [x, y, z] = self.seen[usize::from(i)].place();
@@ -471,7 +530,7 @@ impl Estimator {
                 zz += z * z;
             }
             let count = order.len() as f64 + few;
-            let round = few * 0.04;
+            let round = few * 0.01;
             let [xx, xy, yy, zz] =
                 [(xx + round) / count, xy / count, (yy + round) / count, (zz + round) / count];
             let half = 0.5 * (xx - yy);
@@ -481,11 +540,14 @@ impl Estimator {
             let (nx, ny) = if half < 0.0 { (spread - half, -xy) } else { (-xy, spread + half) };
             let length = libm::sqrt(nx * nx + ny * ny);
             let normal = if length > 0.0 { [nx / length, ny / length] } else { [1.0, 0.0] };
+            let small = (middle - spread).max(0.0);
+            let loose = params.loose_m * params.loose_m;
+            let flat = small * small / (small * small + zz * zz);
             self.now.surfaces[number] = Surface {
                 normal,
-                across: 1.0 / (least + (middle - spread).max(0.0)),
-                along: 1.0 / (least + middle + spread),
-                up: 1.0 / (least + zz),
+                across: 1.0 / (least + small + loose * flat),
+                along: 1.0 / (least + middle + spread + loose),
+                up: 1.0 / (least + zz + loose * (1.0 - flat)),
             };
         }
     }
@@ -498,7 +560,7 @@ impl Estimator {
         for model in &self.now.model[..self.now.points] {
             cost.model += 0.5 * prior * f64::from(square_distance(model, &[0.0; 3]));
         }
-        let count = self.returns.all().len();
+        let count = self.active.len();
         for seen in &self.seen[..count] {
             let number = usize::from(seen.nearest);
             let model = &self.now.model[number];
@@ -514,7 +576,7 @@ impl Estimator {
 
     /// One step of trajectory and model; `equations` hold the process term.
     fn step(&mut self, damping: f64, prior: f64) -> Option<()> {
-        let kept = self.returns.all();
+        let kept = &self.returns.all()[self.active.clone()];
         let n = self.knots.bases();
         let now = &mut self.now;
         self.equations.add_returns(kept, &self.seen, &now.model, &now.surfaces);
