@@ -10,6 +10,7 @@ mod errors;
 mod evaluate;
 mod extent;
 mod figures;
+mod kept;
 mod object;
 mod recorded;
 mod simulated;
@@ -23,7 +24,7 @@ use evaluate::{OURS, evaluate};
 use object::Object;
 use raywake::error::Error;
 use raywake_core::objects::estimate::Estimator;
-use simulated::{Wanted, simulate};
+use simulated::Wanted;
 use std::path::PathBuf;
 use std::time::Instant;
 use tables::Set;
@@ -34,7 +35,7 @@ pub struct Args {
     /// Labelled recorded drives beside the simulated ones
     #[arg(value_name = "DRIVE")]
     drives: Vec<PathBuf>,
-    /// Folder of results
+    /// Folder of results; the simulated objects are kept there for the next run
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Seed of the simulated drives: 1 is for choosing numbers, 2 is held out
@@ -62,7 +63,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     for drive in &args.drives {
         recorded.push(recorded::read(drive)?);
     }
-    let simulated = simulate(args.seed, &Wanted::full());
+    let simulated = kept::sets(&args.out, args.seed, &Wanted::full())?;
     eprintln!("objects: {:.1} s", begin.elapsed().as_secs_f64());
     let mut labels = Errors::default();
     let mut real = [Vec::new(), Vec::new()];
