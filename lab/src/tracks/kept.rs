@@ -23,7 +23,7 @@ const VERSION: u32 = 1;
 /// made anew.
 pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
     let path = folder.join(format!("objects-{seed}.bin"));
-    let key = Digest::of(format!("{VERSION} {seed} {wanted:?} {}", rule()).as_bytes());
+    let key = key(seed, wanted);
     if let Some(sets) = std::fs::read(&path).ok().and_then(|bytes| read(&bytes, key)) {
         return Ok(sets);
     }
@@ -31,6 +31,11 @@ pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
     atomic::create_folder(folder)?;
     atomic::write(&path, |out| out.write_all(&write(&sets, key)))?;
     Ok(sets)
+}
+
+/// What decides the objects.
+pub fn key(seed: u64, wanted: &Wanted) -> u64 {
+    Digest::of(format!("{VERSION} {seed} {wanted:?} {}", rule()).as_bytes())
 }
 
 fn write(sets: &Sets, key: u64) -> Vec<u8> {
@@ -72,7 +77,8 @@ fn write_object(out: &mut Vec<u8>, o: &Object) {
     }
 }
 
-fn read(bytes: &[u8], key: u64) -> Option<Sets> {
+/// The sets of a file; none where it is damaged or has another key.
+pub fn read(bytes: &[u8], key: u64) -> Option<Sets> {
     let (content, check) = bytes.split_last_chunk::<8>()?;
     if u64::from_le_bytes(*check) != Digest::of(content) {
         return None;

@@ -15,6 +15,8 @@ mod object;
 mod recorded;
 mod simulated;
 mod tables;
+#[cfg(test)]
+mod tests;
 mod tracker;
 
 use crate::labels::Kind;
