@@ -40,6 +40,13 @@ impl Digest {
         self.word((v + 0.0).to_bits());
     }
 
+    /// Adds a number in double precision by its bits, the lower word first. The zeros of both signs
+    /// are one.
+    #[inline]
+    pub fn double(&mut self, v: f64) {
+        (v + 0.0).to_bits().to_le_bytes().into_iter().for_each(|b| self.byte(b));
+    }
+
     /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over ground, velocity
     /// relative to the vehicle, covariance, age.
     pub fn column(&mut self, c: &ColumnFlow) {

@@ -2,6 +2,7 @@
 
 mod flow;
 mod sweeps;
+mod track;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ use crate::source::{Format, OpenOptions, PosesFrame};
 
 pub use flow::Flow;
 pub use sweeps::Sweeps;
+pub use track::{FrontEndKind, Track};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -44,6 +46,9 @@ pub enum Command {
     #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = flow::after_help(EXIT_CODES))]
     Flow(Box<Flow>),
+    #[allow(missing_docs)]
+    #[command(after_help = EXIT_CODES, after_long_help = track::after_help(EXIT_CODES))]
+    Track(Box<Track>),
     /// Map the occupancy of every sweep over the sensor's whole range
     Map(Box<Map>),
     /// Run on a small simulated drive and compare with its truth

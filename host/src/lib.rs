@@ -24,3 +24,4 @@ pub mod sink;
 pub mod source;
 pub mod statistics;
 pub mod summary;
+pub mod track;

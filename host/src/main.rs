@@ -10,7 +10,7 @@ use clap::Parser;
 use raywake::args::{Args, Command};
 use raywake::error::Error;
 use raywake::summary::Summary;
-use raywake::{budget, choose, engine, flow, map, run};
+use raywake::{budget, choose, engine, flow, map, run, track};
 use raywake_gpu::guard::Guard;
 
 /// Exit code of a process ended by SIGINT, as shells have it.
@@ -43,6 +43,9 @@ fn execute(command: Command) -> Result<u8, Error> {
     match command {
         Command::Run(args) => run::run(&args).map(code),
         Command::Flow(args) => flow::flow(&args).map(|()| 0),
+        Command::Track(args) => {
+            track::track(&args).map(|whole| if whole { 0 } else { INTERRUPTED })
+        }
         Command::Map(args) => {
             map::command::map(&args).map(|whole| if whole { 0 } else { INTERRUPTED })
         }

@@ -167,10 +167,14 @@ impl Summary {
 
     /// Writes the summary as JSON.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let text =
-            serde_json::to_string_pretty(self).map_err(|e| Error::writing(path)(e.into()))?;
-        replace(path, &(text + "\n"))
+        write_json(self, path)
     }
+}
+
+/// Writes figures as JSON.
+pub fn write_json(figures: &impl Serialize, path: &Path) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(figures).map_err(|e| Error::writing(path)(e.into()))?;
+    replace(path, &(text + "\n"))
 }
 
 /// Writes a file whole or not at all; to what is no file (a pipe, a terminal) as it comes, because

@@ -270,3 +270,119 @@ fn alike(a: [f32; 2], b: [f32; 2]) -> bool {
     let allowed = ALIKE_MPS + ALIKE * libm::sqrtf(square(a).max(square(b)));
     apart <= allowed * allowed
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::random::Random;
+    use std::boxed::Box;
+    use std::vec;
+    use std::vec::Vec;
+
+    const PARAMS: FrontEndParams = FrontEndParams::street();
+
+    /// Clusters of returns, some of which touch, with and without velocities.
+    fn batch(seed: u64) -> Box<Batch> {
+        let mut random = Random(seed);
+        let mut batch = Box::new(Batch::new());
+        for _ in 0..60 {
+            let middle = [0; 2].map(|_| random.between(1.0, 25.0));
+            let velocity = [random.below(3) as f32 * 2.0, 0.0];
+            for _ in 0..random.below(80) {
+                let [x, y] = middle.map(|m| m + random.between(-0.9, 0.9));
+                let seen = Seen {
+                    at: [x, y, random.between(0.0, 2.0)],
+                    time_s: random.between(0.0, 0.1),
+                    velocity,
+                    ..Seen::default()
+                };
+                batch.returns.push(seen).unwrap();
+            }
+        }
+        batch
+    }
+
+    /// Every chunk with all that can be reached from it.
+    fn flood(firsts: &[Seen]) -> Vec<usize> {
+        let mut label = vec![usize::MAX; firsts.len()];
+        for n in 0..firsts.len() {
+            let mut open = vec![n];
+            while let Some(at) = open.pop() {
+                if label[at] == usize::MAX {
+                    label[at] = n;
+                    open.extend((0..firsts.len()).filter(|m| linked(&firsts[at], &firsts[*m])));
+                }
+            }
+        }
+        label
+    }
+
+    #[test]
+    fn components_equal_a_flood_fill() {
+        let mut chunks = Box::new(Chunks::new());
+        let params = FrontEndParams { returns_min: 1, ..PARAMS };
+        let mut several = 0;
+        for seed in 0..20 {
+            let batch = batch(seed);
+            let left = chunks.segment(&params, &batch, |n| n % 7 != 0);
+            let firsts: Vec<Seen> = chunks.chunks.all.iter().map(|c| c.first).collect();
+            let label = flood(&firsts);
+            let mut of_label = vec![None; firsts.len()];
+            for (label, segment) in label.iter().zip(chunks.of_chunk) {
+                let known = of_label[*label].get_or_insert(segment);
+                assert_eq!(*known, segment);
+            }
+            let groups = of_label.iter().flatten().count();
+            assert_eq!(groups, chunks.segments().len() + left.too_large as usize);
+            several += (groups > 10 && groups < firsts.len() / 2) as u32;
+        }
+        assert!(several > 15, "{several}");
+    }
+
+    #[test]
+    fn returns_join_the_nearest_chunk_and_segments_sum_them() {
+        let mut chunks = Box::new(Chunks::new());
+        for seed in 0..10 {
+            let batch = batch(seed);
+            chunks.segment(&PARAMS, &batch, |n| n % 7 != 0);
+            let all = &chunks.chunks.all;
+            let mut opened = 0;
+            for (n, seen) in batch.returns.iter().enumerate() {
+                let chunk = chunks.of_return[n];
+                if n % 7 == 0 {
+                    assert_eq!(chunk, NONE);
+                    continue;
+                }
+                // Of the chunks there were, the nearest it may join; else its own.
+                let joins = |c: &Chunk| {
+                    let d2: f32 = (0..3)
+                        .map(|a| (c.first.at[a] - seen.at[a]) * (c.first.at[a] - seen.at[a]))
+                        .sum();
+                    let near = d2 < JOINS_M * JOINS_M
+                        && (c.first.time_s - seen.time_s).abs() < JOINS_S
+                        && alike(c.first.velocity, seen.velocity);
+                    near.then_some(d2)
+                };
+                let least = all[..opened].iter().filter_map(joins).min_by(f32::total_cmp);
+                match least {
+                    Some(d2) => assert_eq!(joins(&all[chunk as usize]), Some(d2)),
+                    None => {
+                        assert_eq!((chunk as usize, all[opened].first), (opened, *seen));
+                        opened += 1;
+                    }
+                }
+            }
+            for (index, segment) in chunks.segments().iter().enumerate() {
+                let of = |n: &usize| chunks.segment_of(*n) == Some(index);
+                let members: Vec<usize> = (0..batch.returns.len()).filter(of).collect();
+                assert_eq!(members.len(), segment.count as usize);
+                assert!(segment.count >= PARAMS.returns_min);
+                for a in 0..3 {
+                    let sum: f64 = members.iter().map(|n| batch.returns[*n].at[a] as f64).sum();
+                    assert!((sum / members.len() as f64 - segment.centroid[a]).abs() < 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! The figures of a run of tracks.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use raywake_core::digest::Digest;
+use raywake_core::objects::ObjectState;
+use raywake_core::objects::front_end::Turnover;
+use serde::Serialize;
+
+use super::Ended;
+use super::write::Files;
+use crate::args::FrontEndKind;
+use crate::error::Error;
+use crate::source::SweepData;
+use crate::statistics::{Dropped, Spread};
+use crate::summary::write_json;
+
+/// Tracks that the report lists.
+const LISTED: usize = 20;
+
+/// Counts over all sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tally {
+    /// Returns of objects.
+    pub object_returns: u64,
+    /// Of these, beyond the capacity for chunks.
+    pub unchunked: u64,
+    /// Segments that may be objects.
+    pub segments: u64,
+    /// Segments too small for one.
+    pub too_small: u64,
+    /// Segments too large.
+    pub too_large: u64,
+    /// Segments beyond the capacity.
+    pub unlisted: u64,
+    /// Tracks begun.
+    pub born: u64,
+    /// Segments without room for a track.
+    pub unborn: u64,
+    /// Updates of tracks.
+    pub updated: u64,
+    /// Tracks that waited, a count for every sweep.
+    pub waiting: u64,
+    /// Tracks ended.
+    pub ended: u64,
+    /// Of these, because time went backwards.
+    pub reset: u64,
+}
+
+impl Tally {
+    fn add(&mut self, t: &Turnover) {
+        self.object_returns += t.object_returns;
+        self.unchunked += t.unchunked;
+        let pairs = [
+            (&mut self.segments, t.segments),
+            (&mut self.too_small, t.too_small),
+            (&mut self.too_large, t.too_large),
+            (&mut self.unlisted, t.unlisted),
+            (&mut self.born, t.born),
+            (&mut self.unborn, t.unborn),
+            (&mut self.updated, t.updated),
+            (&mut self.waiting, t.waiting),
+            (&mut self.ended, t.ended),
+            (&mut self.reset, t.reset),
+        ];
+        pairs.into_iter().for_each(|(sum, n)| *sum += u64::from(n));
+    }
+}
+
+/// A track at its end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Line {
+    /// Its number.
+    pub track: u32,
+    /// Time of its first centroid, s.
+    pub from_s: f64,
+    /// Time to its last one, s.
+    pub for_s: f64,
+    /// Centroids observed.
+    pub updates: u32,
+    /// Returns seen.
+    pub returns: u64,
+    /// From the first place of the estimate to the last, m.
+    pub moved_m: f64,
+    /// Speed of the estimate at the end, m/s.
+    pub speed_mps: f64,
+    /// Mean distance of a return from the model, m.
+    pub residual_m: f64,
+    /// Iterations of the estimate.
+    pub iterations: usize,
+}
+
+/// What is counted as a run goes on.
+#[derive(Default)]
+pub struct Report {
+    /// Counts.
+    pub tally: Tally,
+    dropped: Dropped,
+    sweeps: u64,
+    steps: Vec<f64>,
+    estimates: Vec<f64>,
+    lines: Vec<Line>,
+    digest: Digest,
+}
+
+impl Report {
+    /// A step of the front end that began at `clock`.
+    pub fn step(&mut self, turnover: &Turnover, clock: Instant) {
+        self.steps.push(clock.elapsed().as_secs_f64() * 1e3);
+        self.tally.add(turnover);
+        self.dropped.returns += turnover.dropped;
+    }
+
+    /// A sweep as it was read.
+    pub fn read(&mut self, sweep: &SweepData) {
+        self.dropped.null_rows += u64::from(sweep.dropped.null_rows);
+        if self.sweeps > 0 {
+            self.dropped.missing_sweeps += sweep.dropped.sweeps_before;
+        }
+        self.sweeps += 1;
+    }
+
+    /// A track at its end, with its files. The digest is over its number, anchor and start, and at
+    /// each state of its history this and the estimate.
+    pub fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
+        let Ended { track, estimator, report, milliseconds } = *ended;
+        self.estimates.push(milliseconds);
+        self.digest.word(track.id);
+        track.anchor.iter().for_each(|v| self.digest.double(*v));
+        self.digest.double(track.start_s);
+        for filter in track.history() {
+            self.state(filter);
+            self.state(&estimator.state(filter.time_s));
+        }
+        let for_s = track.last_s() - track.start_s;
+        let [first, last] = [0.0, for_s].map(|t| estimator.state(t));
+        let [x, y] = [0, 1].map(|a| last.position[a] - first.position[a]);
+        self.lines.push(Line {
+            track: track.id,
+            from_s: track.start_s,
+            for_s,
+            updates: track.observations,
+            returns: track.returns_seen(),
+            moved_m: x.hypot(y),
+            speed_mps: last.speed,
+            residual_m: report.costs.last().map_or(0.0, |c| c.residual_m),
+            iterations: report.iterations,
+        });
+        files.track(ended)
+    }
+
+    fn state(&mut self, s: &ObjectState) {
+        let [x, y, z] = s.position;
+        let numbers = [s.time_s, x, y, z, s.heading, s.speed, s.climb, s.turn_rate];
+        numbers.into_iter().for_each(|v| self.digest.double(v));
+    }
+
+    /// Puts the figures together.
+    pub fn summary(self, source: &str, kind: FrontEndKind, interrupted: bool) -> Summary {
+        Summary {
+            version: env!("CARGO_PKG_VERSION"),
+            source: source.to_string(),
+            front_end: match kind {
+                FrontEndKind::Variance => "variance",
+                FrontEndKind::Flow => "flow",
+            },
+            interrupted,
+            sweeps: self.sweeps,
+            digest: format!("{:016x}", self.digest.value()),
+            step_ms: Spread::of(&self.steps),
+            estimate_ms: Spread::of(&self.estimates),
+            allocations_after_seal: 0,
+            tally: self.tally,
+            dropped: self.dropped,
+            tracks: self.lines,
+        }
+    }
+}
+
+/// What a run was and what came of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Version of this program.
+    pub version: &'static str,
+    /// Name of the recording.
+    pub source: String,
+    /// `variance` or `flow`.
+    pub front_end: &'static str,
+    /// Whether the run was ended by a signal.
+    pub interrupted: bool,
+    /// Sweeps done.
+    pub sweeps: u64,
+    /// Digest of all results, 16 hexadecimal digits; see [`Report::track`].
+    pub digest: String,
+    /// Time of a sweep, ms: that of its flow and of the front end. Null without a sweep.
+    pub step_ms: Option<Spread>,
+    /// Time of the estimate of a track at its end, ms; null without a track.
+    pub estimate_ms: Option<Spread>,
+    /// Allocations of the program within sweeps and estimates.
+    pub allocations_after_seal: u64,
+    /// Counts over all sweeps.
+    pub tally: Tally,
+    /// Left out.
+    pub dropped: Dropped,
+    /// Every track, in the order of their ends.
+    pub tracks: Vec<Line>,
+}
+
+impl Summary {
+    /// Writes the summary as JSON.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        write_json(self, path)
+    }
+
+    /// For people.
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.print(&mut out);
+        out
+    }
+
+    fn print(&self, out: &mut String) -> std::fmt::Result {
+        let end = if self.interrupted { ", INTERRUPTED" } else { "" };
+        writeln!(out, "\n{} sweeps, {} tracks{end}", self.sweeps, self.tracks.len())?;
+        self.longest(out)?;
+        for (what, spread) in [("sweep", &self.step_ms), ("estimate", &self.estimate_ms)] {
+            if let Some(t) = spread {
+                writeln!(
+                    out,
+                    "{what:10} {:.2} ms median, {:.2} sd, {:.2} p99, {:.2} max",
+                    t.median, t.sd, t.p99, t.max
+                )?;
+            }
+        }
+        let t = &self.tally;
+        writeln!(
+            out,
+            "segments   {} that may be objects, {} too small, {} too large",
+            t.segments, t.too_small, t.too_large
+        )?;
+        writeln!(
+            out,
+            "tracks     {} begun, {} updates, {} waits, {} ended by time that ran backwards",
+            t.born, t.updated, t.waiting, t.reset
+        )?;
+        writeln!(
+            out,
+            "left out   {}; over a capacity: {} returns of objects, {} segments, {} tracks",
+            self.dropped, t.unchunked, t.unlisted, t.unborn
+        )?;
+        writeln!(out, "memory     {} allocations within sweeps", self.allocations_after_seal)?;
+        writeln!(out, "digest     {}", self.digest)
+    }
+
+    /// The tracks observed most.
+    fn longest(&self, out: &mut String) -> std::fmt::Result {
+        let mut lines: Vec<&Line> = self.tracks.iter().collect();
+        lines.sort_by_key(|l| (u32::MAX - l.updates, l.track));
+        let head = ["track", "from s", "for s", "updates", "returns", "moved m", "m/s", "off m"];
+        writeln!(out, "\n{}", head.map(|h| format!("{h:>8}")).join(""))?;
+        for l in lines.iter().take(LISTED) {
+            writeln!(
+                out,
+                "{:8}{:8.2}{:8.2}{:8}{:8}{:8.2}{:8.2}{:8.3}",
+                l.track,
+                l.from_s,
+                l.for_s,
+                l.updates,
+                l.returns,
+                l.moved_m,
+                l.speed_mps,
+                l.residual_m
+            )?;
+        }
+        let rest = lines.len().saturating_sub(LISTED);
+        if rest > 0 { writeln!(out, "and {rest} more\n") } else { writeln!(out) }
+    }
+}

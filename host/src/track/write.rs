@@ -1,0 +1,100 @@
+//! The files of tracks.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use raywake_core::objects::{ObjectReturn, ObjectState};
+
+use super::Ended;
+use crate::error::Error;
+use crate::sink::atomic;
+use crate::sink::table::Table;
+
+/// Where files go, and the rows of `tracks.feather`.
+pub struct Files {
+    folder: Option<PathBuf>,
+    rows: Vec<Row>,
+}
+
+/// A track at the time of one of its updates; positions in the world, m.
+struct Row {
+    track: u32,
+    time_s: f64,
+    filter: ObjectState,
+    estimate: ObjectState,
+}
+
+impl Files {
+    /// Creates the folders; without one nothing will be written.
+    pub fn create(root: Option<&Path>) -> Result<Files, Error> {
+        if let Some(root) = root {
+            if !cfg!(feature = "arrow") {
+                let what = "this build lacks the feature `arrow` for --out";
+                return Err(Error::Unsupported(what.into()));
+            }
+            atomic::create_folder(&root.join("clouds"))?;
+        }
+        Ok(Files { folder: root.map(Path::to_path_buf), rows: Vec::new() })
+    }
+
+    /// A track at its end: its cloud, and its rows for later.
+    pub fn track(&mut self, ended: &Ended) -> Result<(), Error> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let Ended { track, estimator, .. } = ended;
+        let placed = |state: ObjectState| ObjectState {
+            position: [0, 1, 2].map(|a| track.anchor[a] + state.position[a]),
+            ..state
+        };
+        self.rows.extend(track.history().iter().map(|filter| Row {
+            track: track.id,
+            time_s: track.start_s + filter.time_s,
+            filter: placed(*filter),
+            estimate: placed(estimator.state(filter.time_s)),
+        }));
+        let in_frame = |seen: &ObjectReturn| {
+            let place = local(&estimator.state(f64::from(seen.time_s)), seen.position);
+            [place[0], place[1], place[2], seen.time_s]
+        };
+        let rows: Vec<[f32; 4]> = track.returns().iter().map(in_frame).collect();
+        ply(&folder.join(format!("clouds/{:05}.ply", track.id)), &rows)
+    }
+
+    /// All tracks have been seen.
+    pub fn finish(self) -> Result<(), Error> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let mut t = Table::default();
+        t.u32s("track", &self.rows, |r| r.track);
+        t.f64s("time_s", &self.rows, |r| r.time_s);
+        let mut states = |prefix: &str, of: fn(&Row) -> &ObjectState| {
+            for (a, axis) in ["x_m", "y_m", "z_m"].iter().enumerate() {
+                t.f64s(&format!("{prefix}{axis}"), &self.rows, |r| of(r).position[a]);
+            }
+            t.f64s(&format!("{prefix}heading_rad"), &self.rows, |r| of(r).heading);
+            t.f64s(&format!("{prefix}speed_mps"), &self.rows, |r| of(r).speed);
+            t.f64s(&format!("{prefix}climb_mps"), &self.rows, |r| of(r).climb);
+            t.f64s(&format!("{prefix}turn_rate_radps"), &self.rows, |r| of(r).turn_rate);
+        };
+        states("ekf_", |r| &r.filter);
+        states("", |r| &r.estimate);
+        t.write(&folder.join("tracks.feather"), &[])
+    }
+}
+
+/// A place (m from the track's anchor) in the frame of an object.
+fn local(state: &ObjectState, at: [f32; 3]) -> [f32; 3] {
+    let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - state.position[a]);
+    let (sin, cos) = libm::sincos(state.heading);
+    [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
+}
+
+/// Writes a cloud of x, y, z and time.
+fn ply(path: &Path, rows: &[[f32; 4]]) -> Result<(), Error> {
+    atomic::write(path, |out| {
+        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", rows.len())?;
+        for name in ["x", "y", "z", "time"] {
+            writeln!(out, "property float {name}")?;
+        }
+        writeln!(out, "end_header")?;
+        rows.iter().flatten().try_for_each(|v| out.write_all(&v.to_le_bytes()))
+    })
+}
