@@ -400,7 +400,7 @@ impl Estimator {
         let kept = &self.returns.all()[self.active.clone()];
         let points = points.clamp(1, MODEL_MAX).min(kept.len());
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
-            *seen = look(&self.now.weights, kept);
+            *seen = Seen::look(&self.now.weights, kept);
         }
         for (i, model) in self.now.model[..points].iter_mut().enumerate() {
             let nth = (2 * i + 1) * kept.len() / (2 * points);
@@ -423,9 +423,8 @@ impl Estimator {
         let precision = precision(params);
         let prior = 1.0 / (params.extent_m * params.extent_m);
         let n = self.knots.bases();
-        self.associate(params, deviation);
+        let mut cost = self.associate(params, deviation);
         self.equations.clear(n);
-        let mut cost = self.cost(params, deviation);
         cost.process =
             process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
         if report.costs.is_empty() {
@@ -438,9 +437,8 @@ impl Estimator {
             }
             self.before.copy(&self.now);
             let Some(()) = self.step(damping, prior) else { return Stop::NotFinite };
-            self.associate(params, deviation);
+            let mut next = self.associate(params, deviation);
             self.equations.clear(n);
-            let mut next = self.cost(params, deviation);
             next.process =
                 process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
             report.iterations += 1;
@@ -469,15 +467,15 @@ impl Estimator {
         Stop::Iterations
     }
 
-    /// Finds every return's model point at the trajectory in `now`.
-    fn associate(&mut self, params: &EstimateParams, deviation: f64) {
+    /// Finds every return's model point at the trajectory in `now`; the cost, but for the process.
+    fn associate(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
         let kept = &self.returns.all()[self.active.clone()];
         let model = &self.now.model[..self.now.points];
         self.nearest.fill(model);
         self.starts[..=model.len()].fill(0);
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
             let guess = usize::from(seen.nearest);
-            *seen = look(&self.now.weights, kept);
+            *seen = Seen::look(&self.now.weights, kept);
             let place = seen.place().map(|value| value as f32);
             let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &place));
             let Some((number, _)) = self.nearest.find(place, far) else { continue };
@@ -499,27 +497,16 @@ impl Estimator {
         if params.surfaces {
             self.find_surfaces(params, deviation);
         }
-        if params.robust > 0.0 {
-            let limit = params.robust * params.robust;
-            for seen in &mut self.seen[..self.active.len()] {
-                let number = usize::from(seen.nearest);
-                let (model, surface) = (&self.now.model[number], &self.now.surfaces[number]);
-                let square = normal::square(seen, model, surface);
-                let share = 1.0 / (1.0 + square / limit);
-                seen.share = share * share;
-            }
-        }
+        self.cost(params, deviation)
     }
 
-    /// Precisions from how the returns of a model point scatter about it.
+    /// The patch of each model point, from how its returns scatter.
     fn find_surfaces(&mut self, params: &EstimateParams, deviation: f64) {
         let least = deviation * deviation;
         for number in 0..self.now.points {
             let order =
                 &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
             let model = self.now.model[number].map(f64::from);
-            // As if one more return lay about it alike in every direction.
-            let few = 1.0;
             let (mut xx, mut xy, mut yy, mut zz) = (0.0, 0.0, 0.0, 0.0);
             for &i in order {
                 let [x, y, z] = self.seen[usize::from(i)].place();
@@ -529,10 +516,10 @@ impl Estimator {
                 yy += y * y;
                 zz += z * z;
             }
-            let count = order.len() as f64 + few;
-            let round = few * 0.01;
+            // As if one more return lay about it alike in every direction.
+            let count = order.len() as f64 + 1.0;
             let [xx, xy, yy, zz] =
-                [(xx + round) / count, xy / count, (yy + round) / count, (zz + round) / count];
+                [(xx + 0.01) / count, xy / count, (yy + 0.01) / count, (zz + 0.01) / count];
             let half = 0.5 * (xx - yy);
             let spread = libm::sqrt(half * half + xy * xy);
             let middle = 0.5 * (xx + yy);
@@ -543,30 +530,26 @@ impl Estimator {
             let small = (middle - spread).max(0.0);
             let loose = params.loose_m * params.loose_m;
             let flat = small * small / (small * small + zz * zz);
-            self.now.surfaces[number] = Surface {
-                normal,
-                across: 1.0 / (least + small + loose * flat),
-                along: 1.0 / (least + middle + spread + loose),
-                up: 1.0 / (least + zz + loose * (1.0 - flat)),
-            };
+            let variances =
+                [small + loose * flat, middle + spread + loose, zz + loose * (1.0 - flat)];
+            let precision = variances.map(|variance| 1.0 / (least + variance));
+            self.now.surfaces[number] = Surface { normal, precision };
         }
     }
 
-    /// The cost at the associations, but for the process.
-    fn cost(&self, params: &EstimateParams, deviation: f64) -> Cost {
+    /// Lays the returns over their model points; the cost, but for the process.
+    fn cost(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
         let prior = 1.0 / (params.extent_m * params.extent_m);
-        let limit = params.robust * params.robust;
+        let robust = params.robust * params.robust;
         let mut cost = Cost { deviation_m: deviation, ..Cost::default() };
         for model in &self.now.model[..self.now.points] {
             cost.model += 0.5 * prior * f64::from(square_distance(model, &[0.0; 3]));
         }
         let count = self.active.len();
-        for seen in &self.seen[..count] {
+        for seen in &mut self.seen[..count] {
             let number = usize::from(seen.nearest);
             let model = &self.now.model[number];
-            let square = normal::square(seen, model, &self.now.surfaces[number]);
-            cost.returns +=
-                0.5 * if limit > 0.0 { square / (1.0 + square / limit) } else { square };
+            cost.returns += seen.lay(model, &self.now.surfaces[number], robust);
             let place = seen.place().map(|value| value as f32);
             cost.residual_m += f64::from(libm::sqrtf(square_distance(model, &place)));
         }
@@ -579,7 +562,7 @@ impl Estimator {
         let kept = &self.returns.all()[self.active.clone()];
         let n = self.knots.bases();
         let now = &mut self.now;
-        self.equations.add_returns(kept, &self.seen, &now.model, &now.surfaces);
+        self.equations.add_returns(kept, &self.seen);
         let orders =
             |number: usize| usize::from(self.starts[number])..usize::from(self.starts[number + 1]);
         for number in 0..now.points {
@@ -609,21 +592,14 @@ impl Estimator {
 
     /// Returns that took part and lie beyond `extent_m` from the object's origin.
     fn outside(&self, extent_m: f64) -> usize {
-        let square = |seen: Seen| seen.arm.iter().map(|v| v * v).sum::<f64>();
-        let far = |seen: &Seen| square(*seen) > extent_m * extent_m;
-        self.returns.all().iter().filter(|kept| far(&look(&self.best.weights, kept))).count()
+        let far = |kept: &&returns::Kept| {
+            Seen::look(&self.best.weights, kept).square_range() > extent_m * extent_m
+        };
+        self.returns.all().iter().filter(far).count()
     }
 }
 
 /// `Q_u^-1`.
 fn precision(params: &EstimateParams) -> Weights {
     params.process.map(|deviation| 1.0 / (deviation * deviation))
-}
-
-/// A return from the object's place and heading at its time.
-fn look(weights: &[Weights], kept: &returns::Kept) -> Seen {
-    let [x, y, z, heading] = normal::pose(weights, kept);
-    let (sin, cos) = libm::sincos(heading);
-    let [u, v, w] = kept.position.map(f64::from);
-    Seen { arm: [u - x, v - y, w - z], cos, sin, ..Seen::NONE }
 }

@@ -42,40 +42,62 @@ pub(super) fn vertical(bases: usize, basis: usize, spline: usize) -> usize {
     if spline == Z { basis } else { bases + basis }
 }
 
-/// Precision of a return about a model point, 1/m²: how the surface lies there.
+/// The piece of surface that a model point stands for.
 #[derive(Clone, Copy)]
 pub(super) struct Surface {
-    /// Unit vector across the surface, in the object's frame.
+    /// Unit vector across it, in the object's frame.
     pub normal: [f64; 2],
-    pub across: f64,
-    pub along: f64,
-    pub up: f64,
+    /// Precision of a return across, along and up, 1/m².
+    pub precision: [f64; 3],
 }
 
 impl Surface {
-    pub const NONE: Surface = Surface { normal: [1.0, 0.0], across: 0.0, along: 0.0, up: 0.0 };
+    pub const NONE: Surface = Surface { normal: [1.0, 0.0], precision: [0.0; 3] };
 
     /// Alike in every direction.
     pub fn round(precision: f64) -> Surface {
-        Surface { across: precision, along: precision, up: precision, ..Surface::NONE }
+        Surface { precision: [precision; 3], ..Surface::NONE }
     }
 }
 
-/// A return as an iteration sees it.
+/// A return as an iteration sees it. Its axes are those of its model point's surface: across, along
+/// and up.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// From the object's origin, m, in the world's axes.
-    pub arm: [f64; 3],
-    pub cos: f64,
-    pub sin: f64,
+    arm: [f64; 3],
+    cos: f64,
+    sin: f64,
     /// Nearest model point.
     pub nearest: u16,
-    /// Share of its precision that it keeps under the robust loss.
-    pub share: f64,
+    /// The first two axes, in the world's plane.
+    axes: [[f64; 2]; 2],
+    /// How turning moves the return along them, m/rad.
+    turning: [f64; 2],
+    /// By how much it misses the model, m, and how precisely, 1/m², along every axis.
+    miss: [f64; 3],
+    precision: [f64; 3],
 }
 
 impl Seen {
-    pub const NONE: Seen = Seen { arm: [0.0; 3], cos: 1.0, sin: 0.0, nearest: 0, share: 1.0 };
+    pub const NONE: Seen = Seen {
+        arm: [0.0; 3],
+        cos: 1.0,
+        sin: 0.0,
+        nearest: 0,
+        axes: [[1.0, 0.0], [0.0, 1.0]],
+        turning: [0.0; 2],
+        miss: [0.0; 3],
+        precision: [0.0; 3],
+    };
+
+    /// A return from the object's place and heading at its time.
+    pub fn look(weights: &[Weights], kept: &Kept) -> Seen {
+        let [x, y, z, heading] = pose(weights, kept);
+        let (sin, cos) = libm::sincos(heading);
+        let [u, v, w] = kept.position.map(f64::from);
+        Seen { arm: [u - x, v - y, w - z], cos, sin, ..Seen::NONE }
+    }
 
     /// The arm in the object's frame.
     pub fn place(&self) -> [f64; 3] {
@@ -83,9 +105,38 @@ impl Seen {
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
     }
 
-    /// A direction of the object's frame in the world's axes.
-    fn turned(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [self.cos * x - self.sin * y, self.sin * x + self.cos * y]
+    /// Squared distance from the object's origin, m².
+    pub fn square_range(&self) -> f64 {
+        self.arm.iter().map(|v| v * v).sum()
+    }
+
+    /// Lays the return over its model point; its share of the cost. `robust` is the squared number of
+    /// deviations from which on it counts for less, if not zero.
+    pub fn lay(&mut self, model: &[f32; 3], surface: &Surface, robust: f64) -> f64 {
+        let [nx, ny] = surface.normal;
+        let [x, y, z] = self.place();
+        let off = [x - f64::from(model[0]), y - f64::from(model[1]), z - f64::from(model[2])];
+        let across = [self.cos * nx - self.sin * ny, self.sin * nx + self.cos * ny];
+        let along = [-across[1], across[0]];
+        let turn = [self.arm[1], -self.arm[0]];
+        self.axes = [across, along];
+        self.turning =
+            [across[0] * turn[0] + across[1] * turn[1], along[0] * turn[0] + along[1] * turn[1]];
+        let miss = [nx * off[0] + ny * off[1], nx * off[1] - ny * off[0], off[2]];
+        self.miss = miss;
+        self.precision = surface.precision;
+        let mut square = 0.0;
+        for (miss, precision) in miss.iter().zip(surface.precision) {
+            square += precision * miss * miss;
+        }
+        if robust > 0.0 {
+            let share = 1.0 / (1.0 + square / robust);
+            for precision in &mut self.precision {
+                *precision *= share * share;
+            }
+            square *= share;
+        }
+        0.5 * square
     }
 }
 
@@ -148,37 +199,6 @@ impl Piece {
     }
 }
 
-/// The miss of a return in the axes of its surface (across, along, up), those axes in the world's
-/// plane, and how turning moves it along them.
-struct Miss {
-    miss: [f64; 3],
-    axes: [[f64; 2]; 2],
-    turning: [f64; 2],
-}
-
-fn miss(seen: &Seen, model: &[f32; 3], surface: &Surface) -> Miss {
-    let [nx, ny] = surface.normal;
-    let [x, y, z] = seen.place();
-    let off = [x - f64::from(model[0]), y - f64::from(model[1])];
-    let across = seen.turned([nx, ny]);
-    let along = [-across[1], across[0]];
-    let turn = [seen.arm[1], -seen.arm[0]];
-    Miss {
-        miss: [nx * off[0] + ny * off[1], nx * off[1] - ny * off[0], z - f64::from(model[2])],
-        axes: [across, along],
-        turning: [
-            across[0] * turn[0] + across[1] * turn[1],
-            along[0] * turn[0] + along[1] * turn[1],
-        ],
-    }
-}
-
-/// Squared length of a miss in standard deviations, without a robust loss.
-pub(super) fn square(seen: &Seen, model: &[f32; 3], surface: &Surface) -> f64 {
-    let [across, along, up] = miss(seen, model, surface).miss;
-    surface.across * across * across + surface.along * along * along + surface.up * up * up
-}
-
 impl Equations {
     pub const fn new() -> Equations {
         Equations { bases: 0, planar: System::new(), vertical: System::new() }
@@ -191,13 +211,7 @@ impl Equations {
     }
 
     /// Adds the returns, in the order of time, as if the model were known.
-    pub fn add_returns(
-        &mut self,
-        kept: &[Kept],
-        seen: &[Seen],
-        model: &[[f32; 3]],
-        surfaces: &[Surface],
-    ) {
+    pub fn add_returns(&mut self, kept: &[Kept], seen: &[Seen]) {
         let mut piece = Piece::EMPTY;
         let mut first = 0;
         for (kept, seen) in kept.iter().zip(seen) {
@@ -205,11 +219,7 @@ impl Equations {
                 piece.flush(first, self);
                 first = kept.basis.first;
             }
-            let surface = &surfaces[usize::from(seen.nearest)];
-            let Miss { miss, axes: [n, t], turning } =
-                miss(seen, &model[usize::from(seen.nearest)], surface);
-            let (a, b) = (surface.across * seen.share, surface.along * seen.share);
-            let up = surface.up * seen.share;
+            let Seen { axes: [n, t], turning, miss, precision: [a, b, up], .. } = *seen;
             let (an, bt) = (a * turning[0], b * turning[1]);
             let terms = [
                 a * n[0] * n[0] + b * t[0] * t[0],
@@ -248,12 +258,9 @@ impl Equations {
         let own = own(order, seen, model, surface, prior);
         for &i in order {
             let (kept, seen) = (&kept[usize::from(i)], &seen[usize::from(i)]);
-            let Miss { axes, turning, .. } = miss(seen, model, surface);
             let from = kept.basis.first - low;
-            let precision = [surface.across * seen.share, surface.along * seen.share];
-            for ((row, precision), (axis, turning)) in
-                rows.iter_mut().zip(precision).zip(axes.iter().zip(turning))
-            {
+            for (a, row) in rows.iter_mut().enumerate() {
+                let (precision, axis, turning) = (seen.precision[a], seen.axes[a], seen.turning[a]);
                 let parts = [precision * axis[0], precision * axis[1], -precision * turning];
                 let places = row[3 * from..3 * (from + SUPPORT)].chunks_exact_mut(3);
                 for (place, value) in places.zip(kept.basis.values) {
@@ -262,7 +269,7 @@ impl Equations {
                     }
                 }
             }
-            let up = surface.up * seen.share;
+            let up = seen.precision[2];
             for (sum, value) in row_up[from..from + SUPPORT].iter_mut().zip(kept.basis.values) {
                 *sum += up * value;
             }
@@ -318,13 +325,12 @@ pub(super) fn follow(
                 *sum += weight * value;
             }
         }
-        let Miss { axes, turning, .. } = miss(seen, model, surface);
-        let precision = [surface.across * seen.share, surface.along * seen.share];
         for a in 0..2 {
-            let back = axes[a][0] * moved[0] + axes[a][1] * moved[1] - turning[a] * moved[3];
-            own.pull[a] -= precision[a] * back;
+            let axis = seen.axes[a];
+            let back = axis[0] * moved[0] + axis[1] * moved[1] - seen.turning[a] * moved[3];
+            own.pull[a] -= seen.precision[a] * back;
         }
-        own.pull[2] -= surface.up * seen.share * moved[2];
+        own.pull[2] -= seen.precision[2] * moved[2];
     }
     let [across, along, up] = core::array::from_fn(|a| own.pull[a] / own.precision[a]);
     let [nx, ny] = surface.normal;
@@ -342,13 +348,11 @@ fn own(order: &[u16], seen: &[Seen], model: &[f32; 3], surface: &Surface, prior:
     let [nx, ny] = surface.normal;
     let at = [nx * x + ny * y, nx * y - ny * x, z];
     let mut own = Own { precision: [prior; 3], pull: at.map(|at| -prior * at) };
-    let precision = [surface.across, surface.along, surface.up];
     for &i in order {
         let seen = &seen[usize::from(i)];
-        let missed = miss(seen, model, surface).miss;
         for a in 0..3 {
-            own.precision[a] += precision[a] * seen.share;
-            own.pull[a] += precision[a] * seen.share * missed[a];
+            own.precision[a] += seen.precision[a];
+            own.pull[a] += seen.precision[a] * seen.miss[a];
         }
     }
     own
@@ -361,7 +365,7 @@ fn reach(order: &[u16], kept: &[Kept]) -> Option<(usize, usize)> {
 }
 
 /// Pose part of a state at a return: position and heading.
-pub(super) fn pose(weights: &[Weights], kept: &Kept) -> [f64; 4] {
+fn pose(weights: &[Weights], kept: &Kept) -> [f64; 4] {
     let mut pose = [0.0; 4];
     for (weights, value) in weights[kept.basis.first..].iter().zip(kept.basis.values) {
         for (sum, weight) in pose.iter_mut().zip(weights) {

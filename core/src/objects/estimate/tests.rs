@@ -16,12 +16,7 @@ fn root_mean(all: &[Errors]) -> Errors {
 #[ignore = "an experiment: prints the errors of variants"]
 fn experiment() {
     let d = EstimateParams::default();
-    let variants = [
-        ("default", EstimateParams { first_deviation_m: 0.2, ..d }),
-        ("no robust", EstimateParams { first_deviation_m: 0.2, robust: 0.0, ..d }),
-        ("loose 0.2", EstimateParams { first_deviation_m: 0.2, robust: 0.0, loose_m: 0.2, ..d }),
-        ("loose 1", EstimateParams { first_deviation_m: 0.2, robust: 0.0, loose_m: 1.0, ..d }),
-    ];
+    let variants = [("default", d), ("robust 5", EstimateParams { robust: 5.0, ..d })];
     let mut estimator = Box::new(Estimator::new());
     for (set, plan) in
         [("parked", synthetic::parked as fn(u64) -> synthetic::Plan), ("moving", synthetic::moving)]
