@@ -6,9 +6,9 @@ use super::extent::extent;
 use super::object::{Object, moment_at};
 use super::tracker::{Track, baseline, motion};
 use crate::labels::Kind;
-use raywake_core::objects::ObjectReturn;
 use raywake_core::objects::centroid_ekf::CentroidParams;
 use raywake_core::objects::estimate::{Cost, EstimateParams, Estimator, Stop};
+use raywake_core::objects::{ObjectReturn, ObjectState};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -84,14 +84,14 @@ pub struct Outcome {
 /// Runs a tracker; costs and the reason of its end where it iterates.
 pub fn track(
     object: &Object,
+    history: &[ObjectState],
     method: &Method,
     estimator: &mut Estimator,
 ) -> (Track, Vec<Cost>, Stop) {
-    let history = baseline(object, &CentroidParams::dissertation());
     match method {
-        Method::Baseline => (Track::of(object, motion(&history)), Vec::new(), Stop::default()),
+        Method::Baseline => (Track::of(object, motion(history)), Vec::new(), Stop::default()),
         Method::Proposed(params) => {
-            let report = estimator.solve(params, &object.returns, &history);
+            let report = estimator.solve(params, &object.returns, history);
             let track = Track::of(object, |t| estimator.state(t).into());
             (track, report.costs.to_vec(), report.stop)
         }
@@ -99,9 +99,14 @@ pub fn track(
 }
 
 /// What a tracker makes of an object, measured.
-fn score(object: &Object, method: &Method, estimator: &mut Estimator) -> Score {
+fn score(
+    object: &Object,
+    history: &[ObjectState],
+    method: &Method,
+    estimator: &mut Estimator,
+) -> Score {
     let begin = Instant::now();
-    let (track, costs, stop) = track(object, method, estimator);
+    let (track, costs, stop) = track(object, history, method, estimator);
     let seconds = begin.elapsed().as_secs_f64();
     let errors = match object.stationary {
         true => Errors::standing(&track.moments),
@@ -111,7 +116,7 @@ fn score(object: &Object, method: &Method, estimator: &mut Estimator) -> Score {
     Score { errors, entropy, extent, costs, stop, seconds }
 }
 
-fn outcome(object: &Object, estimator: &mut Estimator) -> Outcome {
+fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) -> Outcome {
     let really = Track::of(object, |t| moment_at(&object.truth, t));
     let range = |r: &ObjectReturn| {
         let [x, y, z] = [0, 1, 2].map(|i| f64::from(r.position[i] - r.origin[i]));
@@ -128,7 +133,7 @@ fn outcome(object: &Object, estimator: &mut Estimator) -> Outcome {
         range_m: ranges / object.returns.len() as f64,
         entropy: entropy(&really.cloud),
         extent: extent(&really.cloud),
-        scores: methods().iter().map(|(_, m)| score(object, m, estimator)).collect(),
+        scores: methods().iter().map(|(_, m)| score(object, history, m, estimator)).collect(),
     }
 }
 
@@ -136,15 +141,23 @@ fn outcome(object: &Object, estimator: &mut Estimator) -> Outcome {
 /// the heap.
 const STACK: usize = 64 << 20;
 
-/// Evaluates all trackers on all objects, `jobs` at a time; in the order of the objects.
-pub fn evaluate(objects: &[Object], jobs: usize) -> Vec<Outcome> {
+/// The baseline's history of every object.
+pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
+    objects.iter().map(|o| baseline(o, &CentroidParams::dissertation())).collect()
+}
+
+/// Evaluates all trackers on all objects, with the baseline's history of each, `jobs` at a time; in
+/// the order of the objects.
+pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize) -> Vec<Outcome> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {
         let mut estimator = Box::new(Estimator::new());
         loop {
             let n = next.fetch_add(1, Ordering::Relaxed);
-            let Some(object) = objects.get(n) else { return };
-            let outcome = outcome(object, &mut estimator);
+            let (Some(object), Some(history)) = (objects.get(n), histories.get(n)) else {
+                return;
+            };
+            let outcome = outcome(object, history, &mut estimator);
             done.lock().expect("no thread panics with it").push((n, outcome));
         }
     };

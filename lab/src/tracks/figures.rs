@@ -4,22 +4,23 @@ use super::errors::Alignment;
 use super::evaluate::{Method, OURS, Score, methods, track};
 use super::object::{Moment, Object, moment_at};
 use super::tables::Set;
-use super::tracker::Track;
+use super::tracker::{Track, baseline};
 use crate::report::{Axis, Chart, Cloud, Lines, Picture, Plot, Series, clouds};
 use glam::DVec3;
 use raywake::error::Error;
+use raywake_core::objects::centroid_ekf::CentroidParams;
 use raywake_core::objects::estimate::{Cost, Estimator};
 use raywake_sim::Rng;
 
 /// Returns of a cloud that are drawn at most.
 const DRAWN: usize = 40_000;
 
-/// Figure 2.5: the cost after each iteration as printed, and the mean distance of a return from its
-/// model point by every tracker that iterates.
+/// Figure 2.5: cost, and mean distance of a return from its model point, after each iteration over
+/// the simulated sets.
 pub fn convergence(sets: &[Set]) -> Chart {
     let part = |title: &str, y: &str, of: std::ops::Range<usize>, value: fn(&Cost) -> f64| {
         let mut lines = Lines::new(Axis::new("iteration"), Axis::new(y).log());
-        for set in sets.iter().filter(|s| !s.outcomes.is_empty()) {
+        for set in sets.iter().filter(|s| s.id == "stationary" || s.id == "moving") {
             for n in of.clone() {
                 let scores: Vec<&Score> = set.outcomes.iter().map(|o| &o.scores[n]).collect();
                 let name = format!("{}, {}", methods()[n].0, set.name);
@@ -54,7 +55,8 @@ fn means(scores: &[&Score], value: fn(&Cost) -> f64) -> Vec<[f64; 2]> {
 /// The trackers that are drawn: the baseline, as printed, ours.
 fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 3] {
     let methods: [(&str, Method); 3] = [0, 1, OURS].map(|n| methods()[n]);
-    methods.map(|(name, method)| (name, track(object, &method, estimator).0))
+    let history = baseline(object, &CentroidParams::dissertation());
+    methods.map(|(name, method)| (name, track(object, &history, &method, estimator).0))
 }
 
 /// Figure 2.7: speed and heading of an object.

@@ -2,6 +2,7 @@
 
 use super::errors::{Errors, Rmse};
 use super::evaluate::{OURS, Outcome, Score, methods};
+use super::front_ends::Found;
 use crate::labels::Kind;
 use crate::report::{Cell, Row, Table};
 use raywake::statistics::Spread;
@@ -25,9 +26,9 @@ const PRINTED_ENTROPY: [(&str, [f64; 3]); 2] = [
 /// Objects of one set.
 pub struct Set {
     /// Part of the tables' names.
-    pub id: &'static str,
+    pub id: String,
     /// As in "simulated, stationary".
-    pub name: &'static str,
+    pub name: String,
     /// All objects.
     pub outcomes: Vec<Outcome>,
 }
@@ -191,7 +192,7 @@ pub fn entropies(sets: &[Set]) -> Table {
         let all = (0..methods().len()).map(|n| set.entropy(n));
         let cells = [set.mean(|o| o.entropy)].into_iter().chain(all).map(number);
         let gaps = [1, OURS].map(|n| share(set.gap_closed(n)));
-        Row::new([Cell::from(set.name)].into_iter().chain(cells).chain(gaps))
+        Row::new([Cell::from(set.name.as_str())].into_iter().chain(cells).chain(gaps))
     }));
     let names = methods().map(|m| m.0);
     let gaps = ["Gap closed as printed, %", "Gap closed by ours, %"];
@@ -250,7 +251,8 @@ pub fn extents(sets: &[Set]) -> Table {
         };
         let mut row = |name: &str, extent: &dyn Fn(&Outcome) -> [f64; 3]| {
             let numbers = [0, 1, 2].map(|axis| Cell::Number(median(extent, axis), 2));
-            let head = [Cell::from(set.name), Cell::from(vehicles.len()), Cell::from(name)];
+            let head =
+                [Cell::from(set.name.as_str()), Cell::from(vehicles.len()), Cell::from(name)];
             rows.push(Row::new(head.into_iter().chain(numbers)));
         };
         if vehicles.is_empty() {
@@ -305,4 +307,32 @@ pub fn worst(set: &Set) -> Table {
         "Stopped",
     ];
     table(format!("worst-{}", set.id), caption, &columns, rows)
+}
+
+/// What the front ends find of the labelled objects of some drives.
+pub fn front_ends(found: &[(&'static str, Found)]) -> Table {
+    let row = |(name, found): &(&'static str, Found)| {
+        let counts = [
+            found.objects[0],
+            found.objects[1],
+            found.tracks[0],
+            found.tracks[1],
+            found.fragments,
+            found.swaps,
+        ];
+        Row::new([Cell::from(*name)].into_iter().chain(counts.map(Cell::from)))
+    };
+    let caption = "What the front ends find of labelled objects. A track is an object's where more \
+        than half of its returns lie in the object's box; fragments are the tracks of an object \
+        beyond its first, and a swap is a track that goes over from an object to another.";
+    let columns = [
+        "Front end",
+        "Labelled objects",
+        "Found",
+        "Tracks",
+        "Of labelled objects",
+        "Fragments",
+        "Swaps",
+    ];
+    table("front-ends".into(), caption.into(), &columns, found.iter().map(row).collect())
 }

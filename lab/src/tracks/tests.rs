@@ -1,4 +1,4 @@
-use super::evaluate::{OURS, Outcome, evaluate, methods};
+use super::evaluate::{OURS, Outcome, evaluate, histories, methods};
 use super::kept;
 use super::object::{centroid, moment_at};
 use super::simulated::{Sets, Wanted, simulate};
@@ -59,7 +59,8 @@ const PINNED: &str = "";
 
 #[test]
 fn pinned_errors() {
-    let outcomes = evaluate(&[small().stationary.clone(), small().moving.clone()].concat(), 2);
+    let objects = [small().stationary.clone(), small().moving.clone()].concat();
+    let outcomes = evaluate(&objects, &histories(&objects), 2);
     let row = |o: &Outcome| {
         let of = |n: usize| {
             let (score, r) = (&o.scores[n], o.scores[n].errors.rmse());
@@ -75,8 +76,10 @@ fn pinned_errors() {
 
 #[test]
 fn tables_have_a_row_for_every_tracker() {
-    let outcomes = evaluate(&small().stationary[..2], 1);
-    let set = tables::Set { id: "stationary", name: "simulated, stationary", outcomes };
+    let objects = &small().stationary[..2];
+    let outcomes = evaluate(objects, &histories(objects), 1);
+    let set =
+        tables::Set { id: "stationary".into(), name: "simulated, stationary".into(), outcomes };
     let text = tables::errors(&set).text();
     for (name, _) in methods() {
         assert!(text.contains(name), "{text}");
