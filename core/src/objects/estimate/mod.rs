@@ -49,11 +49,18 @@ const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
 
-/// Growth from the middle of a track: how far it reaches at first and with every step, s, and the
-/// deviation of returns meanwhile, m.
+/// Growth from the middle of a track: how far it reaches at first and with every step, s; deviation
+/// of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
+/// dense one holds it.
 const GROWTH_FIRST_S: f64 = 0.4;
 const GROWTH_S: f64 = 0.2;
 const GROWTH_M: f64 = 0.15;
+const GROWTH_POINTS: usize = 75;
+/// Models that are made of what is seen by then, and iterations with each.
+const GROWTH_FIRST_ROUNDS: usize = 6;
+const GROWTH_FIRST_ITERATIONS: usize = 6;
+const GROWTH_ROUNDS: usize = 2;
+const GROWTH_ITERATIONS: usize = 2;
 
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +125,7 @@ impl EstimateParams {
 impl Default for EstimateParams {
     fn default() -> EstimateParams {
         EstimateParams {
-            deviation_m: 0.1,
+            deviation_m: 0.05,
             stages: 2,
             first_deviation_m: 0.2,
             robust: 0.0,
@@ -383,10 +390,14 @@ impl Estimator {
             self.active = all.partition_point(|kept| f64::from(kept.time_s) < from)
                 ..all.partition_point(|kept| f64::from(kept.time_s) <= to);
             if begun {
-                self.descend(params, GROWTH_M, 2, None);
+                self.descend(params, GROWTH_M, GROWTH_ITERATIONS, None);
             }
-            self.extract(params.model / 2, GROWTH_M);
-            self.descend(params, GROWTH_M, if begun { 1 } else { 6 }, None);
+            let rounds = if begun { GROWTH_ROUNDS } else { GROWTH_FIRST_ROUNDS };
+            for _ in 0..rounds {
+                self.extract(GROWTH_POINTS, GROWTH_M);
+                let iterations = if begun { GROWTH_ITERATIONS } else { GROWTH_FIRST_ITERATIONS };
+                self.descend(params, GROWTH_M, iterations, None);
+            }
             if from <= first && to >= last {
                 break;
             }

@@ -6,6 +6,9 @@ use crate::objects::spline::{Basis, Knots};
 
 /// Steps in which times are told apart where there are more returns than take part.
 const TICKS: usize = 4096;
+/// Parts of a track that may give equally many.
+const PARTS: usize = 128;
+const TICKS_PER_PART: usize = TICKS / PARTS;
 
 /// A return that takes part.
 #[derive(Clone, Copy)]
@@ -35,6 +38,17 @@ pub(super) struct Taken {
     pub not_finite: usize,
 }
 
+/// How many a part may give at most, so that all together give no more than `at_most` (or one each).
+fn share(counts: &[u32; PARTS], at_most: usize) -> u32 {
+    let (mut low, mut high) = (1, at_most as u32 + 1);
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        let together: u64 = counts.iter().map(|&count| u64::from(count.min(middle))).sum();
+        if together <= at_most as u64 { low = middle } else { high = middle }
+    }
+    low
+}
+
 fn finite(seen: &ObjectReturn) -> bool {
     seen.time_s.is_finite() && seen.position.iter().chain(&seen.origin).all(|v| v.is_finite())
 }
@@ -44,7 +58,8 @@ impl Returns {
         Returns { kept: [Kept::NONE; RETURNS_MAX], count: 0, ticks: [0; TICKS] }
     }
 
-    /// Takes `at_most` of the returns, every so manyth in the order of time (of one tick, in the order
+    /// Takes `at_most` of the returns, as evenly in time as they allow: parts of the track that have
+    /// more give equally many, every so manyth in the order of time (within a tick, in the order
     /// given). None where no return is finite.
     pub fn take(&mut self, returns: &[ObjectReturn], at_most: usize) -> Option<Taken> {
         self.count = 0;
@@ -58,29 +73,43 @@ impl Returns {
         if sound == 0 {
             return None;
         }
-        let per_s = (TICKS - 1) as f32 / (last_s - first_s).max(1e-3);
-        let tick = |seen: &ObjectReturn| ((seen.time_s - first_s) * per_s) as usize;
+        let per_s = TICKS as f32 / (last_s - first_s).max(1e-3);
+        let tick =
+            |seen: &ObjectReturn| (((seen.time_s - first_s) * per_s) as usize).min(TICKS - 1);
         self.ticks.fill(0);
         for seen in returns.iter().filter(|seen| finite(seen)) {
-            self.ticks[tick(seen).min(TICKS - 1)] += 1;
+            self.ticks[tick(seen)] += 1;
         }
-        let mut before = 0;
-        for count in &mut self.ticks {
-            before += core::mem::replace(count, before);
-        }
-        let at_most = at_most.clamp(1, RETURNS_MAX) as u64;
-        let keep = at_most.min(sound as u64);
-        for seen in returns.iter().filter(|seen| finite(seen)) {
-            let rank = &mut self.ticks[tick(seen).min(TICKS - 1)];
-            let taken_before = u64::from(*rank) * keep / sound as u64;
-            let taken = (u64::from(*rank) + 1) * keep / sound as u64;
-            *rank += 1;
-            if taken > taken_before {
-                self.kept[taken_before as usize] =
-                    Kept { position: seen.position, time_s: seen.time_s, ..Kept::NONE };
+        let mut counts = [0u32; PARTS];
+        for (ticks, count) in self.ticks.chunks_exact_mut(TICKS_PER_PART).zip(&mut counts) {
+            for tick in ticks {
+                *count += core::mem::replace(tick, *count);
             }
         }
-        self.count = keep as usize;
+        let most = share(&counts, at_most.clamp(1, RETURNS_MAX));
+        let mut places = [0u32; PARTS];
+        let mut keep = 0;
+        for (place, count) in places.iter_mut().zip(counts) {
+            *place = keep;
+            keep += count.min(most);
+        }
+        for seen in returns.iter().filter(|seen| finite(seen)) {
+            let tick = tick(seen);
+            let part = tick / TICKS_PER_PART;
+            let (count, kept) = (u64::from(counts[part]), u64::from(counts[part].min(most)));
+            let rank = u64::from(self.ticks[tick]);
+            self.ticks[tick] += 1;
+            let nth = rank * kept / count;
+            if (rank + 1) * kept / count > nth {
+                let place = (places[part] + nth as u32) as usize;
+                if place < RETURNS_MAX {
+                    self.kept[place] =
+                        Kept { position: seen.position, time_s: seen.time_s, ..Kept::NONE };
+                }
+            }
+        }
+        let keep = (keep as usize).min(at_most.clamp(1, RETURNS_MAX));
+        self.count = keep;
         let kept = &mut self.kept[..self.count];
         // Equal times come in an order of their own: nothing may hang on that of the sort.
         kept.sort_unstable_by(|a, b| {

@@ -16,12 +16,19 @@ fn root_mean(all: &[Errors]) -> Errors {
 #[ignore = "an experiment: prints the errors of variants"]
 fn experiment() {
     let d = EstimateParams::default();
-    let variants = [("default", d), ("robust 5", EstimateParams { robust: 5.0, ..d })];
+    let variants = [
+        ("dissertation", EstimateParams::dissertation()),
+        ("default", d),
+        ("default it 5", EstimateParams { iterations: 5, ..d }),
+        ("stages 1 it 6", EstimateParams { iterations: 6, stages: 1, ..d }),
+        ("robust 5", EstimateParams { robust: 5.0, ..d }),
+        ("undamped", EstimateParams { damping: false, ..d }),
+    ];
     let mut estimator = Box::new(Estimator::new());
     for (set, plan) in
         [("parked", synthetic::parked as fn(u64) -> synthetic::Plan), ("moving", synthetic::moving)]
     {
-        let drives: Vec<_> = (0..12).map(|seed| drive(plan(seed))).collect();
+        let drives: Vec<synthetic::Drive> = (0..16).map(|seed| drive(plan(seed))).collect();
         let counts: Vec<usize> = drives.iter().map(|d| d.returns.len()).collect();
         println!("{set} {counts:?}");
         let base: Vec<Errors> = drives.iter().map(history_errors).collect();
@@ -115,4 +122,21 @@ fn time_of_an_iteration() {
         iterations += estimator.solve(&d, &drive.returns, &drive.history).iterations;
     }
     println!("{:.3} ms per iteration", start.elapsed().as_secs_f64() * 1e3 / iterations as f64);
+}
+
+#[test]
+#[ignore = "x"]
+fn traced() {
+    let mut estimator = Box::new(Estimator::new());
+    for seed in [9, 19] {
+        println!("SEED {seed}");
+        let drive = drive(synthetic::moving(seed));
+        for t in &drive.truth {
+            println!(
+                "T {:.3} {:.4} {:.4} {:.4} {:.4}",
+                t.time_s, t.position[0], t.position[1], t.heading, t.speed
+            );
+        }
+        _ = estimator.solve(&EstimateParams::default(), &drive.returns, &drive.history);
+    }
 }
