@@ -27,6 +27,9 @@ mod synthetic;
 mod system;
 #[cfg(test)]
 mod tests;
+mod window;
+
+pub use window::FixedLag;
 
 use core::ops::Range;
 
@@ -226,12 +229,22 @@ impl Solution {
     }
 }
 
+/// A state known with a precision.
+#[derive(Clone, Copy)]
+struct Known {
+    time_s: f64,
+    state: Weights,
+    precision: Weights,
+}
+
 /// The workspace of an estimate, and its result.
 pub struct Estimator {
     knots: Knots,
     returns: Returns,
     /// Those that the equations are made of.
     active: Range<usize>,
+    /// What is known of the state at a time, beside the returns.
+    known: Option<Known>,
     now: Solution,
     before: Solution,
     best: Solution,
@@ -257,6 +270,7 @@ impl Estimator {
             knots: Knots::NONE,
             returns: Returns::new(),
             active: 0..0,
+            known: None,
             now: Solution::NONE,
             before: Solution::NONE,
             best: Solution::NONE,
@@ -279,6 +293,7 @@ impl Estimator {
     ) -> Report {
         let mut report = Report::default();
         self.knots = Knots::NONE;
+        self.known = None;
         self.best.weights.fill([0.0; 7]);
         self.best.points = 0;
         let Some(taken) = self.returns.take(returns, params.returns) else {
@@ -317,14 +332,7 @@ impl Estimator {
     /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end.
     pub fn state(&self, time_s: f64) -> ObjectState {
         let inside = time_s.clamp(self.knots.start(), self.knots.end());
-        let [mut x, mut y, z, heading, speed, climb, turn_rate] =
-            self.knots.value(&self.best.weights, inside);
-        let beyond = time_s - inside;
-        let (sin, cos) = libm::sincos(heading);
-        x += beyond * speed * cos;
-        y += beyond * speed * sin;
-        let position = [x, y, z + beyond * climb];
-        ObjectState { time_s, position, heading, speed, climb, turn_rate }
+        state(&self.knots, &self.best.weights, inside, time_s)
     }
 
     /// Model points, m, in the object's frame.
@@ -337,14 +345,7 @@ impl Estimator {
         let n = self.knots.bases();
         let weights = &mut self.now.weights[..n];
         if !start::fit(&self.knots, history, &mut self.equations, weights, &mut self.step) {
-            let mut mean = [0.0; 7];
-            for kept in self.returns.all() {
-                for (sum, value) in mean.iter_mut().zip(kept.position) {
-                    *sum += f64::from(value);
-                }
-            }
-            let count = self.returns.all().len() as f64;
-            weights.fill(mean.map(|sum| sum / count));
+            self.stand_at_mean();
             return false;
         }
         if params.starts {
@@ -361,6 +362,18 @@ impl Estimator {
         true
     }
 
+    /// At rest where the returns are on average.
+    fn stand_at_mean(&mut self) {
+        let mut mean = [0.0; 7];
+        for kept in self.returns.all() {
+            for (sum, value) in mean.iter_mut().zip(kept.position) {
+                *sum += f64::from(value);
+            }
+        }
+        let count = self.returns.all().len() as f64;
+        self.now.weights[..self.knots.bases()].fill(mean.map(|sum| sum / count));
+    }
+
     /// All stages of a solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
@@ -370,7 +383,7 @@ impl Estimator {
         for stage in (0..=params.stages).rev() {
             let share = stage as f64 / params.stages.max(1) as f64;
             let deviation = params.deviation_m * libm::pow(ratio, share);
-            self.extract(params.model, deviation);
+            self.extract(params, params.model, deviation);
             report.stop = self.descend(params, deviation, params.iterations, Some(report));
         }
     }
@@ -394,7 +407,7 @@ impl Estimator {
             }
             let rounds = if begun { GROWTH_ROUNDS } else { GROWTH_FIRST_ROUNDS };
             for _ in 0..rounds {
-                self.extract(GROWTH_POINTS, GROWTH_M);
+                self.extract(params, GROWTH_POINTS, GROWTH_M);
                 let iterations = if begun { GROWTH_ITERATIONS } else { GROWTH_FIRST_ITERATIONS };
                 self.descend(params, GROWTH_M, iterations, None);
             }
@@ -407,7 +420,7 @@ impl Estimator {
     }
 
     /// Model points from the returns: so many of them, evenly in the order of time.
-    fn extract(&mut self, points: usize, deviation: f64) {
+    fn extract(&mut self, params: &EstimateParams, points: usize, deviation: f64) {
         let kept = &self.returns.all()[self.active.clone()];
         let points = points.clamp(1, MODEL_MAX).min(kept.len());
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
@@ -417,7 +430,12 @@ impl Estimator {
             let nth = (2 * i + 1) * kept.len() / (2 * points);
             *model = self.seen[nth].place().map(|value| value as f32);
         }
-        self.now.surfaces[..points].fill(Surface::round(1.0 / (deviation * deviation)));
+        let surface = Surface {
+            precision: [1.0 / (deviation * deviation); 3],
+            held: 1.0 / (params.extent_m * params.extent_m),
+            ..Surface::NONE
+        };
+        self.now.surfaces[..points].fill(surface);
         self.now.points = points;
     }
 
@@ -431,13 +449,8 @@ impl Estimator {
     ) -> Stop {
         let mut unreported = Report::default();
         let report = report.unwrap_or(&mut unreported);
-        let precision = precision(params);
-        let prior = 1.0 / (params.extent_m * params.extent_m);
-        let n = self.knots.bases();
         let mut cost = self.associate(params, deviation);
-        self.equations.clear(n);
-        cost.process =
-            process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+        cost.process = self.begin(params);
         if report.costs.is_empty() {
             _ = report.costs.push(cost);
         }
@@ -447,11 +460,9 @@ impl Estimator {
                 return Stop::Iterations;
             }
             self.before.copy(&self.now);
-            let Some(()) = self.step(damping, prior) else { return Stop::NotFinite };
+            let Some(()) = self.step(damping) else { return Stop::NotFinite };
             let mut next = self.associate(params, deviation);
-            self.equations.clear(n);
-            next.process =
-                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+            next.process = self.begin(params);
             report.iterations += 1;
             let gain = cost.total() - next.total();
             let worse = params.damping && gain < 0.0;
@@ -462,8 +473,7 @@ impl Estimator {
                 }
                 _ = report.costs.push(cost);
                 self.associate(params, deviation);
-                self.equations.clear(n);
-                process::add(&self.knots, &self.now.weights[..n], &precision, &mut self.equations);
+                self.begin(params);
                 damping *= 10.0;
                 continue;
             }
@@ -476,6 +486,24 @@ impl Estimator {
             }
         }
         Stop::Iterations
+    }
+
+    /// Begins the equations with what is known without returns; its cost.
+    fn begin(&mut self, params: &EstimateParams) -> f64 {
+        let n = self.knots.bases();
+        let weights = &self.now.weights[..n];
+        self.equations.clear(n);
+        let mut cost = process::add(&self.knots, weights, &precision(params), &mut self.equations);
+        if let Some(known) = &self.known {
+            let now = self.knots.value(weights, known.time_s);
+            let miss: Weights = core::array::from_fn(|d| known.state[d] - now[d]);
+            for (miss, precision) in miss.iter().zip(known.precision) {
+                cost += 0.5 * precision * miss * miss;
+            }
+            let basis = self.knots.basis(known.time_s);
+            start::observe(&mut self.equations, &basis, &miss, &known.precision);
+        }
+        cost
     }
 
     /// Finds every return's model point at the trajectory in `now`; the cost, but for the process.
@@ -517,20 +545,12 @@ impl Estimator {
         for number in 0..self.now.points {
             let order =
                 &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
-            let model = self.now.model[number].map(f64::from);
-            let (mut xx, mut xy, mut yy, mut zz) = (0.0, 0.0, 0.0, 0.0);
+            let mut scatter = self.now.surfaces[number].scatter;
             for &i in order {
-                let [x, y, z] = self.seen[usize::from(i)].place();
-                let [x, y, z] = [x - model[0], y - model[1], z - model[2]];
-                xx += x * x;
-                xy += x * y;
-                yy += y * y;
-                zz += z * z;
+                scatter.add(self.seen[usize::from(i)].place(), self.now.model[number]);
             }
-            // As if one more return lay about it alike in every direction.
-            let count = order.len() as f64 + 1.0;
-            let [xx, xy, yy, zz] =
-                [(xx + 0.01) / count, xy / count, (yy + 0.01) / count, (zz + 0.01) / count];
+            let count = f64::from(scatter.count);
+            let [xx, xy, yy, zz] = scatter.sums.map(|sum| f64::from(sum) / count);
             let half = 0.5 * (xx - yy);
             let spread = libm::sqrt(half * half + xy * xy);
             let middle = 0.5 * (xx + yy);
@@ -544,17 +564,18 @@ impl Estimator {
             let variances =
                 [small + loose * flat, middle + spread + loose, zz + loose * (1.0 - flat)];
             let precision = variances.map(|variance| 1.0 / (least + variance));
-            self.now.surfaces[number] = Surface { normal, precision };
+            let surface = &mut self.now.surfaces[number];
+            (surface.normal, surface.precision) = (normal, precision);
         }
     }
 
     /// Lays the returns over their model points; the cost, but for the process.
     fn cost(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
-        let prior = 1.0 / (params.extent_m * params.extent_m);
         let robust = params.robust * params.robust;
         let mut cost = Cost { deviation_m: deviation, ..Cost::default() };
-        for model in &self.now.model[..self.now.points] {
-            cost.model += 0.5 * prior * f64::from(square_distance(model, &[0.0; 3]));
+        let points = self.now.model[..self.now.points].iter().zip(&self.now.surfaces);
+        for (model, surface) in points {
+            cost.model += 0.5 * surface.held * f64::from(square_distance(model, &surface.mean));
         }
         let count = self.active.len();
         for seen in &mut self.seen[..count] {
@@ -569,7 +590,7 @@ impl Estimator {
     }
 
     /// One step of trajectory and model; `equations` hold the process term.
-    fn step(&mut self, damping: f64, prior: f64) -> Option<()> {
+    fn step(&mut self, damping: f64) -> Option<()> {
         let kept = &self.returns.all()[self.active.clone()];
         let n = self.knots.bases();
         let now = &mut self.now;
@@ -579,7 +600,7 @@ impl Estimator {
         for number in 0..now.points {
             let order = &self.order[orders(number)];
             let (model, surface) = (&now.model[number], &now.surfaces[number]);
-            self.equations.eliminate(order, kept, &self.seen, model, surface, prior);
+            self.equations.eliminate(order, kept, &self.seen, model, surface);
         }
         self.equations.planar.damp(damping);
         self.equations.vertical.damp(damping);
@@ -588,7 +609,7 @@ impl Estimator {
         for number in 0..now.points {
             let order = &self.order[orders(number)];
             let (model, surface) = (&mut now.model[number], &now.surfaces[number]);
-            let by = normal::follow(order, kept, &self.seen, model, surface, prior, step);
+            let by = normal::follow(order, kept, &self.seen, model, surface, step);
             for (value, by) in model.iter_mut().zip(by) {
                 *value = (f64::from(*value) + by) as f32;
             }
@@ -608,6 +629,15 @@ impl Estimator {
         };
         self.returns.all().iter().filter(far).count()
     }
+}
+
+/// State at `time_s`, as it goes on from `inside`.
+fn state(knots: &Knots, weights: &[Weights], inside: f64, time_s: f64) -> ObjectState {
+    let [x, y, z, heading, speed, climb, turn_rate] = knots.value(weights, inside);
+    let beyond = time_s - inside;
+    let (sin, cos) = libm::sincos(heading);
+    let position = [x + beyond * speed * cos, y + beyond * speed * sin, z + beyond * climb];
+    ObjectState { time_s, position, heading, speed, climb, turn_rate }
 }
 
 /// `Q_u^-1`.

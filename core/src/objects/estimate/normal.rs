@@ -49,14 +49,40 @@ pub(super) struct Surface {
     pub normal: [f64; 2],
     /// Precision of a return across, along and up, 1/m².
     pub precision: [f64; 3],
+    /// Where the model point is before any return, m, and how precisely, 1/m².
+    pub mean: [f32; 3],
+    pub held: f64,
+    /// Returns before these, and how they lay about it.
+    pub scatter: Scatter,
 }
 
 impl Surface {
-    pub const NONE: Surface = Surface { normal: [1.0, 0.0], precision: [0.0; 3] };
+    pub const NONE: Surface = Surface {
+        normal: [1.0, 0.0],
+        precision: [0.0; 3],
+        mean: [0.0; 3],
+        held: 0.0,
+        scatter: Scatter::ONE,
+    };
+}
 
-    /// Alike in every direction.
-    pub fn round(precision: f64) -> Surface {
-        Surface { precision: [precision; 3], ..Surface::NONE }
+/// Returns about a model point: how many, and the sums of x x, x y, y y and z z, m².
+#[derive(Clone, Copy)]
+pub(super) struct Scatter {
+    pub count: f32,
+    pub sums: [f32; 4],
+}
+
+impl Scatter {
+    /// As if one return lay 0.1 m off in every direction.
+    pub const ONE: Scatter = Scatter { count: 1.0, sums: [0.01, 0.0, 0.01, 0.01] };
+
+    pub fn add(&mut self, place: [f64; 3], model: [f32; 3]) {
+        let [x, y, z]: [f32; 3] = core::array::from_fn(|d| place[d] as f32 - model[d]);
+        self.count += 1.0;
+        for (sum, value) in self.sums.iter_mut().zip([x * x, x * y, y * y, z * z]) {
+            *sum += value;
+        }
     }
 }
 
@@ -250,12 +276,11 @@ impl Equations {
         seen: &[Seen],
         model: &[f32; 3],
         surface: &Surface,
-        prior: f64,
     ) {
         let Some((low, high)) = reach(order, kept) else { return };
         let mut rows = [[0.0; 3 * BASES_MAX]; 2];
         let mut row_up = [0.0; BASES_MAX];
-        let own = own(order, seen, model, surface, prior);
+        let own = own(order, seen, model, surface);
         for &i in order {
             let (kept, seen) = (&kept[usize::from(i)], &seen[usize::from(i)]);
             let from = kept.basis.first - low;
@@ -313,10 +338,9 @@ pub(super) fn follow(
     seen: &[Seen],
     model: &[f32; 3],
     surface: &Surface,
-    prior: f64,
     step: &[Weights],
 ) -> [f64; 3] {
-    let mut own = own(order, seen, model, surface, prior);
+    let mut own = own(order, seen, model, surface);
     for &i in order {
         let (kept, seen) = (&kept[usize::from(i)], &seen[usize::from(i)]);
         let mut moved = [0.0; 4];
@@ -343,11 +367,12 @@ struct Own {
     pull: [f64; 3],
 }
 
-fn own(order: &[u16], seen: &[Seen], model: &[f32; 3], surface: &Surface, prior: f64) -> Own {
-    let [x, y, z] = model.map(f64::from);
+fn own(order: &[u16], seen: &[Seen], model: &[f32; 3], surface: &Surface) -> Own {
+    let back: [f64; 3] =
+        core::array::from_fn(|d| surface.held * (f64::from(surface.mean[d]) - f64::from(model[d])));
     let [nx, ny] = surface.normal;
-    let at = [nx * x + ny * y, nx * y - ny * x, z];
-    let mut own = Own { precision: [prior; 3], pull: at.map(|at| -prior * at) };
+    let pull = [nx * back[0] + ny * back[1], nx * back[1] - ny * back[0], back[2]];
+    let mut own = Own { precision: [surface.held; 3], pull };
     for &i in order {
         let seen = &seen[usize::from(i)];
         for a in 0..3 {

@@ -49,7 +49,7 @@ fn share(counts: &[u32; PARTS], at_most: usize) -> u32 {
     low
 }
 
-fn finite(seen: &ObjectReturn) -> bool {
+pub(super) fn finite(seen: &ObjectReturn) -> bool {
     seen.time_s.is_finite() && seen.position.iter().chain(&seen.origin).all(|v| v.is_finite())
 }
 
@@ -122,6 +122,15 @@ impl Returns {
             })
         });
         Some(Taken { first_s, last_s, not_finite: returns.len() - sound })
+    }
+
+    /// Takes just these, which are in the order of time; the first [`RETURNS_MAX`] of them.
+    pub fn set(&mut self, returns: impl Iterator<Item = ([f32; 3], f32)>) {
+        self.count = 0;
+        for (kept, (position, time_s)) in self.kept.iter_mut().zip(returns) {
+            *kept = Kept { position, time_s, ..Kept::NONE };
+            self.count += 1;
+        }
     }
 
     /// Computes every return's basis functions.

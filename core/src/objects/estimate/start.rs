@@ -24,7 +24,7 @@ pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectS
     })
 }
 
-fn finite(state: &ObjectState) -> bool {
+pub(super) fn finite(state: &ObjectState) -> bool {
     let rest = [state.time_s, state.heading, state.speed, state.climb, state.turn_rate];
     state.position.iter().chain(&rest).all(|value| value.is_finite())
 }
@@ -127,6 +127,8 @@ pub(super) fn fit(
 /// Deviations with which [`smooth`] believes a history: m, m/s.
 const POSITION_M: f64 = 0.3;
 const HEADING: f64 = 0.1;
+/// Turning is about so slow, rad/s.
+const TURNING: f64 = 0.3;
 /// Speed from which on it believes a heading, m/s.
 const HEADS_MPS: f64 = 2.0;
 const SMOOTHINGS: usize = 6;
@@ -151,13 +153,15 @@ pub(super) fn smooth(
                 *own -= now;
             }
             let moves = state.speed * state.speed;
-            let heads = moves / (moves + HEADS_MPS * HEADS_MPS) / (HEADING * HEADING);
+            let believed = moves / (moves + HEADS_MPS * HEADS_MPS);
+            let heads = believed * believed / (HEADING * HEADING);
+            miss[6] = -now[6];
             let place = 1.0 / (POSITION_M * POSITION_M);
             observe(
                 equations,
                 &knots.basis(state.time_s),
                 &miss,
-                &[place, place, place, heads, 0.0, 0.0, 0.0],
+                &[place, place, place, heads, 0.0, 0.0, 1.0 / (TURNING * TURNING)],
             );
         }
         hold(equations, weights);

@@ -41,6 +41,13 @@ pub struct Drive {
     pub truth: Vec<ObjectState>,
     /// Returns up to the end of each sweep.
     pub until: Vec<usize>,
+    pub plan: Plan,
+}
+
+impl Drive {
+    pub fn truth_at(&self, time: f64) -> ObjectState {
+        path(&self.plan)(time)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -117,8 +124,13 @@ pub fn drive(plan: Plan) -> Drive {
     let boxes = boxes(plan.length, plan.width, plan.height);
     let mounts = [[0.8, 0.7, 1.7], [0.8, -0.7, 1.7], [-0.6, 0.7, 1.7], [-0.6, -0.7, 1.7]];
     let sweeps = (plan.seconds / SWEEP_S) as usize;
-    let mut out =
-        Drive { returns: Vec::new(), history: Vec::new(), truth: Vec::new(), until: Vec::new() };
+    let mut out = Drive {
+        returns: Vec::new(),
+        history: Vec::new(),
+        truth: Vec::new(),
+        until: Vec::new(),
+        plan,
+    };
     let mut tracker = None;
     let anchor = plan.position;
     for sweep in 0..sweeps {
@@ -212,25 +224,29 @@ fn path(plan: &Plan) -> impl Fn(f64) -> ObjectState + use<> {
 }
 
 /// A filter of the centroid, each axis by itself: place and velocity.
-type Tracker = ([f64; 3], [f64; 3], f64, f64);
+type Tracker = ([f64; 3], [f64; 3], f64, f64, f64);
 
 fn follow(tracker: &mut Option<Tracker>, mean: [f64; 3], time: f64) {
-    let Some((place, velocity, last, turned)) = tracker else {
-        *tracker = Some((mean, [0.0; 3], time, 0.0));
+    let Some((place, velocity, last, turned, count)) = tracker else {
+        *tracker = Some((mean, [0.0; 3], time, 0.0, 1.0));
         return;
     };
+    *count += 1.0;
+    // Gains of a memory that grows, down to steady ones.
+    let both = *count * (*count + 1.0);
+    let (alpha, beta) = ((2.0 * (2.0 * *count - 1.0) / both).max(0.5), (6.0 / both).max(0.15));
     let dt = time - *last;
     for axis in 0..3 {
         let predicted = place[axis] + dt * velocity[axis];
         let off = mean[axis] - predicted;
-        place[axis] = predicted + 0.5 * off;
-        velocity[axis] += 0.15 * off / dt;
+        place[axis] = predicted + alpha * off;
+        velocity[axis] += beta * off / dt;
     }
     *turned = velocity[1].atan2(velocity[0]);
     *last = time;
 }
 
-fn history_of((place, velocity, time, heading): &Tracker) -> ObjectState {
+fn history_of((place, velocity, time, heading, _): &Tracker) -> ObjectState {
     ObjectState {
         time_s: *time,
         position: *place,

@@ -140,3 +140,61 @@ fn traced() {
         _ = estimator.solve(&EstimateParams::default(), &drive.returns, &drive.history);
     }
 }
+
+#[test]
+#[ignore = "an experiment"]
+fn lagged() {
+    let mut estimator = Box::new(Estimator::new());
+    println!("{} bytes an object, {} the workspace", size_of::<FixedLag>(), size_of::<Estimator>());
+    for (set, plan) in
+        [("parked", synthetic::parked as fn(u64) -> synthetic::Plan), ("moving", synthetic::moving)]
+    {
+        let (mut all, mut base) = (Vec::new(), Vec::new());
+        let (mut ms, mut sweeps, mut worst) = (0.0, 0, 0f64);
+        for seed in 0..16 {
+            let drive = drive(plan(seed));
+            let mut lag = Box::new(FixedLag::new());
+            let mut states = Vec::new();
+            let mut from = 0;
+            let mut history = drive.history.iter();
+            for &until in &drive.until {
+                if until == from {
+                    continue;
+                }
+                let state = history.next().unwrap();
+                let start = Instant::now();
+                let params = EstimateParams::default();
+                states.push(lag.push(&mut estimator, &params, &drive.returns[from..until], state));
+                let took = start.elapsed().as_secs_f64() * 1e3;
+                ms += took;
+                worst = worst.max(took);
+                sweeps += 1;
+                from = until;
+            }
+            let drive_truth: Vec<ObjectState> =
+                states.iter().skip(15).map(|s| drive.truth_at(s.time_s)).collect();
+            let at = |time: f64| {
+                *states
+                    .iter()
+                    .min_by(|a, b| (a.time_s - time).abs().total_cmp(&(b.time_s - time).abs()))
+                    .unwrap()
+            };
+            let e = errors(&drive_truth, at);
+            let late = synthetic::Drive {
+                truth: drive.truth[15..].into(),
+                history: drive.history,
+                ..drive
+            };
+            let b = history_errors(&late);
+            println!("  {e:.3?} {b:.3?} restarts {} model {}", lag.restarts(), lag.points());
+            all.push(e);
+            base.push(b);
+        }
+        println!(
+            "{set} {:.3?} against {:.3?}, {:.3} ms a sweep, {worst:.3} at most",
+            root_mean(&all),
+            root_mean(&base),
+            ms / f64::from(sweeps)
+        );
+    }
+}

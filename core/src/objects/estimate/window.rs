@@ -1,0 +1,381 @@
+//! Fixed lag: the same estimate over the last seconds, sweep by sweep.
+//!
+//! What leaves the window stays as a prior. The state at the window's first time is held where the
+//! estimate had it when the window last moved on, with [`HELD`]; a model point keeps the mean of the
+//! returns that left, as precise as they were many, up to [`HELD_RETURNS`]. An object needs its
+//! [`FixedLag`] (some 40 KB); the workspace is one for all.
+
+use super::normal::{Scatter, Seen, Surface};
+use super::process::Weights;
+use super::returns;
+use super::start;
+use super::{Cost, EstimateParams, Estimator, Known, Report, precision};
+use crate::objects::spline::{DEGREE, Knots};
+use crate::objects::{ObjectReturn, ObjectState};
+use heapless::Vec;
+
+/// The window, s.
+const WINDOW_S: f64 = 2.5;
+/// Pieces of the splines, and their length, s: a piece more than the window, into which time runs on.
+const PIECES: usize = 6;
+const PIECE_S: f64 = 0.5;
+const BASES: usize = PIECES + DEGREE;
+/// Returns of a sweep and of the window at most.
+const PER_SWEEP: usize = 32;
+const RETURNS: usize = 832;
+/// Model points at most.
+const MODEL: usize = 128;
+/// States of the history at most: those of the window, at 10 Hz.
+const HISTORY: usize = 32;
+/// Model points are at least so far apart at first, m; further by that factor when they are too many.
+const SPACING_M: f32 = 0.3;
+const WIDER: f32 = 1.25;
+/// A track younger than that is estimated afresh with every sweep, s.
+const YOUNG_S: f64 = 0.8;
+const YOUNG_ROUNDS: usize = 4;
+const YOUNG_ITERATIONS: usize = 4;
+const YOUNG_MODEL: usize = 75;
+const YOUNG_M: f64 = 0.15;
+/// Iterations with a sweep.
+const ITERATIONS: usize = 2;
+/// Deviation of a state that is held: m, rad, m/s, rad/s.
+const HELD: Weights = [0.1, 0.1, 0.1, 0.02, 0.5, 0.2, 0.05];
+/// A model point is held by so many returns at most.
+const HELD_RETURNS: f32 = 20.0;
+
+#[derive(Clone, Copy)]
+struct Held {
+    position: [f32; 3],
+    time_s: f32,
+    nearest: u16,
+}
+
+#[derive(Clone, Copy)]
+struct Point {
+    at: [f32; 3],
+    mean: [f32; 3],
+    /// Returns that hold it.
+    held: f32,
+    scatter: Scatter,
+}
+
+/// What is kept of an object between sweeps.
+pub struct FixedLag {
+    knots: Knots,
+    weights: [Weights; BASES],
+    known: Option<Known>,
+    returns: Vec<Held, RETURNS>,
+    history: Vec<ObjectState, HISTORY>,
+    model: Vec<Point, MODEL>,
+    spacing_m: f32,
+    /// First and last time of the track's returns, s.
+    born_s: f64,
+    newest_s: f64,
+    begun: bool,
+    restarts: u32,
+}
+
+impl Default for FixedLag {
+    fn default() -> FixedLag {
+        FixedLag::new()
+    }
+}
+
+impl FixedLag {
+    /// That of an object not seen yet.
+    pub const fn new() -> FixedLag {
+        FixedLag {
+            knots: Knots::NONE,
+            weights: [[0.0; 7]; BASES],
+            known: None,
+            returns: Vec::new(),
+            history: Vec::new(),
+            model: Vec::new(),
+            spacing_m: SPACING_M,
+            born_s: 0.0,
+            newest_s: 0.0,
+            begun: false,
+            restarts: 0,
+        }
+    }
+
+    /// Forgets the object, for another one.
+    pub fn clear(&mut self) {
+        self.known = None;
+        self.returns.clear();
+        self.history.clear();
+        self.model.clear();
+        self.spacing_m = SPACING_M;
+        self.begun = false;
+        self.restarts = 0;
+    }
+
+    /// Takes in what a sweep saw of the object and what the tracker that found it says, and returns
+    /// the object's state at the time of the newest return. Without a finite return that is the
+    /// state as it goes on until the tracker's time.
+    ///
+    /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
+    /// leaves the tracker's by more than `extent_m`, the estimate starts again.
+    pub fn push(
+        &mut self,
+        estimator: &mut Estimator,
+        params: &EstimateParams,
+        returns: &[ObjectReturn],
+        baseline: &ObjectState,
+    ) -> ObjectState {
+        let sound = || returns.iter().filter(|seen| returns::finite(seen));
+        let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
+        if start::finite(baseline) {
+            if self.history.is_full() {
+                self.history.remove(0);
+            }
+            _ = self.history.push(*baseline);
+        }
+        let Some(newest) = newest else {
+            return if self.begun { self.state(baseline.time_s) } else { *baseline };
+        };
+        if self.begun && newest > self.newest_s + WINDOW_S {
+            self.restart();
+        }
+        self.newest_s = if self.begun { self.newest_s.max(newest) } else { newest };
+        let oldest = self.newest_s - WINDOW_S;
+        let count = sound().count();
+        let keep = count.min(PER_SWEEP);
+        self.forget(oldest);
+        let before = self.returns.len();
+        for (rank, seen) in sound().enumerate() {
+            let taken = (rank + 1) * keep / count > rank * keep / count;
+            if taken && f64::from(seen.time_s) >= oldest {
+                let held = Held { position: seen.position, time_s: seen.time_s, nearest: 0 };
+                _ = self.returns.push(held);
+            }
+        }
+        let fresh = self.returns.len() - before;
+        self.returns.sort_unstable_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        if !self.begun {
+            self.begin();
+        }
+        self.advance();
+        self.estimate(estimator, params, fresh);
+        let state = self.state(self.newest_s);
+        if self.strayed(&state, params.extent_m) {
+            self.restart();
+            return *self.history.last().unwrap_or(&state);
+        }
+        state
+    }
+
+    /// How often the estimate started again.
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
+    /// Model points.
+    pub fn points(&self) -> usize {
+        self.model.len()
+    }
+
+    fn restart(&mut self) {
+        let restarts = self.restarts + 1;
+        self.clear();
+        self.restarts = restarts;
+    }
+
+    fn begin(&mut self) {
+        self.begun = true;
+        self.born_s = self.returns.first().map_or(self.newest_s, |held| f64::from(held.time_s));
+        self.knots = Knots::pieces(self.born_s, PIECE_S, PIECES);
+    }
+
+    /// Whether the estimate has nothing to do with the tracker's any more.
+    fn strayed(&self, state: &ObjectState, extent_m: f64) -> bool {
+        let Some(baseline) = self.history.last() else { return !start::finite(state) };
+        let ahead = state.time_s - baseline.time_s;
+        let (sin, cos) = libm::sincos(baseline.heading);
+        let go = baseline.speed * ahead;
+        let off = [
+            state.position[0] - baseline.position[0] - go * cos,
+            state.position[1] - baseline.position[1] - go * sin,
+            state.position[2] - baseline.position[2],
+        ];
+        let square: f64 = off.iter().map(|v| v * v).sum();
+        !start::finite(state) || square > extent_m * extent_m
+    }
+
+    fn state(&self, time_s: f64) -> ObjectState {
+        super::state(&self.knots, &self.weights, time_s.min(self.newest_s), time_s)
+    }
+
+    /// Drops returns from before `oldest`; each leaves its weight with its model point.
+    fn forget(&mut self, oldest: f64) {
+        let left = self.returns.partition_point(|held| f64::from(held.time_s) < oldest);
+        for held in &self.returns[..left] {
+            let Some(point) = self.model.get_mut(usize::from(held.nearest)) else { continue };
+            let kept = super::returns::Kept {
+                position: held.position,
+                time_s: held.time_s,
+                basis: self.knots.basis(f64::from(held.time_s)),
+            };
+            let place = Seen::look(&self.weights, &kept).place();
+            point.held = (point.held + 1.0).min(HELD_RETURNS);
+            for (mean, place) in point.mean.iter_mut().zip(place) {
+                *mean += (place as f32 - *mean) / point.held;
+            }
+            if point.scatter.count > HELD_RETURNS {
+                let share = HELD_RETURNS / point.scatter.count;
+                point.scatter.count *= share;
+                point.scatter.sums = point.scatter.sums.map(|sum| sum * share);
+            }
+            point.scatter.add(place, point.at);
+        }
+        self.returns.copy_within(left.., 0);
+        self.returns.truncate(self.returns.len() - left);
+    }
+
+    /// Moves the splines on until they hold the newest time.
+    fn advance(&mut self) {
+        while self.newest_s > self.knots.end() {
+            let first = self.knots.start() + PIECE_S;
+            self.known = Some(Known {
+                time_s: first,
+                state: self.knots.value(&self.weights, first),
+                precision: HELD.map(|deviation| 1.0 / (deviation * deviation)),
+            });
+            self.knots = Knots::pieces(first, PIECE_S, PIECES);
+            self.weights.copy_within(1.., 0);
+            let [.., before, last, next] = &mut self.weights;
+            *next = core::array::from_fn(|d| 2.0 * last[d] - before[d]);
+        }
+    }
+
+    fn estimate(&mut self, estimator: &mut Estimator, params: &EstimateParams, fresh: usize) {
+        estimator.knots = self.knots;
+        estimator.known = self.known;
+        estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
+        estimator.returns.lay(&self.knots);
+        estimator.active = 0..self.returns.len();
+        if self.newest_s - self.born_s < YOUNG_S {
+            self.estimate_young(estimator, params);
+            for (kept, seen) in estimator.returns.all().iter().zip(&mut estimator.seen) {
+                *seen = Seen::look(&self.weights, kept);
+            }
+            self.model.clear();
+            self.add_points(estimator, self.returns.len());
+        } else {
+            estimator.now.weights[..BASES].copy_from_slice(&self.weights);
+            let unit = 1.0 / (params.deviation_m * params.deviation_m);
+            estimator.now.points = self.model.len();
+            for (i, point) in self.model.iter().enumerate() {
+                estimator.now.model[i] = point.at;
+                estimator.now.surfaces[i] = Surface {
+                    precision: [unit; 3],
+                    mean: point.mean,
+                    held: unit * f64::from(point.held.max(0.1)),
+                    scatter: point.scatter,
+                    ..Surface::NONE
+                };
+            }
+            estimator.descend(params, params.deviation_m, ITERATIONS, None);
+            for (point, at) in self.model.iter_mut().zip(&estimator.now.model) {
+                point.at = *at;
+            }
+            self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+            self.add_points(estimator, fresh);
+        }
+    }
+
+    /// The first window: from the history alone, and with models of what is seen by then.
+    fn estimate_young(&mut self, estimator: &mut Estimator, params: &EstimateParams) {
+        let weights = &mut estimator.now.weights[..BASES];
+        let begun = start::stand(&self.history, weights)
+            && start::smooth(
+                &self.knots,
+                &self.history,
+                &precision(params),
+                &mut estimator.equations,
+                weights,
+                &mut estimator.step,
+            );
+        if !begun {
+            estimator.stand_at_mean();
+        }
+        let moving = young(estimator, params);
+        self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+        if begun {
+            start::stand(&self.history, &mut estimator.now.weights[..BASES]);
+            if young(estimator, params) < moving {
+                self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+            }
+        }
+    }
+
+    /// Makes model points of the last `fresh` returns where there are none near, and notes which
+    /// model point each return is at.
+    fn add_points(&mut self, estimator: &Estimator, fresh: usize) {
+        let all = self.returns.len();
+        for i in 0..all {
+            let seen = &estimator.seen[i];
+            let place = seen.place().map(|value| value as f32);
+            self.returns[i].nearest = seen.nearest;
+            if i + fresh < all {
+                continue;
+            }
+            let square = self.spacing_m * self.spacing_m;
+            let near = |point: &Point| super::square_distance(&point.at, &place) < square;
+            if !self.model.iter().any(near) {
+                if self.model.is_full() {
+                    self.thin();
+                }
+                let point = Point { at: place, mean: place, held: 0.0, scatter: Scatter::ONE };
+                _ = self.model.push(point);
+            }
+        }
+        if fresh == all {
+            self.assign(estimator);
+        }
+    }
+
+    /// Nearest model points by brute force, where the model is new.
+    fn assign(&mut self, estimator: &Estimator) {
+        for (held, seen) in self.returns.iter_mut().zip(&estimator.seen) {
+            let place = seen.place().map(|value| value as f32);
+            let mut best = f32::MAX;
+            for (number, point) in self.model.iter().enumerate() {
+                let square = super::square_distance(&point.at, &place);
+                if square < best {
+                    (best, held.nearest) = (square, number as u16);
+                }
+            }
+        }
+    }
+
+    /// Spaces model points wider, until there is room.
+    fn thin(&mut self) {
+        while self.model.is_full() {
+            self.spacing_m *= WIDER;
+            let square = self.spacing_m * self.spacing_m;
+            let mut kept = 0;
+            for i in 0..self.model.len() {
+                let point = self.model[i];
+                let near = |other: &Point| super::square_distance(&other.at, &point.at) < square;
+                if !self.model[..kept].iter().any(near) {
+                    self.model[kept] = point;
+                    kept += 1;
+                }
+            }
+            self.model.truncate(kept);
+        }
+    }
+}
+
+/// Models of what is seen by then; the cost in the end.
+fn young(estimator: &mut Estimator, params: &EstimateParams) -> f64 {
+    let mut cost = f64::MAX;
+    for _ in 0..YOUNG_ROUNDS {
+        let mut report = Report::default();
+        estimator.extract(params, YOUNG_MODEL, YOUNG_M);
+        estimator.descend(params, YOUNG_M, YOUNG_ITERATIONS, Some(&mut report));
+        cost = report.costs.last().map_or(cost, Cost::total);
+    }
+    cost
+}
