@@ -76,6 +76,11 @@ impl Tracker {
         self.front_end.finish(&mut self.tracks)
     }
 
+    /// The tracks that ended in the last step, in the order of their room.
+    pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
+        self.tracks.iter().filter(|t| t.life == Life::Ended)
+    }
+
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
     /// estimate of its trajectory and shape.
     pub fn ended(

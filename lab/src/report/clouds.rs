@@ -87,3 +87,36 @@ fn dot(sheet: &mut Pixmap, area: Area, [x, y]: [f64; 2], [r, g, b]: [u8; 3]) {
         sheet.fill_rect(square, &paint, Transform::identity(), None);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_have_the_colour_of_their_time_and_stay_in_their_panels() {
+        let cloud = |points: &[[f32; 3]], times: &[f32]| Cloud {
+            title: String::new(),
+            points: points.to_vec(),
+            times: times.to_vec(),
+        };
+        let two =
+            [cloud(&[[0.5, 0.2, 0.1]], &[0.0]), cloud(&[[0.0; 3], [9.0, 0.0, 0.0]], &[1.0, 0.0])];
+        let sheet = Pixmap::decode_png(&clouds(&two, [4.0, 2.0, 1.5]).unwrap()).unwrap();
+        let half = sheet.width() as usize / 2;
+        let count = |right: bool, like: fn([u8; 3]) -> bool| {
+            let pixels = sheet.pixels().iter().enumerate();
+            let side = pixels.filter(|(n, _)| (n % (2 * half) >= half) == right);
+            side.filter(|(_, p)| like([p.red(), p.green(), p.blue()])).count()
+        };
+        // A square of four pixels from above, another from the right.
+        let blue = |[r, g, b]: [u8; 3]| b > 140 && r < 120 && g < 120;
+        let yellow = |[r, _, b]: [u8; 3]| r > 200 && b < 120;
+        assert_eq!((count(false, blue), count(true, yellow)), (8, 8));
+        assert_eq!(
+            (count(false, yellow), count(true, blue)),
+            (0, 0),
+            "what lies beyond is left out"
+        );
+        assert!(clouds(&[], [4.0, 2.0, 1.5]).is_ok());
+    }
+}

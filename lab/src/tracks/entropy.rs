@@ -107,7 +107,7 @@ mod tests {
         let mut wall = |n: usize| {
             let (along, up) = (rng.range(-2.0, 2.0), rng.range(0.0, 1.5));
             let off = noise * rng.bell();
-            if n % 3 == 0 { [off - 2.0, 0.4 * along, up] } else { [along, off - 0.8, up] }
+            if n.is_multiple_of(3) { [off - 2.0, 0.4 * along, up] } else { [along, off - 0.8, up] }
         };
         (0..count).map(|n| wall(n).map(|v| v as f32)).collect()
     }

@@ -59,6 +59,9 @@ fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 
     methods.map(|(name, method)| (name, track(object, &history, &method, estimator).0))
 }
 
+/// A number of a moment.
+type Quantity = fn(&Moment) -> f64;
+
 /// Figure 2.7: speed and heading of an object.
 pub fn profile(object: &Object, estimator: &mut Estimator) -> Chart {
     let kind = format!("{:?}", object.kind).to_lowercase();
@@ -67,7 +70,7 @@ pub fn profile(object: &Object, estimator: &mut Estimator) -> Chart {
     let really: Vec<Moment> =
         tracks[0].1.moments.iter().map(|m| moment_at(&object.truth, m.time_s)).collect();
     let speed = |m: &Moment| m.velocity.truncate().length();
-    let quantities: [(&str, fn(&Moment) -> f64); 2] =
+    let quantities: [(&str, Quantity); 2] =
         [("speed, m/s", speed), ("heading, rad", |m| m.heading)];
     for (label, value) in quantities {
         let mut lines = Lines::new(Axis::new("time, s"), Axis::new(label));

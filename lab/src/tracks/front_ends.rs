@@ -12,6 +12,7 @@ use raywake::drive::Drive;
 use raywake::error::Error;
 use raywake::source::{self, OpenOptions, SweepData};
 use raywake::track::Tracker;
+use raywake_core::objects::ObjectReturn;
 use raywake_core::objects::front_end::Track;
 use std::ops::Range;
 use std::path::Path;
@@ -72,7 +73,7 @@ impl Found {
         for track in tracks.iter().filter(|t| t.history().len() >= OBSERVATIONS) {
             self.tracks[0] += 1;
             let owners = owners(track, &objects);
-            self.swaps += swaps(track, &owners);
+            self.swaps += swaps(&owners);
             let Some(owner) = majority(owners.iter().map(|o| o.1)) else { continue };
             self.tracks[1] += 1;
             match &mut longest[owner] {
@@ -117,25 +118,20 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
         };
         let mut tracker = Tracker::new(source.rig(), drive);
         let mut tracks = Vec::new();
-        let mut keep = |tracker: &mut Tracker| {
-            tracker.ended(|ended| {
-                tracks.push(ended.track.clone());
-                Ok(())
-            })
-        };
+        let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
         let (mut now, mut before) = (SweepData::default(), SweepData::default());
         for index in 0..source.len() {
             source.read(index, &mut now)?;
             if tracker.sweep(&now, (index > 0).then_some(&before))?.is_some() {
-                keep(&mut tracker)?;
+                keep(&tracker);
             }
             std::mem::swap(&mut now, &mut before);
         }
         if tracker.last(&before).is_some() {
-            keep(&mut tracker)?;
+            keep(&tracker);
         }
         tracker.finish();
-        keep(&mut tracker)?;
+        keep(&tracker);
         Ok(tracks)
     };
     std::thread::scope(|scope| {
@@ -149,21 +145,26 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
 fn owners(track: &Track, objects: &[&Object]) -> Vec<(f64, Option<usize>)> {
     let returns = track.returns();
     let some = returns.iter().step_by(returns.len().div_ceil(SAMPLE).max(1));
-    let owner = |r: &raywake_core::objects::ObjectReturn| {
+    let owner = |r: &ObjectReturn| {
         let time_s = f64::from(r.time_s);
         let place = DVec3::from_array(track.anchor) + DVec3::from_array(r.position.map(f64::from));
-        let holds = |object: &&Object| {
-            let after_s = track.start_s + time_s - object.start_s;
-            if !(-0.1..object.span_s() + 0.1).contains(&after_s) {
-                return false;
-            }
-            let off = moment_at(&object.truth, after_s).project(place - object.anchor);
-            let half = 0.5 * DVec3::from_array(object.size) + MARGIN_M;
-            off.abs().cmple(half).all()
-        };
-        (time_s, objects.iter().position(holds))
+        (time_s, owner(objects, track.start_s + time_s, place))
     };
     some.map(owner).collect()
+}
+
+/// The object whose box holds a place of the world at a time of the drive.
+fn owner(objects: &[&Object], time_s: f64, place: DVec3) -> Option<usize> {
+    let holds = |object: &&Object| {
+        let after_s = time_s - object.start_s;
+        if !(-0.1..object.span_s() + 0.1).contains(&after_s) {
+            return false;
+        }
+        let off = moment_at(&object.truth, after_s).project(place - object.anchor);
+        let half = 0.5 * DVec3::from_array(object.size) + MARGIN_M;
+        off.abs().cmple(half).all()
+    };
+    objects.iter().position(holds)
 }
 
 /// The object that more than half of some returns lie on.
@@ -177,9 +178,8 @@ fn majority(owners: impl Iterator<Item = Option<usize>>) -> Option<usize> {
 }
 
 /// How often the object of a track's returns changes.
-fn swaps(track: &Track, owners: &[(f64, Option<usize>)]) -> usize {
+fn swaps(owners: &[(f64, Option<usize>)]) -> usize {
     let bin = |owner: &(f64, Option<usize>)| (owner.0 / OWNED_S).floor();
-    debug_assert!(track.returns().len() >= owners.len());
     let bins = owners.chunk_by(|a, b| bin(a) == bin(b));
     let of_bins: Vec<usize> = bins.filter_map(|b| majority(b.iter().map(|o| o.1))).collect();
     of_bins.windows(2).filter(|o| o[0] != o[1]).count()
@@ -212,5 +212,59 @@ fn seen_as(object: &Object, track: &Track) -> Object {
         batches,
         truth: object.truth.iter().map(moment).collect(),
         ..object.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn majorities_and_swaps() {
+        let owners = |text: &str| -> Vec<(f64, Option<usize>)> {
+            let of = |(n, c): (usize, char)| (0.25 * n as f64, c.to_digit(10).map(|d| d as usize));
+            text.chars().enumerate().map(of).collect()
+        };
+        let most = |text: &str| majority(owners(text).into_iter().map(|o| o.1));
+        assert_eq!(
+            (most("1112"), most("1122"), most("111---"), most("")),
+            (Some(1), None, None, None)
+        );
+        // Four a second; a second without a majority says nothing.
+        let count = |text: &str| swaps(&owners(text));
+        assert_eq!((count("11112222"), count("1111111222222222")), (1, 1));
+        assert_eq!((count("1111222211112222"), count("1111----1111"), count("")), (3, 0, 0));
+    }
+
+    /// A wall of returns, followed by a track of its own, against two objects.
+    #[test]
+    fn a_track_lies_on_the_object_whose_box_holds_it() {
+        let object = |x: f64, speed: f64| {
+            let moment = |n: usize| Moment {
+                time_s: 0.1 * n as f64,
+                position: DVec3::new(x + 0.1 * speed * n as f64, 0.0, 1.0),
+                ..Moment::default()
+            };
+            let at = |time_s| ObjectReturn { time_s, ..ObjectReturn::default() };
+            Object {
+                name: String::new(),
+                kind: crate::labels::Kind::Car,
+                size: [4.0, 2.0, 1.5],
+                stationary: speed == 0.0,
+                anchor: DVec3::new(100.0, 50.0, 0.0),
+                start_s: 7.0,
+                returns: vec![at(0.0), at(2.0)],
+                batches: vec![0..1, 1..2],
+                truth: (0..=20).map(moment).collect(),
+            }
+        };
+        let (still, moving) = (object(0.0, 0.0), object(-15.0, 10.0));
+        let objects = [&still, &moving];
+        let holder = |time_s: f64, at: [f64; 3]| owner(&objects, time_s, DVec3::from_array(at));
+        assert_eq!(holder(7.5, [101.9, 50.0, 1.0]), Some(0));
+        assert_eq!(holder(7.5, [103.0, 50.0, 1.0]), None);
+        assert_eq!(holder(7.5, [91.0, 50.9, 1.2]), Some(1));
+        assert_eq!(holder(8.0, [91.0, 50.9, 1.2]), None, "it has gone on");
+        assert_eq!(holder(9.5, [101.0, 50.0, 1.0]), None, "not labelled then");
     }
 }

@@ -175,7 +175,7 @@ fn conclude(
             all.insert(2, tables::kinds(set));
         }
         if set.id == DRIVES[0] {
-            all[0].notes.push(about_labels(labels));
+            all[0].rows.push(tables::wandering(labels));
         }
         let section = report.section(&set.name);
         for table in &all {
@@ -215,16 +215,6 @@ fn front_ends(found: &[(&'static str, Found)]) -> Vec<Table> {
         }
     }
     all
-}
-
-/// How far labels of what stands wander.
-fn about_labels(labels: &Errors) -> String {
-    let r = labels.rmse();
-    format!(
-        "The labels themselves wander in the world with the poses' drift: {:.3} m along x and y, \
-         {:.3} m along z, {:.3} rad.",
-        r.ground, r.height, r.heading
-    )
 }
 
 fn headlines(report: &mut Report, sets: &[Set]) {

@@ -29,6 +29,32 @@ pub struct Object {
     pub truth: Vec<Moment>,
 }
 
+/// A return in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Where the ray ended, m.
+    pub at: DVec3,
+    /// Where it began, m.
+    pub from: DVec3,
+    /// When, s in the drive.
+    pub time_s: f64,
+    /// As the rig counts them.
+    pub sensor: u32,
+}
+
+impl Seen {
+    /// As a return of an object.
+    pub fn of_object(&self, anchor: DVec3, start_s: f64) -> ObjectReturn {
+        let local = |at: DVec3| (at - anchor).as_vec3().to_array();
+        ObjectReturn {
+            position: local(self.at),
+            origin: local(self.from),
+            time_s: (self.time_s - start_s) as f32,
+            sensor: self.sensor,
+        }
+    }
+}
+
 /// An object at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment {

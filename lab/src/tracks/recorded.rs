@@ -1,11 +1,10 @@
 //! Labelled objects of a recorded drive.
 
-use super::object::{Moment, Object, centroid};
+use super::object::{Moment, Object, Seen, centroid};
 use crate::labels::{self, Labels, Motion, Track, Trajectory, trajectories, turn};
 use glam::DVec3;
 use raywake::error::Error;
 use raywake::source::{self, OpenOptions, Source, SweepData};
-use raywake_core::objects::ObjectReturn;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
 use std::f64::consts::TAU;
@@ -64,9 +63,6 @@ pub fn read(path: &Path) -> Result<Recorded, Error> {
     Ok(found)
 }
 
-/// A return in the world: where, from where, when, by which sensor.
-type Seen = (DVec3, DVec3, f64, u32);
-
 /// Returns of a track, sweep by sweep.
 type Gathered = Vec<Vec<Seen>>;
 
@@ -88,14 +84,14 @@ fn gather(
         let half = 0.5 * DVec3::from_array(track.size);
         let within = |s: &&Seen| {
             // The box moves on until the return's time.
-            let moved = state.velocity * (s.2 - sweep.stamp_s);
-            let at = world_from_box.inverse().transform(s.0 - moved);
+            let moved = state.velocity * (s.time_s - sweep.stamp_s);
+            let at = world_from_box.inverse().transform(s.at - moved);
             let out = at.abs() - half;
             out.max_element() <= MARGIN_M && at.z > GROUND_M - half.z
         };
         let mut inside: Vec<Seen> = seen.iter().filter(within).copied().collect();
         if inside.len() >= BATCH_RETURNS {
-            inside.sort_by(|a, b| a.2.total_cmp(&b.2));
+            inside.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
             gathered.push(inside);
         }
     }
@@ -112,7 +108,8 @@ fn seen(rig: &Rig, sweep: &SweepData, point: &Point) -> Option<Seen> {
     let moved = sweep.world_from_vehicle * sweep.twist.over(offset_s);
     let place = if rig.distorted { moved } else { sweep.world_from_vehicle };
     let from = moved.transform(sensor.translation);
-    Some((place.transform(at), from, sweep.stamp_s + offset_s, point.sensor))
+    let (at, time_s) = (place.transform(at), sweep.stamp_s + offset_s);
+    Some(Seen { at, from, time_s, sensor: point.sensor })
 }
 
 /// Time of a return after the sweep's stamp, s.
@@ -141,7 +138,7 @@ fn object(
         return None;
     }
     let first = gathered[0][0];
-    let (anchor, start_s) = (first.0.round(), first.2);
+    let (anchor, start_s) = (first.at.round(), first.time_s);
     let mut object = Object {
         name: format!("{}, track {}", source.name(), track.id),
         kind: track.kind,
@@ -153,15 +150,9 @@ fn object(
         batches: Vec::new(),
         truth: Vec::new(),
     };
-    let local = |at: DVec3| (at - anchor).as_vec3().to_array();
     for sweep in gathered {
         let from = object.returns.len();
-        object.returns.extend(sweep.iter().map(|&(at, origin, time_s, sensor)| ObjectReturn {
-            position: local(at),
-            origin: local(origin),
-            time_s: (time_s - start_s) as f32,
-            sensor,
-        }));
+        object.returns.extend(sweep.iter().map(|r| r.of_object(anchor, start_s)));
         object.batches.push(from..object.returns.len());
     }
     let smooth: Vec<_> = states.iter().map(|s| (s.stamp_s, s.world_from_box, s.velocity)).collect();
@@ -223,7 +214,7 @@ mod tests {
         let point = |position| Point { position, ..Point::default() };
         // It turns clockwise: the left comes a quarter of a turn before the stamp.
         for ([x, y], early) in [([5.0, 0.0], 0.0), ([0.0, 5.0], 0.025), ([0.0, -5.0], -0.025)] {
-            let (at, from, time_s, _) = seen(&rig, &sweep, &point([x, y, 0.0])).unwrap();
+            let Seen { at, from, time_s, .. } = seen(&rig, &sweep, &point([x, y, 0.0])).unwrap();
             assert!((time_s - 7.0 + early).abs() < 1e-9);
             assert!((from.x - (100.0 - 8.0 * early)).abs() < 1e-9);
             assert!((at - from - DVec3::new(f64::from(x), f64::from(y), 0.0)).length() < 1e-6);

@@ -1,6 +1,6 @@
 //! Objects of simulated drives past parked and moving traffic, seen by four HDL-32E.
 
-use super::object::{Moment, Object};
+use super::object::{Moment, Object, Seen};
 use crate::labels::{Kind, kind, turn};
 use crate::simulate::truth::class_name;
 use glam::DVec3;
@@ -160,9 +160,6 @@ fn drive(seed: u64, number: u64) -> Drive {
     Drive::new(rng.bits(), options)
 }
 
-/// A return in the world: where, from where, when in the drive, by which sensor.
-type Seen = (DVec3, DVec3, f64, u32);
-
 /// Everything in a drive that is seen well and long enough, in the order of ids.
 fn objects(drive: &Drive, number: u64) -> Vec<Object> {
     let mut seen: BTreeMap<u32, Vec<Seen>> = BTreeMap::new();
@@ -179,18 +176,17 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
         }
         let Some(window) = window(&returns) else { continue };
         let start_s = (window.start as f64 - 0.5) * PERIOD_S;
-        let within = |r: &&Seen| window.contains(&batch(r.2));
+        let within = |r: &&Seen| window.contains(&batch(r.time_s));
         let returns: Vec<Seen> = returns.iter().filter(within).copied().collect();
         if returns.len() < RETURNS {
             continue;
         }
-        let anchor = returns[0].0.round();
+        let anchor = returns[0].at.round();
         let truth = truth(drive, id, anchor, start_s, window.len());
         let moved = (truth[truth.len() - 1].position - truth[0].position).length();
         if !stationary && moved < MOVED_M {
             continue;
         }
-        let local = |at: DVec3| (at - anchor).as_vec3().to_array();
         found.push(Object {
             name: format!("drive {number}, object {id}"),
             kind,
@@ -198,15 +194,7 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
             stationary,
             anchor,
             start_s,
-            returns: returns
-                .iter()
-                .map(|&(at, from, time_s, sensor)| ObjectReturn {
-                    position: local(at),
-                    origin: local(from),
-                    time_s: (time_s - start_s) as f32,
-                    sensor,
-                })
-                .collect(),
+            returns: returns.iter().map(|r| r.of_object(anchor, start_s)).collect(),
             batches: batches(&returns),
             truth,
         });
@@ -222,7 +210,7 @@ fn batch(time_s: f64) -> usize {
 /// Returns by batches.
 fn batches(returns: &[Seen]) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
-    for same in returns.chunk_by(|a, b| batch(a.2) == batch(b.2)) {
+    for same in returns.chunk_by(|a, b| batch(a.time_s) == batch(b.time_s)) {
         let from = batches.last().map_or(0, |b: &Range<usize>| b.end);
         batches.push(from..from + same.len());
     }
@@ -244,7 +232,8 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
             .or_insert_with(|| drive.world_from_vehicle(time_s));
         let at = pose.transform(DVec3::from_array(point.position.map(f64::from)));
         let from = pose.transform(rig.sensors[point.sensor as usize].translation);
-        seen.entry(truth.object).or_default().push((at, from, time_s, point.sensor));
+        let sensor = point.sensor;
+        seen.entry(truth.object).or_default().push(Seen { at, from, time_s, sensor });
     }
 }
 
@@ -253,7 +242,7 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
 fn window(returns: &[Seen]) -> Option<Range<usize>> {
     let mut counts = [0; SWEEPS + 1];
     for r in returns {
-        counts[batch(r.2).min(SWEEPS)] += 1;
+        counts[batch(r.time_s).min(SWEEPS)] += 1;
     }
     let full: Vec<usize> = (0..SWEEPS).filter(|&b| counts[b] >= BATCH_RETURNS).collect();
     let stretches = full.chunk_by(|a, b| b - a <= GAP_BATCHES + 1);
@@ -302,7 +291,8 @@ mod tests {
     fn windows_lie_about_the_fullest_batch() {
         let seen = |batches: &[(usize, usize)]| -> Vec<Seen> {
             let of = |&(b, n): &(usize, usize)| {
-                std::iter::repeat_n((DVec3::ZERO, DVec3::ZERO, stamp_s(b), 0), n)
+                let (at, from, time_s) = (DVec3::ZERO, DVec3::ZERO, stamp_s(b));
+                std::iter::repeat_n(Seen { at, from, time_s, sensor: 0 }, n)
             };
             batches.iter().flat_map(of).collect()
         };

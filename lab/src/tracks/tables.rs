@@ -136,6 +136,16 @@ pub fn errors(set: &Set) -> Table {
     table(format!("errors-{}", set.id), caption, &columns, rows)
 }
 
+/// A row of [`errors`]: how far labels of what stands wander in the world, with the drift of the
+/// poses and the labels' own errors.
+pub fn wandering(labels: &Errors) -> Row {
+    let r = labels.rmse();
+    let numbers = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
+    let cells = numbers.map(|v| Cell::Number(v, 3));
+    let name = Cell::from("the labels, with the poses' drift");
+    Row::reference([name].into_iter().chain(cells).chain([Cell::Empty]))
+}
+
 /// Share of tracks better than the baseline's, and times.
 pub fn better(set: &Set) -> Table {
     let row = |n: usize| {
