@@ -52,11 +52,11 @@ const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
 
-/// Growth from the middle of a track: how far it reaches at first and with every step, s; deviation
-/// of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
+/// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
+/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
 /// dense one holds it.
-const GROWTH_FIRST_S: f64 = 0.4;
 const GROWTH_S: f64 = 0.2;
+const GROWTHS_MAX: f64 = 200.0;
 const GROWTH_M: f64 = 0.15;
 const GROWTH_POINTS: usize = 75;
 /// Models that are made of what is seen by then, and iterations with each.
@@ -167,7 +167,7 @@ impl Cost {
 /// Why a solve stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
-    /// No return is finite: there is no estimate.
+    /// No return is sound: there is no estimate.
     #[default]
     NoReturns,
     /// The cost fell no more.
@@ -191,8 +191,8 @@ pub struct Report {
     pub returns: usize,
     /// Returns left out because there were more.
     pub thinned: usize,
-    /// Returns left out because they or their times are not finite.
-    pub not_finite: usize,
+    /// Returns left out because they or their times are no numbers, or beyond 100 km and a day.
+    pub unsound: usize,
     /// Returns that took part, and lie further from the object's origin than the prior's `extent_m`.
     pub outside: usize,
     /// The knots are nearer together than asked for: the track is short.
@@ -297,7 +297,7 @@ impl Estimator {
         self.best.weights.fill([0.0; 7]);
         self.best.points = 0;
         let Some(taken) = self.returns.take(returns, params.returns) else {
-            report.not_finite = returns.len();
+            report.unsound = returns.len();
             return report;
         };
         let (knots, Laid { compressed, stretched }) =
@@ -305,8 +305,8 @@ impl Estimator {
         self.knots = knots;
         self.returns.lay(&knots);
         report.returns = self.returns.all().len();
-        report.not_finite = taken.not_finite;
-        report.thinned = returns.len() - taken.not_finite - report.returns;
+        report.unsound = taken.unsound;
+        report.thinned = returns.len() - taken.unsound - report.returns;
         (report.compressed, report.stretched) = (compressed, stretched);
 
         report.no_history = !self.start(params, history);
@@ -395,7 +395,8 @@ impl Estimator {
         let time = |i: usize| f64::from(all[i].time_s);
         let middle = time(all.len() / 2);
         let (first, last) = (self.knots.start(), self.knots.end());
-        let mut reach = GROWTH_FIRST_S;
+        let by = GROWTH_S.max((last - first) / GROWTHS_MAX);
+        let mut reach = 2.0 * by;
         let mut begun = false;
         loop {
             let all = self.returns.all();
@@ -415,7 +416,7 @@ impl Estimator {
                 break;
             }
             begun = true;
-            reach += GROWTH_S;
+            reach += by;
         }
     }
 

@@ -6,6 +6,8 @@ use crate::objects::spline::{Basis, Knots};
 
 /// Steps in which times are told apart where there are more returns than take part.
 const TICKS: usize = 4096;
+/// No track gets so far from its anchor and its start, m and s.
+const FAR: f32 = 1e5;
 /// Parts of a track that may give equally many.
 const PARTS: usize = 128;
 const TICKS_PER_PART: usize = TICKS / PARTS;
@@ -35,7 +37,7 @@ pub(super) struct Returns {
 pub(super) struct Taken {
     pub first_s: f32,
     pub last_s: f32,
-    pub not_finite: usize,
+    pub unsound: usize,
 }
 
 /// How many a part may give at most, so that all together give no more than `at_most` (or one each).
@@ -49,8 +51,9 @@ fn share(counts: &[u32; PARTS], at_most: usize) -> u32 {
     low
 }
 
-pub(super) fn finite(seen: &ObjectReturn) -> bool {
-    seen.time_s.is_finite() && seen.position.iter().chain(&seen.origin).all(|v| v.is_finite())
+/// Whether a return is a number, and one that a track can hold.
+pub(super) fn sound(seen: &ObjectReturn) -> bool {
+    seen.time_s.abs() <= FAR && seen.position.iter().all(|value| value.abs() <= FAR)
 }
 
 impl Returns {
@@ -60,24 +63,24 @@ impl Returns {
 
     /// Takes `at_most` of the returns, as evenly in time as they allow: parts of the track that have
     /// more give equally many, every so manyth in the order of time (within a tick, in the order
-    /// given). None where no return is finite.
+    /// given). None where no return is sound.
     pub fn take(&mut self, returns: &[ObjectReturn], at_most: usize) -> Option<Taken> {
         self.count = 0;
         let (mut first_s, mut last_s) = (f32::MAX, f32::MIN);
-        let mut sound = 0;
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        let mut count = 0;
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             first_s = first_s.min(seen.time_s);
             last_s = last_s.max(seen.time_s);
-            sound += 1;
+            count += 1;
         }
-        if sound == 0 {
+        if count == 0 {
             return None;
         }
         let per_s = TICKS as f32 / (last_s - first_s).max(1e-3);
         let tick =
             |seen: &ObjectReturn| (((seen.time_s - first_s) * per_s) as usize).min(TICKS - 1);
         self.ticks.fill(0);
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             self.ticks[tick(seen)] += 1;
         }
         let mut counts = [0u32; PARTS];
@@ -93,14 +96,14 @@ impl Returns {
             *place = keep;
             keep += count.min(most);
         }
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             let tick = tick(seen);
             let part = tick / TICKS_PER_PART;
-            let (count, kept) = (u64::from(counts[part]), u64::from(counts[part].min(most)));
+            let (of, kept) = (u64::from(counts[part]), u64::from(counts[part].min(most)));
             let rank = u64::from(self.ticks[tick]);
             self.ticks[tick] += 1;
-            let nth = rank * kept / count;
-            if (rank + 1) * kept / count > nth {
+            let nth = rank * kept / of;
+            if (rank + 1) * kept / of > nth {
                 let place = (places[part] + nth as u32) as usize;
                 if place < RETURNS_MAX {
                     self.kept[place] =
@@ -121,7 +124,7 @@ impl Returns {
                     .unwrap_or(core::cmp::Ordering::Equal)
             })
         });
-        Some(Taken { first_s, last_s, not_finite: returns.len() - sound })
+        Some(Taken { first_s, last_s, unsound: returns.len() - count })
     }
 
     /// Takes just these, which are in the order of time; the first [`RETURNS_MAX`] of them.

@@ -111,7 +111,7 @@ impl FixedLag {
     }
 
     /// Takes in what a sweep saw of the object and what the tracker that found it says, and returns
-    /// the object's state at the time of the newest return. Without a finite return that is the
+    /// the object's state at the time of the newest return. Without a sound return that is the
     /// state as it goes on until the tracker's time.
     ///
     /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
@@ -123,9 +123,9 @@ impl FixedLag {
         returns: &[ObjectReturn],
         baseline: &ObjectState,
     ) -> ObjectState {
-        let sound = || returns.iter().filter(|seen| returns::finite(seen));
+        let sound = || returns.iter().filter(|seen| returns::sound(seen));
         let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
-        if start::finite(baseline) {
+        if start::sound(baseline) {
             if self.history.is_full() {
                 self.history.remove(0);
             }
@@ -189,7 +189,7 @@ impl FixedLag {
 
     /// Whether the estimate has nothing to do with the tracker's any more.
     fn strayed(&self, state: &ObjectState, extent_m: f64) -> bool {
-        let Some(baseline) = self.history.last() else { return !start::finite(state) };
+        let Some(baseline) = self.history.last() else { return !start::sound(state) };
         let ahead = state.time_s - baseline.time_s;
         let (sin, cos) = libm::sincos(baseline.heading);
         let go = baseline.speed * ahead;
@@ -199,7 +199,7 @@ impl FixedLag {
             state.position[2] - baseline.position[2],
         ];
         let square: f64 = off.iter().map(|v| v * v).sum();
-        !start::finite(state) || square > extent_m * extent_m
+        !start::sound(state) || square > extent_m * extent_m
     }
 
     fn state(&self, time_s: f64) -> ObjectState {
