@@ -3,6 +3,8 @@
 #![forbid(unsafe_code)]
 
 use raywake::backend::Backend;
+use raywake::source::SweepData;
+use raywake::track::{Ended, Tracker};
 use raywake_core::background_filter;
 use raywake_core::params::Profile;
 use raywake_gpu::guard::{self, Guard};
@@ -34,6 +36,10 @@ fn run() {
             check(&setup, device);
             passed += 1;
         }
+    }
+    for flow in [false, true] {
+        check_tracks(flow);
+        passed += 1;
     }
     println!("frozen: {passed} passed, 0 failed");
 }
@@ -71,6 +77,47 @@ fn check(setup: &Setup, mut backend: Backend) {
     let census = drive.backend().census();
     let bytes = census.map_or(0, |census| check_census(&census));
     println!("{name}, filter {filter}: {columns} flows, {bytes} bytes on the device ... ok");
+}
+
+/// Ten sweeps through the front end of the tracks, and the estimates of these.
+fn check_tracks(flow: bool) {
+    let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.to_string()));
+    let drive = flow.then(|| setup.drive(setup.scalar()));
+    let mut tracker = Tracker::new(&setup.rig, &setup.profile, drive, true);
+    let sweeps: Vec<SweepData> = street()
+        .iter()
+        .map(|s| SweepData {
+            stamp_s: s.stamp_s,
+            points: s.points.clone(),
+            world_from_vehicle: s.world_from_vehicle,
+            twist: s.twist,
+            ..SweepData::default()
+        })
+        .collect();
+    let before = guard::allocations();
+    guard::abort_on_allocation(true);
+    let mut updates = 0;
+    for (n, now) in sweeps.iter().enumerate() {
+        let earlier = n.checked_sub(1).map(|n| &sweeps[n]);
+        let turnover = tracker.sweep(now, earlier).unwrap_or_else(|e| panic!("{e}"));
+        updates += turnover.map_or(0, |t| t.updated);
+    }
+    let ended = tracker.finish();
+    let mut estimated = 0;
+    let show = |ended: &Ended| {
+        let lag = ended.lag.expect("asked for");
+        assert_eq!(lag.len() as u32, ended.track.observations);
+        estimated += (ended.report.returns > 0) as u32;
+        Ok(())
+    };
+    tracker.ended(show).unwrap_or_else(|e| panic!("{e}"));
+    guard::abort_on_allocation(false);
+    assert_eq!(guard::allocations(), before);
+    assert!(
+        updates > 100 && estimated > 10 && estimated <= ended,
+        "{updates}, {ended}, {estimated}"
+    );
+    println!("tracks, flow {flow}: {updates} updates, {estimated} estimates ... ok");
 }
 
 /// Bytes on the device.

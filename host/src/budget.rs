@@ -22,6 +22,7 @@ use crate::error::Error;
 use crate::map::Mapper;
 use crate::report::bytes;
 use crate::statistics::BUDGET_MS;
+use crate::track::Tracker;
 
 pub use markdown::memory_layout;
 
@@ -141,6 +142,11 @@ fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
         parts.push(part("buffers of the scalar backend, at most", "ScalarMap", most));
     }
     parts
+}
+
+/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run.
+pub fn track_parts() -> Vec<Part> {
+    Tracker::parts().map(|(name, kind, bytes)| part(name, kind, bytes)).into()
 }
 
 /// Bytes of all parts.

@@ -132,6 +132,32 @@ fn map_digest(t: &Temp, way: Way) -> String {
     digest.unwrap_or_else(|| panic!("{}", outcome.stdout)).to_string()
 }
 
+/// The digest of `track`, whose summary must be in order.
+fn track_digest(t: &Temp, program: &Path, way: Way, front_end: &str) -> String {
+    let file = t.path().join("tracks.json");
+    let mut command = way.command(program, "track", &t.path().join("drive"));
+    command.args(["--quiet", "--fixed-lag", "--front-end", front_end, "--summary"]).arg(&file);
+    let outcome = Outcome::of(command.output().unwrap());
+    outcome.succeeded();
+    let s = outcome.summary(&file);
+    assert_eq!((&s["sweeps"], &s["allocations_after_seal"]), (&4.into(), &0.into()), "{s}");
+    assert!(s["tracks"].as_array().unwrap().len() > 10, "{s}");
+    s["digest"].as_str().unwrap().to_string()
+}
+
+#[test]
+fn tracks() {
+    let t = Temp::new();
+    drive(&t);
+    let [variance, flow] =
+        ["variance", "flow"].map(|kind| track_digest(&t, own(), Way::Scalar, kind));
+    assert_ne!(variance, flow, "the flow does something");
+    assert_eq!(track_digest(&t, own(), Way::Scalar, "variance"), variance, "again");
+    if vulkan(own()) {
+        assert_eq!(track_digest(&t, own(), Way::Vulkan(THREADS_AT, None), "flow"), flow);
+    }
+}
+
 #[test]
 fn widths_and_threads() {
     let t = Temp::new();
@@ -177,9 +203,12 @@ fn other_builds() {
     let t = Temp::new();
     drive(&t);
     let wanted = digest(&t, own(), Way::Scalar, &[]);
+    let tracks = track_digest(&t, own(), Way::Scalar, "flow");
     for program in env::split_paths(&programs).filter(|p| !p.as_os_str().is_empty()) {
         let name = program.display();
         assert_eq!(digest(&t, &program, Way::Scalar, &[]), wanted, "{name}, scalar");
+        let found = track_digest(&t, &program, Way::Scalar, "flow");
+        assert_eq!(found, tracks, "{name}, tracks");
         if vulkan(&program) {
             let way = Way::Vulkan(THREADS_AT, None);
             assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");

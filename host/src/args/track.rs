@@ -15,9 +15,10 @@ at its own time.";
 
 const FILES: &str = "\
 Files of --out DIR:
-    tracks.feather   a row per track and update: track, time_s, and for the filter (ekf_) position
-                     x_m y_m z_m in the world, heading_rad (unwrapped), speed_mps, climb_mps,
-                     turn_rate_radps
+    tracks.feather   a row per track and update: track, time_s, and as the estimate at the track's
+                     end has it, the filter (ekf_) and the estimate of the sweep (lag_; NaN without
+                     --fixed-lag): x_m y_m z_m (world), heading_rad (unwrapped), speed_mps,
+                     climb_mps, turn_rate_radps; lag_time_s, as that of the sweep is for its end
     clouds/ID.ply    returns of a track in the object's frame at their own times: x y z (m), time (s
                      after the track's start)
     summary.json     the figures of the report";
@@ -31,6 +32,9 @@ pub struct Track {
     /// What tells objects from the rest and from each other
     #[arg(long, value_enum, value_name = "KIND", default_value = "variance")]
     pub front_end: FrontEndKind,
+    /// Estimate with every sweep too, from the last seconds alone
+    #[arg(long)]
+    pub fixed_lag: bool,
     /// Folder for `tracks.feather`, `clouds` and `summary.json`
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     pub out: Option<PathBuf>,

@@ -8,14 +8,17 @@ use raywake_core::record::Step;
 use raywake_kernels::schedule;
 
 use super::traffic::{self, Traffic};
-use super::{ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts, is_map};
+use super::{
+    ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts, is_map, track_parts,
+};
 
 const HEAD: &str = "\
 # Memory layout
 
 What `raywake run` holds from its first sweep to its last, in bytes; nothing is allocated between.
-The buffers of `raywake map` are as fixed; they are under `Sparse map`. `raywake budget` prints this
-file from the declarations the program allocates by, and a test compares the two.
+What `raywake map` and `raywake track` hold is as fixed; it is under `Sparse map` and `Tracks`.
+`raywake budget` prints this file from the declarations the program allocates by, and a test compares
+the two.
 
 A buffer is so many elements of so many bytes. Words are 32-bit, little-endian; an element is
 aligned to its own size. Each heap is one allocation of device memory; in it every buffer begins at
@@ -46,6 +49,21 @@ The voxels of a sweep, and the file made of them, grow with what is seen and are
 const CAPACITY: &str = "
 A sweep of more returns than the capacity is read whole; what the pipeline leaves out of it is
 counted.
+";
+
+const TRACKS_HEAD: &str = "
+## Tracks
+
+`raywake track` holds these parts on the host, and two sweeps; with the flow, what `raywake run`
+holds besides.
+
+| part | type | bytes |
+|---|---|--:|
+";
+
+/// Below the table of the tracks.
+const TRACKS_HOST: &str = "
+The states of tracks that have ended wait for their file, and are not counted.
 ";
 
 const RECORDS_HEAD: &str = "
@@ -99,6 +117,11 @@ pub fn memory_layout(profiles: &[Profile]) -> String {
         out += MAP_HEAD;
         let _ = map(&maps).write(&mut out);
     }
+    out += TRACKS_HEAD;
+    for part in track_parts() {
+        let _ = writeln!(out, "| {} | `{}` | {} |", part.name, part.kind, grouped(part.bytes));
+    }
+    out += TRACKS_HOST;
     let _ = records(&mut out);
     out
 }

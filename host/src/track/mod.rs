@@ -51,9 +51,9 @@ pub fn track(args: &args::Track) -> Result<bool, Error> {
             Some(Drive::new(&profile, source.rig(), &tables, backend))
         }
     };
-    let mut tracker = Tracker::new(source.rig(), drive);
-    let budget = bytes(Tracker::bytes() as u64);
-    say(args.quiet, &format!("memory budget: {budget} of tracks and front end\n"))?;
+    let mut tracker = Tracker::new(source.rig(), &profile, drive, args.fixed_lag);
+    let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
+    say(args.quiet, &format!("memory budget: {}\n", parts.join(", ")))?;
 
     let allocations = guard::allocations();
     let mut report = report::Report::default();

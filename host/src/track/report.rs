@@ -123,9 +123,9 @@ impl Report {
     }
 
     /// A track at its end, with its files. The digest is over its number, anchor and start, and at
-    /// each state of its history this and the estimate.
+    /// each state of its history this and the estimate; then the estimates of every sweep.
     pub fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
-        let Ended { track, estimator, report, milliseconds } = *ended;
+        let Ended { track, estimator, report, lag, milliseconds } = *ended;
         self.estimates.push(milliseconds);
         self.digest.word(track.id);
         track.anchor.iter().for_each(|v| self.digest.double(*v));
@@ -134,6 +134,7 @@ impl Report {
             self.state(filter);
             self.state(&estimator.state(filter.time_s));
         }
+        lag.into_iter().flatten().for_each(|state| self.state(state));
         let for_s = track.last_s() - track.start_s;
         let [first, last] = [0.0, for_s].map(|t| estimator.state(t));
         let [x, y] = [0, 1].map(|a| last.position[a] - first.position[a]);
@@ -204,7 +205,7 @@ pub struct Summary {
     pub tally: Tally,
     /// Left out.
     pub dropped: Dropped,
-    /// Every track, in the order of their ends.
+    /// Every track that was seen often enough, in the order of their ends.
     pub tracks: Vec<Line>,
 }
 
@@ -224,7 +225,13 @@ impl Summary {
 
     fn print(&self, out: &mut String) -> std::fmt::Result {
         let end = if self.interrupted { ", INTERRUPTED" } else { "" };
-        writeln!(out, "\n{} sweeps, {} tracks{end}", self.sweeps, self.tracks.len())?;
+        let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
+        writeln!(
+            out,
+            "\n{} sweeps, {} tracks, {brief} too brief to count{end}",
+            self.sweeps,
+            self.tracks.len()
+        )?;
         self.longest(out)?;
         for (what, spread) in [("sweep", &self.step_ms), ("estimate", &self.estimate_ms)] {
             if let Some(t) = spread {

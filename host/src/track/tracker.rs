@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
-use raywake_core::objects::estimate::{EstimateParams, Estimator, Report};
+use raywake_core::objects::ObjectState;
+use raywake_core::objects::estimate::{EstimateParams, Estimator, FixedLag, Report};
 use raywake_core::objects::front_end::{
-    FrontEnd, FrontEndParams, Life, TRACKS_MAX, Track, Turnover,
+    Flows, FrontEnd, FrontEndParams, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, Turnover,
 };
-use raywake_core::output::PointFlow;
+use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_gpu::GpuError;
 use raywake_gpu::guard::guarded;
@@ -21,28 +22,63 @@ pub struct Tracker {
     rig: Rig,
     params: FrontEndParams,
     drive: Option<Drive>,
+    reach_m: f64,
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
     estimator: Box<Estimator>,
+    /// One for each track, or none.
+    lags: Vec<Lag>,
+}
+
+/// The estimate of a track over its last seconds, sweep by sweep.
+#[derive(Default)]
+struct Lag {
+    filter: FixedLag,
+    /// One for each update of the track, thinned as its history is.
+    states: Thinned<ObjectState, HISTORY_MAX>,
+}
+
+impl Lag {
+    /// Takes in what the last step saw of a track.
+    fn follow(&mut self, track: &Track, estimator: &mut Estimator) {
+        let Some(state) = track.state().filter(|_| track.life == Life::Live) else { return };
+        if track.observations == 1 {
+            self.filter.clear();
+            self.states.clear();
+        }
+        if self.states.seen() < u64::from(track.observations) {
+            let params = EstimateParams::default();
+            self.states.push(self.filter.push(estimator, &params, track.latest(), &state));
+        }
+    }
 }
 
 impl Tracker {
-    /// Tracks of a rig's sweeps, with the flow where there is a drive to find it. Call it on a thread
-    /// with 64 MiB of stack, as [`Drive::new`].
-    pub fn new(rig: &Rig, drive: Option<Drive>) -> Tracker {
+    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, and
+    /// with the estimate of every sweep where `fixed_lag` says so. Call it on a thread with 64 MiB of
+    /// stack, as [`Drive::new`].
+    pub fn new(rig: &Rig, profile: &Profile, drive: Option<Drive>, fixed_lag: bool) -> Tracker {
         Tracker {
             rig: rig.clone(),
             params: FrontEndParams::street(),
             drive,
+            // The window's columns, but for one at the edge.
+            reach_m: (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m,
             front_end: Box::new(FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
             estimator: Box::new(Estimator::new()),
+            lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),
         }
     }
 
-    /// Bytes of host memory held, those of the flow apart.
-    pub fn bytes() -> usize {
-        size_of::<FrontEnd>() + TRACKS_MAX * size_of::<Track>() + size_of::<Estimator>()
+    /// The parts of the host's memory held: name, type and bytes, those of the flow apart.
+    pub fn parts() -> [(&'static str, &'static str, usize); 4] {
+        [
+            ("front end", "FrontEnd", size_of::<FrontEnd>()),
+            ("tracks", "Track", TRACKS_MAX * size_of::<Track>()),
+            ("estimate", "Estimator", size_of::<Estimator>()),
+            ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * size_of::<Lag>()),
+        ]
     }
 
     /// A sweep, and the one before it if there is one. With the flow it is that one whose tracks come
@@ -52,17 +88,20 @@ impl Tracker {
         now: &SweepData,
         before: Option<&SweepData>,
     ) -> Result<Option<Turnover>, GpuError> {
-        let Tracker { rig, params, drive, front_end, tracks, .. } = self;
-        let mut step = |sweep: &SweepData, flows: Option<&[PointFlow]>| {
+        let Tracker { rig, params, drive, reach_m, front_end, tracks, estimator, lags } = self;
+        let mut step = |sweep: &SweepData, flows: Option<Flows>| {
             guarded(|| {
                 front_end.take(rig, &sweep.sweep(), flows);
-                front_end.step(params, None, tracks)
+                let turnover = front_end.step(params, None, tracks);
+                lags.iter_mut().zip(&*tracks).for_each(|(lag, track)| lag.follow(track, estimator));
+                turnover
             })
         };
         let Some(drive) = drive else { return Ok(Some(step(now, None))) };
         let points = before.map_or(&[][..], |b| &b.points);
         let flows = drive.step(&now.sweep(), points)?.flows;
-        Ok(before.map(|before| step(before, flows.map(|f| f.points))))
+        let flows = flows.map(|f| Flows { of: f.points, reach_m: *reach_m });
+        Ok(before.map(|before| step(before, flows)))
     }
 
     /// The last sweep, where it still waits for its flow, which will not come.
@@ -82,18 +121,25 @@ impl Tracker {
     }
 
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
-    /// estimate of its trajectory and shape.
+    /// estimate of its trajectory and shape. Those that ended before they were sure are left out:
+    /// there is little to estimate.
     pub fn ended(
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        for track in self.tracks.iter().filter(|t| t.life == Life::Ended) {
+        for (slot, track) in self.tracks.iter().enumerate() {
+            let brief = track.observations < self.params.observations_min;
+            if track.life != Life::Ended || brief {
+                continue;
+            }
             let clock = Instant::now();
             let (returns, history) = (track.returns(), track.history());
             let report =
                 guarded(|| self.estimator.solve(&EstimateParams::default(), returns, history));
             let milliseconds = clock.elapsed().as_secs_f64() * 1e3;
-            show(&Ended { track, estimator: &self.estimator, report: &report, milliseconds })?;
+            let estimator = &self.estimator;
+            let lag = self.lags.get(slot).map(|lag| lag.states.kept());
+            show(&Ended { track, estimator, report: &report, lag, milliseconds })?;
         }
         Ok(())
     }
@@ -107,6 +153,8 @@ pub struct Ended<'a> {
     pub estimator: &'a Estimator,
     /// How these were found.
     pub report: &'a Report,
-    /// How long that took, ms.
+    /// The estimates of every sweep where there are any, one for each state of its history.
+    pub lag: Option<&'a [ObjectState]>,
+    /// How long the estimate at its end took, ms.
     pub milliseconds: f64,
 }

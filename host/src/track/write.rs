@@ -16,13 +16,24 @@ pub struct Files {
     rows: Vec<Row>,
 }
 
-/// A track at the time of one of its updates; positions in the world, m.
+/// A track at the time of one of its updates: times of the recording, s, and positions in the world,
+/// m.
 struct Row {
     track: u32,
-    time_s: f64,
     filter: ObjectState,
     estimate: ObjectState,
+    /// NaN where there is none.
+    lag: ObjectState,
 }
+
+const NONE: ObjectState = ObjectState {
+    time_s: f64::NAN,
+    position: [f64::NAN; 3],
+    heading: f64::NAN,
+    speed: f64::NAN,
+    climb: f64::NAN,
+    turn_rate: f64::NAN,
+};
 
 impl Files {
     /// Creates the folders; without one nothing will be written.
@@ -42,14 +53,16 @@ impl Files {
         let Some(folder) = &self.folder else { return Ok(()) };
         let Ended { track, estimator, .. } = ended;
         let placed = |state: ObjectState| ObjectState {
+            time_s: track.start_s + state.time_s,
             position: [0, 1, 2].map(|a| track.anchor[a] + state.position[a]),
             ..state
         };
-        self.rows.extend(track.history().iter().map(|filter| Row {
+        let lag = |n: usize| ended.lag.and_then(|states| states.get(n)).copied().unwrap_or(NONE);
+        self.rows.extend(track.history().iter().enumerate().map(|(n, filter)| Row {
             track: track.id,
-            time_s: track.start_s + filter.time_s,
             filter: placed(*filter),
             estimate: placed(estimator.state(filter.time_s)),
+            lag: placed(lag(n)),
         }));
         let in_frame = |seen: &ObjectReturn| {
             let place = local(&estimator.state(f64::from(seen.time_s)), seen.position);
@@ -64,7 +77,7 @@ impl Files {
         let Some(folder) = &self.folder else { return Ok(()) };
         let mut t = Table::default();
         t.u32s("track", &self.rows, |r| r.track);
-        t.f64s("time_s", &self.rows, |r| r.time_s);
+        t.f64s("time_s", &self.rows, |r| r.filter.time_s);
         let mut states = |prefix: &str, of: fn(&Row) -> &ObjectState| {
             for (a, axis) in ["x_m", "y_m", "z_m"].iter().enumerate() {
                 t.f64s(&format!("{prefix}{axis}"), &self.rows, |r| of(r).position[a]);
@@ -76,6 +89,8 @@ impl Files {
         };
         states("ekf_", |r| &r.filter);
         states("", |r| &r.estimate);
+        states("lag_", |r| &r.lag);
+        t.f64s("lag_time_s", &self.rows, |r| r.lag.time_s);
         t.write(&folder.join("tracks.feather"), &[])
     }
 }

@@ -1,7 +1,7 @@
 //! The returns of some 100 ms, of any number of sensors, in the world.
 
 use super::{CELL_M, SIDE};
-use crate::output::PointFlow;
+use crate::output::{Origin, PointFlow};
 use crate::params::{POINTS_MAX, SLOTS};
 use crate::pose::Pose;
 use crate::prepare::{Dropped, Preparation, moved_by, slot_time};
@@ -19,8 +19,8 @@ pub(super) struct Seen {
     pub time_s: f32,
     /// Index of the sensor.
     pub sensor: u32,
-    /// Over ground by the flow, m/s.
-    pub velocity: [f32; 2],
+    /// Over ground by the flow, m/s, as far as it tells.
+    pub velocity: Option<[f32; 2]>,
 }
 
 impl Seen {
@@ -28,6 +28,24 @@ impl Seen {
     pub fn cell(&self) -> usize {
         let [i, j] = cell(self.at);
         i * SIDE + j
+    }
+}
+
+/// The flow of a sweep's returns.
+#[derive(Clone, Copy, Debug)]
+pub struct Flows<'a> {
+    /// Of every return, in the sweep's order.
+    pub of: &'a [PointFlow],
+    /// Returns farther from the vehicle lie outside the flow's window, m.
+    pub reach_m: f64,
+}
+
+impl Flows<'_> {
+    /// Velocity of a return `away` from the vehicle, m/s.
+    fn velocity(&self, n: usize, away: [f64; 2]) -> Option<[f32; 2]> {
+        let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
+        let flow = self.of.get(n).filter(|f| inside && f.origin != Origin::Unmatched)?;
+        Some(flow.velocity_world_mps)
     }
 }
 
@@ -47,8 +65,6 @@ pub(super) struct Batch {
     pub returns: heapless::Vec<Seen, POINTS_MAX>,
     /// Left out since the last step.
     pub dropped: Dropped,
-    /// Whether the returns have velocities.
-    pub flows: bool,
 }
 
 impl Batch {
@@ -59,7 +75,6 @@ impl Batch {
             corner: DVec3::ZERO,
             returns: heapless::Vec::new(),
             dropped: Dropped::default(),
-            flows: false,
         }
     }
 
@@ -67,11 +82,10 @@ impl Batch {
         self.stamp_s = None;
         self.returns.clear();
         self.dropped = Dropped::default();
-        self.flows = false;
     }
 
     /// Adds the returns of a sweep. Those of a sweep without a finite stamp or pose are not finite.
-    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<&[PointFlow]>) {
+    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<Flows>) {
         let Pose { rotation, translation } = sweep.world_from_vehicle;
         let twist = [sweep.twist.linear, sweep.twist.angular];
         let finite = sweep.stamp_s.is_finite()
@@ -90,7 +104,6 @@ impl Batch {
             self.corner = DVec3::new(first(under.x), first(under.y), under.z);
         }
         let after_s = sweep.stamp_s - self.stamp_s.unwrap_or(sweep.stamp_s);
-        self.flows |= flows.is_some();
 
         let timed = rig.timing != Timing::AtStamp;
         let mut places = [Place::default(); SLOTS];
@@ -106,6 +119,7 @@ impl Batch {
             }
         }
         let edge = SIDE as f32 * CELL_M;
+        let vehicle = under - self.corner;
         for (n, point) in sweep.points.iter().enumerate() {
             match self.dropped.admit(rig, point) {
                 Some(false) => {}
@@ -127,7 +141,8 @@ impl Batch {
                 Timing::Offset { .. } => after_s + point.offset_s as f64,
                 _ => place.time_s,
             };
-            let velocity = flows.and_then(|f| f.get(n)).map_or([0.0; 2], |f| f.velocity_world_mps);
+            let away = [at[0] as f64 - vehicle.x, at[1] as f64 - vehicle.y];
+            let velocity = flows.as_ref().and_then(|f| f.velocity(n, away));
             let seen = Seen {
                 at,
                 origin: place.origins[point.sensor as usize],

@@ -16,7 +16,7 @@ const JOINS_S: f32 = 0.05;
 const LINKS_M: f32 = 0.7;
 const LINKS_UP_M: f32 = 1.0;
 /// Velocities of one thing differ by no more than so much, m/s, and this share of the speed.
-const ALIKE_MPS: f32 = 1.0;
+const ALIKE_MPS: f32 = 0.5;
 const ALIKE: f32 = 0.25;
 
 const _: () = assert!(LINKS_M <= 2.0 * CELL_M && JOINS_M <= CELL_M);
@@ -27,6 +27,8 @@ struct Sums {
     count: u32,
     at: [f64; 3],
     time_s: f64,
+    /// Returns with a velocity, and the sum of these.
+    known: u32,
     velocity: [f64; 2],
     low: [f32; 3],
     high: [f32; 3],
@@ -37,6 +39,7 @@ impl Sums {
         count: 0,
         at: [0.0; 3],
         time_s: 0.0,
+        known: 0,
         velocity: [0.0; 2],
         low: [f32::INFINITY; 3],
         high: [f32::NEG_INFINITY; 3],
@@ -47,7 +50,8 @@ impl Sums {
             count: 1,
             at: seen.at.map(f64::from),
             time_s: seen.time_s as f64,
-            velocity: seen.velocity.map(f64::from),
+            known: seen.velocity.is_some() as u32,
+            velocity: seen.velocity.unwrap_or_default().map(f64::from),
             low: seen.at,
             high: seen.at,
         }
@@ -55,6 +59,7 @@ impl Sums {
 
     fn add(&mut self, more: &Sums) {
         self.count += more.count;
+        self.known += more.known;
         self.time_s += more.time_s;
         for a in 0..3 {
             self.at[a] += more.at[a];
@@ -83,8 +88,8 @@ pub(super) struct Segment {
     pub centroid: [f64; 3],
     /// Mean of the returns' times, s after the batch's stamp.
     pub time_s: f64,
-    /// Mean velocity of the returns, m/s.
-    pub velocity: [f64; 2],
+    /// Mean velocity of the returns that have one, m/s, where most have.
+    pub velocity: Option<[f64; 2]>,
 }
 
 /// Segments left out.
@@ -243,7 +248,8 @@ impl Chunks {
                     count: sums.count,
                     centroid: sums.at.map(|v| v / n),
                     time_s: sums.time_s / n,
-                    velocity: sums.velocity.map(|v| v / n),
+                    velocity: (2 * sums.known > sums.count)
+                        .then(|| sums.velocity.map(|v| v / sums.known as f64)),
                 };
                 match self.segments.push(segment) {
                     Ok(()) => index = self.segments.len() as u32 - 1,
@@ -263,8 +269,9 @@ fn linked(a: &Seen, b: &Seen) -> bool {
         && alike(a.velocity, b.velocity)
 }
 
-/// Whether two velocities may be those of one thing.
-fn alike(a: [f32; 2], b: [f32; 2]) -> bool {
+/// Whether two velocities may be those of one thing; an unknown one may be any.
+fn alike(a: Option<[f32; 2]>, b: Option<[f32; 2]>) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return true };
     let square = |v: [f32; 2]| v[0] * v[0] + v[1] * v[1];
     let apart = square([a[0] - b[0], a[1] - b[1]]);
     let allowed = ALIKE_MPS + ALIKE * libm::sqrtf(square(a).max(square(b)));
@@ -288,7 +295,8 @@ mod tests {
         let mut batch = Box::new(Batch::new());
         for _ in 0..60 {
             let middle = [0; 2].map(|_| random.between(1.0, 25.0));
-            let velocity = [random.below(3) as f32 * 2.0, 0.0];
+            let speed = random.below(4) as f32 * 2.0;
+            let velocity = (speed < 6.0).then_some([speed, 0.0]);
             for _ in 0..random.below(80) {
                 let [x, y] = middle.map(|m| m + random.between(-0.9, 0.9));
                 let seen = Seen {

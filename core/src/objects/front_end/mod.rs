@@ -23,11 +23,11 @@ mod chunks;
 mod tests;
 mod track;
 
+pub use batch::Flows;
 pub use cells::GroundMap;
-pub use track::{HISTORY_MAX, Life, RETURNS_MAX, Thinned, Track};
+pub use track::{HISTORY_MAX, LATEST_MAX, Life, RETURNS_MAX, Thinned, Track};
 
 use super::centroid_ekf::{CentroidEkf, CentroidParams};
-use crate::output::PointFlow;
 use crate::params::COLUMNS_MAX;
 use crate::prepare::Dropped;
 use crate::record::NONE;
@@ -39,7 +39,7 @@ use chunks::{Chunks, Segment};
 use nalgebra::{Matrix2, Vector2};
 
 /// Tracks followed at once at most.
-pub const TRACKS_MAX: usize = 128;
+pub const TRACKS_MAX: usize = 160;
 /// Segments of a batch that may be objects; further ones are counted.
 pub const SEGMENTS_MAX: usize = 1024;
 /// Edge of a 2-D cell, m.
@@ -74,9 +74,9 @@ pub struct FrontEndParams {
     /// Segments that extend farther along x or y are no objects, m.
     pub extent_max_m: f32,
     /// Limit of the squared Mahalanobis distance of a centroid: chi-square, three degrees of freedom.
-    pub gate_d2: f32,
+    pub gate_d2: f64,
     /// Limit with the flow's velocity: five degrees of freedom.
-    pub gate_with_flow_d2: f32,
+    pub gate_with_flow_d2: f64,
     /// Standard deviation of a segment's velocity by the flow, m/s.
     pub flow_mps: f64,
     /// A track ends so long after its last observation, s.
@@ -95,7 +95,7 @@ impl FrontEndParams {
             raised_m: 0.5,
             high_m: 4.0,
             moving_mps: 0.5,
-            returns_min: 10,
+            returns_min: 15,
             extent_max_m: 18.0,
             // 99 % quantiles.
             gate_d2: 11.345,
@@ -106,8 +106,8 @@ impl FrontEndParams {
         }
     }
 
-    fn moves(&self, [x, y]: [f32; 2]) -> bool {
-        x * x + y * y >= self.moving_mps * self.moving_mps
+    fn moves(&self, velocity: Option<[f32; 2]>) -> bool {
+        velocity.is_some_and(|[x, y]| x * x + y * y >= self.moving_mps * self.moving_mps)
     }
 }
 
@@ -181,8 +181,8 @@ impl FrontEnd {
     }
 
     /// Adds a sweep to the batch of the next step, as many as there are, each with its own stamp.
-    /// `flows` are those of its points, as far as there are any.
-    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<&[PointFlow]>) {
+    /// `flows` are those of its points, where they are known.
+    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<Flows>) {
         self.batch.take(rig, sweep, flows);
     }
 
@@ -242,7 +242,6 @@ impl FrontEnd {
     /// Finds the segment that continues each track.
     fn associate(&mut self, params: &FrontEndParams, tracks: &[Track]) {
         let segments = self.chunks.segments();
-        let gate = if self.batch.flows { params.gate_with_flow_d2 } else { params.gate_d2 };
         self.rows.clear();
         for (slot, track) in tracks.iter().enumerate() {
             let Some(ekf) = track.ekf.as_ref().filter(|_| track.life == Life::Live) else {
@@ -260,18 +259,23 @@ impl FrontEnd {
                 }
                 let mut ahead = *ekf;
                 ahead.predict(&params.centroid, after_s);
-                let mut d2 = ahead.distance2(&params.centroid, place);
-                if self.batch.flows {
-                    d2 += velocity_distance2(&ahead, segment.velocity, params.flow_mps);
-                }
-                if d2 <= gate as f64 {
-                    *cost = d2 as f32;
+                let d2 = ahead.distance2(&params.centroid, place);
+                // As a share of the gate.
+                let share = match segment.velocity {
+                    None => d2 / params.gate_d2,
+                    Some(v) => {
+                        let of_velocity = velocity_distance2(&ahead, v, params.flow_mps);
+                        (d2 + of_velocity) / params.gate_with_flow_d2
+                    }
+                };
+                if share <= 1.0 {
+                    *cost = share as f32;
                 }
             }
             // There are as many rows as tracks.
             let _ = self.rows.push(slot as u32);
         }
-        self.assignment.solve(self.rows.len(), segments.len(), gate);
+        self.assignment.solve(self.rows.len(), segments.len(), 1.0);
         for (segment, slot) in self.slot_of_segment[..segments.len()].iter_mut().enumerate() {
             *slot = self.assignment.track(segment).map_or(NONE, |row| self.rows[row]);
         }

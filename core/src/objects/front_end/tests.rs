@@ -89,7 +89,7 @@ impl Run {
         }
     }
 
-    fn take(&mut self, stamp_s: f64, points: &[Point], flows: Option<&[PointFlow]>) {
+    fn take(&mut self, stamp_s: f64, points: &[Point], flows: Option<Flows>) {
         let sweep = Sweep { stamp_s, points, world_from_vehicle: self.place, twist: Twist::ZERO };
         self.front_end.take(&self.rig, &sweep, flows);
     }
@@ -137,6 +137,9 @@ fn cars_are_followed_far_from_the_origin() {
         // Before it departed it was the same car.
         assert!((track.history()[0].heading - state.heading).abs() < 0.3);
         assert!(track.returns_seen() > 3000 && track.history_every() == 1);
+        assert_eq!(track.state(), Some(state));
+        assert!(track.latest().len() > 100);
+        assert!(track.latest().iter().all(|r| (r.time_s as f64 - state.time_s).abs() < 1e-6));
         for r in track.returns() {
             let moved = thing.velocity[0] * r.time_s as f64;
             assert!((r.position[0] as f64 - moved).abs() < 2.1, "{r:?}");
@@ -282,7 +285,7 @@ fn the_flow_tells_neighbours_apart() {
             flows.resize(alone, PointFlow::default());
             let moving = PointFlow { velocity_world_mps: of_person, ..PointFlow::default() };
             flows.resize(points.len(), moving);
-            run.take(stamp_s, &points, Some(&flows));
+            run.take(stamp_s, &points, Some(Flows { of: &flows, reach_m: 40.0 }));
             born += run.step().born;
         }
         let mut speeds: Vec<f64> =
@@ -308,7 +311,7 @@ fn velocities_join_the_gate() {
     }
     let distance2 = |v| velocity_distance2(&ekf, v, PARAMS.flow_mps);
     assert!(distance2([10.0, 0.0]) < 1.0);
-    assert!(distance2([-10.0, 0.0]) > PARAMS.gate_with_flow_d2 as f64);
+    assert!(distance2([-10.0, 0.0]) > PARAMS.gate_with_flow_d2);
 }
 
 #[test]

@@ -6,7 +6,10 @@ use crate::objects::{ObjectReturn, ObjectState};
 /// States of the filter that a track keeps.
 pub const HISTORY_MAX: usize = 512;
 /// Returns that a track keeps.
-pub const RETURNS_MAX: usize = 10_240;
+pub const RETURNS_MAX: usize = 8192;
+
+/// Returns of its last batch that a track keeps.
+pub const LATEST_MAX: usize = 256;
 
 /// Every k-th of a sequence, with k doubled whenever there is no room for more.
 #[derive(Clone, Debug)]
@@ -55,7 +58,8 @@ impl<T: Copy, const N: usize> Thinned<T, N> {
         self.seen
     }
 
-    fn clear(&mut self) {
+    /// As if there had been none.
+    pub fn clear(&mut self) {
         self.kept.clear();
         (self.every, self.seen) = (0, 0);
     }
@@ -95,6 +99,7 @@ pub struct Track {
     pub(super) ekf: Option<CentroidEkf>,
     history: Thinned<ObjectState, HISTORY_MAX>,
     returns: Thinned<ObjectReturn, RETURNS_MAX>,
+    latest: Thinned<ObjectReturn, LATEST_MAX>,
 }
 
 impl Track {
@@ -109,6 +114,7 @@ impl Track {
             ekf: None,
             history: Thinned::new(),
             returns: Thinned::new(),
+            latest: Thinned::new(),
         }
     }
 
@@ -128,9 +134,19 @@ impl Track {
         self.returns.kept()
     }
 
+    /// Those of its last observation.
+    pub fn latest(&self) -> &[ObjectReturn] {
+        self.latest.kept()
+    }
+
     /// Returns seen in all.
     pub fn returns_seen(&self) -> u64 {
         self.returns.seen()
+    }
+
+    /// The filter's state, unless there is room only.
+    pub fn state(&self) -> Option<ObjectState> {
+        self.ekf.as_ref().map(CentroidEkf::state)
     }
 
     /// Time of the filter's last update, s.
@@ -144,6 +160,7 @@ impl Track {
         self.observations = 0;
         self.history.clear();
         self.returns.clear();
+        self.latest.clear();
     }
 
     /// Begins a track at a place in the world.
@@ -171,18 +188,21 @@ impl Track {
         let state = ekf.state();
         revision.revise(&state, &mut self.history.kept);
         self.history.push(state);
+        self.latest.clear();
         self.observations += 1;
     }
 
     /// Keeps a return that lies and began at places in the world.
     pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], sensor: u32) {
         let place = |at| self.place(at).map(|v| v as f32);
-        self.returns.push(ObjectReturn {
+        let seen = ObjectReturn {
             position: place(at),
             origin: place(origin),
             time_s: (time_s - self.start_s) as f32,
             sensor,
-        });
+        };
+        self.returns.push(seen);
+        self.latest.push(seen);
     }
 }
 
