@@ -3,8 +3,8 @@
 use super::entropy::entropy;
 use super::errors::Errors;
 use super::extent::extent;
-use super::object::{Object, moment_at};
-use super::tracker::{Track, baseline, motion};
+use super::object::{Moment, Object, moment_at};
+use super::tracker::{Track, baseline, fixed_lag, motion};
 use crate::labels::Kind;
 use raywake_core::objects::centroid_ekf::CentroidParams;
 use raywake_core::objects::estimate::{Cost, EstimateParams, Estimator, Stop};
@@ -20,10 +20,13 @@ pub enum Method {
     Baseline,
     /// Trajectory and shape together.
     Proposed(EstimateParams),
+    /// The same over the last seconds, after every batch, as on board: judged by the states it has
+    /// at the time.
+    FixedLag(EstimateParams),
 }
 
 /// The trackers of the tables and their names.
-pub fn methods() -> [(&'static str, Method); 5] {
+pub fn methods() -> [(&'static str, Method); 6] {
     let of =
         |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
     let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
@@ -33,6 +36,7 @@ pub fn methods() -> [(&'static str, Method); 5] {
         ("as printed, n_m = 3000", of(printed, 3000)),
         ("ours, n_m = 300", of(ours, 300)),
         ("ours, n_m = 3000", of(ours, 3000)),
+        ("ours, fixed lag", Method::FixedLag(ours)),
     ]
 }
 
@@ -73,6 +77,8 @@ pub struct Outcome {
     pub span_s: f64,
     /// Mean range of its returns, m.
     pub range_m: f64,
+    /// By how much its true headings differ, rad.
+    pub turned_rad: f64,
     /// Entropy of its cloud by its true trajectory, nats.
     pub entropy: f64,
     /// Extent of that cloud, m.
@@ -94,6 +100,12 @@ pub fn track(
             let report = estimator.solve(params, &object.returns, history);
             let track = Track::of(object, |t| estimator.state(t).into());
             (track, report.costs.to_vec(), report.stop)
+        }
+        Method::FixedLag(params) => {
+            let history = fixed_lag(object, params, estimator);
+            let moments = history.iter().map(|s| Moment::from(*s)).collect();
+            let track = Track { moments, ..Track::of(object, motion(&history)) };
+            (track, Vec::new(), Stop::default())
         }
     }
 }
@@ -122,6 +134,8 @@ fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) 
         let [x, y, z] = [0, 1, 2].map(|i| f64::from(r.position[i] - r.origin[i]));
         (x * x + y * y + z * z).sqrt()
     };
+    let headings =
+        |of: fn(f64, f64) -> f64| object.truth.iter().map(|m| m.heading).reduce(of).unwrap_or(0.0);
     let ranges: f64 = object.returns.iter().map(range).sum();
     Outcome {
         name: object.name.clone(),
@@ -131,6 +145,7 @@ fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) 
         returns: object.returns.len(),
         span_s: object.span_s(),
         range_m: ranges / object.returns.len() as f64,
+        turned_rad: headings(f64::max) - headings(f64::min),
         entropy: entropy(&really.cloud),
         extent: extent(&really.cloud),
         scores: methods().iter().map(|(_, m)| score(object, history, m, estimator)).collect(),

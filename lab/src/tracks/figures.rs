@@ -23,8 +23,10 @@ pub fn convergence(sets: &[Set]) -> Chart {
         for set in sets.iter().filter(|s| s.id == "stationary" || s.id == "moving") {
             for n in of.clone() {
                 let scores: Vec<&Score> = set.outcomes.iter().map(|o| &o.scores[n]).collect();
-                let name = format!("{}, {}", methods()[n].0, set.name);
-                lines.series.push(Series::line(&name, means(&scores, value)));
+                let (name, points) = (methods()[n].0, means(&scores, value));
+                if !points.is_empty() {
+                    lines.series.push(Series::line(&format!("{name}, {}", set.name), points));
+                }
             }
         }
         (title.to_string(), Plot::Lines(lines))

@@ -104,10 +104,10 @@ const STACK: usize = 64 << 20;
 fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, Error> {
     let work = || -> Result<Vec<Track>, Error> {
         let mut source = source::open(path, &OpenOptions::default())?;
+        let profile = config::profile(settings.profile)?;
         let drive = match kind {
             FrontEndKind::Variance => None,
             FrontEndKind::Flow => {
-                let profile = config::profile(settings.profile)?;
                 let weights = Weights::read(settings.learned, &profile)?;
                 let chosen =
                     choose::backend(settings.backend, &profile, weights.tables(&profile)?)?;
@@ -116,7 +116,7 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
                 Some(Drive::new(&profile, source.rig(), &weights.tables(&profile)?, backend))
             }
         };
-        let mut tracker = Tracker::new(source.rig(), drive);
+        let mut tracker = Tracker::new(source.rig(), &profile, drive, false);
         let mut tracks = Vec::new();
         let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
         let (mut now, mut before) = (SweepData::default(), SweepData::default());

@@ -4,7 +4,6 @@ use super::object::{Moment, Object, Seen};
 use crate::labels::{Kind, kind, turn};
 use crate::simulate::truth::class_name;
 use glam::DVec3;
-use raywake_core::objects::ObjectReturn;
 use raywake_sim::{Drive, Ego, Options, PERIOD_S, Rng, SensorRig, SimSweep};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;

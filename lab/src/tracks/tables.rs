@@ -10,6 +10,9 @@ use raywake::statistics::Spread;
 /// Tracks listed as the worst.
 const WORST: usize = 10;
 
+/// What turns by less goes straight on, rad.
+const STRAIGHT_RAD: f64 = 0.1;
+
 /// Table 2.1: baseline, n_m = 300, n_m = 3000; m, m/s, rad, rad/s.
 const PRINTED: [(&str, [f64; 4]); 3] = [
     ("dissertation, baseline EKF", [0.388, 0.543, 0.527, 0.139]),
@@ -100,15 +103,15 @@ pub fn errors(set: &Set) -> Table {
         }));
     }
     for (n, (name, _)) in methods().iter().enumerate() {
-        let errors = set.errors(n, |_| true);
-        let r = errors.rmse();
-        let all = [r.position, r.ground, r.height, r.velocity, r.heading, r.turn_rate];
-        let of_tracks: Vec<f64> =
-            set.outcomes.iter().map(|o| o.scores[n].errors.rmse().position).collect();
-        let median = Spread::of(&of_tracks).map_or(f64::NAN, |s| s.median);
-        let cells = all.into_iter().chain([median]).map(|v| Cell::Number(v, 3));
-        let flips = Cell::from(errors.flips);
-        rows.push(Row::new([Cell::from(*name)].into_iter().chain(cells).chain([flips])));
+        rows.push(error_row(set, name, n, |_| true));
+    }
+    let straight = |o: &Outcome| o.turned_rad < STRAIGHT_RAD;
+    let count = set.outcomes.iter().filter(|o| straight(o)).count();
+    if count < set.outcomes.len() {
+        for n in [0, OURS] {
+            let name = format!("{}: the {count} that go straight on", methods()[n].0);
+            rows.push(error_row(set, &name, n, straight));
+        }
     }
     let against = match stationary {
         true => {
@@ -134,6 +137,18 @@ pub fn errors(set: &Set) -> Table {
         "Flips",
     ];
     table(format!("errors-{}", set.id), caption, &columns, rows)
+}
+
+/// A row of [`errors`]: a tracker over some objects.
+fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool) -> Row {
+    let errors = set.errors(method, &of);
+    let r = errors.rmse();
+    let all = [r.position, r.ground, r.height, r.velocity, r.heading, r.turn_rate];
+    let some = set.outcomes.iter().filter(|o| of(o));
+    let of_tracks: Vec<f64> = some.map(|o| o.scores[method].errors.rmse().position).collect();
+    let median = Spread::of(&of_tracks).map_or(f64::NAN, |s| s.median);
+    let cells = all.into_iter().chain([median]).map(|v| Cell::Number(v, 3));
+    Row::new([Cell::from(name)].into_iter().chain(cells).chain([Cell::from(errors.flips)]))
 }
 
 /// A row of [`errors`]: how far labels of what stands wander in the world, with the drift of the
@@ -192,7 +207,7 @@ pub fn entropies(sets: &[Set]) -> Table {
         .iter()
         .map(|&(name, [truth, baseline, proposed])| {
             let gap = (baseline - proposed) / (baseline - truth);
-            let none = [Cell::Empty, Cell::Empty, Cell::Empty];
+            let none = vec![Cell::Empty; methods().len() - 2];
             let cells = [truth, baseline, proposed].map(number).into_iter().chain(none);
             let gaps = [share(gap), Cell::Empty];
             Row::reference([Cell::from(name)].into_iter().chain(cells).chain(gaps))
@@ -287,13 +302,15 @@ pub fn worst(set: &Set) -> Table {
     let row = |o: &&Outcome| {
         let ours = &o.scores[OURS];
         let r = ours.errors.rmse();
-        let errors = [position(o, 0), position(o, 1), r.position, r.velocity, r.heading];
+        let errors =
+            [position(o, 0), position(o, 1), r.position, r.velocity, r.heading, r.turn_rate];
         let head = [
             Cell::from(o.name.as_str()),
             Cell::from(format!("{:?}", o.kind).to_lowercase()),
             Cell::from(o.returns),
             Cell::Number(o.span_s, 1),
             Cell::Number(o.range_m, 0),
+            Cell::Number(o.turned_rad, 1),
         ];
         let entropy = [Cell::Number(ours.entropy - o.entropy, 2)];
         let stop = [Cell::from(format!("{:?}", ours.stop).to_lowercase())];
@@ -308,11 +325,13 @@ pub fn worst(set: &Set) -> Table {
         "Returns",
         "Seen, s",
         "Mean range, m",
+        "Turns, rad",
         "Baseline's position, m",
         "As printed, m",
         "Ours, m",
         "Velocity, m/s",
         "Heading, rad",
+        "Heading rate, rad/s",
         "Entropy above the truth's",
         "Stopped",
     ];
