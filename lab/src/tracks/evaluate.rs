@@ -4,7 +4,7 @@ use super::entropy::entropy;
 use super::errors::Errors;
 use super::extent::extent;
 use super::object::{Moment, Object, moment_at};
-use super::tracker::{Track, baseline, fixed_lag, motion};
+use super::tracker::{Track, baseline, baseline_live, fixed_lag, motion};
 use crate::labels::Kind;
 use raywake_core::objects::centroid_ekf::CentroidParams;
 use raywake_core::objects::estimate::{Cost, EstimateParams, Estimator, Stop};
@@ -16,8 +16,10 @@ use std::time::Instant;
 /// A tracker with its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
-    /// The extended Kalman filter of centroids.
+    /// The extended Kalman filter of centroids, its states revised by what it learns later.
     Baseline,
+    /// The same as it is at the time.
+    BaselineLive,
     /// Trajectory and shape together.
     Proposed(EstimateParams),
     /// The same over the last seconds, after every batch, as on board: judged by the states it has
@@ -26,7 +28,7 @@ pub enum Method {
 }
 
 /// The trackers of the tables and their names.
-pub fn methods() -> [(&'static str, Method); 6] {
+pub fn methods() -> [(&'static str, Method); 7] {
     let of =
         |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
     let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
@@ -36,6 +38,7 @@ pub fn methods() -> [(&'static str, Method); 6] {
         ("as printed, n_m = 3000", of(printed, 3000)),
         ("ours, n_m = 300", of(ours, 300)),
         ("ours, n_m = 3000", of(ours, 3000)),
+        ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]
 }
@@ -101,13 +104,18 @@ pub fn track(
             let track = Track::of(object, |t| estimator.state(t).into());
             (track, report.costs.to_vec(), report.stop)
         }
-        Method::FixedLag(params) => {
-            let history = fixed_lag(object, params, estimator);
-            let moments = history.iter().map(|s| Moment::from(*s)).collect();
-            let track = Track { moments, ..Track::of(object, motion(&history)) };
-            (track, Vec::new(), Stop::default())
+        Method::BaselineLive => {
+            at_the_time(object, &baseline_live(object, &CentroidParams::dissertation()))
         }
+        Method::FixedLag(params) => at_the_time(object, &fixed_lag(object, params, estimator)),
     }
+}
+
+/// A track judged by its states themselves, with the cloud by what joins them.
+fn at_the_time(object: &Object, history: &[ObjectState]) -> (Track, Vec<Cost>, Stop) {
+    let moments = history.iter().map(|s| Moment::from(*s)).collect();
+    let track = Track { moments, ..Track::of(object, motion(history)) };
+    (track, Vec::new(), Stop::default())
 }
 
 /// What a tracker makes of an object, measured.

@@ -116,7 +116,7 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
                 Some(Drive::new(&profile, source.rig(), &weights.tables(&profile)?, backend))
             }
         };
-        let mut tracker = Tracker::new(source.rig(), &profile, drive, false);
+        let mut tracker = Tracker::new(source.rig(), &profile, drive, None, false);
         let mut tracks = Vec::new();
         let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
         let (mut now, mut before) = (SweepData::default(), SweepData::default());

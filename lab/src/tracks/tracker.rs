@@ -41,6 +41,13 @@ pub fn baseline(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
     history
 }
 
+/// The baseline without revisions: what it knows at the time.
+pub fn baseline_live(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
+    let mut history = Vec::new();
+    follow(object, params, |state, _, _| history.push(state));
+    history
+}
+
 /// The estimate of the last seconds after every batch, with the baseline as it is at that time.
 pub fn fixed_lag(
     object: &Object,
