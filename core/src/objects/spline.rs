@@ -40,8 +40,8 @@ pub struct Laid {
 }
 
 impl Knots {
-    /// No knots, of a place that waits for them.
-    pub const NONE: Knots = Knots { start: 0.0, spacing: 1.0, pieces: 1 };
+    /// No knots, of a place that waits for them: no splines are over these.
+    pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
     /// One basis function for each `every` seconds from `start` to `end`, five at least and
     /// [`BASES_MAX`] at most.

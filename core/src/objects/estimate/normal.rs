@@ -58,12 +58,22 @@ pub(super) struct Surface {
 
 impl Surface {
     pub const NONE: Surface = Surface {
-        normal: [1.0, 0.0],
+        normal: [0.0; 2],
         precision: [0.0; 3],
         mean: [0.0; 3],
         held: 0.0,
-        scatter: Scatter::ONE,
+        scatter: Scatter { count: 0.0, sums: [0.0; 4] },
     };
+
+    /// Alike in every direction.
+    pub const fn round(precision: f64) -> Surface {
+        Surface {
+            normal: [1.0, 0.0],
+            precision: [precision; 3],
+            scatter: Scatter::ONE,
+            ..Surface::NONE
+        }
+    }
 }
 
 /// Returns about a model point: how many, and the sums of x x, x y, y y and z z, m².
@@ -108,10 +118,10 @@ pub(super) struct Seen {
 impl Seen {
     pub const NONE: Seen = Seen {
         arm: [0.0; 3],
-        cos: 1.0,
+        cos: 0.0,
         sin: 0.0,
         nearest: 0,
-        axes: [[1.0, 0.0], [0.0, 1.0]],
+        axes: [[0.0; 2]; 2],
         turning: [0.0; 2],
         miss: [0.0; 3],
         precision: [0.0; 3],
@@ -127,7 +137,12 @@ impl Seen {
 
     /// The arm in the object's frame.
     pub fn place(&self) -> [f64; 3] {
-        let [x, y, z] = self.arm;
+        self.frame([0.0; 3])
+    }
+
+    /// What lies by `beyond` (m, along the world's axes) beyond the return, in the object's frame.
+    pub fn frame(&self, beyond: [f64; 3]) -> [f64; 3] {
+        let [x, y, z]: [f64; 3] = core::array::from_fn(|d| self.arm[d] + beyond[d]);
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
     }
 
@@ -435,6 +450,7 @@ mod tests {
                 let time = 3.5 * f64::from(i) / 90.0;
                 Kept {
                     position: [0, 1, 2].map(|_| random.between(-3.0, 3.0)),
+                    origin: [0.0; 3],
                     time_s: time as f32,
                     basis: knots.basis(time),
                 }
@@ -578,9 +594,9 @@ mod tests {
 
     #[test]
     fn a_robust_loss_keeps_what_is_near_and_bounds_what_is_far() {
-        let surface = Surface { precision: [100.0; 3], ..Surface::NONE };
+        let surface = Surface::round(100.0);
         let cost = |off: f64, robust: f64| {
-            let mut seen = Seen { arm: [off, 0.0, 0.0], ..Seen::NONE };
+            let mut seen = Seen { arm: [off, 0.0, 0.0], cos: 1.0, ..Seen::NONE };
             (seen.lay(&[0.0; 3], &surface, robust), seen.precision[0])
         };
         assert_eq!(cost(0.5, 0.0), (12.5, 100.0));

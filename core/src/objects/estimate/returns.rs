@@ -16,13 +16,24 @@ const TICKS_PER_PART: usize = TICKS / PARTS;
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
     pub position: [f32; 3],
+    /// Where its ray began.
+    pub origin: [f32; 3],
     pub time_s: f32,
     pub basis: Basis,
 }
 
 impl Kept {
-    pub const NONE: Kept =
-        Kept { position: [0.0; 3], time_s: 0.0, basis: Basis { first: 0, values: [0.0; 5] } };
+    pub const NONE: Kept = Kept {
+        position: [0.0; 3],
+        origin: [0.0; 3],
+        time_s: 0.0,
+        basis: Basis { first: 0, values: [0.0; 5] },
+    };
+
+    /// The way from its end to its beginning, m.
+    pub fn origin_from_return(&self) -> [f64; 3] {
+        core::array::from_fn(|d| f64::from(self.origin[d]) - f64::from(self.position[d]))
+    }
 }
 
 /// They, in the order of time.
@@ -53,7 +64,8 @@ fn share(counts: &[u32; PARTS], at_most: usize) -> u32 {
 
 /// Whether a return is a number, and one that a track can hold.
 pub(super) fn sound(seen: &ObjectReturn) -> bool {
-    seen.time_s.abs() <= FAR && seen.position.iter().all(|value| value.abs() <= FAR)
+    let places = seen.position.iter().chain(&seen.origin);
+    seen.time_s.abs() <= FAR && places.map(|value| value.abs()).all(|value| value <= FAR)
 }
 
 impl Returns {
@@ -106,8 +118,12 @@ impl Returns {
             if (rank + 1) * kept / of > nth {
                 let place = (places[part] + nth as u32) as usize;
                 if place < RETURNS_MAX {
-                    self.kept[place] =
-                        Kept { position: seen.position, time_s: seen.time_s, ..Kept::NONE };
+                    self.kept[place] = Kept {
+                        position: seen.position,
+                        origin: seen.origin,
+                        time_s: seen.time_s,
+                        ..Kept::NONE
+                    };
                 }
             }
         }
@@ -131,7 +147,7 @@ impl Returns {
     pub fn set(&mut self, returns: impl Iterator<Item = ([f32; 3], f32)>) {
         self.count = 0;
         for (kept, (position, time_s)) in self.kept.iter_mut().zip(returns) {
-            *kept = Kept { position, time_s, ..Kept::NONE };
+            *kept = Kept { position, origin: position, time_s, ..Kept::NONE };
             self.count += 1;
         }
     }

@@ -206,7 +206,7 @@ fn bad_input_is_bounded_and_reported() {
         assert_eq!(solve(&broken, &history).unsound, 90);
         assert_eq!(solve(&broken[..1], &history).stop, Stop::NoReturns);
         // Longer than the knots reach.
-        let mut long = whole.returns.clone();
+        let mut long: Vec<_> = whole.returns.iter().step_by(50).copied().collect();
         for seen in &mut long {
             seen.time_s *= 100.0;
         }
@@ -362,13 +362,20 @@ fn options_measured() {
     let ours = EstimateParams::default();
     let variants = [
         ("dissertation", EstimateParams::dissertation()),
+        ("with carving", EstimateParams { carves: true, ..EstimateParams::dissertation() }),
         ("its n_m = 3000", EstimateParams { model: 3000, ..EstimateParams::dissertation() }),
+        ("with robust", EstimateParams { robust: 3.0, ..EstimateParams::dissertation() }),
+        ("with damping", EstimateParams { damping: true, ..EstimateParams::dissertation() }),
+        (
+            "with surfaces",
+            EstimateParams { surfaces: true, loose_m: 0.5, ..EstimateParams::dissertation() },
+        ),
         ("ours", ours),
         ("no growth", EstimateParams { grows: false, ..ours }),
         ("no starts", EstimateParams { starts: false, ..ours }),
         ("no surfaces", EstimateParams { surfaces: false, ..ours }),
-        ("no annealing", EstimateParams { stages: 0, ..ours }),
         ("no damping", EstimateParams { damping: false, ..ours }),
+        ("carves", EstimateParams { carves: true, ..ours }),
         ("robust", EstimateParams { robust: 5.0, ..ours }),
     ];
     let mut estimator = Box::new(Estimator::new());
