@@ -28,7 +28,7 @@ pub enum Method {
 }
 
 /// The trackers of the tables and their names.
-pub fn methods() -> [(&'static str, Method); 7] {
+pub fn methods() -> [(&'static str, Method); 8] {
     let of =
         |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
     let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
@@ -38,6 +38,7 @@ pub fn methods() -> [(&'static str, Method); 7] {
         ("as printed, n_m = 3000", of(printed, 3000)),
         ("ours, n_m = 300", of(ours, 300)),
         ("ours, n_m = 3000", of(ours, 3000)),
+        ("ours, carved by rays", Method::Proposed(EstimateParams { carves: true, ..ours })),
         ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]

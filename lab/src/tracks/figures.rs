@@ -39,8 +39,7 @@ pub fn convergence(sets: &[Set]) -> Chart {
         part("distance, ours", "mean distance, m", OURS..last, |c| c.residual_m),
     ];
     let caption = "As figure 2.5: cost J, and mean distance of a return from its model point, after \
-        each iteration; mean over tracks, of which those that have ended stay as they are. Ours \
-        lowers the standard deviation of a return by stages, which raises J.";
+        each iteration; mean over tracks, of which those that have ended stay as they are.";
     Chart::small_multiples("figure-2-5", caption, parts)
 }
 
