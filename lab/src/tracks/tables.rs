@@ -107,7 +107,7 @@ pub fn errors(set: &Set) -> Table {
     }
     let straight = |o: &Outcome| o.turned_rad < STRAIGHT_RAD;
     let count = set.outcomes.iter().filter(|o| straight(o)).count();
-    if count < set.outcomes.len() {
+    if (1..set.outcomes.len()).contains(&count) {
         for n in [0, OURS] {
             let name = format!("{}: the {count} that go straight on", methods()[n].0);
             rows.push(error_row(set, &name, n, straight));
