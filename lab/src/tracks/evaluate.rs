@@ -60,7 +60,7 @@ pub struct Score {
     pub costs: Vec<Cost>,
     /// Why it stopped.
     pub stop: Stop,
-    /// Time of the estimate, s.
+    /// Time of the estimate, or of all of them where there is one a batch, s; 0 for the baseline.
     pub seconds: f64,
 }
 
@@ -91,32 +91,45 @@ pub struct Outcome {
     pub scores: Vec<Score>,
 }
 
-/// Runs a tracker; costs and the reason of its end where it iterates.
+/// What a tracker did.
+pub struct Run {
+    /// What it makes of the object.
+    pub track: Track,
+    costs: Vec<Cost>,
+    stop: Stop,
+    seconds: f64,
+}
+
+/// Runs a tracker.
 pub fn track(
     object: &Object,
     history: &[ObjectState],
     method: &Method,
     estimator: &mut Estimator,
-) -> (Track, Vec<Cost>, Stop) {
-    match method {
-        Method::Baseline => (Track::of(object, motion(history)), Vec::new(), Stop::default()),
+) -> Run {
+    let begin = Instant::now();
+    let done = |track: Track, seconds: f64| Run {
+        track,
+        costs: Vec::new(),
+        stop: Stop::default(),
+        seconds,
+    };
+    let live = match method {
+        Method::Baseline => return done(Track::of(object, motion(history)), 0.0),
         Method::Proposed(params) => {
             let report = estimator.solve(params, &object.returns, history);
+            let seconds = begin.elapsed().as_secs_f64();
             let track = Track::of(object, |t| estimator.state(t).into());
-            (track, report.costs.to_vec(), report.stop)
+            let costs = report.costs.to_vec();
+            return Run { costs, stop: report.stop, ..done(track, seconds) };
         }
-        Method::BaselineLive => {
-            at_the_time(object, &baseline_live(object, &CentroidParams::dissertation()))
-        }
-        Method::FixedLag(params) => at_the_time(object, &fixed_lag(object, params, estimator)),
-    }
-}
-
-/// A track judged by its states themselves, with the cloud by what joins them.
-fn at_the_time(object: &Object, history: &[ObjectState]) -> (Track, Vec<Cost>, Stop) {
-    let moments = history.iter().map(|s| Moment::from(*s)).collect();
-    let track = Track { moments, ..Track::of(object, motion(history)) };
-    (track, Vec::new(), Stop::default())
+        Method::BaselineLive => baseline_live(object, &CentroidParams::dissertation()),
+        Method::FixedLag(params) => fixed_lag(object, params, estimator),
+    };
+    let seconds = begin.elapsed().as_secs_f64();
+    // Judged by its states themselves, with the cloud by what joins them.
+    let moments = live.iter().map(|s| Moment::from(*s)).collect();
+    done(Track { moments, ..Track::of(object, motion(&live)) }, seconds)
 }
 
 /// What a tracker makes of an object, measured.
@@ -126,9 +139,7 @@ fn score(
     method: &Method,
     estimator: &mut Estimator,
 ) -> Score {
-    let begin = Instant::now();
-    let (track, costs, stop) = track(object, history, method, estimator);
-    let seconds = begin.elapsed().as_secs_f64();
+    let Run { track, costs, stop, seconds } = track(object, history, method, estimator);
     let errors = match object.stationary {
         true => Errors::standing(&track.moments),
         false => Errors::moving(&track.moments, &object.truth),

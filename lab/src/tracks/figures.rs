@@ -57,7 +57,7 @@ fn means(scores: &[&Score], value: fn(&Cost) -> f64) -> Vec<[f64; 2]> {
 fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 3] {
     let methods: [(&str, Method); 3] = [0, 1, OURS].map(|n| methods()[n]);
     let history = baseline(object, &CentroidParams::dissertation());
-    methods.map(|(name, method)| (name, track(object, &history, &method, estimator).0))
+    methods.map(|(name, method)| (name, track(object, &history, &method, estimator).track))
 }
 
 /// A number of a moment.

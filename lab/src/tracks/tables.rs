@@ -192,8 +192,8 @@ pub fn better(set: &Set) -> Table {
     let rows = (1..methods().len()).map(row).collect();
     let mut table = table(format!("better-{}", set.id), caption, &columns, rows);
     table.notes.push(
-        "Iterations are those that led to the estimate; the time is that of all of them and of the \
-         poses of all returns."
+        "Iterations are those that led to the estimate; the time is that of all there were, of the \
+         fixed lag for all batches of a track."
             .into(),
     );
     table
