@@ -83,7 +83,7 @@ fn check(setup: &Setup, mut backend: Backend) {
 fn check_tracks(flow: bool) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.to_string()));
     let drive = flow.then(|| setup.drive(setup.scalar()));
-    let mut tracker = Tracker::new(&setup.rig, &setup.profile, drive, true);
+    let mut tracker = Tracker::new(&setup.rig, &setup.profile, drive, None, true);
     let sweeps: Vec<SweepData> = street()
         .iter()
         .map(|s| SweepData {

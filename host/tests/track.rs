@@ -78,6 +78,23 @@ fn figures_and_files() {
     }
 }
 
+/// A map that says the ground is above all of it leaves nothing to follow.
+#[test]
+fn a_map_of_the_ground() {
+    let t = Temp::new();
+    drive(&t);
+    let json = t.path().join("s.json");
+    for (height, segments) in [("-1.73", true), ("5", false)] {
+        let head = "ncols 1\nnrows 1\nxllcorner -100\nyllcorner -100\ncellsize 200\n";
+        let map = t.write("ground.asc", format!("{head}{height}\n"));
+        let map = ["--ground-map", map.to_str().unwrap(), "-n", "3"];
+        let o = track(&t, &[&map[..], &["--summary", json.to_str().unwrap()]].concat());
+        o.succeeded();
+        let s = o.summary(&json);
+        assert_eq!(s["tally"]["segments"].as_u64() > Some(0), segments, "{s}");
+    }
+}
+
 #[test]
 fn bad_input() {
     let t = Temp::new();
@@ -88,6 +105,7 @@ fn bad_input() {
     track(&t, &["--front-end", "none"]).failed(2, &["variance"]);
     let below = t.write("file", "").join("out");
     track(&t, &["--out", below.to_str().unwrap()]).failed(4, &[below.to_str().unwrap()]);
+    track(&t, &["--ground-map", "absent.asc"]).failed(3, &["absent.asc"]);
     // Nothing seen, NaN, times that jump.
     t.write("drive/velodyne_points/data/0000000003.bin", []);
     let nan: Vec<u8> = (0..400).flat_map(|_| f32::NAN.to_le_bytes()).collect();

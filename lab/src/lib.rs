@@ -12,4 +12,5 @@ pub mod report;
 #[cfg(test)]
 mod scratch;
 pub mod simulate;
+pub mod tracks;
 pub mod train;

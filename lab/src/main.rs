@@ -1,9 +1,10 @@
 #![forbid(unsafe_code)]
 //! `raywake-lab`: one command per experiment.
 
-use clap::Parser;
+use clap::{ArgMatches, Args, FromArgMatches, Parser};
+use raywake::error::Error;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, matching, simulate, train};
+use raywake_lab::{eval, matching, simulate, tracks, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -14,7 +15,7 @@ enum Command {
     #[command(subcommand)]
     Train(train::Command),
     /// Run labelled drives through the pipeline and compare flow and tracklets with the truth.
-    Eval(Box<eval::Args>),
+    Eval(Box<Eval>),
     /// Evaluate variants of a profile, one thing changed in each: one table.
     Ablate(Box<eval::ablate::Args>),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
@@ -25,10 +26,55 @@ enum Command {
     Sim(simulate::Args),
 }
 
+/// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2: a command that has arguments of its
+/// own beside a subcommand.
+enum Eval {
+    Flow(eval::Args),
+    Tracks(tracks::Args),
+}
+
+const TRACKS: &str = "tracks";
+
+impl Args for Eval {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        let about = "Trajectory and shape of objects against their truth (chapter 2)";
+        let tracks = tracks::Args::augment_args(clap::Command::new(TRACKS)).about(about);
+        let command = eval::Args::augment_args(command).subcommand(tracks);
+        command.args_conflicts_with_subcommands(true).subcommand_negates_reqs(true)
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        Eval::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Eval {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Eval, clap::Error> {
+        match matches.subcommand() {
+            Some((TRACKS, matches)) => tracks::Args::from_arg_matches(matches).map(Eval::Tracks),
+            _ => eval::Args::from_arg_matches(matches).map(Eval::Flow),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Eval::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Eval {
+    fn run(&self) -> Result<(), Error> {
+        match self {
+            Eval::Flow(args) => eval::run(args),
+            Eval::Tracks(args) => tracks::run(args),
+        }
+    }
+}
+
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command).map_err(Into::into),
-        Command::Eval(args) => eval::run(&args).map_err(Into::into),
+        Command::Eval(args) => args.run().map_err(Into::into),
         Command::Ablate(args) => eval::ablate::run(&args).map_err(Into::into),
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => matching::run(&args),
@@ -39,6 +85,23 @@ fn main() -> ExitCode {
         Err(error) => {
             eprintln!("raywake-lab: {error}");
             ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eval_takes_drives_or_a_chapter() {
+        let parse = |line: &str| Command::try_parse_from(line.split(' '));
+        let flow = parse("lab eval a/drive other --out results --jobs 2");
+        assert!(matches!(flow, Ok(Command::Eval(e)) if matches!(*e, Eval::Flow(_))));
+        let tracks = parse("lab eval tracks --out results a/drive");
+        assert!(matches!(tracks, Ok(Command::Eval(e)) if matches!(*e, Eval::Tracks(_))));
+        for wrong in ["lab eval", "lab eval a/drive", "lab eval tracks", "lab eval --out results"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -32,6 +32,10 @@ pub struct Track {
     /// What tells objects from the rest and from each other
     #[arg(long, value_enum, value_name = "KIND", default_value = "variance")]
     pub front_end: FrontEndKind,
+    /// Heights of the ground in the frame of the poses, an ESRI ASCII grid; found in the returns where
+    /// it has none
+    #[arg(long, value_name = "FILE")]
+    pub ground_map: Option<PathBuf>,
     /// Estimate with every sweep too, from the last seconds alone
     #[arg(long)]
     pub fixed_lag: bool,

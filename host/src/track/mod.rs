@@ -1,5 +1,6 @@
 //! `raywake track`: objects of a recorded drive.
 
+mod ground;
 mod report;
 mod tracker;
 mod write;
@@ -19,6 +20,7 @@ use crate::summary::make_room;
 
 use raywake_gpu::guard;
 
+pub use ground::Ground;
 pub use report::Summary;
 pub use tracker::{Ended, Tracker};
 
@@ -31,6 +33,7 @@ pub fn track(args: &args::Track) -> Result<bool, Error> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let summary = args.summary.clone().or(args.out.as_ref().map(|out| out.join("summary.json")));
+    let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
     make_room(&summary)?;
     let mut files = write::Files::create(args.out.as_deref())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
@@ -51,7 +54,7 @@ pub fn track(args: &args::Track) -> Result<bool, Error> {
             Some(Drive::new(&profile, source.rig(), &tables, backend))
         }
     };
-    let mut tracker = Tracker::new(source.rig(), &profile, drive, args.fixed_lag);
+    let mut tracker = Tracker::new(source.rig(), &profile, drive, ground, args.fixed_lag);
     let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
     say(args.quiet, &format!("memory budget: {}\n", parts.join(", ")))?;
 

@@ -13,6 +13,7 @@ use raywake_core::sweep::Rig;
 use raywake_gpu::GpuError;
 use raywake_gpu::guard::guarded;
 
+use super::Ground;
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::source::SweepData;
@@ -23,6 +24,7 @@ pub struct Tracker {
     params: FrontEndParams,
     drive: Option<Drive>,
     reach_m: f64,
+    ground: Option<Ground>,
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
     estimator: Box<Estimator>,
@@ -54,16 +56,23 @@ impl Lag {
 }
 
 impl Tracker {
-    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, and
-    /// with the estimate of every sweep where `fixed_lag` says so. Call it on a thread with 64 MiB of
-    /// stack, as [`Drive::new`].
-    pub fn new(rig: &Rig, profile: &Profile, drive: Option<Drive>, fixed_lag: bool) -> Tracker {
+    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, with a
+    /// map of the ground where there is one, and with the estimate of every sweep where `fixed_lag`
+    /// says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
+    pub fn new(
+        rig: &Rig,
+        profile: &Profile,
+        drive: Option<Drive>,
+        ground: Option<Ground>,
+        fixed_lag: bool,
+    ) -> Tracker {
         Tracker {
             rig: rig.clone(),
             params: FrontEndParams::street(),
             drive,
             // The window's columns, but for one at the edge.
             reach_m: (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m,
+            ground,
             front_end: Box::new(FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
             estimator: Box::new(Estimator::new()),
@@ -88,11 +97,13 @@ impl Tracker {
         now: &SweepData,
         before: Option<&SweepData>,
     ) -> Result<Option<Turnover>, GpuError> {
-        let Tracker { rig, params, drive, reach_m, front_end, tracks, estimator, lags } = self;
+        let Tracker { rig, params, drive, reach_m, ground, front_end, tracks, estimator, lags } =
+            self;
+        let map = ground.as_ref().map(Ground::map);
         let mut step = |sweep: &SweepData, flows: Option<Flows>| {
             guarded(|| {
                 front_end.take(rig, &sweep.sweep(), flows);
-                let turnover = front_end.step(params, None, tracks);
+                let turnover = front_end.step(params, map.as_ref(), tracks);
                 lags.iter_mut().zip(&*tracks).for_each(|(lag, track)| lag.follow(track, estimator));
                 turnover
             })
@@ -113,6 +124,11 @@ impl Tracker {
     /// Ends all tracks. Returns how many there were.
     pub fn finish(&mut self) -> u32 {
         self.front_end.finish(&mut self.tracks)
+    }
+
+    /// The tracks that ended in the last step, in the order of their room.
+    pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
+        self.tracks.iter().filter(|t| t.life == Life::Ended)
     }
 
     /// Shows the tracks that ended in the last step, in the order of their room, each with the

@@ -20,6 +20,7 @@ pub use footprint::Footprint;
 pub use kind::kind;
 pub use open::open;
 pub use raywake::error::Error;
+pub(crate) use sweeps::turn;
 pub use trajectory::{Motion, Trajectory, trajectories};
 
 use glam::DVec3;

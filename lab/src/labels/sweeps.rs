@@ -103,7 +103,7 @@ fn jumps(kind: Kind, a: (f64, Pose), b: (f64, Pose)) -> bool {
 }
 
 /// The turn from one heading to another, -pi to pi, rad.
-pub(super) fn turn(from_rad: f64, to_rad: f64) -> f64 {
+pub fn turn(from_rad: f64, to_rad: f64) -> f64 {
     (to_rad - from_rad + PI).rem_euclid(TAU) - PI
 }
 

@@ -6,6 +6,7 @@
 
 mod birds_eye;
 mod chart;
+mod clouds;
 mod encode;
 mod html;
 mod palette;
@@ -20,6 +21,7 @@ pub use birds_eye::{Column, Look, Outline, Panel, birds_eye};
 pub use chart::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
+pub use clouds::{Cloud, clouds};
 pub use table::{Cell, Row, Table};
 
 use raywake::error::Error;

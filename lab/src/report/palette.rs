@@ -89,6 +89,11 @@ pub(super) fn height(t: f64) -> [u8; 3] {
     mix(&[[208.0, 216.0, 226.0], [156.0, 172.0, 192.0], [98.0, 116.0, 142.0]], t)
 }
 
+/// Of a time from first (0) to last (1): blue over green to yellow, ever lighter.
+pub(super) fn time(t: f64) -> [u8; 3] {
+    mix(&[[53.0, 42.0, 135.0], [15.0, 118.0, 200.0], [55.0, 184.0, 157.0], [250.0, 220.0, 30.0]], t)
+}
+
 fn blend(stops: &[[f64; 3]], t: f64) -> String {
     let [r, g, b] = mix(stops, t);
     format!("#{r:02x}{g:02x}{b:02x}")

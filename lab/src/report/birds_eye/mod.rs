@@ -119,7 +119,8 @@ pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Vec<u8>, Error> {
     raster::encode(&sheet)
 }
 
-fn rect(a: Area, colour: &str) -> String {
+/// A rectangle of one colour.
+pub(super) fn rect(a: Area, colour: &str) -> String {
     let Area { left, top, width, height } = a;
     format!(
         "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" \

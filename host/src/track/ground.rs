@@ -1,0 +1,125 @@
+//! A map of the ground from a file: an ESRI ASCII grid in the frame of the poses.
+//!
+//! Lines of a key and a number (`ncols`, `nrows`, `xllcorner`, `yllcorner`, `cellsize` and, if there
+//! is such, `NODATA_value`; m), then `nrows` lines of `ncols` heights (m), that of the largest y
+//! first.
+
+use std::path::Path;
+
+use raywake_core::objects::front_end::GroundMap;
+
+use crate::error::Error;
+use crate::source::text;
+
+/// Heights of the ground, with their memory.
+#[derive(Debug)]
+pub struct Ground {
+    corner: [f64; 2],
+    cell_m: f64,
+    columns: usize,
+    heights: Vec<f32>,
+}
+
+impl Ground {
+    /// Reads a file; fails where it is no such grid.
+    pub fn read(path: &Path) -> Result<Ground, Error> {
+        parse(path, &text::read(path)?)
+    }
+
+    /// As the front end takes it.
+    pub fn map(&self) -> GroundMap<'_> {
+        GroundMap {
+            corner: self.corner,
+            cell_m: self.cell_m,
+            columns: self.columns,
+            heights: &self.heights,
+        }
+    }
+}
+
+fn parse(path: &Path, content: &str) -> Result<Ground, Error> {
+    let whole = |what: String| Error::input(path, "", what);
+    let mut lines = text::lines(content).peekable();
+    let mut header = Vec::new();
+    let starts_with_key = |line: &(usize, &str)| {
+        line.1.starts_with(|c: char| c.is_ascii_alphabetic()) && line.1.parse::<f64>().is_err()
+    };
+    while let Some((number, line)) = lines.next_if(starts_with_key) {
+        let (key, value) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let [value] = text::exactly::<1>(path, number, value)?;
+        header.push((key.to_ascii_lowercase(), value));
+    }
+    let find = |key: &str| header.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
+    let needed = |key: &str| {
+        let value = find(key).filter(|v| v.is_finite());
+        value.ok_or_else(|| whole(format!("`{key}` is missing or not finite: no ESRI ASCII grid")))
+    };
+    let [columns, rows] = [needed("ncols")?, needed("nrows")?];
+    let corner = [needed("xllcorner")?, needed("yllcorner")?];
+    let cell_m = needed("cellsize")?;
+    if !(columns >= 1.0 && rows >= 1.0 && cell_m > 0.0) {
+        return Err(whole("a grid has cells of a size above 0".into()));
+    }
+    let (columns, rows) = (columns as usize, rows as usize);
+    let nothing = find("nodata_value");
+    let mut heights = Vec::new();
+    for (number, line) in lines {
+        let row = text::numbers(path, number, line)?;
+        if row.len() != columns {
+            let what = format!("{columns} heights expected, {} found", row.len());
+            return Err(Error::input(path, format!("line {number}"), what));
+        }
+        let height = |z: f64| if Some(z) == nothing { f32::NAN } else { z as f32 };
+        heights.push(row.into_iter().map(height).collect::<Vec<_>>());
+    }
+    if heights.len() != rows {
+        return Err(whole(format!("{rows} rows of heights expected, {} found", heights.len())));
+    }
+    heights.reverse();
+    Ok(Ground { corner, cell_m, columns, heights: heights.concat() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: &str = "\
+ncols 3
+nrows 2
+xllcorner -1.5
+yllcorner 4
+cellsize 2
+NODATA_value -9999
+0.5 0.6 -9999
+1 nan 3
+";
+
+    #[test]
+    fn a_grid_is_read_from_the_north() {
+        let ground = parse(Path::new("g.asc"), GRID).unwrap();
+        let map = ground.map();
+        let heights = [[-1.0, 4.5], [4.0, 5.9], [-1.0, 6.1], [1.0, 7.0]];
+        let found = heights.map(|[x, y]| map.height(x, y));
+        assert_eq!(found, [Some(1.0), Some(3.0), Some(0.5), Some(0.6)]);
+        for [x, y] in [[4.0, 7.0], [1.0, 5.0], [-1.6, 5.0], [0.0, 8.1], [0.0, 3.9], [4.6, 5.0]] {
+            assert_eq!(map.height(x, y), None, "{x}, {y}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_grid() {
+        let wrong = [
+            ("cellsize 2", "", "`cellsize`"),
+            ("cellsize 2", "cellsize -2", "above 0"),
+            ("ncols 3", "ncols 4", "line 7: 4 heights expected, 3 found"),
+            ("nrows 2", "nrows 3", "3 rows"),
+            ("nrows 2", "nrows two", "line 2: `two` is no number"),
+            ("1 nan 3", "1 x 3", "line 8: `x` is no number"),
+        ];
+        for (from, to, what) in wrong {
+            let e = parse(Path::new("g.asc"), &GRID.replace(from, to)).unwrap_err().to_string();
+            assert!(e.contains("g.asc") && e.contains(what), "{e}");
+        }
+        assert!(parse(Path::new("g.asc"), "").is_err());
+    }
+}

@@ -1,0 +1,208 @@
+//! Every tracker over every object.
+
+use super::entropy::entropy;
+use super::errors::Errors;
+use super::extent::extent;
+use super::object::{Moment, Object, moment_at};
+use super::tracker::{Track, baseline, baseline_live, fixed_lag, motion};
+use crate::labels::Kind;
+use raywake_core::objects::centroid_ekf::CentroidParams;
+use raywake_core::objects::estimate::{Cost, EstimateParams, Estimator, Stop};
+use raywake_core::objects::{ObjectReturn, ObjectState};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// A tracker with its numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// The extended Kalman filter of centroids, its states revised by what it learns later.
+    Baseline,
+    /// The same as it is at the time.
+    BaselineLive,
+    /// Trajectory and shape together.
+    Proposed(EstimateParams),
+    /// The same over the last seconds, after every batch, as on board: judged by the states it has
+    /// at the time.
+    FixedLag(EstimateParams),
+}
+
+/// The trackers of the tables and their names.
+pub fn methods() -> [(&'static str, Method); 8] {
+    let of =
+        |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
+    let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
+    [
+        ("baseline EKF", Method::Baseline),
+        ("as printed, n_m = 300", of(printed, 300)),
+        ("as printed, n_m = 3000", of(printed, 3000)),
+        ("ours, n_m = 300", of(ours, 300)),
+        ("ours, n_m = 3000", of(ours, 3000)),
+        ("ours, carved by rays", Method::Proposed(EstimateParams { carves: true, ..ours })),
+        ("baseline EKF, at the time", Method::BaselineLive),
+        ("ours, fixed lag", Method::FixedLag(ours)),
+    ]
+}
+
+/// Index of our tracker of 300 points in [`methods`].
+pub const OURS: usize = 3;
+
+/// How one tracker did on one object.
+#[derive(Clone, Debug)]
+pub struct Score {
+    /// Against what is known.
+    pub errors: Errors,
+    /// Of the whole cloud, nats.
+    pub entropy: f64,
+    /// Length, width, height of the cloud, m.
+    pub extent: [f64; 3],
+    /// At the start and after each iteration; empty for the baseline.
+    pub costs: Vec<Cost>,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Time of the estimate, or of all of them where there is one a batch, s; 0 for the baseline.
+    pub seconds: f64,
+}
+
+/// How all trackers did on one object.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Drive and number.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+    /// Length, width and height of its box, m.
+    pub size: [f64; 3],
+    /// Whether it stands.
+    pub stationary: bool,
+    /// Its returns.
+    pub returns: usize,
+    /// Seen for so long, s.
+    pub span_s: f64,
+    /// Mean range of its returns, m.
+    pub range_m: f64,
+    /// By how much its true headings differ, rad.
+    pub turned_rad: f64,
+    /// Entropy of its cloud by its true trajectory, nats.
+    pub entropy: f64,
+    /// Extent of that cloud, m.
+    pub extent: [f64; 3],
+    /// In the order of [`methods`].
+    pub scores: Vec<Score>,
+}
+
+/// What a tracker did.
+pub struct Run {
+    /// What it makes of the object.
+    pub track: Track,
+    costs: Vec<Cost>,
+    stop: Stop,
+    seconds: f64,
+}
+
+/// Runs a tracker.
+pub fn track(
+    object: &Object,
+    history: &[ObjectState],
+    method: &Method,
+    estimator: &mut Estimator,
+) -> Run {
+    let begin = Instant::now();
+    let done = |track: Track, seconds: f64| Run {
+        track,
+        costs: Vec::new(),
+        stop: Stop::default(),
+        seconds,
+    };
+    let live = match method {
+        Method::Baseline => return done(Track::of(object, motion(history)), 0.0),
+        Method::Proposed(params) => {
+            let report = estimator.solve(params, &object.returns, history);
+            let seconds = begin.elapsed().as_secs_f64();
+            let track = Track::of(object, |t| estimator.state(t).into());
+            let costs = report.costs.to_vec();
+            return Run { costs, stop: report.stop, ..done(track, seconds) };
+        }
+        Method::BaselineLive => baseline_live(object, &CentroidParams::dissertation()),
+        Method::FixedLag(params) => fixed_lag(object, params, estimator),
+    };
+    let seconds = begin.elapsed().as_secs_f64();
+    // Judged by its states themselves, with the cloud by what joins them.
+    let moments = live.iter().map(|s| Moment::from(*s)).collect();
+    done(Track { moments, ..Track::of(object, motion(&live)) }, seconds)
+}
+
+/// What a tracker makes of an object, measured.
+fn score(
+    object: &Object,
+    history: &[ObjectState],
+    method: &Method,
+    estimator: &mut Estimator,
+) -> Score {
+    let Run { track, costs, stop, seconds } = track(object, history, method, estimator);
+    let errors = match object.stationary {
+        true => Errors::standing(&track.moments),
+        false => Errors::moving(&track.moments, &object.truth),
+    };
+    let (entropy, extent) = (entropy(&track.cloud), extent(&track.cloud));
+    Score { errors, entropy, extent, costs, stop, seconds }
+}
+
+fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) -> Outcome {
+    let really = Track::of(object, |t| moment_at(&object.truth, t));
+    let range = |r: &ObjectReturn| {
+        let [x, y, z] = [0, 1, 2].map(|i| f64::from(r.position[i] - r.origin[i]));
+        (x * x + y * y + z * z).sqrt()
+    };
+    let headings =
+        |of: fn(f64, f64) -> f64| object.truth.iter().map(|m| m.heading).reduce(of).unwrap_or(0.0);
+    let ranges: f64 = object.returns.iter().map(range).sum();
+    Outcome {
+        name: object.name.clone(),
+        kind: object.kind,
+        size: object.size,
+        stationary: object.stationary,
+        returns: object.returns.len(),
+        span_s: object.span_s(),
+        range_m: ranges / object.returns.len() as f64,
+        turned_rad: headings(f64::max) - headings(f64::min),
+        entropy: entropy(&really.cloud),
+        extent: extent(&really.cloud),
+        scores: methods().iter().map(|(_, m)| score(object, history, m, estimator)).collect(),
+    }
+}
+
+/// Stack of a thread that estimates: unoptimised builds make the estimator there before it moves to
+/// the heap.
+const STACK: usize = 64 << 20;
+
+/// The baseline's history of every object.
+pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
+    objects.iter().map(|o| baseline(o, &CentroidParams::dissertation())).collect()
+}
+
+/// Evaluates all trackers on all objects, with the baseline's history of each, `jobs` at a time; in
+/// the order of the objects.
+pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize) -> Vec<Outcome> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        let mut estimator = Box::new(Estimator::new());
+        loop {
+            let n = next.fetch_add(1, Ordering::Relaxed);
+            let (Some(object), Some(history)) = (objects.get(n), histories.get(n)) else {
+                return;
+            };
+            let outcome = outcome(object, history, &mut estimator);
+            done.lock().expect("no thread panics with it").push((n, outcome));
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, objects.len().max(1)) {
+            let thread = std::thread::Builder::new().stack_size(STACK);
+            thread.spawn_scoped(scope, work).expect("the system has threads");
+        }
+    });
+    let mut done = done.into_inner().expect("no thread panicked with it");
+    done.sort_by_key(|(n, _)| *n);
+    done.into_iter().map(|(_, outcome)| outcome).collect()
+}

@@ -1,0 +1,163 @@
+//! Simulated sets kept in a file: to cast them again takes minutes.
+//!
+//! Little-endian: what was asked for, then every object's head, returns, ends of batches and truth,
+//! then a checksum of it all.
+
+use super::object::{Moment, Object};
+use super::simulated::{Sets, Wanted, rule, simulate};
+use crate::labels::Kind;
+use glam::DVec3;
+use raywake::error::Error;
+use raywake::sink::atomic;
+use raywake_core::digest::Digest;
+use raywake_core::objects::ObjectReturn;
+use std::io::Write;
+use std::path::Path;
+
+/// Counts changes of the simulator and of the format: files of another number are made anew.
+const VERSION: u32 = 1;
+
+/// The sets of a seed from a folder, or simulated and left there.
+///
+/// Fails where the folder cannot be written. A file that is damaged, or made of something else, is
+/// made anew.
+pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
+    let path = folder.join(format!("objects-{seed}.bin"));
+    let key = key(seed, wanted);
+    if let Some(sets) = std::fs::read(&path).ok().and_then(|bytes| read(&bytes, key)) {
+        return Ok(sets);
+    }
+    let sets = simulate(seed, wanted);
+    atomic::create_folder(folder)?;
+    atomic::write(&path, |out| out.write_all(&write(&sets, key)))?;
+    Ok(sets)
+}
+
+/// What decides the objects.
+pub fn key(seed: u64, wanted: &Wanted) -> u64 {
+    Digest::of(format!("{VERSION} {seed} {wanted:?} {}", rule()).as_bytes())
+}
+
+fn write(sets: &Sets, key: u64) -> Vec<u8> {
+    let mut out = key.to_le_bytes().to_vec();
+    for objects in [&sets.stationary, &sets.moving] {
+        count(&mut out, objects.len());
+        objects.iter().for_each(|object| write_object(&mut out, object));
+    }
+    let check = Digest::of(&out);
+    out.extend(check.to_le_bytes());
+    out
+}
+
+fn count(out: &mut Vec<u8>, n: usize) {
+    out.extend((n as u64).to_le_bytes());
+}
+
+fn write_object(out: &mut Vec<u8>, o: &Object) {
+    count(out, o.name.len());
+    out.extend(o.name.as_bytes());
+    let kind = Kind::ALL.iter().position(|k| *k == o.kind).unwrap_or(0);
+    count(out, kind);
+    count(out, usize::from(o.stationary));
+    let head = o.size.into_iter().chain(o.anchor.to_array()).chain([o.start_s]);
+    out.extend(head.flat_map(f64::to_le_bytes));
+    count(out, o.returns.len());
+    for r in &o.returns {
+        let numbers = r.position.into_iter().chain(r.origin).chain([r.time_s]);
+        out.extend(numbers.flat_map(f32::to_le_bytes));
+        out.extend(r.sensor.to_le_bytes());
+    }
+    count(out, o.batches.len());
+    o.batches.iter().for_each(|b| count(out, b.end));
+    count(out, o.truth.len());
+    for m in &o.truth {
+        let numbers = [m.time_s, m.heading, m.turn_rate].into_iter();
+        let numbers = numbers.chain(m.position.to_array()).chain(m.velocity.to_array());
+        out.extend(numbers.flat_map(f64::to_le_bytes));
+    }
+}
+
+/// The sets of a file; none where it is damaged or has another key.
+pub fn read(bytes: &[u8], key: u64) -> Option<Sets> {
+    let (content, check) = bytes.split_last_chunk::<8>()?;
+    if u64::from_le_bytes(*check) != Digest::of(content) {
+        return None;
+    }
+    let mut left = Left(content);
+    if left.word()? != key {
+        return None;
+    }
+    Some(Sets { stationary: left.all(Left::object)?, moving: left.all(Left::object)? })
+}
+
+/// What is not read yet.
+struct Left<'a>(&'a [u8]);
+
+impl Left<'_> {
+    fn chunk<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (chunk, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*chunk)
+    }
+
+    fn word(&mut self) -> Option<u64> {
+        self.chunk().map(u64::from_le_bytes)
+    }
+
+    fn count(&mut self) -> Option<usize> {
+        usize::try_from(self.word()?).ok()
+    }
+
+    /// A count and so many of something.
+    fn all<T>(&mut self, one: impl Fn(&mut Self) -> Option<T>) -> Option<Vec<T>> {
+        let count = self.count()?;
+        (0..count).map(|_| one(self)).collect()
+    }
+
+    fn doubles<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut all = [0.0; N];
+        for value in &mut all {
+            *value = f64::from_le_bytes(self.chunk()?);
+        }
+        Some(all)
+    }
+
+    fn object(&mut self) -> Option<Object> {
+        let name = String::from_utf8(self.all(|left| left.chunk::<1>().map(|[b]| b))?).ok()?;
+        let kind = *Kind::ALL.get(self.count()?)?;
+        let stationary = self.count()? == 1;
+        let [length, width, height, x, y, z, start_s] = self.doubles()?;
+        let returns = self.all(Left::one_return)?;
+        let ends = self.all(Left::count)?;
+        let starts = [0].into_iter().chain(ends.iter().copied());
+        let batches = starts.zip(ends.iter().copied()).map(|(a, b)| a..b).collect();
+        let truth = self.all(Left::moment)?;
+        Some(Object {
+            name,
+            kind,
+            size: [length, width, height],
+            stationary,
+            anchor: DVec3::new(x, y, z),
+            start_s,
+            returns,
+            batches,
+            truth,
+        })
+    }
+
+    fn one_return(&mut self) -> Option<ObjectReturn> {
+        let mut v = [0.0; 7];
+        for value in &mut v {
+            *value = f32::from_le_bytes(self.chunk()?);
+        }
+        let sensor = u32::from_le_bytes(self.chunk()?);
+        let [x, y, z, ox, oy, oz, time_s] = v;
+        Some(ObjectReturn { position: [x, y, z], origin: [ox, oy, oz], time_s, sensor })
+    }
+
+    fn moment(&mut self) -> Option<Moment> {
+        let [time_s, heading, turn_rate, x, y, z, vx, vy, vz] = self.doubles()?;
+        let (position, velocity) = (DVec3::new(x, y, z), DVec3::new(vx, vy, vz));
+        Some(Moment { time_s, position, heading, velocity, turn_rate })
+    }
+}

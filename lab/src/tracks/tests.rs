@@ -1,0 +1,103 @@
+use super::evaluate::{OURS, Outcome, evaluate, histories, methods};
+use super::kept;
+use super::object::{centroid, moment_at};
+use super::simulated::{Sets, Wanted, simulate};
+use super::tables;
+use crate::labels::Kind;
+use crate::scratch::Scratch;
+use glam::DVec3;
+use std::fs;
+use std::sync::OnceLock;
+
+fn wanted() -> Wanted {
+    let moving = [Kind::Car, Kind::Truck, Kind::Cyclist, Kind::Pedestrian];
+    Wanted { parked: 5, moving: moving.map(|kind| (kind, 1)).into() }
+}
+
+/// Of one drive; to cast it takes seconds.
+fn small() -> &'static Sets {
+    static SETS: OnceLock<Sets> = OnceLock::new();
+    SETS.get_or_init(|| simulate(1, &wanted()))
+}
+
+#[test]
+fn sets_have_what_is_asked_for_and_are_the_same_again() {
+    let sets = small();
+    assert_eq!((sets.stationary.len(), sets.moving.len()), (5, 4));
+    let mut kinds: Vec<Kind> = sets.moving.iter().map(|o| o.kind).collect();
+    kinds.sort();
+    assert_eq!(kinds, [Kind::Car, Kind::Truck, Kind::Cyclist, Kind::Pedestrian]);
+    for object in sets.stationary.iter().chain(&sets.moving) {
+        assert!(object.span_s() > 3.8 && object.span_s() < 6.6, "{}", object.name);
+        assert!(object.returns.is_sorted_by(|a, b| a.time_s <= b.time_s));
+        assert_eq!(object.batches.iter().map(|b| b.len()).sum::<usize>(), object.returns.len());
+        // Its returns lie on it, all along.
+        let half = 0.5 * DVec3::from_array(object.size) + 0.35;
+        for (time_s, at) in object.batches().map(centroid) {
+            let off = moment_at(&object.truth, time_s).project(at);
+            assert!(off.abs().cmple(half).all(), "{}: {off} at {time_s} s", object.name);
+        }
+    }
+    let scratch = Scratch::new();
+    // Simulated anew, then read.
+    for _ in 0..2 {
+        assert!(kept::sets(scratch.path(), 1, &wanted()).unwrap() == *sets);
+    }
+    let file = scratch.path().join("objects-1.bin");
+    let whole = fs::read(&file).unwrap();
+    assert!(kept::read(&whole, kept::key(1, &wanted())).is_some());
+    let mut damaged = whole.clone();
+    damaged[whole.len() / 2] ^= 1;
+    for bad in [&damaged[..], &whole[..whole.len() / 2], &[]] {
+        assert!(kept::read(bad, kept::key(1, &wanted())).is_none());
+    }
+    assert!(kept::read(&whole, kept::key(2, &wanted())).is_none(), "other drives");
+}
+
+/// Errors by kind of the baseline and of ours: m, m/s, rad, rad/s, nats above the truth's.
+const PINNED: &str = "\
+Car: 0.247 0.218 0.292 0.016 0.618 | 0.002 0.003 0.001 0.002 0.000
+Car: 0.463 1.061 0.177 0.067 0.400 | 0.037 0.111 0.002 0.004 -0.011
+Car: 0.896 0.850 0.441 0.095 0.486 | 0.010 0.017 0.002 0.003 -0.006
+Car: 1.190 0.928 0.397 0.101 0.490 | 0.027 0.021 0.002 0.003 -0.011
+Car: 1.254 0.874 0.625 0.220 0.634 | 0.029 0.023 0.002 0.004 -0.011
+Car: 0.011 0.045 0.003 0.003 0.015 | 0.010 0.025 0.002 0.004 -0.002
+Truck: 1.442 0.882 0.036 0.023 1.071 | 0.050 0.052 0.005 0.006 -0.004
+Cyclist: 0.104 0.152 0.009 0.006 0.001 | 0.016 0.019 0.002 0.003 -0.036
+Pedestrian: 0.208 0.329 0.017 0.007 -0.060 | 0.040 0.188 0.006 0.010 -0.076
+";
+
+#[test]
+fn pinned_errors() {
+    let objects = [small().stationary.clone(), small().moving.clone()].concat();
+    let outcomes = evaluate(&objects, &histories(&objects), 2);
+    let row = |o: &Outcome| {
+        let of = |n: usize| {
+            let (score, r) = (&o.scores[n], o.scores[n].errors.rmse());
+            let numbers = [r.position, r.velocity, r.heading, r.turn_rate];
+            let numbers = numbers.into_iter().chain([score.entropy - o.entropy]);
+            numbers.map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(" ")
+        };
+        format!("{:?}: {} | {}\n", o.kind, of(0), of(OURS))
+    };
+    let found: String = outcomes.iter().map(row).collect();
+    assert_eq!(found, PINNED, "\n{found}");
+}
+
+#[test]
+fn tables_have_a_row_for_every_tracker() {
+    let objects = &small().stationary[..2];
+    let outcomes = evaluate(objects, &histories(objects), 1);
+    let set =
+        tables::Set { id: "stationary".into(), name: "simulated, stationary".into(), outcomes };
+    let text = tables::errors(&set).text();
+    for (name, _) in methods() {
+        assert!(text.contains(name), "{text}");
+    }
+    assert!(text.contains("0.388") && text.contains("2 objects"), "{text}");
+    // Against itself the baseline is never better, and closes nothing.
+    assert_eq!((set.better(0, |r| r.position), set.gap_closed(0)), (0.0, 0.0));
+    assert!(set.better(OURS, |r| r.position) > 0.5 && set.gap_closed(OURS) > 0.3);
+    let entropies = tables::entropies(&[set]).text();
+    assert!(entropies.contains("1.920") && entropies.contains("42"), "{entropies}");
+}

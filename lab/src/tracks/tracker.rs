@@ -1,0 +1,97 @@
+//! The trackers that are compared, each run over one object.
+
+use super::object::{Moment, Object, centroid, moment_at};
+use crate::labels::turn;
+use glam::DVec3;
+use raywake_core::objects::centroid_ekf::{CentroidEkf, CentroidParams, Revision};
+use raywake_core::objects::estimate::{EstimateParams, Estimator, FixedLag};
+use raywake_core::objects::{ObjectReturn, ObjectState};
+
+/// What a tracker makes of an object.
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    /// At the mean time of every batch.
+    pub moments: Vec<Moment>,
+    /// Every return in the object's frame, m, by the pose at its own time.
+    pub cloud: Vec<[f32; 3]>,
+}
+
+impl Track {
+    /// Of a motion: at the times of the object's batches, and of each of its returns.
+    pub fn of(object: &Object, mut at: impl FnMut(f64) -> Moment) -> Track {
+        let moments = object.batches().map(|batch| at(centroid(batch).0)).collect();
+        let project = |r: &ObjectReturn| {
+            let place = DVec3::from_array(r.position.map(f64::from));
+            at(f64::from(r.time_s)).project(place).as_vec3().to_array()
+        };
+        let cloud = object.returns.iter().map(project).collect();
+        Track { moments, cloud }
+    }
+}
+
+/// The baseline of section 2.4: states after every batch, the centroid of which the filter takes for
+/// the object's position. Where it finds out later which way the object looks, its earlier states
+/// are revised, as they are for the proposed tracker's start.
+pub fn baseline(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
+    let mut history = Vec::new();
+    follow(object, params, |state, revision, _| {
+        revision.revise(&state, &mut history);
+        history.push(state);
+    });
+    history
+}
+
+/// The baseline without revisions: what it knows at the time.
+pub fn baseline_live(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
+    let mut history = Vec::new();
+    follow(object, params, |state, _, _| history.push(state));
+    history
+}
+
+/// The estimate of the last seconds after every batch, with the baseline as it is at that time.
+pub fn fixed_lag(
+    object: &Object,
+    params: &EstimateParams,
+    estimator: &mut Estimator,
+) -> Vec<ObjectState> {
+    let (mut filter, mut history) = (Box::new(FixedLag::new()), Vec::new());
+    follow(object, &CentroidParams::dissertation(), |state, _, batch| {
+        history.push(filter.push(estimator, params, batch, &state));
+    });
+    history
+}
+
+/// Shows the baseline's state after every batch, and what it says of those before.
+fn follow(
+    object: &Object,
+    params: &CentroidParams,
+    mut show: impl FnMut(ObjectState, Revision, &[ObjectReturn]),
+) {
+    let mut filter: Option<CentroidEkf> = None;
+    for batch in object.batches() {
+        let (time_s, at) = centroid(batch);
+        let at = at.to_array();
+        match &mut filter {
+            None => {
+                let born = CentroidEkf::birth(params, time_s, at);
+                show(born.state(), Revision::None, batch);
+                filter = Some(born);
+            }
+            Some(filter) => {
+                filter.predict(params, time_s);
+                let revision = filter.update(params, at);
+                show(filter.state(), revision, batch);
+            }
+        }
+    }
+}
+
+/// The motion of a history of states, between two of them on the line that joins them.
+pub fn motion(history: &[ObjectState]) -> impl Fn(f64) -> Moment + use<> {
+    let mut moments: Vec<Moment> = history.iter().map(|s| Moment::from(*s)).collect();
+    for n in 1..moments.len() {
+        let last = moments[n - 1].heading;
+        moments[n].heading = last + turn(last, moments[n].heading);
+    }
+    move |time_s| moment_at(&moments, time_s)
+}
