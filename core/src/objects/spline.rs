@@ -40,8 +40,8 @@ pub struct Laid {
 }
 
 impl Knots {
-    /// No knots, of a place that waits for them.
-    pub const NONE: Knots = Knots { start: 0.0, spacing: 1.0, pieces: 1 };
+    /// No knots, of a place that waits for them: no splines are over these.
+    pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
     /// One basis function for each `every` seconds from `start` to `end`, five at least and
     /// [`BASES_MAX`] at most.
@@ -151,4 +151,104 @@ fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
         values[p] = carried;
     }
     values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// (2.16) and (2.17) as they are written.
+    fn defined(knots: &Knots, i: usize, p: usize, x: f64) -> f64 {
+        let t = |i| knots.knot(i);
+        if p == 0 {
+            return if t(i) <= x && x < t(i + 1) { 1.0 } else { 0.0 };
+        }
+        (x - t(i)) / (t(i + p) - t(i)) * defined(knots, i, p - 1, x)
+            + (t(i + p + 1) - x) / (t(i + p + 1) - t(i + 1)) * defined(knots, i + 1, p - 1, x)
+    }
+
+    #[test]
+    fn basis_is_that_of_the_recursion() {
+        let mut random = Random(3);
+        for (start, end) in [(0.0, 6.05), (-3.0, 1.0), (100.0, 100.4)] {
+            let (knots, _) = Knots::over(start, end, 0.5);
+            for _ in 0..200 {
+                let time = start + (end - start) * random.uniform();
+                let basis = knots.basis(time);
+                for i in 0..knots.bases() {
+                    let value = i
+                        .checked_sub(basis.first)
+                        .and_then(|i| basis.values.get(i))
+                        .unwrap_or(&0.0);
+                    assert!((value - defined(&knots, i, DEGREE, time)).abs() < 1e-9, "{i} {time}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn basis_sums_to_one_and_holds_ends() {
+        let (knots, _) = Knots::over(2.0, 8.0, 0.5);
+        assert_eq!((knots.bases(), knots.start(), knots.end()), (12, 2.0, 8.0));
+        for i in -20..=120 {
+            let basis = knots.basis(2.0 + 0.06 * f64::from(i));
+            assert!((basis.values.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+            assert!(basis.first + SUPPORT <= knots.bases());
+        }
+        assert_eq!(knots.basis(0.0), knots.basis(2.0));
+        assert_eq!(knots.basis(9.0), knots.basis(8.0));
+    }
+
+    #[test]
+    fn slopes_are_differences() {
+        let (knots, _) = Knots::over(0.0, 3.0, 0.25);
+        let step = 1e-6;
+        for i in 1..50 {
+            let u = f64::from(i) / 50.0;
+            let (values, slopes) = knots.shape(u);
+            let (more, _) = knots.shape(u + step);
+            let (less, _) = knots.shape(u - step);
+            let basis = knots.basis(u * knots.spacing()).values;
+            for k in 0..SUPPORT {
+                let slope = (more[k] - less[k]) / (2.0 * step * knots.spacing());
+                assert!((slope - slopes[k]).abs() < 1e-7);
+                assert!((values[k] - basis[k]).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn de_boor_is_the_weighted_sum() {
+        let mut random = Random(4);
+        let (knots, _) = Knots::over(-1.0, 9.3, 0.5);
+        let mut weights = [[0.0; 2]; BASES_MAX];
+        weights.as_flattened_mut().fill_with(|| random.normal());
+        for _ in 0..200 {
+            let time = -2.0 + 12.0 * random.uniform();
+            let basis = knots.basis(time);
+            let value = knots.value(&weights, time);
+            for d in 0..2 {
+                let sum: f64 =
+                    (0..SUPPORT).map(|i| basis.values[i] * weights[basis.first + i][d]).sum();
+                assert!((sum - value[d]).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn short_tracks_compress_and_long_ones_stretch() {
+        let laid = |domain: f64| {
+            let (knots, laid) = Knots::over(0.0, domain, 0.5);
+            (knots.bases(), laid.compressed, laid.stretched)
+        };
+        assert_eq!(laid(0.0), (5, true, false));
+        assert_eq!(laid(2.4), (5, true, false));
+        assert_eq!(laid(2.5), (5, false, false));
+        assert_eq!(laid(2.6), (6, false, false));
+        assert_eq!(laid(32.0), (BASES_MAX, false, false));
+        assert_eq!(laid(1e6), (BASES_MAX, false, true));
+        let (knots, _) = Knots::over(5.0, 5.0, 0.5);
+        assert_eq!(knots.end(), 5.0 + DOMAIN_MIN_S);
+    }
 }

@@ -52,11 +52,11 @@ const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
 
-/// Growth from the middle of a track: how far it reaches at first and with every step, s; deviation
-/// of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
+/// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
+/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
 /// dense one holds it.
-const GROWTH_FIRST_S: f64 = 0.4;
 const GROWTH_S: f64 = 0.2;
+const GROWTHS_MAX: f64 = 64.0;
 const GROWTH_M: f64 = 0.15;
 const GROWTH_POINTS: usize = 75;
 /// Models that are made of what is seen by then, and iterations with each.
@@ -64,6 +64,17 @@ const GROWTH_FIRST_ROUNDS: usize = 6;
 const GROWTH_FIRST_ITERATIONS: usize = 6;
 const GROWTH_ROUNDS: usize = 2;
 const GROWTH_ITERATIONS: usize = 2;
+
+/// Rounds of carving, rays that carve, how far beside a model point and how far before their ends
+/// they may pass it, m, how steeply through its surface (cosine), how thin that is at least
+/// (precision by that of a return), and by what a point outweighs its rays.
+const CARVINGS: usize = 3;
+const RAYS: usize = 1000;
+const BESIDE_M: f64 = 0.12;
+const BEFORE_M: f64 = 0.25;
+const CROSSES: f64 = 0.2;
+const THIN: f64 = 0.05;
+const SHARE: usize = 8;
 
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,13 +92,8 @@ pub struct EstimateParams {
     pub extent_m: f64,
     /// Standard deviation of a return about its model point (`σ_z`), m.
     pub deviation_m: f64,
-    /// Iterations at that deviation, at most.
+    /// Iterations at most.
     pub iterations: usize,
-    /// Stages before, each with a model of its own: the deviation falls evenly from
-    /// `first_deviation_m` to `deviation_m`.
-    pub stages: usize,
-    /// See `stages`, m.
-    pub first_deviation_m: f64,
     /// A return further off than so many deviations counts for a quarter; 0 for no robust loss.
     pub robust: f64,
     /// Steps that raise the cost are taken back and damped (Levenberg and Marquardt).
@@ -98,6 +104,8 @@ pub struct EstimateParams {
     pub loose_m: f64,
     /// The start is smoothed with the process model, and one at rest is tried beside it.
     pub starts: bool,
+    /// Model points that rays went through are taken away, and the rest is estimated again.
+    pub carves: bool,
     /// The start grows from the middle of the track, see [`Estimator::grow`].
     pub grows: bool,
 }
@@ -113,13 +121,12 @@ impl EstimateParams {
             extent_m: 10.0,
             deviation_m: 0.5,
             iterations: 10,
-            stages: 0,
-            first_deviation_m: 0.5,
             robust: 0.0,
             damping: false,
             surfaces: false,
             loose_m: 0.0,
             starts: false,
+            carves: false,
             grows: false,
         }
     }
@@ -129,8 +136,6 @@ impl Default for EstimateParams {
     fn default() -> EstimateParams {
         EstimateParams {
             deviation_m: 0.05,
-            stages: 2,
-            first_deviation_m: 0.2,
             robust: 0.0,
             damping: true,
             surfaces: true,
@@ -153,8 +158,6 @@ pub struct Cost {
     pub returns: f64,
     /// Mean distance of a return from its model point, m.
     pub residual_m: f64,
-    /// Standard deviation of a return that this was reckoned with, m.
-    pub deviation_m: f64,
 }
 
 impl Cost {
@@ -167,7 +170,7 @@ impl Cost {
 /// Why a solve stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
-    /// No return is finite: there is no estimate.
+    /// No return is sound: there is no estimate.
     #[default]
     NoReturns,
     /// The cost fell no more.
@@ -191,10 +194,12 @@ pub struct Report {
     pub returns: usize,
     /// Returns left out because there were more.
     pub thinned: usize,
-    /// Returns left out because they or their times are not finite.
-    pub not_finite: usize,
+    /// Returns left out because they or their times are no numbers, or beyond 100 km and a day.
+    pub unsound: usize,
     /// Returns that took part, and lie further from the object's origin than the prior's `extent_m`.
     pub outside: usize,
+    /// Model points that were taken away because rays went through them.
+    pub carved: usize,
     /// The knots are nearer together than asked for: the track is short.
     pub compressed: bool,
     /// They are further apart: the track is long.
@@ -264,7 +269,7 @@ impl Default for Estimator {
 }
 
 impl Estimator {
-    /// An empty one.
+    /// An empty one, all zeros: a static of it takes no room in a binary.
     pub const fn new() -> Estimator {
         Estimator {
             knots: Knots::NONE,
@@ -297,7 +302,7 @@ impl Estimator {
         self.best.weights.fill([0.0; 7]);
         self.best.points = 0;
         let Some(taken) = self.returns.take(returns, params.returns) else {
-            report.not_finite = returns.len();
+            report.unsound = returns.len();
             return report;
         };
         let (knots, Laid { compressed, stretched }) =
@@ -305,8 +310,8 @@ impl Estimator {
         self.knots = knots;
         self.returns.lay(&knots);
         report.returns = self.returns.all().len();
-        report.not_finite = taken.not_finite;
-        report.thinned = returns.len() - taken.not_finite - report.returns;
+        report.unsound = taken.unsound;
+        report.thinned = returns.len() - taken.unsound - report.returns;
         (report.compressed, report.stretched) = (compressed, stretched);
 
         report.no_history = !self.start(params, history);
@@ -329,8 +334,12 @@ impl Estimator {
         report
     }
 
-    /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end.
+    /// State of the object at `time_s`. Outside the time of its returns it goes on as at the end; all
+    /// zeros where there is no estimate.
     pub fn state(&self, time_s: f64) -> ObjectState {
+        if self.knots == Knots::NONE {
+            return ObjectState { time_s, ..ObjectState::default() };
+        }
         let inside = time_s.clamp(self.knots.start(), self.knots.end());
         state(&self.knots, &self.best.weights, inside, time_s)
     }
@@ -374,28 +383,35 @@ impl Estimator {
         self.now.weights[..self.knots.bases()].fill(mean.map(|sum| sum / count));
     }
 
-    /// All stages of a solve from the trajectory in `now`.
+    /// A solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
         report.iterations = 0;
         self.active = 0..self.returns.all().len();
-        let ratio = params.first_deviation_m / params.deviation_m;
-        for stage in (0..=params.stages).rev() {
-            let share = stage as f64 / params.stages.max(1) as f64;
-            let deviation = params.deviation_m * libm::pow(ratio, share);
-            self.extract(params, params.model, deviation);
-            report.stop = self.descend(params, deviation, params.iterations, Some(report));
+        self.extract(params);
+        report.stop = self.descend(params, params.iterations, Some(report));
+        if params.carves {
+            for _ in 0..CARVINGS {
+                let carved = self.carve(params.deviation_m);
+                report.carved += carved;
+                if carved == 0 {
+                    break;
+                }
+                report.stop = self.descend(params, params.iterations, Some(report));
+            }
         }
     }
 
     /// From the middle of the returns outwards: what is seen next is laid over the model of what was
     /// seen so far, starting where the process model puts it.
     fn grow(&mut self, params: &EstimateParams) {
+        let sparse = &EstimateParams { model: GROWTH_POINTS, deviation_m: GROWTH_M, ..*params };
         let all = self.returns.all();
         let time = |i: usize| f64::from(all[i].time_s);
         let middle = time(all.len() / 2);
         let (first, last) = (self.knots.start(), self.knots.end());
-        let mut reach = GROWTH_FIRST_S;
+        let by = GROWTH_S.max((last - first) / GROWTHS_MAX);
+        let mut reach = 2.0 * by;
         let mut begun = false;
         loop {
             let all = self.returns.all();
@@ -403,26 +419,26 @@ impl Estimator {
             self.active = all.partition_point(|kept| f64::from(kept.time_s) < from)
                 ..all.partition_point(|kept| f64::from(kept.time_s) <= to);
             if begun {
-                self.descend(params, GROWTH_M, GROWTH_ITERATIONS, None);
+                self.descend(sparse, GROWTH_ITERATIONS, None);
             }
             let rounds = if begun { GROWTH_ROUNDS } else { GROWTH_FIRST_ROUNDS };
             for _ in 0..rounds {
-                self.extract(params, GROWTH_POINTS, GROWTH_M);
+                self.extract(sparse);
                 let iterations = if begun { GROWTH_ITERATIONS } else { GROWTH_FIRST_ITERATIONS };
-                self.descend(params, GROWTH_M, iterations, None);
+                self.descend(sparse, iterations, None);
             }
             if from <= first && to >= last {
                 break;
             }
             begun = true;
-            reach += GROWTH_S;
+            reach += by;
         }
     }
 
     /// Model points from the returns: so many of them, evenly in the order of time.
-    fn extract(&mut self, params: &EstimateParams, points: usize, deviation: f64) {
+    fn extract(&mut self, params: &EstimateParams) {
         let kept = &self.returns.all()[self.active.clone()];
-        let points = points.clamp(1, MODEL_MAX).min(kept.len());
+        let points = params.model.clamp(1, MODEL_MAX).min(kept.len());
         for (kept, seen) in kept.iter().zip(&mut self.seen) {
             *seen = Seen::look(&self.now.weights, kept);
         }
@@ -431,25 +447,68 @@ impl Estimator {
             *model = self.seen[nth].place().map(|value| value as f32);
         }
         let surface = Surface {
-            precision: [1.0 / (deviation * deviation); 3],
             held: 1.0 / (params.extent_m * params.extent_m),
-            ..Surface::NONE
+            ..Surface::round(1.0 / (params.deviation_m * params.deviation_m))
         };
         self.now.surfaces[..points].fill(surface);
         self.now.points = points;
     }
 
-    /// Gauss-Newton iterations with one deviation.
+    /// Takes away model points that rays went through: points of a surface, seen from the side that it
+    /// shows, with less returns than rays. How many.
+    fn carve(&mut self, deviation: f64) -> usize {
+        let kept = &self.returns.all()[self.active.clone()];
+        let every = kept.len().div_ceil(RAYS).max(1);
+        let mut through = [0u16; MODEL_MAX];
+        for (kept, seen) in kept.iter().zip(&self.seen).step_by(every) {
+            let (from, to) = (seen.frame(kept.origin_from_return()), seen.place());
+            let ray: [f64; 3] = core::array::from_fn(|d| to[d] - from[d]);
+            let length = libm::sqrt(ray.iter().map(|v| v * v).sum());
+            if length < BEFORE_M {
+                continue;
+            }
+            let ray = ray.map(|v| v / length);
+            let points = self.now.model[..self.now.points].iter().zip(&self.now.surfaces);
+            for ((model, surface), through) in points.zip(&mut through) {
+                let arm: [f64; 3] = core::array::from_fn(|d| f64::from(model[d]) - from[d]);
+                let along: f64 = arm.iter().zip(ray).map(|(a, r)| a * r).sum();
+                let square: f64 = arm.iter().map(|v| v * v).sum();
+                let [nx, ny] = surface.normal;
+                let crosses = libm::fabs(nx * ray[0] + ny * ray[1]) > CROSSES;
+                let thin = surface.precision[0] * deviation * deviation > THIN;
+                let near = square - along * along < BESIDE_M * BESIDE_M;
+                if near && crosses && thin && along < length - BEFORE_M {
+                    *through = through.saturating_add(1);
+                }
+            }
+        }
+        let mut left = 0;
+        for number in 0..self.now.points {
+            let returns = usize::from(self.starts[number + 1] - self.starts[number]);
+            if usize::from(through[number]) * every * SHARE < returns.max(1) {
+                self.now.model[left] = self.now.model[number];
+                self.now.surfaces[left] = self.now.surfaces[number];
+                left += 1;
+            }
+        }
+        let carved = self.now.points - left;
+        if left == 0 {
+            return 0;
+        }
+        self.now.points = left;
+        carved
+    }
+
+    /// Gauss-Newton iterations.
     fn descend(
         &mut self,
         params: &EstimateParams,
-        deviation: f64,
         iterations: usize,
         report: Option<&mut Report>,
     ) -> Stop {
         let mut unreported = Report::default();
         let report = report.unwrap_or(&mut unreported);
-        let mut cost = self.associate(params, deviation);
+        let mut cost = self.associate(params);
         cost.process = self.begin(params);
         if report.costs.is_empty() {
             _ = report.costs.push(cost);
@@ -461,7 +520,7 @@ impl Estimator {
             }
             self.before.copy(&self.now);
             let Some(()) = self.step(damping) else { return Stop::NotFinite };
-            let mut next = self.associate(params, deviation);
+            let mut next = self.associate(params);
             next.process = self.begin(params);
             report.iterations += 1;
             let gain = cost.total() - next.total();
@@ -472,7 +531,7 @@ impl Estimator {
                     return Stop::NotFinite;
                 }
                 _ = report.costs.push(cost);
-                self.associate(params, deviation);
+                self.associate(params);
                 self.begin(params);
                 damping *= 10.0;
                 continue;
@@ -507,7 +566,7 @@ impl Estimator {
     }
 
     /// Finds every return's model point at the trajectory in `now`; the cost, but for the process.
-    fn associate(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
+    fn associate(&mut self, params: &EstimateParams) -> Cost {
         let kept = &self.returns.all()[self.active.clone()];
         let model = &self.now.model[..self.now.points];
         self.nearest.fill(model);
@@ -534,14 +593,14 @@ impl Estimator {
         }
         self.starts[0] = 0;
         if params.surfaces {
-            self.find_surfaces(params, deviation);
+            self.find_surfaces(params);
         }
-        self.cost(params, deviation)
+        self.cost(params)
     }
 
     /// The patch of each model point, from how its returns scatter.
-    fn find_surfaces(&mut self, params: &EstimateParams, deviation: f64) {
-        let least = deviation * deviation;
+    fn find_surfaces(&mut self, params: &EstimateParams) {
+        let least = params.deviation_m * params.deviation_m;
         for number in 0..self.now.points {
             let order =
                 &self.order[usize::from(self.starts[number])..usize::from(self.starts[number + 1])];
@@ -570,9 +629,9 @@ impl Estimator {
     }
 
     /// Lays the returns over their model points; the cost, but for the process.
-    fn cost(&mut self, params: &EstimateParams, deviation: f64) -> Cost {
+    fn cost(&mut self, params: &EstimateParams) -> Cost {
         let robust = params.robust * params.robust;
-        let mut cost = Cost { deviation_m: deviation, ..Cost::default() };
+        let mut cost = Cost::default();
         let points = self.now.model[..self.now.points].iter().zip(&self.now.surfaces);
         for (model, surface) in points {
             cost.model += 0.5 * surface.held * f64::from(square_distance(model, &surface.mean));

@@ -2,8 +2,8 @@
 
 /// Cells along an axis.
 const SIDE: usize = 64;
-/// Cells hold about so many points.
-const POINTS_PER_CELL: f32 = 1.5;
+/// Points for each cell: few, as they lie along an outline.
+const POINTS_PER_CELL: f32 = 0.5;
 
 /// Points ordered by the cell they lie in.
 pub(super) struct Nearest<const N: usize> {
@@ -86,9 +86,9 @@ impl<const N: usize> Nearest<N> {
     }
 
     /// Number and squared distance of the point nearest to `at`, of equally near ones the first.
-    /// `guess` is a squared distance that some point is known to have, which shortens the search.
+    /// None without points, and where `at` is not finite. `guess` is a squared distance that some point is known to have, which shortens the search.
     pub fn find(&self, at: [f32; 3], guess: f32) -> Option<(u16, f32)> {
-        if self.count == 0 {
+        if self.count == 0 || !at.iter().all(|value| value.is_finite()) {
             return None;
         }
         let (mut best, mut number) = (f32::MAX, u16::MAX);
@@ -111,7 +111,7 @@ impl<const N: usize> Nearest<N> {
                     }
                 }
             }
-            if best <= reach * reach || reach > whole {
+            if best <= reach * reach || !(reach <= whole) {
                 return Some((number, best));
             }
             // The nearest of all is no further than the best of these.

@@ -58,12 +58,22 @@ pub(super) struct Surface {
 
 impl Surface {
     pub const NONE: Surface = Surface {
-        normal: [1.0, 0.0],
+        normal: [0.0; 2],
         precision: [0.0; 3],
         mean: [0.0; 3],
         held: 0.0,
-        scatter: Scatter::ONE,
+        scatter: Scatter { count: 0.0, sums: [0.0; 4] },
     };
+
+    /// Alike in every direction.
+    pub const fn round(precision: f64) -> Surface {
+        Surface {
+            normal: [1.0, 0.0],
+            precision: [precision; 3],
+            scatter: Scatter::ONE,
+            ..Surface::NONE
+        }
+    }
 }
 
 /// Returns about a model point: how many, and the sums of x x, x y, y y and z z, m².
@@ -108,10 +118,10 @@ pub(super) struct Seen {
 impl Seen {
     pub const NONE: Seen = Seen {
         arm: [0.0; 3],
-        cos: 1.0,
+        cos: 0.0,
         sin: 0.0,
         nearest: 0,
-        axes: [[1.0, 0.0], [0.0, 1.0]],
+        axes: [[0.0; 2]; 2],
         turning: [0.0; 2],
         miss: [0.0; 3],
         precision: [0.0; 3],
@@ -127,7 +137,12 @@ impl Seen {
 
     /// The arm in the object's frame.
     pub fn place(&self) -> [f64; 3] {
-        let [x, y, z] = self.arm;
+        self.frame([0.0; 3])
+    }
+
+    /// What lies by `beyond` (m, along the world's axes) beyond the return, in the object's frame.
+    pub fn frame(&self, beyond: [f64; 3]) -> [f64; 3] {
+        let [x, y, z]: [f64; 3] = core::array::from_fn(|d| self.arm[d] + beyond[d]);
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
     }
 
@@ -398,4 +413,200 @@ fn pose(weights: &[Weights], kept: &Kept) -> [f64; 4] {
         }
     }
     pose
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::super::system::tests::gauss;
+    use super::*;
+    use crate::objects::spline::Knots;
+    use crate::random::Random;
+    use std::boxed::Box;
+    use std::vec;
+    use std::vec::Vec;
+
+    const BASES: usize = 7;
+    const POINTS: usize = 4;
+
+    struct Scene {
+        weights: [Weights; BASES],
+        kept: Vec<Kept>,
+        model: [[f32; 3]; POINTS],
+        surfaces: [Surface; POINTS],
+    }
+
+    fn scene() -> Scene {
+        let mut random = Random(17);
+        let (knots, _) = Knots::over(0.0, 3.5, 0.5);
+        assert_eq!(knots.bases(), BASES);
+        let weights = core::array::from_fn(|k| {
+            let mut weight: Weights = core::array::from_fn(|_| 0.2 * random.normal());
+            weight[0] += k as f64;
+            weight
+        });
+        let kept = (0..90)
+            .map(|i| {
+                let time = 3.5 * f64::from(i) / 90.0;
+                Kept {
+                    position: [0, 1, 2].map(|_| random.between(-3.0, 3.0)),
+                    origin: [0.0; 3],
+                    time_s: time as f32,
+                    basis: knots.basis(time),
+                }
+            })
+            .collect();
+        let model = [(); POINTS].map(|()| [0, 1, 2].map(|_| random.between(-2.0, 2.0)));
+        let surfaces = model.map(|mean| {
+            let (sin, cos) = libm::sincos(3.0 * random.normal());
+            Surface {
+                normal: [cos, sin],
+                precision: [100.0, 4.0, 30.0],
+                mean: mean.map(|v| v + 0.3),
+                held: 0.7,
+                ..Surface::NONE
+            }
+        });
+        Scene { weights, kept, model, surfaces }
+    }
+
+    impl Scene {
+        fn seen(&self) -> Vec<Seen> {
+            let lay = |(i, kept)| {
+                let mut seen =
+                    Seen { nearest: (i % POINTS) as u16, ..Seen::look(&self.weights, kept) };
+                seen.lay(&self.model[i % POINTS], &self.surfaces[i % POINTS], 0.0);
+                seen
+            };
+            self.kept.iter().enumerate().map(lay).collect()
+        }
+
+        /// Everything at once: x, y, z and heading by basis function, then the model points.
+        fn unknowns(&self) -> Vec<f64> {
+            let poses = self.weights.iter().flat_map(|w| w[..4].to_vec());
+            poses.chain(self.model.as_flattened().iter().map(|&v| f64::from(v))).collect()
+        }
+
+        /// Residuals of the returns and of the model's prior, in deviations, written once more.
+        fn residuals(&self, unknowns: &[f64]) -> Vec<f64> {
+            let mut all = Vec::new();
+            let model = &unknowns[4 * BASES..];
+            for (i, kept) in self.kept.iter().enumerate() {
+                let mut pose = [0.0; 4];
+                for (k, value) in kept.basis.values.iter().enumerate() {
+                    for (d, sum) in pose.iter_mut().enumerate() {
+                        *sum += value * unknowns[4 * (kept.basis.first + k) + d];
+                    }
+                }
+                let m = &model[3 * (i % POINTS)..][..3];
+                let arm: Vec<f64> = (0..3).map(|d| f64::from(kept.position[d]) - pose[d]).collect();
+                let (sin, cos) = pose[3].sin_cos();
+                let off = [
+                    cos * arm[0] + sin * arm[1] - m[0],
+                    cos * arm[1] - sin * arm[0] - m[1],
+                    arm[2] - m[2],
+                ];
+                let surface = &self.surfaces[i % POINTS];
+                let [nx, ny] = surface.normal;
+                let [a, b, c] = surface.precision.map(f64::sqrt);
+                all.push(a * (nx * off[0] + ny * off[1]));
+                all.push(b * (nx * off[1] - ny * off[0]));
+                all.push(c * off[2]);
+            }
+            for (m, surface) in model.chunks(3).zip(&self.surfaces) {
+                for d in 0..3 {
+                    all.push(surface.held.sqrt() * (m[d] - f64::from(surface.mean[d])));
+                }
+            }
+            all
+        }
+    }
+
+    /// Both the derivatives, taken here by central differences, and the elimination.
+    #[test]
+    fn elimination_solves_the_dense_problem() {
+        let scene = scene();
+        let at = scene.unknowns();
+        let n = at.len();
+        let residuals = scene.residuals(&at);
+        let step = 1e-6;
+        let columns: Vec<Vec<f64>> = (0..n)
+            .map(|i| {
+                let moved = |by: f64| {
+                    let mut at = at.clone();
+                    at[i] += by;
+                    scene.residuals(&at)
+                };
+                moved(step).iter().zip(moved(-step)).map(|(a, b)| (a - b) / (2.0 * step)).collect()
+            })
+            .collect();
+        let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let mut rows = vec![vec![0.0; n + 1]; n];
+        for i in 0..n {
+            for j in 0..n {
+                rows[i][j] = product(&columns[i], &columns[j]);
+            }
+            rows[i][n] = -product(&columns[i], &residuals);
+        }
+        // What both hold the poses with: returns alone need not determine them.
+        for (i, row) in rows.iter_mut().enumerate().take(4 * BASES) {
+            row[i] += 1.0;
+        }
+        let dense = gauss(rows);
+
+        let seen = scene.seen();
+        let mut equations = Box::new(Equations::new());
+        equations.clear(BASES);
+        for k in 0..BASES {
+            for d in 0..7 {
+                if d == Z || d == CLIMB {
+                    let i = vertical(BASES, k, d);
+                    equations.vertical.add(i, i, 1.0);
+                } else {
+                    let i = planar(BASES, k, d);
+                    equations.planar.add(i, i, 1.0);
+                }
+            }
+        }
+        equations.add_returns(&scene.kept, &seen);
+        let order = |number: usize| -> Vec<u16> {
+            (0..scene.kept.len() as u16).filter(|i| usize::from(*i) % POINTS == number).collect()
+        };
+        for number in 0..POINTS {
+            let (model, surface) = (&scene.model[number], &scene.surfaces[number]);
+            equations.eliminate(&order(number), &scene.kept, &seen, model, surface);
+        }
+        let mut steps = [[0.0; 7]; BASES];
+        equations.solve(1e-12, &mut steps).unwrap();
+        for (k, step) in steps.iter().enumerate() {
+            for d in 0..4 {
+                assert!((step[d] - dense[4 * k + d]).abs() < 1e-6, "basis {k} spline {d}");
+            }
+        }
+        for number in 0..POINTS {
+            let (model, surface) = (&scene.model[number], &scene.surfaces[number]);
+            let by = follow(&order(number), &scene.kept, &seen, model, surface, &steps);
+            for d in 0..3 {
+                assert!((by[d] - dense[4 * BASES + 3 * number + d]).abs() < 1e-6, "point {number}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_robust_loss_keeps_what_is_near_and_bounds_what_is_far() {
+        let surface = Surface::round(100.0);
+        let cost = |off: f64, robust: f64| {
+            let mut seen = Seen { arm: [off, 0.0, 0.0], cos: 1.0, ..Seen::NONE };
+            (seen.lay(&[0.0; 3], &surface, robust), seen.precision[0])
+        };
+        assert_eq!(cost(0.5, 0.0), (12.5, 100.0));
+        let (near, kept) = cost(0.01, 9.0);
+        assert!((near - 0.005).abs() < 1e-5 && kept > 99.0);
+        let (far, left) = cost(100.0, 9.0);
+        assert!(far < 4.5 && left < 1e-4);
+        // The pull is the slope of the loss.
+        let step = 1e-6;
+        let slope = (cost(0.2 + step, 9.0).0 - cost(0.2 - step, 9.0).0) / (2.0 * step);
+        assert!((slope - cost(0.2, 9.0).1 * 0.2).abs() < 1e-5);
+    }
 }

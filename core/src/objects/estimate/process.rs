@@ -121,3 +121,103 @@ fn accumulate<const N: usize, const L: usize>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::objects::estimate::EstimateParams;
+    use crate::objects::estimate::precision;
+    use crate::random::Random;
+    use std::boxed::Box;
+
+    fn weights<const N: usize>() -> [Weights; N] {
+        let mut random = Random(7);
+        core::array::from_fn(|k| {
+            let mut weight: Weights = core::array::from_fn(|_| 0.3 * random.normal());
+            weight[0] += 5.0 * k as f64;
+            weight[3] += 0.1 * k as f64;
+            weight[4] += 10.0;
+            weight
+        })
+    }
+
+    #[test]
+    fn derivatives_are_differences() {
+        let (knots, _) = Knots::over(0.0, 1.0, 0.5);
+        let (values, slopes) = knots.shape(0.3);
+        let weights = weights::<SUPPORT>();
+        let rows = residuals(&weights, &values, &slopes);
+        let step = 1e-5;
+        for (d, row) in rows.iter().enumerate() {
+            for spline in 0..7 {
+                for k in 0..SUPPORT {
+                    let at = |step: f64| {
+                        let mut weights = weights;
+                        weights[k][spline] += step;
+                        residuals(&weights, &values, &slopes)[d].value
+                    };
+                    let slope = (at(step) - at(-step)) / (2.0 * step);
+                    let part = parts(row).iter().find(|part| part.0 == spline);
+                    let known = part.map_or(0.0, |part| part.1[k]);
+                    assert!((slope - known).abs() < 1e-6, "row {d} spline {spline} basis {k}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gradient_is_that_of_the_cost() {
+        let (knots, _) = Knots::over(0.0, 4.0, 0.5);
+        let mut equations = Box::new(Equations::new());
+        let mut weights = weights::<8>();
+        let precision = precision(&EstimateParams::dissertation());
+        let mut cost = |weights: &[Weights]| {
+            equations.clear(8);
+            let cost = add(&knots, weights, &precision, &mut equations);
+            (cost, equations.planar.vector, equations.vertical.vector)
+        };
+        let (_, plane, height) = cost(&weights);
+        let step = 1e-6;
+        for k in 0..8 {
+            for d in 0..7 {
+                let before = weights[k][d];
+                weights[k][d] = before + step;
+                let (more, ..) = cost(&weights);
+                weights[k][d] = before - step;
+                let (less, ..) = cost(&weights);
+                weights[k][d] = before;
+                let pull = if d == Z || d == CLIMB {
+                    height[vertical(8, k, d)]
+                } else {
+                    plane[planar(8, k, d)]
+                };
+                let known = (less - more) / (2.0 * step);
+                assert!((pull - known).abs() < 1e-5 * known.abs() + 0.3, "{k} {d} {pull} {known}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_integral_is_exact_enough() {
+        let (knots, _) = Knots::over(0.0, 6.0, 0.5);
+        let weights = weights::<12>();
+        let precision = precision(&EstimateParams::dissertation());
+        let mut equations = Box::new(Equations::new());
+        equations.clear(12);
+        let ours = add(&knots, &weights, &precision, &mut equations);
+        let mut fine = 0.0;
+        let steps = 4000;
+        for i in 0..steps {
+            let (values, slopes) = knots.shape((f64::from(i) + 0.5) / f64::from(steps));
+            for piece in 0..knots.spans() {
+                let rows = residuals(&weights[piece..piece + SUPPORT], &values, &slopes);
+                for (row, precision) in rows.iter().zip(precision) {
+                    fine += 0.5 * precision * row.value * row.value;
+                }
+            }
+        }
+        fine *= knots.spacing() / f64::from(steps);
+        assert!((ours / fine - 1.0).abs() < 1e-6, "{ours} {fine}");
+    }
+}

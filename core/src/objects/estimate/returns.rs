@@ -6,6 +6,8 @@ use crate::objects::spline::{Basis, Knots};
 
 /// Steps in which times are told apart where there are more returns than take part.
 const TICKS: usize = 4096;
+/// No track gets so far from its anchor and its start, m and s.
+const FAR: f32 = 1e5;
 /// Parts of a track that may give equally many.
 const PARTS: usize = 128;
 const TICKS_PER_PART: usize = TICKS / PARTS;
@@ -14,13 +16,24 @@ const TICKS_PER_PART: usize = TICKS / PARTS;
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
     pub position: [f32; 3],
+    /// Where its ray began.
+    pub origin: [f32; 3],
     pub time_s: f32,
     pub basis: Basis,
 }
 
 impl Kept {
-    pub const NONE: Kept =
-        Kept { position: [0.0; 3], time_s: 0.0, basis: Basis { first: 0, values: [0.0; 5] } };
+    pub const NONE: Kept = Kept {
+        position: [0.0; 3],
+        origin: [0.0; 3],
+        time_s: 0.0,
+        basis: Basis { first: 0, values: [0.0; 5] },
+    };
+
+    /// The way from its end to its beginning, m.
+    pub fn origin_from_return(&self) -> [f64; 3] {
+        core::array::from_fn(|d| f64::from(self.origin[d]) - f64::from(self.position[d]))
+    }
 }
 
 /// They, in the order of time.
@@ -35,7 +48,7 @@ pub(super) struct Returns {
 pub(super) struct Taken {
     pub first_s: f32,
     pub last_s: f32,
-    pub not_finite: usize,
+    pub unsound: usize,
 }
 
 /// How many a part may give at most, so that all together give no more than `at_most` (or one each).
@@ -49,8 +62,10 @@ fn share(counts: &[u32; PARTS], at_most: usize) -> u32 {
     low
 }
 
-pub(super) fn finite(seen: &ObjectReturn) -> bool {
-    seen.time_s.is_finite() && seen.position.iter().chain(&seen.origin).all(|v| v.is_finite())
+/// Whether a return is a number, and one that a track can hold.
+pub(super) fn sound(seen: &ObjectReturn) -> bool {
+    let places = seen.position.iter().chain(&seen.origin);
+    seen.time_s.abs() <= FAR && places.map(|value| value.abs()).all(|value| value <= FAR)
 }
 
 impl Returns {
@@ -60,24 +75,24 @@ impl Returns {
 
     /// Takes `at_most` of the returns, as evenly in time as they allow: parts of the track that have
     /// more give equally many, every so manyth in the order of time (within a tick, in the order
-    /// given). None where no return is finite.
+    /// given). None where no return is sound.
     pub fn take(&mut self, returns: &[ObjectReturn], at_most: usize) -> Option<Taken> {
         self.count = 0;
         let (mut first_s, mut last_s) = (f32::MAX, f32::MIN);
-        let mut sound = 0;
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        let mut count = 0;
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             first_s = first_s.min(seen.time_s);
             last_s = last_s.max(seen.time_s);
-            sound += 1;
+            count += 1;
         }
-        if sound == 0 {
+        if count == 0 {
             return None;
         }
         let per_s = TICKS as f32 / (last_s - first_s).max(1e-3);
         let tick =
             |seen: &ObjectReturn| (((seen.time_s - first_s) * per_s) as usize).min(TICKS - 1);
         self.ticks.fill(0);
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             self.ticks[tick(seen)] += 1;
         }
         let mut counts = [0u32; PARTS];
@@ -93,18 +108,22 @@ impl Returns {
             *place = keep;
             keep += count.min(most);
         }
-        for seen in returns.iter().filter(|seen| finite(seen)) {
+        for seen in returns.iter().filter(|seen| sound(seen)) {
             let tick = tick(seen);
             let part = tick / TICKS_PER_PART;
-            let (count, kept) = (u64::from(counts[part]), u64::from(counts[part].min(most)));
+            let (of, kept) = (u64::from(counts[part]), u64::from(counts[part].min(most)));
             let rank = u64::from(self.ticks[tick]);
             self.ticks[tick] += 1;
-            let nth = rank * kept / count;
-            if (rank + 1) * kept / count > nth {
+            let nth = rank * kept / of;
+            if (rank + 1) * kept / of > nth {
                 let place = (places[part] + nth as u32) as usize;
                 if place < RETURNS_MAX {
-                    self.kept[place] =
-                        Kept { position: seen.position, time_s: seen.time_s, ..Kept::NONE };
+                    self.kept[place] = Kept {
+                        position: seen.position,
+                        origin: seen.origin,
+                        time_s: seen.time_s,
+                        ..Kept::NONE
+                    };
                 }
             }
         }
@@ -121,14 +140,14 @@ impl Returns {
                     .unwrap_or(core::cmp::Ordering::Equal)
             })
         });
-        Some(Taken { first_s, last_s, not_finite: returns.len() - sound })
+        Some(Taken { first_s, last_s, unsound: returns.len() - count })
     }
 
     /// Takes just these, which are in the order of time; the first [`RETURNS_MAX`] of them.
     pub fn set(&mut self, returns: impl Iterator<Item = ([f32; 3], f32)>) {
         self.count = 0;
         for (kept, (position, time_s)) in self.kept.iter_mut().zip(returns) {
-            *kept = Kept { position, time_s, ..Kept::NONE };
+            *kept = Kept { position, origin: position, time_s, ..Kept::NONE };
             self.count += 1;
         }
     }

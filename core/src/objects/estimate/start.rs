@@ -5,16 +5,18 @@ use super::process::{self, Weights};
 use crate::objects::ObjectState;
 use crate::objects::spline::{Basis, Knots};
 
+/// What no state reaches, in any of its units.
+const FAR: f64 = 1e5;
 /// Precision of the bending of the splines (second differences of their weights) in a fit: it decides
 /// where the history says nothing, and hardly elsewhere.
 const BENDING: f64 = 1e-3;
 /// Precision of every weight about zero, after subtracting the first state.
 const LEAST: f64 = 1e-9;
 
-/// A finite state of the history, its heading unwrapped.
+/// The sound states of a history, their heading unwrapped.
 pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectState> {
     let mut last: Option<f64> = None;
-    history.iter().filter(|state| finite(state)).map(move |state| {
+    history.iter().filter(|state| sound(state)).map(move |state| {
         let heading = match last {
             Some(last) => last + turn(state.heading - last),
             None => turn(state.heading),
@@ -24,9 +26,10 @@ pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectS
     })
 }
 
-pub(super) fn finite(state: &ObjectState) -> bool {
+/// Whether a state is of numbers, and of such as a track can have.
+pub(super) fn sound(state: &ObjectState) -> bool {
     let rest = [state.time_s, state.heading, state.speed, state.climb, state.turn_rate];
-    state.position.iter().chain(&rest).all(|value| value.is_finite())
+    state.position.iter().chain(&rest).all(|value| value.abs() <= FAR)
 }
 
 /// An angle within half a turn of zero.

@@ -101,3 +101,81 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    extern crate std;
+    use super::*;
+    use crate::random::Random;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// Gauss's elimination with pivots, of rows that end with the right-hand side.
+    pub fn gauss(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+        let n = rows.len();
+        for i in 0..n {
+            let best = (i..n).max_by(|&a, &b| rows[a][i].abs().total_cmp(&rows[b][i].abs()));
+            rows.swap(i, best.unwrap());
+            let pivot = rows[i].clone();
+            for row in &mut rows[i + 1..] {
+                let factor = row[i] / pivot[i];
+                for (value, pivot) in row.iter_mut().zip(&pivot).skip(i) {
+                    *value -= factor * pivot;
+                }
+            }
+        }
+        let mut x = vec![0.0; n];
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|j| rows[i][j] * x[j]).sum();
+            x[i] = (rows[i][n] - known) / rows[i][i];
+        }
+        x
+    }
+
+    #[test]
+    fn solves_what_elimination_solves() {
+        let mut random = Random(9);
+        let mut system = System::<23, 529>::new();
+        for n in [1, 2, 7, 23] {
+            system.clear(n);
+            let mut rows = vec![vec![0.0; n + 1]; n];
+            // Squares of random rows, of scales as far apart as the precisions are.
+            for k in 0..2 * n {
+                let row: Vec<f64> = (0..n).map(|_| random.normal()).collect();
+                let weight = if k % 2 == 0 { 1e6 } else { 4.0 };
+                for i in 0..n {
+                    for j in 0..n {
+                        rows[i][j] += weight * row[i] * row[j];
+                        if j <= i {
+                            system.add(j, i, weight * row[i] * row[j]);
+                        }
+                    }
+                }
+            }
+            for i in 0..n {
+                rows[i][n] = random.normal();
+                system.vector[i] = rows[i][n];
+            }
+            assert!(system.solve(1e-12));
+            for (ours, known) in system.vector.iter().zip(gauss(rows)) {
+                assert!((ours - known).abs() < 1e-7 * (known.abs() + 1e-3), "{ours} {known}");
+            }
+        }
+    }
+
+    #[test]
+    fn hardly_goes_where_nothing_determines() {
+        let mut system = System::<2, 4>::new();
+        system.clear(2);
+        for (i, j) in [(0, 0), (1, 0), (1, 1)] {
+            system.add(i, j, 1.0);
+        }
+        system.vector = [1.0, 1.0];
+        assert!(system.solve(1e-10));
+        assert!((system.vector[0] + system.vector[1] - 1.0).abs() < 1e-6);
+        assert!(system.vector[1].abs() < 1e-3);
+        system.clear(2);
+        system.vector[0] = f64::NAN;
+        assert!(!system.solve(1e-10));
+    }
+}

@@ -91,7 +91,7 @@ impl FixedLag {
             returns: Vec::new(),
             history: Vec::new(),
             model: Vec::new(),
-            spacing_m: SPACING_M,
+            spacing_m: 0.0,
             born_s: 0.0,
             newest_s: 0.0,
             begun: false,
@@ -105,13 +105,12 @@ impl FixedLag {
         self.returns.clear();
         self.history.clear();
         self.model.clear();
-        self.spacing_m = SPACING_M;
         self.begun = false;
         self.restarts = 0;
     }
 
     /// Takes in what a sweep saw of the object and what the tracker that found it says, and returns
-    /// the object's state at the time of the newest return. Without a finite return that is the
+    /// the object's state at the time of the newest return. Without a sound return that is the
     /// state as it goes on until the tracker's time.
     ///
     /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
@@ -123,9 +122,9 @@ impl FixedLag {
         returns: &[ObjectReturn],
         baseline: &ObjectState,
     ) -> ObjectState {
-        let sound = || returns.iter().filter(|seen| returns::finite(seen));
+        let sound = || returns.iter().filter(|seen| returns::sound(seen));
         let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
-        if start::finite(baseline) {
+        if start::sound(baseline) {
             if self.history.is_full() {
                 self.history.remove(0);
             }
@@ -183,13 +182,14 @@ impl FixedLag {
 
     fn begin(&mut self) {
         self.begun = true;
+        self.spacing_m = SPACING_M;
         self.born_s = self.returns.first().map_or(self.newest_s, |held| f64::from(held.time_s));
         self.knots = Knots::pieces(self.born_s, PIECE_S, PIECES);
     }
 
     /// Whether the estimate has nothing to do with the tracker's any more.
     fn strayed(&self, state: &ObjectState, extent_m: f64) -> bool {
-        let Some(baseline) = self.history.last() else { return !start::finite(state) };
+        let Some(baseline) = self.history.last() else { return !start::sound(state) };
         let ahead = state.time_s - baseline.time_s;
         let (sin, cos) = libm::sincos(baseline.heading);
         let go = baseline.speed * ahead;
@@ -199,7 +199,7 @@ impl FixedLag {
             state.position[2] - baseline.position[2],
         ];
         let square: f64 = off.iter().map(|v| v * v).sum();
-        !start::finite(state) || square > extent_m * extent_m
+        !start::sound(state) || square > extent_m * extent_m
     }
 
     fn state(&self, time_s: f64) -> ObjectState {
@@ -213,6 +213,7 @@ impl FixedLag {
             let Some(point) = self.model.get_mut(usize::from(held.nearest)) else { continue };
             let kept = super::returns::Kept {
                 position: held.position,
+                origin: held.position,
                 time_s: held.time_s,
                 basis: self.knots.basis(f64::from(held.time_s)),
             };
@@ -268,14 +269,13 @@ impl FixedLag {
             for (i, point) in self.model.iter().enumerate() {
                 estimator.now.model[i] = point.at;
                 estimator.now.surfaces[i] = Surface {
-                    precision: [unit; 3],
                     mean: point.mean,
                     held: unit * f64::from(point.held.max(0.1)),
                     scatter: point.scatter,
-                    ..Surface::NONE
+                    ..Surface::round(unit)
                 };
             }
-            estimator.descend(params, params.deviation_m, ITERATIONS, None);
+            estimator.descend(params, ITERATIONS, None);
             for (point, at) in self.model.iter_mut().zip(&estimator.now.model) {
                 point.at = *at;
             }
@@ -370,11 +370,12 @@ impl FixedLag {
 
 /// Models of what is seen by then; the cost in the end.
 fn young(estimator: &mut Estimator, params: &EstimateParams) -> f64 {
+    let sparse = &EstimateParams { model: YOUNG_MODEL, deviation_m: YOUNG_M, ..*params };
     let mut cost = f64::MAX;
     for _ in 0..YOUNG_ROUNDS {
         let mut report = Report::default();
-        estimator.extract(params, YOUNG_MODEL, YOUNG_M);
-        estimator.descend(params, YOUNG_M, YOUNG_ITERATIONS, Some(&mut report));
+        estimator.extract(sparse);
+        estimator.descend(sparse, YOUNG_ITERATIONS, Some(&mut report));
         cost = report.costs.last().map_or(cost, Cost::total);
     }
     cost
