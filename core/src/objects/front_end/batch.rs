@@ -8,6 +8,9 @@ use crate::prepare::{Dropped, Preparation, moved_by, slot_time};
 use crate::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
 use glam::{DMat3, DVec3};
 
+/// A velocity with a larger standard deviation tells nothing, m/s.
+const SURE_MPS: f32 = 0.7;
+
 /// A return in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Seen {
@@ -45,7 +48,8 @@ impl Flows<'_> {
     fn velocity(&self, n: usize, away: [f64; 2]) -> Option<[f32; 2]> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
         let flow = self.of.get(n).filter(|f| inside && f.origin != Origin::Unmatched)?;
-        Some(flow.velocity_world_mps)
+        let sure = flow.covariance[0] + flow.covariance[2] < 2.0 * SURE_MPS * SURE_MPS;
+        sure.then_some(flow.velocity_world_mps)
     }
 }
 
