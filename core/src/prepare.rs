@@ -117,12 +117,23 @@ impl Dropped {
     }
 }
 
-/// Entries of the table from direction to slot.
+/// Entries of the table from direction to time.
 const AZIMUTHS: usize = 1024;
+
+/// Where and when a return was, NaN where it was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placed {
+    /// Voxels from the window's corner, at its own time and not only its slot's: in half a slot a
+    /// fast vehicle goes a centimetre.
+    pub at: [f32; 3],
+    /// After the sweep's stamp, s.
+    pub offset_s: f32,
+}
 
 /// Turns sweeps into rays. Holds only tables that do not change.
 pub struct Preparation {
-    slot_of_azimuth: [u8; AZIMUTHS],
+    /// Share of a turn, 0 to 1, by [`pseudo_angle`].
+    turn_of_azimuth: [f32; AZIMUTHS + 1],
 }
 
 /// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
@@ -137,25 +148,23 @@ impl Default for Preparation {
 impl Preparation {
     /// Makes the tables.
     pub fn new() -> Preparation {
-        let mut slot_of_azimuth = [0; AZIMUTHS];
-        for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
-            // The inverse of `pseudo_angle` at the middle of the entry.
-            let p = (n as f64 + 0.5) * 4.0 / AZIMUTHS as f64;
+        let mut turn_of_azimuth = [0.0; AZIMUTHS + 1];
+        for (n, turn) in turn_of_azimuth.iter_mut().enumerate() {
+            // The inverse of `pseudo_angle`.
+            let p = n as f64 * 4.0 / AZIMUTHS as f64;
             let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
             let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
-            let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
-            *slot = (turn * SLOTS as f64) as u8;
+            *turn = (0.5 - libm::atan2(y, x) / core::f64::consts::TAU) as f32;
         }
-        Preparation { slot_of_azimuth }
+        Preparation { turn_of_azimuth }
     }
 
     /// Rays of a sweep.
     ///
     /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
     /// the number of rays and what was left out. `columns[p]` becomes the column in which point
-    /// `p` of the sweep lies, or [`NONE`]; `positions[p]`, as far as there is room, its place in
-    /// voxels from the window's corner, or NaN where it was left out; `origins` the voxel of every
-    /// ray origin.
+    /// `p` of the sweep lies, or [`NONE`]; `placed[p]`, as far as there is room, where and when
+    /// it was; `origins` the voxel of every ray origin.
     pub fn prepare(
         &self,
         profile: &Profile,
@@ -164,23 +173,33 @@ impl Preparation {
         sweep: &Sweep,
         rays: &mut [Ray],
         columns: &mut [u32],
-        positions: &mut [[f32; 3]],
+        placed: &mut [Placed],
         origins: &mut [[i32; 4]],
     ) -> (usize, Dropped) {
         assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
         let deskew = profile.deskew && rig.distorted;
         let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
         let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
+        // What the matrix of a slot changes by from its begin to its end.
+        let mut drift = [[[0.0; 4]; 3]; SLOTS];
         let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
         place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
-        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
+        let matrix = |slot: f64| {
             let moved = if deskew && moving {
-                sweep.twist.over(slot_time(rig, slot))
+                sweep.twist.over(time(rig, slot / SLOTS as f64))
             } else {
                 Pose::IDENTITY
             };
-            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
+            voxel_matrix(profile, &(window.grid_from_vehicle * moved))
+        };
+        let mut begin = matrix(0.0);
+        for (slot, (middle, drift)) in to_voxel.iter_mut().zip(&mut drift).enumerate() {
+            *middle = matrix(slot as f64 + 0.5);
+            let end = matrix(slot as f64 + 1.0);
+            *drift = [0, 1, 2].map(|a| [0, 1, 2, 3].map(|b| end[a][b] - begin[a][b]));
+            begin = end;
         }
+        let [from, to] = [0.0, 1.0].map(|turn| time(rig, turn) as f32);
 
         let (side, levels) = (profile.side, profile.levels);
         let centre = central(profile);
@@ -192,8 +211,8 @@ impl Preparation {
         for (n, (point, column)) in sweep.points[..taken].iter().zip(columns.iter_mut()).enumerate()
         {
             *column = NONE;
-            if let Some(position) = positions.get_mut(n) {
-                *position = [f32::NAN; 3];
+            if let Some(placed) = placed.get_mut(n) {
+                *placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
             }
             let p = point.position;
             if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
@@ -209,7 +228,8 @@ impl Preparation {
                 dropped.unknown_sensor += 1;
                 continue;
             }
-            let slot = if moving { self.slot(rig, point) } else { 0 };
+            let turn = self.turn(rig, point);
+            let slot = if moving { ((turn * SLOTS as f32) as usize).min(SLOTS - 1) } else { 0 };
             let at = in_voxels(&to_voxel[slot], p);
             let end = add(voxel(at), centre);
             if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
@@ -224,8 +244,14 @@ impl Preparation {
             if i < side && j < side && k < levels && !own {
                 *column = i * side + j;
             }
-            if let Some(position) = positions.get_mut(n).filter(|_| !own) {
-                *position = [0, 1, 2].map(|a| at[a] + centre_f[a]);
+            if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
+                let after = turn * SLOTS as f32 - (slot as f32 + 0.5);
+                let m = &drift[slot];
+                let at = [0, 1, 2].map(|a| {
+                    let drifted = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
+                    at[a] + centre_f[a] + after * drifted
+                });
+                *placed = Placed { at, offset_s: from + turn * (to - from) };
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
             count += 1;
@@ -233,20 +259,21 @@ impl Preparation {
         (count, dropped)
     }
 
-    /// Time slot of a return.
+    /// When in the sweep a return was, 0 to 1.
     #[inline]
-    fn slot(&self, rig: &Rig, point: &Point) -> usize {
-        let last = (SLOTS - 1) as f32;
+    fn turn(&self, rig: &Rig, point: &Point) -> f32 {
         match rig.timing {
-            Timing::AtStamp => 0,
+            Timing::AtStamp => 0.0,
             Timing::Offset { from_s, span_s } => {
-                let turn = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
-                turn.clamp(0.0, last) as usize
+                let turn = (point.offset_s - from_s as f32) / span_s as f32;
+                if turn > 0.0 { turn.min(1.0) } else { 0.0 }
             }
             Timing::Azimuth { .. } => {
                 let p = pseudo_angle(point.position[0], point.position[1]);
-                let n = (p * (AZIMUTHS as f32 / 4.0)) as usize;
-                self.slot_of_azimuth[n.min(AZIMUTHS - 1)] as usize
+                let p = p * (AZIMUTHS as f32 / 4.0);
+                let n = (p as usize).min(AZIMUTHS - 1);
+                let [low, high] = [n, n + 1].map(|n| self.turn_of_azimuth[n]);
+                low + (p - n as f32) * (high - low)
             }
         }
     }
@@ -264,9 +291,8 @@ fn pseudo_angle(x: f32, y: f32) -> f32 {
     if y >= 0.0 { 1.0 + c } else { 3.0 - c }
 }
 
-/// Middle of a slot, s after the stamp.
-fn slot_time(rig: &Rig, slot: usize) -> f64 {
-    let turn = (slot as f64 + 0.5) / SLOTS as f64;
+/// Time of a share of the sweep, s after the stamp.
+fn time(rig: &Rig, turn: f64) -> f64 {
     match rig.timing {
         Timing::AtStamp => 0.0,
         Timing::Offset { from_s, span_s } => from_s + turn * span_s,
@@ -321,8 +347,11 @@ fn place_origins(
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved =
-                if moving { sweep.twist.over(slot_time(rig, slot)) } else { Pose::IDENTITY };
+            let moved = if moving {
+                sweep.twist.over(time(rig, (slot as f64 + 0.5) / SLOTS as f64))
+            } else {
+                Pose::IDENTITY
+            };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m)
                 .to_array()
@@ -368,6 +397,7 @@ mod tests {
     struct Out {
         rays: Vec<Ray>,
         columns: Vec<u32>,
+        placed: Vec<Placed>,
         origins: Vec<[i32; 4]>,
         dropped: Dropped,
         window: Window,
@@ -378,6 +408,7 @@ mod tests {
         let sweep = Sweep { stamp_s: 0.0, points, world_from_vehicle: pose, twist };
         let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
+        let mut placed = vec![Placed::default(); points.len()];
         let (count, dropped) = Preparation::new().prepare(
             profile,
             rig,
@@ -385,12 +416,12 @@ mod tests {
             &sweep,
             &mut rays,
             &mut columns,
-            &mut [],
+            &mut placed,
             &mut origins,
         );
         rays.truncate(count);
         columns.truncate(points.len());
-        Out { rays, columns, origins, dropped, window }
+        Out { rays, columns, placed, origins, dropped, window }
     }
 
     #[test]
@@ -446,6 +477,44 @@ mod tests {
         let first = cells(Pose::IDENTITY);
         assert_eq!(first, cells(Pose::planar(2.77, -1.3, 0.2, 0.4)));
         assert_eq!(first[20], [34, 0, 1]);
+    }
+
+    #[test]
+    fn a_return_is_placed_at_its_own_time() {
+        // A fast, turning vehicle sees a post at any time of its turn: always at the same place.
+        let profile = Profile::hdl64();
+        let twist = Twist { linear: DVec3::new(20.0, 1.0, 0.0), angular: DVec3::Z * 0.5 };
+        let post = DVec3::new(9.0, -14.0, 0.4);
+        let times: Vec<f64> = (0..1000).map(|n| (n as f64 / 999.0 - 0.5) * 0.1).collect();
+        let seen = |t: f64| {
+            let p = twist.over(t).inverse().transform(post);
+            Point { offset_s: t as f32, ..at(p.x as f32, p.y as f32, p.z as f32) }
+        };
+        let points: Vec<Point> = times.iter().map(|t| seen(*t)).collect();
+        let timing = Timing::Offset { from_s: -0.05, span_s: 0.1 };
+        let out = run(&profile, &rig(timing), Pose::IDENTITY, twist, &points);
+        let centre = central(&profile);
+        for (placed, t) in out.placed.iter().zip(&times) {
+            assert!((placed.offset_s - *t as f32).abs() < 1e-6);
+            for a in 0..3 {
+                let at = f64::from(placed.at[a]) - 0.5 - f64::from(centre[a]);
+                // By slots it would be 2 cm.
+                assert!((at * profile.voxel_m - post[a]).abs() < 2e-4, "{placed:?}");
+            }
+        }
+        // The direction of a return tells its time where nothing else does.
+        let timing = Timing::Azimuth { span_s: 0.1 };
+        let around: Vec<Point> = (0..500)
+            .map(|n| {
+                let angle = 3.1 - n as f32 * 0.0124;
+                at(20.0 * libm::cosf(angle), 20.0 * libm::sinf(angle), 0.0)
+            })
+            .collect();
+        let out = run(&profile, &rig(timing), Pose::IDENTITY, twist, &around);
+        for (n, placed) in out.placed.iter().enumerate() {
+            let turn = (3.1 - n as f32 * 0.0124) / core::f32::consts::TAU;
+            assert!((placed.offset_s + 0.1 * turn).abs() < 1e-6, "{n}: {placed:?}");
+        }
     }
 
     #[test]

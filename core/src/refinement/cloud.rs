@@ -2,7 +2,7 @@
 
 use super::align::{NOISE, Sample, Weight};
 use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
-use crate::prepare::central;
+use crate::prepare::{Placed, central};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
 use core::cell::Cell;
@@ -70,12 +70,12 @@ impl Ground {
 
     /// The third-lowest return of each cell, or of its neighbours if the ground falls that way:
     /// mirrored returns come from below, but seldom together.
-    fn estimate(&mut self, profile: &Profile, positions: &[[f32; 3]], columns: &[u32]) {
+    fn estimate(&mut self, profile: &Profile, placed: &[Placed], columns: &[u32]) {
         self.list_cells(profile.side as usize);
         self.lowest.fill([f32::INFINITY; 3]);
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
-        for (p, &column) in positions.iter().zip(columns) {
+        for (Placed { at: p, .. }, &column) in placed.iter().zip(columns) {
             if column == NONE {
                 continue;
             }
@@ -125,6 +125,8 @@ pub struct Return {
     pub at: [f32; 3],
     /// Sensor that saw it: each sees a thing at a time of its own.
     pub sensor: u32,
+    /// When, s after the sweep's stamp.
+    pub offset_s: f32,
 }
 
 /// Thinned returns of one sweep, voxels from the window's corner.
@@ -164,15 +166,15 @@ impl Cloud {
         &mut self,
         profile: &Profile,
         points: &[Point],
-        positions: &[[f32; 3]],
+        placed: &[Placed],
         columns: &[u32],
         order: &mut [u32],
     ) -> usize {
         let side = profile.side as usize;
         self.side = side;
-        self.ground.estimate(profile, positions, columns);
+        self.ground.estimate(profile, placed, columns);
         let ground = &self.ground;
-        let height = |n: usize| ground.above(columns[n] as usize, positions[n][2]);
+        let height = |n: usize| ground.above(columns[n] as usize, placed[n].at[2]);
         let is_thing =
             |n: usize| columns[n] != NONE && (GROUND_HEIGHT..THING_HEIGHT).contains(&height(n));
         // A counting sort keeps the source's order within a column.
@@ -210,14 +212,14 @@ impl Cloud {
                     if points[n as usize].sensor != sensor {
                         continue;
                     }
-                    let p = positions[n as usize];
+                    let Placed { at: p, offset_s } = placed[n as usize];
                     let part = |v: f32| (v * THINNED).clamp(0.0, THINNED - 1.0) as usize;
                     let level = (height(n as usize) * THINNED) as usize;
                     let bit = (level * 3 + part(p[0] - corner[0])) * 3 + part(p[1] - corner[1]);
                     let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
                     if *word & 1 << (bit % 32) == 0 {
                         *word |= 1 << (bit % 32);
-                        if self.points.push(Return { at: p, sensor }).is_ok() {
+                        if self.points.push(Return { at: p, sensor, offset_s }).is_ok() {
                             self.levels[c] |= 1 << height(n as usize) as u32;
                         } else {
                             dropped += 1;
@@ -266,9 +268,9 @@ impl Cloud {
     }
 
     /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
-    /// (voxels) and itself; of two as near one, always the same. The first one closer than `enough`
+    /// (voxels²) and itself; of two as near one, always the same. The first one closer than `enough`
     /// will do.
-    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, [f32; 3])> {
+    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, &Return)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
         if !(near(at[0]) && near(at[1])) {
@@ -277,38 +279,38 @@ impl Cloud {
         // One beyond the window on either side would still have neighbours inside.
         let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
-        let mut best = (1.0, [0.0; 3]);
-        let mut found = false;
+        let (mut least, mut best) = (1.0, None);
         let in_row = at[0] + 1.0 - i as f32;
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
             let row = row.wrapping_sub(1);
-            if row >= self.side || gap * gap >= best.0 {
+            if row >= self.side || gap * gap >= least {
                 continue;
             }
             // So far from its column nothing can be nearer.
-            let reach = libm::sqrtf(best.0 - gap * gap);
+            let reach = libm::sqrtf(least - gap * gap);
             let (low, high) = (at[1] + 1.0 - reach, at[1] + 1.0 + reach);
             let (j_from, j_to) =
                 ((low as usize).saturating_sub(1).max(j_from), (high as usize).min(j_to));
-            for Return { at: p, sensor: by } in self.row(row, j_from, j_to.max(j_from)) {
+            for other in self.row(row, j_from, j_to.max(j_from)) {
+                let p = other.at;
                 let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                if d2 < best.0 && *by == sensor {
-                    (best, found) = ((d2, *p), true);
+                if d2 < least && other.sensor == sensor {
+                    (least, best) = (d2, Some(other));
                     if d2 < enough * enough {
-                        return Some(best);
+                        return Some((d2, other));
                     }
                 }
             }
         }
-        found.then_some(best)
+        best.map(|best| (least, best))
     }
 
     /// A return.
     pub fn sample(&self, n: usize) -> Sample {
-        let Return { at, sensor } = self.points[n];
-        Sample { at, sensor, index: n as u32 }
+        let Return { at, sensor, offset_s } = self.points[n];
+        Sample { at, sensor, offset_s, index: n as u32 }
     }
 
     /// What the returns around a return tell about the surface it lies on.
@@ -317,7 +319,7 @@ impl Cloud {
         if known != UNKNOWN {
             return known;
         }
-        let Return { at, sensor } = self.points[n as usize];
+        let Return { at, sensor, .. } = self.points[n as usize];
         let weight = self.surface(at, sensor);
         self.weights[n as usize].set(weight);
         weight
