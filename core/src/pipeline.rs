@@ -307,13 +307,8 @@ impl Pipeline {
         let placed = &self.placed[..taken];
         let points = &sweep.points[..taken];
         let refinement = &mut self.refinement;
-        let unrefined =
-            refinement.take(&self.profile, corner, sweep.stamp_s, points, placed, columns);
-        for (n, &column) in columns.iter().enumerate() {
-            self.is_apart[0][n] =
-                column != NONE && self.refinement.is_apart(column, placed[n].at[2]);
-        }
-        unrefined
+        let apart = &mut self.is_apart[0][..taken];
+        refinement.take(&self.profile, corner, sweep.stamp_s, points, placed, columns, apart)
     }
 
     /// Whether the sweep continues the one before.

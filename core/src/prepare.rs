@@ -132,8 +132,8 @@ pub struct Placed {
 
 /// Turns sweeps into rays. Holds only tables that do not change.
 pub struct Preparation {
-    /// Share of a turn, 0 to 1, by [`pseudo_angle`].
-    turn_of_azimuth: [f32; AZIMUTHS + 1],
+    /// When in the turn, in slots, by [`pseudo_angle`].
+    slot_of_azimuth: [f32; AZIMUTHS + 1],
 }
 
 /// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
@@ -148,15 +148,16 @@ impl Default for Preparation {
 impl Preparation {
     /// Makes the tables.
     pub fn new() -> Preparation {
-        let mut turn_of_azimuth = [0.0; AZIMUTHS + 1];
-        for (n, turn) in turn_of_azimuth.iter_mut().enumerate() {
+        let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
+        for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
             // The inverse of `pseudo_angle`.
             let p = n as f64 * 4.0 / AZIMUTHS as f64;
             let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
             let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
-            *turn = (0.5 - libm::atan2(y, x) / core::f64::consts::TAU) as f32;
+            let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
+            *slot = (turn * SLOTS as f64) as f32;
         }
-        Preparation { turn_of_azimuth }
+        Preparation { slot_of_azimuth }
     }
 
     /// Rays of a sweep.
@@ -200,6 +201,7 @@ impl Preparation {
             begin = end;
         }
         let [from, to] = [0.0, 1.0].map(|turn| time(rig, turn) as f32);
+        let slot_s = (to - from) / SLOTS as f32;
 
         let (side, levels) = (profile.side, profile.levels);
         let centre = central(profile);
@@ -228,8 +230,8 @@ impl Preparation {
                 dropped.unknown_sensor += 1;
                 continue;
             }
-            let turn = self.turn(rig, point);
-            let slot = if moving { ((turn * SLOTS as f32) as usize).min(SLOTS - 1) } else { 0 };
+            let when = self.when(rig, point);
+            let slot = if moving { (when as i32 as usize).min(SLOTS - 1) } else { 0 };
             let at = in_voxels(&to_voxel[slot], p);
             let end = add(voxel(at), centre);
             if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
@@ -245,13 +247,13 @@ impl Preparation {
                 *column = i * side + j;
             }
             if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
-                let after = turn * SLOTS as f32 - (slot as f32 + 0.5);
+                let after = when - (slot as f32 + 0.5);
                 let m = &drift[slot];
                 let at = [0, 1, 2].map(|a| {
                     let drifted = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
                     at[a] + centre_f[a] + after * drifted
                 });
-                *placed = Placed { at, offset_s: from + turn * (to - from) };
+                *placed = Placed { at, offset_s: from + when * slot_s };
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
             count += 1;
@@ -259,20 +261,20 @@ impl Preparation {
         (count, dropped)
     }
 
-    /// When in the sweep a return was, 0 to 1.
+    /// When in the sweep a return was, slots from its begin.
     #[inline]
-    fn turn(&self, rig: &Rig, point: &Point) -> f32 {
+    fn when(&self, rig: &Rig, point: &Point) -> f32 {
         match rig.timing {
             Timing::AtStamp => 0.0,
             Timing::Offset { from_s, span_s } => {
-                let turn = (point.offset_s - from_s as f32) / span_s as f32;
-                if turn > 0.0 { turn.min(1.0) } else { 0.0 }
+                let slots = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
+                if slots > 0.0 { slots.min(SLOTS as f32) } else { 0.0 }
             }
             Timing::Azimuth { .. } => {
                 let p = pseudo_angle(point.position[0], point.position[1]);
                 let p = p * (AZIMUTHS as f32 / 4.0);
-                let n = (p as usize).min(AZIMUTHS - 1);
-                let [low, high] = [n, n + 1].map(|n| self.turn_of_azimuth[n]);
+                let n = (p as i32 as usize).min(AZIMUTHS - 1);
+                let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
                 low + (p - n as f32) * (high - low)
             }
         }

@@ -1,6 +1,6 @@
 //! How a thing moved between sweeps: its returns laid over those of the other sweeps.
 
-use super::cloud::{Cloud, Return};
+use super::cloud::Cloud;
 use crate::params::{COLUMNS_MAX, LEVELS_MAX, REFINEMENT_SWEEPS_MAX};
 use crate::record::Column;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
@@ -232,7 +232,7 @@ fn off(of: &Cloud, s: &Sample, motion: &Motion, other: &Other) -> f32 {
 
 /// Squared distance of a return of the cloud `of` from what was found, 0 to 1: all that is missed
 /// counts the same.
-fn truncated(of: &Cloud, s: &Sample, at: [f32; 3], found: Option<(f32, &Return)>) -> f32 {
+fn truncated(of: &Cloud, s: &Sample, at: [f32; 3], found: Option<(f32, Sample)>) -> f32 {
     let Some((d2, q)) = found else { return 1.0 };
     // So near that the surface hardly matters.
     if d2 < TOUCHING * TOUCHING {

@@ -16,13 +16,13 @@ mod segments;
 #[cfg(test)]
 mod tests;
 
-use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
+use crate::params::{COLUMNS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
 use crate::pipeline::Perceived;
 use crate::prepare::Placed;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
 use align::{Mean, Motion, OTHERS, Other, Sample, Sweeps, Thing, Visits};
-use cloud::Cloud;
+use cloud::{Cloud, Scratch};
 use segments::Segments;
 
 /// Displacements that many columns found, tried as starts.
@@ -144,7 +144,7 @@ pub struct Refinement {
     held: usize,
     /// Where the newest is.
     newest: usize,
-    order: [u32; POINTS_MAX],
+    scratch: Scratch,
     things: Things,
 }
 
@@ -168,7 +168,7 @@ impl Refinement {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             held: 0,
             newest: 0,
-            order: [0; POINTS_MAX],
+            scratch: Scratch::new(),
             things: Things {
                 segments: Segments::new(),
                 segment: [0; COLUMNS_MAX],
@@ -183,7 +183,8 @@ impl Refinement {
         self.held = 0;
     }
 
-    /// Takes over a sweep: its returns, where and when they were, and in which column. Returns how many had no room.
+    /// Takes over a sweep: its returns, where and when they were, and in which column. `apart` becomes
+    /// whether each is of the ground, or higher than things are. Returns how many had no room.
     pub(crate) fn take(
         &mut self,
         profile: &Profile,
@@ -192,13 +193,14 @@ impl Refinement {
         points: &[Point],
         placed: &[Placed],
         columns: &[u32],
+        apart: &mut [bool],
     ) -> usize {
         self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
         let cloud = &mut self.clouds[self.newest];
         cloud.corner = corner;
         cloud.stamp_s = stamp_s;
-        cloud.fill(profile, points, placed, columns, &mut self.order)
+        cloud.fill(profile, points, placed, columns, apart, &mut self.scratch)
     }
 
     /// Motion of the things of the pair's first sweep. `predicted` is the displacement that the
@@ -251,11 +253,6 @@ impl Refinement {
         let side = self.clouds[index(self.newest, 1)].side as u32;
         let at = [column / side, column % side].map(|c| c as f32 + 0.5);
         Some(Refined::of(found, at))
-    }
-
-    /// Whether a return of the newest sweep is of the ground, or higher than things are.
-    pub(crate) fn is_apart(&self, column: u32, z: f32) -> bool {
-        self.clouds[self.newest].is_apart(column, z)
     }
 
     /// How a column of the new window moved, or that it stands.
