@@ -181,27 +181,15 @@ impl Preparation {
         let deskew = profile.deskew && rig.distorted;
         let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
         let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
-        // What the matrix of a slot changes by from its begin to its end.
-        let mut drift = [[[0.0; 4]; 3]; SLOTS];
         let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
         place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
-        let matrix = |slot: f64| {
-            let moved = if deskew && moving {
-                sweep.twist.over(time(rig, slot / SLOTS as f64))
-            } else {
-                Pose::IDENTITY
-            };
-            voxel_matrix(profile, &(window.grid_from_vehicle * moved))
-        };
-        let mut begin = matrix(0.0);
-        for (slot, (middle, drift)) in to_voxel.iter_mut().zip(&mut drift).enumerate() {
-            *middle = matrix(slot as f64 + 0.5);
-            let end = matrix(slot as f64 + 1.0);
-            *drift = [0, 1, 2].map(|a| [0, 1, 2, 3].map(|b| end[a][b] - begin[a][b]));
-            begin = end;
+        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
+            let moved = if deskew && moving { over(rig, sweep, slot) } else { Pose::IDENTITY };
+            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
         }
         let [from, to] = [0.0, 1.0].map(|turn| time(rig, turn) as f32);
         let slot_s = (to - from) / SLOTS as f32;
+        let drift = Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 });
 
         let (side, levels) = (profile.side, profile.levels);
         let centre = central(profile);
@@ -248,11 +236,7 @@ impl Preparation {
             }
             if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
                 let after = when - (slot as f32 + 0.5);
-                let m = &drift[slot];
-                let at = [0, 1, 2].map(|a| {
-                    let drifted = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
-                    at[a] + centre_f[a] + after * drifted
-                });
+                let at = drift.place([0, 1, 2].map(|a| at[a] + centre_f[a]), after);
                 *placed = Placed { at, offset_s: from + when * slot_s };
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
@@ -291,6 +275,45 @@ fn pseudo_angle(x: f32, y: f32) -> f32 {
     }
     let c = x / sum;
     if y >= 0.0 { 1.0 + c } else { 3.0 - c }
+}
+
+/// Motion of the vehicle from its stamp to the middle of a slot.
+fn over(rig: &Rig, sweep: &Sweep, slot: usize) -> Pose {
+    sweep.twist.over(time(rig, (slot as f64 + 0.5) / SLOTS as f64))
+}
+
+/// What the vehicle's motion within a slot does to its returns: translation and yaw.
+struct Drift {
+    /// Voxels and radians a slot.
+    by: [f32; 3],
+    turn: f32,
+    /// About the vehicle, voxels from the window's corner.
+    centre: [f32; 2],
+}
+
+impl Drift {
+    fn new(profile: &Profile, window: &Window, sweep: &Sweep, slot_s: f32) -> Drift {
+        let from_vehicle = window.grid_from_vehicle;
+        let by = from_vehicle.rotation * sweep.twist.linear * (f64::from(slot_s) / profile.voxel_m);
+        let at = from_vehicle.translation / profile.voxel_m;
+        let middle = central(profile);
+        Drift {
+            by: by.to_array().map(|v| v as f32),
+            turn: sweep.twist.angular.z as f32 * slot_s,
+            centre: [at.x, at.y].map(|v| v as f32 + 0.5 + middle[0] as f32),
+        }
+    }
+
+    /// A place, so many slots after the time it was reckoned for.
+    #[inline]
+    fn place(&self, [x, y, z]: [f32; 3], after: f32) -> [f32; 3] {
+        let ([dx, dy, dz], [cx, cy]) = (self.by, self.centre);
+        [
+            x + after * (dx - self.turn * (y - cy)),
+            y + after * (dy + self.turn * (x - cx)),
+            z + after * dz,
+        ]
+    }
 }
 
 /// Time of a share of the sweep, s after the stamp.
@@ -349,11 +372,7 @@ fn place_origins(
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved = if moving {
-                sweep.twist.over(time(rig, (slot as f64 + 0.5) / SLOTS as f64))
-            } else {
-                Pose::IDENTITY
-            };
+            let moved = if moving { over(rig, sweep, slot) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m)
                 .to_array()
@@ -500,8 +519,8 @@ mod tests {
             assert!((placed.offset_s - *t as f32).abs() < 1e-6);
             for a in 0..3 {
                 let at = f64::from(placed.at[a]) - 0.5 - f64::from(centre[a]);
-                // By slots it would be 2 cm.
-                assert!((at * profile.voxel_m - post[a]).abs() < 2e-4, "{placed:?}");
+                // By slots it would be 1 cm.
+                assert!((at * profile.voxel_m - post[a]).abs() < 1e-3, "{placed:?}");
             }
         }
         // The direction of a return tells its time where nothing else does.
