@@ -166,7 +166,7 @@ impl Profile {
             frame: Frame::Lattice,
             deskew: true,
             // 20 find nothing that the refinement does not find after 10.
-            em_rounds: 10,
+            em_rounds: 8,
             smoothing: 1000,
             displacement_cost: 1,
             outside_cost: COST_UNKNOWN,

@@ -22,7 +22,7 @@ use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
-use crate::prepare::{Dropped, Preparation, Window, central, place, step_of};
+use crate::prepare::{Dropped, Placed, Preparation, Window, central, place, step_of};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
@@ -186,7 +186,7 @@ pub struct Pipeline {
     unobserved: usize,
     column_of_point: [[u32; POINTS_MAX]; 2],
     is_apart: [[bool; POINTS_MAX]; 2],
-    positions: [[f32; 3]; POINTS_MAX],
+    placed: [Placed; POINTS_MAX],
     refinement: Refinement,
     flow_of_column: [u32; COLUMNS_MAX],
 }
@@ -217,7 +217,7 @@ impl Pipeline {
             unobserved: 0,
             column_of_point: [[NONE; POINTS_MAX]; 2],
             is_apart: [[false; POINTS_MAX]; 2],
-            positions: [[0.0; 3]; POINTS_MAX],
+            placed: [const { Placed { at: [0.0; 3], offset_s: 0.0 } }; POINTS_MAX],
             refinement: Refinement::new(),
             flow_of_column: [NONE; COLUMNS_MAX],
         }
@@ -257,7 +257,7 @@ impl Pipeline {
             sweep,
             rays,
             &mut self.column_of_point[0],
-            &mut self.positions,
+            &mut self.placed,
             origins,
         );
         let refines = self.profile.refinement_sweeps > 0;
@@ -299,21 +299,16 @@ impl Pipeline {
         let side = self.profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
         let columns = &mut self.column_of_point[0][..taken];
-        for (column, [x, y, _]) in columns.iter_mut().zip(&self.positions) {
+        for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
             if *column == NONE && inside(*x) && inside(*y) {
                 *column = *x as u32 * self.profile.side + *y as u32;
             }
         }
-        let positions = &self.positions[..taken];
+        let placed = &self.placed[..taken];
         let points = &sweep.points[..taken];
         let refinement = &mut self.refinement;
-        let unrefined =
-            refinement.take(&self.profile, corner, sweep.stamp_s, points, positions, columns);
-        for (n, &column) in columns.iter().enumerate() {
-            self.is_apart[0][n] =
-                column != NONE && self.refinement.is_apart(column, positions[n][2]);
-        }
-        unrefined
+        let apart = &mut self.is_apart[0][..taken];
+        refinement.take(&self.profile, corner, sweep.stamp_s, points, placed, columns, apart)
     }
 
     /// Whether the sweep continues the one before.

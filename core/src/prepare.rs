@@ -139,12 +139,23 @@ impl Dropped {
     }
 }
 
-/// Entries of the table from direction to slot.
+/// Entries of the table from direction to time.
 const AZIMUTHS: usize = 1024;
+
+/// Where and when a return was, NaN where it was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placed {
+    /// Voxels from the window's corner, at its own time and not only its slot's: in half a slot a
+    /// fast vehicle goes a centimetre.
+    pub at: [f32; 3],
+    /// After the sweep's stamp, s.
+    pub offset_s: f32,
+}
 
 /// Turns sweeps into rays. Holds only tables that do not change.
 pub struct Preparation {
-    slot_of_azimuth: [u8; AZIMUTHS],
+    /// When in the turn, in slots, by [`pseudo_angle`].
+    slot_of_azimuth: [f32; AZIMUTHS + 1],
 }
 
 /// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
@@ -159,14 +170,14 @@ impl Default for Preparation {
 impl Preparation {
     /// Makes the tables.
     pub fn new() -> Preparation {
-        let mut slot_of_azimuth = [0; AZIMUTHS];
+        let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
         for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
-            // The inverse of `pseudo_angle` at the middle of the entry.
-            let p = (n as f64 + 0.5) * 4.0 / AZIMUTHS as f64;
+            // The inverse of `pseudo_angle`.
+            let p = n as f64 * 4.0 / AZIMUTHS as f64;
             let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
             let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
             let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
-            *slot = (turn * SLOTS as f64) as u8;
+            *slot = (turn * SLOTS as f64) as f32;
         }
         Preparation { slot_of_azimuth }
     }
@@ -175,9 +186,8 @@ impl Preparation {
     ///
     /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
     /// the number of rays and what was left out. `columns[p]` becomes the column in which point
-    /// `p` of the sweep lies, or [`NONE`]; `positions[p]`, as far as there is room, its place in
-    /// voxels from the window's corner, or NaN where it was left out; `origins` the voxel of every
-    /// ray origin.
+    /// `p` of the sweep lies, or [`NONE`]; `placed[p]`, as far as there is room, where and when
+    /// it was; `origins` the voxel of every ray origin.
     pub fn prepare(
         &self,
         profile: &Profile,
@@ -186,7 +196,7 @@ impl Preparation {
         sweep: &Sweep,
         rays: &mut [Ray],
         columns: &mut [u32],
-        positions: &mut [[f32; 3]],
+        placed: &mut [Placed],
         origins: &mut [[i32; 4]],
     ) -> (usize, Dropped) {
         assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
@@ -199,6 +209,9 @@ impl Preparation {
             let moved = if deskew && moving { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
             *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
         }
+        let [from, to] = [0.0, SLOTS as f64].map(|when| time(rig, when) as f32);
+        let slot_s = (to - from) / SLOTS as f32;
+        let drift = Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 });
 
         let (side, levels) = (profile.side, profile.levels);
         let centre = central(profile);
@@ -210,12 +223,13 @@ impl Preparation {
         for (n, (point, column)) in sweep.points[..taken].iter().zip(columns.iter_mut()).enumerate()
         {
             *column = NONE;
-            if let Some(position) = positions.get_mut(n) {
-                *position = [f32::NAN; 3];
+            if let Some(placed) = placed.get_mut(n) {
+                *placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
             }
             let Some(own) = dropped.admit(rig, point) else { continue };
             let (p, sensor) = (point.position, point.sensor as usize);
-            let slot = if moving { self.slot(rig, point) } else { 0 };
+            let when = self.when(rig, point);
+            let slot = if moving { slot_of(when) } else { 0 };
             let at = in_voxels(&to_voxel[slot], p);
             let end = add(voxel(at), centre);
             if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
@@ -227,8 +241,10 @@ impl Preparation {
             if i < side && j < side && k < levels && !own {
                 *column = i * side + j;
             }
-            if let Some(position) = positions.get_mut(n).filter(|_| !own) {
-                *position = [0, 1, 2].map(|a| at[a] + centre_f[a]);
+            if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
+                let after = when - (slot as f32 + 0.5);
+                let at = drift.place([0, 1, 2].map(|a| at[a] + centre_f[a]), after);
+                *placed = Placed { at, offset_s: from + when * slot_s };
             }
             rays[count] = ray(end, origin_ids[sensor][slot], own);
             count += 1;
@@ -236,20 +252,21 @@ impl Preparation {
         (count, dropped)
     }
 
-    /// Time slot of a return.
+    /// When in the sweep a return was, slots from its begin.
     #[inline]
-    pub(crate) fn slot(&self, rig: &Rig, point: &Point) -> usize {
-        let last = (SLOTS - 1) as f32;
+    pub(crate) fn when(&self, rig: &Rig, point: &Point) -> f32 {
         match rig.timing {
-            Timing::AtStamp => 0,
+            Timing::AtStamp => 0.0,
             Timing::Offset { from_s, span_s } => {
-                let turn = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
-                turn.clamp(0.0, last) as usize
+                let slots = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
+                if slots > 0.0 { slots.min(SLOTS as f32) } else { 0.0 }
             }
             Timing::Azimuth { .. } => {
                 let p = pseudo_angle(point.position[0], point.position[1]);
-                let n = (p * (AZIMUTHS as f32 / 4.0)) as usize;
-                self.slot_of_azimuth[n.min(AZIMUTHS - 1)] as usize
+                let p = p * (AZIMUTHS as f32 / 4.0);
+                let n = (p as i32 as usize).min(AZIMUTHS - 1);
+                let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
+                low + (p - n as f32) * (high - low)
             }
         }
     }
@@ -267,9 +284,49 @@ fn pseudo_angle(x: f32, y: f32) -> f32 {
     if y >= 0.0 { 1.0 + c } else { 3.0 - c }
 }
 
-/// Middle of a slot, s after the stamp.
-pub(crate) fn slot_time(rig: &Rig, slot: usize) -> f64 {
-    let turn = (slot as f64 + 0.5) / SLOTS as f64;
+/// The slot of a time in slots.
+#[inline]
+pub(crate) fn slot_of(when: f32) -> usize {
+    (when as i32 as usize).min(SLOTS - 1)
+}
+
+/// What the vehicle's motion within a slot does to its returns: translation and yaw.
+struct Drift {
+    /// Voxels and radians a slot.
+    by: [f32; 3],
+    turn: f32,
+    /// About the vehicle, voxels from the window's corner.
+    centre: [f32; 2],
+}
+
+impl Drift {
+    fn new(profile: &Profile, window: &Window, sweep: &Sweep, slot_s: f32) -> Drift {
+        let from_vehicle = window.grid_from_vehicle;
+        let by = from_vehicle.rotation * sweep.twist.linear * (f64::from(slot_s) / profile.voxel_m);
+        let at = from_vehicle.translation / profile.voxel_m;
+        let middle = central(profile);
+        Drift {
+            by: by.to_array().map(|v| v as f32),
+            turn: sweep.twist.angular.z as f32 * slot_s,
+            centre: [at.x, at.y].map(|v| v as f32 + 0.5 + middle[0] as f32),
+        }
+    }
+
+    /// A place, so many slots after the time it was reckoned for.
+    #[inline]
+    fn place(&self, [x, y, z]: [f32; 3], after: f32) -> [f32; 3] {
+        let ([dx, dy, dz], [cx, cy]) = (self.by, self.centre);
+        [
+            x + after * (dx - self.turn * (y - cy)),
+            y + after * (dy + self.turn * (x - cx)),
+            z + after * dz,
+        ]
+    }
+}
+
+/// A time in slots, s after the stamp.
+pub(crate) fn time(rig: &Rig, when: f64) -> f64 {
+    let turn = when / SLOTS as f64;
     match rig.timing {
         Timing::AtStamp => 0.0,
         Timing::Offset { from_s, span_s } => from_s + turn * span_s,
@@ -279,7 +336,7 @@ pub(crate) fn slot_time(rig: &Rig, slot: usize) -> f64 {
 
 /// The vehicle at the middle of a slot, in its frame at the stamp.
 pub(crate) fn moved_by(rig: &Rig, sweep: &Sweep, slot: usize) -> Pose {
-    sweep.twist.over(slot_time(rig, slot))
+    sweep.twist.over(time(rig, slot as f64 + 0.5))
 }
 
 fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
@@ -375,6 +432,7 @@ mod tests {
     struct Out {
         rays: Vec<Ray>,
         columns: Vec<u32>,
+        placed: Vec<Placed>,
         origins: Vec<[i32; 4]>,
         dropped: Dropped,
         window: Window,
@@ -385,6 +443,7 @@ mod tests {
         let sweep = Sweep { stamp_s: 0.0, points, world_from_vehicle: pose, twist };
         let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
+        let mut placed = vec![Placed::default(); points.len()];
         let (count, dropped) = Preparation::new().prepare(
             profile,
             rig,
@@ -392,12 +451,12 @@ mod tests {
             &sweep,
             &mut rays,
             &mut columns,
-            &mut [],
+            &mut placed,
             &mut origins,
         );
         rays.truncate(count);
         columns.truncate(points.len());
-        Out { rays, columns, origins, dropped, window }
+        Out { rays, columns, placed, origins, dropped, window }
     }
 
     #[test]
@@ -453,6 +512,44 @@ mod tests {
         let first = cells(Pose::IDENTITY);
         assert_eq!(first, cells(Pose::planar(2.77, -1.3, 0.2, 0.4)));
         assert_eq!(first[20], [34, 0, 1]);
+    }
+
+    #[test]
+    fn a_return_is_placed_at_its_own_time() {
+        // A fast, turning vehicle sees a post at any time of its turn: always at the same place.
+        let profile = Profile::hdl64();
+        let twist = Twist { linear: DVec3::new(20.0, 1.0, 0.0), angular: DVec3::Z * 0.5 };
+        let post = DVec3::new(9.0, -14.0, 0.4);
+        let times: Vec<f64> = (0..1000).map(|n| (n as f64 / 999.0 - 0.5) * 0.1).collect();
+        let seen = |t: f64| {
+            let p = twist.over(t).inverse().transform(post);
+            Point { offset_s: t as f32, ..at(p.x as f32, p.y as f32, p.z as f32) }
+        };
+        let points: Vec<Point> = times.iter().map(|t| seen(*t)).collect();
+        let timing = Timing::Offset { from_s: -0.05, span_s: 0.1 };
+        let out = run(&profile, &rig(timing), Pose::IDENTITY, twist, &points);
+        let centre = central(&profile);
+        for (placed, t) in out.placed.iter().zip(&times) {
+            assert!((placed.offset_s - *t as f32).abs() < 1e-6);
+            for a in 0..3 {
+                let at = f64::from(placed.at[a]) - 0.5 - f64::from(centre[a]);
+                // By slots it would be 1 cm.
+                assert!((at * profile.voxel_m - post[a]).abs() < 1e-3, "{placed:?}");
+            }
+        }
+        // The direction of a return tells its time where nothing else does.
+        let timing = Timing::Azimuth { span_s: 0.1 };
+        let around: Vec<Point> = (0..500)
+            .map(|n| {
+                let angle = 3.1 - n as f32 * 0.0124;
+                at(20.0 * libm::cosf(angle), 20.0 * libm::sinf(angle), 0.0)
+            })
+            .collect();
+        let out = run(&profile, &rig(timing), Pose::IDENTITY, twist, &around);
+        for (n, placed) in out.placed.iter().enumerate() {
+            let turn = (3.1 - n as f32 * 0.0124) / core::f32::consts::TAU;
+            assert!((placed.offset_s + 0.1 * turn).abs() < 1e-6, "{n}: {placed:?}");
+        }
     }
 
     #[test]

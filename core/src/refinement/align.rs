@@ -1,7 +1,7 @@
 //! How a thing moved between sweeps: its returns laid over those of the other sweeps.
 
 use super::cloud::Cloud;
-use crate::params::{COLUMNS_MAX, LEVELS_MAX};
+use crate::params::{COLUMNS_MAX, LEVELS_MAX, REFINEMENT_SWEEPS_MAX};
 use crate::record::Column;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 
@@ -42,6 +42,8 @@ pub struct Sample {
     pub at: [f32; 3],
     /// Sensor that saw it.
     pub sensor: u32,
+    /// When, s after the stamp of its sweep.
+    pub offset_s: f32,
     /// Its index in the cloud of its sweep.
     pub index: u32,
 }
@@ -52,13 +54,21 @@ fn square(weight: &Weight, [x, y, z]: [f32; 3]) -> f32 {
     x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z
 }
 
-/// Another sweep: where its window lies seen from the first one's, and how much of the motion has
-/// happened by then.
+/// Another sweep: where its window lies seen from the first one's, and how much of the motion over
+/// the pair has happened from stamp to stamp.
 #[derive(Clone, Copy)]
 pub struct Other<'a> {
+    pub nth: usize,
     pub cloud: &'a Cloud,
     pub offset: [f32; 3],
     pub scale: f32,
+}
+
+impl Other<'_> {
+    /// How much of a motion over the pair has happened when a thing is seen in this sweep.
+    fn share(&self, motion: &Motion) -> f32 {
+        self.scale + motion.late[self.nth]
+    }
 }
 
 /// Rigid motion in the plane over one pair of sweeps.
@@ -70,6 +80,9 @@ pub struct Motion {
     pub centre: [f32; 2],
     /// Covariance of `by`.
     pub covariance: Matrix3<f32>,
+    /// How much later after its stamp each other sweep sees it, in spans of the pair: one that
+    /// passes by is not seen at the same time of every turn.
+    pub late: [f32; OTHERS],
 }
 
 impl Motion {
@@ -98,6 +111,9 @@ impl Motion {
     }
 }
 
+/// Sweeps that a thing is laid over.
+pub const OTHERS: usize = REFINEMENT_SWEEPS_MAX - 1;
+
 type Samples = heapless::Vec<Sample, SAMPLES>;
 
 /// What a thing is laid over.
@@ -111,6 +127,8 @@ pub struct Sweeps<'a> {
     pub before: &'a [Column],
     /// Columns of the second sweep.
     pub now: &'a [Column],
+    /// From the pair's first stamp to the second, s.
+    pub span_s: f32,
 }
 
 impl Sweeps<'_> {
@@ -176,9 +194,10 @@ impl Visits {
 
 fn moved(s: &Sample, motion: &Motion, other: &Other) -> [f32; 3] {
     let d = motion.of([s.at[0], s.at[1]]);
+    let share = other.share(motion);
     [
-        s.at[0] + other.scale * d[0] + other.offset[0],
-        s.at[1] + other.scale * d[1] + other.offset[1],
+        s.at[0] + share * d[0] + other.offset[0],
+        s.at[1] + share * d[1] + other.offset[1],
         s.at[2] + other.offset[2],
     ]
 }
@@ -213,13 +232,13 @@ fn off(of: &Cloud, s: &Sample, motion: &Motion, other: &Other) -> f32 {
 
 /// Squared distance of a return of the cloud `of` from what was found, 0 to 1: all that is missed
 /// counts the same.
-fn truncated(of: &Cloud, s: &Sample, at: [f32; 3], found: Option<(f32, [f32; 3])>) -> f32 {
+fn truncated(of: &Cloud, s: &Sample, at: [f32; 3], found: Option<(f32, Sample)>) -> f32 {
     let Some((d2, q)) = found else { return 1.0 };
     // So near that the surface hardly matters.
     if d2 < TOUCHING * TOUCHING {
         return 0.0;
     }
-    (square(&of.weight(s.index), minus(q, at)) / (MISSED * MISSED)).min(1.0)
+    (square(&of.weight(s.index), minus(q.at, at)) / (MISSED * MISSED)).min(1.0)
 }
 
 impl<'a> Thing<'a> {
@@ -279,9 +298,11 @@ impl<'a> Thing<'a> {
 
     /// Where a return of the newest sweep was, voxels of the first sweep's window.
     fn back(&self, q: &Sample, motion: &Motion) -> [f32; 3] {
-        let at = minus(q.at, self.sweeps.others[0].offset);
-        let d = motion.of([at[0] - motion.by.x, at[1] - motion.by.y]);
-        [at[0] - d[0], at[1] - d[1], at[2]]
+        let other = &self.sweeps.others[0];
+        let share = other.share(motion);
+        let at = minus(q.at, other.offset);
+        let d = motion.of([at[0] - share * motion.by.x, at[1] - share * motion.by.y]);
+        [at[0] - share * d[0], at[1] - share * d[1], at[2]]
     }
 
     /// Mean truncated squared distance, 0 (all lie on something) to 1 (none does).
@@ -366,20 +387,25 @@ impl<'a> Thing<'a> {
                 g[1] += fy;
                 g[2] += a * fx + b * fy;
             };
+            let mut late: [Mean; OTHERS] = Default::default();
             for other in others {
+                let share = other.share(&motion);
                 for s in self.samples.iter().step_by(every) {
                     let at = moved(s, &motion, other);
                     if let Some((_, q)) = other.cloud.nearest(at, s.sensor, 0.0) {
                         let weight = self.sweeps.first.weight(s.index);
-                        pair(&weight, s.at, minus(q, at), other.scale);
+                        pair(&weight, s.at, minus(q.at, at), share);
+                        late[other.nth].add(q.offset_s - s.offset_s);
                     }
                 }
             }
+            let share = self.sweeps.others[0].share(&motion);
             for q in there.iter().step_by(every) {
                 let at = self.back(q, &motion);
                 if let Some((_, p)) = self.sweeps.first.nearest(at, q.sensor, 0.0) {
                     let weight = self.sweeps.others[0].cloud.weight(q.index);
-                    pair(&weight, p, minus(at, p), 1.0);
+                    pair(&weight, p.at, minus(at, p.at), share);
+                    late[0].add(q.offset_s - p.offset_s);
                 }
             }
             let [xx, xy, xt, yy, yt, tt] = h;
@@ -388,6 +414,7 @@ impl<'a> Thing<'a> {
             let by = inverse * Vector3::from(g);
             motion.by += by;
             motion.covariance = inverse;
+            motion.late = late.map(|mean| mean.value() / self.sweeps.span_s);
             let small = by.norm_squared() < SMALL * SMALL;
             if wide == 0 && small {
                 break;

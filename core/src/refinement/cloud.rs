@@ -2,8 +2,10 @@
 
 use super::align::{NOISE, Sample, Weight};
 use crate::ground::Ground;
-use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, Profile};
-use crate::prepare::central;
+use crate::params::{
+    ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, POINTS_MAX, Profile,
+};
+use crate::prepare::{Placed, central};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
 use core::cell::Cell;
@@ -22,6 +24,18 @@ const AROUND: f32 = 1.5;
 const THINNED: f32 = 3.0;
 /// Words of a mask of the sub-voxels of a column: 3 x 3 x 3 x 16.
 const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
+
+/// Scratch of [`Cloud::fill`]: returns above the ground, as they come and by column.
+pub struct Scratch {
+    listed: [u32; POINTS_MAX],
+    order: [u32; POINTS_MAX],
+}
+
+impl Scratch {
+    pub(super) const fn new() -> Scratch {
+        Scratch { listed: [0; POINTS_MAX], order: [0; POINTS_MAX] }
+    }
+}
 
 /// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
 const UNKNOWN: Weight = [0.0; 6];
@@ -45,6 +59,8 @@ pub struct Cloud {
     pub stamp_s: f64,
     ground: Ground,
     points: heapless::Vec<Return, CLOUD_MAX>,
+    /// When each was, s after the sweep's stamp: seldom asked for.
+    offset_s: [f32; CLOUD_MAX],
     start: [u32; COLUMNS_MAX + 1],
     /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
     weights: [Cell<Weight>; CLOUD_MAX],
@@ -60,51 +76,59 @@ impl Cloud {
             stamp_s: 0.0,
             ground: Ground::new(),
             points: heapless::Vec::new(),
+            offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
             weights: [const { Cell::new(UNKNOWN) }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
 
-    /// Takes over a sweep. `order` is scratch, one element per return. Returns how many returns
-    /// were left out for want of room: those of the last columns.
+    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than things
+    /// are. Returns how many returns were left out for want of room: those of the last columns.
     pub(super) fn fill(
         &mut self,
         profile: &Profile,
         points: &[Point],
-        positions: &[[f32; 3]],
+        placed: &[Placed],
         columns: &[u32],
-        order: &mut [u32],
+        apart: &mut [bool],
+        scratch: &mut Scratch,
     ) -> usize {
         let side = profile.side as usize;
         self.side = side;
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
-        let placed = columns.iter().zip(positions).filter(|(column, _)| **column != NONE);
-        let placed = placed.map(|(column, at)| (*column as usize, *at));
-        self.ground.estimate(side, [middle[0], middle[1], level], placed);
+        let found = columns.iter().zip(placed).filter(|(column, _)| **column != NONE);
+        let found = found.map(|(column, placed)| (*column as usize, placed.at));
+        self.ground.estimate(side, [middle[0], middle[1], level], found);
         let ground = &self.ground;
-        let height = |n: usize| ground.above(columns[n] as usize, positions[n][2]);
-        let is_thing =
-            |n: usize| columns[n] != NONE && (GROUND_HEIGHT..THING_HEIGHT).contains(&height(n));
+        let height = |n: usize| ground.above(columns[n] as usize, placed[n].at[2]);
         // A counting sort keeps the source's order within a column.
         let columns_used = side * side;
         let start = &mut self.start[..columns_used + 1];
         start.fill(0);
-        for n in 0..columns.len() {
-            if is_thing(n) {
-                start[columns[n] as usize + 1] += 1;
+        let Scratch { listed, order } = scratch;
+        let mut count = 0;
+        for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
+            *apart = false;
+            if column == NONE {
+                continue;
+            }
+            let height = height(n);
+            *apart = !(GROUND_RETURN..THING_HEIGHT).contains(&height);
+            if (GROUND_HEIGHT..THING_HEIGHT).contains(&height) {
+                start[column as usize + 1] += 1;
+                listed[count] = n as u32;
+                count += 1;
             }
         }
         for c in 0..columns_used {
             start[c + 1] += start[c];
         }
-        for n in 0..columns.len() {
-            if is_thing(n) {
-                let at = &mut start[columns[n] as usize];
-                order[*at as usize] = n as u32;
-                *at += 1;
-            }
+        for &n in &listed[..count] {
+            let at = &mut start[columns[n as usize] as usize];
+            order[*at as usize] = n;
+            *at += 1;
         }
         // Each start has become its end; what is kept is written from the front again.
         self.points.clear();
@@ -122,14 +146,16 @@ impl Cloud {
                     if points[n as usize].sensor != sensor {
                         continue;
                     }
-                    let p = positions[n as usize];
+                    let Placed { at: p, offset_s } = placed[n as usize];
                     let part = |v: f32| (v * THINNED).clamp(0.0, THINNED - 1.0) as usize;
                     let level = (height(n as usize) * THINNED) as usize;
                     let bit = (level * 3 + part(p[0] - corner[0])) * 3 + part(p[1] - corner[1]);
                     let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
                     if *word & 1 << (bit % 32) == 0 {
                         *word |= 1 << (bit % 32);
+                        let kept = self.points.len();
                         if self.points.push(Return { at: p, sensor }).is_ok() {
+                            self.offset_s[kept] = offset_s;
                             self.levels[c] |= 1 << height(n as usize) as u32;
                         } else {
                             dropped += 1;
@@ -160,12 +186,6 @@ impl Cloud {
         (0.0..LEVELS_MAX as f32).contains(&height) && self.levels[column] >> height as u32 & 1 != 0
     }
 
-    /// Whether a return in a column is of the ground, or higher than things are.
-    pub fn is_apart(&self, column: u32, z: f32) -> bool {
-        let height = self.ground.above(column as usize, z);
-        !(GROUND_RETURN..THING_HEIGHT).contains(&height)
-    }
-
     /// Indices of the thinned returns in a column.
     pub fn column(&self, column: usize) -> Range<usize> {
         self.start[column] as usize..self.start[column + 1] as usize
@@ -178,9 +198,9 @@ impl Cloud {
     }
 
     /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
-    /// (voxels) and itself; of two as near one, always the same. The first one closer than `enough`
+    /// (voxels²) and itself; of two as near one, always the same. The first one closer than `enough`
     /// will do.
-    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, [f32; 3])> {
+    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, Sample)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
         if !(near(at[0]) && near(at[1])) {
@@ -189,38 +209,39 @@ impl Cloud {
         // One beyond the window on either side would still have neighbours inside.
         let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
-        let mut best = (1.0, [0.0; 3]);
-        let mut found = false;
-        let in_row = at[0] + 1.0 - i as f32;
+        let (mut least, mut best) = (1.0, None);
+        let (in_row, in_column) = (at[0] + 1.0 - i as f32, at[1] + 1.0 - j as f32);
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
             let row = row.wrapping_sub(1);
-            if row >= self.side || gap * gap >= best.0 {
+            if row >= self.side || gap * gap >= least {
                 continue;
             }
-            // So far from its column nothing can be nearer.
-            let reach = libm::sqrtf(best.0 - gap * gap);
-            let (low, high) = (at[1] + 1.0 - reach, at[1] + 1.0 + reach);
-            let (j_from, j_to) =
-                ((low as usize).saturating_sub(1).max(j_from), (high as usize).min(j_to));
-            for Return { at: p, sensor: by } in self.row(row, j_from, j_to.max(j_from)) {
+            // In a column so far off nothing can be nearer.
+            let left = gap * gap + in_column * in_column < least;
+            let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
+            let from = if left { j_from } else { j.saturating_sub(1).max(j_from) };
+            let to = if right { j_to } else { j.min(j_to) };
+            let first = self.start[row * self.side + from] as usize;
+            for (n, other) in self.row(row, from, to.max(from)).iter().enumerate() {
+                let p = other.at;
                 let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                if d2 < best.0 && *by == sensor {
-                    (best, found) = ((d2, *p), true);
+                if d2 < least && other.sensor == sensor {
+                    (least, best) = (d2, Some(first + n));
                     if d2 < enough * enough {
-                        return Some(best);
+                        return Some((d2, self.sample(first + n)));
                     }
                 }
             }
         }
-        found.then_some(best)
+        best.map(|n| (least, self.sample(n)))
     }
 
     /// A return.
     pub fn sample(&self, n: usize) -> Sample {
         let Return { at, sensor } = self.points[n];
-        Sample { at, sensor, index: n as u32 }
+        Sample { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
     }
 
     /// What the returns around a return tell about the surface it lies on.

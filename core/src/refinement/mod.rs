@@ -16,12 +16,13 @@ mod segments;
 #[cfg(test)]
 mod tests;
 
-use crate::params::{COLUMNS_MAX, POINTS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
+use crate::params::{COLUMNS_MAX, Profile, REACH, REFINEMENT_SWEEPS_MAX, SIDE};
 use crate::pipeline::Perceived;
+use crate::prepare::Placed;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
-use align::{Mean, Motion, Other, Sample, Sweeps, Thing, Visits};
-use cloud::Cloud;
+use align::{Mean, Motion, OTHERS, Other, Sample, Sweeps, Thing, Visits};
+use cloud::{Cloud, Scratch};
 use segments::Segments;
 
 /// Displacements that many columns found, tried as starts.
@@ -42,8 +43,10 @@ const GAIN: f32 = 0.12;
 /// Standard deviation of what stands, before [`doubt`], voxels.
 const STILL: f32 = 0.1;
 /// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
-const CONFIDENCE: f32 = 0.06;
+const CONFIDENCE: f32 = 0.01;
 const DOUBTFUL: f32 = 0.008;
+/// How much more gain makes it e times likelier that a thing moves, see [`Found::unsure`].
+const SURER: f32 = 0.04;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
 /// Mean misfit of a column's returns from which on it may be part of something that moves.
@@ -91,8 +94,17 @@ pub(crate) struct Refined {
 }
 
 impl Refined {
-    fn moving(motion: &Motion, at: [f32; 2]) -> Refined {
-        Refined { by: motion.of(at), covariance: motion.covariance_of(at), moves: true }
+    /// As part of a thing.
+    fn of(found: &Found, at: [f32; 2]) -> Refined {
+        let by = found.motion.of(at);
+        // Of two motions, one of which is the right one.
+        let [x, y] = by;
+        let between = [x * x, x * y, y * y].map(|v| found.unsure * v);
+        let own = match found.moves {
+            true => Refined { by, covariance: found.motion.covariance_of(at), moves: true },
+            false => Refined::standing(found.still),
+        };
+        Refined { covariance: [0, 1, 2].map(|n| own.covariance[n] + between[n]), ..own }
     }
 
     fn standing(misfit: f32) -> Refined {
@@ -111,8 +123,12 @@ fn doubt(misfit: f32) -> f32 {
 /// What became of a thing.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
-    /// How it moved, if it did.
-    motion: Option<Motion>,
+    /// The motion that explains it best.
+    motion: Motion,
+    /// Whether it moved so, or stood.
+    moves: bool,
+    /// Variance of whether it did: p (1 - p) where p is how likely that is.
+    unsure: f32,
     /// Misfit of standing still.
     still: f32,
     /// Largest extent along an axis, voxels.
@@ -128,7 +144,7 @@ pub struct Refinement {
     held: usize,
     /// Where the newest is.
     newest: usize,
-    order: [u32; POINTS_MAX],
+    scratch: Scratch,
     things: Things,
 }
 
@@ -152,7 +168,7 @@ impl Refinement {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             held: 0,
             newest: 0,
-            order: [0; POINTS_MAX],
+            scratch: Scratch::new(),
             things: Things {
                 segments: Segments::new(),
                 segment: [0; COLUMNS_MAX],
@@ -167,23 +183,24 @@ impl Refinement {
         self.held = 0;
     }
 
-    /// Takes over a sweep: its returns, where they lie in voxels from the window's corner, and in
-    /// which column. Returns how many had no room.
+    /// Takes over a sweep: its returns, where and when they were, and in which column. `apart` becomes
+    /// whether each is of the ground, or higher than things are. Returns how many had no room.
     pub(crate) fn take(
         &mut self,
         profile: &Profile,
         corner: [i32; 3],
         stamp_s: f64,
         points: &[Point],
-        positions: &[[f32; 3]],
+        placed: &[Placed],
         columns: &[u32],
+        apart: &mut [bool],
     ) -> usize {
         self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
         let cloud = &mut self.clouds[self.newest];
         cloud.corner = corner;
         cloud.stamp_s = stamp_s;
-        cloud.fill(profile, points, positions, columns, &mut self.order)
+        cloud.fill(profile, points, placed, columns, apart, &mut self.scratch)
     }
 
     /// Motion of the things of the pair's first sweep. `predicted` is the displacement that the
@@ -212,17 +229,18 @@ impl Refinement {
         let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span = self.clouds[newest].stamp_s - first.stamp_s;
-        let mut others = heapless::Vec::<Other, REFINEMENT_SWEEPS_MAX>::new();
+        let mut others = heapless::Vec::<Other, OTHERS>::new();
         for age in (0..self.held).filter(|a| *a != 1) {
             let cloud = &self.clouds[index(newest, age)];
             // There are fewer than the capacity.
             let _ = others.push(Other {
+                nth: others.len(),
                 cloud,
                 offset: core::array::from_fn(|a| (first.corner[a] - cloud.corner[a]) as f32),
                 scale: ((cloud.stamp_s - first.stamp_s) / span) as f32,
             });
         }
-        let sweeps = Sweeps { first, others: &others, before, now };
+        let sweeps = Sweeps { first, others: &others, before, now, span_s: span as f32 };
         things.wholes(sweeps, flow, predicted);
         things.parts(sweeps, flow, predicted);
         things.rest(sweeps);
@@ -231,15 +249,10 @@ impl Refinement {
     /// How a column of the first sweep's window moved, as part of a thing that does.
     pub(crate) fn at(&self, column: u32) -> Option<Refined> {
         let segment = *self.things.segment.get(column as usize)?;
-        let motion = self.things.found.get(segment as usize)?.motion?;
+        let found = self.things.found.get(segment as usize).filter(|f| f.moves)?;
         let side = self.clouds[index(self.newest, 1)].side as u32;
         let at = [column / side, column % side].map(|c| c as f32 + 0.5);
-        Some(Refined::moving(&motion, at))
-    }
-
-    /// Whether a return of the newest sweep is of the ground, or higher than things are.
-    pub(crate) fn is_apart(&self, column: u32, z: f32) -> bool {
-        self.clouds[self.newest].is_apart(column, z)
+        Some(Refined::of(found, at))
     }
 
     /// How a column of the new window moved, or that it stands.
@@ -253,10 +266,7 @@ impl Refinement {
         };
         let at = [i as f32 + 0.5, j as f32 + 0.5];
         if let Some(own) = segment(i, j) {
-            return match own.motion {
-                Some(motion) => Refined::moving(&motion, at),
-                None => Refined::standing(own.still),
-            };
+            return Refined::of(own, at);
         }
         // Nothing but low returns: the lower edge of a thing, where the match says so.
         if flow & VALID == 0 {
@@ -264,8 +274,8 @@ impl Refinement {
         }
         let cells = flow_displacement(flow);
         for (di, dj) in (-EDGE..=EDGE).flat_map(|a| (-EDGE..=EDGE).map(move |b| (a, b))) {
-            let Some(motion) = segment(i + di, j + dj).and_then(|f| f.motion) else { continue };
-            let refined = Refined::moving(&motion, at);
+            let Some(found) = segment(i + di, j + dj).filter(|f| f.moves) else { continue };
+            let refined = Refined::of(found, at);
             if (0..2).all(|a| (cells[a] as f32 - refined.by[a]).abs() <= ALIKE) {
                 return refined;
             }
@@ -313,11 +323,11 @@ impl Things {
             let columns = self.segments.columns(n);
             let thing = Thing::new(sweeps, columns);
             let found = motion(&thing, flow, predicted, &mut self.visits);
-            if let Some(motion) = found.motion {
+            if found.moves {
                 let (id, whole) = (self.found.len() as u32, self.segment[columns[0] as usize]);
                 columns.iter().for_each(|c| self.segment[*c as usize] = id);
                 for &c in columns {
-                    grow(sweeps, c as usize, &motion, whole, id, &mut self.segment);
+                    grow(sweeps, c as usize, &found.motion, whole, id, &mut self.segment);
                 }
                 let _ = self.found.push(Found { whole, ..found });
             }
@@ -342,8 +352,7 @@ impl Things {
             let mut best = 1.0;
             for m in &near {
                 let found = self.found[*m as usize];
-                let Some(motion) = found.motion else { continue };
-                let misfit = thing.misfit(&motion, &mut self.visits);
+                let misfit = thing.misfit(&found.motion, &mut self.visits);
                 let rest =
                     found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;
@@ -405,16 +414,16 @@ fn motion(
     // A motion that fits ill is left to the thing's parts unless it explains much.
     let gained = gain(found.still, misfit);
     let convinces = gained > if misfit < UNFIT { GAIN } else { 2.0 * GAIN };
-    if convinces && by > LEAST && thing.samples.len() >= ENOUGH {
-        let covariance = motion.covariance * doubt(misfit);
-        found.motion = Some(Motion { covariance, ..motion });
-    }
+    found.moves = convinces && by > LEAST && thing.samples.len() >= ENOUGH;
+    let likely = 1.0 / (1.0 + libm::expf((GAIN - gained) / SURER));
+    found.unsure = likely * (1.0 - likely);
+    found.motion = Motion { covariance: motion.covariance * doubt(misfit), ..motion };
     found
 }
 
 /// Whether a column is part of something that stands.
 fn stands_still(segment: &[u32], found: &[Found], column: usize) -> bool {
-    found.get(segment[column] as usize).is_some_and(|f| f.motion.is_none())
+    found.get(segment[column] as usize).is_some_and(|f| !f.moves)
 }
 
 /// Takes columns beside one of a moving part along if their returns fit its motion as well as
@@ -504,7 +513,7 @@ fn neighbours(
         for a in i.saturating_sub(NEAR)..(i + NEAR + 1).min(side) {
             for b in j.saturating_sub(NEAR)..(j + NEAR + 1).min(side) {
                 let other = segment[a * side + b];
-                let moves = found.get(other as usize).is_some_and(|f| f.motion.is_some());
+                let moves = found.get(other as usize).is_some_and(|f| f.moves);
                 if moves && !near.contains(&other) {
                     // Beyond the capacity: the first ones are enough.
                     let _ = near.push(other);

@@ -4,7 +4,7 @@ use super::{CELL_M, SIDE};
 use crate::output::{Origin, PointFlow};
 use crate::params::{POINTS_MAX, SLOTS};
 use crate::pose::Pose;
-use crate::prepare::{Dropped, Preparation, moved_by, slot_time};
+use crate::prepare::{Dropped, Preparation, moved_by, slot_of, time};
 use crate::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
 use glam::{DMat3, DVec3};
 
@@ -117,11 +117,13 @@ impl Batch {
             let at = if rig.distorted { then } else { sweep.world_from_vehicle };
             place.turn = at.matrix();
             place.at = at.translation - self.corner;
-            place.time_s = after_s + if timed { slot_time(rig, slot) } else { 0.0 };
+            place.offset_s = if timed { time(rig, slot as f64 + 0.5) } else { 0.0 };
             for (origin, mounted) in place.origins.iter_mut().zip(&rig.sensors) {
                 *origin = metres((then * *mounted).translation - self.corner);
             }
         }
+        // What the vehicle moves on within a slot.
+        let drift = if rig.distorted { rotation * sweep.twist.linear } else { DVec3::ZERO };
         let edge = SIDE as f32 * CELL_M;
         let vehicle = under - self.corner;
         for (n, point) in sweep.points.iter().enumerate() {
@@ -133,24 +135,23 @@ impl Batch {
                 }
                 None => continue,
             }
-            let slot = if timed { self.preparation.slot(rig, point) } else { 0 };
+            let when = self.preparation.when(rig, point);
+            let slot = if timed { slot_of(when) } else { 0 };
+            let offset_s = time(rig, f64::from(when));
             let place = &places[slot];
             let [x, y, z] = point.position.map(f64::from);
-            let at = metres(place.turn * DVec3::new(x, y, z) + place.at);
+            let drift = drift * (offset_s - place.offset_s);
+            let at = metres(place.turn * DVec3::new(x, y, z) + place.at + drift);
             if !at[..2].iter().all(|v| *v >= 0.0 && *v < edge) {
                 self.dropped.too_far += 1;
                 continue;
             }
-            let time_s = match rig.timing {
-                Timing::Offset { .. } => after_s + point.offset_s as f64,
-                _ => place.time_s,
-            };
             let away = [at[0] as f64 - vehicle.x, at[1] as f64 - vehicle.y];
             let velocity = flows.as_ref().and_then(|f| f.velocity(n, away));
             let seen = Seen {
                 at,
                 origin: place.origins[point.sensor as usize],
-                time_s: time_s as f32,
+                time_s: (after_s + offset_s) as f32,
                 sensor: point.sensor,
                 velocity,
             };
@@ -165,8 +166,8 @@ struct Place {
     turn: DMat3,
     /// m from the corner.
     at: DVec3,
-    /// s after the batch's stamp.
-    time_s: f64,
+    /// s after the sweep's stamp.
+    offset_s: f64,
     /// Of the sensors, m from the corner.
     origins: [[f32; 3]; SENSORS_MAX],
 }

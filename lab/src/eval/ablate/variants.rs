@@ -61,7 +61,7 @@ pub const VARIANTS: [Variant; 24] = [
     of("smoothing-1", "w_p = 1", |p| Profile { smoothing: 1000, ..p }),
     of("smoothing-3", "w_p = 3", |p| Profile { smoothing: 3000, ..p }),
     of("rounds-5", "5 rounds", |p| Profile { em_rounds: 5, ..p }),
-    of("rounds-10", "10 rounds", |p| Profile { em_rounds: 10, ..p }),
+    of("rounds-8", "8 rounds", |p| Profile { em_rounds: 8, ..p }),
     of("rounds-20", "20 rounds", |p| Profile { em_rounds: 20, ..p }),
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
     Variant { numbers: Numbers::NoFilter, ..of("filter-off", "every solid column", |p| p) },
