@@ -93,6 +93,9 @@ pub enum Birth {
 pub struct TrackletParams {
     /// Standard deviation of a measured position, cells: half a cell.
     pub measurement_cells: f32,
+    /// Standard deviation of what the poses err from one sweep to the next, m. Tracklets
+    /// allow for it beside the covariance of a displacement, which is by the poses given.
+    pub pose_noise_m: f32,
     /// Process noise of the speed, m/s per second, as a standard deviation per step of `dt`.
     pub speed_noise_mps2: f32,
     /// Process noise of the turning rate, rad/s per second.
@@ -165,7 +168,7 @@ impl Profile {
             range_m: 100.0,
             frame: Frame::Lattice,
             deskew: true,
-            // 20 find nothing that the refinement does not find after 10.
+            // 20 find nothing that the refinement does not find after 8.
             em_rounds: 8,
             smoothing: 1000,
             displacement_cost: 1,
@@ -173,6 +176,7 @@ impl Profile {
             refinement_sweeps: 3,
             tracklet: TrackletParams {
                 measurement_cells: 0.5,
+                pose_noise_m: 0.01,
                 speed_noise_mps2: 1.0,
                 turn_noise_radps2: 0.6,
                 turn_birth_radps: 0.2,
@@ -203,6 +207,7 @@ impl Profile {
             // 14 log(p q + (1 - p)(1 - q)) with p, q at the clip bounds -1 and 3.
             outside_cost: 17_289,
             tracklet: TrackletParams {
+                pose_noise_m: 0.0,
                 speed_noise_mps2: 0.5,
                 turn_noise_radps2: 0.3,
                 // His gate compares the distance itself with the quantile 5.9915.
@@ -248,7 +253,7 @@ impl Profile {
     pub fn check(&self) -> Result<(), ProfileError> {
         let (t, l) = (&self.tracklet, &self.limits);
         let positive = |v: f32| v.is_finite() && v > 0.0;
-        let rules: [(bool, &'static str, &'static str); 21] = [
+        let rules: [(bool, &'static str, &'static str); 22] = [
             (self.side % 2 == 1 && self.side >= 31, "side", "odd and at least 31"),
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
@@ -274,6 +279,7 @@ impl Profile {
                 "0 where the frame is the sensor's",
             ),
             (positive(t.measurement_cells), "measurement_cells", "above 0"),
+            ((0.0..=1.0).contains(&t.pose_noise_m), "pose_noise_m", "0 to 1"),
             (positive(t.speed_noise_mps2), "speed_noise_mps2", "above 0"),
             (positive(t.turn_noise_radps2), "turn_noise_radps2", "above 0"),
             (positive(t.turn_birth_radps), "turn_birth_radps", "above 0"),

@@ -42,6 +42,7 @@ struct Keys {
 #[serde(deny_unknown_fields)]
 struct TrackletKeys {
     measurement_cells: Option<f32>,
+    pose_noise_m: Option<f32>,
     speed_noise_mps2: Option<f32>,
     turn_noise_radps2: Option<f32>,
     turn_birth_radps: Option<f32>,
@@ -94,6 +95,7 @@ impl Keys {
         set(&mut p.limits.spin_radps, self.spin_radps);
         let (t, keys) = (&mut p.tracklet, self.tracklet);
         set(&mut t.measurement_cells, keys.measurement_cells);
+        set(&mut t.pose_noise_m, keys.pose_noise_m);
         set(&mut t.speed_noise_mps2, keys.speed_noise_mps2);
         set(&mut t.turn_noise_radps2, keys.turn_noise_radps2);
         set(&mut t.turn_birth_radps, keys.turn_birth_radps);
@@ -243,7 +245,7 @@ mod tests {
             displacement_cost = 8\noutside_cost = 9\nrefinement_sweeps = 0\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
             measurement_cells = 0.75\nspeed_noise_mps2 = 2.0\nturn_noise_radps2 = 3.0\n\
             turn_birth_radps = 4.0\ngate_d2 = 5.0\nbirth = \"source\"\n\
-            takes_over = false\ncoast_sweeps = 6\n";
+            takes_over = false\ncoast_sweeps = 6\npose_noise_m = 0.25\n";
         let p = parsed(text).unwrap();
         assert_eq!((p.name.as_str(), p.side, p.levels), ("mine", 101, 12));
         assert_eq!((p.voxel_m, p.range_m, p.frame, p.deskew), (0.4, 80.0, Frame::Sensor, false));
@@ -257,7 +259,7 @@ mod tests {
             (t.measurement_cells, t.speed_noise_mps2, t.turn_noise_radps2),
             (0.75, 2.0, 3.0)
         );
-        assert_eq!((t.turn_birth_radps, t.gate_d2), (4.0, 5.0));
+        assert_eq!((t.turn_birth_radps, t.gate_d2, t.pose_noise_m), (4.0, 5.0, 0.25));
         assert_eq!((p.refinement_sweeps, t.takes_over, t.coast_sweeps), (0, false, 6));
         let p = parsed("base = \"dissertation\"").unwrap();
         assert_eq!(Profile { name: Profile::dissertation().name, ..p }, Profile::dissertation());

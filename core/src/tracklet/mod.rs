@@ -11,7 +11,7 @@ pub mod ekf;
 #[cfg(test)]
 mod tests;
 
-use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile};
+use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile, TrackletParams};
 use crate::record::{NONE, Step};
 use ekf::Ekf;
 use nalgebra::Matrix2;
@@ -76,7 +76,7 @@ pub(crate) fn observe(
     dt: f32,
 ) -> bool {
     let params = &profile.tracklet;
-    let noise = position_noise(covariance);
+    let noise = position_noise(params, covariance);
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
         // From the sweep before its birth to this one.
         let sweeps = if profile.refinement_sweeps > 0 { 1 } else { t.age + 2 };
@@ -92,9 +92,11 @@ pub(crate) fn observe(
     passed
 }
 
-/// A displacement lies between two positions that err alike: half its covariance is each one's.
-fn position_noise([xx, xy, yy]: [f32; 3]) -> Matrix2<f32> {
-    Matrix2::new(xx, xy, xy, yy) * 0.5
+/// A displacement lies between two positions that err alike: half its covariance is each one's, and
+/// half that of the poses between them.
+fn position_noise(params: &TrackletParams, [xx, xy, yy]: [f32; 3]) -> Matrix2<f32> {
+    let of_poses = params.pose_noise_m * params.pose_noise_m;
+    Matrix2::new(xx + of_poses, xy, xy, yy + of_poses) * 0.5
 }
 
 /// All tracklets: fixed capacity; beyond it none are born.
@@ -317,7 +319,7 @@ impl Tracklets {
 const INSIDE: f32 = 1.0 - f32::EPSILON;
 
 fn born(profile: &Profile, o: &Observation, dt: f32) -> Tracklet {
-    let noise = position_noise(o.covariance);
+    let noise = position_noise(&profile.tracklet, o.covariance);
     let ekf = Ekf::birth(&profile.tracklet, noise, o.moved, dt);
     Tracklet { ekf, age: 0, missed: 0, column: o.column, place: [0.5; 2] }
 }
