@@ -6,9 +6,13 @@
 
 #![forbid(unsafe_code)]
 
+use glam::DVec3;
 use raywake::map::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
 use raywake_core::background_filter;
 use raywake_core::layout::{BUFFERS, Buffer, COUNTERS, DISTINCT_COUNT};
+use raywake_core::objects::centroid_ekf::{CentroidEkf, CentroidParams};
+use raywake_core::objects::estimate::{EstimateParams, Estimator, FixedLag, MODEL_MAX};
+use raywake_core::objects::{ObjectReturn, ObjectState};
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::prepare::place;
 use raywake_gpu::{self as gpu, Executor, Heap, Op, Options, Program};
@@ -18,6 +22,7 @@ use raywake_tests::drives::{Setup, pairs, sweep};
 use raywake_tests::grid::{Rays, Tracer};
 use raywake_tests::table::{Variant, table};
 use raywake_tests::vulkan;
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 fn milliseconds(since: Instant) -> f64 {
@@ -155,6 +160,91 @@ fn map(sweeps: &[SimSweep]) {
     table("sparse map, profile map, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
 }
 
+/// Trajectory and shape of the object with most returns: one iteration of the batch over all sweeps
+/// (2.6.6), and a push of the fixed lag with every sweep.
+fn tracks(sweeps: &[SimSweep]) {
+    let all =
+        || sweeps.iter().flat_map(|s| s.points.iter().zip(&s.truth).map(move |(p, t)| (s, p, t)));
+    let mut counts = BTreeMap::new();
+    all()
+        .filter(|(.., t)| t.object != 0)
+        .for_each(|(.., t)| *counts.entry(t.object).or_insert(0) += 1);
+    let Some((&most, _)) = counts.iter().max_by_key(|(_, count)| **count) else { return };
+    let seen = |s: &SimSweep| -> Vec<ObjectReturn> {
+        let own = s.points.iter().zip(&s.truth).filter(|(_, t)| t.object == most);
+        own.map(|(p, _)| {
+            let then = s.world_from_vehicle * s.twist.over(f64::from(p.offset_s));
+            let at = then.transform(DVec3::from_array(p.position.map(f64::from)));
+            let time_s = s.stamp_s as f32 + p.offset_s;
+            let [position, origin] = [at, then.translation].map(|v| v.as_vec3().to_array());
+            ObjectReturn { position, origin, time_s, sensor: p.sensor }
+        })
+        .collect()
+    };
+    let batches: Vec<Vec<ObjectReturn>> =
+        sweeps.iter().map(seen).filter(|b| !b.is_empty()).collect();
+    let filter = CentroidParams::dissertation();
+    let mut ekf: Option<CentroidEkf> = None;
+    let mut history: Vec<ObjectState> = Vec::new();
+    for batch in &batches {
+        let mean = |of: &dyn Fn(&ObjectReturn) -> f32| {
+            batch.iter().map(|r| f64::from(of(r))).sum::<f64>() / batch.len() as f64
+        };
+        let centroid = [0, 1, 2].map(|a| mean(&|r| r.position[a]));
+        let time_s = mean(&|r| r.time_s);
+        let ekf = match &mut ekf {
+            None => ekf.insert(CentroidEkf::birth(&filter, time_s, centroid)),
+            Some(ekf) => {
+                ekf.predict(&filter, time_s);
+                let revision = ekf.update(&filter, centroid);
+                revision.revise(&ekf.state(), &mut history);
+                ekf
+            }
+        };
+        history.push(ekf.state());
+    }
+    let returns = batches.concat();
+    let mut estimator = Box::new(Estimator::new());
+    let mut variants = Vec::new();
+    for (name, model) in [("batch, n_m = 300", 300), ("batch, n_m = 3000", MODEL_MAX)] {
+        let mut variant = Variant::new(format!(
+            "{name}, {} returns of {}",
+            5000.min(returns.len()),
+            returns.len()
+        ));
+        let mut solve = |iterations: usize| {
+            let params = EstimateParams { iterations, model, ..EstimateParams::dissertation() };
+            let clock = Instant::now();
+            let report = estimator.solve(&params, &returns, &history);
+            (milliseconds(clock), report.iterations)
+        };
+        for n in 0..batches.len() {
+            let ([short, long], [one, many]): ([f64; 2], [usize; 2]) = {
+                let (a, b) = (solve(1), solve(8));
+                ([a.0, b.0], [a.1, b.1])
+            };
+            variant.add(n, "total", (long - short) / (many - one).max(1) as f64);
+        }
+        estimator.model().as_flattened().iter().for_each(|v| variant.digest.word(v.to_bits()));
+        variants.push(variant);
+    }
+    let mut variant = Variant::new("fixed lag, a push".into());
+    let mut lag = FixedLag::new();
+    for (n, (batch, baseline)) in batches.iter().zip(&history).enumerate() {
+        let clock = Instant::now();
+        let state = lag.push(&mut estimator, &EstimateParams::default(), batch, baseline);
+        variant.add(n, "total", milliseconds(clock));
+        state.position.iter().for_each(|v| variant.digest.double(*v));
+    }
+    variants.push(variant);
+    table(
+        "trajectory and shape of one object, ms an iteration or a push",
+        &variants,
+        &[(1, 0), (2, 0)],
+        &[],
+    );
+}
+
 /// The pipeline is made on the stack before it moves to the heap.
 const STACK: usize = 64 << 20;
 
@@ -175,4 +265,5 @@ fn run() {
     flow(&sweeps);
     dense(&sweeps);
     map(&sweeps);
+    tracks(&sweeps);
 }

@@ -27,8 +27,8 @@ pub enum Method {
     FixedLag(EstimateParams),
 }
 
-/// The trackers of the tables and their names.
-pub fn methods() -> [(&'static str, Method); 8] {
+/// The trackers of the tables and their names: those of the dissertation, then each option by itself.
+pub fn methods() -> [(&'static str, Method); 15] {
     let of =
         |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
     let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
@@ -38,7 +38,17 @@ pub fn methods() -> [(&'static str, Method); 8] {
         ("as printed, n_m = 3000", of(printed, 3000)),
         ("ours, n_m = 300", of(ours, 300)),
         ("ours, n_m = 3000", of(ours, 3000)),
-        ("ours, carved by rays", Method::Proposed(EstimateParams { carves: true, ..ours })),
+        ("as printed, damped", Method::Proposed(EstimateParams { damping: true, ..printed })),
+        ("as printed, robust loss", Method::Proposed(EstimateParams { robust: 3.0, ..printed })),
+        (
+            "as printed, carved by rays",
+            Method::Proposed(EstimateParams { carves: true, ..printed }),
+        ),
+        ("ours without ends", Method::Proposed(EstimateParams { ends_m: 0.0, ..ours })),
+        ("ours not carved", Method::Proposed(EstimateParams { carves: false, ..ours })),
+        ("ours not grown", Method::Proposed(EstimateParams { grows: false, ..ours })),
+        ("ours from one start", Method::Proposed(EstimateParams { starts: false, ..ours })),
+        ("ours without surfaces", Method::Proposed(EstimateParams { surfaces: false, ..ours })),
         ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]
@@ -46,6 +56,8 @@ pub fn methods() -> [(&'static str, Method); 8] {
 
 /// Index of our tracker of 300 points in [`methods`].
 pub const OURS: usize = 3;
+/// Trackers of the dissertation's tables, the first ones.
+pub const MAIN: usize = 5;
 
 /// How one tracker did on one object.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Figures 2.1 and 2.5 to 2.8 of the dissertation.
 
 use super::errors::Alignment;
-use super::evaluate::{Method, OURS, Score, methods, track};
+use super::evaluate::{MAIN, Method, OURS, Score, methods, track};
 use super::object::{Moment, Object, moment_at};
 use super::tables::Set;
 use super::tracker::{Track, baseline};
@@ -31,12 +31,11 @@ pub fn convergence(sets: &[Set]) -> Chart {
         }
         (title.to_string(), Plot::Lines(lines))
     };
-    let last = methods().len();
     let parts = vec![
         part("cost, as printed", "mean J", 1..OURS, Cost::total),
         part("distance, as printed", "mean distance, m", 1..OURS, |c| c.residual_m),
-        part("cost, ours", "mean J", OURS..last, Cost::total),
-        part("distance, ours", "mean distance, m", OURS..last, |c| c.residual_m),
+        part("cost, ours", "mean J", OURS..MAIN, Cost::total),
+        part("distance, ours", "mean distance, m", OURS..MAIN, |c| c.residual_m),
     ];
     let caption = "As figure 2.5: cost J, and mean distance of a return from its model point, after \
         each iteration; mean over tracks, of which those that have ended stay as they are.";

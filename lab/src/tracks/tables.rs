@@ -1,7 +1,7 @@
 //! Tables 2.1 and 2.2 of the dissertation, and what else is counted.
 
 use super::errors::{Errors, Rmse};
-use super::evaluate::{OURS, Outcome, Score, methods};
+use super::evaluate::{MAIN, OURS, Outcome, Score, methods};
 use super::front_ends::Found;
 use crate::labels::Kind;
 use crate::report::{Cell, Row, Table};
@@ -207,19 +207,19 @@ pub fn entropies(sets: &[Set]) -> Table {
         .iter()
         .map(|&(name, [truth, baseline, proposed])| {
             let gap = (baseline - proposed) / (baseline - truth);
-            let none = vec![Cell::Empty; methods().len() - 2];
+            let none = vec![Cell::Empty; MAIN - 2];
             let cells = [truth, baseline, proposed].map(number).into_iter().chain(none);
             let gaps = [share(gap), Cell::Empty];
             Row::reference([Cell::from(name)].into_iter().chain(cells).chain(gaps))
         })
         .collect();
     rows.extend(sets.iter().filter(|s| !s.outcomes.is_empty()).map(|set| {
-        let all = (0..methods().len()).map(|n| set.entropy(n));
+        let all = (0..MAIN).map(|n| set.entropy(n));
         let cells = [set.mean(|o| o.entropy)].into_iter().chain(all).map(number);
         let gaps = [1, OURS].map(|n| share(set.gap_closed(n)));
         Row::new([Cell::from(set.name.as_str())].into_iter().chain(cells).chain(gaps))
     }));
-    let names = methods().map(|m| m.0);
+    let names = methods().into_iter().take(MAIN).map(|m| m.0);
     let gaps = ["Gap closed as printed, %", "Gap closed by ours, %"];
     let columns: Vec<&str> = ["Set", "Truth"].into_iter().chain(names).chain(gaps).collect();
     let caption = "As table 2.2: entropy of the clouds of all returns in the object's frame, sigma \
@@ -284,7 +284,7 @@ pub fn extents(sets: &[Set]) -> Table {
             continue;
         }
         row("truth", &|o| o.extent);
-        for (n, (name, _)) in methods().iter().enumerate() {
+        for (n, (name, _)) in methods().iter().enumerate().take(MAIN) {
             row(name, &|o| o.scores[n].extent);
         }
     }

@@ -24,8 +24,8 @@
 //! ([`EstimateParams::starts`]), returns that weigh across surfaces ([`EstimateParams::surfaces`]).
 //! For long vehicles what counts most is where they end ([`EstimateParams::ends_m`]).
 //! Rays through model points ([`EstimateParams::carves`]) help the plain method, and little beyond
-//! these; so do damping and a robust loss, which are for bad input. `options_measured` prints the
-//! table.
+//! these; so do damping and a robust loss, which are for bad input. `raywake-lab eval
+//! tracks` measures every one by itself.
 
 mod ends;
 mod nearest;
