@@ -38,7 +38,7 @@ pub fn methods() -> [(&'static str, Method); 8] {
         ("as printed, n_m = 3000", of(printed, 3000)),
         ("ours, n_m = 300", of(ours, 300)),
         ("ours, n_m = 3000", of(ours, 3000)),
-        ("ours, carved by rays", Method::Proposed(EstimateParams { carves: true, ..ours })),
+        ("ours, not carved by rays", Method::Proposed(EstimateParams { carves: false, ..ours })),
         ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]

@@ -65,8 +65,8 @@ const LEAST_PIVOT: f64 = 1e-10;
 const CONVERGED: f64 = 1e-4;
 
 /// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
-/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
-/// dense one holds it.
+/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A
+/// sparse model lets a trajectory slide into place where a dense one holds it.
 const GROWTH_S: f64 = 0.2;
 const GROWTHS_MAX: f64 = 64.0;
 const GROWTH_M: f64 = 0.15;
@@ -159,7 +159,6 @@ impl Default for EstimateParams {
         process[6] = 0.15;
         EstimateParams {
             deviation_m: 0.05,
-            robust: 0.0,
             damping: true,
             surfaces: true,
             loose_m: 0.5,
@@ -490,7 +489,7 @@ impl Estimator {
     /// A solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
-        report.iterations = 0;
+        (report.iterations, report.carved) = (0, 0);
         self.active = 0..self.returns.all().len();
         if params.ends_m > 0.0 {
             self.extract(params);
@@ -687,9 +686,9 @@ impl Estimator {
             *seen = Seen::look(&self.now.weights, kept);
             let place = seen.place().map(|value| value as f32);
             let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &place));
-            let Some((number, _)) = self.nearest.find(place, far) else { continue };
-            seen.nearest = number;
-            self.starts[usize::from(number) + 1] += 1;
+            // Any will do for what is beyond all numbers: its cost tells.
+            seen.nearest = self.nearest.find(place, far).map_or(0, |(number, _)| number);
+            self.starts[usize::from(seen.nearest) + 1] += 1;
         }
         for i in 0..model.len() {
             self.starts[i + 1] += self.starts[i];

@@ -281,6 +281,21 @@ fn takes_as_many_as_it_may_evenly_in_time() {
     }
 }
 
+/// What is counted is of the start that led to the estimate, not of all that were tried.
+#[test]
+fn carved_points_are_those_that_lack() {
+    let mut estimator = Box::new(Estimator::new());
+    let params = EstimateParams::default();
+    let mut carved = 0;
+    for seed in 0..4 {
+        let drive = drive(synthetic::parked(seed));
+        let report = estimator.solve(&params, &drive.returns, &drive.history);
+        assert_eq!(report.carved + estimator.model().len(), params.model, "{seed}: {report:?}");
+        carved += report.carved;
+    }
+    assert!(carved > 0);
+}
+
 /// Returns of something else, in the middle of a track.
 #[test]
 fn a_wrong_association_does_not_break_a_track() {
@@ -401,7 +416,7 @@ fn options_measured() {
         ("no starts", EstimateParams { starts: false, ..ours }),
         ("no surfaces", EstimateParams { surfaces: false, ..ours }),
         ("no damping", EstimateParams { damping: false, ..ours }),
-        ("carves", EstimateParams { carves: true, ..ours }),
+        ("no carving", EstimateParams { carves: false, ..ours }),
         ("robust", EstimateParams { robust: 5.0, ..ours }),
     ];
     let mut estimator = Box::new(Estimator::new());
