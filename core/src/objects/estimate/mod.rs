@@ -385,6 +385,7 @@ impl Estimator {
         if params.starts {
             self.face_forward();
         }
+        self.unwind();
         report.outside = self.outside(params.extent_m);
         report
     }
@@ -402,6 +403,17 @@ impl Estimator {
             for [x, y, _] in &mut self.best.model[..self.best.points] {
                 (*x, *y) = (-*x, -*y);
             }
+        }
+    }
+
+    /// What is too small or too round to have a heading may have made many turns on its way here:
+    /// whole ones mean nothing, and the heading begins within half a turn of zero.
+    fn unwind(&mut self) {
+        let weights = &mut self.best.weights[..self.knots.bases()];
+        let [.., heading, _, _, _] = self.knots.value(weights, self.knots.start());
+        let turns = heading - start::turn(heading);
+        for weights in weights {
+            weights[3] -= turns;
         }
     }
 
