@@ -18,6 +18,8 @@ type Covariance = SMatrix<f64, STATE, STATE>;
 
 /// 99 % quantile of chi-square with two degrees of freedom.
 const DEPARTED_D2: f64 = 9.2103;
+/// What departs faster has shown another side to another sensor, m/s.
+const FASTEST_MPS: f64 = 60.0;
 /// Standard deviations from zero from which on the sign of a speed is sure.
 const SURE: f64 = 3.0;
 
@@ -233,7 +235,8 @@ impl CentroidEkf {
         let moved = [centroid[0] - first[0], centroid[1] - first[1]];
         let moved2 = moved[0] * moved[0] + moved[1] * moved[1];
         let departs = moved2 > 2.0 * measured * DEPARTED_D2 || elapsed >= params.start_s;
-        if !departs || elapsed <= 0.0 || moved2 == 0.0 {
+        let fastest = FASTEST_MPS * elapsed.max(0.0);
+        if !departs || moved2 > fastest * fastest || moved2 == 0.0 {
             *self = CentroidEkf { phase: self.phase, ..born };
             return Revision::None;
         }
@@ -335,6 +338,21 @@ mod tests {
             assert!((0..STATE).all(|n| ekf.covariance()[(n, n)] >= 0.0));
         }
         states
+    }
+
+    /// As of two sensors that see two sides of an object one right after the other.
+    #[test]
+    fn centroids_at_one_time_are_no_motion() {
+        for after_s in [0.0, 1e-300, 1e-30, 1e-12, 1e-6] {
+            let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, [0.0; 3]);
+            for n in 1..4 {
+                ekf.predict(&PARAMS, after_s * n as f64);
+                ekf.update(&PARAMS, [2.0 * n as f64, 0.0, 0.0]);
+                let state = ekf.state();
+                assert!(state.speed.abs() < 100.0, "{after_s}: {state:?}");
+                assert!(ekf.covariance().iter().all(|v| v.is_finite()), "{after_s}");
+            }
+        }
     }
 
     fn off(from: f64, to: f64) -> f64 {

@@ -195,7 +195,8 @@ pub struct Summary {
     pub sweeps: u64,
     /// Digest of all results, 16 hexadecimal digits; see [`Report::track`].
     pub digest: String,
-    /// Time of a sweep, ms: that of its flow and of the front end. Null without a sweep.
+    /// Time of a sweep, ms: that of its flow, of the front end and of the fixed lag, as far as they
+    /// are asked for. Null without a sweep.
     pub step_ms: Option<Spread>,
     /// Time of the estimate of a track at its end, ms; null without a track.
     pub estimate_ms: Option<Spread>,

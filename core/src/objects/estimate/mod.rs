@@ -65,8 +65,8 @@ const LEAST_PIVOT: f64 = 1e-10;
 const CONVERGED: f64 = 1e-4;
 
 /// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
-/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A sparse model lets a trajectory slide into place where a
-/// dense one holds it.
+/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A
+/// sparse model lets a trajectory slide into place where a dense one holds it.
 const GROWTH_S: f64 = 0.2;
 const GROWTHS_MAX: f64 = 64.0;
 const GROWTH_M: f64 = 0.15;
@@ -159,7 +159,6 @@ impl Default for EstimateParams {
         process[6] = 0.15;
         EstimateParams {
             deviation_m: 0.05,
-            robust: 0.0,
             damping: true,
             surfaces: true,
             loose_m: 0.5,
@@ -386,6 +385,7 @@ impl Estimator {
         if params.starts {
             self.face_forward();
         }
+        self.unwind();
         report.outside = self.outside(params.extent_m);
         report
     }
@@ -403,6 +403,17 @@ impl Estimator {
             for [x, y, _] in &mut self.best.model[..self.best.points] {
                 (*x, *y) = (-*x, -*y);
             }
+        }
+    }
+
+    /// What is too small or too round to have a heading may have made many turns on its way here:
+    /// whole ones mean nothing, and the heading begins within half a turn of zero.
+    fn unwind(&mut self) {
+        let weights = &mut self.best.weights[..self.knots.bases()];
+        let [.., heading, _, _, _] = self.knots.value(weights, self.knots.start());
+        let turns = heading - start::turn(heading);
+        for weights in weights {
+            weights[3] -= turns;
         }
     }
 
@@ -490,7 +501,7 @@ impl Estimator {
     /// A solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
-        report.iterations = 0;
+        (report.iterations, report.carved) = (0, 0);
         self.active = 0..self.returns.all().len();
         if params.ends_m > 0.0 {
             self.extract(params);
@@ -687,9 +698,9 @@ impl Estimator {
             *seen = Seen::look(&self.now.weights, kept);
             let place = seen.place().map(|value| value as f32);
             let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &place));
-            let Some((number, _)) = self.nearest.find(place, far) else { continue };
-            seen.nearest = number;
-            self.starts[usize::from(number) + 1] += 1;
+            // Any will do for what is beyond all numbers: its cost tells.
+            seen.nearest = self.nearest.find(place, far).map_or(0, |(number, _)| number);
+            self.starts[usize::from(seen.nearest) + 1] += 1;
         }
         for i in 0..model.len() {
             self.starts[i + 1] += self.starts[i];

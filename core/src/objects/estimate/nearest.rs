@@ -84,7 +84,8 @@ impl<const N: usize> Nearest<N> {
     }
 
     /// Number and squared distance of the point nearest to `at`, of equally near ones the first.
-    /// None without points, and where `at` is not finite. `guess` is a squared distance that some point is known to have, which shortens the search.
+    /// None without points, and where no squared distance is finite. `guess` is a squared distance
+    /// that some point is known to have, which shortens the search.
     pub fn find(&self, at: [f32; 3], guess: f32) -> Option<(u16, f32)> {
         if self.count == 0 || !at.iter().all(|value| value.is_finite()) {
             return None;
@@ -110,7 +111,7 @@ impl<const N: usize> Nearest<N> {
                 }
             }
             if best <= reach * reach || reach > whole {
-                return Some((number, best));
+                return (number != u16::MAX).then_some((number, best));
             }
             // The nearest of all is no further than the best of these.
             reach = if best < f32::MAX { libm::sqrtf(best) } else { 2.0 * reach };
@@ -174,6 +175,9 @@ mod tests {
                 assert_eq!(grid.find(at, guess), Some(expected), "{count} {size} {at:?}");
                 assert_eq!(grid.find(at, f32::MAX), Some(expected), "{count} {size} {at:?}");
             }
+        }
+        for at in [[f32::NAN, 0.0, 0.0], [f32::INFINITY; 3], [1e30, 0.0, 0.0], [0.0, 0.0, -1e38]] {
+            assert_eq!(grid.find(at, f32::MAX), None, "{at:?}");
         }
         grid.fill(&[]);
         assert_eq!(grid.find([0.0; 3], f32::MAX), None);

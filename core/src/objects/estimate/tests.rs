@@ -281,6 +281,48 @@ fn takes_as_many_as_it_may_evenly_in_time() {
     }
 }
 
+/// What is counted is of the start that led to the estimate, not of all that were tried.
+#[test]
+fn carved_points_are_those_that_lack() {
+    let mut estimator = Box::new(Estimator::new());
+    let params = EstimateParams::default();
+    let mut carved = 0;
+    for seed in 0..4 {
+        let drive = drive(synthetic::parked(seed));
+        let report = estimator.solve(&params, &drive.returns, &drive.history);
+        assert_eq!(report.carved + estimator.model().len(), params.model, "{seed}: {report:?}");
+        carved += report.carved;
+    }
+    assert!(carved > 0);
+}
+
+/// A crumb has no heading that returns could tell, but neither does it spin.
+#[test]
+fn whole_turns_are_taken_back() {
+    let mut estimator = Box::new(Estimator::new());
+    let mut random = Random(2);
+    for _ in 0..20 {
+        let returns: Vec<ObjectReturn> = (0..40)
+            .map(|i| ObjectReturn {
+                position: [0.2, 0.2, 0.3].map(|size| size * random.normal() as f32),
+                origin: [20.0, 3.0, 1.0],
+                time_s: 0.1 * (i / 10) as f32 + 0.001 * (i % 10) as f32,
+                ..Default::default()
+            })
+            .collect();
+        let history: Vec<ObjectState> = (0..4)
+            .map(|i| ObjectState {
+                time_s: 0.1 * f64::from(i),
+                position: [0, 1, 2].map(|_| 0.1 * random.normal()),
+                ..Default::default()
+            })
+            .collect();
+        estimator.solve(&EstimateParams::default(), &returns, &history);
+        let state = estimator.state(0.0);
+        assert!(state.heading.abs() <= core::f64::consts::PI, "{state:?}");
+    }
+}
+
 /// Returns of something else, in the middle of a track.
 #[test]
 fn a_wrong_association_does_not_break_a_track() {

@@ -142,7 +142,8 @@ impl Batch {
             let [x, y, z] = point.position.map(f64::from);
             let drift = drift * (offset_s - place.offset_s);
             let at = metres(place.turn * DVec3::new(x, y, z) + place.at + drift);
-            if !at[..2].iter().all(|v| *v >= 0.0 && *v < edge) {
+            let inside = at[..2].iter().all(|v| *v >= 0.0 && *v < edge) && at[2].abs() < edge;
+            if !inside {
                 self.dropped.too_far += 1;
                 continue;
             }

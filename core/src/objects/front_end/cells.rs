@@ -25,7 +25,8 @@ impl GroundMap<'_> {
         if !(i >= 0.0 && i < self.columns as f64 && j >= 0.0) {
             return None;
         }
-        let height = self.heights.get((j as usize).checked_mul(self.columns)? + i as usize)?;
+        let row = (j as usize).checked_mul(self.columns)?;
+        let height = self.heights.get(row.checked_add(i as usize)?)?;
         height.is_finite().then_some(*height)
     }
 }

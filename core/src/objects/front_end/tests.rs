@@ -379,7 +379,9 @@ fn what_is_not_finite_leaves_no_trace() {
         points.insert(at, Point { position: [10.0, f32::INFINITY, 1.0], ..Point::default() });
         points.push(Point { offset_s: f32::NAN, position: [10.0, 4.0, 1.0], ..Point::default() });
         points.push(Point { sensor: 7, position: [10.0, 4.0, 1.0], ..Point::default() });
-        points.push(Point { position: [3e8, 4.0, 1.0], ..Point::default() });
+        for far in [[3e8, 4.0, 1.0], [10.0, 4.0, 3e38], [10.0, 4.0, -3e38]] {
+            points.push(Point { position: far, ..Point::default() });
+        }
         points.push(Point::default());
         soiled.take(stamp_s, &points, None);
         // A sweep without a stamp, and one without a pose.
@@ -389,7 +391,7 @@ fn what_is_not_finite_leaves_no_trace() {
         soiled.place = Pose::IDENTITY;
         let d = soiled.step().dropped;
         assert_eq!(d.not_finite, 3 + 2 * points.len() as u64);
-        assert_eq!((d.no_return, d.unknown_sensor, d.too_far), (1, 1, 1));
+        assert_eq!((d.no_return, d.unknown_sensor, d.too_far), (1, 1, 3));
     }
     let [clean, soiled] = [&clean, &soiled].map(|run| run.live()[0].history().to_vec());
     assert_eq!(clean, soiled);
