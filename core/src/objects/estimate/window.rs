@@ -3,13 +3,16 @@
 //! What leaves the window stays as a prior. The state at the window's first time is held where the
 //! estimate had it when the window last moved on, with [`HELD`]; a model point keeps the mean of the
 //! returns that left, as precise as they were many, up to [`HELD_RETURNS`]. An object needs its
-//! [`FixedLag`] (some 40 KB); the workspace is one for all.
+//! [`FixedLag`] (some 30 KB); the workspace is one for all.
+//!
+//! A young track is estimated afresh from several starts. Each of those has a frame of its own: it is
+//! moved to where the states that came out before have the object, and what rests keeps its heading.
 
 use super::normal::{Scatter, Seen, Surface};
 use super::process::Weights;
 use super::returns;
 use super::start;
-use super::{Cost, EstimateParams, Estimator, Known, Report, precision};
+use super::{Cost, EstimateParams, Estimator, Known, Report, Start};
 use crate::objects::spline::{DEGREE, Knots};
 use crate::objects::{ObjectReturn, ObjectState};
 use heapless::Vec;
@@ -20,9 +23,15 @@ const WINDOW_S: f64 = 2.5;
 const PIECES: usize = 6;
 const PIECE_S: f64 = 0.5;
 const BASES: usize = PIECES + DEGREE;
-/// Returns of a sweep and of the window at most.
+/// Returns of a sweep, beside its foremost and hindmost, and of the window at most.
 const PER_SWEEP: usize = 32;
-const RETURNS: usize = 832;
+const RETURNS: usize = 26 * (PER_SWEEP + 2);
+/// States at most that a young track keeps.
+const SAID: usize = 16;
+/// What went back by more than this on the whole faces the other way, m.
+const BACK_M: f64 = 0.3;
+/// Length at most by which a tracker's centroid may be off the estimate's, m.
+const LONG_M: f64 = 15.0;
 /// Model points at most.
 const MODEL: usize = 128;
 /// States of the history at most: those of the window, at 10 Hz.
@@ -30,8 +39,11 @@ const HISTORY: usize = 32;
 /// Model points are at least so far apart at first, m; further by that factor when they are too many.
 const SPACING_M: f32 = 0.3;
 const WIDER: f32 = 1.25;
-/// A track younger than that is estimated afresh with every sweep, s.
-const YOUNG_S: f64 = 0.8;
+/// A track younger than that is estimated afresh from time to time, s: when it is older by this factor.
+const YOUNG_S: f64 = 1.5;
+const AGAIN: f64 = 1.25;
+/// What goes no further meanwhile rests, m: its heading is a gauge, which stays.
+const STILL_M: f64 = 0.7;
 const YOUNG_ROUNDS: usize = 4;
 const YOUNG_ITERATIONS: usize = 4;
 const YOUNG_MODEL: usize = 75;
@@ -67,6 +79,14 @@ pub struct FixedLag {
     returns: Vec<Held, RETURNS>,
     history: Vec<ObjectState, HISTORY>,
     model: Vec<Point, MODEL>,
+    /// Front and rear, m along the object.
+    ends: [f32; 2],
+    /// How far it went forward, m.
+    gone_m: f64,
+    /// Its age when it was last estimated afresh, s.
+    solved_s: f64,
+    /// What was said of it while it was young.
+    said: Vec<ObjectState, SAID>,
     spacing_m: f32,
     /// First and last time of the track's returns, s.
     born_s: f64,
@@ -91,6 +111,10 @@ impl FixedLag {
             returns: Vec::new(),
             history: Vec::new(),
             model: Vec::new(),
+            ends: [0.0; 2],
+            gone_m: 0.0,
+            solved_s: 0.0,
+            said: Vec::new(),
             spacing_m: 0.0,
             born_s: 0.0,
             newest_s: 0.0,
@@ -105,6 +129,8 @@ impl FixedLag {
         self.returns.clear();
         self.history.clear();
         self.model.clear();
+        self.said.clear();
+        self.solved_s = 0.0;
         self.begun = false;
         self.restarts = 0;
     }
@@ -122,15 +148,19 @@ impl FixedLag {
         returns: &[ObjectReturn],
         baseline: &ObjectState,
     ) -> ObjectState {
-        // So few returns of a sweep do not reach the object's ends.
-        let params = &EstimateParams { ends_m: 0.0, ..*params };
         let sound = || returns.iter().filter(|seen| returns::sound(seen));
         let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
         if start::sound(baseline) {
             if self.history.is_full() {
                 self.history.remove(0);
             }
-            _ = self.history.push(*baseline);
+            let mut state = *baseline;
+            // Backwards for a tracker that has not found out yet which way the object faces.
+            if state.speed < 0.0 {
+                state.heading += core::f64::consts::PI;
+                state.speed = -state.speed;
+            }
+            _ = self.history.push(state);
         }
         let Some(newest) = newest else {
             return if self.begun { self.state(baseline.time_s) } else { *baseline };
@@ -138,14 +168,17 @@ impl FixedLag {
         if self.begun && newest > self.newest_s + WINDOW_S {
             self.restart();
         }
+        let elapsed = if self.begun { (newest - self.newest_s).max(0.0) } else { 0.0 };
         self.newest_s = if self.begun { self.newest_s.max(newest) } else { newest };
         let oldest = self.newest_s - WINDOW_S;
         let count = sound().count();
         let keep = count.min(PER_SWEEP);
         self.forget(oldest);
+        let ends = self.ends_of(returns, baseline);
         let before = self.returns.len();
         for (rank, seen) in sound().enumerate() {
-            let taken = (rank + 1) * keep / count > rank * keep / count;
+            let taken =
+                (rank + 1) * keep / count > rank * keep / count || ends.contains(&Some(rank));
             if taken && f64::from(seen.time_s) >= oldest {
                 let held = Held { position: seen.position, time_s: seen.time_s, nearest: 0 };
                 _ = self.returns.push(held);
@@ -157,9 +190,18 @@ impl FixedLag {
             self.begin();
         }
         self.advance();
+        self.gone_m += self.state(self.newest_s).speed * elapsed;
         self.estimate(estimator, params, fresh);
         let state = self.state(self.newest_s);
-        if self.strayed(&state, params.extent_m) {
+        if self.newest_s - self.born_s < YOUNG_S {
+            if self.said.is_full() {
+                self.said.remove(0);
+            }
+            _ = self.said.push(state);
+        }
+        // A centroid can be anywhere on the object.
+        let [front, rear] = self.ends.map(f64::from);
+        if self.strayed(&state, params.extent_m + (front - rear).clamp(0.0, LONG_M)) {
             self.restart();
             return *self.history.last().unwrap_or(&state);
         }
@@ -174,6 +216,24 @@ impl FixedLag {
     /// Model points.
     pub fn points(&self) -> usize {
         self.model.len()
+    }
+
+    /// Which of the sound returns are foremost and hindmost, as the object goes on.
+    fn ends_of(&self, returns: &[ObjectReturn], baseline: &ObjectState) -> [Option<usize>; 2] {
+        let state = if self.begun { self.state(self.newest_s) } else { *baseline };
+        let (sin, cos) = libm::sincos(state.heading);
+        let along = |seen: &ObjectReturn| {
+            let [x, y, _] = seen.position.map(f64::from);
+            cos * x + sin * y - state.speed * f64::from(seen.time_s)
+        };
+        [1.0, -1.0].map(|forward| {
+            returns
+                .iter()
+                .filter(|seen| returns::sound(seen))
+                .enumerate()
+                .max_by(|(_, a), (_, b)| (forward * along(a)).total_cmp(&(forward * along(b))))
+                .map(|(rank, _)| rank)
+        })
     }
 
     fn restart(&mut self) {
@@ -257,7 +317,9 @@ impl FixedLag {
         estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
         estimator.returns.lay(&self.knots);
         estimator.active = 0..self.returns.len();
-        if self.newest_s - self.born_s < YOUNG_S {
+        let age = self.newest_s - self.born_s;
+        if age < YOUNG_S && age >= AGAIN * self.solved_s {
+            self.solved_s = age;
             self.estimate_young(estimator, params);
             for (kept, seen) in estimator.returns.all().iter().zip(&mut estimator.seen) {
                 *seen = Seen::look(&self.weights, kept);
@@ -277,38 +339,93 @@ impl FixedLag {
                     ..Surface::round(unit)
                 };
             }
+            estimator.now.ends = self.ends;
             estimator.descend(params, ITERATIONS, None);
+            self.ends = estimator.now.ends;
             for (point, at) in self.model.iter_mut().zip(&estimator.now.model) {
                 point.at = *at;
             }
             self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
             self.add_points(estimator, fresh);
+            self.face_forward();
         }
     }
 
     /// The first window: from the history alone, and with models of what is seen by then.
     fn estimate_young(&mut self, estimator: &mut Estimator, params: &EstimateParams) {
-        let weights = &mut estimator.now.weights[..BASES];
-        let begun = start::stand(&self.history, weights)
-            && start::smooth(
-                &self.knots,
-                &self.history,
-                &precision(params),
-                &mut estimator.equations,
-                weights,
-                &mut estimator.step,
-            );
-        if !begun {
-            estimator.stand_at_mean();
-        }
-        let moving = young(estimator, params);
-        self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
-        if begun {
-            start::stand(&self.history, &mut estimator.now.weights[..BASES]);
-            if young(estimator, params) < super::RESTS * moving {
+        let history = &self.history;
+        let heading = self.said.last().map(|state| state.heading);
+        let mut least = f64::MAX;
+        for from in [Start::Rest, Start::History, Start::Middles] {
+            match from {
+                Start::History => _ = estimator.start(params, history),
+                Start::Rest => {
+                    let weights = &mut estimator.now.weights[..BASES];
+                    if !start::stand(history, weights) {
+                        continue;
+                    }
+                    if let Some(heading) = heading {
+                        weights.iter_mut().for_each(|weights| weights[3] = heading);
+                    }
+                }
+                Start::Middles if !estimator.start_from_middles(params, history) => continue,
+                Start::Middles => {}
+            }
+            estimator.active = 0..self.returns.len();
+            let cost = young(estimator, params);
+            let gone = gone(&self.knots, &estimator.now.weights, self.newest_s);
+            let moves = libm::fabs(gone) > STILL_M && super::RESTS * cost < least;
+            if least == f64::MAX || moves {
+                least = if from == Start::Rest { cost } else { super::RESTS * cost };
                 self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+                self.ends = estimator.now.ends;
             }
         }
+        self.gone_m = gone(&self.knots, &self.weights, self.newest_s);
+        self.face_forward();
+        self.anchor();
+    }
+
+    /// Of both headings, the one that it went with on the whole.
+    fn face_forward(&mut self) {
+        if self.gone_m > -BACK_M {
+            return;
+        }
+        self.gone_m = -self.gone_m;
+        let turn = |weights: &mut Weights| {
+            weights[3] += core::f64::consts::PI;
+            weights[4] = -weights[4];
+        };
+        self.weights.iter_mut().for_each(turn);
+        self.known.iter_mut().for_each(|known| turn(&mut known.state));
+        for point in &mut self.model {
+            for [x, y, _] in [&mut point.at, &mut point.mean] {
+                (*x, *y) = (-*x, -*y);
+            }
+        }
+        let [front, rear] = self.ends;
+        self.ends = [-rear, -front];
+    }
+
+    /// Lets the state be that of the point of the object that it was of before.
+    fn anchor(&mut self) {
+        let mut by = [0.0; 3];
+        for said in &self.said {
+            let [x, y, z, heading, ..] = self.knots.value(&self.weights, said.time_s);
+            let (sin, cos) = libm::sincos(heading);
+            let off = [said.position[0] - x, said.position[1] - y, said.position[2] - z];
+            by[0] += cos * off[0] + sin * off[1];
+            by[1] += cos * off[1] - sin * off[0];
+            by[2] += off[2];
+        }
+        let by = by.map(|by| by / self.said.len().max(1) as f64);
+        for [x, y, z, heading, ..] in &mut self.weights {
+            let (sin, cos) = libm::sincos(*heading);
+            *x += cos * by[0] - sin * by[1];
+            *y += sin * by[0] + cos * by[1];
+            *z += by[2];
+        }
+        self.ends = self.ends.map(|end| end - by[0] as f32);
     }
 
     /// Makes model points of the last `fresh` returns where there are none near, and notes which
@@ -381,4 +498,11 @@ fn young(estimator: &mut Estimator, params: &EstimateParams) -> f64 {
         cost = report.costs.last().map_or(cost, Cost::total);
     }
     cost
+}
+
+/// How far it goes forward over the window, m.
+fn gone(knots: &Knots, weights: &[Weights], until_s: f64) -> f64 {
+    let [from, to] = [knots.start(), until_s].map(|time_s| knots.value(weights, time_s));
+    let (sin, cos) = libm::sincos(to[3]);
+    cos * (to[0] - from[0]) + sin * (to[1] - from[1])
 }
