@@ -5,7 +5,6 @@ use super::*;
 use crate::random::Random;
 use std::boxed::Box;
 use std::vec::Vec;
-use std::{println, time::Instant};
 
 fn root_mean(all: &[Errors]) -> Errors {
     core::array::from_fn(|i| {
@@ -120,7 +119,6 @@ fn long_sides_move_with_their_ends() {
         let before = history_errors(&drive);
         let [with, without] =
             [&EstimateParams::default(), &without].map(|p| estimated(&mut estimator, p, &drive));
-        println!("{speed} {before:?} {with:?} {without:?}");
         assert!(with[0] < 1.0 && with[0] < 0.5 * without[0], "{speed}: {with:?} {before:?}");
     }
 }
@@ -343,18 +341,16 @@ fn a_wrong_association_does_not_break_a_track() {
 }
 
 /// A drive sweep by sweep; errors of the states that came out, but for the first few.
-fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize, ms: &mut Vec<f64>) -> Errors {
+fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize) -> Errors {
     let mut lag = FixedLag::new();
     let mut states = Vec::new();
     let mut from = 0;
     let mut history = drive.history.iter();
     for &until in drive.until.iter() {
         if until > from {
-            let start = Instant::now();
             let returns = &drive.returns[from..until];
             let state = history.next().unwrap();
             states.push(lag.push(estimator, &EstimateParams::default(), returns, state));
-            ms.push(start.elapsed().as_secs_f64() * 1e3);
             from = until;
         }
     }
@@ -370,15 +366,14 @@ fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize, ms: &mut V
 #[test]
 fn a_window_follows_sweep_by_sweep() {
     let mut estimator = Box::new(Estimator::new());
-    let mut ms = Vec::new();
     for seed in [1, 4] {
         let parked = drive(synthetic::parked(seed));
         // It keeps its place and heading from the first state on.
-        let ours = streamed(&mut estimator, &parked, 0, &mut ms);
+        let ours = streamed(&mut estimator, &parked, 0);
         assert!(ours[0] < 0.2 && ours[1] < 0.2 && ours[2] < 0.05, "{ours:?}");
-        let ours = streamed(&mut estimator, &parked, 15, &mut ms);
+        let ours = streamed(&mut estimator, &parked, 15);
         assert!(ours[0] < 0.1 && ours[1] < 0.2 && ours[2] < 0.05 && ours[3] < 0.02, "{ours:?}");
-        let ours = streamed(&mut estimator, &drive(synthetic::moving(seed)), 15, &mut ms);
+        let ours = streamed(&mut estimator, &drive(synthetic::moving(seed)), 15);
         assert!(ours[0] < 0.2 && ours[1] < 0.4 && ours[2] < 0.05, "{ours:?}");
     }
 }
