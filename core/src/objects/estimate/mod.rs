@@ -19,11 +19,10 @@
 //!
 //! The plain method stays where its start puts it: the visible face of an object changes as one
 //! passes it, a history of centroids slides along, and the model takes up two shifted copies of one
-//! face (figure 2.9). What cures that, in the order of its effect on simulated objects that move: where
-//! the object ends ([`EstimateParams::ends_m`]), more starts than one ([`EstimateParams::starts`]), a
-//! start that grows from the middle of the track over a sparse model ([`EstimateParams::grows`]),
-//! returns that weigh across surfaces ([`EstimateParams::surfaces`]), rays through model points
-//! ([`EstimateParams::carves`]). Damping and a robust loss are for bad input. `raywake-lab eval tracks`
+//! face (figure 2.9). What cures that: where the object ends ([`EstimateParams::ends_m`]), more starts
+//! than one ([`EstimateParams::starts`]), a start that grows from the middle of the track over a sparse
+//! model ([`EstimateParams::grows`]), returns that weigh across surfaces
+//! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and a robust loss are for bad input. `raywake-lab eval tracks`
 //! measures every one by itself.
 
 mod ends;
