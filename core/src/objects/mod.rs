@@ -10,6 +10,9 @@ pub mod estimate;
 pub mod front_end;
 pub mod spline;
 
+/// Returns that a track keeps, and an estimate is made of, at most.
+pub const RETURNS_MAX: usize = 8192;
+
 /// One return of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectReturn {

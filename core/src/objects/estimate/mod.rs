@@ -43,15 +43,13 @@ pub use window::FixedLag;
 use core::ops::Range;
 
 use super::spline::{BASES_MAX, Knots, Laid};
-use super::{ObjectReturn, ObjectState};
+use super::{ObjectReturn, ObjectState, RETURNS_MAX};
 use ends::Ends;
 use nearest::{Nearest, square_distance};
 use normal::{Equations, Seen, Surface};
 use process::Weights;
 use returns::Returns;
 
-/// Returns that take part in an estimate at most.
-pub const RETURNS_MAX: usize = 8192;
 /// Model points at most.
 pub const MODEL_MAX: usize = 3000;
 /// Iterations of a solve at most.

@@ -1,7 +1,7 @@
 //! The returns that take part: so many of a track, evenly in the order of their times.
 
-use super::RETURNS_MAX;
 use crate::objects::ObjectReturn;
+use crate::objects::RETURNS_MAX;
 use crate::objects::spline::{Basis, Knots};
 
 /// Steps in which times are told apart where there are more returns than take part.

@@ -25,7 +25,7 @@ mod track;
 
 pub use batch::Flows;
 pub use cells::GroundMap;
-pub use track::{HISTORY_MAX, LATEST_MAX, Life, RETURNS_MAX, Thinned, Track};
+pub use track::{HISTORY_MAX, LATEST_MAX, Life, Thinned, Track};
 
 use super::centroid_ekf::{CentroidEkf, CentroidParams};
 use crate::params::COLUMNS_MAX;

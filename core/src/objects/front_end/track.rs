@@ -1,13 +1,10 @@
 //! What is kept of an object from its birth to its end.
 
 use crate::objects::centroid_ekf::{CentroidEkf, CentroidParams};
-use crate::objects::{ObjectReturn, ObjectState};
+use crate::objects::{ObjectReturn, ObjectState, RETURNS_MAX};
 
 /// States of the filter that a track keeps.
 pub const HISTORY_MAX: usize = 512;
-/// Returns that a track keeps.
-pub const RETURNS_MAX: usize = 8192;
-
 /// Returns of its last batch that a track keeps.
 pub const LATEST_MAX: usize = 256;
 
