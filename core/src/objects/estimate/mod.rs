@@ -22,13 +22,17 @@
 //! face (figure 2.9). What cures that: where the object ends ([`EstimateParams::ends_m`]), more starts
 //! than one ([`EstimateParams::starts`]), a start that grows from the middle of the track over a sparse
 //! model ([`EstimateParams::grows`]), returns that weigh across surfaces
-//! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and a robust loss are for bad input. `raywake-lab eval tracks`
+//! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and
+//! a robust loss are for bad input. `raywake-lab eval tracks`
 //! measures every one by itself.
 
+mod carve;
 mod ends;
 mod nearest;
 mod normal;
+mod params;
 mod process;
+mod report;
 mod returns;
 mod start;
 #[cfg(test)]
@@ -47,7 +51,9 @@ use super::{ObjectReturn, ObjectState, RETURNS_MAX};
 use ends::Ends;
 use nearest::{Nearest, square_distance};
 use normal::{Equations, Seen, Surface};
+pub use params::EstimateParams;
 use process::Weights;
+pub use report::{Cost, Report, Start, Stop};
 use returns::Returns;
 
 /// Model points at most.
@@ -75,173 +81,6 @@ const GROWTH_ITERATIONS: usize = 2;
 
 /// What may as well rest, rests: so much more than motion it may cost.
 const RESTS: f64 = 1.05;
-
-/// Rounds of carving, rays that carve, how far beside a model point and how far before their ends
-/// they may pass it, m, how steeply through its surface (cosine), how thin that is at least
-/// (precision by that of a return), and by what a point outweighs its rays.
-const CARVINGS: usize = 3;
-const RAYS: usize = 1000;
-const BESIDE_M: f64 = 0.12;
-const BEFORE_M: f64 = 0.25;
-const CROSSES: f64 = 0.2;
-const THIN: f64 = 0.05;
-const SHARE: usize = 8;
-
-/// The choices of an estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimateParams {
-    /// Returns that take part, evenly in time as far as there are as many.
-    pub returns: usize,
-    /// Model points (`n_m`).
-    pub model: usize,
-    /// Time for each basis function, s.
-    pub basis_s: f64,
-    /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
-    /// rate (rad/s).
-    pub process: [f64; 7],
-    /// Standard deviation of a model point about the origin, m.
-    pub extent_m: f64,
-    /// Standard deviation of a return about its model point (`σ_z`), m.
-    pub deviation_m: f64,
-    /// Iterations at most.
-    pub iterations: usize,
-    /// A return further off than so many deviations counts for a quarter; 0 for no robust loss.
-    pub robust: f64,
-    /// Steps that raise the cost are taken back and damped (Levenberg and Marquardt).
-    pub damping: bool,
-    /// Returns weigh across the surface that their model point stands for, little along it.
-    pub surfaces: bool,
-    /// Additional deviation along a surface, m; with `surfaces`.
-    pub loose_m: f64,
-    /// The start is smoothed with the process model, and one at rest is tried beside it.
-    pub starts: bool,
-    /// Deviation of a return at an end of the object, m; 0 to leave ends out. They lead the first
-    /// iterations, as many again; then the returns know better. See [`ends`].
-    pub ends_m: f64,
-    /// Model points that rays went through are taken away, and the rest is estimated again.
-    pub carves: bool,
-    /// The start grows from the middle of the track, over a sparse model.
-    pub grows: bool,
-}
-
-impl EstimateParams {
-    /// The dissertation's (2.6.2).
-    pub const fn dissertation() -> EstimateParams {
-        EstimateParams {
-            returns: 5000,
-            model: 300,
-            basis_s: 0.5,
-            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
-            extent_m: 10.0,
-            deviation_m: 0.5,
-            iterations: 10,
-            robust: 0.0,
-            damping: false,
-            surfaces: false,
-            loose_m: 0.0,
-            starts: false,
-            ends_m: 0.0,
-            carves: false,
-            grows: false,
-        }
-    }
-}
-
-impl Default for EstimateParams {
-    /// Ours.
-    fn default() -> EstimateParams {
-        let mut process = EstimateParams::dissertation().process;
-        // Town traffic turns into a bend within a second.
-        process[6] = 0.15;
-        EstimateParams {
-            deviation_m: 0.05,
-            damping: true,
-            surfaces: true,
-            loose_m: 0.5,
-            starts: true,
-            ends_m: 0.2,
-            carves: true,
-            grows: true,
-            process,
-            ..EstimateParams::dissertation()
-        }
-    }
-}
-
-/// What the terms of the cost are.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cost {
-    /// `J_m`.
-    pub model: f64,
-    /// `J_u`.
-    pub process: f64,
-    /// `J_z`.
-    pub returns: f64,
-    /// Mean distance of a return from its model point, m.
-    pub residual_m: f64,
-}
-
-impl Cost {
-    /// Their sum.
-    pub fn total(&self) -> f64 {
-        self.model + self.process + self.returns
-    }
-}
-
-/// Why a solve stopped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stop {
-    /// No return is sound: there is no estimate.
-    #[default]
-    NoReturns,
-    /// The cost fell no more.
-    Converged,
-    /// It made as many iterations as it may.
-    Iterations,
-    /// A step had no finite solution; the estimate is that before it.
-    NotFinite,
-}
-
-/// Where a solve starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Start {
-    /// The tracker's history.
-    #[default]
-    History,
-    /// At rest.
-    Rest,
-    /// The middle of what is seen.
-    Middles,
-}
-
-/// How a solve went.
-#[derive(Clone, Debug, Default)]
-pub struct Report {
-    /// Why it stopped.
-    pub stop: Stop,
-    /// Iterations that led to the estimate.
-    pub iterations: usize,
-    /// Cost at the start and after each of them.
-    pub costs: heapless::Vec<Cost, { ITERATIONS_MAX + 1 }>,
-    /// Returns that took part.
-    pub returns: usize,
-    /// Returns left out because there were more.
-    pub thinned: usize,
-    /// Returns left out because they or their times are no numbers, or beyond 100 km and a day.
-    pub unsound: usize,
-    /// Returns that took part, and lie further from the object's origin than the prior's `extent_m`.
-    pub outside: usize,
-    /// Model points that were taken away because rays went through them.
-    pub carved: usize,
-    /// The knots are nearer together than asked for: the track is short.
-    pub compressed: bool,
-    /// They are further apart: the track is long.
-    pub stretched: bool,
-    /// There was no history: the start stands at the returns' mean.
-    pub no_history: bool,
-    /// Which start led to it.
-    pub from: Start,
-}
 
 /// A trajectory with its shape.
 struct Solution {
@@ -507,7 +346,7 @@ impl Estimator {
         self.extract(params);
         report.stop = self.descend(params, params.iterations, Some(report));
         if params.carves {
-            for _ in 0..CARVINGS {
+            for _ in 0..carve::CARVINGS {
                 let carved = self.carve(params.deviation_m);
                 report.carved += carved;
                 if carved == 0 {
@@ -570,51 +409,6 @@ impl Estimator {
         self.now.points = points;
         self.ends.find(kept, &self.seen, params.ends_m);
         self.now.ends = self.ends.begin();
-    }
-
-    /// Takes away model points that rays went through: points of a surface, seen from the side that it
-    /// shows, with less returns than rays. How many.
-    fn carve(&mut self, deviation: f64) -> usize {
-        let kept = &self.returns.all()[self.active.clone()];
-        let every = kept.len().div_ceil(RAYS).max(1);
-        let mut through = [0u16; MODEL_MAX];
-        for (kept, seen) in kept.iter().zip(&self.seen).step_by(every) {
-            let (from, to) = (seen.frame(kept.origin_from_return()), seen.place());
-            let ray: [f64; 3] = core::array::from_fn(|d| to[d] - from[d]);
-            let length = libm::sqrt(ray.iter().map(|v| v * v).sum());
-            if length < BEFORE_M {
-                continue;
-            }
-            let ray = ray.map(|v| v / length);
-            let points = self.now.model[..self.now.points].iter().zip(&self.now.surfaces);
-            for ((model, surface), through) in points.zip(&mut through) {
-                let arm: [f64; 3] = core::array::from_fn(|d| f64::from(model[d]) - from[d]);
-                let along: f64 = arm.iter().zip(ray).map(|(a, r)| a * r).sum();
-                let square: f64 = arm.iter().map(|v| v * v).sum();
-                let [nx, ny] = surface.normal;
-                let crosses = libm::fabs(nx * ray[0] + ny * ray[1]) > CROSSES;
-                let thin = surface.precision[0] * deviation * deviation > THIN;
-                let near = square - along * along < BESIDE_M * BESIDE_M;
-                if near && crosses && thin && along < length - BEFORE_M {
-                    *through = through.saturating_add(1);
-                }
-            }
-        }
-        let mut left = 0;
-        for (number, &through) in through[..self.now.points].iter().enumerate() {
-            let returns = usize::from(self.starts[number + 1] - self.starts[number]);
-            if usize::from(through) * every * SHARE < returns.max(1) {
-                self.now.model[left] = self.now.model[number];
-                self.now.surfaces[left] = self.now.surfaces[number];
-                left += 1;
-            }
-        }
-        let carved = self.now.points - left;
-        if left == 0 {
-            return 0;
-        }
-        self.now.points = left;
-        carved
     }
 
     /// Gauss-Newton iterations.

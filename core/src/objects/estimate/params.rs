@@ -1,0 +1,82 @@
+//! The choices of an estimate: the dissertation's and ours.
+
+/// The choices of an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimateParams {
+    /// Returns that take part, evenly in time as far as there are as many.
+    pub returns: usize,
+    /// Model points (`n_m`).
+    pub model: usize,
+    /// Time for each basis function, s.
+    pub basis_s: f64,
+    /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
+    /// rate (rad/s).
+    pub process: [f64; 7],
+    /// Standard deviation of a model point about the origin, m.
+    pub extent_m: f64,
+    /// Standard deviation of a return about its model point (`σ_z`), m.
+    pub deviation_m: f64,
+    /// Iterations at most.
+    pub iterations: usize,
+    /// A return further off than so many deviations counts for a quarter; 0 for no robust loss.
+    pub robust: f64,
+    /// Steps that raise the cost are taken back and damped (Levenberg and Marquardt).
+    pub damping: bool,
+    /// Returns weigh across the surface that their model point stands for, little along it.
+    pub surfaces: bool,
+    /// Additional deviation along a surface, m; with `surfaces`.
+    pub loose_m: f64,
+    /// The start is smoothed with the process model, and one at rest is tried beside it.
+    pub starts: bool,
+    /// Deviation of a return at an end of the object, m; 0 to leave ends out. They lead the first
+    /// iterations, as many again; then the returns know better. See [`ends`].
+    pub ends_m: f64,
+    /// Model points that rays went through are taken away, and the rest is estimated again.
+    pub carves: bool,
+    /// The start grows from the middle of the track, over a sparse model.
+    pub grows: bool,
+}
+
+impl EstimateParams {
+    /// The dissertation's (2.6.2).
+    pub const fn dissertation() -> EstimateParams {
+        EstimateParams {
+            returns: 5000,
+            model: 300,
+            basis_s: 0.5,
+            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
+            extent_m: 10.0,
+            deviation_m: 0.5,
+            iterations: 10,
+            robust: 0.0,
+            damping: false,
+            surfaces: false,
+            loose_m: 0.0,
+            starts: false,
+            ends_m: 0.0,
+            carves: false,
+            grows: false,
+        }
+    }
+}
+
+impl Default for EstimateParams {
+    /// Ours.
+    fn default() -> EstimateParams {
+        let mut process = EstimateParams::dissertation().process;
+        // Town traffic turns into a bend within a second.
+        process[6] = 0.15;
+        EstimateParams {
+            deviation_m: 0.05,
+            damping: true,
+            surfaces: true,
+            loose_m: 0.5,
+            starts: true,
+            ends_m: 0.2,
+            carves: true,
+            grows: true,
+            process,
+            ..EstimateParams::dissertation()
+        }
+    }
+}
