@@ -1,15 +1,11 @@
 //! How the vehicle that carries the sensor drives.
 
-use crate::path::{Path, State};
+use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::FRAC_PI_2;
 
 /// Distance of a lane's middle from the road's centre line, m.
 pub(crate) const LANE: f64 = 1.75;
-
-/// Time in which a turn or braking begins and ends, s: no vehicle's yaw rate or acceleration jumps,
-/// and within a sweep the twist at its stamp stands for all of it.
-const EASE_S: f64 = 1.0;
 
 /// What the vehicle does during a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,14 +56,14 @@ impl Ego {
             Ego::Straight { speed } => Plan { path: start(speed), crossing },
             Ego::StopAndGo { speed } => {
                 let path = start(speed).then(0.1 * duration_s, 0.0, 0.0);
-                let path = path.then_ease_to_speed(0.0, 3.0, EASE_S).then(1.0, 0.0, 0.0);
-                Plan { path: path.then_ease_to_speed(speed, 2.0, EASE_S), crossing }
+                let path = path.then_to_speed(0.0, 3.0, EASE_S).then(1.0, 0.0, 0.0);
+                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing }
             }
             Ego::Turn { left, speed } => {
                 let before = (0.25 * duration_s).min(1.0);
                 let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
                 let path = start(speed).then(before, 0.0, 0.0);
-                let path = path.then_ease_turn(angle, radius, EASE_S);
+                let path = path.then_turn(angle, radius, EASE_S);
                 // The turn ends in the right lane of the crossing road.
                 let crossing = path.end().x - LANE.copysign(angle);
                 Plan { path, crossing }

@@ -1,6 +1,13 @@
 //! Planar motion, leg by leg: acceleration and curvature are constant or change evenly, the one with
 //! time, the other along the way (clothoids, by which real vehicles enter a bend).
 
+/// Time in which a vehicle's turn or braking begins and ends, s: its yaw rate and acceleration do not
+/// jump, and within a sweep the twist at its stamp stands for all of it.
+pub(crate) const EASE_S: f64 = 1.0;
+
+/// Steps in which the angle of a change of lane is found.
+const SHIFT_STEPS: u32 = 8;
+
 /// Where something is and how it moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
@@ -111,15 +118,9 @@ impl Path {
         self
     }
 
-    /// Appends a leg along which the speed changes to `speed` (m/s) at `rate` (m/s^2 > 0).
-    pub fn then_to_speed(self, speed: f64, rate: f64) -> Path {
-        let change = speed - self.end().speed;
-        self.then(change.abs() / rate, rate.copysign(change), 0.0).at_speed(speed)
-    }
-
-    /// The same, with the acceleration growing to `rate` and fading again over `ease_s` each, > 0.
-    /// The speed must change.
-    pub fn then_ease_to_speed(self, speed: f64, rate: f64, ease_s: f64) -> Path {
+    /// Appends legs along which the speed changes to `speed` (m/s), which must be another than
+    /// before: the acceleration grows to `rate` (m/s^2 > 0) and fades again over `ease_s` each, > 0.
+    pub fn then_to_speed(self, speed: f64, rate: f64, ease_s: f64) -> Path {
         let change = speed - self.end().speed;
         let (time, rate) = (change.abs() / rate, rate.copysign(change));
         let ease_s = ease_s.min(time);
@@ -138,16 +139,9 @@ impl Path {
         self
     }
 
-    /// Appends a turn by `angle` (rad, left positive) of this radius (m) at constant speed, which
-    /// must not be zero.
-    pub fn then_turn(self, angle: f64, radius: f64) -> Path {
-        let speed = self.end().speed;
-        self.then(angle.abs() * radius / speed, 0.0, 1.0f64.copysign(angle) / radius)
-    }
-
-    /// The same, with the curvature growing to that of the radius and fading again over `ease_s`
-    /// each, > 0.
-    pub fn then_ease_turn(self, angle: f64, radius: f64, ease_s: f64) -> Path {
+    /// Appends a turn by `angle` (rad, left positive) at constant speed, which must not be zero: the
+    /// curvature grows to that of the radius (m) and fades again over `ease_s` each, > 0.
+    pub fn then_turn(self, angle: f64, radius: f64, ease_s: f64) -> Path {
         let speed = self.end().speed;
         let whole_m = angle.abs() * radius;
         let ease_m = (speed * ease_s).min(whole_m);
@@ -161,12 +155,23 @@ impl Path {
             )
     }
 
-    /// Appends a change of lane by `aside` (m, left positive) over `length` (m) of road at constant
-    /// speed, which must not be zero: two arcs, after which the heading is as before.
-    pub fn then_shift(self, aside: f64, length: f64) -> Path {
-        let angle = 2.0 * (aside / length).atan();
-        let radius = 0.5 * length / angle.abs().sin();
-        self.then_turn(angle, radius).then_turn(-angle, radius)
+    /// Appends a change of lane by `aside` (m, left positive, not zero) in this time (s) at constant
+    /// speed, which must not be zero: two turns whose curvature grows and fades all the way, after
+    /// which the heading is as before.
+    pub fn then_shift(self, aside: f64, duration: f64) -> Path {
+        let start = self.end();
+        let length = start.speed * duration;
+        let turns = |path: Path, angle: f64| {
+            let radius = 0.25 * length / angle.abs();
+            path.then_turn(angle, radius, duration).then_turn(-angle, radius, duration)
+        };
+        let straight = State { speed: start.speed, ..State::default() };
+        let mut angle = 2.0 * aside / length;
+        // The sine of small angles is nearly linear: each step leaves a hundredth of the error.
+        for _ in 0..SHIFT_STEPS {
+            angle *= aside / turns(Path::from(straight), angle).end().y;
+        }
+        turns(self, angle)
     }
 
     /// State when the last leg begins.
@@ -204,8 +209,8 @@ mod tests {
     #[test]
     fn brakes_turns_and_goes_on() {
         let start = State { x: 1.0, y: 2.0, yaw: 0.0, speed: 10.0 };
-        let path =
-            Path::from(start).then(1.0, 0.0, 0.0).then_to_speed(5.0, 2.5).then_turn(FRAC_PI_2, 8.0);
+        let path = Path::from(start).then(1.0, 0.0, 0.0).then(2.0, -2.5, 0.0);
+        let path = path.then(8.0 * FRAC_PI_2 / 5.0, 0.0, 0.125);
         assert_eq!(path.at(-1.0).x, -9.0);
         assert_eq!(path.at(1.0).x, 11.0);
         // Braking from 10 to 5 m/s at 2.5 m/s^2 takes 2 s and 15 m.
@@ -218,11 +223,12 @@ mod tests {
     #[test]
     fn changes_lane() {
         let start = State { x: 3.0, y: -1.75, speed: 12.0, ..State::default() };
-        let path = Path::starting(-2.0, start).then(1.0, 0.0, 0.0).then_shift(3.5, 24.0);
+        let path = Path::starting(-2.0, start).then(1.0, 0.0, 0.0).then_shift(3.5, 3.0);
         assert_eq!(path.at(-2.0), start);
         let end = path.end();
-        assert!((end.x - 39.0).abs() < 1e-9 && (end.y - 1.75).abs() < 1e-9);
-        assert!(end.yaw.abs() < 1e-12 && end.speed == 12.0);
+        assert!((end.y - 1.75).abs() < 1e-9 && end.yaw.abs() < 1e-12 && end.speed == 12.0);
+        // Half way after half of the 36 m along it, which are a little longer than the road.
+        assert!(path.at(0.5).y.abs() < 1e-9 && (50.4..51.0).contains(&end.x), "{end:?}");
     }
 
     /// That heading and speed are the derivative of the place at a time.
@@ -256,10 +262,10 @@ mod tests {
         let start = State { speed: 6.0, ..State::default() };
         let path = Path::from(start)
             .then(0.5, 0.0, 0.0)
-            .then_ease_turn(-FRAC_PI_2, 8.0, 1.0)
-            .then_ease_to_speed(0.0, 3.0, 0.5)
+            .then_turn(-FRAC_PI_2, 8.0, 1.0)
+            .then_to_speed(0.0, 3.0, 0.5)
             .then(1.0, 0.0, 0.0)
-            .then_ease_to_speed(6.0, 2.0, 0.5);
+            .then_to_speed(6.0, 2.0, 0.5);
         let times: Vec<f64> = (0..900).map(|i| 0.01 * f64::from(i)).collect();
         let (mut most, mut before) = ([0.0f64; 2], [0.0; 2]);
         for &t in &times {
@@ -285,12 +291,12 @@ mod tests {
     #[test]
     fn short_changes_are_eased_all_the_way() {
         let start = State { speed: 10.0, ..State::default() };
-        let turned = Path::from(start).then_ease_turn(0.2, 20.0, 1.0).end();
+        let turned = Path::from(start).then_turn(0.2, 20.0, 1.0).end();
         assert!((turned.yaw - 0.2).abs() < 1e-12);
         // Curvature grows and fades over 4 m each: half of the turn lies to either side.
-        let half = Path::from(start).then_ease_turn(0.2, 20.0, 1.0).at(0.4);
+        let half = Path::from(start).then_turn(0.2, 20.0, 1.0).at(0.4);
         assert!((half.yaw - 0.1).abs() < 1e-12);
-        let slower = Path::from(start).then_ease_to_speed(9.5, 2.0, 1.0);
+        let slower = Path::from(start).then_to_speed(9.5, 2.0, 1.0);
         assert_eq!(slower.end().speed, 9.5);
         assert!((slower.at(0.25).speed - 9.75).abs() < 1e-12);
     }

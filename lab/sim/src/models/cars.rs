@@ -1,19 +1,12 @@
 //! Cars and vans: no side is one plane, so that a piece of it tells how far it has come.
 
-use super::{axle, block, part};
-use crate::object::{Class, Object, Part, Surface};
+use super::{axle, block, mirrors};
+use crate::object::{Class, Object, Surface};
 use crate::path::Path;
 use crate::rng::Rng;
-use crate::shape::Shape;
 
 /// How far the body stays behind the mirrors on each side, m.
 const MIRROR: f64 = 0.07;
-
-/// Mirrors that reach to the sides of the box, at x and `z` above the ground.
-fn mirrors(x: f64, width: f64, z: f64, height: f64, surface: Surface) -> [Part; 2] {
-    let (out, shape) = (0.1, Shape::ellipsoid(0.09, 0.1, 0.1));
-    [1.0, -1.0].map(|side| part(shape, [x, side * (0.5 * width - out), z], height, surface))
-}
 
 /// A car: a body that narrows towards both ends, a glazed cabin that narrows towards its roof,
 /// mirrors, wheels that stand out a little.

@@ -39,6 +39,12 @@ fn axle(x: f64, track: f64, radius: f64, height: f64) -> [Part; 2] {
     [0.5, -0.5].map(|side| wheel(x, side * track, [radius, 0.2], height, rubber))
 }
 
+/// Mirrors that reach to the sides of the box, at x and `z` above the ground.
+fn mirrors(x: f64, width: f64, z: f64, height: f64, surface: Surface) -> [Part; 2] {
+    let (out, shape) = (0.1, Shape::ellipsoid(0.09, 0.1, 0.1));
+    [1.0, -1.0].map(|side| part(shape, [x, side * (0.5 * width - out), z], height, surface))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,9 +2,12 @@
 
 use crate::ego::{LANE, Plan};
 use crate::ground::ROAD_HALF;
-use crate::path::{Path, State};
+use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Time in which somebody on foot begins and ends a turn, s.
+const WALKER_EASE_S: f64 = 0.4;
 
 /// Draws paths that meet the vehicle's during a drive.
 pub(super) struct Routes<'a> {
@@ -65,7 +68,7 @@ impl Routes<'_> {
         // Half begin before the drive does.
         let begin = (t - self.rng.range(0.0, 2.0)).max(0.0);
         let path = Path::from(start).then(begin, 0.0, 0.0);
-        path.then_to_speed(if later < 0.8 { 0.0 } else { later }, rate)
+        path.then_to_speed(if later < 0.8 { 0.0 } else { later }, rate, EASE_S)
     }
 
     /// Past somebody on the main road and back into the lane, a few m/s faster.
@@ -76,25 +79,24 @@ impl Routes<'_> {
         let speed = (other.speed + self.rng.range(4.0, 8.0)).max(7.0);
         let aside = self.rng.range(2.8, 3.5);
         // The lane is left this far behind the other, and taken again this far ahead of it.
-        let (gap, change) = (self.rng.range(9.0, 14.0), self.rng.range(16.0, 24.0));
-        let before = gap / (speed - other.speed) + change / speed;
+        let (gap, change_s) = (self.rng.range(9.0, 14.0), self.rng.range(2.2, 3.5));
+        let before = gap / (speed - other.speed) + change_s;
         let start = State { x: other.x - way * speed * before, ..lane(way, LANE, speed) };
-        let path = Path::starting(abreast - before, start).then_shift(aside, change);
-        path.then(2.0 * gap / (speed - other.speed), 0.0, 0.0).then_shift(-aside, change)
+        let path = Path::starting(abreast - before, start).then_shift(aside, change_s);
+        path.then(2.0 * gap / (speed - other.speed), 0.0, 0.0).then_shift(-aside, change_s)
     }
 
-    /// From the main road into the crossing road, at constant yaw rate.
+    /// From the main road into the right lane of the crossing road.
     fn turning(&mut self) -> Path {
         let (way, speed) = (self.rng.sign(), self.rng.range(3.5, 6.5));
         let left = self.rng.chance(0.4);
         let (radius, angle) = if left { (11.0, FRAC_PI_2) } else { (8.0, -FRAC_PI_2) };
         let before = self.rng.range(0.0, self.duration_s.max(2.0));
-        // Relative to the crossing and along the way: where the turn begins so that it ends in
-        // the right lane.
-        let begin = if left { LANE - radius } else { -LANE - radius };
-        let x = self.plan.crossing + way * (begin - speed * before);
-        let start = State { x, ..lane(way, LANE, speed) };
-        Path::from(start).then(before, 0.0, 0.0).then_turn(angle, radius)
+        let path = Path::from(lane(way, LANE, speed)).then(before, 0.0, 0.0);
+        let path = path.then_turn(angle, radius, EASE_S);
+        let right = self.plan.crossing + way * LANE.copysign(angle);
+        let x = right - path.end().x;
+        path.moved(x, 0.0)
     }
 
     /// Along the crossing road.
@@ -124,9 +126,10 @@ impl Routes<'_> {
                 let start = State { x: x - way * speed * before, y, yaw, speed };
                 // Left or right by a quarter onto the road, back along the other sidewalk.
                 let quarter = -side * way * FRAC_PI_2;
-                let path = Path::from(start).then(before, 0.0, 0.0).then_turn(quarter, 0.8);
-                let over = 2.0 * (y.abs() - 0.8);
-                path.then(over / speed, 0.0, 0.0).then_turn(-quarter, 0.8)
+                let turn = |path: Path, angle| path.then_turn(angle, 0.8, WALKER_EASE_S);
+                let path = turn(Path::from(start).then(before, 0.0, 0.0), quarter);
+                let over = 2.0 * path.end().y.abs();
+                turn(path.then(over / speed, 0.0, 0.0), -quarter)
             }
             _ => Path::from(State { x: x - way * speed * t, y, yaw, speed }),
         }
