@@ -41,12 +41,17 @@ const UNFIT: f32 = 0.3;
 /// Gain over standing still from which on a thing moves, see [`gain`].
 const GAIN: f32 = 0.12;
 /// Standard deviation of what stands, before [`doubt`], voxels.
-const STILL: f32 = 0.1;
+const STILL: f32 = 0.35;
 /// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
-const CONFIDENCE: f32 = 0.01;
+const CONFIDENCE: f32 = 0.005;
 const DOUBTFUL: f32 = 0.008;
+/// Standard deviation of a motion, as a share of itself, however well it fits: when each return was,
+/// and sides that come into view.
+const SHARE: f32 = 0.014;
 /// How much more gain makes it e times likelier that a thing moves, see [`Found::unsure`].
 const SURER: f32 = 0.04;
+/// Variance of whether what stands does where its column's match says otherwise: either may be right.
+const MATCHED: f32 = 0.25;
 /// Displacement from which on a thing moves, voxels.
 const LEAST: f32 = 0.13;
 /// Mean misfit of a column's returns from which on it may be part of something that moves.
@@ -99,12 +104,21 @@ impl Refined {
         let by = found.motion.of(at);
         // Of two motions, one of which is the right one.
         let [x, y] = by;
-        let between = [x * x, x * y, y * y].map(|v| found.unsure * v);
+        let unsure = found.unsure + if found.moves { SHARE * SHARE } else { 0.0 };
+        let between = [x * x, x * y, y * y].map(|v| unsure * v);
         let own = match found.moves {
             true => Refined { by, covariance: found.motion.covariance_of(at), moves: true },
             false => Refined::standing(found.still),
         };
         Refined { covariance: [0, 1, 2].map(|n| own.covariance[n] + between[n]), ..own }
+    }
+
+    /// As what stands although its column's match, cells, says otherwise.
+    fn against(self, matched: Option<[f32; 2]>) -> Refined {
+        let [x, y] = matched.unwrap_or_default();
+        let between = [x * x, x * y, y * y];
+        let covariance = [0, 1, 2].map(|n| self.covariance[n] + MATCHED * between[n]);
+        Refined { covariance, ..self }
     }
 
     fn standing(misfit: f32) -> Refined {
@@ -265,22 +279,23 @@ impl Refinement {
             self.things.found.get(segment as usize)
         };
         let at = [i as f32 + 0.5, j as f32 + 0.5];
+        let matched = (flow & VALID != 0).then(|| flow_displacement(flow).map(|d| d as f32));
         if let Some(own) = segment(i, j) {
-            return Refined::of(own, at);
+            let refined = Refined::of(own, at);
+            return if own.moves { refined } else { refined.against(matched) };
         }
         // Nothing but low returns: the lower edge of a thing, where the match says so.
-        if flow & VALID == 0 {
+        let Some(cells) = matched else {
             return Refined::standing(0.0);
-        }
-        let cells = flow_displacement(flow);
+        };
         for (di, dj) in (-EDGE..=EDGE).flat_map(|a| (-EDGE..=EDGE).map(move |b| (a, b))) {
             let Some(found) = segment(i + di, j + dj).filter(|f| f.moves) else { continue };
             let refined = Refined::of(found, at);
-            if (0..2).all(|a| (cells[a] as f32 - refined.by[a]).abs() <= ALIKE) {
+            if (0..2).all(|a| (cells[a] - refined.by[a]).abs() <= ALIKE) {
                 return refined;
             }
         }
-        Refined::standing(0.0)
+        Refined::standing(0.0).against(matched)
     }
 }
 

@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// Counts changes of the simulator and of the format: files of another number are made anew.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// The sets of a seed from a folder, or simulated and left there.
 ///
