@@ -22,6 +22,8 @@ const PARTS: usize = 160;
 const ENOUGH: usize = 6;
 /// A return further off than this counts no more for being further, m.
 const BOUND_M: f64 = 0.3;
+/// One that falls short by more than this counts ever less: something hides the end, m.
+const HIDDEN_M: f64 = 1.0;
 /// Share that counts of one that falls short.
 const SHORT: f64 = 0.3;
 /// Slope of the view, across to along, from which on the far end is believed to be seen.
@@ -87,16 +89,24 @@ impl Ends {
         }
     }
 
-    /// States in the middle between both ends of every part.
-    pub fn middles(&self, knots: &Knots, weights: &[Weights]) -> Vec<ObjectState, PARTS> {
+    /// States of the object in every part by what is foremost, by what is hindmost (1 and 0 of the
+    /// way from rear to front), or by what lies between (0.5).
+    pub fn places(
+        &self,
+        knots: &Knots,
+        weights: &[Weights],
+        share: f64,
+    ) -> Vec<ObjectState, PARTS> {
         let [fronts, rears] = &self.kept;
+        let [front, rear] = self.begin().map(f64::from);
+        let middle = (0.5 - share) * (front - rear);
         let parts = fronts.iter().zip(rears).zip(self.seen[0].iter().zip(&self.seen[1]));
         parts
             .take(self.count)
             .map(|((front, rear), (ahead, behind))| {
                 let time_s = 0.5 * (f64::from(front.time_s) + f64::from(rear.time_s));
                 let state = super::state(knots, weights, time_s, time_s);
-                let by = 0.5 * (ahead.place()[0] + behind.place()[0]);
+                let by = share * ahead.place()[0] + (1.0 - share) * behind.place()[0] + middle;
                 let (sin, cos) = libm::sincos(state.heading);
                 let [x, y, z] = state.position;
                 ObjectState { position: [x + by * cos, y + by * sin, z], ..state }
@@ -136,11 +146,17 @@ impl Ends {
                 let view = (slope / SLOPE).min(1.0);
                 let counts = view * view * if miss < 0.0 { SHORT } else { 1.0 };
                 let off = libm::fabs(miss);
-                let bound = (BOUND_M / off.max(BOUND_M)).min(1.0);
                 let precision = self.precision * counts;
-                seen.precision = [precision * bound, 0.0, 0.0];
-                let square =
-                    if off < BOUND_M { off * off } else { BOUND_M * (2.0 * off - BOUND_M) };
+                // Bounded slope beyond the end, bounded cost before it.
+                let (share, square) = if miss < 0.0 {
+                    let fall = 1.0 / (1.0 + off * off / (HIDDEN_M * HIDDEN_M));
+                    (fall * fall, off * off * fall)
+                } else if off < BOUND_M {
+                    (1.0, off * off)
+                } else {
+                    (BOUND_M / off, BOUND_M * (2.0 * off - BOUND_M))
+                };
+                seen.precision = [precision * share, 0.0, 0.0];
                 cost += 0.5 * precision * square;
             }
         }

@@ -79,6 +79,9 @@ const GROWTH_FIRST_ITERATIONS: usize = 6;
 const GROWTH_ROUNDS: usize = 2;
 const GROWTH_ITERATIONS: usize = 2;
 
+/// Objects beyond these lengths move like those of them, m.
+const LENGTHS_M: [f64; 2] = [0.6, 30.0];
+
 /// What may as well rest, rests: so much more than motion it may cost.
 const RESTS: f64 = 1.05;
 
@@ -200,11 +203,11 @@ impl Estimator {
         self.best.copy(&self.now);
         if params.starts && !report.no_history {
             let mut least = self.cost_with_ends(params, &report);
-            for from in [Start::Rest, Start::Middles] {
+            for from in [Start::Rest, Start::Ends] {
                 let n = knots.bases();
                 match from {
                     Start::Rest => _ = start::stand(history, &mut self.now.weights[..n]),
-                    _ if !self.start_from_middles(params, history) => continue,
+                    _ if !self.start_from_ends(params, history) => continue,
                     _ => {}
                 }
                 let mut other = Report { from, ..report.clone() };
@@ -284,7 +287,7 @@ impl Estimator {
             return false;
         }
         if params.starts {
-            let precision = precision(params);
+            let precision = precision(params, self.returns.length_m());
             start::smooth(
                 &self.knots,
                 history,
@@ -297,9 +300,10 @@ impl Estimator {
         true
     }
 
-    /// First trajectory by what lies in the middle of the returns of every part of the track: they
-    /// are where the object is, wherever on it most of them are. False where there are none.
-    fn start_from_middles(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
+    /// First trajectory by where the object's returns end in every part of the track, wherever on it
+    /// most of them are: by the foremost, the hindmost or the middle between them, whichever moves
+    /// most like an object. False where there are none.
+    fn start_from_ends(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
         self.start(params, history);
         self.active = 0..self.returns.all().len();
         let kept = self.returns.all();
@@ -308,17 +312,29 @@ impl Estimator {
         }
         self.ends.find(kept, &self.seen, params.ends_m);
         let n = self.knots.bases();
-        let middles = self.ends.middles(&self.knots, &self.now.weights);
-        let weights = &mut self.now.weights[..n];
-        !middles.is_empty()
-            && start::smooth(
+        let begun = self.now.weights;
+        let mut least = f64::MAX;
+        for share in [0.5, 1.0, 0.0] {
+            let places = self.ends.places(&self.knots, &begun, share);
+            if places.is_empty() {
+                return false;
+            }
+            let weights = &mut self.before.weights;
+            *weights = begun;
+            let off = start::smooth(
                 &self.knots,
-                &middles,
-                &precision(params),
+                &places,
+                &precision(params, self.returns.length_m()),
                 &mut self.equations,
-                weights,
+                &mut weights[..n],
                 &mut self.step,
-            )
+            );
+            if let Some(off) = off.filter(|off| *off < least) {
+                least = off;
+                self.now.weights = *weights;
+            }
+        }
+        least < f64::MAX
     }
 
     /// At rest where the returns are on average.
@@ -464,7 +480,8 @@ impl Estimator {
         let n = self.knots.bases();
         let weights = &self.now.weights[..n];
         self.equations.clear(n);
-        let mut cost = process::add(&self.knots, weights, &precision(params), &mut self.equations);
+        let precision = precision(params, self.returns.length_m());
+        let mut cost = process::add(&self.knots, weights, &precision, &mut self.equations);
         if let Some(known) = &self.known {
             let now = self.knots.value(weights, known.time_s);
             let miss: Weights = core::array::from_fn(|d| known.state[d] - now[d]);
@@ -616,7 +633,15 @@ fn state(knots: &Knots, weights: &[Weights], inside: f64, time_s: f64) -> Object
     ObjectState { time_s, position, heading, speed, climb, turn_rate }
 }
 
-/// `Q_u^-1`.
-fn precision(params: &EstimateParams) -> Weights {
-    params.process.map(|deviation| 1.0 / (deviation * deviation))
+/// `Q_u^-1` of an object so long: a short one turns more briskly, a long one less so, and it also
+/// brakes and speeds up less.
+fn precision(params: &EstimateParams, length_m: f32) -> Weights {
+    let mut process = params.process;
+    if params.process_m > 0.0 && length_m > 0.0 {
+        let [shortest, longest] = LENGTHS_M;
+        let shorter = params.process_m / f64::from(length_m).clamp(shortest, longest);
+        process[6] *= shorter;
+        process[4] *= shorter.min(1.0);
+    }
+    process.map(|deviation| 1.0 / (deviation * deviation))
 }

@@ -12,6 +12,9 @@ pub struct EstimateParams {
     /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
     /// rate (rad/s).
     pub process: [f64; 7],
+    /// Length of an object for which `process` holds, m; see [`Estimator`](super::Estimator) for
+    /// others. 0 where it holds for all.
+    pub process_m: f64,
     /// Standard deviation of a model point about the origin, m.
     pub extent_m: f64,
     /// Standard deviation of a return about its model point (`σ_z`), m.
@@ -45,6 +48,7 @@ impl EstimateParams {
             model: 300,
             basis_s: 0.5,
             process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
+            process_m: 0.0,
             extent_m: 10.0,
             deviation_m: 0.5,
             iterations: 10,
@@ -76,6 +80,8 @@ impl Default for EstimateParams {
             carves: true,
             grows: true,
             process,
+            // A car's.
+            process_m: 4.5,
             ..EstimateParams::dissertation()
         }
     }

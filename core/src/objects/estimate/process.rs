@@ -171,7 +171,7 @@ mod tests {
         let (knots, _) = Knots::over(0.0, 4.0, 0.5);
         let mut equations = Box::new(Equations::new());
         let mut weights = weights::<8>();
-        let precision = precision(&EstimateParams::dissertation());
+        let precision = precision(&EstimateParams::dissertation(), 0.0);
         let mut cost = |weights: &[Weights]| {
             equations.clear(8);
             let cost = add(&knots, weights, &precision, &mut equations);
@@ -202,7 +202,7 @@ mod tests {
     fn the_integral_is_exact_enough() {
         let (knots, _) = Knots::over(0.0, 6.0, 0.5);
         let weights = weights::<12>();
-        let precision = precision(&EstimateParams::dissertation());
+        let precision = precision(&EstimateParams::dissertation(), 0.0);
         let mut equations = Box::new(Equations::new());
         equations.clear(12);
         let ours = add(&knots, &weights, &precision, &mut equations);

@@ -44,8 +44,8 @@ pub enum Start {
     History,
     /// At rest.
     Rest,
-    /// The middle of what is seen.
-    Middles,
+    /// Where the returns of every part of the track end.
+    Ends,
 }
 
 /// How a solve went.

@@ -12,6 +12,12 @@ const FAR: f32 = 1e5;
 const PARTS: usize = 128;
 const TICKS_PER_PART: usize = TICKS / PARTS;
 
+/// Parts of a track in which the object's length is measured, s: it hardly moves meanwhile. Their
+/// number at most, and returns of one that tells.
+const GLANCE_S: f32 = 0.1;
+const GLANCES: usize = 128;
+const GLANCE_RETURNS: usize = 6;
+
 /// A return that takes part.
 #[derive(Clone, Copy)]
 pub(super) struct Kept {
@@ -41,6 +47,7 @@ pub(super) struct Returns {
     kept: [Kept; RETURNS_MAX],
     count: usize,
     ticks: [u32; TICKS],
+    length_m: f32,
 }
 
 /// What became of the returns of a track.
@@ -70,7 +77,7 @@ pub(super) fn sound(seen: &ObjectReturn) -> bool {
 
 impl Returns {
     pub const fn new() -> Returns {
-        Returns { kept: [Kept::NONE; RETURNS_MAX], count: 0, ticks: [0; TICKS] }
+        Returns { kept: [Kept::NONE; RETURNS_MAX], count: 0, ticks: [0; TICKS], length_m: 0.0 }
     }
 
     /// Takes `at_most` of the returns, as evenly in time as they allow: parts of the track that have
@@ -152,11 +159,41 @@ impl Returns {
         }
     }
 
-    /// Computes every return's basis functions.
+    /// Computes every return's basis functions, and the object's length.
     pub fn lay(&mut self, knots: &Knots) {
         for kept in &mut self.kept[..self.count] {
             kept.basis = knots.basis(f64::from(kept.time_s));
         }
+        self.length_m = self.measure();
+    }
+
+    /// About how long the object is: the diagonal of what is seen of it in a glance, which four of
+    /// five glances do not exceed; 0 where no glance tells.
+    pub fn length_m(&self) -> f32 {
+        self.length_m
+    }
+
+    fn measure(&self) -> f32 {
+        let mut diagonals = heapless::Vec::<f32, GLANCES>::new();
+        let mut rest = self.all();
+        while let [first, ..] = rest {
+            let until = first.time_s + GLANCE_S;
+            let (glance, later) =
+                rest.split_at(rest.partition_point(|kept| kept.time_s < until).max(1));
+            rest = later;
+            if glance.len() < GLANCE_RETURNS {
+                continue;
+            }
+            let [x, y] = [0, 1].map(|d| {
+                let values = || glance.iter().map(|kept| kept.position[d]);
+                values().fold(f32::MIN, f32::max) - values().fold(f32::MAX, f32::min)
+            });
+            if diagonals.push(libm::sqrtf(x * x + y * y)).is_err() {
+                break;
+            }
+        }
+        diagonals.sort_unstable_by(f32::total_cmp);
+        diagonals.get(diagonals.len() * 4 / 5).copied().unwrap_or(0.0)
     }
 
     pub fn all(&self) -> &[Kept] {

@@ -131,9 +131,13 @@ const TURNING: f64 = 0.3;
 /// Speed from which on it believes a heading, m/s.
 const HEADS_MPS: f64 = 2.0;
 const SMOOTHINGS: usize = 6;
+/// Steps after which a position further off than this, m, counts ever less.
+const ROUGH: usize = 2;
+const OFF_M: f64 = 1.0;
 
-/// Trajectory that a history of positions and the process model make together. What moves slowly has
-/// no heading in it but noise.
+/// Trajectory that a history of positions and the process model make together, and how far off the
+/// positions are from it: the sum of their squares, each bounded, m². What moves slowly has no heading
+/// in it but noise. None where there is no solution.
 pub(super) fn smooth(
     knots: &Knots,
     history: &[ObjectState],
@@ -141,8 +145,10 @@ pub(super) fn smooth(
     equations: &mut Equations,
     weights: &mut [Weights],
     step: &mut [Weights],
-) -> bool {
-    for _ in 0..SMOOTHINGS {
+) -> Option<f64> {
+    let mut off = 0.0;
+    for n in 0..SMOOTHINGS {
+        off = 0.0;
         equations.clear(knots.bases());
         process::add(knots, weights, precision, equations);
         for state in unwrapped(history) {
@@ -155,7 +161,11 @@ pub(super) fn smooth(
             let believed = moves / (moves + HEADS_MPS * HEADS_MPS);
             let heads = believed * believed / (HEADING * HEADING);
             miss[6] = -now[6];
-            let place = 1.0 / (POSITION_M * POSITION_M);
+            let square = (miss[0] * miss[0] + miss[1] * miss[1]) / (OFF_M * OFF_M);
+            let fall = 1.0 / (1.0 + square);
+            off += OFF_M * OFF_M * square * fall;
+            let counts = if n < ROUGH { 1.0 } else { fall * fall };
+            let place = counts / (POSITION_M * POSITION_M);
             observe(
                 equations,
                 &knots.basis(state.time_s),
@@ -165,10 +175,10 @@ pub(super) fn smooth(
         }
         hold(equations, weights);
         if !apply(equations, weights, step) {
-            return false;
+            return None;
         }
     }
-    true
+    Some(off)
 }
 
 /// Everything at rest where the history is on average.

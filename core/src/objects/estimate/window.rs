@@ -356,7 +356,7 @@ impl FixedLag {
         let history = &self.history;
         let heading = self.said.last().map(|state| state.heading);
         let mut least = f64::MAX;
-        for from in [Start::Rest, Start::History, Start::Middles] {
+        for from in [Start::Rest, Start::History, Start::Ends] {
             match from {
                 Start::History => _ = estimator.start(params, history),
                 Start::Rest => {
@@ -368,8 +368,8 @@ impl FixedLag {
                         weights.iter_mut().for_each(|weights| weights[3] = heading);
                     }
                 }
-                Start::Middles if !estimator.start_from_middles(params, history) => continue,
-                Start::Middles => {}
+                Start::Ends if !estimator.start_from_ends(params, history) => continue,
+                Start::Ends => {}
             }
             estimator.active = 0..self.returns.len();
             let cost = young(estimator, params);
