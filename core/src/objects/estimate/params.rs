@@ -71,6 +71,8 @@ impl Default for EstimateParams {
         // Town traffic turns into a bend within a second.
         process[6] = 0.15;
         EstimateParams {
+            // Somebody on foot turns within half a second.
+            basis_s: 0.3,
             deviation_m: 0.05,
             damping: true,
             surfaces: true,
