@@ -392,7 +392,7 @@ mod tests {
         profile.tracklet.pose_noise_m = 0.0;
         // A gate that never closes.
         profile.tracklet.gate_d2 = f32::INFINITY;
-        let params = profile.tracklet.clone();
+        let params = profile.tracklet;
         let mut random = Random(seed * 7919 + 17);
         let (sigma, dt) = (0.01f64, DT as f64);
         let (mut heading, mut speed) = (random.uniform() * 6.0 - 3.0, 8.0);
