@@ -93,8 +93,9 @@ pub enum Birth {
 pub struct TrackletParams {
     /// Standard deviation of a measured position, cells: half a cell.
     pub measurement_cells: f32,
-    /// Standard deviation of what the poses err from one sweep to the next, m. Tracklets
-    /// allow for it beside the covariance of a displacement, which is by the poses given.
+    /// Standard deviation of what the poses err from one sweep to the next, m: a guess, which
+    /// `innovation_sweeps` corrects. Tracklets allow for it beside the covariance of a
+    /// displacement, which is by the poses given.
     pub pose_noise_m: f32,
     /// Process noise of the speed, m/s per second, as a standard deviation per step of `dt`.
     pub speed_noise_mps2: f32,
@@ -105,6 +106,9 @@ pub struct TrackletParams {
     /// Limit of the squared Mahalanobis distance (3.25); 9.2103 is the 99 % quantile of
     /// chi-square with two degrees of freedom.
     pub gate_d2: f32,
+    /// Sweeps over which the innovations of a tracklet tell how large all its noise is (the
+    /// exponential mean, from 1 on); 0: as large as assumed.
+    pub innovation_sweeps: f32,
     /// Where a tracklet is born.
     pub birth: Birth,
     /// Whether a tracklet whose cell was not observed takes over an observed column beside it.
@@ -176,11 +180,12 @@ impl Profile {
             refinement_sweeps: 3,
             tracklet: TrackletParams {
                 measurement_cells: 0.5,
-                pose_noise_m: 0.01,
+                pose_noise_m: 0.005,
                 speed_noise_mps2: 1.0,
                 turn_noise_radps2: 0.6,
                 turn_birth_radps: 0.2,
                 gate_d2: 9.2103,
+                innovation_sweeps: 8.0,
                 birth: Birth::Target,
                 takes_over: true,
                 coast_sweeps: 2,
@@ -212,6 +217,7 @@ impl Profile {
                 turn_noise_radps2: 0.3,
                 // His gate compares the distance itself with the quantile 5.9915.
                 gate_d2: 5.9915 * 5.9915,
+                innovation_sweeps: 0.0,
                 birth: Birth::Source,
                 takes_over: false,
                 coast_sweeps: 0,
@@ -253,7 +259,7 @@ impl Profile {
     pub fn check(&self) -> Result<(), ProfileError> {
         let (t, l) = (&self.tracklet, &self.limits);
         let positive = |v: f32| v.is_finite() && v > 0.0;
-        let rules: [(bool, &'static str, &'static str); 22] = [
+        let rules: [(bool, &'static str, &'static str); 23] = [
             (self.side % 2 == 1 && self.side >= 31, "side", "odd and at least 31"),
             (self.columns() <= COLUMNS_MAX, "side", "at most 255 (65,536 columns)"),
             ((2..=LEVELS_MAX as u32).contains(&self.levels), "levels", "2 to 16"),
@@ -284,6 +290,11 @@ impl Profile {
             (positive(t.turn_noise_radps2), "turn_noise_radps2", "above 0"),
             (positive(t.turn_birth_radps), "turn_birth_radps", "above 0"),
             (positive(t.gate_d2), "gate_d2", "above 0"),
+            (
+                t.innovation_sweeps == 0.0 || (1.0..=1000.0).contains(&t.innovation_sweeps),
+                "innovation_sweeps",
+                "0, or 1 to 1,000",
+            ),
             (t.coast_sweeps <= 20, "coast_sweeps", "at most 20"),
             (l.gap_s > 0.0 && l.gap_s <= 10.0, "gap_s", "above 0, at most 10"),
             (l.jump_mps > 0.0 && l.jump_mps <= 1000.0, "jump_mps", "above 0, at most 1,000"),

@@ -595,7 +595,7 @@ impl Pipeline {
             velocity_world_mps: world_velocity,
             velocity_ego_mps: ego_velocity,
             covariance: core::array::from_fn(|a| {
-                core::array::from_fn(|b| t.ekf.covariance[(a, b)])
+                core::array::from_fn(|b| t.ekf.scale * t.ekf.covariance[(a, b)])
             }),
             age: t.age,
         }

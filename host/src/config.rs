@@ -47,6 +47,7 @@ struct TrackletKeys {
     turn_noise_radps2: Option<f32>,
     turn_birth_radps: Option<f32>,
     gate_d2: Option<f32>,
+    innovation_sweeps: Option<f32>,
     birth: Option<BirthKey>,
     takes_over: Option<bool>,
     coast_sweeps: Option<u32>,
@@ -100,6 +101,7 @@ impl Keys {
         set(&mut t.turn_noise_radps2, keys.turn_noise_radps2);
         set(&mut t.turn_birth_radps, keys.turn_birth_radps);
         set(&mut t.gate_d2, keys.gate_d2);
+        set(&mut t.innovation_sweeps, keys.innovation_sweeps);
         let birth = |key| match key {
             BirthKey::Target => Birth::Target,
             BirthKey::Source => Birth::Source,
@@ -244,7 +246,7 @@ mod tests {
             range_m = 80\nframe = \"sensor\"\ndeskew = false\nem_rounds = 5\nsmoothing = 7\n\
             displacement_cost = 8\noutside_cost = 9\nrefinement_sweeps = 0\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
             measurement_cells = 0.75\nspeed_noise_mps2 = 2.0\nturn_noise_radps2 = 3.0\n\
-            turn_birth_radps = 4.0\ngate_d2 = 5.0\nbirth = \"source\"\n\
+            turn_birth_radps = 4.0\ngate_d2 = 5.0\ninnovation_sweeps = 12\nbirth = \"source\"\n\
             takes_over = false\ncoast_sweeps = 6\npose_noise_m = 0.25\n";
         let p = parsed(text).unwrap();
         assert_eq!((p.name.as_str(), p.side, p.levels), ("mine", 101, 12));
@@ -260,6 +262,7 @@ mod tests {
             (0.75, 2.0, 3.0)
         );
         assert_eq!((t.turn_birth_radps, t.gate_d2, t.pose_noise_m), (4.0, 5.0, 0.25));
+        assert_eq!(t.innovation_sweeps, 12.0);
         assert_eq!((p.refinement_sweeps, t.takes_over, t.coast_sweeps), (0, false, 6));
         let p = parsed("base = \"dissertation\"").unwrap();
         assert_eq!(Profile { name: Profile::dissertation().name, ..p }, Profile::dissertation());

@@ -12,9 +12,17 @@ use nalgebra::{Matrix2, Matrix4, Matrix5, Matrix5x2, Vector2, Vector5};
 pub struct Ekf {
     /// m, m, rad, m/s, rad/s.
     pub mean: Vector5<f32>,
-    /// Symmetric.
+    /// Symmetric, of the noise assumed: what is put out is `scale` times that.
     pub covariance: Matrix5<f32>,
+    /// By how much the variances of all noise, of the process and of what is measured, are larger than
+    /// assumed, as the innovations tell over [`TrackletParams::innovation_sweeps`]. Common to all, it
+    /// leaves the gains as they are.
+    pub scale: f32,
 }
+
+/// Bounds of the scale: a few innovations may happen to be small, and one that fits nothing shall not
+/// open the gate ever wider.
+const SCALE: [f32; 2] = [0.1, 10.0];
 
 /// Standard deviations at birth in the author's program.
 const BIRTH_SOURCE: [f32; 5] = [0.1, 0.1, 0.2, 1.5, 0.2];
@@ -86,7 +94,7 @@ impl Ekf {
                 p[(4, 4)] = params.turn_birth_radps * params.turn_birth_radps;
             }
         }
-        Ekf { mean, covariance: p }
+        Ekf { mean, covariance: p, scale: 1.0 }
     }
 
     /// Whether every match since birth stayed in its cell. Then speed is zero and the heading, which
@@ -130,8 +138,19 @@ impl Ekf {
         self.covariance[(4, 4)] += of_turn * of_turn;
     }
 
+    /// Takes the place it follows for one measured by itself, with errors of covariance `noise` that
+    /// have nothing to do with those of the motion.
+    pub fn measure_place(&mut self, noise: Matrix2<f32>) {
+        let mut keep = Matrix5::identity();
+        keep.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
+        self.mean = keep * self.mean;
+        self.covariance = keep * self.covariance * keep;
+        self.covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise);
+    }
+
     /// Observes a position (3.22-3.24, Joseph form) unless it lies beyond the gate (3.25): then
-    /// nothing changes and `false` comes back.
+    /// nothing changes and `false` comes back. The gate is wider where noise was found to be larger
+    /// than assumed.
     pub fn update(&mut self, params: &TrackletParams, noise: Matrix2<f32>, seen: [f32; 2]) -> bool {
         let p = &self.covariance;
         let r = noise;
@@ -142,7 +161,7 @@ impl Ekf {
             Matrix2::new(s[(1, 1)], -s[(0, 1)], -s[(1, 0)], s[(0, 0)]) * (1.0 / determinant);
         let d2 = (innovation.transpose() * inverse * innovation)[0];
         // A NaN, should one ever arise, ends the tracklet.
-        if d2 > params.gate_d2 || d2.is_nan() {
+        if d2 > params.gate_d2 * self.scale.max(1.0) || d2.is_nan() {
             return false;
         }
         let gain: Matrix5x2<f32> = p.fixed_view::<5, 2>(0, 0) * inverse;
@@ -152,6 +171,12 @@ impl Ekf {
         seen_part -= gain;
         let joseph = keep * p * keep.transpose() + gain * r * gain.transpose();
         self.covariance = (joseph + joseph.transpose()) * 0.5;
+        // What was at rest all the time tells nothing: it is put out to stand exactly.
+        if params.innovation_sweeps > 0.0 && !self.at_rest() {
+            let per_axis = 0.5 * d2;
+            let scale = self.scale + (per_axis - self.scale) / params.innovation_sweeps;
+            self.scale = scale.clamp(SCALE[0], SCALE[1]);
+        }
         self.face_forward();
         true
     }
@@ -185,12 +210,11 @@ impl Ekf {
     pub fn velocity(&self) -> ([f32; 2], [f32; 3]) {
         let (sin, cos) = (libm::sinf(self.mean[2]), libm::cosf(self.mean[2]));
         let speed = self.mean[3];
+        let [hh, hs, ss] = [(2, 2), (2, 3), (3, 3)].map(|at| self.scale * self.covariance[at]);
         if self.at_rest() {
             // Any direction is as likely.
-            return ([0.0; 2], [self.covariance[(3, 3)], 0.0, self.covariance[(3, 3)]]);
+            return ([0.0; 2], [ss, 0.0, ss]);
         }
-        let (hh, hs, ss) =
-            (self.covariance[(2, 2)], self.covariance[(2, 3)], self.covariance[(3, 3)]);
         // Rows of the Jacobian of (v cos h, v sin h) by (h, v).
         let (a, b) = ([-speed * sin, cos], [speed * cos, sin]);
         let product = |l: [f32; 2], r: [f32; 2]| {
@@ -356,6 +380,78 @@ mod tests {
         let rest = Ekf::birth(&profile.tracklet, noise(), [0.0, 0.0], DT);
         let (_, [xx, xy, yy]) = rest.velocity();
         assert!(xx == yy && xx > 1.0 && xy == 0.0);
+    }
+
+    /// Scale, and squared error of the velocity in terms of its covariance, of a thing whose refined
+    /// displacements err by themselves, 1 cm and `factor` times that, its speed and turning rate
+    /// changing by `factor` times what is assumed.
+    fn displaced(seed: u64, factor: f64, innovation_sweeps: f32) -> (f32, f32) {
+        use crate::tracklet::{Tracklet, observe};
+        let mut profile = Profile::hdl64();
+        profile.tracklet.innovation_sweeps = innovation_sweeps;
+        profile.tracklet.pose_noise_m = 0.0;
+        // A gate that never closes.
+        profile.tracklet.gate_d2 = f32::INFINITY;
+        let params = profile.tracklet;
+        let mut random = Random(seed * 7919 + 17);
+        let (sigma, dt) = (0.01f64, DT as f64);
+        let (mut heading, mut speed) = (random.uniform() * 6.0 - 3.0, 8.0);
+        let mut turn = factor * random.normal() * params.turn_birth_radps as f64;
+        let mut see = |random: &mut Random| {
+            let by = [speed * heading.cos() * dt, speed * heading.sin() * dt];
+            let seen = by.map(|v| (v + factor * sigma * random.normal()) as f32);
+            heading += turn * dt;
+            speed += factor * random.normal() * params.speed_noise_mps2 as f64 * dt;
+            turn += factor * random.normal() * params.turn_noise_radps2 as f64 * dt;
+            (seen, [speed * heading.cos(), speed * heading.sin()].map(|v| v as f32))
+        };
+        let variance = (sigma * sigma) as f32;
+        let born = Matrix2::from_diagonal_element(0.5 * variance);
+        let ekf = Ekf::birth(&params, born, see(&mut random).0, DT);
+        let mut t = Tracklet { ekf, age: 0, missed: 0, column: 0, place: [0.5; 2] };
+        let mut truth = [0.0; 2];
+        for _ in 0..30 {
+            let (moved, velocity) = see(&mut random);
+            assert!(observe(&mut t, &profile, moved, [variance, 0.0, variance], DT));
+            truth = velocity;
+        }
+        let (v, [xx, xy, yy]) = t.ekf.velocity();
+        let error = Vector2::new(v[0] - truth[0], v[1] - truth[1]);
+        let inverse = Matrix2::new(xx, xy, xy, yy).try_inverse().unwrap();
+        (t.ekf.scale, (error.transpose() * inverse * error)[0])
+    }
+
+    fn displaced_mean(factor: f64, innovation_sweeps: f32) -> (f32, f32) {
+        let all = (0..500).map(|seed| displaced(seed, factor, innovation_sweeps));
+        let (scale, d2) = all.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+        (scale / 500.0, d2 / 500.0)
+    }
+
+    #[test]
+    fn displacements_that_err_by_themselves() {
+        // Chi-square of 2 degrees of freedom. Were they taken for differences of positions that err by
+        // themselves, it would be 2.7: such errors cancel in time.
+        let (scale, d2) = displaced_mean(1.0, 0.0);
+        std::println!("mean squared error {d2}");
+        assert_eq!(scale, 1.0);
+        assert!((d2 - 2.0).abs() < 0.25, "{d2}");
+    }
+
+    #[test]
+    fn innovations_tell_how_large_the_noise_is() {
+        for factor in [0.5, 1.0, 2.0] {
+            let (scale, d2) = displaced_mean(factor, 8.0);
+            std::println!("noise times {factor}: scale {scale}, mean squared error {d2}");
+            let variance = (factor * factor) as f32;
+            assert!((scale / variance - 1.0).abs() < 0.1, "{factor}: {scale}");
+            assert!((1.75..2.5).contains(&d2), "{factor}: {d2}");
+        }
+        // What stands exactly tells nothing.
+        let params = Profile::hdl64().tracklet;
+        let mut rest = Ekf::birth(&params, noise(), [0.0; 2], DT);
+        rest.predict(&params, DT);
+        assert!(rest.update(&params, noise(), [0.0; 2]));
+        assert_eq!(rest.scale, 1.0);
     }
 
     #[test]

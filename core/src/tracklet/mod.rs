@@ -77,9 +77,15 @@ pub(crate) fn observe(
 ) -> bool {
     let params = &profile.tracklet;
     let noise = position_noise(params, covariance);
+    let refined = profile.refinement_sweeps > 0;
+    if refined {
+        // Things are laid over each other anew every time: what one displacement is off by, the next
+        // one does not make good, as whole cells do.
+        t.ekf.measure_place(noise);
+    }
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
         // From the sweep before its birth to this one.
-        let sweeps = if profile.refinement_sweeps > 0 { 1 } else { t.age + 2 };
+        let sweeps = if refined { 1 } else { t.age + 2 };
         let elapsed = dt * sweeps.min(DEPARTURE_SWEEPS) as f32;
         let departed = t.ekf.depart(params, noise, moved, elapsed, dt);
         t.ekf = departed.unwrap_or(t.ekf);
