@@ -1,4 +1,5 @@
-//! Places of returns, an array per axis: a processor compares several of them at once.
+//! Places of returns, an array per axis: a processor compares several of them at once. Compilers see
+//! to that where nothing in a lane can branch: hence no sums with a check for overflow.
 
 use crate::params::CLOUD_MAX;
 use core::array::from_fn;
@@ -83,8 +84,7 @@ impl Places {
         let (mut n, end) = (range.start as u32, range.end as u32);
         // Each lane has its own, so that none waits for another.
         let (mut least, mut best) = ([least; LANES], [NONE; LANES]);
-        for b in 0..x.len().min(y.len()).min(z.len()).min(sensors.len()) {
-            let (x, y, z, sensors) = (&x[b], &y[b], &z[b], &sensors[b]);
+        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -122,15 +122,14 @@ impl Places {
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
         let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
         let (mut n, end) = (range.start as u32, range.end as u32);
-        for b in 0..x.len().min(y.len()).min(z.len()).min(sensors.len()) {
-            let (x, y, z, sensors) = (&x[b], &y[b], &z[b], &sensors[b]);
+        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
             let mut terms = [[0.0; LANES]; 10];
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let own = n.wrapping_add(l as u32);
                 let near = (d2 < radius * radius) & (sensors[l] == sensor) & (own < end);
-                // What is not adds zeros: no branch to mispredict.
+                // What is not near adds zeros, which changes no sum.
                 let mask = if near { u32::MAX } else { 0 };
                 let [x, y, z] = [masked(d[0], mask), masked(d[1], mask), masked(d[2], mask)];
                 terms[0][l] = masked(1.0, mask);
@@ -145,8 +144,8 @@ impl Places {
                 terms[9][l] = z * z;
             }
             for l in 0..LANES {
-                for k in 0..10 {
-                    sums[k] += terms[k][l];
+                for (sum, term) in sums.iter_mut().zip(&terms) {
+                    *sum += term[l];
                 }
             }
             n = n.wrapping_add(LANES as u32);
