@@ -6,8 +6,9 @@
 //!                             background_filter, compact, occupancy_constancy,
 //!                             window, expectation / maximisation x n_em
 //! ```
-//! [`Pipeline::prepare`] and [`Pipeline::follow`] run on the CPU. What lies between is integers and
-//! bits: [`perceive`] does it here, the kernels do the same on a device, with the same result.
+//! [`Pipeline::prepare`] and [`Pipeline::follow`] run on the CPU, [`Pipeline::take`] too, while a
+//! device perceives. What lies between them is integers and bits: [`perceive`] does it here, the
+//! kernels do the same on a device, with the same result.
 
 use crate::background_filter::background_filter;
 use crate::compact::compact;
@@ -148,8 +149,6 @@ pub struct Prepared {
     pub dropped: Dropped,
     /// Set where this sweep has no usable predecessor.
     pub reset: Option<Reset>,
-    /// Returns beyond the capacity of the refinement: it does not see them.
-    pub unrefined: usize,
 }
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
@@ -260,8 +259,6 @@ impl Pipeline {
             &mut self.placed,
             origins,
         );
-        let refines = self.profile.refinement_sweeps > 0;
-        let unrefined = if refines { self.take(sweep, window.corner) } else { 0 };
         self.current = Some(Side {
             window,
             pose: sweep.world_from_vehicle,
@@ -289,16 +286,22 @@ impl Pipeline {
             score_min: self.scores.min,
             ..step_of(&self.profile, count)
         };
-        Prepared { step, dropped, reset, unrefined }
+        Prepared { step, dropped, reset }
     }
 
-    /// Hands a sweep to the refinement. Things on slopes reach out of the window's levels: their
-    /// returns belong to its columns all the same. Returns how many it had no room for.
-    fn take(&mut self, sweep: &Sweep, corner: [i32; 3]) -> usize {
+    /// Hands the sweep that was just prepared to the refinement: needed before [`Pipeline::follow`],
+    /// but not by perception, which may go on meanwhile. Returns how many returns it had no room for:
+    /// it does not see them.
+    pub fn take(&mut self, sweep: &Sweep) -> usize {
+        let Some(current) = self.current.filter(|_| self.profile.refinement_sweeps > 0) else {
+            return 0;
+        };
         let taken = sweep.points.len().min(POINTS_MAX);
         let side = self.profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
         let columns = &mut self.column_of_point[0][..taken];
+        // Things on slopes reach out of the window's levels: their returns belong to its columns all
+        // the same.
         for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
             if *column == NONE && inside(*x) && inside(*y) {
                 *column = *x as u32 * self.profile.side + *y as u32;
@@ -306,7 +309,7 @@ impl Pipeline {
         }
         let placed = &self.placed[..taken];
         let points = &sweep.points[..taken];
-        let refinement = &mut self.refinement;
+        let (refinement, corner) = (&mut self.refinement, current.window.corner);
         let apart = &mut self.is_apart[0][..taken];
         refinement.take(&self.profile, corner, sweep.stamp_s, points, placed, columns, apart)
     }

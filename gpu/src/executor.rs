@@ -102,19 +102,29 @@ impl Executor {
     /// `Timeout` after [`Options::timeout`], `DeviceLost`, `Vulkan`. Once one of them has been
     /// returned, every later run returns it again at once.
     pub fn run(&mut self, program: usize) -> Result<(), GpuError> {
+        self.run_beside(program, || ())
+    }
+
+    /// Runs a program to its end, and `work` on this thread while the device is at it: its time does
+    /// not count against [`Options::timeout`].
+    ///
+    /// # Errors
+    /// As [`Executor::run`]. `work` has not been done where the submission failed.
+    pub fn run_beside(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
-        let outcome = self.submit_and_wait(program);
+        let outcome = self.submit_and_wait(program, work);
         self.failure = outcome.clone().err();
         outcome
     }
 
-    fn submit_and_wait(&mut self, program: usize) -> Result<(), GpuError> {
+    fn submit_and_wait(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
         let commands = self.programs[program].commands;
         let submitted = self.gpu.submit(commands, self.fence);
         submitted.map_err(|result| self.fault("vkQueueSubmit", result, program))?;
         self.in_flight = true;
+        work();
         let waited = self.gpu.wait(self.fence, self.timeout);
         let finished = waited.map_err(|result| self.fault("vkWaitForFences", result, program))?;
         if !finished {

@@ -11,8 +11,9 @@
 //!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host and create, record or
 //!   update nothing on the device; [`Executor::census`] counts what would break that promise.
 //!   What a driver allocates inside a submit is its own affair.
-//! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]. Programs never overlap,
-//!   so nothing needs ordering between two runs.
+//! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
+//!   does the caller's work in between. Programs never overlap, so nothing needs ordering between
+//!   two runs.
 //! - **Who orders.** Within a program a barrier stands exactly where declared accesses conflict
 //!   ([`Binding::reads`], [`Binding::writes`]): a kernel that touches what it does not declare is
 //!   not ordered. Every recording is checked a second time, pair by pair, before it is accepted.

@@ -25,6 +25,8 @@ pub struct Stepped<'a> {
     pub prepared: Prepared,
     /// Flow of the pair that this sweep completes; none after a reset.
     pub flows: Option<Flows<'a>>,
+    /// Returns beyond the capacity of the refinement: it does not see them.
+    pub unrefined: usize,
     /// Foreground columns.
     pub foreground: usize,
     /// Distinct rays.
@@ -70,13 +72,15 @@ impl Drive {
             let prepared = self.pipeline.prepare(sweep, rays, origins);
             laps.lap("prepare");
             let rounds = self.pipeline.profile().em_rounds;
-            let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps)?;
+            let mut unrefined = 0;
+            let meanwhile = || unrefined = self.pipeline.take(sweep);
+            let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps, meanwhile)?;
             let output = Output { columns: &mut self.columns, points: &mut self.points };
             let lap = &mut |name| laps.lap(name);
             let flows = self.pipeline.follow(&prepared.step, &perceived, before, output, lap);
             laps.lap("follow");
             let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
-            Ok(Stepped { prepared, flows, foreground, rays, laps })
+            Ok(Stepped { prepared, flows, unrefined, foreground, rays, laps })
         })
     }
 

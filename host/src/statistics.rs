@@ -213,7 +213,7 @@ impl Statistics {
     /// Counts a sweep; its columns go to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
         self.dropped.returns += stepped.prepared.dropped;
-        self.dropped.unrefined += stepped.prepared.unrefined as u64;
+        self.dropped.unrefined += stepped.unrefined as u64;
         self.dropped.null_rows += u64::from(data.dropped.null_rows);
         if self.sweeps > 0 {
             self.dropped.missing_sweeps += data.dropped.sweeps_before;

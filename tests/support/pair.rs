@@ -53,7 +53,9 @@ impl Side {
         let mut laps = Laps::start();
         let profile: &Profile = self.pipeline.profile();
         let (rounds, columns) = (profile.em_rounds, profile.columns());
-        let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps);
+        let (pipeline, sweep) = (&mut self.pipeline, sweep(now));
+        let meanwhile = || _ = pipeline.take(&sweep);
+        let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps, meanwhile);
         let perceived = perceived.unwrap_or_else(|e| panic!("{e}"));
         let mut stages = Stages { step: prepared.step, ..Stages::default() };
         stages.words.extend([("rays", rays), ("origins", origins)]);

@@ -1,6 +1,7 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
 use super::align::{NOISE, Sample, Weight};
+use super::places::Places;
 use crate::ground::Ground;
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, POINTS_MAX, Profile,
@@ -40,15 +41,6 @@ impl Scratch {
 /// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
 const UNKNOWN: Weight = [0.0; 6];
 
-/// A return above the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Return {
-    /// Voxels from the window's corner.
-    pub at: [f32; 3],
-    /// Sensor that saw it: each sees a thing at a time of its own.
-    pub sensor: u32,
-}
-
 /// Thinned returns of one sweep, voxels from the window's corner.
 pub struct Cloud {
     /// Columns along an axis of the window.
@@ -58,7 +50,7 @@ pub struct Cloud {
     /// Time of the sweep, s.
     pub stamp_s: f64,
     ground: Ground,
-    points: heapless::Vec<Return, CLOUD_MAX>,
+    places: Places,
     /// When each was, s after the sweep's stamp: seldom asked for.
     offset_s: [f32; CLOUD_MAX],
     start: [u32; COLUMNS_MAX + 1],
@@ -75,7 +67,7 @@ impl Cloud {
             corner: [0; 3],
             stamp_s: 0.0,
             ground: Ground::new(),
-            points: heapless::Vec::new(),
+            places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
             weights: [const { Cell::new(UNKNOWN) }; CLOUD_MAX],
@@ -131,12 +123,12 @@ impl Cloud {
             *at += 1;
         }
         // Each start has become its end; what is kept is written from the front again.
-        self.points.clear();
+        self.places.clear();
         let (mut from, mut dropped) = (0, 0);
         for (c, end) in start[..columns_used].iter_mut().enumerate() {
             let listed = &order[from..*end as usize];
             from = *end as usize;
-            *end = self.points.len() as u32;
+            *end = self.places.len() as u32;
             self.levels[c] = 0;
             let corner = [(c / side) as f32, (c % side) as f32];
             let sensors = listed.iter().fold(0u32, |s, n| s | 1 << points[*n as usize].sensor);
@@ -153,8 +145,8 @@ impl Cloud {
                     let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
                     if *word & 1 << (bit % 32) == 0 {
                         *word |= 1 << (bit % 32);
-                        let kept = self.points.len();
-                        if self.points.push(Return { at: p, sensor }).is_ok() {
+                        let kept = self.places.len();
+                        if self.places.push(p, sensor) {
                             self.offset_s[kept] = offset_s;
                             self.levels[c] |= 1 << height(n as usize) as u32;
                         } else {
@@ -164,8 +156,8 @@ impl Cloud {
                 }
             }
         }
-        start[columns_used] = self.points.len() as u32;
-        self.weights[..self.points.len()].iter().for_each(|w| w.set(UNKNOWN));
+        start[columns_used] = self.places.len() as u32;
+        self.weights[..self.places.len()].iter().for_each(|w| w.set(UNKNOWN));
         dropped
     }
 
@@ -191,15 +183,14 @@ impl Cloud {
         self.start[column] as usize..self.start[column + 1] as usize
     }
 
-    /// Thinned returns of columns `j_from..j_to` of row `i`: they lie side by side.
-    pub fn row(&self, i: usize, j_from: usize, j_to: usize) -> &[Return] {
+    /// Indices of the thinned returns in columns `j_from..j_to` of row `i`: they lie side by side.
+    fn row(&self, i: usize, j_from: usize, j_to: usize) -> Range<usize> {
         let row = i * self.side;
-        &self.points[self.start[row + j_from] as usize..self.start[row + j_to] as usize]
+        self.start[row + j_from] as usize..self.start[row + j_to] as usize
     }
 
     /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
-    /// (voxels²) and itself; of two as near one, always the same. The first one closer than `enough`
-    /// will do.
+    /// (voxels²) and itself; of two as near one, always the same. One closer than `enough` will do.
     pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, Sample)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
@@ -222,16 +213,11 @@ impl Cloud {
             let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
             let from = if left { j_from } else { j.saturating_sub(1).max(j_from) };
             let to = if right { j_to } else { j.min(j_to) };
-            let first = self.start[row * self.side + from] as usize;
-            for (n, other) in self.row(row, from, to.max(from)).iter().enumerate() {
-                let p = other.at;
-                let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
-                let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                if d2 < least && other.sensor == sensor {
-                    (least, best) = (d2, Some(first + n));
-                    if d2 < enough * enough {
-                        return Some((d2, self.sample(first + n)));
-                    }
+            let row = self.row(row, from, to.max(from));
+            if let Some((d2, n)) = self.places.nearest(row, at, sensor, least) {
+                (least, best) = (d2, Some(n));
+                if d2 < enough * enough {
+                    break;
                 }
             }
         }
@@ -240,7 +226,7 @@ impl Cloud {
 
     /// A return.
     pub fn sample(&self, n: usize) -> Sample {
-        let Return { at, sensor } = self.points[n];
+        let (at, sensor) = (self.places.at(n), self.places.sensor(n));
         Sample { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
     }
 
@@ -250,7 +236,7 @@ impl Cloud {
         if known != UNKNOWN {
             return known;
         }
-        let Return { at, sensor } = self.points[n as usize];
+        let (at, sensor) = (self.places.at(n as usize), self.places.sensor(n as usize));
         let weight = self.surface(at, sensor);
         self.weights[n as usize].set(weight);
         weight
@@ -259,19 +245,13 @@ impl Cloud {
     /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.
     fn surface(&self, at: [f32; 3], sensor: u32) -> Weight {
         let [i, j] = [at[0] as usize, at[1] as usize];
-        let (mut n, mut mean, mut square) = (0.0f32, [0.0f32; 3], [0.0f32; 6]);
+        let mut sums = [0.0; 10];
         for a in i.saturating_sub(1)..(i + 2).min(self.side) {
-            for p in self.row(a, j.saturating_sub(1), (j + 2).min(self.side)) {
-                let [x, y, z] = [0, 1, 2].map(|a| p.at[a] - at[a]);
-                if p.sensor == sensor && x * x + y * y + z * z < AROUND * AROUND {
-                    n += 1.0;
-                    mean = [mean[0] + x, mean[1] + y, mean[2] + z];
-                    let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-                    square = core::array::from_fn(|k| square[k] + products[k]);
-                }
-            }
+            let row = self.row(a, j.saturating_sub(1), (j + 2).min(self.side));
+            self.places.add_around(row, at, sensor, AROUND, &mut sums);
         }
-        let [x, y, z] = mean.map(|m| m / n);
+        let [n, x, y, z, square @ ..] = sums;
+        let [x, y, z] = [x, y, z].map(|m| m / n);
         let products = [x * x, x * y, x * z, y * y, y * z, z * z];
         let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
         let spread = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);

@@ -11,6 +11,7 @@
 
 mod align;
 mod cloud;
+mod places;
 mod search;
 mod segments;
 #[cfg(test)]

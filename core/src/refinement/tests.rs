@@ -66,8 +66,13 @@ impl Returns {
     }
 }
 
-fn kept(cloud: &Cloud, column: usize) -> Vec<cloud::Return> {
-    cloud.row(column / SIDE, column % SIDE, column % SIDE + 1).to_vec()
+/// Places and sensors of the returns that are kept of a column.
+fn kept(cloud: &Cloud, column: usize) -> Vec<([f32; 3], u32)> {
+    cloud.column(column).map(|n| cloud.sample(n)).map(|s| (s.at, s.sensor)).collect()
+}
+
+fn all_kept(cloud: &Cloud) -> Vec<([f32; 3], u32)> {
+    (0..SIDE * SIDE).flat_map(|c| kept(cloud, c)).collect()
 }
 
 /// Returns anywhere above flat ground, some beyond the window.
@@ -85,7 +90,7 @@ fn nearest_is_the_nearest() {
     let mut random = Random(1);
     for count in [300, 3000, 12000] {
         let cloud = scattered(&mut random, count, 6.0).cloud();
-        let all = cloud.row(0, 0, SIDE * SIDE);
+        let all = all_kept(&cloud);
         let mut found = 0;
         for n in 0..4000 {
             // A third along each border.
@@ -99,12 +104,12 @@ fn nearest_is_the_nearest() {
                 let d = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
                 d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
             };
-            let of_sensor = all.iter().filter(|r| r.sensor == sensor);
-            let least = of_sensor.map(|r| distance(r.at)).fold(f32::INFINITY, f32::min);
+            let of_sensor = all.iter().filter(|r| r.1 == sensor);
+            let least = of_sensor.map(|r| distance(r.0)).fold(f32::INFINITY, f32::min);
             match cloud.nearest(at, sensor, 0.0) {
                 Some((d2, p)) => {
                     assert!(d2 == least && distance(p.at) == d2, "{at:?}: {d2}, not {least}");
-                    assert!(all[p.index as usize].at == p.at && p.sensor == sensor);
+                    assert!(all[p.index as usize] == (p.at, sensor) && p.sensor == sensor);
                     found += 1;
                 }
                 None => assert!(least >= 1.0, "{at:?}: missed {least}"),
@@ -145,7 +150,7 @@ fn of_each_part_of_a_voxel_the_first_return_stays() {
             let list = list.into_iter().collect::<BTreeSet<_>>();
             expected.extend(list.iter().map(|n| (returns.placed[*n].at, sensor)));
         }
-        let found: Vec<_> = kept(&cloud, column).iter().map(|r| (r.at, r.sensor)).collect();
+        let found = kept(&cloud, column);
         assert_eq!(found, expected, "column {column}");
         total += found.len();
     }
@@ -174,18 +179,18 @@ fn returns_beyond_the_capacity_are_counted() {
     let (dropped, _) = returns.fill(&mut cloud);
     assert_eq!(dropped, parts.len() - CLOUD_MAX);
     assert!(dropped > 20_000);
-    let all = cloud.row(0, 0, SIDE * SIDE).to_vec();
+    let all = all_kept(&cloud);
     assert_eq!(all.len(), CLOUD_MAX);
     // Those of the last columns go.
     let in_column = |p: &[f32; 3], c: u32| column_of(*p) < c;
-    let last = column_of(all[CLOUD_MAX - 1].at);
+    let last = column_of(all[CLOUD_MAX - 1].0);
     let before = parts.iter().filter(|p| in_column(p, last)).count();
     assert!(
         before <= CLOUD_MAX && parts.iter().filter(|p| in_column(p, last + 1)).count() >= CLOUD_MAX
     );
     // The same again, whatever the cloud held.
     assert_eq!(returns.fill(&mut cloud).0, dropped);
-    assert!(all == cloud.row(0, 0, SIDE * SIDE));
+    assert!(all == all_kept(&cloud));
     // And it can be worked with.
     let mut refinement = Box::new(Refinement::new());
     for n in 0..3 {

@@ -38,7 +38,7 @@ impl Device {
         let mut device = Device { executor };
         // Nothing of what the device held before comes into view.
         let empty = Step { shift_x: profile.side as i32, ..step_of(profile, 0) };
-        device.perceive(&empty, &mut Laps::start())?;
+        device.perceive(&empty, &mut Laps::start(), || ())?;
         Ok(device)
     }
 
@@ -69,10 +69,15 @@ impl Device {
         (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
     }
 
-    /// From rays to flow.
-    pub fn perceive(&mut self, step: &Step, laps: &mut Laps) -> Result<Perceived<'_>, GpuError> {
+    /// From rays to flow; `meanwhile` is done while the device works.
+    pub fn perceive(
+        &mut self,
+        step: &Step,
+        laps: &mut Laps,
+        meanwhile: impl FnOnce(),
+    ) -> Result<Perceived<'_>, GpuError> {
         step.write(self.executor.upload(Buffer::StepIn as usize));
-        self.executor.run(FLOW)?;
+        self.executor.run_beside(FLOW, meanwhile)?;
         let mut on_device = 0.0;
         for (name, milliseconds) in self.executor.times(FLOW) {
             laps.add(name, milliseconds);

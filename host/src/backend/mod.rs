@@ -79,16 +79,22 @@ impl Backend {
         }
     }
 
-    /// From rays to flow; the time of each stage goes to `laps`.
+    /// From rays to flow; the time of each stage goes to `laps`. `meanwhile` is done while a device
+    /// works, and otherwise first.
     pub fn perceive(
         &mut self,
         step: &Step,
         rounds: u32,
         laps: &mut Laps,
+        meanwhile: impl FnOnce(),
     ) -> Result<Perceived<'_>, GpuError> {
         match self {
-            Backend::Scalar(b) => Ok(b.perceive(step, rounds, laps)),
-            Backend::Device(b) => b.perceive(step, laps),
+            Backend::Scalar(b) => {
+                meanwhile();
+                laps.lap("prepare");
+                Ok(b.perceive(step, rounds, laps))
+            }
+            Backend::Device(b) => b.perceive(step, laps, meanwhile),
         }
     }
 

@@ -1,0 +1,154 @@
+//! Places of returns, an array per axis: a processor compares several of them at once. Compilers see
+//! to that where nothing in a lane can branch: hence no sums with a check for overflow.
+
+use crate::params::CLOUD_MAX;
+use core::array::from_fn;
+use core::ops::Range;
+
+/// Returns that are compared at once.
+const LANES: usize = 8;
+/// The last ones are compared together with what lies behind them.
+const ROOM: usize = CLOUD_MAX + LANES;
+/// No return.
+const NONE: u32 = u32::MAX;
+
+/// Sums over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
+pub type Sums = [f32; 10];
+
+/// Places of returns, voxels from the window's corner, with the sensor that saw each: every sensor
+/// sees a thing at a time of its own.
+pub struct Places {
+    len: usize,
+    at: [[f32; ROOM]; 3],
+    sensor: [u32; ROOM],
+}
+
+/// Blocks of those in a range.
+#[inline(always)]
+fn blocks<'a, T>(of: &'a [T; ROOM], range: &Range<usize>) -> &'a [[T; LANES]] {
+    of[range.start..range.end].as_chunks().0
+}
+
+/// A number, or zero.
+#[inline(always)]
+fn masked(v: f32, mask: u32) -> f32 {
+    f32::from_bits(v.to_bits() & mask)
+}
+
+impl Places {
+    pub const fn new() -> Places {
+        Places { len: 0, at: [[0.0; ROOM]; 3], sensor: [0; ROOM] }
+    }
+
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Adds a return if there is room. Returns whether there was.
+    pub fn push(&mut self, at: [f32; 3], sensor: u32) -> bool {
+        if self.len == CLOUD_MAX {
+            return false;
+        }
+        for (of, v) in self.at.iter_mut().zip(at) {
+            of[self.len] = v;
+        }
+        self.sensor[self.len] = sensor;
+        self.len += 1;
+        true
+    }
+
+    pub fn at(&self, n: usize) -> [f32; 3] {
+        from_fn(|a| self.at[a][n])
+    }
+
+    pub fn sensor(&self, n: usize) -> u32 {
+        self.sensor[n]
+    }
+
+    /// The return of a sensor, among some, that is nearest to a place, the first of such: squared
+    /// distance and index, if that distance is less than `least`.
+    pub fn nearest(
+        &self,
+        range: Range<usize>,
+        at: [f32; 3],
+        sensor: u32,
+        least: f32,
+    ) -> Option<(f32, usize)> {
+        let padded = range.start..range.start + range.len().next_multiple_of(LANES);
+        let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
+        let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
+        let (mut n, end) = (range.start as u32, range.end as u32);
+        // Each lane has its own, so that none waits for another.
+        let (mut least, mut best) = ([least; LANES], [NONE; LANES]);
+        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
+            for l in 0..LANES {
+                let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
+                let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let own = n.wrapping_add(l as u32);
+                let closer = (d2 < least[l]) & (sensors[l] == sensor) & (own < end);
+                least[l] = if closer { d2 } else { least[l] };
+                best[l] = if closer { own } else { best[l] };
+            }
+            n = n.wrapping_add(LANES as u32);
+        }
+        // Bits of numbers that are not negative are in their order.
+        let mut keys = [0; LANES];
+        for l in 0..LANES {
+            keys[l] = (least[l].to_bits() as u64) << 32 | best[l] as u64;
+        }
+        let mut key = u64::MAX;
+        for k in keys {
+            key = if k < key { k } else { key };
+        }
+        let best = key as u32;
+        (best != NONE).then(|| (f32::from_bits((key >> 32) as u32), best as usize))
+    }
+
+    /// Adds those returns of a sensor, among some, that are closer to a place than `radius`, in
+    /// their order.
+    pub fn add_around(
+        &self,
+        range: Range<usize>,
+        at: [f32; 3],
+        sensor: u32,
+        radius: f32,
+        sums: &mut Sums,
+    ) {
+        let padded = range.start..range.start + range.len().next_multiple_of(LANES);
+        let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
+        let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
+        let (mut n, end) = (range.start as u32, range.end as u32);
+        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
+            let mut terms = [[0.0; LANES]; 10];
+            for l in 0..LANES {
+                let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
+                let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let own = n.wrapping_add(l as u32);
+                let near = (d2 < radius * radius) & (sensors[l] == sensor) & (own < end);
+                // What is not near adds zeros, which changes no sum.
+                let mask = if near { u32::MAX } else { 0 };
+                let [x, y, z] = [masked(d[0], mask), masked(d[1], mask), masked(d[2], mask)];
+                terms[0][l] = masked(1.0, mask);
+                terms[1][l] = x;
+                terms[2][l] = y;
+                terms[3][l] = z;
+                terms[4][l] = x * x;
+                terms[5][l] = x * y;
+                terms[6][l] = x * z;
+                terms[7][l] = y * y;
+                terms[8][l] = y * z;
+                terms[9][l] = z * z;
+            }
+            for l in 0..LANES {
+                for (sum, term) in sums.iter_mut().zip(&terms) {
+                    *sum += term[l];
+                }
+            }
+            n = n.wrapping_add(LANES as u32);
+        }
+    }
+}
