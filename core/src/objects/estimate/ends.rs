@@ -87,8 +87,13 @@ impl Ends {
         }
     }
 
-    /// States in the middle between both ends of every part.
-    pub fn middles(&self, knots: &Knots, weights: &[Weights]) -> Vec<ObjectState, PARTS> {
+    /// States at this share of the way from the rear to the front of every part.
+    pub fn places(
+        &self,
+        knots: &Knots,
+        weights: &[Weights],
+        share: f64,
+    ) -> Vec<ObjectState, PARTS> {
         let [fronts, rears] = &self.kept;
         let parts = fronts.iter().zip(rears).zip(self.seen[0].iter().zip(&self.seen[1]));
         parts
@@ -96,7 +101,7 @@ impl Ends {
             .map(|((front, rear), (ahead, behind))| {
                 let time_s = 0.5 * (f64::from(front.time_s) + f64::from(rear.time_s));
                 let state = super::state(knots, weights, time_s, time_s);
-                let by = 0.5 * (ahead.place()[0] + behind.place()[0]);
+                let by = share * ahead.place()[0] + (1.0 - share) * behind.place()[0];
                 let (sin, cos) = libm::sincos(state.heading);
                 let [x, y, z] = state.position;
                 ObjectState { position: [x + by * cos, y + by * sin, z], ..state }

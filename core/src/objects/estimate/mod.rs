@@ -204,7 +204,7 @@ impl Estimator {
                 let n = knots.bases();
                 match from {
                     Start::Rest => _ = start::stand(history, &mut self.now.weights[..n]),
-                    _ if !self.start_from_middles(params, history) => continue,
+                    _ if !self.start_from_seen(params, history, 0.5) => continue,
                     _ => {}
                 }
                 let mut other = Report { from, ..report.clone() };
@@ -297,9 +297,15 @@ impl Estimator {
         true
     }
 
-    /// First trajectory by what lies in the middle of the returns of every part of the track: they
-    /// are where the object is, wherever on it most of them are. False where there are none.
-    fn start_from_middles(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
+    /// First trajectory by what lies at this share of the way from the hindmost to the foremost return
+    /// of every part of the track: they are where the object is, wherever on it most of them are.
+    /// False where there are none.
+    fn start_from_seen(
+        &mut self,
+        params: &EstimateParams,
+        history: &[ObjectState],
+        share: f64,
+    ) -> bool {
         self.start(params, history);
         self.active = 0..self.returns.all().len();
         let kept = self.returns.all();
@@ -308,12 +314,12 @@ impl Estimator {
         }
         self.ends.find(kept, &self.seen, params.ends_m);
         let n = self.knots.bases();
-        let middles = self.ends.middles(&self.knots, &self.now.weights);
+        let places = self.ends.places(&self.knots, &self.now.weights, share);
         let weights = &mut self.now.weights[..n];
-        !middles.is_empty()
+        !places.is_empty()
             && start::smooth(
                 &self.knots,
-                &middles,
+                &places,
                 &precision(params),
                 &mut self.equations,
                 weights,
