@@ -23,7 +23,8 @@ use heapless::Vec;
 
 /// The window, s.
 const WINDOW_S: f64 = 2.5;
-/// Pieces of the splines, and their length, s: a piece more than the window, into which time runs on.
+/// Pieces of the splines at most, and their length, s: a piece more than the window, into which time
+/// runs on.
 const PIECES: usize = 6;
 const PIECE_S: f64 = 0.5;
 const BASES: usize = PIECES + DEGREE;
@@ -45,7 +46,7 @@ const SPACING_M: f32 = 0.3;
 const WIDER: f32 = 1.25;
 /// A track younger than that tries other starts, s.
 const YOUNG_S: f64 = 1.5;
-/// What goes no further meanwhile rests, m: its heading is a gauge, which stays.
+/// What goes no further meanwhile rests, m: its heading is a gauge, which stays, and its speed noise.
 const STILL_M: f64 = 0.5;
 /// Models that a solve of it makes, and iterations with each.
 const YOUNG_ROUNDS: usize = 2;
@@ -166,7 +167,8 @@ impl FixedLag {
 
     /// Takes in what a sweep saw of the object and what the tracker that found it says, and returns
     /// the object's state at the time of the newest return. Without a sound return that is the
-    /// state as it goes on until the tracker's time.
+    /// state as it goes on until the tracker's time. A young track that has hardly gone anywhere is
+    /// said to stand.
     ///
     /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
     /// leaves the tracker's by more than `extent_m`, the estimate starts again.
@@ -223,7 +225,10 @@ impl FixedLag {
         self.gone_m += self.state(self.newest_s).speed * elapsed;
         let young = self.said.is_empty() || self.newest_s - self.born_s < YOUNG_S;
         self.estimate(estimator, params, fresh, young);
-        let state = self.state(self.newest_s);
+        let mut state = self.state(self.newest_s);
+        if young && libm::fabs(self.gone_m) <= STILL_M {
+            (state.speed, state.climb, state.turn_rate) = (0.0, 0.0, 0.0);
+        }
         if young {
             if self.said.is_full() {
                 self.said.remove(0);
@@ -282,7 +287,7 @@ impl FixedLag {
         self.begun = true;
         self.spacing_m = SPACING_M;
         self.born_s = self.returns.first().map_or(self.newest_s, |held| f64::from(held.time_s));
-        self.knots = Knots::pieces(self.born_s, PIECE_S, PIECES);
+        self.knots = Knots::pieces(self.born_s, PIECE_S, 1);
     }
 
     /// Whether the estimate has nothing to do with the tracker's any more.
@@ -331,19 +336,25 @@ impl FixedLag {
         self.returns.truncate(self.returns.len() - left);
     }
 
-    /// Moves the splines on until they hold the newest time.
+    /// Moves the splines on until they hold the newest time: first by more pieces, then by later ones.
     fn advance(&mut self) {
         while self.newest_s > self.knots.end() {
-            let first = self.knots.start() + PIECE_S;
-            self.known = Some(Known {
-                time_s: first,
-                state: self.knots.value(&self.weights, first),
-                precision: HELD.map(|deviation| 1.0 / (deviation * deviation)),
-            });
-            self.knots = Knots::pieces(first, PIECE_S, PIECES);
-            self.weights.copy_within(1.., 0);
-            let [.., before, last, next] = &mut self.weights;
-            *next = core::array::from_fn(|d| 2.0 * last[d] - before[d]);
+            let pieces = self.knots.spans();
+            if pieces < PIECES {
+                self.knots = Knots::pieces(self.knots.start(), PIECE_S, pieces + 1);
+            } else {
+                let first = self.knots.start() + PIECE_S;
+                self.known = Some(Known {
+                    time_s: first,
+                    state: self.knots.value(&self.weights, first),
+                    precision: HELD.map(|deviation| 1.0 / (deviation * deviation)),
+                });
+                self.knots = Knots::pieces(first, PIECE_S, PIECES);
+                self.weights.copy_within(1.., 0);
+            }
+            let n = self.knots.bases();
+            self.weights[n - 1] =
+                core::array::from_fn(|d| 2.0 * self.weights[n - 2][d] - self.weights[n - 3][d]);
         }
     }
 
@@ -478,7 +489,8 @@ impl FixedLag {
         self.ends = [-rear, -front];
     }
 
-    /// Lets the state be that of the point of the object that it was of before.
+    /// Lets the state be that of the point of the object that it was of before, with its heading within
+    /// half a turn of that.
     fn anchor(&mut self) {
         let mut by = [0.0; 3];
         for said in &self.said {
@@ -490,7 +502,14 @@ impl FixedLag {
             by[2] += off[2];
         }
         let by = by.map(|by| by / self.said.len().max(1) as f64);
+        // Whole turns mean nothing.
+        let turns = self.said.last().map_or(0.0, |said| {
+            let [.., heading, _, _, _] = self.knots.value(&self.weights, said.time_s);
+            let off = heading - said.heading;
+            off - start::turn(off)
+        });
         for [x, y, z, heading, ..] in &mut self.weights {
+            *heading -= turns;
             let (sin, cos) = libm::sincos(*heading);
             *x += cos * by[0] - sin * by[1];
             *y += sin * by[0] + cos * by[1];
