@@ -46,7 +46,7 @@ const SPACING_M: f32 = 0.3;
 const WIDER: f32 = 1.25;
 /// A track younger than that tries other starts, s.
 const YOUNG_S: f64 = 1.5;
-/// What goes no further meanwhile rests, m: its heading is a gauge, which stays, and its speed noise.
+/// What goes no further meanwhile rests, m: its heading is a gauge, which stays, and its speed is noise.
 const STILL_M: f64 = 0.5;
 /// Models that a solve of it makes, and iterations with each.
 const YOUNG_ROUNDS: usize = 2;
@@ -57,8 +57,8 @@ const YOUNG_PER_POINT: usize = 6;
 const YOUNG_MODEL: [usize; 2] = [12, 75];
 const YOUNG_M: f64 = 0.15;
 /// Where its solves start, by turns. One end may be where the view ends, while the other moves.
-const STARTS: [From; 5] =
-    [From::Rest, From::History, From::Seen(0.5), From::Seen(1.0), From::Seen(0.0)];
+const STARTS: [Guess; 5] =
+    [Guess::Rest, Guess::History, Guess::Seen(0.5), Guess::Seen(1.0), Guess::Seen(0.0)];
 /// Iterations with a sweep.
 const ITERATIONS: usize = 2;
 /// Deviation of a state that is held: m, rad, m/s, rad/s.
@@ -68,7 +68,7 @@ const HELD_RETURNS: f32 = 20.0;
 
 /// Where a solve of a young track starts.
 #[derive(Clone, Copy)]
-enum From {
+enum Guess {
     /// At rest.
     Rest,
     /// The tracker's history.
@@ -426,7 +426,7 @@ impl FixedLag {
             let gone = gone(&self.knots, &estimator.now.weights, self.newest_s);
             libm::fabs(gone) <= STILL_M
         };
-        if cost < least && (matches!(from, From::Rest) || !rests()) {
+        if cost < least && (matches!(from, Guess::Rest) || !rests()) {
             self.keep(estimator);
         }
         self.gone_m = gone(&self.knots, &self.weights, self.newest_s);
@@ -435,9 +435,9 @@ impl FixedLag {
     }
 
     /// Puts a start into `now`.
-    fn start(&self, from: From, estimator: &mut Estimator, params: &EstimateParams) {
+    fn start(&self, from: Guess, estimator: &mut Estimator, params: &EstimateParams) {
         match from {
-            From::Rest => {
+            Guess::Rest => {
                 if !start::stand(&self.history, &mut estimator.now.weights[..BASES]) {
                     estimator.stand_at_mean();
                 }
@@ -446,8 +446,8 @@ impl FixedLag {
                     weights.iter_mut().for_each(|weights| weights[3] = said.heading);
                 }
             }
-            From::History => _ = estimator.start(params, &self.history),
-            From::Seen(share) => _ = estimator.start_from_seen(params, &self.history, share),
+            Guess::History => _ = estimator.start(params, &self.history),
+            Guess::Seen(share) => _ = estimator.start_from_seen(params, &self.history, share),
         }
     }
 
