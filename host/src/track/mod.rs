@@ -18,6 +18,7 @@ use crate::report::bytes;
 use crate::source::{self, SweepData};
 use crate::summary::make_room;
 
+use raywake_core::objects::estimate::FixedLag;
 use raywake_gpu::guard;
 
 pub use ground::Ground;
@@ -57,6 +58,11 @@ pub fn track(args: &args::Track) -> Result<bool, Error> {
     let mut tracker = Tracker::new(source.rig(), &profile, drive, ground, args.fixed_lag);
     let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
     say(args.quiet, &format!("memory budget: {}\n", parts.join(", ")))?;
+    if args.fixed_lag {
+        let (iterations, returns) = (FixedLag::ITERATIONS_MAX, FixedLag::RETURNS_MAX);
+        let most = format!("{iterations} iterations over {returns} returns");
+        say(args.quiet, &format!("fixed lag: {most} at most a track and sweep\n"))?;
+    }
 
     let allocations = guard::allocations();
     let mut report = report::Report::default();

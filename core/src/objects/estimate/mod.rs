@@ -207,7 +207,7 @@ impl Estimator {
                 let n = knots.bases();
                 match from {
                     Start::Rest => _ = start::stand(history, &mut self.now.weights[..n]),
-                    _ if !self.start_from_ends(params, history) => continue,
+                    _ if !self.start_from_ends(params, history, &[0.5, 1.0, 0.0]) => continue,
                     _ => {}
                 }
                 let mut other = Report { from, ..report.clone() };
@@ -301,9 +301,14 @@ impl Estimator {
     }
 
     /// First trajectory by where the object's returns end in every part of the track, wherever on it
-    /// most of them are: by the foremost, the hindmost or the middle between them, whichever moves
-    /// most like an object. False where there are none.
-    fn start_from_ends(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
+    /// most of them are: by what lies at one of these shares of the way from the hindmost to the
+    /// foremost, whichever moves most like an object. False where there are none.
+    fn start_from_ends(
+        &mut self,
+        params: &EstimateParams,
+        history: &[ObjectState],
+        shares: &[f64],
+    ) -> bool {
         self.start(params, history);
         self.active = 0..self.returns.all().len();
         let kept = self.returns.all();
@@ -314,7 +319,7 @@ impl Estimator {
         let n = self.knots.bases();
         let begun = self.now.weights;
         let mut least = f64::MAX;
-        for share in [0.5, 1.0, 0.0] {
+        for &share in shares {
             let places = self.ends.places(&self.knots, &begun, share);
             if places.is_empty() {
                 return false;

@@ -5,21 +5,26 @@
 //! returns that left, as precise as they were many, up to [`HELD_RETURNS`]. An object needs its
 //! [`FixedLag`] (some 30 KB); the workspace is one for all.
 //!
-//! A young track is estimated afresh from several starts. Each of those has a frame of its own: it is
-//! moved to where the states that came out before have the object, and what rests keeps its heading.
+//! A young track is solved twice with every sweep, over a sparse model made anew: on from where it is,
+//! and from one other start, which take turns; the cheaper stays. A start has a frame of its own: it
+//! is moved to where the states that came out before have the object, and what rests keeps its heading.
+//!
+//! So the work of a push is bounded, however young its track and however many appear at once:
+//! [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
 
 use super::normal::{Scatter, Seen, Surface};
 use super::process::Weights;
 use super::returns;
 use super::start;
-use super::{Cost, EstimateParams, Estimator, Known, Report, Start};
+use super::{Cost, EstimateParams, Estimator, Known, Report};
 use crate::objects::spline::{DEGREE, Knots};
 use crate::objects::{ObjectReturn, ObjectState};
 use heapless::Vec;
 
 /// The window, s.
 const WINDOW_S: f64 = 2.5;
-/// Pieces of the splines, and their length, s: a piece more than the window, into which time runs on.
+/// Pieces of the splines at most, and their length, s: a piece more than the window, into which time
+/// runs on.
 const PIECES: usize = 6;
 const PIECE_S: f64 = 0.5;
 const BASES: usize = PIECES + DEGREE;
@@ -39,21 +44,38 @@ const HISTORY: usize = 32;
 /// Model points are at least so far apart at first, m; further by that factor when they are too many.
 const SPACING_M: f32 = 0.3;
 const WIDER: f32 = 1.25;
-/// A track younger than that is estimated afresh from time to time, s: when it is older by this factor.
+/// A track younger than that tries other starts, s.
 const YOUNG_S: f64 = 1.5;
-const AGAIN: f64 = 1.25;
-/// What goes no further meanwhile rests, m: its heading is a gauge, which stays.
-const STILL_M: f64 = 0.7;
-const YOUNG_ROUNDS: usize = 4;
-const YOUNG_ITERATIONS: usize = 4;
-const YOUNG_MODEL: usize = 75;
+/// What goes no further meanwhile rests, m: its heading is a gauge, which stays, and its speed is noise.
+const STILL_M: f64 = 0.5;
+/// Models that a solve of it makes, and iterations with each.
+const YOUNG_ROUNDS: usize = 2;
+const YOUNG_ITERATIONS: usize = 3;
+/// Returns for each point of these, and least and most points: with fewer returns for each, a model
+/// explains motion as well by points of its own for every sweep.
+const YOUNG_PER_POINT: usize = 6;
+const YOUNG_MODEL: [usize; 2] = [12, 75];
 const YOUNG_M: f64 = 0.15;
+/// Where its solves start, by turns. One end may be where the view ends, while the other moves.
+const STARTS: [Guess; 5] =
+    [Guess::Rest, Guess::History, Guess::Seen(0.5), Guess::Seen(1.0), Guess::Seen(0.0)];
 /// Iterations with a sweep.
 const ITERATIONS: usize = 2;
 /// Deviation of a state that is held: m, rad, m/s, rad/s.
 const HELD: Weights = [0.1, 0.1, 0.1, 0.02, 0.5, 0.2, 0.05];
 /// A model point is held by so many returns at most.
 const HELD_RETURNS: f32 = 20.0;
+
+/// Where a solve of a young track starts.
+#[derive(Clone, Copy)]
+enum Guess {
+    /// At rest.
+    Rest,
+    /// The tracker's history.
+    History,
+    /// What is seen: at this share of the way from its hindmost to its foremost return.
+    Seen(f64),
+}
 
 #[derive(Clone, Copy)]
 struct Held {
@@ -83,10 +105,12 @@ pub struct FixedLag {
     ends: [f32; 2],
     /// How far it went forward, m.
     gone_m: f64,
-    /// Its age when it was last estimated afresh, s.
-    solved_s: f64,
     /// What was said of it while it was young.
     said: Vec<ObjectState, SAID>,
+    /// Starts tried.
+    tried: usize,
+    /// Iterations of the last push.
+    iterations: usize,
     spacing_m: f32,
     /// First and last time of the track's returns, s.
     born_s: f64,
@@ -102,6 +126,11 @@ impl Default for FixedLag {
 }
 
 impl FixedLag {
+    /// Gauss-Newton iterations of a push at most: those of both solves of a young track.
+    pub const ITERATIONS_MAX: usize = 2 * YOUNG_ROUNDS * YOUNG_ITERATIONS;
+    /// Returns of each at most.
+    pub const RETURNS_MAX: usize = RETURNS;
+
     /// That of an object not seen yet.
     pub const fn new() -> FixedLag {
         FixedLag {
@@ -113,8 +142,9 @@ impl FixedLag {
             model: Vec::new(),
             ends: [0.0; 2],
             gone_m: 0.0,
-            solved_s: 0.0,
             said: Vec::new(),
+            tried: 0,
+            iterations: 0,
             spacing_m: 0.0,
             born_s: 0.0,
             newest_s: 0.0,
@@ -130,14 +160,15 @@ impl FixedLag {
         self.history.clear();
         self.model.clear();
         self.said.clear();
-        self.solved_s = 0.0;
+        self.tried = 0;
         self.begun = false;
         self.restarts = 0;
     }
 
     /// Takes in what a sweep saw of the object and what the tracker that found it says, and returns
     /// the object's state at the time of the newest return. Without a sound return that is the
-    /// state as it goes on until the tracker's time.
+    /// state as it goes on until the tracker's time. A young track that has hardly gone anywhere is
+    /// said to stand.
     ///
     /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
     /// leaves the tracker's by more than `extent_m`, the estimate starts again.
@@ -148,6 +179,7 @@ impl FixedLag {
         returns: &[ObjectReturn],
         baseline: &ObjectState,
     ) -> ObjectState {
+        self.iterations = 0;
         let sound = || returns.iter().filter(|seen| returns::sound(seen));
         let newest = sound().map(|seen| f64::from(seen.time_s)).max_by(f64::total_cmp);
         if start::sound(baseline) {
@@ -191,9 +223,13 @@ impl FixedLag {
         }
         self.advance();
         self.gone_m += self.state(self.newest_s).speed * elapsed;
-        self.estimate(estimator, params, fresh);
-        let state = self.state(self.newest_s);
-        if self.newest_s - self.born_s < YOUNG_S {
+        let young = self.said.is_empty() || self.newest_s - self.born_s < YOUNG_S;
+        self.estimate(estimator, params, fresh, young);
+        let mut state = self.state(self.newest_s);
+        if young && libm::fabs(self.gone_m) <= STILL_M {
+            (state.speed, state.climb, state.turn_rate) = (0.0, 0.0, 0.0);
+        }
+        if young {
             if self.said.is_full() {
                 self.said.remove(0);
             }
@@ -213,7 +249,12 @@ impl FixedLag {
         self.restarts
     }
 
-    /// Model points.
+    /// Gauss-Newton iterations of the last push.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// Model points; none while the track is young.
     pub fn points(&self) -> usize {
         self.model.len()
     }
@@ -246,7 +287,7 @@ impl FixedLag {
         self.begun = true;
         self.spacing_m = SPACING_M;
         self.born_s = self.returns.first().map_or(self.newest_s, |held| f64::from(held.time_s));
-        self.knots = Knots::pieces(self.born_s, PIECE_S, PIECES);
+        self.knots = Knots::pieces(self.born_s, PIECE_S, 1);
     }
 
     /// Whether the estimate has nothing to do with the tracker's any more.
@@ -295,95 +336,136 @@ impl FixedLag {
         self.returns.truncate(self.returns.len() - left);
     }
 
-    /// Moves the splines on until they hold the newest time.
+    /// Moves the splines on until they hold the newest time: first by more pieces, then by later ones.
     fn advance(&mut self) {
         while self.newest_s > self.knots.end() {
-            let first = self.knots.start() + PIECE_S;
-            self.known = Some(Known {
-                time_s: first,
-                state: self.knots.value(&self.weights, first),
-                precision: HELD.map(|deviation| 1.0 / (deviation * deviation)),
-            });
-            self.knots = Knots::pieces(first, PIECE_S, PIECES);
-            self.weights.copy_within(1.., 0);
-            let [.., before, last, next] = &mut self.weights;
-            *next = core::array::from_fn(|d| 2.0 * last[d] - before[d]);
+            let pieces = self.knots.spans();
+            if pieces < PIECES {
+                self.knots = Knots::pieces(self.knots.start(), PIECE_S, pieces + 1);
+            } else {
+                let first = self.knots.start() + PIECE_S;
+                self.known = Some(Known {
+                    time_s: first,
+                    state: self.knots.value(&self.weights, first),
+                    precision: HELD.map(|deviation| 1.0 / (deviation * deviation)),
+                });
+                self.knots = Knots::pieces(first, PIECE_S, PIECES);
+                self.weights.copy_within(1.., 0);
+            }
+            let n = self.knots.bases();
+            self.weights[n - 1] =
+                core::array::from_fn(|d| 2.0 * self.weights[n - 2][d] - self.weights[n - 3][d]);
         }
     }
 
-    fn estimate(&mut self, estimator: &mut Estimator, params: &EstimateParams, fresh: usize) {
+    fn estimate(
+        &mut self,
+        estimator: &mut Estimator,
+        params: &EstimateParams,
+        fresh: usize,
+        young: bool,
+    ) {
         estimator.knots = self.knots;
         estimator.known = self.known;
         estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
         estimator.returns.lay(&self.knots);
         estimator.active = 0..self.returns.len();
-        let age = self.newest_s - self.born_s;
-        if age < YOUNG_S && age >= AGAIN * self.solved_s {
-            self.solved_s = age;
+        if young {
             self.estimate_young(estimator, params);
+            return;
+        }
+        if self.model.is_empty() {
             for (kept, seen) in estimator.returns.all().iter().zip(&mut estimator.seen) {
                 *seen = Seen::look(&self.weights, kept);
             }
-            self.model.clear();
             self.add_points(estimator, self.returns.len());
-        } else {
-            estimator.now.weights[..BASES].copy_from_slice(&self.weights);
-            let unit = 1.0 / (params.deviation_m * params.deviation_m);
-            estimator.now.points = self.model.len();
-            for (i, point) in self.model.iter().enumerate() {
-                estimator.now.model[i] = point.at;
-                estimator.now.surfaces[i] = Surface {
-                    mean: point.mean,
-                    held: unit * f64::from(point.held.max(0.1)),
-                    scatter: point.scatter,
-                    ..Surface::round(unit)
-                };
-            }
-            estimator.now.ends = self.ends;
-            estimator.descend(params, ITERATIONS, None);
-            self.ends = estimator.now.ends;
-            for (point, at) in self.model.iter_mut().zip(&estimator.now.model) {
-                point.at = *at;
-            }
-            self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
-            self.add_points(estimator, fresh);
-            self.face_forward();
         }
+        estimator.now.weights[..BASES].copy_from_slice(&self.weights);
+        let unit = 1.0 / (params.deviation_m * params.deviation_m);
+        estimator.now.points = self.model.len();
+        for (i, point) in self.model.iter().enumerate() {
+            estimator.now.model[i] = point.at;
+            estimator.now.surfaces[i] = Surface {
+                mean: point.mean,
+                held: unit * f64::from(point.held.max(0.1)),
+                scatter: point.scatter,
+                ..Surface::round(unit)
+            };
+        }
+        estimator.now.ends = self.ends;
+        let mut report = Report::default();
+        estimator.descend(params, ITERATIONS, Some(&mut report));
+        self.iterations += report.iterations;
+        self.keep(estimator);
+        for (point, at) in self.model.iter_mut().zip(&estimator.now.model) {
+            point.at = *at;
+        }
+        self.add_points(estimator, fresh);
+        self.face_forward();
     }
 
-    /// The first window: from the history alone, and with models of what is seen by then.
+    /// Takes the trajectory in `now`.
+    fn keep(&mut self, estimator: &Estimator) {
+        self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
+        self.ends = estimator.now.ends;
+    }
+
+    /// Solves on from where it is, and from the start whose turn it is.
     fn estimate_young(&mut self, estimator: &mut Estimator, params: &EstimateParams) {
-        let history = &self.history;
-        let heading = self.said.last().map(|state| state.heading);
         let mut least = f64::MAX;
-        for from in [Start::Rest, Start::History, Start::Ends] {
-            match from {
-                Start::History => _ = estimator.start(params, history),
-                Start::Rest => {
-                    let weights = &mut estimator.now.weights[..BASES];
-                    if !start::stand(history, weights) {
-                        continue;
-                    }
-                    if let Some(heading) = heading {
-                        weights.iter_mut().for_each(|weights| weights[3] = heading);
-                    }
-                }
-                Start::Ends if !estimator.start_from_ends(params, history) => continue,
-                Start::Ends => {}
-            }
-            estimator.active = 0..self.returns.len();
-            let cost = young(estimator, params);
+        if !self.said.is_empty() {
+            estimator.now.weights[..BASES].copy_from_slice(&self.weights);
+            least = self.solve(estimator, params);
+            self.keep(estimator);
+        }
+        let from = STARTS[self.tried % STARTS.len()];
+        self.tried += 1;
+        self.start(from, estimator, params);
+        let cost = self.solve(estimator, params);
+        let rests = || {
             let gone = gone(&self.knots, &estimator.now.weights, self.newest_s);
-            let moves = libm::fabs(gone) > STILL_M && super::RESTS * cost < least;
-            if least == f64::MAX || moves {
-                least = if from == Start::Rest { cost } else { super::RESTS * cost };
-                self.weights.copy_from_slice(&estimator.now.weights[..BASES]);
-                self.ends = estimator.now.ends;
-            }
+            libm::fabs(gone) <= STILL_M
+        };
+        if cost < least && (matches!(from, Guess::Rest) || !rests()) {
+            self.keep(estimator);
         }
         self.gone_m = gone(&self.knots, &self.weights, self.newest_s);
         self.face_forward();
         self.anchor();
+    }
+
+    /// Puts a start into `now`.
+    fn start(&self, from: Guess, estimator: &mut Estimator, params: &EstimateParams) {
+        match from {
+            Guess::Rest => {
+                if !start::stand(&self.history, &mut estimator.now.weights[..BASES]) {
+                    estimator.stand_at_mean();
+                }
+                if let Some(said) = self.said.last() {
+                    let weights = &mut estimator.now.weights[..BASES];
+                    weights.iter_mut().for_each(|weights| weights[3] = said.heading);
+                }
+            }
+            Guess::History => _ = estimator.start(params, &self.history),
+            Guess::Seen(share) => _ = estimator.start_from_ends(params, &self.history, &[share]),
+        }
+    }
+
+    /// Solves from the trajectory in `now`, with models of what is seen by then; its cost.
+    fn solve(&mut self, estimator: &mut Estimator, params: &EstimateParams) -> f64 {
+        let [least, most] = YOUNG_MODEL;
+        let model = (self.returns.len() / YOUNG_PER_POINT).clamp(least, most);
+        let sparse = &EstimateParams { model, deviation_m: YOUNG_M, ..*params };
+        estimator.active = 0..self.returns.len();
+        let mut cost = f64::MAX;
+        for _ in 0..YOUNG_ROUNDS {
+            let mut report = Report::default();
+            estimator.extract(sparse);
+            estimator.descend(sparse, YOUNG_ITERATIONS, Some(&mut report));
+            self.iterations += report.iterations;
+            cost = report.costs.last().map_or(cost, Cost::total);
+        }
+        cost
     }
 
     /// Of both headings, the one that it went with on the whole.
@@ -407,7 +489,8 @@ impl FixedLag {
         self.ends = [-rear, -front];
     }
 
-    /// Lets the state be that of the point of the object that it was of before.
+    /// Lets the state be that of the point of the object that it was of before, with its heading within
+    /// half a turn of that.
     fn anchor(&mut self) {
         let mut by = [0.0; 3];
         for said in &self.said {
@@ -419,7 +502,14 @@ impl FixedLag {
             by[2] += off[2];
         }
         let by = by.map(|by| by / self.said.len().max(1) as f64);
+        // Whole turns mean nothing.
+        let turns = self.said.last().map_or(0.0, |said| {
+            let [.., heading, _, _, _] = self.knots.value(&self.weights, said.time_s);
+            let off = heading - said.heading;
+            off - start::turn(off)
+        });
         for [x, y, z, heading, ..] in &mut self.weights {
+            *heading -= turns;
             let (sin, cos) = libm::sincos(*heading);
             *x += cos * by[0] - sin * by[1];
             *y += sin * by[0] + cos * by[1];
@@ -485,19 +575,6 @@ impl FixedLag {
             self.model.truncate(kept);
         }
     }
-}
-
-/// Models of what is seen by then; the cost in the end.
-fn young(estimator: &mut Estimator, params: &EstimateParams) -> f64 {
-    let sparse = &EstimateParams { model: YOUNG_MODEL, deviation_m: YOUNG_M, ..*params };
-    let mut cost = f64::MAX;
-    for _ in 0..YOUNG_ROUNDS {
-        let mut report = Report::default();
-        estimator.extract(sparse);
-        estimator.descend(sparse, YOUNG_ITERATIONS, Some(&mut report));
-        cost = report.costs.last().map_or(cost, Cost::total);
-    }
-    cost
 }
 
 /// How far it goes forward over the window, m.
