@@ -173,7 +173,7 @@ impl Profile {
             frame: Frame::Lattice,
             deskew: true,
             // 20 find nothing that the refinement does not find after 8.
-            em_rounds: 8,
+            em_rounds: 6,
             smoothing: 1000,
             displacement_cost: 1,
             outside_cost: COST_UNKNOWN,

@@ -220,14 +220,14 @@ fn variants_in_one_table() {
         let text = fs::read_to_string(out.join("tables/ablations.csv")).unwrap();
         text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect()
     };
-    let only = ["--only", "filter-off,base,rounds-8,refine-0"];
+    let only = ["--only", "filter-off,base,rounds-6,refine-0"];
     command("ablate", &[&drive, flag, &out], &only).unwrap();
     let table = lines(&out);
     let names: Vec<&String> = table.iter().map(|row| &row[0]).collect();
-    assert_eq!(names, ["base", "refine-0", "rounds-8", "filter-off"]);
+    assert_eq!(names, ["base", "refine-0", "rounds-6", "filter-off"]);
     // Of the same rows: the base has as many rounds.
     assert_eq!(table[0][2..], table[2][2..]);
-    assert!(out.join("filter-off/rows").is_dir() && !out.join("rounds-8").exists());
+    assert!(out.join("filter-off/rows").is_dir() && !out.join("rounds-6").exists());
     let number = |row: usize, column: usize| table[row][column].parse::<f64>().unwrap();
     // Whole cells are farther off what moves, and the filter changes what is found.
     assert!(number(1, 3) > 2.0 * number(0, 3), "{table:?}");
