@@ -172,7 +172,7 @@ impl Profile {
             range_m: 100.0,
             frame: Frame::Lattice,
             deskew: true,
-            // 20 find nothing that the refinement does not find after 8.
+            // 20 find nothing that the refinement does not find after 6.
             em_rounds: 6,
             smoothing: 1000,
             displacement_cost: 1,

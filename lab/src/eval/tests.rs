@@ -3,7 +3,7 @@
 use super::row::{CLASSES, Row};
 use super::{Args, ablate, rows_file, run};
 use crate::scratch::Scratch;
-use crate::simulate::{Motion, Recipe, write};
+use crate::simulate::{Motion, Recipe, truth, write};
 use clap::Parser;
 use raywake_core::output::Origin;
 use std::ffi::OsStr;
@@ -162,8 +162,9 @@ fn drives_that_fail_are_named() {
     assert!(failed.contains("unlabelled") && failed.contains("label"), "{failed}");
     assert!(out.join("report.html").is_file());
     // Truth that does not fit the clouds.
-    let truth = good.join("truth/points");
-    fs::copy(truth.join("0000000001.feather"), truth.join("0000000000.feather")).unwrap();
+    let first = truth::points_path(&good, 0);
+    let rows = truth::read_points(&first).unwrap();
+    truth::write_points(&first, &rows[1..]).unwrap();
     let failed = eval(&[&good, flag, &out], &["-n", "3"]).unwrap_err();
     assert!(failed.contains("0000000000.feather"), "{failed}");
     // One name for two drives, no drive, a margin that is none.

@@ -199,7 +199,7 @@ fn labels(xml: &str) -> Vec<Label> {
 #[test]
 fn labels_hold_what_the_camera_sees() {
     let (t, sweeps) = (Scratch::new(), 4);
-    let recipe = recipe("hdl64", Motion::Turn, sweeps);
+    let recipe = Recipe { density: 1.0, ..recipe("hdl64", Motion::Turn, sweeps) };
     write(t.path(), &recipe, 1, 2, true).unwrap();
     let folder = drive_folder(t.path(), 0);
     let labels = labels(&fs::read_to_string(folder.join("tracklet_labels.xml")).unwrap());
