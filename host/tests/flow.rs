@@ -212,7 +212,7 @@ fn clouds_that_tell_nothing() {
     refused(&good, &one, &["one.ply", "too few flat patches", "--pose"]);
     flow(&one, &one, &out, &["--ground", "-1.7"]).failed(3, &["too few flat patches"]);
     // Another place.
-    let other = Drive::new(77, Options { sweeps: 1, ..Options::default() }).sweep(0);
+    let other = Drive::new(78, Options { sweeps: 1, ..Options::default() }).sweep(0);
     let other = t.write("other.bin", bin(&positions(&other)));
     refused(&good, &other, &["other.bin", "cannot be laid", "% of the flat patches"]);
     // A floor and nothing on it.
