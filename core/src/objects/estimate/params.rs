@@ -12,8 +12,8 @@ pub struct EstimateParams {
     /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
     /// rate (rad/s).
     pub process: [f64; 7],
-    /// Length of an object for which `process` holds, m; see [`Estimator`](super::Estimator) for
-    /// others. 0 where it holds for all.
+    /// Length of an object for which `process` holds, m: the turn rate of others varies in inverse
+    /// proportion to theirs, and so does the speed of longer ones. 0 where it holds for all.
     pub process_m: f64,
     /// Standard deviation of a model point about the origin, m.
     pub extent_m: f64,

@@ -465,3 +465,40 @@ fn a_window_survives_bad_input() {
     lag.clear();
     assert!(lag.push(&mut estimator, &params, &[ObjectReturn::default()], &state).heading == 0.0);
 }
+
+#[test]
+fn a_glance_tells_how_long_an_object_is() {
+    let mut returns = Box::new(Returns::new());
+    let (knots, _) = Knots::over(0.0, 4.0, 0.5);
+    // 8 m along the diagonal of the plane at 5 m/s; half of it hidden for half a second.
+    let mut look = |count: usize| {
+        let seen = (0..count).map(|i| {
+            let time_s = 4.0 * i as f32 / count as f32;
+            let hidden = (1.0..1.5).contains(&time_s);
+            let along = 5.0 * time_s + (i % 5) as f32 * if hidden { 1.0 } else { 2.0 };
+            ([0.6 * along, 0.8 * along, 0.0], time_s)
+        });
+        returns.set(seen);
+        returns.lay(&knots);
+        returns.length_m()
+    };
+    let length = look(2000);
+    assert!((8.0..8.6).contains(&length), "{length}");
+    // Too few in every glance.
+    assert_eq!(look(80), 0.0);
+}
+
+#[test]
+fn what_is_long_is_sluggish() {
+    let ours = EstimateParams::default();
+    let plain = precision(&EstimateParams { process_m: 0.0, ..ours }, 9.0);
+    let by = |length_m: f32| {
+        let scaled = precision(&ours, length_m);
+        core::array::from_fn::<f64, 7, _>(|d| (1e6 * scaled[d] / plain[d]).round() / 1e6)
+    };
+    assert_eq!(by(9.0), [1.0, 1.0, 1.0, 1.0, 4.0, 1.0, 4.0]);
+    assert_eq!(by(0.9), [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.04]);
+    assert_eq!(by(500.0), by(30.0));
+    // Nothing is known of the length.
+    assert_eq!(by(0.0), [1.0; 7]);
+}
