@@ -197,7 +197,7 @@ impl Profile {
     /// 70.5 m: what the graders of Argoverse 2 score.
     pub fn wide() -> Profile {
         // Farther away the energy minimisation takes longer to settle.
-        Profile { name: short("wide"), side: 235, em_rounds: 40, ..Profile::hdl64() }
+        Profile { name: short("wide"), side: 235, em_rounds: 20, ..Profile::hdl64() }
     }
 
     /// The author's choices where the text or his program differ from ours.
