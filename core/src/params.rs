@@ -172,7 +172,7 @@ impl Profile {
             range_m: 100.0,
             frame: Frame::Lattice,
             deskew: true,
-            // 20 find nothing that the refinement does not find after 6.
+            // The refinement makes little of more: 20 bring half a point within 30 cm.
             em_rounds: 6,
             smoothing: 1000,
             displacement_cost: 1,

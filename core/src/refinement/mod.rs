@@ -103,23 +103,24 @@ impl Refined {
     /// As part of a thing.
     fn of(found: &Found, at: [f32; 2]) -> Refined {
         let by = found.motion.of(at);
-        // Of two motions, one of which is the right one.
-        let [x, y] = by;
         let unsure = found.unsure + if found.moves { SHARE * SHARE } else { 0.0 };
-        let between = [x * x, x * y, y * y].map(|v| unsure * v);
         let own = match found.moves {
             true => Refined { by, covariance: found.motion.covariance_of(at), moves: true },
             false => Refined::standing(found.still),
         };
-        Refined { covariance: [0, 1, 2].map(|n| own.covariance[n] + between[n]), ..own }
+        own.between(by, unsure)
+    }
+
+    /// As one of two motions `by` apart, of which one is right: so large is the variance of which.
+    fn between(self, [x, y]: [f32; 2], variance: f32) -> Refined {
+        let apart = [x * x, x * y, y * y];
+        let covariance = [0, 1, 2].map(|n| self.covariance[n] + variance * apart[n]);
+        Refined { covariance, ..self }
     }
 
     /// As what stands although its column's match, cells, says otherwise.
     fn against(self, matched: Option<[f32; 2]>) -> Refined {
-        let [x, y] = matched.unwrap_or_default();
-        let between = [x * x, x * y, y * y];
-        let covariance = [0, 1, 2].map(|n| self.covariance[n] + MATCHED * between[n]);
-        Refined { covariance, ..self }
+        self.between(matched.unwrap_or_default(), MATCHED)
     }
 
     fn standing(misfit: f32) -> Refined {
