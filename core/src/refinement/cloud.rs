@@ -19,8 +19,11 @@ pub const GROUND_HEIGHT: f32 = 0.6;
 const GROUND_RETURN: f32 = 0.35;
 /// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
 const THING_HEIGHT: f32 = 14.0;
-/// Returns so near tell which way the surface faces, voxels.
-const AROUND: f32 = 1.5;
+/// Returns so near tell which way the surface faces, voxels; and so near where those lie on a line, as
+/// of one ring on a hood: a line would hold a thing across the surface and along it.
+const AROUND: [f32; 2] = [1.5, 2.5];
+/// Variance across a line, voxels².
+const LINE: f32 = 0.05;
 /// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.
 const THINNED: f32 = 3.0;
 /// Words of a mask of the sub-voxels of a column: 3 x 3 x 3 x 16.
@@ -244,20 +247,37 @@ impl Cloud {
 
     /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.
     fn surface(&self, at: [f32; 3], sensor: u32) -> Weight {
-        let [i, j] = [at[0] as usize, at[1] as usize];
-        let mut sums = [0.0; 10];
-        for a in i.saturating_sub(1)..(i + 2).min(self.side) {
-            let row = self.row(a, j.saturating_sub(1), (j + 2).min(self.side));
-            self.places.add_around(row, at, sensor, AROUND, &mut sums);
+        let mut spread = self.spread(at, sensor, AROUND[0]);
+        if across(&spread) < LINE {
+            spread = self.spread(at, sensor, AROUND[1]);
         }
-        let [n, x, y, z, square @ ..] = sums;
-        let [x, y, z] = [x, y, z].map(|m| m / n);
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
-        let spread = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         // Positive definite by the noise.
         let noise = Matrix3::from_diagonal_element(NOISE * NOISE);
         let w = (spread + noise).try_inverse().unwrap_or_default() * (NOISE * NOISE);
         [w[(0, 0)], w[(0, 1)], w[(0, 2)], w[(1, 1)], w[(1, 2)], w[(2, 2)]]
     }
+
+    /// Covariance of the returns of a sensor around a place, voxels².
+    fn spread(&self, at: [f32; 3], sensor: u32, radius: f32) -> Matrix3<f32> {
+        let [i, j] = [at[0] as usize, at[1] as usize];
+        let reach = radius as usize;
+        let mut sums = [0.0; 10];
+        for a in i.saturating_sub(reach)..(i + reach + 1).min(self.side) {
+            let row = self.row(a, j.saturating_sub(reach), (j + reach + 1).min(self.side));
+            self.places.add_around(row, at, sensor, radius, &mut sums);
+        }
+        let [n, x, y, z, square @ ..] = sums;
+        let [x, y, z] = [x, y, z].map(|m| m / n);
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
+        Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+    }
+}
+
+/// Variance across the longest direction, voxels²: the middle eigenvalue where the least is small.
+fn across(spread: &Matrix3<f32>) -> f32 {
+    let minor =
+        |a: usize, b: usize| spread[(a, a)] * spread[(b, b)] - spread[(a, b)] * spread[(b, a)];
+    let trace = spread.trace();
+    if trace > 0.0 { (minor(0, 1) + minor(0, 2) + minor(1, 2)) / trace } else { 0.0 }
 }
