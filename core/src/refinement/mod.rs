@@ -35,6 +35,8 @@ const STANDS: f32 = 0.08;
 const FEW: usize = 3;
 /// A start that leads to so good a fit is the last.
 const FITS: f32 = 0.05;
+/// Share of [`GAIN`] and [`STANDS`] that will do for what moves as it did before.
+const AS_BEFORE: f32 = 0.25;
 /// Starts as near to each other lead to the same, voxels.
 const SAME: f32 = 0.75;
 /// A start that fits so badly calls for a search.
@@ -393,14 +395,16 @@ fn motion(
     let still = Motion::around(thing.centre);
     let mut found =
         Found { still: thing.standing(visits).0, extent: thing.extent, ..Found::default() };
-    if found.still < STANDS || thing.extent > EXTENT_MAX {
+    let expected = mean(thing.columns.iter().filter_map(|c| predicted(*c as usize)));
+    let expected = expected.filter(|by| by[0] * by[0] + by[1] * by[1] > LEAST * LEAST);
+    let ease = if expected.is_some() { AS_BEFORE } else { 1.0 };
+    if found.still < STANDS * ease || thing.extent > EXTENT_MAX {
         return found;
     }
     let mut best = (found.still, still);
     let mut tried = heapless::Vec::<[f32; 2], { STARTS + 3 }>::new();
     let mut start = |by: [f32; 2]| {
-        let known = |t: &[f32; 2]| (t[0] - by[0]).abs().max((t[1] - by[1]).abs()) < SAME;
-        if !tried.iter().any(known) {
+        if !tried.iter().any(|t| same(t, by)) {
             // There is room for every start.
             let _ = tried.push(by);
             let motion = thing.align(still.by(by), FEW, visits);
@@ -415,7 +419,7 @@ fn motion(
         best.0
     };
     let mut misfit = start([0.0; 2]);
-    if let Some(by) = mean(thing.columns.iter().filter_map(|c| predicted(*c as usize))) {
+    if let Some(by) = expected {
         misfit = start(by);
     }
     let mut votes = Votes::new(thing.columns.iter().map(|c| flow(*c as usize)));
@@ -430,12 +434,19 @@ fn motion(
     let by = motion.by.xy().norm();
     // A motion that fits ill is left to the thing's parts unless it explains much.
     let gained = gain(found.still, misfit);
-    let convinces = gained > if misfit < UNFIT { GAIN } else { 2.0 * GAIN };
+    let as_before = expected.is_some_and(|e| same(&e, [motion.by.x, motion.by.y]));
+    let enough = if as_before { GAIN * AS_BEFORE } else { GAIN };
+    let convinces = gained > if misfit < UNFIT { enough } else { 2.0 * enough };
     found.moves = convinces && by > LEAST && thing.samples.len() >= ENOUGH;
-    let likely = 1.0 / (1.0 + libm::expf((GAIN - gained) / SURER));
+    let likely = 1.0 / (1.0 + libm::expf((enough - gained) / SURER));
     found.unsure = likely * (1.0 - likely);
     found.motion = Motion { covariance: motion.covariance * doubt(misfit), ..motion };
     found
+}
+
+/// Whether two displacements are as good as one.
+fn same(a: &[f32; 2], b: [f32; 2]) -> bool {
+    (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) < SAME
 }
 
 /// Whether a column is part of something that stands.
