@@ -375,7 +375,7 @@ impl Things {
                 let rest =
                     found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;
-                let joins = gain(still, misfit) > GAIN || hidden || rest && misfit < still + REST;
+                let joins = gain(still, misfit) > GAIN * AS_BEFORE || hidden || rest && misfit < still + REST;
                 if joins && misfit < best {
                     best = misfit;
                     columns.iter().for_each(|c| self.segment[*c as usize] = *m);
