@@ -27,6 +27,8 @@ const TURN: f32 = 0.03;
 const HOLD: f32 = 1e-3;
 /// Distance from which on a return counts as missed, voxels.
 const MISSED: f32 = 0.5;
+/// Nothing is nearer than the vehicle's own sides, voxels: see [`Thing::range`].
+const RANGE_MIN: f32 = 7.0;
 /// Distance up to which a return counts as met, voxels.
 const TOUCHING: f32 = 0.15;
 
@@ -257,6 +259,13 @@ impl<'a> Thing<'a> {
         });
         let extent = extent[0].max(extent[1]);
         Thing { sweeps, columns, samples, centre, extent }
+    }
+
+    /// Distance from the middle of the window, where the vehicle is, voxels, [`RANGE_MIN`] at least.
+    pub fn range(&self) -> f32 {
+        let middle = 0.5 * self.sweeps.first.side as f32;
+        let [x, y] = self.centre.map(|c| c - middle);
+        libm::sqrtf(x * x + y * y).max(RANGE_MIN)
     }
 
     /// Returns of the newest sweep where the thing would be.

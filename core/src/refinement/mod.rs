@@ -44,13 +44,14 @@ const UNFIT: f32 = 0.3;
 /// Gain over standing still from which on a thing moves, see [`gain`].
 const GAIN: f32 = 0.12;
 /// Standard deviation of what stands, before [`doubt`], voxels.
-const STILL: f32 = 0.35;
-/// See [`doubt`]: a variance of which a perfect fit leaves this share, and the misfit that doubles it.
-const CONFIDENCE: f32 = 0.005;
+const STILL: f32 = 0.025;
+/// Share of its covariance that a perfect fit leaves a thing of one column a voxel away: the nearer it
+/// is, the more another side of it comes into view; the smaller, the more its returns err alike.
+const CONFIDENCE: f32 = 1.3;
+/// The misfit that doubles a variance, see [`doubt`].
 const DOUBTFUL: f32 = 0.008;
-/// Standard deviation of a motion, as a share of itself, however well it fits: when each return was,
-/// and sides that come into view.
-const SHARE: f32 = 0.014;
+/// Standard deviation of a motion, as a share of itself, however well it fits: when each return was.
+const SHARE: f32 = 0.008;
 /// How much more gain makes it e times likelier that a thing moves, see [`Found::unsure`].
 const SURER: f32 = 0.04;
 /// Variance of whether what stands does where its column's match says otherwise: either may be right.
@@ -135,7 +136,7 @@ impl Refined {
 /// on simulated drives, so that ellipses hold what they claim.
 fn doubt(misfit: f32) -> f32 {
     let ill = misfit / DOUBTFUL;
-    CONFIDENCE * (1.0 + ill * ill)
+    1.0 + ill * ill
 }
 
 /// What became of a thing.
@@ -375,7 +376,9 @@ impl Things {
                 let rest =
                     found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;
-                let joins = gain(still, misfit) > GAIN * AS_BEFORE || hidden || rest && misfit < still + REST;
+                let joins = gain(still, misfit) > GAIN * AS_BEFORE
+                    || hidden
+                    || rest && misfit < still + REST;
                 if joins && misfit < best {
                     best = misfit;
                     columns.iter().for_each(|c| self.segment[*c as usize] = *m);
@@ -440,7 +443,9 @@ fn motion(
     found.moves = convinces && by > LEAST && thing.samples.len() >= ENOUGH;
     let likely = 1.0 / (1.0 + libm::expf((enough - gained) / SURER));
     found.unsure = likely * (1.0 - likely);
-    found.motion = Motion { covariance: motion.covariance * doubt(misfit), ..motion };
+    let confidence = CONFIDENCE / (thing.range() * libm::sqrtf(thing.columns.len() as f32));
+    let covariance = motion.covariance * (confidence * doubt(misfit));
+    found.motion = Motion { covariance, ..motion };
     found
 }
 
