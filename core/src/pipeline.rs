@@ -27,6 +27,7 @@ use crate::prepare::{Dropped, Placed, Preparation, Window, central, place, step_
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
+use crate::team::Team;
 use crate::tracklet::{Observation, Tracklet, Tracklets, Turnover};
 use crate::window::window;
 use glam::DVec3;
@@ -326,9 +327,11 @@ impl Pipeline {
     /// From the flow of columns to velocities: refinement, tracklets, motion compensation, columns
     /// and points. `lap` is called with the name of the refinement when that is done.
     /// `points` are those of the pair's first sweep, `output` must hold one element per solid
-    /// column and per point. After a reset there is no pair and nothing comes back.
+    /// column and per point. After a reset there is no pair and nothing comes back. How many are in the
+    /// `team` makes no difference to what does.
     pub fn follow<'o>(
         &mut self,
+        team: &impl Team,
         step: &Step,
         perceived: &Perceived,
         points: &[Point],
@@ -342,7 +345,7 @@ impl Pipeline {
         let left = self.tracklets.place(step);
         if self.profile.refinement_sweeps > 0 {
             let (tracklets, r) = (&self.tracklets, self.profile.voxel_m as f32);
-            self.refinement.run(step, perceived, |c| {
+            self.refinement.run(team, step, perceived, |c| {
                 let t = tracklets.at(c).filter(|t| t.age > 0)?;
                 Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
             });

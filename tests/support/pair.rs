@@ -5,6 +5,7 @@ use raywake::laps::Laps;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::{Output, Perceived, Pipeline};
+use raywake_core::team::Alone;
 use raywake_sim::SimSweep;
 
 use crate::difference;
@@ -65,7 +66,7 @@ impl Side {
         let output = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
         if let Some(flows) =
-            self.pipeline.follow(&prepared.step, &perceived, seen, output, &mut |_| ())
+            self.pipeline.follow(&Alone, &prepared.step, &perceived, seen, output, &mut |_| ())
         {
             (stages.columns, stages.points) = (flows.columns.to_vec(), flows.points.to_vec());
         }

@@ -9,8 +9,9 @@ use crate::params::{
 use crate::prepare::{Placed, central};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
-use core::cell::Cell;
 use core::ops::Range;
+use core::sync::atomic::AtomicU32;
+use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use nalgebra::Matrix3;
 
 /// Returns higher above the ground than this belong to things, voxels.
@@ -38,8 +39,29 @@ impl Scratch {
     }
 }
 
-/// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
-const UNKNOWN: Weight = [0.0; 6];
+/// Bits of a weight, all zero until it is asked for: that takes no room in a program. Threads that ask
+/// at the same time find the same.
+struct Memo([AtomicU32; 6]);
+
+impl Memo {
+    const UNKNOWN: Memo = Memo([const { AtomicU32::new(0) }; 6]);
+
+    /// The weight, or what `find` says it is.
+    fn get(&self, find: impl FnOnce() -> Weight) -> Weight {
+        // That of a known weight is positive. It is written last and read first.
+        let [first, rest @ ..] = &self.0;
+        let known = first.load(Acquire);
+        if known != 0 {
+            let [a, b, c, d, e] = rest.each_ref().map(|bits| bits.load(Relaxed));
+            return [known, a, b, c, d, e].map(f32::from_bits);
+        }
+        let weight = find();
+        let [known, more @ ..] = weight.map(f32::to_bits);
+        rest.iter().zip(more).for_each(|(to, bits)| to.store(bits, Relaxed));
+        first.store(known, Release);
+        weight
+    }
+}
 
 /// Thinned returns of one sweep, voxels from the window's corner.
 pub struct Cloud {
@@ -55,7 +77,7 @@ pub struct Cloud {
     offset_s: [f32; CLOUD_MAX],
     start: [u32; COLUMNS_MAX + 1],
     /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
-    weights: [Cell<Weight>; CLOUD_MAX],
+    weights: [Memo; CLOUD_MAX],
     /// Levels above the ground of each column in which something was hit, a bit each.
     levels: [u16; COLUMNS_MAX],
 }
@@ -70,7 +92,7 @@ impl Cloud {
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
-            weights: [const { Cell::new(UNKNOWN) }; CLOUD_MAX],
+            weights: [Memo::UNKNOWN; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
@@ -157,7 +179,7 @@ impl Cloud {
             }
         }
         start[columns_used] = self.places.len() as u32;
-        self.weights[..self.places.len()].iter().for_each(|w| w.set(UNKNOWN));
+        self.weights[..self.places.len()].fill_with(|| Memo::UNKNOWN);
         dropped
     }
 
@@ -232,14 +254,8 @@ impl Cloud {
 
     /// What the returns around a return tell about the surface it lies on.
     pub fn weight(&self, n: u32) -> Weight {
-        let known = self.weights[n as usize].get();
-        if known != UNKNOWN {
-            return known;
-        }
-        let (at, sensor) = (self.places.at(n as usize), self.places.sensor(n as usize));
-        let weight = self.surface(at, sensor);
-        self.weights[n as usize].set(weight);
-        weight
+        let n = n as usize;
+        self.weights[n].get(|| self.surface(self.places.at(n), self.places.sensor(n)))
     }
 
     /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.

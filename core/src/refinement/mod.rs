@@ -22,6 +22,7 @@ use crate::pipeline::Perceived;
 use crate::prepare::Placed;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
+use crate::team::{Team, fill};
 use align::{Mean, Motion, OTHERS, Other, Sample, Sweeps, Thing, Visits};
 use cloud::{Cloud, Scratch};
 use segments::Segments;
@@ -170,7 +171,6 @@ struct Things {
     /// Segment of each column of the first sweep's window.
     segment: [u32; COLUMNS_MAX],
     found: heapless::Vec<Found, COLUMNS_MAX>,
-    visits: Visits,
 }
 
 /// Index of the cloud `age` sweeps before the newest.
@@ -189,7 +189,6 @@ impl Refinement {
                 segments: Segments::new(),
                 segment: [0; COLUMNS_MAX],
                 found: heapless::Vec::new(),
-                visits: Visits::new(),
             },
         }
     }
@@ -223,9 +222,10 @@ impl Refinement {
     /// tracklet of a column of the new window predicts, voxels.
     pub(crate) fn run(
         &mut self,
+        team: &impl Team,
         step: &Step,
         perceived: &Perceived,
-        predicted: impl Fn(usize) -> Option<[f32; 2]>,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Sync,
     ) {
         let things = &mut self.things;
         things.found.clear();
@@ -257,8 +257,8 @@ impl Refinement {
             });
         }
         let sweeps = Sweeps { first, others: &others, before, now, span_s: span as f32 };
-        things.wholes(sweeps, flow, predicted);
-        things.parts(sweeps, flow, predicted);
+        things.wholes(team, sweeps, flow, predicted);
+        things.parts(team, sweeps, flow, predicted);
         things.rest(sweeps);
     }
 
@@ -305,26 +305,45 @@ impl Things {
     /// Things as they touch: the best motion of each.
     fn wholes(
         &mut self,
+        team: &impl Team,
         sweeps: Sweeps,
-        flow: impl Fn(usize) -> Flow + Copy,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
     ) {
         self.segments.find(sweeps.first, |_| true, flow);
-        for n in 0..self.segments.len() {
+        self.motions(team, sweeps, flow, predicted);
+        for (n, found) in self.found.iter_mut().enumerate() {
             let columns = self.segments.columns(n);
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
-            let thing = Thing::new(sweeps, columns);
-            let found = motion(&thing, flow, predicted, &mut self.visits);
-            let _ = self.found.push(Found { whole: n as u32, ..found });
+            found.whole = n as u32;
         }
+    }
+
+    /// Appends the best motion of each segment to what was found.
+    fn motions(
+        &mut self,
+        team: &impl Team,
+        sweeps: Sweeps,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+    ) {
+        let before = self.found.len();
+        // Parts are of what stands, and few: there is room.
+        let all = (before + self.segments.len()).min(COLUMNS_MAX);
+        let _ = self.found.resize(all, Found::default());
+        fill(team, 0, &mut self.found[before..], &|n| {
+            let thing = Thing::new(sweeps, self.segments.columns(n));
+            motion(&thing, flow, predicted, &mut Visits::new())
+        });
     }
 
     /// What stands as a whole may have a part that does not.
     fn parts(
         &mut self,
+        team: &impl Team,
         sweeps: Sweeps,
-        flow: impl Fn(usize) -> Flow + Copy,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
     ) {
         let stands = |c: usize| stands_still(&self.segment, &self.found, c);
         self.segments.find(
@@ -336,23 +355,29 @@ impl Things {
             },
             |_| 0,
         );
-        for n in 0..self.segments.len() {
-            let columns = self.segments.columns(n);
-            let thing = Thing::new(sweeps, columns);
-            let found = motion(&thing, flow, predicted, &mut self.visits);
+        let wholes = self.found.len();
+        self.motions(team, sweeps, flow, predicted);
+        // Only those that move are kept.
+        let mut kept = wholes;
+        for n in wholes..self.found.len() {
+            let found = self.found[n];
             if found.moves {
-                let (id, whole) = (self.found.len() as u32, self.segment[columns[0] as usize]);
+                let columns = self.segments.columns(n - wholes);
+                let (id, whole) = (kept as u32, self.segment[columns[0] as usize]);
                 columns.iter().for_each(|c| self.segment[*c as usize] = id);
                 for &c in columns {
                     grow(sweeps, c as usize, &found.motion, whole, id, &mut self.segment);
                 }
-                let _ = self.found.push(Found { whole, ..found });
+                self.found[kept] = Found { whole, ..found };
+                kept += 1;
             }
         }
+        self.found.truncate(kept);
     }
 
     /// What is left of such a thing, and fragments beside others that move.
     fn rest(&mut self, sweeps: Sweeps) {
+        let visits = &mut Visits::new();
         self.segments.find(sweeps.first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
@@ -364,12 +389,12 @@ impl Things {
             if thing.extent > EXTENT_MAX {
                 continue;
             }
-            let (still, seen) = thing.standing(&mut self.visits);
+            let (still, seen) = thing.standing(visits);
             let whole = self.segment[columns[0] as usize];
             let mut best = 1.0;
             for m in &near {
                 let found = self.found[*m as usize];
-                let misfit = thing.misfit(&found.motion, &mut self.visits);
+                let misfit = thing.misfit(&found.motion, visits);
                 let rest =
                     found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;

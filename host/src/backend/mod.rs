@@ -109,7 +109,7 @@ impl Backend {
     /// The device's name.
     pub fn device(&self) -> &str {
         match self {
-            Backend::Scalar(_) => "CPU, one thread",
+            Backend::Scalar(_) => "CPU",
             Backend::Device(b) => b.name(),
         }
     }
