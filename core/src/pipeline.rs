@@ -232,6 +232,7 @@ impl Pipeline {
     /// [`crate::params::ORIGINS_MAX`].
     pub fn prepare(
         &mut self,
+        team: &impl Team,
         sweep: &Sweep,
         rays: &mut [Ray],
         origins: &mut [[i32; 4]],
@@ -251,6 +252,7 @@ impl Pipeline {
         self.column_of_point.swap(0, 1);
         self.is_apart.swap(0, 1);
         let (count, dropped) = self.preparation.prepare(
+            team,
             &self.profile,
             &self.rig,
             &window,
@@ -366,7 +368,13 @@ impl Pipeline {
             turned,
             output.columns,
         );
-        self.flow_of_points(step, points, &ego, &output.columns[..count], dt as f32, output.points);
+        let (columns, dt_s) = (&output.columns[..count], dt as f32);
+        let half = points.len().min(output.points.len()) / 2;
+        let (first, second) = output.points.split_at_mut(half);
+        team.join(
+            || self.flow_of_points(step, 0, &points[..half], &ego, columns, dt_s, first),
+            || self.flow_of_points(step, half, &points[half..], &ego, columns, dt_s, second),
+        );
         Some(Flows {
             columns: &output.columns[..count],
             points: &output.points[..before.points],
@@ -514,10 +522,11 @@ impl Pipeline {
     }
 
     /// Every point moves with its column; outside the window, and where nothing is solid, with the
-    /// ground.
+    /// ground. `points` are the sweep's from the index `from` on.
     fn flow_of_points(
         &self,
         step: &Step,
+        from: usize,
         points: &[Point],
         ego: &EgoMotion,
         columns: &[ColumnFlow],
@@ -527,7 +536,7 @@ impl Pipeline {
         let refined = self.profile.refinement_sweeps > 0;
         let r = self.profile.voxel_m as f32;
         let side = step.side;
-        let places = self.column_of_point[1].iter().zip(&self.is_apart[1]);
+        let places = self.column_of_point[1][from..].iter().zip(&self.is_apart[1][from..]);
         for (((&column, &is_apart), point), out) in places.zip(points).zip(out) {
             let i = (column / side as u32) as i32 - step.shift_x;
             let j = (column % side as u32) as i32 - step.shift_y;

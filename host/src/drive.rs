@@ -70,7 +70,7 @@ impl Drive {
         guarded(|| {
             let mut laps = Laps::start();
             let (rays, origins) = self.backend.input();
-            let prepared = self.pipeline.prepare(sweep, rays, origins);
+            let prepared = self.pipeline.prepare(&Team, sweep, rays, origins);
             laps.lap("prepare");
             let rounds = self.pipeline.profile().em_rounds;
             let mut unrefined = 0;

@@ -48,7 +48,7 @@ impl Side {
     /// One sweep; `before` is the sweep before it.
     pub fn step(&mut self, now: &SimSweep, before: Option<&SimSweep>) -> Stages {
         let (rays, origins) = self.backend.input();
-        let prepared = self.pipeline.prepare(&sweep(now), rays, origins);
+        let prepared = self.pipeline.prepare(&Alone, &sweep(now), rays, origins);
         let rays = rays[..prepared.step.rays as usize].as_flattened().to_vec();
         let origins = bytemuck::cast_slice(origins.as_flattened()).to_vec();
         let mut laps = Laps::start();

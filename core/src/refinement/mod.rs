@@ -171,6 +171,8 @@ struct Things {
     /// Segment of each column of the first sweep's window.
     segment: [u32; COLUMNS_MAX],
     found: heapless::Vec<Found, COLUMNS_MAX>,
+    /// Columns that may be part of something that moves, a bit each.
+    restless: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
 /// Index of the cloud `age` sweeps before the newest.
@@ -189,6 +191,7 @@ impl Refinement {
                 segments: Segments::new(),
                 segment: [0; COLUMNS_MAX],
                 found: heapless::Vec::new(),
+                restless: [0; COLUMNS_MAX.div_ceil(64)],
             },
         }
     }
@@ -345,16 +348,18 @@ impl Things {
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
     ) {
-        let stands = |c: usize| stands_still(&self.segment, &self.found, c);
-        self.segments.find(
-            sweeps.first,
-            |c| {
-                stands(c)
-                    && flow(c) & VALID != 0
-                    && misfit_of(sweeps, c, |s| sweeps.standing(s)) > RESTLESS
-            },
-            |_| 0,
-        );
+        let restless = |c: usize| {
+            stands_still(&self.segment, &self.found, c)
+                && flow(c) & VALID != 0
+                && misfit_of(sweeps, c, |s| sweeps.standing(s)) > RESTLESS
+        };
+        let columns = sweeps.first.side * sweeps.first.side;
+        fill(team, 0, &mut self.restless[..columns.div_ceil(64)], &|word| {
+            let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
+            bits.fold(0, |bits, (n, c)| bits | u64::from(restless(c)) << n)
+        });
+        let restless = &self.restless;
+        self.segments.find(sweeps.first, |c| restless[c / 64] >> (c % 64) & 1 != 0, |_| 0);
         let wholes = self.found.len();
         self.motions(team, sweeps, flow, predicted);
         // Only those that move are kept.
