@@ -122,7 +122,7 @@ impl Cloud {
         let start = &mut self.start[..columns_used + 1];
         start.fill(0);
         let Scratch { listed, order } = scratch;
-        let mut count = 0;
+        let (mut count, mut all_sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
             *apart = false;
             if column == NONE {
@@ -133,6 +133,7 @@ impl Cloud {
             if (GROUND_HEIGHT..THING_HEIGHT).contains(&height) {
                 start[column as usize + 1] += 1;
                 listed[count] = n as u32;
+                all_sensors |= 1 << points[n].sensor;
                 count += 1;
             }
         }
@@ -144,6 +145,9 @@ impl Cloud {
             order[*at as usize] = n;
             *at += 1;
         }
+        // By column they are looked up far apart: only where there are several.
+        let only = all_sensors.is_power_of_two().then(|| all_sensors.trailing_zeros());
+        let sensor_of = |n: u32| only.unwrap_or_else(|| points[n as usize].sensor);
         // Each start has become its end; what is kept is written from the front again.
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);
@@ -153,11 +157,11 @@ impl Cloud {
             *end = self.places.len() as u32;
             self.levels[c] = 0;
             let corner = [(c / side) as f32, (c % side) as f32];
-            let sensors = listed.iter().fold(0u32, |s, n| s | 1 << points[*n as usize].sensor);
+            let sensors = listed.iter().fold(0u32, |s, n| s | 1 << sensor_of(*n));
             for sensor in (0..SENSORS_MAX as u32).filter(|s| sensors & 1 << s != 0) {
                 let mut taken = [0u32; MASK_WORDS];
                 for &n in listed {
-                    if points[n as usize].sensor != sensor {
+                    if sensor_of(n) != sensor {
                         continue;
                     }
                     let Placed { at: p, offset_s } = placed[n as usize];
