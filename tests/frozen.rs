@@ -1,11 +1,14 @@
-//! Nothing is allocated, created or recorded between the first sweep and the last.
+//! Nothing is allocated, created or recorded between the first sweep and the last, however many threads
+//! share the work; and all of them together find the same as one.
 
 #![forbid(unsafe_code)]
 
 use raywake::backend::Backend;
 use raywake::source::SweepData;
+use raywake::team;
 use raywake::track::{Ended, Tracker};
 use raywake_core::background_filter;
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_gpu::guard::{self, Guard};
 use raywake_gpu::{Census, Options};
@@ -20,20 +23,30 @@ const DEVICE_BYTES: u64 = 64 << 20;
 /// Stack of the thread that works, bytes: as the program's, it holds the core's state for a moment.
 const STACK: usize = 64 << 20;
 
+/// Numbers of threads, whatever the machine has.
+const THREADS: [usize; 2] = [3, 1];
+
 fn main() {
-    let worker = std::thread::Builder::new().stack_size(STACK).spawn(run);
-    worker.expect("a thread").join().expect("all pass");
+    let [several, one] = THREADS.map(|threads| {
+        let worker = std::thread::Builder::new().stack_size(STACK);
+        let worker = worker.spawn(move || team::lead(threads, run));
+        worker.expect("a thread").join().expect("all pass")
+    });
+    assert!(several == one, "{several:x?}, alone {one:x?}");
 }
 
-fn run() {
+/// All checks. Returns digests of what the sweeps yield.
+fn run() -> Vec<u64> {
+    println!("threads: {}", team::threads());
     the_guard_sees();
     let mut passed = 1;
+    let mut digests = Vec::new();
     for filter in [None, Some(background_filter::SHIPPED.to_string())] {
         let setup = Setup::new(Profile::hdl64(), filter);
-        check(&setup, setup.scalar());
+        digests.push(check(&setup, setup.scalar()));
         passed += 1;
         if let Some(device) = setup.device(&Options::default()) {
-            check(&setup, device);
+            digests.push(check(&setup, device));
             passed += 1;
         }
     }
@@ -42,6 +55,7 @@ fn run() {
         passed += 1;
     }
     println!("frozen: {passed} passed, 0 failed");
+    digests
 }
 
 /// An allocation on purpose is counted, one outside is not.
@@ -54,8 +68,8 @@ fn the_guard_sees() {
     println!("the guard counts an allocation ... ok");
 }
 
-/// Ten sweeps after the seal. An allocation among them ends the process.
-fn check(setup: &Setup, mut backend: Backend) {
+/// Ten sweeps after the seal. An allocation among them ends the process. Returns a digest of their flow.
+fn check(setup: &Setup, mut backend: Backend) -> u64 {
     let name = backend.name();
     let filter = if setup.filter.is_some() { "on" } else { "off" };
     let sweeps = street();
@@ -64,11 +78,14 @@ fn check(setup: &Setup, mut backend: Backend) {
     let mut drive = setup.drive(backend);
     let before = guard::allocations();
     guard::abort_on_allocation(true);
-    let mut columns = 0;
+    let (mut columns, mut digest) = (0, Digest::default());
     for (now, earlier) in pairs(sweeps) {
         let points = earlier.map_or(&[][..], |e| &e.points);
         let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
-        columns += stepped.flows.map_or(0, |flows| flows.valid);
+        if let Some(flows) = stepped.flows {
+            columns += flows.valid;
+            flows.columns.iter().for_each(|c| digest.column(c));
+        }
     }
     let tracklets = guard::guarded(|| drive.tracklets().count());
     guard::abort_on_allocation(false);
@@ -77,6 +94,7 @@ fn check(setup: &Setup, mut backend: Backend) {
     let census = drive.backend().census();
     let bytes = census.map_or(0, |census| check_census(&census));
     println!("{name}, filter {filter}: {columns} flows, {bytes} bytes on the device ... ok");
+    digest.value()
 }
 
 /// Ten sweeps through the front end of the tracks, and the estimates of these.

@@ -28,6 +28,7 @@ mod random;
 pub mod record;
 pub mod refinement;
 pub mod sweep;
+pub mod team;
 pub mod tracklet;
 pub mod weights;
 pub mod window;

@@ -27,6 +27,7 @@ use crate::prepare::{Dropped, Placed, Preparation, Window, central, place, step_
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
+use crate::team::Team;
 use crate::tracklet::{Observation, Tracklet, Tracklets, Turnover};
 use crate::window::window;
 use glam::DVec3;
@@ -231,6 +232,7 @@ impl Pipeline {
     /// [`crate::params::ORIGINS_MAX`].
     pub fn prepare(
         &mut self,
+        team: &impl Team,
         sweep: &Sweep,
         rays: &mut [Ray],
         origins: &mut [[i32; 4]],
@@ -250,6 +252,7 @@ impl Pipeline {
         self.column_of_point.swap(0, 1);
         self.is_apart.swap(0, 1);
         let (count, dropped) = self.preparation.prepare(
+            team,
             &self.profile,
             &self.rig,
             &window,
@@ -326,9 +329,11 @@ impl Pipeline {
     /// From the flow of columns to velocities: refinement, tracklets, motion compensation, columns
     /// and points. `lap` is called with the name of the refinement when that is done.
     /// `points` are those of the pair's first sweep, `output` must hold one element per solid
-    /// column and per point. After a reset there is no pair and nothing comes back.
+    /// column and per point. After a reset there is no pair and nothing comes back. How many are in the
+    /// `team` makes no difference to what does.
     pub fn follow<'o>(
         &mut self,
+        team: &impl Team,
         step: &Step,
         perceived: &Perceived,
         points: &[Point],
@@ -342,7 +347,7 @@ impl Pipeline {
         let left = self.tracklets.place(step);
         if self.profile.refinement_sweeps > 0 {
             let (tracklets, r) = (&self.tracklets, self.profile.voxel_m as f32);
-            self.refinement.run(step, perceived, |c| {
+            self.refinement.run(team, step, perceived, |c| {
                 let t = tracklets.at(c).filter(|t| t.age > 0)?;
                 Some(t.ekf.velocity().0.map(|v| v * dt as f32 / r))
             });
@@ -363,7 +368,13 @@ impl Pipeline {
             turned,
             output.columns,
         );
-        self.flow_of_points(step, points, &ego, &output.columns[..count], dt as f32, output.points);
+        let (columns, dt_s) = (&output.columns[..count], dt as f32);
+        let half = points.len().min(output.points.len()) / 2;
+        let (first, second) = output.points.split_at_mut(half);
+        team.join(
+            || self.flow_of_points(step, 0, &points[..half], &ego, columns, dt_s, first),
+            || self.flow_of_points(step, half, &points[half..], &ego, columns, dt_s, second),
+        );
         Some(Flows {
             columns: &output.columns[..count],
             points: &output.points[..before.points],
@@ -511,10 +522,11 @@ impl Pipeline {
     }
 
     /// Every point moves with its column; outside the window, and where nothing is solid, with the
-    /// ground.
+    /// ground. `points` are the sweep's from the index `from` on.
     fn flow_of_points(
         &self,
         step: &Step,
+        from: usize,
         points: &[Point],
         ego: &EgoMotion,
         columns: &[ColumnFlow],
@@ -524,7 +536,7 @@ impl Pipeline {
         let refined = self.profile.refinement_sweeps > 0;
         let r = self.profile.voxel_m as f32;
         let side = step.side;
-        let places = self.column_of_point[1].iter().zip(&self.is_apart[1]);
+        let places = self.column_of_point[1][from..].iter().zip(&self.is_apart[1][from..]);
         for (((&column, &is_apart), point), out) in places.zip(points).zip(out) {
             let i = (column / side as u32) as i32 - step.shift_x;
             let j = (column % side as u32) as i32 - step.shift_y;

@@ -6,6 +6,7 @@ use crate::params::{
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, Step, ray};
 use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
+use crate::team::Team;
 use glam::DVec3;
 
 /// Where the window lies in one sweep.
@@ -182,7 +183,7 @@ impl Preparation {
         Preparation { slot_of_azimuth }
     }
 
-    /// Rays of a sweep.
+    /// Rays of a sweep, the same however many are in the team.
     ///
     /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
     /// the number of rays and what was left out. `columns[p]` becomes the column in which point
@@ -190,6 +191,7 @@ impl Preparation {
     /// it was; `origins` the voxel of every ray origin.
     pub fn prepare(
         &self,
+        team: &impl Team,
         profile: &Profile,
         rig: &Rig,
         window: &Window,
@@ -215,41 +217,62 @@ impl Preparation {
 
         let (side, levels) = (profile.side, profile.levels);
         let centre = central(profile);
-        let mut dropped = Dropped::default();
-        let taken = sweep.points.len().min(POINTS_MAX);
-        dropped.over_capacity = (sweep.points.len() - taken) as u64;
-        let mut count = 0;
         let centre_f = centre.map(|c| c as f32);
-        for (n, (point, column)) in sweep.points[..taken].iter().zip(columns.iter_mut()).enumerate()
-        {
-            *column = NONE;
-            if let Some(placed) = placed.get_mut(n) {
-                *placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
-            }
-            let Some(own) = dropped.admit(rig, point) else { continue };
-            let (p, sensor) = (point.position, point.sensor as usize);
-            let when = self.when(rig, point);
-            let slot = if moving { slot_of(when) } else { 0 };
-            let at = in_voxels(&to_voxel[slot], p);
-            let end = add(voxel(at), centre);
-            if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
-                dropped.too_far += 1;
-                continue;
-            }
-            dropped.own_vehicle += own as u64;
-            let [i, j, k] = end.map(|v| v as u32);
-            if i < side && j < side && k < levels && !own {
-                *column = i * side + j;
-            }
-            if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
-                let after = when - (slot as f32 + 0.5);
-                let at = drift.place([0, 1, 2].map(|a| at[a] + centre_f[a]), after);
-                *placed = Placed { at, offset_s: from + when * slot_s };
-            }
-            rays[count] = ray(end, origin_ids[sensor][slot], own);
-            count += 1;
+        let part =
+            |points: &[Point], rays: &mut [Ray], columns: &mut [u32], placed: &mut [Placed]| {
+                let mut dropped = Dropped::default();
+                let mut count = 0;
+                for (n, (point, column)) in points.iter().zip(columns).enumerate() {
+                    *column = NONE;
+                    if let Some(placed) = placed.get_mut(n) {
+                        *placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
+                    }
+                    let Some(own) = dropped.admit(rig, point) else { continue };
+                    let (p, sensor) = (point.position, point.sensor as usize);
+                    let when = self.when(rig, point);
+                    let slot = if moving { slot_of(when) } else { 0 };
+                    let at = in_voxels(&to_voxel[slot], p);
+                    let end = add(voxel(at), centre);
+                    if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
+                        dropped.too_far += 1;
+                        continue;
+                    }
+                    dropped.own_vehicle += own as u64;
+                    let [i, j, k] = end.map(|v| v as u32);
+                    if i < side && j < side && k < levels && !own {
+                        *column = i * side + j;
+                    }
+                    if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
+                        let after = when - (slot as f32 + 0.5);
+                        let at = drift.place([0, 1, 2].map(|a| at[a] + centre_f[a]), after);
+                        *placed = Placed { at, offset_s: from + when * slot_s };
+                    }
+                    rays[count] = ray(end, origin_ids[sensor][slot], own);
+                    count += 1;
+                }
+                (count, dropped)
+            };
+        // Two parts, the rays of the second behind those that the first may have.
+        let taken = sweep.points.len().min(POINTS_MAX);
+        let (first, second) = sweep.points[..taken].split_at(taken / 2);
+        let admitted = first.iter().filter(|p| Dropped::default().admit(rig, p).is_some()).count();
+        let (of_first, of_second) = rays.split_at_mut(admitted);
+        let (columns, more_columns) = columns.split_at_mut(first.len());
+        let (placed, more_placed) = placed.split_at_mut(first.len().min(placed.len()));
+        let mut found = [(0, Dropped::default()); 2];
+        let [(count, dropped), (more, more_dropped)] = &mut found;
+        team.join(
+            || (*count, *dropped) = part(first, of_first, columns, placed),
+            || (*more, *more_dropped) = part(second, of_second, more_columns, more_placed),
+        );
+        let [(count, mut dropped), (more, more_dropped)] = found;
+        dropped += more_dropped;
+        dropped.over_capacity = (sweep.points.len() - taken) as u64;
+        if count < admitted {
+            // Seldom: `rays` may be memory of a device, slow to read.
+            rays.copy_within(admitted..admitted + more, count);
         }
-        (count, dropped)
+        (count + more, dropped)
     }
 
     /// When in the sweep a return was, slots from its begin.
@@ -410,6 +433,7 @@ mod tests {
     use super::*;
     use crate::pose::Twist;
     use crate::record::{NO_END, ray_end, ray_origin};
+    use crate::team::Alone;
     use std::vec;
     use std::vec::Vec;
 
@@ -445,6 +469,7 @@ mod tests {
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
         let mut placed = vec![Placed::default(); points.len()];
         let (count, dropped) = Preparation::new().prepare(
+            &Alone,
             profile,
             rig,
             &window,

@@ -142,7 +142,7 @@ pub enum BackendKind {
     Auto,
     /// A Vulkan device, a CPU too if there is nothing else
     Vulkan,
-    /// One thread of the CPU
+    /// The CPU
     Scalar,
 }
 

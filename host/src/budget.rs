@@ -22,6 +22,7 @@ use crate::error::Error;
 use crate::map::Mapper;
 use crate::report::bytes;
 use crate::statistics::BUDGET_MS;
+use crate::team;
 use crate::track::Tracker;
 
 pub use markdown::memory_layout;
@@ -173,12 +174,13 @@ pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
     format!(
         "profile {}, {} backend ({}), background filter: {filter}\n\
          memory budget: {device}; host {} ({})\n\
-         time budget: {BUDGET_MS:.0} ms per sweep\n",
+         time budget: {BUDGET_MS:.0} ms per sweep; threads of the refinement: {}\n",
         profile.name,
         backend.name(),
         backend.device(),
         bytes(host_bytes(profile, scalar)),
-        parts.collect::<Vec<_>>().join(", ")
+        parts.collect::<Vec<_>>().join(", "),
+        team::threads()
     )
 }
 

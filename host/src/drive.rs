@@ -10,6 +10,7 @@ use raywake_gpu::guard::guarded;
 
 use crate::backend::{Backend, Tables};
 use crate::laps::Laps;
+use crate::team::Team;
 
 /// The pipeline with its backend and the storage of its results.
 pub struct Drive {
@@ -69,7 +70,7 @@ impl Drive {
         guarded(|| {
             let mut laps = Laps::start();
             let (rays, origins) = self.backend.input();
-            let prepared = self.pipeline.prepare(sweep, rays, origins);
+            let prepared = self.pipeline.prepare(&Team, sweep, rays, origins);
             laps.lap("prepare");
             let rounds = self.pipeline.profile().em_rounds;
             let mut unrefined = 0;
@@ -77,7 +78,8 @@ impl Drive {
             let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps, meanwhile)?;
             let output = Output { columns: &mut self.columns, points: &mut self.points };
             let lap = &mut |name| laps.lap(name);
-            let flows = self.pipeline.follow(&prepared.step, &perceived, before, output, lap);
+            let flows =
+                self.pipeline.follow(&Team, &prepared.step, &perceived, before, output, lap);
             laps.lap("follow");
             let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
             Ok(Stepped { prepared, flows, unrefined, foreground, rays, laps })

@@ -24,4 +24,5 @@ pub mod sink;
 pub mod source;
 pub mod statistics;
 pub mod summary;
+pub mod team;
 pub mod track;

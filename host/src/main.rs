@@ -10,7 +10,7 @@ use clap::Parser;
 use raywake::args::{Args, Command};
 use raywake::error::Error;
 use raywake::summary::Summary;
-use raywake::{budget, choose, engine, flow, map, run, track};
+use raywake::{budget, choose, engine, flow, map, run, team, track};
 use raywake_gpu::guard::Guard;
 
 /// Exit code of a process ended by SIGINT, as shells have it.
@@ -25,7 +25,7 @@ const STACK: usize = 64 << 20;
 
 fn main() -> ExitCode {
     let command = Args::parse().command;
-    let work = || match execute(command) {
+    let work = || match team::lead(team::available(), || execute(command)) {
         Ok(code) => code,
         Err(e) => {
             // Nobody is left to tell where standard error is closed.

@@ -11,6 +11,7 @@ use crate::backend::Backend;
 use crate::error::Error;
 use crate::sink::atomic;
 use crate::statistics::{AGES, Dropped, ResetAt, Spread, Statistics, Tally};
+use crate::team;
 
 /// Entries of a JSON object in the order given.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,6 +49,8 @@ pub struct Summary {
     pub backend: &'static str,
     /// Name of the device.
     pub device: String,
+    /// Threads of the refinement.
+    pub threads: usize,
     /// Where the background filter comes from.
     pub filter: String,
     /// Whether the run was ended by a signal.
@@ -137,6 +140,7 @@ impl Summary {
             profile: facts.profile.name.to_string(),
             backend: facts.backend.name(),
             device: facts.backend.device().to_string(),
+            threads: team::threads(),
             filter: facts.filter.to_string(),
             interrupted: facts.interrupted,
             sweeps: s.sweeps,

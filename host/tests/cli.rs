@@ -42,7 +42,7 @@ fn figures_and_files() {
     assert!(out.join("tracklets/0000000005.feather").is_file());
     assert!(out.join("argoverse/drive/4.feather").is_file());
     let s = first.summary(&out.join("summary.json"));
-    let wanted = "version source profile backend device filter interrupted sweeps pairs digest \
+    let wanted = "version source profile backend device threads filter interrupted sweeps pairs digest \
         valid_flows valid_flows_per_sweep foreground_columns solid_columns points distinct_rays \
         stage_ms total_ms share_under_100_ms device_bytes host_bytes vulkan_allocations \
         allocations_after_seal dropped tracklets_by_age resets";

@@ -8,6 +8,7 @@ use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
 use raywake_core::prepare::{Preparation, Window, central, place};
 use raywake_core::record::{Column, Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
+use raywake_core::team::Alone;
 
 /// What [`Grid::sweep`] works with and leaves behind.
 pub struct Grid {
@@ -73,6 +74,7 @@ impl Grid {
         self.lattice_origin = Some(origin);
         let window = place(&self.profile, rig, pose, Some(origin));
         let (count, _) = self.preparation.prepare(
+            &Alone,
             &self.profile,
             rig,
             &window,

@@ -6,6 +6,7 @@ use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
 use raywake_core::prepare::{Preparation, Window};
 use raywake_core::record::{Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
+use raywake_core::team::Alone;
 
 /// A sweep as rays in a window.
 pub struct Rays {
@@ -24,6 +25,7 @@ impl Rays {
         let mut origins = vec![[0; 4]; ORIGINS_MAX];
         let preparation = Preparation::new();
         let (count, _) = preparation.prepare(
+            &Alone,
             profile,
             rig,
             window,

@@ -5,6 +5,7 @@ use raywake::laps::Laps;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::{Output, Perceived, Pipeline};
+use raywake_core::team::Alone;
 use raywake_sim::SimSweep;
 
 use crate::difference;
@@ -47,7 +48,7 @@ impl Side {
     /// One sweep; `before` is the sweep before it.
     pub fn step(&mut self, now: &SimSweep, before: Option<&SimSweep>) -> Stages {
         let (rays, origins) = self.backend.input();
-        let prepared = self.pipeline.prepare(&sweep(now), rays, origins);
+        let prepared = self.pipeline.prepare(&Alone, &sweep(now), rays, origins);
         let rays = rays[..prepared.step.rays as usize].as_flattened().to_vec();
         let origins = bytemuck::cast_slice(origins.as_flattened()).to_vec();
         let mut laps = Laps::start();
@@ -65,7 +66,7 @@ impl Side {
         let output = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
         if let Some(flows) =
-            self.pipeline.follow(&prepared.step, &perceived, seen, output, &mut |_| ())
+            self.pipeline.follow(&Alone, &prepared.step, &perceived, seen, output, &mut |_| ())
         {
             (stages.columns, stages.points) = (flows.columns.to_vec(), flows.points.to_vec());
         }

@@ -172,25 +172,25 @@ pub struct Thing<'a> {
     pub extent: f32,
 }
 
-/// Marks columns that were seen, by number of the visit.
-pub struct Visits {
-    visit: u32,
-    of: [u32; COLUMNS_MAX],
-}
+/// Marks columns that were seen, a bit each: small enough for a stack.
+pub struct Visits([u64; COLUMNS_MAX.div_ceil(64)]);
 
 impl Visits {
-    pub(super) const fn new() -> Visits {
-        Visits { visit: 0, of: [0; COLUMNS_MAX] }
+    pub fn new() -> Visits {
+        Visits([0; COLUMNS_MAX.div_ceil(64)])
     }
-    fn start(&mut self) {
-        self.visit = self.visit.wrapping_add(1);
-        if self.visit == 0 {
-            self.of.fill(0);
-            self.visit = 1;
-        }
-    }
+
+    /// Whether a column was not marked yet, which it is now.
     fn first(&mut self, column: usize) -> bool {
-        core::mem::replace(&mut self.of[column], self.visit) != self.visit
+        let (word, bit) = (&mut self.0[column / 64], 1 << (column % 64));
+        let first = *word & bit == 0;
+        *word |= bit;
+        first
+    }
+
+    /// Whoever marked columns has to take them back.
+    fn forget(&mut self, columns: &[u32]) {
+        columns.iter().for_each(|c| self.0[*c as usize / 64] &= !(1 << (c % 64)));
     }
 }
 
@@ -273,10 +273,9 @@ impl<'a> Thing<'a> {
         let other = &self.sweeps.others[0];
         let side = self.sweeps.first.side;
         let mut there = Samples::new();
-        visits.start();
         let mut list = heapless::Vec::<u32, THERE>::new();
         let mut total = 0;
-        for &c in self.columns {
+        'columns: for &c in self.columns {
             let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
             let d = motion.of(at);
             let i = (at[0] + d[0] + other.offset[0]) as i32;
@@ -285,13 +284,18 @@ impl<'a> Thing<'a> {
                 for b in j.saturating_sub(1).max(0)..j.saturating_add(2).min(side as i32) {
                     let column = a as usize * side + b as usize;
                     let n = other.cloud.column(column).len();
-                    if n > 0 && visits.first(column) {
+                    if list.is_full() {
                         // Of a thing as large as that the first columns tell enough.
-                        total += list.push(column as u32).map_or(0, |()| n);
+                        break 'columns;
+                    }
+                    if n > 0 && visits.first(column) {
+                        let _ = list.push(column as u32);
+                        total += n;
                     }
                 }
             }
         }
+        visits.forget(&list);
         let stride = total.div_ceil(SAMPLES).max(1);
         let mut seen = 0;
         for &c in &list {

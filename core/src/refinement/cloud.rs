@@ -9,8 +9,9 @@ use crate::params::{
 use crate::prepare::{Placed, central};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
-use core::cell::Cell;
 use core::ops::Range;
+use core::sync::atomic::AtomicU32;
+use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use nalgebra::Matrix3;
 
 /// Returns higher above the ground than this belong to things, voxels.
@@ -41,8 +42,29 @@ impl Scratch {
     }
 }
 
-/// A weight not yet asked for: a known one is positive. Zeros take no room in a program.
-const UNKNOWN: Weight = [0.0; 6];
+/// Bits of a weight, all zero until it is asked for: that takes no room in a program. Threads that ask
+/// at the same time find the same.
+struct Memo([AtomicU32; 6]);
+
+impl Memo {
+    const UNKNOWN: Memo = Memo([const { AtomicU32::new(0) }; 6]);
+
+    /// The weight, or what `find` says it is.
+    fn get(&self, find: impl FnOnce() -> Weight) -> Weight {
+        // That of a known weight is positive. It is written last and read first.
+        let [first, rest @ ..] = &self.0;
+        let known = first.load(Acquire);
+        if known != 0 {
+            let [a, b, c, d, e] = rest.each_ref().map(|bits| bits.load(Relaxed));
+            return [known, a, b, c, d, e].map(f32::from_bits);
+        }
+        let weight = find();
+        let [known, more @ ..] = weight.map(f32::to_bits);
+        rest.iter().zip(more).for_each(|(to, bits)| to.store(bits, Relaxed));
+        first.store(known, Release);
+        weight
+    }
+}
 
 /// Thinned returns of one sweep, voxels from the window's corner.
 pub struct Cloud {
@@ -58,7 +80,7 @@ pub struct Cloud {
     offset_s: [f32; CLOUD_MAX],
     start: [u32; COLUMNS_MAX + 1],
     /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
-    weights: [Cell<Weight>; CLOUD_MAX],
+    weights: [Memo; CLOUD_MAX],
     /// Levels above the ground of each column in which something was hit, a bit each.
     levels: [u16; COLUMNS_MAX],
 }
@@ -73,7 +95,7 @@ impl Cloud {
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
-            weights: [const { Cell::new(UNKNOWN) }; CLOUD_MAX],
+            weights: [Memo::UNKNOWN; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
@@ -103,7 +125,7 @@ impl Cloud {
         let start = &mut self.start[..columns_used + 1];
         start.fill(0);
         let Scratch { listed, order } = scratch;
-        let mut count = 0;
+        let (mut count, mut all_sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
             *apart = false;
             if column == NONE {
@@ -114,6 +136,7 @@ impl Cloud {
             if (GROUND_HEIGHT..THING_HEIGHT).contains(&height) {
                 start[column as usize + 1] += 1;
                 listed[count] = n as u32;
+                all_sensors |= 1 << points[n].sensor;
                 count += 1;
             }
         }
@@ -125,6 +148,9 @@ impl Cloud {
             order[*at as usize] = n;
             *at += 1;
         }
+        // By column they are looked up far apart: only where there are several.
+        let only = all_sensors.is_power_of_two().then(|| all_sensors.trailing_zeros());
+        let sensor_of = |n: u32| only.unwrap_or_else(|| points[n as usize].sensor);
         // Each start has become its end; what is kept is written from the front again.
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);
@@ -134,11 +160,11 @@ impl Cloud {
             *end = self.places.len() as u32;
             self.levels[c] = 0;
             let corner = [(c / side) as f32, (c % side) as f32];
-            let sensors = listed.iter().fold(0u32, |s, n| s | 1 << points[*n as usize].sensor);
+            let sensors = listed.iter().fold(0u32, |s, n| s | 1 << sensor_of(*n));
             for sensor in (0..SENSORS_MAX as u32).filter(|s| sensors & 1 << s != 0) {
                 let mut taken = [0u32; MASK_WORDS];
                 for &n in listed {
-                    if points[n as usize].sensor != sensor {
+                    if sensor_of(n) != sensor {
                         continue;
                     }
                     let Placed { at: p, offset_s } = placed[n as usize];
@@ -160,7 +186,7 @@ impl Cloud {
             }
         }
         start[columns_used] = self.places.len() as u32;
-        self.weights[..self.places.len()].iter().for_each(|w| w.set(UNKNOWN));
+        self.weights[..self.places.len()].fill_with(|| Memo::UNKNOWN);
         dropped
     }
 
@@ -235,14 +261,8 @@ impl Cloud {
 
     /// What the returns around a return tell about the surface it lies on.
     pub fn weight(&self, n: u32) -> Weight {
-        let known = self.weights[n as usize].get();
-        if known != UNKNOWN {
-            return known;
-        }
-        let (at, sensor) = (self.places.at(n as usize), self.places.sensor(n as usize));
-        let weight = self.surface(at, sensor);
-        self.weights[n as usize].set(weight);
-        weight
+        let n = n as usize;
+        self.weights[n].get(|| self.surface(self.places.at(n), self.places.sensor(n)))
     }
 
     /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.

@@ -22,6 +22,7 @@ use crate::pipeline::Perceived;
 use crate::prepare::Placed;
 use crate::record::{Flow, NONE, Step, VALID, flow_displacement};
 use crate::sweep::Point;
+use crate::team::{Team, fill};
 use align::{Mean, Motion, OTHERS, Other, Sample, Sweeps, Thing, Visits};
 use cloud::{Cloud, Scratch};
 use segments::Segments;
@@ -173,7 +174,8 @@ struct Things {
     /// Segment of each column of the first sweep's window.
     segment: [u32; COLUMNS_MAX],
     found: heapless::Vec<Found, COLUMNS_MAX>,
-    visits: Visits,
+    /// Columns that may be part of something that moves, a bit each.
+    restless: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
 /// Index of the cloud `age` sweeps before the newest.
@@ -192,7 +194,7 @@ impl Refinement {
                 segments: Segments::new(),
                 segment: [0; COLUMNS_MAX],
                 found: heapless::Vec::new(),
-                visits: Visits::new(),
+                restless: [0; COLUMNS_MAX.div_ceil(64)],
             },
         }
     }
@@ -226,9 +228,10 @@ impl Refinement {
     /// tracklet of a column of the new window predicts, voxels.
     pub(crate) fn run(
         &mut self,
+        team: &impl Team,
         step: &Step,
         perceived: &Perceived,
-        predicted: impl Fn(usize) -> Option<[f32; 2]>,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Sync,
     ) {
         let things = &mut self.things;
         things.found.clear();
@@ -260,8 +263,8 @@ impl Refinement {
             });
         }
         let sweeps = Sweeps { first, others: &others, before, now, span_s: span as f32 };
-        things.wholes(sweeps, flow, predicted);
-        things.parts(sweeps, flow, predicted);
+        things.wholes(team, sweeps, flow, predicted);
+        things.parts(team, sweeps, flow, predicted);
         things.rest(sweeps);
     }
 
@@ -308,54 +311,81 @@ impl Things {
     /// Things as they touch: the best motion of each.
     fn wholes(
         &mut self,
+        team: &impl Team,
         sweeps: Sweeps,
-        flow: impl Fn(usize) -> Flow + Copy,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
     ) {
         self.segments.find(sweeps.first, |_| true, flow);
-        for n in 0..self.segments.len() {
+        self.motions(team, sweeps, flow, predicted);
+        for (n, found) in self.found.iter_mut().enumerate() {
             let columns = self.segments.columns(n);
             columns.iter().for_each(|c| self.segment[*c as usize] = n as u32);
-            let thing = Thing::new(sweeps, columns);
-            let found = motion(&thing, flow, predicted, &mut self.visits);
-            let _ = self.found.push(Found { whole: n as u32, ..found });
+            found.whole = n as u32;
         }
+    }
+
+    /// Appends the best motion of each segment to what was found.
+    fn motions(
+        &mut self,
+        team: &impl Team,
+        sweeps: Sweeps,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+    ) {
+        let before = self.found.len();
+        // Parts are of what stands, and few: there is room.
+        let all = (before + self.segments.len()).min(COLUMNS_MAX);
+        let _ = self.found.resize(all, Found::default());
+        fill(team, 0, &mut self.found[before..], &|n| {
+            let thing = Thing::new(sweeps, self.segments.columns(n));
+            motion(&thing, flow, predicted, &mut Visits::new())
+        });
     }
 
     /// What stands as a whole may have a part that does not.
     fn parts(
         &mut self,
+        team: &impl Team,
         sweeps: Sweeps,
-        flow: impl Fn(usize) -> Flow + Copy,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
     ) {
-        let stands = |c: usize| stands_still(&self.segment, &self.found, c);
-        self.segments.find(
-            sweeps.first,
-            |c| {
-                stands(c)
-                    && flow(c) & VALID != 0
-                    && misfit_of(sweeps, c, |s| sweeps.standing(s)) > RESTLESS
-            },
-            |_| 0,
-        );
-        for n in 0..self.segments.len() {
-            let columns = self.segments.columns(n);
-            let thing = Thing::new(sweeps, columns);
-            let found = motion(&thing, flow, predicted, &mut self.visits);
+        let restless = |c: usize| {
+            stands_still(&self.segment, &self.found, c)
+                && flow(c) & VALID != 0
+                && misfit_of(sweeps, c, |s| sweeps.standing(s)) > RESTLESS
+        };
+        let columns = sweeps.first.side * sweeps.first.side;
+        fill(team, 0, &mut self.restless[..columns.div_ceil(64)], &|word| {
+            let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
+            bits.fold(0, |bits, (n, c)| bits | u64::from(restless(c)) << n)
+        });
+        let restless = &self.restless;
+        self.segments.find(sweeps.first, |c| restless[c / 64] >> (c % 64) & 1 != 0, |_| 0);
+        let wholes = self.found.len();
+        self.motions(team, sweeps, flow, predicted);
+        // Only those that move are kept.
+        let mut kept = wholes;
+        for n in wholes..self.found.len() {
+            let found = self.found[n];
             if found.moves {
-                let (id, whole) = (self.found.len() as u32, self.segment[columns[0] as usize]);
+                let columns = self.segments.columns(n - wholes);
+                let (id, whole) = (kept as u32, self.segment[columns[0] as usize]);
                 columns.iter().for_each(|c| self.segment[*c as usize] = id);
                 for &c in columns {
                     grow(sweeps, c as usize, &found.motion, whole, id, &mut self.segment);
                 }
-                let _ = self.found.push(Found { whole, ..found });
+                self.found[kept] = Found { whole, ..found };
+                kept += 1;
             }
         }
+        self.found.truncate(kept);
     }
 
     /// What is left of such a thing, and fragments beside others that move.
     fn rest(&mut self, sweeps: Sweeps) {
+        let visits = &mut Visits::new();
         self.segments.find(sweeps.first, |c| stands_still(&self.segment, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
@@ -367,12 +397,12 @@ impl Things {
             if thing.extent > EXTENT_MAX {
                 continue;
             }
-            let (still, seen) = thing.standing(&mut self.visits);
+            let (still, seen) = thing.standing(visits);
             let whole = self.segment[columns[0] as usize];
             let mut best = 1.0;
             for m in &near {
                 let found = self.found[*m as usize];
-                let misfit = thing.misfit(&found.motion, &mut self.visits);
+                let misfit = thing.misfit(&found.motion, visits);
                 let rest =
                     found.whole == whole && found.extent > MOST * self.found[whole as usize].extent;
                 let hidden = seen < SEEN && misfit < UNFIT;

@@ -78,6 +78,9 @@ impl Places {
         sensor: u32,
         least: f32,
     ) -> Option<(f32, usize)> {
+        if range.is_empty() {
+            return None;
+        }
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
         let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));

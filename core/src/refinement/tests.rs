@@ -5,6 +5,7 @@ use super::*;
 use crate::params::CLOUD_MAX;
 use crate::random::Random;
 use crate::record::{Column, Proposal, flow};
+use crate::team::Alone;
 use std::boxed::Box;
 use std::collections::{BTreeMap, BTreeSet};
 use std::vec;
@@ -321,7 +322,7 @@ fn run(refinement: &mut Refinement, pair: &[&Returns; 2], flows: &[Flow]) {
         proposal: &[] as &[Proposal],
     };
     let step = Step { side: SIDE as i32, ..Step::default() };
-    refinement.run(&step, &perceived, |_| None);
+    refinement.run(&Alone, &step, &perceived, |_| None);
 }
 
 type Moved = Option<([f32; 2], [f32; 3])>;
@@ -500,7 +501,7 @@ fn a_wall_that_seems_to_move_stands() {
         proposal: &[] as &[Proposal],
     };
     let step = Step { side: 167, ..Step::default() };
-    refinement.run(&step, &perceived, |_| Some([10.0, 0.0]));
+    refinement.run(&Alone, &step, &perceived, |_| Some([10.0, 0.0]));
     let longest = refinement.things.found.iter().map(|f| f.extent).fold(0.0, f32::max);
     assert!(longest > EXTENT_MAX, "{longest}");
     let moves = |f: &Found| f.extent > EXTENT_MAX && f.moves;

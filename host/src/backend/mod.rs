@@ -8,9 +8,11 @@ use raywake_core::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Perceived;
 use raywake_core::record::{Ray, Step};
+use raywake_core::team::Team as _;
 use raywake_gpu::{Census, GpuError};
 
 use crate::laps::Laps;
+use crate::team::Team;
 
 /// The learned numbers in the form the kernels and their twins use.
 pub struct Tables {
@@ -80,19 +82,20 @@ impl Backend {
     }
 
     /// From rays to flow; the time of each stage goes to `laps`. `meanwhile` is done while a device
-    /// works, and otherwise first.
+    /// works, and otherwise by another thread of the team.
     pub fn perceive(
         &mut self,
         step: &Step,
         rounds: u32,
         laps: &mut Laps,
-        meanwhile: impl FnOnce(),
+        meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         match self {
             Backend::Scalar(b) => {
-                meanwhile();
+                let mut perceived = None;
+                Team.join(|| perceived = Some(b.perceive(step, rounds, laps)), meanwhile);
                 laps.lap("prepare");
-                Ok(b.perceive(step, rounds, laps))
+                Ok(perceived.expect("both were done"))
             }
             Backend::Device(b) => b.perceive(step, laps, meanwhile),
         }
@@ -109,7 +112,7 @@ impl Backend {
     /// The device's name.
     pub fn device(&self) -> &str {
         match self {
-            Backend::Scalar(_) => "CPU, one thread",
+            Backend::Scalar(_) => "CPU",
             Backend::Device(b) => b.name(),
         }
     }

@@ -10,6 +10,7 @@ use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::prepare::{Dropped, Preparation, Window, place, step_of};
 use raywake_core::record::{NONE, Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
+use raywake_core::team::Alone;
 use raywake_gpu::GpuError;
 
 /// Either backend.
@@ -102,6 +103,7 @@ impl Mapper {
         self.lattice_origin.get_or_insert(window.lattice_origin);
         let (rays, origins) = self.backend.input();
         let (count, dropped) = self.preparation.prepare(
+            &Alone,
             &self.profile,
             &self.rig,
             &window,

@@ -1,0 +1,51 @@
+//! The threads that share the work within a sweep.
+
+use std::num::NonZero;
+use std::thread;
+
+use rayon_core::ThreadPoolBuilder;
+use raywake_gpu::guard::guarded;
+
+/// Threads at most: more would wait for the longest piece of work.
+pub const THREADS_MAX: usize = 4;
+
+/// Whoever belongs to the thread that asks.
+pub struct Team;
+
+impl raywake_core::team::Team for Team {
+    fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+        if threads() > 1 {
+            rayon_core::join(a, b);
+        } else {
+            raywake_core::team::Alone.join(a, b);
+        }
+    }
+}
+
+/// How many threads share the work of this one, itself among them.
+pub fn threads() -> usize {
+    // A pool takes in the work of other threads too, but allocates for that.
+    rayon_core::current_thread_index().map_or(1, |_| rayon_core::current_num_threads())
+}
+
+/// As many threads as pay on this machine.
+pub fn available() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get).min(THREADS_MAX)
+}
+
+/// Does `work` on this thread, with so many less one others that share it: they are under guard all
+/// their life, and sleep where there is nothing to do. Once a thread: there is no other team for it.
+pub fn lead<R>(threads: usize, work: impl FnOnce() -> R) -> R {
+    if threads < 2 {
+        return work();
+    }
+    let pool = ThreadPoolBuilder::new().num_threads(threads).use_current_thread();
+    let pool = pool.spawn_handler(|other| {
+        thread::Builder::new().spawn(|| guarded(|| other.run()))?;
+        Ok(())
+    });
+    let pool = pool.build().expect("the system has threads");
+    // What a thread allocates when it first looks for work.
+    pool.broadcast(|_| ());
+    work()
+}
