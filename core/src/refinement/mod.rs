@@ -52,7 +52,7 @@ const CONFIDENCE: f32 = 1.3;
 /// The misfit that doubles a variance, see [`doubt`].
 const DOUBTFUL: f32 = 0.008;
 /// Standard deviation of a motion, as a share of itself, however well it fits: when each return was.
-const SHARE: f32 = 0.008;
+const SHARE: f32 = 0.01;
 /// How much more gain makes it e times likelier that a thing moves, see [`Found::unsure`].
 const SURER: f32 = 0.04;
 /// Variance of whether what stands does where its column's match says otherwise: either may be right.
