@@ -37,7 +37,7 @@ const FEW: usize = 3;
 /// A start that leads to so good a fit is the last.
 const FITS: f32 = 0.05;
 /// Share of [`GAIN`] and [`STANDS`] that will do for what moves as it did before.
-const AS_BEFORE: f32 = 0.25;
+const AS_BEFORE: f32 = 0.4;
 /// Starts as near to each other lead to the same, voxels.
 const SAME: f32 = 0.75;
 /// A start that fits so badly calls for a search.
