@@ -174,7 +174,7 @@ pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
     format!(
         "profile {}, {} backend ({}), background filter: {filter}\n\
          memory budget: {device}; host {} ({})\n\
-         time budget: {BUDGET_MS:.0} ms per sweep; threads of the refinement: {}\n",
+         time budget: {BUDGET_MS:.0} ms per sweep; threads on the CPU: {}\n",
         profile.name,
         backend.name(),
         backend.device(),

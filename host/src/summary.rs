@@ -49,7 +49,7 @@ pub struct Summary {
     pub backend: &'static str,
     /// Name of the device.
     pub device: String,
-    /// Threads of the refinement.
+    /// Threads that share the CPU's part of a sweep.
     pub threads: usize,
     /// Where the background filter comes from.
     pub filter: String,

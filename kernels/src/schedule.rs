@@ -29,11 +29,11 @@ pub fn flow(profile: &Profile) -> Program {
             GROUPS_DISTINCT,
         ),
         threads("columns", &COLUMNS, &[StepNow, LogOdds, Now], columns),
-        threads(
+        groups(
             "background_filter",
             &BACKGROUND_FILTER,
             &[StepNow, Filter, Before, Marks],
-            columns,
+            columns.div_ceil(TILE),
         ),
     ]);
     ops.extend(prefix_sum("compact", Marks, Tiles, Rank, columns));

@@ -29,19 +29,44 @@ fn score(column: i32) -> i32 {
     return sum;
 }
 
+var<workgroup> count: atomic<u32>;
+var<workgroup> solid: array<u32, TILE>;
+
+// Lists the solid ones of TILE columns, then scores them. The columns are from all over the window, so
+// that every workgroup has as many.
 @compute @workgroup_size(ROW_WORKGROUP)
-fn background_filter(@builtin(global_invocation_id) id: vec3<u32>) {
-    let column = i32(id.x);
-    if column >= params.side * params.side {
-        return;
+fn background_filter(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if lane == 0u {
+        atomicStore(&count, 0u);
     }
-    var mark = 0u;
-    if columns_before.d[column].y != 0u {
-        if params.unfiltered != 0 {
-            mark = 1u;
-        } else {
-            mark = select(0u, 1u, score(column) > 0);
+    workgroupBarrier();
+    for (var n = 0u; n < TILE / ROW_WORKGROUP; n += 1u) { // <= 16
+        let column = (n * groups.x + group.x) * ROW_WORKGROUP + lane;
+        if column < u32(params.side * params.side) {
+            let is_solid = columns_before.d[column].y != 0u;
+            if is_solid && params.unfiltered == 0 {
+                solid[atomicAdd(&count, 1u)] = column;
+            } else {
+                marks.d[column] = select(0u, 1u, is_solid);
+            }
         }
     }
-    marks.d[column] = mark;
+    workgroupBarrier();
+    let listed = atomicLoad(&count);
+    var n = lane;
+    // The exit comes last: software devices go through a loop once more behind one that comes first.
+    loop { // <= 16
+        if n < listed {
+            let column = solid[n];
+            marks.d[column] = select(0u, 1u, score(i32(column)) > 0);
+        }
+        n += ROW_WORKGROUP;
+        if n >= listed {
+            break;
+        }
+    }
 }

@@ -9,7 +9,9 @@ struct Words { d: array<u32> }
 @group(0) @binding(2) var<storage, read_write> sums: Words;
 
 const EACH = TILE / WORKGROUP;
+const SPAN = 16u;
 var<workgroup> partial: array<u32, WORKGROUP>;
+var<workgroup> spans: array<u32, WORKGROUP / SPAN>;
 
 fn value_at(index: u32) -> u32 {
     if index < arrayLength(&values.d) {
@@ -18,21 +20,23 @@ fn value_at(index: u32) -> u32 {
     return 0u;
 }
 
-// Exclusive prefix over the workgroup of one number per invocation; the last entry of `partial`
-// then holds the total of all.
+// Exclusive prefix over the workgroup of one number per invocation: within spans, then of their sums.
+// Few barriers: software devices pay for each of them by the invocation.
 fn scan_workgroup(lane: u32, mine: u32) -> u32 {
     partial[lane] = mine;
     workgroupBarrier();
-    for (var reach = 1u; reach < WORKGROUP; reach *= 2u) { // <= 8
-        var from_left = 0u;
-        if lane >= reach {
-            from_left = partial[lane - reach];
-        }
-        workgroupBarrier();
-        partial[lane] += from_left;
-        workgroupBarrier();
+    var before = 0u;
+    for (var n = lane - lane % SPAN; n < lane; n += 1u) { // <= 15
+        before += partial[n];
     }
-    return partial[lane] - mine;
+    if lane % SPAN == SPAN - 1u {
+        spans[lane / SPAN] = before + mine;
+    }
+    workgroupBarrier();
+    for (var n = 0u; n < lane / SPAN; n += 1u) { // <= 15
+        before += spans[n];
+    }
+    return before;
 }
 
 @compute @workgroup_size(WORKGROUP)

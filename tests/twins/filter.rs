@@ -1,7 +1,7 @@
 //! The background filter.
 
 use raywake_core::background_filter::{TABLE_WORDS, background_filter, load};
-use raywake_core::params::ROW_WORKGROUP;
+use raywake_core::params::{ROW_WORKGROUP, TILE};
 use raywake_core::record::{Column, Step};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::BACKGROUND_FILTER;
@@ -28,7 +28,7 @@ fn check(case: &str, step: &Step, table: &[i32], before: &[Column]) -> usize {
         .buffer("filter_table", bytemuck::cast_slice(table).to_vec())
         .buffer("columns_before", words(before))
         .buffer("marks", marks.clone())
-        .threads(&BACKGROUND_FILTER, before.len());
+        .groups(&BACKGROUND_FILTER, before.len().div_ceil(TILE));
     background_filter(step, table, before, &mut marks);
     if let Some(outcome) = bench.run() {
         outcome.check(&format!("{case}, {step:?}"), &[("marks", &marks)]);

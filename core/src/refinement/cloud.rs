@@ -47,7 +47,9 @@ impl Scratch {
 struct Memo([AtomicU32; 6]);
 
 impl Memo {
-    const UNKNOWN: Memo = Memo([const { AtomicU32::new(0) }; 6]);
+    const fn unknown() -> Memo {
+        Memo([const { AtomicU32::new(0) }; 6])
+    }
 
     /// The weight, or what `find` says it is.
     fn get(&self, find: impl FnOnce() -> Weight) -> Weight {
@@ -95,7 +97,7 @@ impl Cloud {
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
-            weights: [Memo::UNKNOWN; CLOUD_MAX],
+            weights: [const { Memo::unknown() }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
@@ -186,7 +188,7 @@ impl Cloud {
             }
         }
         start[columns_used] = self.places.len() as u32;
-        self.weights[..self.places.len()].fill_with(|| Memo::UNKNOWN);
+        self.weights[..self.places.len()].fill_with(Memo::unknown);
         dropped
     }
 

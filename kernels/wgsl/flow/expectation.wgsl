@@ -45,24 +45,38 @@ fn outside_cost(i: i32, j: i32) -> i32 {
     return (9 - rows * lines) * params.outside_cost;
 }
 
-// Every displacement, without smoothing; also learns the least energy, feasible or not, and where.
+// The least energy without smoothing, feasible or not, and where: a word of two costs at a time.
+fn lowest(rank: u32, i: i32, j: i32, outside: i32) -> vec2<u32> {
+    var least = vec2<u32>(NONE);
+    for (var word = 0; word < i32(ROW_WORDS); word += 1) { // <= 496
+        let costs = matching.d[rank * ROW_WORDS + u32(word)];
+        let first = displacement(2 * word);
+        for (var half = 0; half < 2; half += 1) { // <= 2
+            let d = first + vec2<i32>(0, half);
+            let square = d.x * d.x + d.y * d.y;
+            let cost = i32((costs >> (16u * u32(half))) & 0xffffu);
+            let energy = u32(cost + params.displacement_cost * square + outside);
+            if d.y <= REACH && inside(i + d.x, j + d.y) && energy < least.x {
+                least = vec2<u32>(energy, u32(2 * word + half));
+            }
+        }
+    }
+    return least;
+}
+
+// Every displacement, without smoothing.
 fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    var lowest = vec2<u32>(NONE);
     for (var index = 0; index < i32(ROW); index += 1) { // <= ROW
         let d = displacement(index);
         if d.y <= REACH && inside(i + d.x, j + d.y) {
             let square = d.x * d.x + d.y * d.y;
             let energy = cost_of(rank, index) + params.displacement_cost * square + outside;
-            if u32(energy) < lowest.x {
-                lowest = vec2<u32>(u32(energy), u32(index));
-            }
             if energy < best.energy {
                 best = consider(best, column, index, energy, own);
             }
         }
     }
-    least.d[rank] = lowest;
     return best;
 }
 
@@ -143,11 +157,13 @@ fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
     let outside = outside_cost(i, j);
     var best = Best(I32_MAX, I32_MAX);
     if count == 0 {
-        // Where it paid least before, it pays least again, if it may.
-        let known = least.d[rank];
-        if known.y != NONE {
-            best = consider(best, column, i32(known.y), i32(known.x), own);
+        // Where it pays least, if it may: in every round the same.
+        var known = least.d[rank];
+        if known.y == NONE {
+            known = lowest(rank, i, j, outside);
+            least.d[rank] = known;
         }
+        best = consider(best, column, i32(known.y), i32(known.x), own);
         if best.index == I32_MAX {
             best = everywhere(rank, column, i, j, outside, own);
         }
