@@ -36,8 +36,10 @@ const STANDS: f32 = 0.08;
 const FEW: usize = 3;
 /// A start that leads to so good a fit is the last.
 const FITS: f32 = 0.05;
-/// Share of [`GAIN`] and [`STANDS`] that will do for what moves as it did before.
+/// Share of [`GAIN`] and [`STANDS`] that will do for what moves as it did before, or as what is beside
+/// it; the longer it is before, the less, from this extent on, voxels: its sides slide along themselves.
 const AS_BEFORE: f32 = 0.4;
+const LONG: f32 = 15.0;
 /// Starts as near to each other lead to the same, voxels.
 const SAME: f32 = 0.75;
 /// A start that fits so badly calls for a search.
@@ -430,7 +432,8 @@ fn motion(
         Found { still: thing.standing(visits).0, extent: thing.extent, ..Found::default() };
     let expected = mean(thing.columns.iter().filter_map(|c| predicted(*c as usize)));
     let expected = expected.filter(|by| by[0] * by[0] + by[1] * by[1] > LEAST * LEAST);
-    let ease = if expected.is_some() { AS_BEFORE } else { 1.0 };
+    let as_before = AS_BEFORE * (LONG / thing.extent).min(1.0);
+    let ease = if expected.is_some() { as_before } else { 1.0 };
     if found.still < STANDS * ease || thing.extent > EXTENT_MAX {
         return found;
     }
@@ -467,8 +470,8 @@ fn motion(
     let by = motion.by.xy().norm();
     // A motion that fits ill is left to the thing's parts unless it explains much.
     let gained = gain(found.still, misfit);
-    let as_before = expected.is_some_and(|e| same(&e, [motion.by.x, motion.by.y]));
-    let enough = if as_before { GAIN * AS_BEFORE } else { GAIN };
+    let goes_on = expected.is_some_and(|e| same(&e, [motion.by.x, motion.by.y]));
+    let enough = if goes_on { GAIN * as_before } else { GAIN };
     let convinces = gained > if misfit < UNFIT { enough } else { 2.0 * enough };
     found.moves = convinces && by > LEAST && thing.samples.len() >= ENOUGH;
     let likely = 1.0 / (1.0 + libm::expf((enough - gained) / SURER));
