@@ -370,6 +370,7 @@ impl FixedLag {
         estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
         estimator.returns.lay(&self.knots);
         estimator.active = 0..self.returns.len();
+        let params = &params.of(estimator.returns.length_m());
         if young {
             self.estimate_young(estimator, params);
             return;
