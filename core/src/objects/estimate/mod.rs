@@ -183,6 +183,8 @@ impl Estimator {
             report.unsound = returns.len();
             return report;
         };
+        let extent_m = params.extent_m;
+        let params = &params.of(self.returns.length_m());
         let (knots, Laid { compressed, stretched }) =
             Knots::over(f64::from(taken.first_s), f64::from(taken.last_s), params.basis_s);
         self.knots = knots;
@@ -192,8 +194,6 @@ impl Estimator {
         report.thinned = returns.len() - taken.unsound - report.returns;
         (report.compressed, report.stretched) = (compressed, stretched);
 
-        let extent_m = params.extent_m;
-        let params = &params.of(self.returns.length_m());
         report.no_history = !self.start(params, history);
         if params.grows {
             self.grow(&EstimateParams { ends_m: 0.0, ..params.plain() });

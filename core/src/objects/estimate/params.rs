@@ -3,6 +3,9 @@
 /// Objects beyond these lengths move like those of them, m.
 const LENGTHS_M: [f64; 2] = [0.6, 30.0];
 
+/// Basis functions of short objects are no shorter than this share.
+const BASIS_LEAST: f64 = 2.0 / 3.0;
+
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimateParams {
@@ -15,10 +18,11 @@ pub struct EstimateParams {
     /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
     /// rate (rad/s).
     pub process: [f64; 7],
-    /// Length of an object for which `process` and `loose_m` hold, m: the turn rate of others varies
-    /// in inverse proportion to theirs, and so does the speed of longer ones; shorter ones are less
-    /// loose, and no model point is expected further from the origin than an object is long. 0 where
-    /// all holds for all.
+    /// Length of an object for which `basis_s`, `process` and `loose_m` hold, m: the turn rate of
+    /// others varies in inverse proportion to theirs, and so does the speed of longer ones; bases of
+    /// shorter ones are shorter, as somebody on foot turns within half a second, and they are less
+    /// loose; no model point is expected further from the origin than an object is long. 0 where all
+    /// holds for all.
     pub length_m: f64,
     /// Time in which a turn rate fades to a third, s; infinite where turns go on.
     pub turn_s: f64,
@@ -88,6 +92,7 @@ impl EstimateParams {
             let shorter = self.length_m / length_m;
             params.process[6] *= shorter;
             params.process[4] *= shorter.min(1.0);
+            params.basis_s *= shorter.recip().clamp(BASIS_LEAST, 1.0);
             params.loose_m *= shorter.recip().min(1.0);
             params.extent_m = params.extent_m.min(length_m);
         }
@@ -107,8 +112,7 @@ impl Default for EstimateParams {
         // Town traffic turns into a bend within a second.
         process[6] = 0.15;
         EstimateParams {
-            // Somebody on foot turns within half a second.
-            basis_s: 0.2,
+            basis_s: 0.3,
             deviation_m: 0.05,
             damping: true,
             surfaces: true,

@@ -494,11 +494,11 @@ fn what_is_long_is_sluggish() {
     let by = |length_m: f32| {
         let of = ours.of(length_m);
         let process: [f64; 7] = core::array::from_fn(|d| of.process[d] / ours.process[d]);
-        (process, of.loose_m / ours.loose_m, of.extent_m)
+        (process, [of.loose_m / ours.loose_m, of.basis_s / ours.basis_s], of.extent_m)
     };
     let all = |speed, turn| [1.0, 1.0, 1.0, 1.0, speed, 1.0, turn];
-    assert_eq!(by(9.0), (all(0.5, 0.5), 1.0, 9.0));
-    assert_eq!(by(2.25), (all(1.0, 2.0), 0.5, 2.25));
+    assert_eq!(by(9.0), (all(0.5, 0.5), [1.0; 2], 9.0));
+    assert_eq!(by(2.25), (all(1.0, 2.0), [0.5, 2.0 / 3.0], 2.25));
     assert_eq!(by(500.0), by(30.0));
     assert_eq!(by(30.0).2, ours.extent_m);
     // Nothing is known of the length, or nothing hangs on it.
