@@ -23,8 +23,11 @@
 //! than one ([`EstimateParams::starts`]), a start that grows from the middle of the track over a sparse
 //! model ([`EstimateParams::grows`]), returns that weigh across surfaces
 //! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and
-//! a robust loss are for bad input. `raywake-lab eval tracks`
-//! measures every one by itself.
+//! a robust loss are for bad input. `raywake-lab eval tracks` measures each of these by itself.
+//!
+//! A round object hides where on it the origin lies: with one behind it, as a trailer's axle, it turns
+//! later and more gently. So its points are near the origin ([`EstimateParams::length_m`]), and its
+//! turns may be hard ([`EstimateParams::tails`]).
 
 mod carve;
 mod ends;

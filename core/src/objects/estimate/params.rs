@@ -26,10 +26,12 @@ pub struct EstimateParams {
     pub length_m: f64,
     /// Time in which a turn rate fades to a third, s; infinite where turns go on.
     pub turn_s: f64,
-    /// Degrees of freedom of the turn rate's noise, Student's; 0 for a Gaussian. See [`process`].
+    /// Degrees of freedom of the turn rate's noise, which is then Student's; 0 for a Gaussian: steady
+    /// motion with a few hard turns. It refines what a Gaussian finds.
     pub tails: f64,
-    /// With `tails`, its scale as a share of the deviation in `process`, and how long it is the same, s.
+    /// Scale of Student's noise as a share of the deviation in `process`.
     pub calm: f64,
+    /// A manoeuvre's length, s: so long Student's noise has one variance.
     pub manoeuvre_s: f64,
     /// Standard deviation of a model point about the origin, m.
     pub extent_m: f64,
