@@ -372,9 +372,13 @@ impl FixedLag {
         estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
         estimator.returns.lay(&self.knots);
         estimator.active = 0..self.returns.len();
-        // Two iterations do not find the other minima of tails.
-        let own = params.of(estimator.returns.length_m()).plain();
-        let params = &EstimateParams { loose_m: LOOSE_M, extent_m: params.extent_m, ..own };
+        // Two iterations with a sweep do not find the other minima that hard turns bring.
+        let params = &EstimateParams {
+            loose_m: LOOSE_M,
+            extent_m: params.extent_m,
+            turn_s: f64::INFINITY,
+            ..params.of(estimator.returns.length_m()).plain()
+        };
         if young {
             self.estimate_young(estimator, params);
             return;
