@@ -23,8 +23,11 @@
 //! than one ([`EstimateParams::starts`]), a start that grows from the middle of the track over a sparse
 //! model ([`EstimateParams::grows`]), returns that weigh across surfaces
 //! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and
-//! a robust loss are for bad input. `raywake-lab eval tracks`
-//! measures every one by itself.
+//! a robust loss are for bad input. `raywake-lab eval tracks` measures each of these by itself.
+//!
+//! A round object hides where on it the origin lies: with one behind it, as a trailer's axle, it turns
+//! later and more gently. So its points are near the origin ([`EstimateParams::length_m`]), and its
+//! turns may be hard ([`EstimateParams::tails`]).
 
 mod carve;
 mod ends;
@@ -52,7 +55,7 @@ use ends::Ends;
 use nearest::{Nearest, square_distance};
 use normal::{Equations, Seen, Surface};
 pub use params::EstimateParams;
-use process::Weights;
+use process::{Process, Weights};
 pub use report::{Cost, Report, Start, Stop};
 use returns::Returns;
 
@@ -78,9 +81,6 @@ const GROWTH_FIRST_ROUNDS: usize = 6;
 const GROWTH_FIRST_ITERATIONS: usize = 6;
 const GROWTH_ROUNDS: usize = 2;
 const GROWTH_ITERATIONS: usize = 2;
-
-/// Objects beyond these lengths move like those of them, m.
-const LENGTHS_M: [f64; 2] = [0.6, 30.0];
 
 /// What may as well rest, rests: so much more than motion it may cost.
 const RESTS: f64 = 1.05;
@@ -186,6 +186,8 @@ impl Estimator {
             report.unsound = returns.len();
             return report;
         };
+        let extent_m = params.extent_m;
+        let params = &params.of(self.returns.length_m());
         let (knots, Laid { compressed, stretched }) =
             Knots::over(f64::from(taken.first_s), f64::from(taken.last_s), params.basis_s);
         self.knots = knots;
@@ -197,7 +199,7 @@ impl Estimator {
 
         report.no_history = !self.start(params, history);
         if params.grows {
-            self.grow(&EstimateParams { ends_m: 0.0, ..*params });
+            self.grow(&EstimateParams { ends_m: 0.0, ..params.plain() });
         }
         self.run(params, &mut report);
         self.best.copy(&self.now);
@@ -224,7 +226,7 @@ impl Estimator {
             self.face_forward();
         }
         self.unwind();
-        report.outside = self.outside(params.extent_m);
+        report.outside = self.outside(extent_m);
         report
     }
 
@@ -287,11 +289,10 @@ impl Estimator {
             return false;
         }
         if params.starts {
-            let precision = precision(params, self.returns.length_m());
             start::smooth(
                 &self.knots,
                 history,
-                &precision,
+                &Process::of(&params.plain()),
                 &mut self.equations,
                 weights,
                 &mut self.step,
@@ -329,7 +330,7 @@ impl Estimator {
             let off = start::smooth(
                 &self.knots,
                 &places,
-                &precision(params, self.returns.length_m()),
+                &Process::of(&params.plain()),
                 &mut self.equations,
                 &mut weights[..n],
                 &mut self.step,
@@ -360,6 +361,7 @@ impl Estimator {
         (report.iterations, report.carved) = (0, 0);
         self.active = 0..self.returns.all().len();
         if params.ends_m > 0.0 {
+            let params = &params.plain();
             self.extract(params);
             self.descend(params, params.iterations, Some(report));
         }
@@ -485,8 +487,8 @@ impl Estimator {
         let n = self.knots.bases();
         let weights = &self.now.weights[..n];
         self.equations.clear(n);
-        let precision = precision(params, self.returns.length_m());
-        let mut cost = process::add(&self.knots, weights, &precision, &mut self.equations);
+        let process = Process::of(params);
+        let mut cost = process::add(&self.knots, weights, &process, &mut self.equations);
         if let Some(known) = &self.known {
             let now = self.knots.value(weights, known.time_s);
             let miss: Weights = core::array::from_fn(|d| known.state[d] - now[d]);
@@ -636,17 +638,4 @@ fn state(knots: &Knots, weights: &[Weights], inside: f64, time_s: f64) -> Object
     let (sin, cos) = libm::sincos(heading);
     let position = [x + beyond * speed * cos, y + beyond * speed * sin, z + beyond * climb];
     ObjectState { time_s, position, heading, speed, climb, turn_rate }
-}
-
-/// `Q_u^-1` of an object so long: a short one turns more briskly, a long one less so, and it also
-/// brakes and speeds up less.
-fn precision(params: &EstimateParams, length_m: f32) -> Weights {
-    let mut process = params.process;
-    if params.process_m > 0.0 && length_m > 0.0 {
-        let [shortest, longest] = LENGTHS_M;
-        let shorter = params.process_m / f64::from(length_m).clamp(shortest, longest);
-        process[6] *= shorter;
-        process[4] *= shorter.min(1.0);
-    }
-    process.map(|deviation| 1.0 / (deviation * deviation))
 }

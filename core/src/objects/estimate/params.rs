@@ -1,5 +1,11 @@
 //! The choices of an estimate: the dissertation's and ours.
 
+/// Objects beyond these lengths move like those of them, m.
+const LENGTHS_M: [f64; 2] = [0.6, 30.0];
+
+/// Basis functions of short objects are no shorter than this share.
+const BASIS_LEAST: f64 = 2.0 / 3.0;
+
 /// The choices of an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimateParams {
@@ -12,9 +18,21 @@ pub struct EstimateParams {
     /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
     /// rate (rad/s).
     pub process: [f64; 7],
-    /// Length of an object for which `process` holds, m: the turn rate of others varies in inverse
-    /// proportion to theirs, and so does the speed of longer ones. 0 where it holds for all.
-    pub process_m: f64,
+    /// Length of an object for which `basis_s`, `process` and `loose_m` hold, m: the turn rate of
+    /// others varies in inverse proportion to theirs, and so does the speed of longer ones; bases of
+    /// shorter ones are shorter, as somebody on foot turns within half a second, and they are less
+    /// loose; no model point is expected further from the origin than an object is long. 0 where all
+    /// holds for all.
+    pub length_m: f64,
+    /// Time in which a turn rate fades to a third, s; infinite where turns go on.
+    pub turn_s: f64,
+    /// Degrees of freedom of the turn rate's noise, which is then Student's; 0 for a Gaussian: steady
+    /// motion with a few hard turns. It refines what a Gaussian finds.
+    pub tails: f64,
+    /// Scale of Student's noise as a share of the deviation in `process`.
+    pub calm: f64,
+    /// A manoeuvre's length, s: so long Student's noise has one variance.
+    pub manoeuvre_s: f64,
     /// Standard deviation of a model point about the origin, m.
     pub extent_m: f64,
     /// Standard deviation of a return about its model point (`σ_z`), m.
@@ -48,7 +66,11 @@ impl EstimateParams {
             model: 300,
             basis_s: 0.5,
             process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
-            process_m: 0.0,
+            length_m: 0.0,
+            turn_s: f64::INFINITY,
+            tails: 0.0,
+            calm: 1.0,
+            manoeuvre_s: 0.0,
             extent_m: 10.0,
             deviation_m: 0.5,
             iterations: 10,
@@ -62,6 +84,27 @@ impl EstimateParams {
             grows: false,
         }
     }
+
+    /// Those for an object so long, m; these where it is not known.
+    pub(super) fn of(&self, length_m: f32) -> EstimateParams {
+        let mut params = *self;
+        if self.length_m > 0.0 && length_m > 0.0 {
+            let [shortest, longest] = LENGTHS_M;
+            let length_m = f64::from(length_m).clamp(shortest, longest);
+            let shorter = self.length_m / length_m;
+            params.process[6] *= shorter;
+            params.process[4] *= shorter.min(1.0);
+            params.basis_s *= shorter.recip().clamp(BASIS_LEAST, 1.0);
+            params.loose_m *= shorter.recip().min(1.0);
+            params.extent_m = params.extent_m.min(length_m);
+        }
+        params
+    }
+
+    /// The same with Gaussian noise alone.
+    pub(super) fn plain(&self) -> EstimateParams {
+        EstimateParams { tails: 0.0, ..*self }
+    }
 }
 
 impl Default for EstimateParams {
@@ -71,19 +114,22 @@ impl Default for EstimateParams {
         // Town traffic turns into a bend within a second.
         process[6] = 0.15;
         EstimateParams {
-            // Somebody on foot turns within half a second.
             basis_s: 0.3,
             deviation_m: 0.05,
             damping: true,
             surfaces: true,
-            loose_m: 0.5,
+            loose_m: 0.3,
             starts: true,
             ends_m: 0.2,
             carves: true,
             grows: true,
             process,
             // A car's.
-            process_m: 4.5,
+            length_m: 4.5,
+            turn_s: 1.5,
+            tails: 1.0,
+            calm: 0.13,
+            manoeuvre_s: 1.7,
             ..EstimateParams::dissertation()
         }
     }

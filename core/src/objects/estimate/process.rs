@@ -6,13 +6,27 @@
 //! heading are polynomials of degree 8 at most; those two are as smooth, and over a piece, in which a
 //! heading turns by a fraction of a radian, six nodes leave less than a millionth of the integral
 //! (`the_integral_is_exact_enough`).
+//!
+//! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_s`. And most of the time an object
+//! goes steadily, which one variance for all times cannot say: it lets the steady jitter and smooths
+//! the hard turns. So the variance is another one for each manoeuvre of `m` pieces of the splines,
+//! unknown, and its reciprocal of Gamma's distribution with `ν` degrees of freedom. Integrated out, it
+//! leaves Student's distribution: with `S = ∫ e² / q²` over the manoeuvre its cost is
+//! `(ν + m) / 2 ln(1 + S / ν)` where a Gaussian's is `S / 2`. Nobody knows when manoeuvres begin: the
+//! cost is the mean over all `m` ways to cut the track into them. Gauss-Newton takes that as a
+//! Gaussian whose precision is `(ν + m) / (ν + S)` of `1 / q²`, which has the same slope. It has other
+//! minima than the one looked for, so trajectories are found with a Gaussian first.
 
+use super::EstimateParams;
 use super::normal::{CLIMB, Equations, Z, planar, vertical};
 use super::system::System;
-use crate::objects::spline::{Knots, SUPPORT};
+use crate::objects::spline::{BASES_MAX, Knots, SUPPORT};
 
 /// Weights of a state's seven splines: x, y, z, heading, speed, climb, turn rate.
 pub(super) type Weights = [f64; 7];
+
+/// The turn rate's.
+const TURN: usize = 6;
 
 const NODES: usize = 6;
 /// Half of the nodes on -1 to 1, and their weights; the others mirror them.
@@ -31,40 +45,117 @@ struct Row {
 /// Nothing of a spline.
 const NO_PART: (usize, [f64; SUPPORT]) = (0, [0.0; SUPPORT]);
 
-/// Adds the process term to `equations` and returns it. `precision` is `Q_u^-1`.
+/// How an object moves.
+#[derive(Clone, Copy)]
+pub(super) struct Process {
+    /// `Q_u^-1`.
+    precision: Weights,
+    /// By how much of itself a turn rate falls, 1/s.
+    fading: f64,
+    /// Degrees of freedom of the turn rate's noise; 0 for a Gaussian.
+    freedom: f64,
+    manoeuvre_s: f64,
+}
+
+impl Process {
+    pub fn of(params: &EstimateParams) -> Process {
+        let mut deviations = params.process;
+        if params.tails > 0.0 {
+            deviations[TURN] *= params.calm;
+        }
+        Process {
+            precision: deviations.map(|deviation| 1.0 / (deviation * deviation)),
+            fading: 1.0 / params.turn_s,
+            freedom: params.tails,
+            manoeuvre_s: params.manoeuvre_s,
+        }
+    }
+
+    /// Cost of the turn rate's noise; replaces its square in every piece by how much it counts there.
+    fn turning(&self, spacing_s: f64, pieces: &mut [f64]) -> f64 {
+        let nu = self.freedom;
+        if nu <= 0.0 {
+            let cost = 0.5 * pieces.iter().sum::<f64>();
+            pieces.fill(1.0);
+            return cost;
+        }
+        let long = (libm::round(self.manoeuvre_s / spacing_s) as usize).clamp(1, BASES_MAX);
+        let mut cost = 0.0;
+        let mut counts = [0.0; BASES_MAX];
+        for end in 1..pieces.len() + long {
+            let range = end.saturating_sub(long)..end.min(pieces.len());
+            let square: f64 = pieces[range.clone()].iter().sum();
+            let freedom = nu + range.len() as f64;
+            cost += 0.5 * freedom * libm::log1p(square / nu);
+            for count in &mut counts[range] {
+                *count += freedom / (nu + square) / long as f64;
+            }
+        }
+        pieces.copy_from_slice(&counts[..pieces.len()]);
+        cost / long as f64
+    }
+}
+
+/// Adds the process term to `equations` and returns it.
 pub(super) fn add(
     knots: &Knots,
     weights: &[Weights],
-    precision: &[f64; 7],
+    process: &Process,
     equations: &mut Equations,
 ) -> f64 {
-    let mut cost = 0.0;
-    for (place, share) in GAUSS {
-        for u in [0.5 - 0.5 * place, 0.5 + 0.5 * place] {
-            let (values, slopes) = knots.shape(u);
-            let length = 0.5 * share * knots.spacing();
-            for piece in 0..knots.spans() {
-                let rows = residuals(&weights[piece..piece + SUPPORT], &values, &slopes);
-                for (d, (row, precision)) in rows.iter().zip(precision).enumerate() {
-                    let weight = precision * length;
+    let mut turns = [0.0; BASES_MAX];
+    let turns = &mut turns[..knots.spans()];
+    nodes(knots, |values, slopes, length| {
+        let weight = process.precision[TURN] * length;
+        for (turn, weights) in turns.iter_mut().zip(weights.windows(SUPPORT)) {
+            let noise = residuals(weights, values, slopes, process.fading)[TURN].value;
+            *turn += weight * noise * noise;
+        }
+    });
+    let mut cost = process.turning(knots.spacing(), turns);
+    nodes(knots, |values, slopes, length| {
+        for (piece, turn) in turns.iter().enumerate() {
+            let weights = &weights[piece..piece + SUPPORT];
+            let rows = residuals(weights, values, slopes, process.fading);
+            for (d, (row, precision)) in rows.iter().zip(process.precision).enumerate() {
+                let mut weight = precision * length;
+                if d == TURN {
+                    weight *= turn;
+                } else {
                     cost += 0.5 * weight * row.value * row.value;
-                    let bases = equations.bases;
-                    if d == Z || d == CLIMB {
-                        let index = |i, d| vertical(bases, piece + i, d);
-                        accumulate(&mut equations.vertical, index, row, weight);
-                    } else {
-                        let index = |i, d| planar(bases, piece + i, d);
-                        accumulate(&mut equations.planar, index, row, weight);
-                    }
+                }
+                let bases = equations.bases;
+                if d == Z || d == CLIMB {
+                    let index = |i, d| vertical(bases, piece + i, d);
+                    accumulate(&mut equations.vertical, index, row, weight);
+                } else {
+                    let index = |i, d| planar(bases, piece + i, d);
+                    accumulate(&mut equations.planar, index, row, weight);
                 }
             }
         }
-    }
+    });
     cost
 }
 
+/// Shows the basis functions' values and slopes at every node of a piece, and the node's share of its
+/// length, s.
+fn nodes(knots: &Knots, mut show: impl FnMut(&[f64; SUPPORT], &[f64; SUPPORT], f64)) {
+    for (place, share) in GAUSS {
+        for u in [0.5 - 0.5 * place, 0.5 + 0.5 * place] {
+            let (values, slopes) = knots.shape(u);
+            show(&values, &slopes, 0.5 * share * knots.spacing());
+        }
+    }
+}
+
 /// The seven elements of `e_u` (2.8), where the basis functions have `values` and `slopes`.
-fn residuals(weights: &[Weights], values: &[f64; SUPPORT], slopes: &[f64; SUPPORT]) -> [Row; 7] {
+fn residuals(
+    weights: &[Weights],
+    values: &[f64; SUPPORT],
+    slopes: &[f64; SUPPORT],
+    fading: f64,
+) -> [Row; 7] {
     let mut state = [0.0; 7];
     let mut rate = [0.0; 7];
     for ((weight, value), slope) in weights.iter().zip(values).zip(slopes) {
@@ -80,6 +171,7 @@ fn residuals(weights: &[Weights], values: &[f64; SUPPORT], slopes: &[f64; SUPPOR
         value: rate[d] - predicted,
         parts: [(d, *slopes), second, third],
     };
+    let faded = core::array::from_fn(|i| slopes[i] + fading * values[i]);
     [
         row(0, v * cos, (3, times(v * sin)), (4, times(-cos))),
         row(1, v * sin, (3, times(-v * cos)), (4, times(-sin))),
@@ -87,7 +179,7 @@ fn residuals(weights: &[Weights], values: &[f64; SUPPORT], slopes: &[f64; SUPPOR
         row(3, state[6], (6, times(-1.0)), NO_PART),
         row(4, 0.0, NO_PART, NO_PART),
         row(5, 0.0, NO_PART, NO_PART),
-        row(6, 0.0, NO_PART, NO_PART),
+        Row { value: rate[6] + fading * state[6], parts: [(6, faded), NO_PART, NO_PART] },
     ]
 }
 
@@ -126,8 +218,6 @@ fn accumulate<const N: usize, const L: usize>(
 mod tests {
     extern crate std;
     use super::*;
-    use crate::objects::estimate::EstimateParams;
-    use crate::objects::estimate::precision;
     use crate::random::Random;
     use std::boxed::Box;
 
@@ -147,7 +237,7 @@ mod tests {
         let (knots, _) = Knots::over(0.0, 1.0, 0.5);
         let (values, slopes) = knots.shape(0.3);
         let weights = weights::<SUPPORT>();
-        let rows = residuals(&weights, &values, &slopes);
+        let rows = residuals(&weights, &values, &slopes, 0.8);
         let step = 1e-5;
         for (d, row) in rows.iter().enumerate() {
             for spline in 0..7 {
@@ -155,7 +245,7 @@ mod tests {
                     let at = |step: f64| {
                         let mut weights = weights;
                         weights[k][spline] += step;
-                        residuals(&weights, &values, &slopes)[d].value
+                        residuals(&weights, &values, &slopes, 0.8)[d].value
                     };
                     let slope = (at(step) - at(-step)) / (2.0 * step);
                     let part = parts(row).iter().find(|part| part.0 == spline);
@@ -168,51 +258,84 @@ mod tests {
 
     #[test]
     fn gradient_is_that_of_the_cost() {
-        let (knots, _) = Knots::over(0.0, 4.0, 0.5);
-        let mut equations = Box::new(Equations::new());
-        let mut weights = weights::<8>();
-        let precision = precision(&EstimateParams::dissertation(), 0.0);
-        let mut cost = |weights: &[Weights]| {
-            equations.clear(8);
-            let cost = add(&knots, weights, &precision, &mut equations);
-            (cost, equations.planar.vector, equations.vertical.vector)
-        };
-        let (_, plane, height) = cost(&weights);
-        let step = 1e-6;
-        for k in 0..8 {
-            for d in 0..7 {
-                let before = weights[k][d];
-                weights[k][d] = before + step;
-                let (more, ..) = cost(&weights);
-                weights[k][d] = before - step;
-                let (less, ..) = cost(&weights);
-                weights[k][d] = before;
-                let pull = if d == Z || d == CLIMB {
-                    height[vertical(8, k, d)]
-                } else {
-                    plane[planar(8, k, d)]
-                };
-                let known = (less - more) / (2.0 * step);
-                assert!((pull - known).abs() < 1e-5 * known.abs() + 0.3, "{k} {d} {pull} {known}");
+        for params in [EstimateParams::dissertation(), EstimateParams::default()] {
+            // Noise that is neither all steady nor all turning.
+            let process = Process::of(&EstimateParams { calm: 1.0, manoeuvre_s: 1.0, ..params });
+            let (knots, _) = Knots::over(0.0, 4.0, 0.5);
+            let mut equations = Box::new(Equations::new());
+            let mut weights = weights::<8>();
+            let mut cost = |weights: &[Weights]| {
+                equations.clear(8);
+                let cost = add(&knots, weights, &process, &mut equations);
+                (cost, equations.planar.vector, equations.vertical.vector)
+            };
+            let (_, plane, height) = cost(&weights);
+            let step = 1e-6;
+            for k in 0..8 {
+                for d in 0..7 {
+                    let before = weights[k][d];
+                    weights[k][d] = before + step;
+                    let (more, ..) = cost(&weights);
+                    weights[k][d] = before - step;
+                    let (less, ..) = cost(&weights);
+                    weights[k][d] = before;
+                    let pull = if d == Z || d == CLIMB {
+                        height[vertical(8, k, d)]
+                    } else {
+                        plane[planar(8, k, d)]
+                    };
+                    let known = (less - more) / (2.0 * step);
+                    assert!(
+                        (pull - known).abs() < 1e-5 * known.abs() + 0.3,
+                        "{k} {d} {pull} {known}"
+                    );
+                }
             }
         }
+    }
+
+    #[test]
+    fn a_turn_costs_the_logarithm_of_its_noise() {
+        let process =
+            Process::of(&EstimateParams { manoeuvre_s: 1.0, ..EstimateParams::default() });
+        let turning = |mut pieces: [f64; 6]| (process.turning(0.5, &mut pieces), pieces);
+        // As manoeuvres of two pieces, and of one at either end.
+        let (cost, counts) = turning([0.0, 0.0, 7.0, 0.0, 0.0, 0.0]);
+        assert!((cost - 0.5 * (3.0 * 8f64.ln())).abs() < 1e-12, "{cost}");
+        assert_eq!(counts, [2.5, 1.6875, 0.375, 1.6875, 3.0, 2.5]);
+        // A second one beside it costs less than one elsewhere.
+        let [beside, apart] = [[0.0, 0.0, 7.0, 7.0, 0.0, 0.0], [0.0, 7.0, 0.0, 0.0, 7.0, 0.0]];
+        assert!(turning(beside).0 < 0.9 * turning(apart).0);
+        let step = 1e-6;
+        for piece in 0..6 {
+            let at = |by: f64| {
+                let mut pieces = [0.3, 2.0, 7.0, 1.0, 0.0, 0.5];
+                pieces[piece] += by;
+                turning(pieces)
+            };
+            let slope = (at(step).0 - at(-step).0) / (2.0 * step);
+            assert!((slope - 0.5 * at(0.0).1[piece]).abs() < 1e-8, "piece {piece}: {slope}");
+        }
+        let plain = Process::of(&EstimateParams::dissertation());
+        let mut pieces = [1.0, 4.0, 9.0];
+        assert_eq!((plain.turning(0.5, &mut pieces), pieces), (7.0, [1.0; 3]));
     }
 
     #[test]
     fn the_integral_is_exact_enough() {
         let (knots, _) = Knots::over(0.0, 6.0, 0.5);
         let weights = weights::<12>();
-        let precision = precision(&EstimateParams::dissertation(), 0.0);
+        let process = Process::of(&EstimateParams::dissertation());
         let mut equations = Box::new(Equations::new());
         equations.clear(12);
-        let ours = add(&knots, &weights, &precision, &mut equations);
+        let ours = add(&knots, &weights, &process, &mut equations);
         let mut fine = 0.0;
         let steps = 4000;
         for i in 0..steps {
             let (values, slopes) = knots.shape((f64::from(i) + 0.5) / f64::from(steps));
             for piece in 0..knots.spans() {
-                let rows = residuals(&weights[piece..piece + SUPPORT], &values, &slopes);
-                for (row, precision) in rows.iter().zip(precision) {
+                let rows = residuals(&weights[piece..piece + SUPPORT], &values, &slopes, 0.0);
+                for (row, precision) in rows.iter().zip(process.precision) {
                     fine += 0.5 * precision * row.value * row.value;
                 }
             }

@@ -147,6 +147,7 @@ impl Returns {
                     .unwrap_or(core::cmp::Ordering::Equal)
             })
         });
+        self.length_m = self.measure();
         Some(Taken { first_s, last_s, unsound: returns.len() - count })
     }
 
@@ -157,14 +158,14 @@ impl Returns {
             *kept = Kept { position, origin: position, time_s, ..Kept::NONE };
             self.count += 1;
         }
+        self.length_m = self.measure();
     }
 
-    /// Computes every return's basis functions, and the object's length.
+    /// Computes every return's basis functions.
     pub fn lay(&mut self, knots: &Knots) {
         for kept in &mut self.kept[..self.count] {
             kept.basis = knots.basis(f64::from(kept.time_s));
         }
-        self.length_m = self.measure();
     }
 
     /// About how long the object is: the diagonal of what is seen of it in a glance, which four of

@@ -1,7 +1,7 @@
 //! First guess of the trajectory (2.5.3): splines fitted to the history of another tracker.
 
 use super::normal::{CLIMB, Equations, Z, planar, vertical};
-use super::process::{self, Weights};
+use super::process::{self, Process, Weights};
 use crate::objects::ObjectState;
 use crate::objects::spline::{Basis, Knots};
 
@@ -141,7 +141,7 @@ const OFF_M: f64 = 1.0;
 pub(super) fn smooth(
     knots: &Knots,
     history: &[ObjectState],
-    precision: &Weights,
+    process: &Process,
     equations: &mut Equations,
     weights: &mut [Weights],
     step: &mut [Weights],
@@ -150,7 +150,7 @@ pub(super) fn smooth(
     for n in 0..SMOOTHINGS {
         off = 0.0;
         equations.clear(knots.bases());
-        process::add(knots, weights, precision, equations);
+        process::add(knots, weights, process, equations);
         for state in unwrapped(history) {
             let now = knots.value(weights, state.time_s);
             let mut miss = elements(&state);

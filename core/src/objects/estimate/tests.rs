@@ -491,14 +491,17 @@ fn a_glance_tells_how_long_an_object_is() {
 #[test]
 fn what_is_long_is_sluggish() {
     let ours = EstimateParams::default();
-    let plain = precision(&EstimateParams { process_m: 0.0, ..ours }, 9.0);
     let by = |length_m: f32| {
-        let scaled = precision(&ours, length_m);
-        core::array::from_fn::<f64, 7, _>(|d| (1e6 * scaled[d] / plain[d]).round() / 1e6)
+        let of = ours.of(length_m);
+        let process: [f64; 7] = core::array::from_fn(|d| of.process[d] / ours.process[d]);
+        (process, [of.loose_m / ours.loose_m, of.basis_s / ours.basis_s], of.extent_m)
     };
-    assert_eq!(by(9.0), [1.0, 1.0, 1.0, 1.0, 4.0, 1.0, 4.0]);
-    assert_eq!(by(0.9), [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.04]);
+    let all = |speed, turn| [1.0, 1.0, 1.0, 1.0, speed, 1.0, turn];
+    assert_eq!(by(9.0), (all(0.5, 0.5), [1.0; 2], 9.0));
+    assert_eq!(by(2.25), (all(1.0, 2.0), [0.5, 2.0 / 3.0], 2.25));
     assert_eq!(by(500.0), by(30.0));
-    // Nothing is known of the length.
-    assert_eq!(by(0.0), [1.0; 7]);
+    assert_eq!(by(30.0).2, ours.extent_m);
+    // Nothing is known of the length, or nothing hangs on it.
+    assert_eq!(ours.of(0.0), ours);
+    assert_eq!(EstimateParams::dissertation().of(9.0), EstimateParams::dissertation());
 }

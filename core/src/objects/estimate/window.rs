@@ -59,6 +59,8 @@ const YOUNG_M: f64 = 0.15;
 /// Where its solves start, by turns. One end may be where the view ends, while the other moves.
 const STARTS: [Guess; 5] =
     [Guess::Rest, Guess::History, Guess::Seen(0.5), Guess::Seen(1.0), Guess::Seen(0.0)];
+/// Additional deviation of a return along a surface, m: its model points are few, however short it is.
+const LOOSE_M: f64 = 0.5;
 /// Iterations with a sweep.
 const ITERATIONS: usize = 2;
 /// Deviation of a state that is held: m, rad, m/s, rad/s.
@@ -370,6 +372,13 @@ impl FixedLag {
         estimator.returns.set(self.returns.iter().map(|held| (held.position, held.time_s)));
         estimator.returns.lay(&self.knots);
         estimator.active = 0..self.returns.len();
+        // Two iterations with a sweep do not find the other minima that hard turns bring.
+        let params = &EstimateParams {
+            loose_m: LOOSE_M,
+            extent_m: params.extent_m,
+            turn_s: f64::INFINITY,
+            ..params.of(estimator.returns.length_m()).plain()
+        };
         if young {
             self.estimate_young(estimator, params);
             return;
