@@ -303,3 +303,21 @@ fn across(spread: &Matrix3<f32>) -> f32 {
     let trace = spread.trace();
     if trace > 0.0 { (minor(0, 1) + minor(0, 2) + minor(1, 2)) / trace } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_told_from_a_surface() {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1);
+        let turned = |variances: [f32; 3]| {
+            let spread = Matrix3::from_diagonal(&variances.into());
+            across(&(turn * spread * turn.inverse()))
+        };
+        // One ring with its noise, two rings 0.3 m apart, a single return.
+        assert!(turned([0.5, 0.005, 0.005]) < LINE);
+        assert!(turned([0.5, 0.25, 0.005]) > LINE);
+        assert!(turned([0.0; 3]) < LINE);
+    }
+}

@@ -6,8 +6,8 @@
 //! [`crate::params::Profile::refinement_sweeps`] allows, starting from standing still, from what its
 //! tracklets predict, from the displacements most of its columns found by energy minimisation, and,
 //! where none of these fits, from a search ([`align`]). It moves where that explains the returns far
-//! better than standing still does, or, if it moved so before, somewhat better. Then all its columns move with it, those that the background
-//! filter took or that found no match too.
+//! better than standing still does, or, if it moved so before, somewhat better. Then all its columns
+//! move with it, those that the background filter took or that found no match too.
 
 mod align;
 mod cloud;
