@@ -311,6 +311,16 @@ fn columns(returns: &Returns) -> Vec<Column> {
 }
 
 fn run(refinement: &mut Refinement, pair: &[&Returns; 2], flows: &[Flow]) {
+    run_expecting(refinement, pair, flows, None);
+}
+
+/// The same where every tracklet predicts a displacement.
+fn run_expecting(
+    refinement: &mut Refinement,
+    pair: &[&Returns; 2],
+    flows: &[Flow],
+    expected: Option<[f32; 2]>,
+) {
     let [before, now] = pair.map(columns);
     let perceived = Perceived {
         before: &before,
@@ -322,7 +332,7 @@ fn run(refinement: &mut Refinement, pair: &[&Returns; 2], flows: &[Flow]) {
         proposal: &[] as &[Proposal],
     };
     let step = Step { side: SIDE as i32, ..Step::default() };
-    refinement.run(&Alone, &step, &perceived, |_| None);
+    refinement.run(&Alone, &step, &perceived, |_| expected);
 }
 
 type Moved = Option<([f32; 2], [f32; 3])>;
@@ -506,6 +516,37 @@ fn a_wall_that_seems_to_move_stands() {
     assert!(longest > EXTENT_MAX, "{longest}");
     let moves = |f: &Found| f.extent > EXTENT_MAX && f.moves;
     assert!(!refinement.things.found.iter().any(moves));
+}
+
+/// A long side slides along itself; only a few returns before it tell.
+#[test]
+fn what_moved_goes_on_by_less() {
+    let side = |moved: f32| {
+        let mut returns = Returns::flat();
+        for k in 0..100 {
+            let along = 12.0 + 0.4 * k as f32;
+            returns.add([along, 30.3, GROUND + 1.5], 0);
+            returns.add([along, 30.3, GROUND + 2.5], 0);
+        }
+        for k in 0..5 {
+            for n in 0..2 {
+                let (beside, height) = (29.4 - 0.35 * n as f32, GROUND + 1.2 + 0.4 * k as f32);
+                returns.add([30.2 + moved, beside, height], 0);
+            }
+        }
+        returns
+    };
+    let moving = |sweeps: &[Returns; 3], expected| {
+        let mut refinement = Box::new(Refinement::new());
+        sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
+        run_expecting(&mut refinement, &[&sweeps[1], &sweeps[2]], &no_flow(), expected);
+        motions(&refinement).iter().flatten().count()
+    };
+    let steady = [0.0, 1.2, 2.4].map(side);
+    let still = [0.0; 3].map(side);
+    assert_eq!(moving(&steady, None), 0);
+    assert!(moving(&steady, Some([1.2, 0.0])) > 40);
+    assert_eq!(moving(&still, Some([1.2, 0.0])), 0);
 }
 
 #[test]
