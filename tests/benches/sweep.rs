@@ -201,7 +201,7 @@ fn tracks(sweeps: &[SimSweep]) {
             let at = then.transform(DVec3::from_array(p.position.map(f64::from)));
             let time_s = s.stamp_s as f32 + p.offset_s;
             let [position, origin] = [at, then.translation].map(|v| v.as_vec3().to_array());
-            ObjectReturn { position, origin, time_s, sensor: p.sensor }
+            ObjectReturn { position, origin, time_s, ..ObjectReturn::default() }
         })
         .collect()
     };

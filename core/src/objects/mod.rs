@@ -8,6 +8,7 @@
 pub mod centroid_ekf;
 pub mod estimate;
 pub mod front_end;
+pub mod panorama;
 pub mod spline;
 
 /// Returns that a track keeps, and an estimate is made of, at most.
@@ -23,7 +24,10 @@ pub struct ObjectReturn {
     /// When, s after the track's start.
     pub time_s: f32,
     /// Sensor that saw it, index in [`crate::sweep::Rig::sensors`].
-    pub sensor: u32,
+    pub sensor: u8,
+    /// Whether the next rays pass it, to its left and to its right as the sensor sees it: there the
+    /// object ends. See [`panorama`].
+    pub passed: [bool; 2],
 }
 
 /// State of an object at a time (2.2).

@@ -92,6 +92,11 @@ impl Knots {
         self.start + (i as f64 - DEGREE as f64) * self.spacing
     }
 
+    /// Mean of the knots inside basis function `i`, s: splines with these for weights are the time.
+    pub fn centre(&self, i: usize) -> f64 {
+        self.knot(i) + 0.5 * SUPPORT as f64 * self.spacing
+    }
+
     /// The piece that `time` falls into, and how far into it, 0 to 1. The domain's ends hold what is
     /// outside it.
     fn locate(&self, time: f64) -> (usize, f64) {

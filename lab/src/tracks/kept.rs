@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// Counts changes of the simulator and of the format: files of another number are made anew.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// The sets of a seed from a folder, or simulated and left there.
 ///
@@ -65,7 +65,7 @@ fn write_object(out: &mut Vec<u8>, o: &Object) {
     for r in &o.returns {
         let numbers = r.position.into_iter().chain(r.origin).chain([r.time_s]);
         out.extend(numbers.flat_map(f32::to_le_bytes));
-        out.extend(r.sensor.to_le_bytes());
+        out.extend([r.sensor, u8::from(r.passed[0]), u8::from(r.passed[1])]);
     }
     count(out, o.batches.len());
     o.batches.iter().for_each(|b| count(out, b.end));
@@ -150,9 +150,10 @@ impl Left<'_> {
         for value in &mut v {
             *value = f32::from_le_bytes(self.chunk()?);
         }
-        let sensor = u32::from_le_bytes(self.chunk()?);
+        let [sensor, left, right] = self.chunk()?;
+        let passed = [left, right].map(|side| side != 0);
         let [x, y, z, ox, oy, oz, time_s] = v;
-        Some(ObjectReturn { position: [x, y, z], origin: [ox, oy, oz], time_s, sensor })
+        Some(ObjectReturn { position: [x, y, z], origin: [ox, oy, oz], time_s, sensor, passed })
     }
 
     fn moment(&mut self) -> Option<Moment> {

@@ -2,6 +2,7 @@
 
 use crate::labels::Kind;
 use glam::{DVec2, DVec3};
+use raywake_core::objects::panorama::Panorama;
 use raywake_core::objects::{ObjectReturn, ObjectState};
 use std::ops::Range;
 
@@ -39,7 +40,27 @@ pub struct Seen {
     /// When, s in the drive.
     pub time_s: f64,
     /// As the rig counts them.
-    pub sensor: u32,
+    pub sensor: u8,
+    /// See [`ObjectReturn::passed`].
+    pub passed: [bool; 2],
+}
+
+/// Finds where rays pass the returns of a sweep that are asked for.
+pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
+    let mut panorama = Box::new(Panorama::new());
+    let ends = |s: &Seen| [[0.0; 3], (s.at - s.from).as_vec3().to_array()];
+    for sensor in 0..seen.iter().map(|s| s.sensor + 1).max().unwrap_or(0) {
+        panorama.clear();
+        for [from, to] in seen.iter().filter(|s| s.sensor == sensor).map(ends) {
+            panorama.add(from, to);
+        }
+        for (n, seen) in seen.iter_mut().enumerate() {
+            if seen.sensor == sensor && wanted(n) {
+                let [from, to] = ends(seen);
+                seen.passed = panorama.passed(from, to);
+            }
+        }
+    }
 }
 
 impl Seen {
@@ -51,6 +72,7 @@ impl Seen {
             origin: local(self.from),
             time_s: (self.time_s - start_s) as f32,
             sensor: self.sensor,
+            passed: self.passed,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Labelled objects of a recorded drive.
 
-use super::object::{Moment, Object, Seen, centroid};
+use super::object::{Moment, Object, Seen, centroid, look_beside};
 use crate::labels::{self, Labels, Motion, Track, Trajectory, trajectories, turn};
 use glam::DVec3;
 use raywake::error::Error;
@@ -73,7 +73,8 @@ fn gather(
     trajectories: &[Trajectory],
     gathered: &mut [Gathered],
 ) {
-    let seen: Vec<Seen> = sweep.points.iter().filter_map(|p| seen(rig, sweep, p)).collect();
+    let mut seen: Vec<Seen> = sweep.points.iter().filter_map(|p| seen(rig, sweep, p)).collect();
+    look_beside(&mut seen, |_| true);
     for ((track, trajectory), gathered) in labels.tracks.iter().zip(trajectories).zip(gathered) {
         let (Some(labelled), Some(state)) =
             (track.boxes.get(&sweep.frame), trajectory.at(sweep.frame))
@@ -109,7 +110,7 @@ fn seen(rig: &Rig, sweep: &SweepData, point: &Point) -> Option<Seen> {
     let place = if rig.distorted { moved } else { sweep.world_from_vehicle };
     let from = moved.transform(sensor.translation);
     let (at, time_s) = (place.transform(at), sweep.stamp_s + offset_s);
-    Some(Seen { at, from, time_s, sensor: point.sensor })
+    Some(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] })
 }
 
 /// Time of a return after the sweep's stamp, s.

@@ -1,6 +1,6 @@
 //! Objects of simulated drives past parked and moving traffic, seen by four HDL-32E.
 
-use super::object::{Moment, Object, Seen};
+use super::object::{Moment, Object, Seen, look_beside};
 use crate::labels::{Kind, kind, turn};
 use crate::simulate::truth::class_name;
 use glam::DVec3;
@@ -221,18 +221,21 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
     let rig = drive.rig();
     // All beams of a column have one time.
     let mut poses = HashMap::new();
-    for (point, truth) in sweep.points.iter().zip(&sweep.truth) {
-        if truth.object == 0 {
-            continue;
-        }
+    let mut all = Vec::with_capacity(sweep.points.len());
+    for point in &sweep.points {
         let time_s = sweep.stamp_s + f64::from(point.offset_s);
         let pose = *poses
             .entry(point.offset_s.to_bits())
             .or_insert_with(|| drive.world_from_vehicle(time_s));
         let at = pose.transform(DVec3::from_array(point.position.map(f64::from)));
         let from = pose.transform(rig.sensors[point.sensor as usize].translation);
-        let sensor = point.sensor;
-        seen.entry(truth.object).or_default().push(Seen { at, from, time_s, sensor });
+        all.push(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] });
+    }
+    look_beside(&mut all, |n| sweep.truth[n].object != 0);
+    for (one, truth) in all.into_iter().zip(&sweep.truth) {
+        if truth.object != 0 {
+            seen.entry(truth.object).or_default().push(one);
+        }
     }
 }
 
@@ -291,7 +294,7 @@ mod tests {
         let seen = |batches: &[(usize, usize)]| -> Vec<Seen> {
             let of = |&(b, n): &(usize, usize)| {
                 let (at, from, time_s) = (DVec3::ZERO, DVec3::ZERO, stamp_s(b));
-                std::iter::repeat_n(Seen { at, from, time_s, sensor: 0 }, n)
+                std::iter::repeat_n(Seen { at, from, time_s, sensor: 0, passed: [false; 2] }, n)
             };
             batches.iter().flat_map(of).collect()
         };

@@ -5,7 +5,8 @@
 //! passes: in every part of the track the foremost and the hindmost return lie at the same two places
 //! of the object, unless something hides them. Both places are unknowns, eliminated as a model point
 //! is. A return that falls short of its end counts for less than one beyond it, as the end may be
-//! hidden; hardly at all where the sensor looks along the object from its other end.
+//! hidden, unless rays pass there; hardly at all where the sensor looks along the object from its other
+//! end.
 
 use super::normal::{Equations, Seen, Surface, follow};
 use super::process::Weights;
@@ -28,13 +29,25 @@ const HIDDEN_M: f64 = 1.0;
 const SHORT: f64 = 0.3;
 /// Slope of the view, across to along, from which on the far end is believed to be seen.
 const SLOPE: f64 = 0.3;
+/// Rays pass an end where they pass a return no further from it, m.
+const END_M: f64 = 0.5;
 /// Precision of an end without returns, 1/m²: none.
 const LOOSE: f64 = 1e-6;
+
+/// Whether rays pass a return on the side on which the object's front (0) or rear (1) is.
+fn passes(kept: &Kept, seen: &Seen, end: usize) -> bool {
+    let [_, y, _] = seen.frame(kept.origin_from_return());
+    let origin = seen.place()[1];
+    // Seen from its left, an object has its front on the left.
+    kept.passed[if y > origin { end } else { 1 - end }]
+}
 
 /// The returns that are foremost and hindmost in their part of the track.
 pub(super) struct Ends {
     kept: [[Kept; PARTS]; 2],
     seen: [[Seen; PARTS]; 2],
+    /// Whether rays pass there: nothing hides the end.
+    open: [[bool; PARTS]; 2],
     order: [u16; PARTS],
     count: usize,
     precision: f64,
@@ -51,6 +64,7 @@ impl Ends {
         Ends {
             kept: [[Kept::NONE; PARTS]; 2],
             seen: [[Seen::NONE; PARTS]; 2],
+            open: [[false; PARTS]; 2],
             order,
             count: 0,
             precision: 0.0,
@@ -82,6 +96,10 @@ impl Ends {
                 for (end, i) in [last, first].into_iter().enumerate() {
                     self.kept[end][self.count] = kept[i];
                     self.seen[end][self.count] = seen[i];
+                    self.open[end][self.count] = (from..to).any(|n| {
+                        let off = libm::fabs(along(n) - along(i));
+                        off < END_M && passes(&kept[n], &seen[n], end)
+                    });
                 }
                 self.count += 1;
             }
@@ -135,8 +153,8 @@ impl Ends {
         for (end, &at) in ends.iter().enumerate() {
             let surface = self.surface(at);
             let forward = if end == 0 { 1.0 } else { -1.0 };
-            let all = self.seen[end].iter_mut().zip(&self.kept[end]);
-            for (seen, kept) in all.take(self.count) {
+            let all = self.seen[end].iter_mut().zip(&self.kept[end]).zip(&self.open[end]);
+            for ((seen, kept), &open) in all.take(self.count) {
                 seen.lay(&[at, 0.0, 0.0], &surface, 0.0);
                 let miss = forward * (seen.place()[0] - f64::from(at));
                 let [x, y, _] = seen.frame(kept.origin_from_return());
@@ -144,11 +162,12 @@ impl Ends {
                 // Seen from its own side, or from the side.
                 let slope = if ahead < 0.0 { libm::fabs(y) / -ahead } else { SLOPE };
                 let view = (slope / SLOPE).min(1.0);
-                let counts = view * view * if miss < 0.0 { SHORT } else { 1.0 };
+                let hidden = miss < 0.0 && !open;
+                let counts = view * view * if hidden { SHORT } else { 1.0 };
                 let off = libm::fabs(miss);
                 let precision = self.precision * counts;
-                // Bounded slope beyond the end, bounded cost before it.
-                let (share, square) = if miss < 0.0 {
+                // Bounded slope beyond the end, bounded cost before it where it may be hidden.
+                let (share, square) = if hidden {
                     let fall = 1.0 / (1.0 + off * off / (HIDDEN_M * HIDDEN_M));
                     (fall * fall, off * off * fall)
                 } else if off < BOUND_M {

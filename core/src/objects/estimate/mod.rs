@@ -19,8 +19,9 @@
 //!
 //! The plain method stays where its start puts it: the visible face of an object changes as one
 //! passes it, a history of centroids slides along, and the model takes up two shifted copies of one
-//! face (figure 2.9). What cures that: where the object ends ([`EstimateParams::ends_m`]), more starts
-//! than one ([`EstimateParams::starts`]), a start that grows from the middle of the track over a sparse
+//! face (figure 2.9). What cures that: where the object ends ([`EstimateParams::ends_m`]), and that rays
+//! pass there ([`crate::objects::panorama`]), more starts than one ([`EstimateParams::starts`]), found by
+//! a search over velocities ([`steady`]), a start that grows from the middle of the track over a sparse
 //! model ([`EstimateParams::grows`]), returns that weigh across surfaces
 //! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and
 //! a robust loss are for bad input. `raywake-lab eval tracks` measures each of these by itself.
@@ -38,6 +39,7 @@ mod process;
 mod report;
 mod returns;
 mod start;
+mod steady;
 #[cfg(test)]
 mod synthetic;
 mod system;
@@ -58,6 +60,7 @@ pub use params::EstimateParams;
 use process::{Process, Weights};
 pub use report::{Cost, Report, Start, Stop};
 use returns::Returns;
+use steady::Search;
 
 /// Model points at most.
 pub const MODEL_MAX: usize = 3000;
@@ -82,8 +85,8 @@ const GROWTH_FIRST_ITERATIONS: usize = 6;
 const GROWTH_ROUNDS: usize = 2;
 const GROWTH_ITERATIONS: usize = 2;
 
-/// What may as well rest, rests: so much more than motion it may cost.
-const RESTS: f64 = 1.05;
+/// Half the time about the middle of a track over which its motion is taken as steady for a start, s.
+const STEADY_S: f32 = 1.5;
 
 /// A trajectory with its shape.
 struct Solution {
@@ -140,6 +143,7 @@ pub struct Estimator {
     ends: Ends,
     equations: Equations,
     step: [Weights; BASES_MAX],
+    search: Search,
 }
 
 impl Default for Estimator {
@@ -166,6 +170,7 @@ impl Estimator {
             ends: Ends::new(),
             equations: Equations::new(),
             step: [[0.0; 7]; BASES_MAX],
+            search: Search::new(),
         }
     }
 
@@ -203,26 +208,20 @@ impl Estimator {
         }
         self.run(params, &mut report);
         self.best.copy(&self.now);
-        if params.starts && !report.no_history {
+        if params.starts {
             let mut least = self.cost_with_ends(params, &report);
-            for from in [Start::Rest, Start::Ends] {
-                let n = knots.bases();
-                match from {
-                    Start::Rest => _ = start::stand(history, &mut self.now.weights[..n]),
-                    _ if !self.start_from_ends(params, history, &[0.5, 1.0, 0.0]) => continue,
-                    _ => {}
+            for (from, by_s) in [(Start::Steady, f32::MAX), (Start::Middle, STEADY_S)] {
+                if !self.start_steady(by_s) {
+                    continue;
                 }
                 let mut other = Report { from, ..report.clone() };
                 self.run(params, &mut other);
                 let cost = self.cost_with_ends(params, &other);
-                let allowed = if from == Start::Rest { RESTS } else { 1.0 };
-                if cost < allowed * least {
+                if cost < least {
                     (report, least) = (other, cost);
                     self.best.copy(&self.now);
                 }
             }
-        }
-        if params.starts {
             self.face_forward();
         }
         self.unwind();
@@ -301,46 +300,19 @@ impl Estimator {
         true
     }
 
-    /// First trajectory by where the object's returns end in every part of the track, wherever on it
-    /// most of them are: by what lies at one of these shares of the way from the hindmost to the
-    /// foremost, whichever moves most like an object. False where there are none.
-    fn start_from_ends(
-        &mut self,
-        params: &EstimateParams,
-        history: &[ObjectState],
-        shares: &[f64],
-    ) -> bool {
-        self.start(params, history);
-        self.active = 0..self.returns.all().len();
+    /// The steady motion of the returns of so long, s, before and after the middle one. False where
+    /// they have none.
+    fn start_steady(&mut self, by_s: f32) -> bool {
         let kept = self.returns.all();
-        for (kept, seen) in kept.iter().zip(&mut self.seen) {
-            *seen = Seen::look(&self.now.weights, kept);
+        let part = steady::within(kept, kept[kept.len() / 2].time_s, by_s);
+        let Some(steady) = self.search.find(part, self.returns.length_m()) else { return false };
+        let ([x, y, z], [vx, vy]) = (steady.position, steady.velocity);
+        let (heading, speed) = (libm::atan2(vy, vx), libm::hypot(vx, vy));
+        for (k, weights) in self.now.weights[..self.knots.bases()].iter_mut().enumerate() {
+            let after = self.knots.centre(k) - steady.time_s;
+            *weights = [x + after * vx, y + after * vy, z, heading, speed, 0.0, 0.0];
         }
-        self.ends.find(kept, &self.seen, params.ends_m);
-        let n = self.knots.bases();
-        let begun = self.now.weights;
-        let mut least = f64::MAX;
-        for &share in shares {
-            let places = self.ends.places(&self.knots, &begun, share);
-            if places.is_empty() {
-                return false;
-            }
-            let weights = &mut self.before.weights;
-            *weights = begun;
-            let off = start::smooth(
-                &self.knots,
-                &places,
-                &Process::of(&params.plain()),
-                &mut self.equations,
-                &mut weights[..n],
-                &mut self.step,
-            );
-            if let Some(off) = off.filter(|off| *off < least) {
-                least = off;
-                self.now.weights = *weights;
-            }
-        }
-        least < f64::MAX
+        true
     }
 
     /// At rest where the returns are on average.

@@ -450,9 +450,9 @@ mod tests {
                 let time = 3.5 * f64::from(i) / 90.0;
                 Kept {
                     position: [0, 1, 2].map(|_| random.between(-3.0, 3.0)),
-                    origin: [0.0; 3],
                     time_s: time as f32,
                     basis: knots.basis(time),
+                    ..Kept::NONE
                 }
             })
             .collect();

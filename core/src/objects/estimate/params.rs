@@ -47,7 +47,8 @@ pub struct EstimateParams {
     pub surfaces: bool,
     /// Additional deviation along a surface, m; with `surfaces`.
     pub loose_m: f64,
-    /// The start is smoothed with the process model, and one at rest is tried beside it.
+    /// The start is smoothed with the process model, and steady motions that lay the returns over each
+    /// other are tried beside it.
     pub starts: bool,
     /// Deviation of a return at an end of the object, m; 0 to leave ends out. They lead the first
     /// iterations, as many again; then the returns know better. See [`ends`].

@@ -42,10 +42,10 @@ pub enum Start {
     /// The tracker's history.
     #[default]
     History,
-    /// At rest.
-    Rest,
-    /// Where the returns of every part of the track end.
-    Ends,
+    /// The steady motion that lays all returns over each other.
+    Steady,
+    /// That of the middle of the track.
+    Middle,
 }
 
 /// How a solve went.

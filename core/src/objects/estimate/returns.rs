@@ -25,6 +25,8 @@ pub(super) struct Kept {
     /// Where its ray began.
     pub origin: [f32; 3],
     pub time_s: f32,
+    /// See [`ObjectReturn::passed`].
+    pub passed: [bool; 2],
     pub basis: Basis,
 }
 
@@ -33,6 +35,7 @@ impl Kept {
         position: [0.0; 3],
         origin: [0.0; 3],
         time_s: 0.0,
+        passed: [false; 2],
         basis: Basis { first: 0, values: [0.0; 5] },
     };
 
@@ -129,6 +132,7 @@ impl Returns {
                         position: seen.position,
                         origin: seen.origin,
                         time_s: seen.time_s,
+                        passed: seen.passed,
                         ..Kept::NONE
                     };
                 }

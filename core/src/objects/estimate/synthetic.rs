@@ -157,15 +157,22 @@ pub fn drive(plan: Plan) -> Drive {
                 for beam in 0..32 {
                     let elevation = (-30.67 + 1.333 * beam as f64 + 0.1).to_radians();
                     let (es, ec) = elevation.sin_cos();
-                    let along = [ec * (c * hc + s * hs), ec * (s * hc - c * hs), es];
-                    let Some(range) = hit(&boxes, local, along) else { continue };
+                    let ray = |azimuth: f64| {
+                        let (s, c) = azimuth.sin_cos();
+                        [ec * (c * hc + s * hs), ec * (s * hc - c * hs), es]
+                    };
+                    let Some(range) = hit(&boxes, local, ray(azimuth)) else { continue };
+                    let step = std::f64::consts::TAU / AZIMUTHS as f64;
+                    let passes =
+                        |side: f64| hit(&boxes, local, ray(azimuth + side * step)).is_none();
                     let range = range + 0.015 * random.normal();
                     let at = [ec * c * range, ec * s * range, es * range];
                     out.returns.push(ObjectReturn {
                         position: [0, 1, 2].map(|i| (from[i] + at[i]) as f32),
                         origin: from.map(|v| v as f32),
                         time_s: time as f32,
-                        sensor: sensor as u32,
+                        sensor: sensor as u8,
+                        passed: [1.0, -1.0].map(passes),
                     });
                 }
             }

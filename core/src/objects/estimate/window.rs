@@ -13,7 +13,7 @@
 //! [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
 
 use super::normal::{Scatter, Seen, Surface};
-use super::process::Weights;
+use super::process::{Process, Weights};
 use super::returns;
 use super::start;
 use super::{Cost, EstimateParams, Estimator, Known, Report};
@@ -321,6 +321,7 @@ impl FixedLag {
                 origin: held.position,
                 time_s: held.time_s,
                 basis: self.knots.basis(f64::from(held.time_s)),
+                ..super::returns::Kept::NONE
             };
             let place = Seen::look(&self.weights, &kept).place();
             point.held = (point.held + 1.0).min(HELD_RETURNS);
@@ -456,7 +457,19 @@ impl FixedLag {
                 }
             }
             Guess::History => _ = estimator.start(params, &self.history),
-            Guess::Seen(share) => _ = estimator.start_from_ends(params, &self.history, &[share]),
+            Guess::Seen(share) => {
+                estimator.start(params, &self.history);
+                let Estimator { knots, returns, seen, ends, now, equations, step, .. } = estimator;
+                for (kept, seen) in returns.all().iter().zip(seen.iter_mut()) {
+                    *seen = Seen::look(&now.weights, kept);
+                }
+                ends.find(returns.all(), seen, params.ends_m);
+                let places = ends.places(knots, &now.weights, share);
+                if !places.is_empty() {
+                    let weights = &mut now.weights[..knots.bases()];
+                    start::smooth(knots, &places, &Process::of(params), equations, weights, step);
+                }
+            }
         }
     }
 

@@ -21,7 +21,9 @@ pub(super) struct Seen {
     /// s after the batch's stamp.
     pub time_s: f32,
     /// Index of the sensor.
-    pub sensor: u32,
+    pub sensor: u8,
+    /// Whether rays pass to its left and right, once they have been looked at.
+    pub passed: [bool; 2],
     /// Over ground by the flow, m/s, as far as it tells.
     pub velocity: Option<[f32; 2]>,
 }
@@ -153,7 +155,9 @@ impl Batch {
                 at,
                 origin: place.origins[point.sensor as usize],
                 time_s: (after_s + offset_s) as f32,
-                sensor: point.sensor,
+                // Admitted: there is such a sensor, and there are few.
+                sensor: point.sensor as u8,
+                passed: [false; 2],
                 velocity,
             };
             self.dropped.over_capacity += self.returns.push(seen).is_err() as u64;

@@ -28,6 +28,7 @@ pub use cells::GroundMap;
 pub use track::{HISTORY_MAX, LATEST_MAX, Life, Thinned, Track};
 
 use super::centroid_ekf::{CentroidEkf, CentroidParams};
+use super::panorama::Panorama;
 use crate::params::COLUMNS_MAX;
 use crate::prepare::Dropped;
 use crate::record::NONE;
@@ -148,6 +149,7 @@ pub struct FrontEnd {
     cells: Cells,
     chunks: Chunks,
     assignment: Assignment,
+    panorama: Panorama,
     /// Slots of the tracks that may be continued: the rows of the assignment.
     rows: heapless::Vec<u32, TRACKS_MAX>,
     /// Segments without a track.
@@ -172,6 +174,7 @@ impl FrontEnd {
             cells: Cells::new(),
             chunks: Chunks::new(),
             assignment: Assignment::new(),
+            panorama: Panorama::new(),
             rows: heapless::Vec::new(),
             free: heapless::Vec::new(),
             slot_of_segment: [NONE; SEGMENTS_MAX],
@@ -209,6 +212,7 @@ impl FrontEnd {
             self.segment(params, map, &mut turnover);
             self.associate(params, tracks);
             self.advance(params, tracks, &mut turnover);
+            self.look_beside();
             self.distribute(tracks);
         }
         self.batch.clear();
@@ -219,6 +223,22 @@ impl FrontEnd {
     pub fn finish(&mut self, tracks: &mut [Track]) -> u32 {
         tracks.iter_mut().filter(|t| t.life == Life::Ended).for_each(Track::free);
         end(tracks, |_| true)
+    }
+
+    /// Finds where rays pass the returns of segments.
+    fn look_beside(&mut self) {
+        let sensors = self.batch.returns.iter().map(|s| s.sensor + 1).max().unwrap_or(0);
+        for sensor in 0..sensors {
+            self.panorama.clear();
+            for seen in self.batch.returns.iter().filter(|s| s.sensor == sensor) {
+                self.panorama.add(seen.origin, seen.at);
+            }
+            for (n, seen) in self.batch.returns.iter_mut().enumerate() {
+                if seen.sensor == sensor && self.chunks.segment_of(n).is_some() {
+                    seen.passed = self.panorama.passed(seen.origin, seen.at);
+                }
+            }
+        }
     }
 
     fn segment(
@@ -330,7 +350,7 @@ impl FrontEnd {
             if let Some(track) = tracks.get_mut(slot as usize) {
                 let time_s = self.last_s + seen.time_s as f64;
                 let world = |v: [f32; 3]| from_corner(&self.batch, v.map(f64::from));
-                track.keep(time_s, world(seen.at), world(seen.origin), seen.sensor);
+                track.keep(time_s, world(seen.at), world(seen.origin), seen);
             }
         }
     }

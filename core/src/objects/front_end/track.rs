@@ -1,5 +1,6 @@
 //! What is kept of an object from its birth to its end.
 
+use super::batch::Seen;
 use crate::objects::centroid_ekf::{CentroidEkf, CentroidParams};
 use crate::objects::{ObjectReturn, ObjectState, RETURNS_MAX};
 
@@ -190,13 +191,14 @@ impl Track {
     }
 
     /// Keeps a return that lies and began at places in the world.
-    pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], sensor: u32) {
+    pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], seen: &Seen) {
         let place = |at| self.place(at).map(|v| v as f32);
         let seen = ObjectReturn {
             position: place(at),
             origin: place(origin),
             time_s: (time_s - self.start_s) as f32,
-            sensor,
+            sensor: seen.sensor,
+            passed: seen.passed,
         };
         self.returns.push(seen);
         self.latest.push(seen);

@@ -1,0 +1,184 @@
+//! Free space beside what a sensor sees: rays that pass an object and end farther away.
+//!
+//! Where an object ends and where it is only hidden by another look alike in its own returns; the
+//! rays next to it know. Directions from a sensor are binned by azimuth and rise, and each bin holds
+//! the nearest and the farthest return.
+
+/// Bins of a turn; they are as wide as 0.22 to 0.45 degrees.
+const AZIMUTHS: usize = 1024;
+/// Bins of the rise, height over distance on the plane, from the lowest on.
+const RISES: usize = 64;
+const LOWEST: f32 = -0.6;
+const RISE: f32 = 0.015;
+/// Bins beside a return whose rays may pass.
+const BESIDE: usize = 3;
+/// What is farther by more than this is something else, m, and by so much more for every metre of
+/// distance: a side that is seen at a slant goes on that far.
+const MARGIN_M: f32 = 1.0;
+const SLANT: f32 = 0.05;
+/// So many times as many must pass as end at the thing, or before it.
+const NEARLY_ALL: usize = 3;
+
+/// Nearest and farthest distance, m; none has the first beyond the second.
+type Reach = [f32; 2];
+const NOTHING: Reach = [f32::INFINITY, 0.0];
+
+/// What a sensor sees around it in some 100 ms.
+pub struct Panorama {
+    reach: [[Reach; RISES]; AZIMUTHS],
+}
+
+impl Default for Panorama {
+    fn default() -> Panorama {
+        Panorama::new()
+    }
+}
+
+impl Panorama {
+    /// Nothing seen. 512 KB: keep it in a box.
+    pub const fn new() -> Panorama {
+        Panorama { reach: [[NOTHING; RISES]; AZIMUTHS] }
+    }
+
+    /// For the next sensor.
+    pub fn clear(&mut self) {
+        self.reach.fill([NOTHING; RISES]);
+    }
+
+    /// Adds a return, from where its ray began.
+    pub fn add(&mut self, from: [f32; 3], to: [f32; 3]) {
+        let Some(Direction { azimuth, rise, range }) = direction(from, to) else { return };
+        let [near, far] = &mut self.reach[azimuth][rise];
+        (*near, *far) = (near.min(range), far.max(range));
+    }
+
+    /// Whether the next rays to the left and to the right of a return, as the sensor sees it, pass
+    /// what it is of: over the whole height of that, nearly all that end, end farther away. Through a
+    /// window or between wheels only some do.
+    pub fn passed(&self, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
+        let Some(Direction { azimuth, range, .. }) = direction(from, to) else {
+            return [false; 2];
+        };
+        let farther = range + MARGIN_M + SLANT * range;
+        [1, AZIMUTHS - 1].map(|step| {
+            let beside: [_; BESIDE] =
+                core::array::from_fn(|n| &self.reach[(azimuth + (n + 1) * step) % AZIMUTHS]);
+            let (mut pass, mut end) = (0, 0);
+            for (rise, [near, far]) in self.reach[azimuth].iter().enumerate() {
+                if *near > range + MARGIN_M || *far < range - MARGIN_M {
+                    continue;
+                }
+                let level = || beside.iter().map(|bins| bins[rise]);
+                if level().any(|[near, _]| near < farther) {
+                    end += 1;
+                } else if level().any(|[_, far]| far > farther) {
+                    pass += 1;
+                }
+            }
+            pass > NEARLY_ALL * end
+        })
+    }
+}
+
+struct Direction {
+    azimuth: usize,
+    rise: usize,
+    /// Along the plane, m.
+    range: f32,
+}
+
+/// None beneath and above what is binned, and for what is no number.
+fn direction(from: [f32; 3], to: [f32; 3]) -> Option<Direction> {
+    let [x, y, z]: [f32; 3] = core::array::from_fn(|d| to[d] - from[d]);
+    let range = libm::sqrtf(x * x + y * y);
+    let rise = (z / range - LOWEST) / RISE;
+    if !(range > 0.0 && range.is_finite() && (0.0..RISES as f32).contains(&rise)) {
+        return None;
+    }
+    // Grows with the azimuth from 0 to 4, without a trigonometric function.
+    let share = y / (x.abs() + y.abs());
+    let quarters = match (x < 0.0, y < 0.0) {
+        (true, _) => 2.0 - share,
+        (false, true) => 4.0 + share,
+        (false, false) => share,
+    };
+    let azimuth = ((quarters * (AZIMUTHS / 4) as f32) as usize).min(AZIMUTHS - 1);
+    Some(Direction { azimuth, rise: rise as usize, range })
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    const FROM: [f32; 3] = [3.0, -2.0, 1.8];
+    const BEAMS: [f32; 5] = [-0.06, -0.04, -0.02, 0.0, 0.02];
+
+    fn at(degrees: f32, beam: usize, range: f32) -> [f32; 3] {
+        let (s, c) = degrees.to_radians().sin_cos();
+        [FROM[0] + range * c, FROM[1] + range * s, FROM[2] + range * BEAMS[beam]]
+    }
+
+    /// A wall at 40 m, an object at 20 m from 10 degrees before to 10 degrees behind `middle`, but
+    /// for what is seen of other things by a beam and so many degrees off.
+    fn scene(middle: f32, other: impl Fn(usize, f32) -> Option<f32>) -> Box<Panorama> {
+        let mut panorama = Box::new(Panorama::new());
+        for n in 0..1800 {
+            let degrees = 0.2 * n as f32;
+            let off = (degrees - middle + 540.0) % 360.0 - 180.0;
+            for beam in 0..BEAMS.len() {
+                let range = other(beam, off).unwrap_or(if off.abs() < 10.1 { 20.0 } else { 40.0 });
+                panorama.add(FROM, at(degrees, beam, range));
+            }
+        }
+        panorama
+    }
+
+    #[test]
+    fn rays_pass_at_the_ends_of_an_object_alone() {
+        for middle in [0.0, 45.0, 90.0, 179.0, 230.0, 300.0] {
+            let panorama = scene(middle, |_, _| None);
+            for beam in 0..BEAMS.len() {
+                let passed = |off: f32| panorama.passed(FROM, at(middle + off, beam, 20.0));
+                assert_eq!(passed(10.0), [true, false], "{middle}");
+                assert_eq!(passed(-10.0), [false, true], "{middle}");
+                assert_eq!(passed(0.0), [false, false], "{middle}");
+            }
+        }
+    }
+
+    #[test]
+    fn none_pass_where_something_is_before_it_or_beside() {
+        for range in [8.0, 20.5] {
+            let panorama = scene(60.0, |_, off| (9.1..15.0).contains(&off).then_some(range));
+            assert_eq!(panorama.passed(FROM, at(60.0 + 9.0, 1, 20.0)), [false, false]);
+            assert_eq!(panorama.passed(FROM, at(60.0 - 10.0, 1, 20.0)), [false, true]);
+        }
+    }
+
+    #[test]
+    fn a_window_is_no_end() {
+        let window = |beam, off: f32| (beam == 2 && off.abs() < 2.9).then_some(40.0);
+        let panorama = scene(60.0, window);
+        for beam in 0..BEAMS.len() {
+            assert_eq!(panorama.passed(FROM, at(60.0 - 3.0, beam, 20.0)), [false, false]);
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_known_nothing_passes() {
+        let mut panorama = scene(60.0, |_, _| None);
+        panorama.clear();
+        assert_eq!(panorama.passed(FROM, at(70.0, 1, 20.0)), [false; 2]);
+        for odd in [[f32::NAN; 3], FROM, [FROM[0], FROM[1], 9.0], [3.1, -2.0, 90.0], [f32::MAX; 3]]
+        {
+            panorama.add(FROM, odd);
+            assert_eq!(panorama.passed(FROM, odd), [false; 2]);
+        }
+        let seen: Vec<_> =
+            panorama.reach.iter().flatten().filter(|reach| **reach != NOTHING).collect();
+        assert!(seen.is_empty(), "{seen:?}");
+    }
+}
