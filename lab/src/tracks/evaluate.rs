@@ -28,7 +28,7 @@ pub enum Method {
 }
 
 /// The trackers of the tables and their names: those of the dissertation, then each option by itself.
-pub fn methods() -> [(&'static str, Method); 15] {
+pub fn methods() -> [(&'static str, Method); 17] {
     let of =
         |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
     let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
@@ -45,10 +45,12 @@ pub fn methods() -> [(&'static str, Method); 15] {
             Method::Proposed(EstimateParams { carves: true, ..printed }),
         ),
         ("ours without ends", Method::Proposed(EstimateParams { ends_m: 0.0, ..ours })),
+        ("ours without passing rays", Method::Proposed(EstimateParams { passing: false, ..ours })),
         ("ours not carved", Method::Proposed(EstimateParams { carves: false, ..ours })),
         ("ours not grown", Method::Proposed(EstimateParams { grows: false, ..ours })),
         ("ours from one start", Method::Proposed(EstimateParams { starts: false, ..ours })),
         ("ours without surfaces", Method::Proposed(EstimateParams { surfaces: false, ..ours })),
+        ("ours, Gaussian turns", Method::Proposed(EstimateParams { tails: 0.0, ..ours })),
         ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]

@@ -20,7 +20,7 @@
 //! The plain method stays where its start puts it: the visible face of an object changes as one
 //! passes it, a history of centroids slides along, and the model takes up two shifted copies of one
 //! face (figure 2.9). What cures that: where the object ends ([`EstimateParams::ends_m`]), and that rays
-//! pass there ([`crate::objects::panorama`]), more starts than one ([`EstimateParams::starts`]), found by
+//! pass there ([`EstimateParams::passing`]), more starts than one ([`EstimateParams::starts`]), found by
 //! a search over velocities ([`steady`]), a start that grows from the middle of the track over a sparse
 //! model ([`EstimateParams::grows`]), returns that weigh across surfaces
 //! ([`EstimateParams::surfaces`]), rays through model points ([`EstimateParams::carves`]). Damping and
@@ -71,22 +71,6 @@ pub const ITERATIONS_MAX: usize = 64;
 const LEAST_PIVOT: f64 = 1e-10;
 /// A solve has converged when an iteration gains no more than this share of the cost.
 const CONVERGED: f64 = 1e-4;
-
-/// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
-/// and how many steps may lead over a track; deviation of returns and model points meanwhile. A
-/// sparse model lets a trajectory slide into place where a dense one holds it.
-const GROWTH_S: f64 = 0.2;
-const GROWTHS_MAX: f64 = 64.0;
-const GROWTH_M: f64 = 0.15;
-const GROWTH_POINTS: usize = 75;
-/// Models that are made of what is seen by then, and iterations with each.
-const GROWTH_FIRST_ROUNDS: usize = 6;
-const GROWTH_FIRST_ITERATIONS: usize = 6;
-const GROWTH_ROUNDS: usize = 2;
-const GROWTH_ITERATIONS: usize = 2;
-
-/// Half the time about the middle of a track over which its motion is taken as steady for a start, s.
-const STEADY_S: f32 = 1.5;
 
 /// A trajectory with its shape.
 struct Solution {
@@ -187,7 +171,7 @@ impl Estimator {
         self.known = None;
         self.best.weights.fill([0.0; 7]);
         self.best.points = 0;
-        let Some(taken) = self.returns.take(returns, params.returns) else {
+        let Some(taken) = self.returns.take(returns, params.returns, params.passing) else {
             report.unsound = returns.len();
             return report;
         };
@@ -210,7 +194,7 @@ impl Estimator {
         self.best.copy(&self.now);
         if params.starts {
             let mut least = self.cost_with_ends(params, &report);
-            for (from, by_s) in [(Start::Steady, f32::MAX), (Start::Middle, STEADY_S)] {
+            for (from, by_s) in [(Start::Steady, f32::MAX), (Start::Middle, start::STEADY_S)] {
                 if !self.start_steady(by_s) {
                     continue;
                 }
@@ -279,54 +263,6 @@ impl Estimator {
         report.costs.last().map_or(f64::MAX, Cost::total) + ends
     }
 
-    /// First trajectory of a solve. False where there is no history.
-    fn start(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
-        let n = self.knots.bases();
-        let weights = &mut self.now.weights[..n];
-        if !start::fit(&self.knots, history, &mut self.equations, weights, &mut self.step) {
-            self.stand_at_mean();
-            return false;
-        }
-        if params.starts {
-            start::smooth(
-                &self.knots,
-                history,
-                &Process::of(&params.plain()),
-                &mut self.equations,
-                weights,
-                &mut self.step,
-            );
-        }
-        true
-    }
-
-    /// The steady motion of the returns of so long, s, before and after the middle one. False where
-    /// they have none.
-    fn start_steady(&mut self, by_s: f32) -> bool {
-        let kept = self.returns.all();
-        let part = steady::within(kept, kept[kept.len() / 2].time_s, by_s);
-        let Some(steady) = self.search.find(part, self.returns.length_m()) else { return false };
-        let ([x, y, z], [vx, vy]) = (steady.position, steady.velocity);
-        let (heading, speed) = (libm::atan2(vy, vx), libm::hypot(vx, vy));
-        for (k, weights) in self.now.weights[..self.knots.bases()].iter_mut().enumerate() {
-            let after = self.knots.centre(k) - steady.time_s;
-            *weights = [x + after * vx, y + after * vy, z, heading, speed, 0.0, 0.0];
-        }
-        true
-    }
-
-    /// At rest where the returns are on average.
-    fn stand_at_mean(&mut self) {
-        let mut mean = [0.0; 7];
-        for kept in self.returns.all() {
-            for (sum, value) in mean.iter_mut().zip(kept.position) {
-                *sum += f64::from(value);
-            }
-        }
-        let count = self.returns.all().len() as f64;
-        self.now.weights[..self.knots.bases()].fill(mean.map(|sum| sum / count));
-    }
-
     /// A solve from the trajectory in `now`.
     fn run(&mut self, params: &EstimateParams, report: &mut Report) {
         report.costs.clear();
@@ -349,39 +285,6 @@ impl Estimator {
                 }
                 report.stop = self.descend(params, params.iterations, Some(report));
             }
-        }
-    }
-
-    /// From the middle of the returns outwards: what is seen next is laid over the model of what was
-    /// seen so far, starting where the process model puts it.
-    fn grow(&mut self, params: &EstimateParams) {
-        let sparse = &EstimateParams { model: GROWTH_POINTS, deviation_m: GROWTH_M, ..*params };
-        let all = self.returns.all();
-        let time = |i: usize| f64::from(all[i].time_s);
-        let middle = time(all.len() / 2);
-        let (first, last) = (self.knots.start(), self.knots.end());
-        let by = GROWTH_S.max((last - first) / GROWTHS_MAX);
-        let mut reach = 2.0 * by;
-        let mut begun = false;
-        loop {
-            let all = self.returns.all();
-            let (from, to) = (middle - reach, middle + reach);
-            self.active = all.partition_point(|kept| f64::from(kept.time_s) < from)
-                ..all.partition_point(|kept| f64::from(kept.time_s) <= to);
-            if begun {
-                self.descend(sparse, GROWTH_ITERATIONS, None);
-            }
-            let rounds = if begun { GROWTH_ROUNDS } else { GROWTH_FIRST_ROUNDS };
-            for _ in 0..rounds {
-                self.extract(sparse);
-                let iterations = if begun { GROWTH_ITERATIONS } else { GROWTH_FIRST_ITERATIONS };
-                self.descend(sparse, iterations, None);
-            }
-            if from <= first && to >= last {
-                break;
-            }
-            begun = true;
-            reach += by;
         }
     }
 

@@ -55,6 +55,8 @@ pub struct EstimateParams {
     pub ends_m: f64,
     /// Model points that rays went through are taken away, and the rest is estimated again.
     pub carves: bool,
+    /// Rays that pass the object tell where it ends: [`crate::objects::panorama`].
+    pub passing: bool,
     /// The start grows from the middle of the track, over a sparse model.
     pub grows: bool,
 }
@@ -82,6 +84,7 @@ impl EstimateParams {
             starts: false,
             ends_m: 0.0,
             carves: false,
+            passing: false,
             grows: false,
         }
     }
@@ -123,13 +126,14 @@ impl Default for EstimateParams {
             starts: true,
             ends_m: 0.2,
             carves: true,
+            passing: true,
             grows: true,
             process,
             // A car's.
             length_m: 4.5,
             turn_s: 1.5,
-            tails: 1.0,
-            calm: 0.13,
+            tails: 0.5,
+            calm: 0.05,
             manoeuvre_s: 1.7,
             ..EstimateParams::dissertation()
         }

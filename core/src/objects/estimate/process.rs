@@ -296,8 +296,11 @@ mod tests {
 
     #[test]
     fn a_turn_costs_the_logarithm_of_its_noise() {
-        let process =
-            Process::of(&EstimateParams { manoeuvre_s: 1.0, ..EstimateParams::default() });
+        let process = Process::of(&EstimateParams {
+            tails: 1.0,
+            manoeuvre_s: 1.0,
+            ..EstimateParams::default()
+        });
         let turning = |mut pieces: [f64; 6]| (process.turning(0.5, &mut pieces), pieces);
         // As manoeuvres of two pieces, and of one at either end.
         let (cost, counts) = turning([0.0, 0.0, 7.0, 0.0, 0.0, 0.0]);

@@ -85,8 +85,13 @@ impl Returns {
 
     /// Takes `at_most` of the returns, as evenly in time as they allow: parts of the track that have
     /// more give equally many, every so manyth in the order of time (within a tick, in the order
-    /// given). None where no return is sound.
-    pub fn take(&mut self, returns: &[ObjectReturn], at_most: usize) -> Option<Taken> {
+    /// given), with or without what rays pass. None where no return is sound.
+    pub fn take(
+        &mut self,
+        returns: &[ObjectReturn],
+        at_most: usize,
+        passing: bool,
+    ) -> Option<Taken> {
         self.count = 0;
         let (mut first_s, mut last_s) = (f32::MAX, f32::MIN);
         let mut count = 0;
@@ -132,7 +137,7 @@ impl Returns {
                         position: seen.position,
                         origin: seen.origin,
                         time_s: seen.time_s,
-                        passed: seen.passed,
+                        passed: seen.passed.map(|passed| passed && passing),
                         ..Kept::NONE
                     };
                 }
