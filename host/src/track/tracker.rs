@@ -10,6 +10,7 @@ use raywake_core::objects::front_end::{
 };
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
+use raywake_core::team::Team as _;
 use raywake_gpu::GpuError;
 use raywake_gpu::guard::guarded;
 
@@ -17,6 +18,7 @@ use super::Ground;
 use crate::drive::Drive;
 use crate::error::Error;
 use crate::source::SweepData;
+use crate::team::{THREADS_MAX, Team};
 
 /// The front end with its tracks, and the estimate.
 pub struct Tracker {
@@ -27,9 +29,42 @@ pub struct Tracker {
     ground: Option<Ground>,
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
-    estimator: Box<Estimator>,
+    /// One for each thread; fixed lags use the first.
+    solvers: Vec<Solver>,
+    /// Rooms of the tracks that ended.
+    ended: Vec<usize>,
     /// One for each track, or none.
     lags: Vec<Lag>,
+}
+
+/// Room for the estimate of a track, and how it went.
+#[derive(Default)]
+struct Solver {
+    estimator: Estimator,
+    report: Report,
+    milliseconds: f64,
+}
+
+impl Solver {
+    fn solve(&mut self, track: &Track) {
+        let clock = Instant::now();
+        let (returns, history) = (track.returns(), track.history());
+        self.report = self.estimator.solve(&EstimateParams::default(), returns, history);
+        self.milliseconds = clock.elapsed().as_secs_f64() * 1e3;
+    }
+}
+
+/// Solves some of the tracks, each in a room of its own.
+fn solve(solvers: &mut [Solver], tracks: &[Track], slots: &[usize]) {
+    match (solvers, slots) {
+        ([], _) | (_, []) => {}
+        ([solver, ..], [slot]) => solver.solve(&tracks[*slot]),
+        (solvers, slots) => {
+            let half = slots.len() / 2;
+            let ((a, b), (c, d)) = (solvers.split_at_mut(half), slots.split_at(half));
+            Team.join(|| solve(a, tracks, c), || solve(b, tracks, d));
+        }
+    }
 }
 
 /// The estimate of a track over its last seconds, sweep by sweep.
@@ -75,7 +110,8 @@ impl Tracker {
             ground,
             front_end: Box::new(FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
-            estimator: Box::new(Estimator::new()),
+            solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
+            ended: Vec::with_capacity(TRACKS_MAX),
             lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),
         }
     }
@@ -85,7 +121,7 @@ impl Tracker {
         [
             ("front end", "FrontEnd", size_of::<FrontEnd>()),
             ("tracks", "Track", TRACKS_MAX * size_of::<Track>()),
-            ("estimate", "Estimator", size_of::<Estimator>()),
+            ("estimates, one for each thread", "Solver", THREADS_MAX * size_of::<Solver>()),
             ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * size_of::<Lag>()),
         ]
     }
@@ -97,8 +133,10 @@ impl Tracker {
         now: &SweepData,
         before: Option<&SweepData>,
     ) -> Result<Option<Turnover>, GpuError> {
-        let Tracker { rig, params, drive, reach_m, ground, front_end, tracks, estimator, lags } =
-            self;
+        let Tracker {
+            rig, params, drive, reach_m, ground, front_end, tracks, solvers, lags, ..
+        } = self;
+        let estimator = &mut solvers[0].estimator;
         let map = ground.as_ref().map(Ground::map);
         let mut step = |sweep: &SweepData, flows: Option<Flows>| {
             guarded(|| {
@@ -138,19 +176,19 @@ impl Tracker {
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        for (slot, track) in self.tracks.iter().enumerate() {
-            let brief = track.observations < self.params.observations_min;
-            if track.life != Life::Ended || brief {
-                continue;
+        let Tracker { tracks, solvers, ended, lags, params, .. } = self;
+        let sure = |track: &Track| track.observations >= params.observations_min;
+        let slots = tracks.iter().enumerate();
+        let slots = slots.filter(|(_, track)| track.life == Life::Ended && sure(track));
+        ended.clear();
+        ended.extend(slots.map(|(slot, _)| slot));
+        for group in ended.chunks(solvers.len()) {
+            guarded(|| solve(solvers, tracks, group));
+            for (&slot, Solver { estimator, report, milliseconds }) in group.iter().zip(&*solvers) {
+                let lag = lags.get(slot).map(|lag| lag.states.kept());
+                let (track, milliseconds) = (&tracks[slot], *milliseconds);
+                show(&Ended { track, estimator, report, lag, milliseconds })?;
             }
-            let clock = Instant::now();
-            let (returns, history) = (track.returns(), track.history());
-            let report =
-                guarded(|| self.estimator.solve(&EstimateParams::default(), returns, history));
-            let milliseconds = clock.elapsed().as_secs_f64() * 1e3;
-            let estimator = &self.estimator;
-            let lag = self.lags.get(slot).map(|lag| lag.states.kept());
-            show(&Ended { track, estimator, report: &report, lag, milliseconds })?;
         }
         Ok(())
     }
