@@ -56,22 +56,26 @@ impl Panorama {
     /// what it is of: over the whole height of that, nearly all that end, end farther away. Through a
     /// window or between wheels only some do.
     pub fn passed(&self, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
-        let Some(Direction { azimuth, range, .. }) = direction(from, to) else {
+        let Some(Direction { azimuth, rise: own, range }) = direction(from, to) else {
             return [false; 2];
         };
         let farther = range + MARGIN_M + SLANT * range;
         [1, AZIMUTHS - 1].map(|step| {
             let beside: [_; BESIDE] =
                 core::array::from_fn(|n| &self.reach[(azimuth + (n + 1) * step) % AZIMUTHS]);
+            let ends = |rise: usize| beside.iter().any(|bins| bins[rise][0] < farther);
+            // Of most returns it is soon told.
+            if ends(own) {
+                return false;
+            }
             let (mut pass, mut end) = (0, 0);
             for (rise, [near, far]) in self.reach[azimuth].iter().enumerate() {
                 if *near > range + MARGIN_M || *far < range - MARGIN_M {
                     continue;
                 }
-                let level = || beside.iter().map(|bins| bins[rise]);
-                if level().any(|[near, _]| near < farther) {
+                if ends(rise) {
                     end += 1;
-                } else if level().any(|[_, far]| far > farther) {
+                } else if beside.iter().any(|bins| bins[rise][1] > farther) {
                     pass += 1;
                 }
             }

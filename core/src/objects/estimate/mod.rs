@@ -194,8 +194,13 @@ impl Estimator {
         self.best.copy(&self.now);
         if params.starts {
             let mut least = self.cost_with_ends(params, &report);
-            for (from, by_s) in [(Start::Steady, f32::MAX), (Start::Middle, start::STEADY_S)] {
-                if !self.start_steady(by_s) {
+            for from in [Start::Steady, Start::Middle, Start::Unsteady] {
+                let begun = match from {
+                    Start::Unsteady => self.start_unsteady(),
+                    Start::Middle => self.start_steady(start::STEADY_S),
+                    _ => self.start_steady(f32::MAX),
+                };
+                if !begun {
                     continue;
                 }
                 let mut other = Report { from, ..report.clone() };

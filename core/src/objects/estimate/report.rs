@@ -46,6 +46,8 @@ pub enum Start {
     Steady,
     /// That of the middle of the track.
     Middle,
+    /// Motion that is steady for a second at a time.
+    Unsteady,
 }
 
 /// How a solve went.

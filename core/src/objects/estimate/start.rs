@@ -3,6 +3,7 @@
 
 use super::normal::{CLIMB, Equations, Z, planar, vertical};
 use super::process::{self, Process, Weights};
+use super::steady::Steady;
 use super::{EstimateParams, Estimator, steady};
 use crate::objects::ObjectState;
 use crate::objects::spline::{Basis, Knots};
@@ -22,6 +23,10 @@ const GROWTH_ITERATIONS: usize = 2;
 
 /// Half the time about the middle of a track over which its motion is taken as steady for a start, s.
 pub(super) const STEADY_S: f32 = 1.5;
+
+/// Motion is steady for about so long, s; so many parts of a track at most.
+const UNSTEADY_S: f64 = 1.0;
+const UNSTEADY_MAX: usize = 16;
 
 /// What no state reaches, in any of its units.
 const FAR: f64 = 1e5;
@@ -264,6 +269,54 @@ impl Estimator {
         for (k, weights) in self.now.weights[..self.knots.bases()].iter_mut().enumerate() {
             let after = self.knots.centre(k) - steady.time_s;
             *weights = [x + after * vx, y + after * vy, z, heading, speed, 0.0, 0.0];
+        }
+        true
+    }
+
+    /// Motion that is steady about each of some times: what brakes or bends has no one velocity. False
+    /// where there are not two such.
+    pub(super) fn start_unsteady(&mut self) -> bool {
+        let (first, last) = (self.knots.start(), self.knots.end());
+        let count = ((last - first) / UNSTEADY_S) as usize;
+        let mut found = heapless::Vec::<Steady, UNSTEADY_MAX>::new();
+        for n in 0..count.min(UNSTEADY_MAX) {
+            let middle = first + (last - first) * (n as f64 + 0.5) / count.min(UNSTEADY_MAX) as f64;
+            let part = steady::within(self.returns.all(), middle as f32, UNSTEADY_S as f32);
+            found.extend(self.search.find(part, self.returns.length_m()));
+        }
+        let [begin, .., end] = &found[..] else { return false };
+        // Linear between them, and as at the nearest beyond.
+        let velocity = |time: f64| {
+            let next = found.partition_point(|steady| steady.time_s <= time);
+            let (a, b) = match next {
+                0 => (begin, begin),
+                next if next == found.len() => (end, end),
+                next => (&found[next - 1], &found[next]),
+            };
+            let share = (time - a.time_s) / (b.time_s - a.time_s).max(1e-3);
+            [0, 1].map(|d| a.velocity[d] + share * (b.velocity[d] - a.velocity[d]))
+        };
+        let anchor = found[found.len() / 2];
+        let spacing = self.knots.spacing();
+        let weights = &mut self.now.weights[..self.knots.bases()];
+        let (mut heading, [mut x, mut y]) = (0.0, [0.0; 2]);
+        let mut anchored = [0.0; 2];
+        for (k, weights) in weights.iter_mut().enumerate() {
+            let time = self.knots.centre(k);
+            let [vx, vy] = velocity(time);
+            if k == 0 || libm::hypot(vx, vy) > HEADS_MPS {
+                heading += turn(libm::atan2(vy, vx) - heading);
+            }
+            let (sin, cos) = libm::sincos(heading);
+            *weights = [x, y, anchor.position[2], heading, cos * vx + sin * vy, 0.0, 0.0];
+            let half = velocity(time + 0.5 * spacing);
+            let after = (anchor.time_s - time).clamp(0.0, spacing);
+            anchored = [0, 1].map(|d| anchored[d] + after * half[d]);
+            (x, y) = (x + spacing * half[0], y + spacing * half[1]);
+        }
+        for weights in weights {
+            weights[0] += anchor.position[0] - anchored[0];
+            weights[1] += anchor.position[1] - anchored[1];
         }
         true
     }
