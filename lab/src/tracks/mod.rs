@@ -45,8 +45,8 @@ pub struct Args {
     /// Folder of results; the simulated objects are kept there for the next run
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Seed of the simulated sets: 1 to 5 are for choosing numbers
-    #[arg(long, default_value_t = 2)]
+    /// Seed of the simulated sets: 1 to 6 are for choosing numbers
+    #[arg(long, default_value_t = 7)]
     seed: u64,
     /// Objects at a time; as many as the machine runs at once unless given
     #[arg(long, value_name = "N")]

@@ -194,11 +194,10 @@ impl Estimator {
         self.best.copy(&self.now);
         if params.starts {
             let mut least = self.cost_with_ends(params, &report);
-            for from in [Start::Steady, Start::Middle, Start::Unsteady] {
+            for from in [Start::Steady, Start::Unsteady] {
                 let begun = match from {
-                    Start::Unsteady => self.start_unsteady(),
-                    Start::Middle => self.start_steady(start::STEADY_S),
-                    _ => self.start_steady(f32::MAX),
+                    Start::Steady => self.start_steady(),
+                    _ => self.start_unsteady(),
                 };
                 if !begun {
                     continue;

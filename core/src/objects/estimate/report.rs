@@ -44,8 +44,6 @@ pub enum Start {
     History,
     /// The steady motion that lays all returns over each other.
     Steady,
-    /// That of the middle of the track.
-    Middle,
     /// Motion that is steady for a second at a time.
     Unsteady,
 }

@@ -21,9 +21,6 @@ const GROWTH_FIRST_ITERATIONS: usize = 6;
 const GROWTH_ROUNDS: usize = 2;
 const GROWTH_ITERATIONS: usize = 2;
 
-/// Half the time about the middle of a track over which its motion is taken as steady for a start, s.
-pub(super) const STEADY_S: f32 = 1.5;
-
 /// Motion is steady for about so long, s; so many parts of a track at most.
 const UNSTEADY_S: f64 = 1.0;
 const UNSTEADY_MAX: usize = 16;
@@ -258,12 +255,10 @@ impl Estimator {
         true
     }
 
-    /// The steady motion of the returns of so long, s, before and after the middle one. False where
-    /// they have none.
-    pub(super) fn start_steady(&mut self, by_s: f32) -> bool {
-        let kept = self.returns.all();
-        let part = steady::within(kept, kept[kept.len() / 2].time_s, by_s);
-        let Some(steady) = self.search.find(part, self.returns.length_m()) else { return false };
+    /// The steady motion of all returns. False where they have none.
+    pub(super) fn start_steady(&mut self) -> bool {
+        let length_m = self.returns.length_m();
+        let Some(steady) = self.search.find(self.returns.all(), length_m) else { return false };
         let ([x, y, z], [vx, vy]) = (steady.position, steady.velocity);
         let (heading, speed) = (libm::atan2(vy, vx), libm::hypot(vx, vy));
         for (k, weights) in self.now.weights[..self.knots.bases()].iter_mut().enumerate() {

@@ -130,6 +130,31 @@ fn long_sides_move_with_their_ends() {
     assert!(worst > 1.0, "{worst}");
 }
 
+/// Steady for a second at a time, a motion is found that brakes and bends.
+#[test]
+fn unsteady_motion_has_a_start() {
+    let mut estimator = Box::new(Estimator::new());
+    let plan = Plan { acceleration: -1.2, turn_rate: 0.1, speed: 9.0, ..synthetic::moving(2) };
+    let drive = drive(plan);
+    estimator.solve(
+        &EstimateParams { iterations: 0, ..EstimateParams::default() },
+        &drive.returns,
+        &[],
+    );
+    assert!(estimator.start_unsteady());
+    estimator.best.copy(&estimator.now);
+    let found = errors(&drive.truth, |time| estimator.state(time));
+    assert!(estimator.start_steady());
+    estimator.best.copy(&estimator.now);
+    let steady = errors(&drive.truth, |time| estimator.state(time));
+    assert!(found[0] < 0.5 && found[1] < 1.0, "{found:?}");
+    assert!(found[0] < 0.5 * steady[0] && found[1] < 0.7 * steady[1], "{found:?} {steady:?}");
+    // What is too short for two such has none.
+    let short = &drive.returns[..drive.returns.partition_point(|seen| seen.time_s < 1.5)];
+    estimator.solve(&EstimateParams::default(), short, &[]);
+    assert!(!estimator.start_unsteady());
+}
+
 /// One and the same optimum from histories that are off in different ways.
 #[test]
 fn perturbed_starts_converge() {
