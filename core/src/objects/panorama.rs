@@ -40,13 +40,38 @@ impl Panorama {
         Panorama { reach: [[NOTHING; RISES]; AZIMUTHS] }
     }
 
+    /// Finds which rays pass the returns that are `wanted` by their index, among all returns of some
+    /// 100 ms. `ray` tells of a return its sensor, and where its ray began and ended, m; `found` is told
+    /// whether the next rays pass on its left and on its right.
+    pub fn look<T>(
+        &mut self,
+        returns: &mut [T],
+        ray: impl Fn(&T) -> (u8, [f32; 3], [f32; 3]),
+        wanted: impl Fn(usize) -> bool,
+        found: impl Fn(&mut T, [bool; 2]),
+    ) {
+        let sensors = returns.iter().map(|one| ray(one).0.saturating_add(1)).max();
+        for sensor in 0..sensors.unwrap_or(0) {
+            self.clear();
+            for (_, from, to) in returns.iter().map(&ray).filter(|ray| ray.0 == sensor) {
+                self.add(from, to);
+            }
+            for (n, one) in returns.iter_mut().enumerate() {
+                let (of, from, to) = ray(one);
+                if of == sensor && wanted(n) {
+                    found(one, self.passed(from, to));
+                }
+            }
+        }
+    }
+
     /// For the next sensor.
-    pub fn clear(&mut self) {
+    fn clear(&mut self) {
         self.reach.fill([NOTHING; RISES]);
     }
 
     /// Adds a return, from where its ray began.
-    pub fn add(&mut self, from: [f32; 3], to: [f32; 3]) {
+    fn add(&mut self, from: [f32; 3], to: [f32; 3]) {
         let Some(Direction { azimuth, rise, range }) = direction(from, to) else { return };
         let [near, far] = &mut self.reach[azimuth][rise];
         (*near, *far) = (near.min(range), far.max(range));
@@ -55,7 +80,7 @@ impl Panorama {
     /// Whether the next rays to the left and to the right of a return, as the sensor sees it, pass
     /// what it is of: over the whole height of that, nearly all that end, end farther away. Through a
     /// window or between wheels only some do.
-    pub fn passed(&self, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
+    fn passed(&self, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
         let Some(Direction { azimuth, rise: own, range }) = direction(from, to) else {
             return [false; 2];
         };
@@ -168,6 +193,30 @@ mod tests {
         let panorama = scene(60.0, window);
         for beam in 0..BEAMS.len() {
             assert_eq!(panorama.passed(FROM, at(60.0 - 3.0, beam, 20.0)), [false, false]);
+        }
+    }
+
+    #[test]
+    fn every_sensor_looks_for_itself() {
+        let mut panorama = Box::new(Panorama::new());
+        // An edge at 60 degrees, its wall seen by the other sensor or by the same one.
+        for (of_wall, expected) in [(1, [false; 2]), (0, [true, false])] {
+            let returns = (0..100).map(|n| 50.0 + 0.2 * n as f32);
+            let mut returns: Vec<_> = returns
+                .map(|degrees| match degrees < 60.1 {
+                    true => (0, at(degrees, 1, 20.0), [false; 2]),
+                    false => (of_wall, at(degrees, 1, 40.0), [false; 2]),
+                })
+                .collect();
+            panorama.look(
+                &mut returns,
+                |(sensor, to, _)| (*sensor, FROM, *to),
+                |n| n != 49,
+                |one, passed| one.2 = passed,
+            );
+            assert_eq!(returns[50].2, expected);
+            assert_eq!(returns[49].2, [false; 2], "not wanted");
+            assert_eq!(returns[20].2, [false; 2]);
         }
     }
 

@@ -47,20 +47,9 @@ pub struct Seen {
 
 /// Finds where rays pass the returns of a sweep that are asked for.
 pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
+    let ray = |s: &Seen| (s.sensor, [0.0; 3], (s.at - s.from).as_vec3().to_array());
     let mut panorama = Box::new(Panorama::new());
-    let ends = |s: &Seen| [[0.0; 3], (s.at - s.from).as_vec3().to_array()];
-    for sensor in 0..seen.iter().map(|s| s.sensor + 1).max().unwrap_or(0) {
-        panorama.clear();
-        for [from, to] in seen.iter().filter(|s| s.sensor == sensor).map(ends) {
-            panorama.add(from, to);
-        }
-        for (n, seen) in seen.iter_mut().enumerate() {
-            if seen.sensor == sensor && wanted(n) {
-                let [from, to] = ends(seen);
-                seen.passed = panorama.passed(from, to);
-            }
-        }
-    }
+    panorama.look(seen, ray, wanted, |s, passed| s.passed = passed);
 }
 
 impl Seen {

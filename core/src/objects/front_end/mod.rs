@@ -34,7 +34,7 @@ use crate::prepare::Dropped;
 use crate::record::NONE;
 use crate::sweep::{Rig, Sweep};
 use assignment::Assignment;
-use batch::Batch;
+use batch::{Batch, Seen};
 use cells::Cells;
 use chunks::{Chunks, Segment};
 use nalgebra::{Matrix2, Vector2};
@@ -227,18 +227,10 @@ impl FrontEnd {
 
     /// Finds where rays pass the returns of segments.
     fn look_beside(&mut self) {
-        let sensors = self.batch.returns.iter().map(|s| s.sensor + 1).max().unwrap_or(0);
-        for sensor in 0..sensors {
-            self.panorama.clear();
-            for seen in self.batch.returns.iter().filter(|s| s.sensor == sensor) {
-                self.panorama.add(seen.origin, seen.at);
-            }
-            for (n, seen) in self.batch.returns.iter_mut().enumerate() {
-                if seen.sensor == sensor && self.chunks.segment_of(n).is_some() {
-                    seen.passed = self.panorama.passed(seen.origin, seen.at);
-                }
-            }
-        }
+        let FrontEnd { panorama, batch, chunks, .. } = self;
+        let ray = |seen: &Seen| (seen.sensor, seen.origin, seen.at);
+        let wanted = |n| chunks.segment_of(n).is_some();
+        panorama.look(&mut batch.returns, ray, wanted, |seen, passed| seen.passed = passed);
     }
 
     fn segment(
