@@ -36,10 +36,10 @@ const LOOSE: f64 = 1e-6;
 
 /// Whether rays pass a return on the side on which the object's front (0) or rear (1) is.
 fn passes(kept: &Kept, seen: &Seen, end: usize) -> bool {
-    let [_, y, _] = seen.frame(kept.origin_from_return());
-    let origin = seen.place()[1];
+    let [_, sensor, _] = seen.frame(kept.origin_from_return());
+    let [_, own, _] = seen.place();
     // Seen from its left, an object has its front on the left.
-    kept.passed[if y > origin { end } else { 1 - end }]
+    kept.passed[if sensor > own { end } else { 1 - end }]
 }
 
 /// The returns that are foremost and hindmost in their part of the track.

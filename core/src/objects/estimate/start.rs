@@ -155,9 +155,8 @@ const SMOOTHINGS: usize = 6;
 const ROUGH: usize = 2;
 const OFF_M: f64 = 1.0;
 
-/// Trajectory that a history of positions and the process model make together, and how far off the
-/// positions are from it: the sum of their squares, each bounded, m². What moves slowly has no heading
-/// in it but noise. None where there is no solution.
+/// Trajectory that a history of positions and the process model make together. What moves slowly has no
+/// heading in it but noise.
 pub(super) fn smooth(
     knots: &Knots,
     history: &[ObjectState],
@@ -165,10 +164,8 @@ pub(super) fn smooth(
     equations: &mut Equations,
     weights: &mut [Weights],
     step: &mut [Weights],
-) -> Option<f64> {
-    let mut off = 0.0;
+) {
     for n in 0..SMOOTHINGS {
-        off = 0.0;
         equations.clear(knots.bases());
         process::add(knots, weights, process, equations);
         for state in unwrapped(history) {
@@ -183,7 +180,6 @@ pub(super) fn smooth(
             miss[6] = -now[6];
             let square = (miss[0] * miss[0] + miss[1] * miss[1]) / (OFF_M * OFF_M);
             let fall = 1.0 / (1.0 + square);
-            off += OFF_M * OFF_M * square * fall;
             let counts = if n < ROUGH { 1.0 } else { fall * fall };
             let place = counts / (POSITION_M * POSITION_M);
             observe(
@@ -195,10 +191,9 @@ pub(super) fn smooth(
         }
         hold(equations, weights);
         if !apply(equations, weights, step) {
-            return None;
+            return;
         }
     }
-    Some(off)
 }
 
 /// Everything at rest where the history is on average.
@@ -272,10 +267,10 @@ impl Estimator {
     /// where there are not two such.
     pub(super) fn start_unsteady(&mut self) -> bool {
         let (first, last) = (self.knots.start(), self.knots.end());
-        let count = ((last - first) / UNSTEADY_S) as usize;
+        let count = (((last - first) / UNSTEADY_S) as usize).min(UNSTEADY_MAX);
         let mut found = heapless::Vec::<Steady, UNSTEADY_MAX>::new();
-        for n in 0..count.min(UNSTEADY_MAX) {
-            let middle = first + (last - first) * (n as f64 + 0.5) / count.min(UNSTEADY_MAX) as f64;
+        for n in 0..count {
+            let middle = first + (last - first) * (n as f64 + 0.5) / count as f64;
             let part = steady::within(self.returns.all(), middle as f32, UNSTEADY_S as f32);
             found.extend(self.search.find(part, self.returns.length_m()));
         }

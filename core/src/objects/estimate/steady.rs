@@ -65,7 +65,7 @@ pub(super) struct Search {
     counts: [u16; SLOTS],
     touched: [u16; SAMPLES + EDGES],
     /// What the nth return of a cell adds to the sum of `n ln n`.
-    gains: [f32; SAMPLES + 1],
+    gains: [f32; SAMPLES + EDGES + 1],
 }
 
 impl Search {
@@ -74,7 +74,7 @@ impl Search {
             samples: [Sample { at: [0.0; 3], time_s: 0.0 }; SAMPLES + EDGES],
             counts: [0; SLOTS],
             touched: [0; SAMPLES + EDGES],
-            gains: [0.0; SAMPLES + 1],
+            gains: [0.0; SAMPLES + EDGES + 1],
         }
     }
 
@@ -106,7 +106,7 @@ impl Search {
         }
         let count = Count { all: count, edges };
         let entropy = |n: usize| if n > 0 { n as f32 * libm::logf(n as f32) } else { 0.0 };
-        for (n, gain) in self.gains[1..=count.all].iter_mut().enumerate() {
+        for (n, gain) in self.gains[1..=count.all + edges].iter_mut().enumerate() {
             *gain = entropy(n + 1) - entropy(n);
         }
         let length_m = length_m.max(1.0);
