@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 use glam::{DVec2, DVec3};
+use raywake::order_statistics::median;
 use raywake_core::background_filter;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
@@ -81,15 +82,10 @@ fn errors(drive: &Drive) -> BTreeMap<u32, Vec<DVec2>> {
     errors
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// What the tracklets of an object say together, component by component, m/s off.
 fn together(errors: &[DVec2]) -> f64 {
-    let x = median(errors.iter().map(|e| e.x).collect());
-    let y = median(errors.iter().map(|e| e.y).collect());
+    let x = median(errors.iter().map(|e| e.x));
+    let y = median(errors.iter().map(|e| e.y));
     x.hypot(y)
 }
 
@@ -102,7 +98,7 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
             let object = &objects[id as usize - 1];
             let speed = object.velocity_world.length();
             let (count, off) = (errors.len(), together(&errors));
-            let each = median(errors.iter().map(|e| e.length()).collect());
+            let each = median(errors.iter().map(|e| e.length()));
             println!(
                 "{case}: object {id}, {speed:4.1} m/s: {off:.2} m/s off, each {each:.2}, {count} columns"
             );

@@ -11,10 +11,10 @@ use crate::args::{Demo, Learned, PictureFrame};
 use crate::config::Weights;
 use crate::engine::{self, Plan, say};
 use crate::error::Error;
+use crate::order_statistics::Spread;
 use crate::outputs::Kinds;
 use crate::source::SweepData;
 use crate::source::simulated::Simulated;
-use crate::statistics::Spread;
 use crate::summary::Summary;
 
 const SEED: u64 = 1;

@@ -15,6 +15,7 @@ pub mod error;
 pub mod flow;
 pub mod laps;
 pub mod map;
+pub mod order_statistics;
 pub mod outputs;
 pub mod progress;
 pub mod registration;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::statistics::Spread;
+use crate::order_statistics::Spread;
 use crate::summary::Summary;
 
 /// Everything a summary holds, for people.

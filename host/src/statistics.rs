@@ -20,40 +20,6 @@ pub const AGES: [(&str, u32); 5] = [("0", 0), ("1-2", 1), ("3-5", 3), ("6-9", 6)
 /// The time a sweep may take: sweeps come at 10 Hz, ms.
 pub const BUDGET_MS: f64 = 100.0;
 
-/// How a quantity is distributed over sweeps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
-    /// Sum over count.
-    pub mean: f64,
-    /// Half lie below.
-    pub median: f64,
-    /// Standard deviation.
-    pub sd: f64,
-    /// 99 % lie at or below.
-    pub p99: f64,
-    /// Greatest.
-    pub max: f64,
-}
-
-impl Spread {
-    /// None without values.
-    pub fn of(values: &[f64]) -> Option<Spread> {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let (n, max) = (sorted.len(), *sorted.last()?);
-        let mean = sorted.iter().sum::<f64>() / n as f64;
-        let variance = sorted.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n as f64;
-        let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
-        Some(Spread {
-            mean,
-            median,
-            sd: variance.sqrt(),
-            p99: sorted[(99 * n).div_ceil(100) - 1],
-            max,
-        })
-    }
-}
-
 /// A sweep that had no usable predecessor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResetAt {
@@ -279,17 +245,6 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn spreads() {
-        assert_eq!(Spread::of(&[]), None);
-        let one = Spread::of(&[3.0]).unwrap();
-        assert_eq!(one, Spread { mean: 3.0, median: 3.0, sd: 0.0, p99: 3.0, max: 3.0 });
-        let values: Vec<f64> = (1..=200).rev().map(f64::from).collect();
-        let s = Spread::of(&values).unwrap();
-        assert_eq!((s.median, s.p99, s.max), (100.5, 198.0, 200.0));
-        assert!((s.sd - 57.734).abs() < 1e-3);
-    }
 
     #[test]
     fn ages() {

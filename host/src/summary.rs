@@ -9,8 +9,9 @@ use serde::{Serialize, Serializer};
 
 use crate::backend::Backend;
 use crate::error::Error;
+use crate::order_statistics::Spread;
 use crate::sink::atomic;
-use crate::statistics::{AGES, Dropped, ResetAt, Spread, Statistics, Tally};
+use crate::statistics::{AGES, Dropped, ResetAt, Statistics, Tally};
 use crate::team;
 
 /// Entries of a JSON object in the order given.

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use common::{Outcome, Temp, raywake, row};
 use glam::{DQuat, DVec3, EulerRot};
+use raywake::order_statistics::median;
 use raywake_core::pose::Pose;
 use raywake_sim::{Drive, Options, Path as Track, Scene, SimSweep, State};
 
@@ -87,11 +88,6 @@ fn printed(o: &Outcome) -> Pose {
     let [roll, pitch, yaw] = [n[3], n[4], n[5]].map(f64::to_radians);
     let rotation = DQuat::from_euler(EulerRot::ZYX, yaw, pitch, roll);
     Pose::new(rotation, DVec3::new(n[0], n[1], n[2]))
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 #[test]

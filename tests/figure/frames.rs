@@ -2,6 +2,7 @@
 //! sensor's frame. Both end at the same velocity over ground.
 
 use glam::DVec2;
+use raywake::order_statistics::median;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
 use raywake_core::pose::Pose;
@@ -31,14 +32,8 @@ fn near_a_post(c: &&ColumnFlow) -> bool {
     c.origin == Origin::Matched && c.age >= 5 && posts().any(|p| p.distance(at) < 0.6)
 }
 
-fn median(mut values: Vec<f32>) -> f32 {
-    assert!(values.len() > 5, "{} columns", values.len());
-    values.sort_by(f32::total_cmp);
-    values[values.len() / 2]
-}
-
 /// Median displacement (cells), velocity over ground and relative to the vehicle, along the road.
-fn posts_seen_with(profile: Profile) -> [f32; 3] {
+fn posts_seen_with(profile: Profile) -> [f64; 3] {
     // The rings of returns from flat ground stand still in the sensor's frame.
     let setup = Setup::new(profile, Some(weights::tall_filter(14)));
     let mut side = Side::new(&setup, setup.scalar());
@@ -46,7 +41,10 @@ fn posts_seen_with(profile: Profile) -> [f32; 3] {
     let last = pairs(&sweeps).map(|(now, before)| side.step(now, before)).last();
     let columns = last.expect("sweeps").columns;
     let of = |value: fn(&ColumnFlow) -> f32| {
-        median(columns.iter().filter(near_a_post).map(value).collect())
+        let near: Vec<f64> =
+            columns.iter().filter(near_a_post).map(|c| f64::from(value(c))).collect();
+        assert!(near.len() > 5, "{} columns", near.len());
+        median(near)
     };
     [
         of(|c| c.displacement_cells[0] as f32),

@@ -1,23 +1,20 @@
 //! Numbers without a pattern, the same in every run.
 
 use raywake_core::record::Column;
+use raywake_sim::Rng;
 
-/// A generator; equal seeds give equal numbers.
-pub struct Random(u64);
+/// The simulator's generator, in whole numbers; equal seeds give equal ones.
+pub struct Random(Rng);
 
 impl Random {
     /// From a seed.
     pub fn new(seed: u64) -> Random {
-        Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
+        Random(Rng::new(seed))
     }
 
-    /// Any word (SplitMix64, upper half).
+    /// Any word.
     pub fn word(&mut self) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ z >> 31) >> 32) as u32
+        (self.0.bits() >> 32) as u32
     }
 
     /// Below `n`.

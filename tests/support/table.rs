@@ -1,6 +1,6 @@
 //! Times of several variants as a table.
 
-use raywake::statistics::Spread;
+use raywake::order_statistics::median;
 use raywake_core::digest::Digest;
 
 /// Rows that are no stages: printed last.
@@ -36,7 +36,7 @@ impl Variant {
 
     fn median(&self, row: &str) -> Option<f64> {
         let (_, values) = self.rows.iter().find(|r| r.0 == row)?;
-        Spread::of(values).map(|s| s.median)
+        Some(median(values.iter().copied()))
     }
 }
 

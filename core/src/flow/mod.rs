@@ -66,6 +66,7 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::params::{LINE, REACH, ROW};
+    use crate::random::Random;
     use crate::record::{VALID, flow, flow_displacement};
     use crate::window::outside_cost;
     use std::vec;
@@ -129,11 +130,7 @@ mod tests {
     #[test]
     fn equals_brute_force() {
         for (seed, share, outside) in [(1u64, 3, 693), (2, 1, 693), (3, 2, 17_289), (4, 9, 693)] {
-            let mut state = seed;
-            let mut random = |n: u64| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                (state >> 33) % n
-            };
+            let mut random = Random(seed);
             let step = Step {
                 side: 37,
                 smoothing: 1000,
@@ -141,12 +138,13 @@ mod tests {
                 outside_cost: outside,
                 ..Default::default()
             };
-            let foreground: Vec<u32> = (0..37 * 37).filter(|_| random(share) == 0).collect();
+            let foreground: Vec<u32> = (0..37 * 37).filter(|_| random.below(share) == 0).collect();
             // Costs of few values, so that ties are common, with a preferred displacement.
             let matching: Vec<u16> = (0..foreground.len() * ROW)
                 .map(|n| {
                     let liked = n % ROW == 500 || ((n / ROW).is_multiple_of(5) && n % ROW == 333);
-                    (if liked { random(3) * 900 } else { 2000 + random(12) * 700 }) as u16
+                    (if liked { random.below(3) * 900 } else { 2000 + random.below(12) * 700 })
+                        as u16
                 })
                 .collect();
             let columns = 37 * 37;

@@ -54,6 +54,7 @@ mod tests {
     use super::*;
     use crate::grid::ray_merge::ray_merge;
     use crate::params::MERGE_SLOTS;
+    use crate::random::Random;
     use crate::record::ray;
     use std::collections::HashMap;
     use std::vec;
@@ -77,11 +78,8 @@ mod tests {
     #[test]
     fn merged_and_traced_equals_the_update_list() {
         let step = Step { side: 31, levels: 8, range_steps: 20, ..Default::default() };
-        let mut seed = 1u64;
-        let mut random = |n: i32| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((seed >> 33) % n as u64) as i32
-        };
+        let mut generator = Random(1);
+        let mut random = |n| generator.below(n) as i32;
         // One origin inside the window, one outside it.
         for origin in [[15, 15, 4], [-3, 15, 4]] {
             let rays: Vec<Ray> = (0..4000)

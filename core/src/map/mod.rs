@@ -111,6 +111,7 @@ mod tests {
     use super::*;
     use crate::grid::ray_trace::{inside, ray_trace};
     use crate::params::MERGE_SLOTS;
+    use crate::random::Random;
     use crate::record::ray;
     use std::vec;
     use std::vec::Vec;
@@ -148,11 +149,8 @@ mod tests {
 
     #[test]
     fn equals_the_dense_window() {
-        let mut seed = 5u64;
-        let mut random = |n: i32| {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((seed >> 33) % n as u64) as i32
-        };
+        let mut generator = Random(5);
+        let mut random = |n| generator.below(n) as i32;
         // Enough updates for several bands.
         let rays: Vec<Ray> = (0..30_000)
             .map(|_| ray([random(201), random(201), random(41)], 0, random(9) == 0))

@@ -10,11 +10,12 @@ use crate::args;
 use crate::choose;
 use crate::engine::{interrupted, listen, say};
 use crate::error::Error;
+use crate::order_statistics::Spread;
 use crate::progress::Progress;
 use crate::report::bytes;
 use crate::sink::{atomic, feather};
 use crate::source::{self, SweepData};
-use crate::statistics::{Dropped, Spread};
+use crate::statistics::Dropped;
 
 /// Voxels of one sweep, in columns as the file has them.
 #[derive(Default)]

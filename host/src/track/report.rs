@@ -13,8 +13,9 @@ use super::Ended;
 use super::write::Files;
 use crate::args::FrontEndKind;
 use crate::error::Error;
+use crate::order_statistics::Spread;
 use crate::source::SweepData;
-use crate::statistics::{Dropped, Spread};
+use crate::statistics::Dropped;
 use crate::summary::write_json;
 
 /// Tracks that the report lists.

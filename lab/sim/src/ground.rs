@@ -3,15 +3,11 @@
 //!
 //! Street frame: x along the main road, y left, z up.
 
+use crate::dimensions::{CROSS_HALF, ROAD_HALF, SIDEWALK};
 use crate::roughness::roughness;
-use crate::street::SIDEWALK;
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// Half width of the main road (a lane and a parking strip on either side), m.
-pub const ROAD_HALF: f64 = 5.7;
-/// Half width of the crossing road, m.
-pub const CROSS_HALF: f64 = 4.5;
 /// Width over which a walker's feet climb the kerb, m.
 const RAMP: f64 = 0.3;
 

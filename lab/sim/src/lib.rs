@@ -13,6 +13,7 @@
 //! the vehicle is the rig's choice ([`SensorRig::origin`]).
 
 mod cast;
+mod dimensions;
 mod drive;
 mod ego;
 mod ground;

@@ -74,12 +74,11 @@ impl Scene {
         let heading = rng.range(-std::f64::consts::PI, std::f64::consts::PI);
         let world_from_street =
             Pose::planar(rng.range(-200.0, 200.0), rng.range(-200.0, 200.0), 0.0, heading);
-        let mut scene =
-            Scene { ground, fixtures: Vec::new(), objects: Vec::new(), world_from_street };
         let extent = street::Extent::around(&plan.path, duration_s);
-        street::build(&mut scene, extent, plan.crossing, &mut Rng::split(seed, 2));
-        traffic::fill(&mut scene, extent, plan, duration_s, density, &mut Rng::split(seed, 3));
-        scene
+        let fixtures = street::build(&ground, extent, plan.crossing, &mut Rng::split(seed, 2));
+        let mut chance = Rng::split(seed, 3);
+        let objects = traffic::fill(&fixtures, extent, plan, duration_s, density, &mut chance);
+        Scene { ground, fixtures, objects, world_from_street }
     }
 
     /// Puts up something of the background; `pose` is `street_from_shape`.

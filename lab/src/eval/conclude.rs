@@ -146,7 +146,7 @@ fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
         "all labelled in the dissertation: 0.50 m/s",
     );
     let totals: Vec<f64> = drives.iter().flat_map(|d| &d.totals).copied().collect();
-    if let Some(s) = raywake::statistics::Spread::of(&totals) {
+    if let Some(s) = raywake::order_statistics::Spread::of(&totals) {
         report.headline(
             &number(s.median, "ms", 1),
             "median time of a pair of sweeps",

@@ -8,7 +8,8 @@ use crate::curve::{Curve, Operating};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
-use raywake::statistics::{BUDGET_MS, Spread};
+use raywake::order_statistics::Spread;
+use raywake::statistics::BUDGET_MS;
 
 /// Bins of the histograms: 5 cm, up to 1.5 m.
 const BIN_M: f64 = 0.05;

@@ -7,7 +7,8 @@ use super::tally::{Estimate, Group, Motion, Tally, Truth};
 use crate::curve::{Curve, Operating};
 use crate::metrics::{Class, Motion as PointMotion, Range};
 use crate::report::{Cell, Row, Table};
-use raywake::statistics::{BUDGET_MS, Spread};
+use raywake::order_statistics::Spread;
+use raywake::statistics::BUDGET_MS;
 
 /// Errors below this count as "within 30 cm" (table 3.1).
 pub const WITHIN_M: f64 = 0.3;

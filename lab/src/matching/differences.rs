@@ -1,5 +1,6 @@
 //! How far motions are from those they are compared with, as a table.
 
+use raywake::order_statistics::quantiles;
 use raywake_core::pose::Pose;
 use std::fmt::{self, Write};
 
@@ -31,9 +32,7 @@ impl Differences {
         let mut text = String::new();
         writeln!(text, "{:<16}{:>10}{:>10}{:>10}", "per step", "median", "95 %", "max")?;
         for (name, row) in ROWS.iter().zip(&self.rows) {
-            let mut sorted = row.clone();
-            sorted.sort_by(f64::total_cmp);
-            let [median, high, max] = [0.5, 0.95, 1.0].map(|share| quantile(&sorted, share));
+            let [median, high, max] = quantiles(row.iter().copied(), [0.5, 0.95, 1.0]);
             writeln!(text, "{name:<16}{median:>10.4}{high:>10.4}{max:>10.4}")?;
         }
         let end = (given.inverse() * *found).twist(1.0);
@@ -51,21 +50,12 @@ impl Differences {
     }
 }
 
-/// The value that a share of the sorted ones does not exceed; 0 of none.
-pub fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let rank = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_and_rows() {
-        let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
-        let of = |share| quantile(&sorted, share);
-        assert_eq!([of(0.5), of(0.95), of(1.0), quantile(&[], 0.5)], [50.0, 95.0, 100.0, 0.0]);
+    fn a_step_off_by_known_amounts() {
         let mut differences = Differences::default();
         let given = Pose::planar(1.0, 0.0, 0.0, 0.1);
         let off = Pose::planar(0.0, -0.02, 0.0, 0.5f64.to_radians());

@@ -3,7 +3,8 @@
 mod differences;
 mod sequence;
 
-use differences::{Differences, quantile};
+use differences::Differences;
+use raywake::order_statistics::quantiles;
 use raywake::registration::Options;
 use raywake::sink::atomic;
 use raywake::source::simulated::Simulated;
@@ -114,19 +115,13 @@ impl Chain {
             differences.add(&found.motion, &(self.given[n].inverse() * self.given[n + 1]));
         }
         let count = |of: &dyn Fn(&Matched) -> bool| self.matched.iter().filter(|m| of(m)).count();
-        let sorted = |of: &dyn Fn(&Matched) -> f64| {
-            let mut values: Vec<f64> = self.matched.iter().map(of).collect();
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let [rms, rounds, steps, least] = [
-            sorted(&|m| m.registration.rms),
-            sorted(&|m| m.rounds as f64),
-            sorted(&|m| m.registration.iterations as f64),
-            sorted(&|m| m.registration.least_eigenvalue),
-        ];
-        let mut times = self.times_ms.clone();
-        times.sort_by(f64::total_cmp);
+        let of = |value: fn(&Matched) -> f64| self.matched.iter().map(value);
+        let median_and_max = |value| quantiles(of(value), [0.5, 1.0]);
+        let rms = median_and_max(|m| m.registration.rms);
+        let steps = median_and_max(|m| m.registration.iterations as f64);
+        let rounds = median_and_max(|m| m.rounds as f64);
+        let time = quantiles(self.times_ms.iter().copied(), [0.5, 0.95, 1.0]);
+        let least = of(|m| m.registration.least_eigenvalue).fold(f64::INFINITY, f64::min);
         let (found, given) = match (self.poses.last(), self.given.last()) {
             (Some(found), Some(given)) => (found, given),
             _ => return Ok(String::new()),
@@ -141,16 +136,16 @@ impl Chain {
             count(&|m| m.registration.converged),
             self.matched.len(),
             count(&|m| m.registration.unobserved > 0),
-            least.first().copied().unwrap_or(0.0),
-            quantile(&rms, 0.5),
-            quantile(&rms, 1.0),
-            quantile(&steps, 0.5),
-            quantile(&steps, 1.0),
-            quantile(&rounds, 0.5),
-            quantile(&rounds, 1.0),
-            quantile(&times, 0.5),
-            quantile(&times, 0.95),
-            quantile(&times, 1.0),
+            least,
+            rms[0],
+            rms[1],
+            steps[0],
+            steps[1],
+            rounds[0],
+            rounds[1],
+            time[0],
+            time[1],
+            time[2],
         ))
     }
 }

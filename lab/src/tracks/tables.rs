@@ -5,7 +5,7 @@ use super::evaluate::{MAIN, OURS, Outcome, Score, methods};
 use super::front_ends::Found;
 use crate::labels::Kind;
 use crate::report::{Cell, Row, Table};
-use raywake::statistics::Spread;
+use raywake::order_statistics::median;
 
 /// Tracks listed as the worst.
 const WORST: usize = 10;
@@ -145,8 +145,7 @@ fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool
     let r = errors.rmse();
     let all = [r.position, r.ground, r.height, r.velocity, r.heading, r.turn_rate];
     let some = set.outcomes.iter().filter(|o| of(o));
-    let of_tracks: Vec<f64> = some.map(|o| o.scores[method].errors.rmse().position).collect();
-    let median = Spread::of(&of_tracks).map_or(f64::NAN, |s| s.median);
+    let median = median(some.map(|o| o.scores[method].errors.rmse().position));
     let cells = all.into_iter().chain([median]).map(|v| Cell::Number(v, 3));
     Row::new([Cell::from(name)].into_iter().chain(cells).chain([Cell::from(errors.flips)]))
 }
@@ -269,13 +268,11 @@ pub fn extents(sets: &[Set]) -> Table {
     for set in sets {
         let vehicles: Vec<&Outcome> =
             set.outcomes.iter().filter(|o| o.kind <= Kind::Tram).collect();
-        let median = |extent: &dyn Fn(&Outcome) -> [f64; 3], axis: usize| {
-            let off = |o: &&Outcome| (extent(o)[axis] - o.size[axis]).abs();
-            let off: Vec<f64> = vehicles.iter().map(off).collect();
-            Spread::of(&off).map_or(f64::NAN, |s| s.median)
+        let off_by = |extent: &dyn Fn(&Outcome) -> [f64; 3], axis: usize| {
+            median(vehicles.iter().map(|o| (extent(o)[axis] - o.size[axis]).abs()))
         };
         let mut row = |name: &str, extent: &dyn Fn(&Outcome) -> [f64; 3]| {
-            let numbers = [0, 1, 2].map(|axis| Cell::Number(median(extent, axis), 2));
+            let numbers = [0, 1, 2].map(|axis| Cell::Number(off_by(extent, axis), 2));
             let head =
                 [Cell::from(set.name.as_str()), Cell::from(vehicles.len()), Cell::from(name)];
             rows.push(Row::new(head.into_iter().chain(numbers)));

@@ -1,8 +1,8 @@
 //! What stands on the sidewalks: lamps, signs, bins, bollards, benches, bicycles, shelters, and
 //! the borders of plots.
 
-use super::{EDGE, Yard};
-use crate::ground::{CROSS_HALF, ROAD_HALF};
+use super::Yard;
+use crate::dimensions::{CROSS_HALF, EDGE, ROAD_HALF};
 use crate::object::{Class, Surface};
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
@@ -133,10 +133,10 @@ impl Yard<'_> {
     fn bicycle(&mut self, [x, y]: [f64; 2], yaw: f64, lean: f64) {
         let (spokes, metal) = (Surface::porous(0.2, 0.6), Surface::porous(0.3, 0.35));
         let turn = DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(lean);
-        let foot = DVec3::new(x, y, self.scene.ground.height(x, y));
+        let foot = DVec3::new(x, y, self.ground.height(x, y));
         let mut put = |shape: Shape, at: DVec3, own: DQuat, surface: Surface| {
             let pose = Pose::new(turn * own, foot + turn * at);
-            self.scene.put(Class::Fixture, shape, pose, surface);
+            self.fix(Class::Fixture, shape, pose, surface);
         };
         let axle = DQuat::from_rotation_x(FRAC_PI_2);
         for end in [-0.52, 0.52] {

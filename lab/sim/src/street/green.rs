@@ -1,6 +1,7 @@
 //! Trees, bushes and hedges, each of several clumps of leaves that let a share of the rays through.
 
-use super::{EDGE, Yard};
+use super::Yard;
+use crate::dimensions::EDGE;
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {

@@ -1,7 +1,7 @@
 //! Houses: in closed rows, behind gardens, along the crossing road.
 
-use super::{EDGE, Yard};
-use crate::ground::CROSS_HALF;
+use super::Yard;
+use crate::dimensions::{CROSS_HALF, EDGE};
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {

@@ -5,19 +5,15 @@ mod furniture;
 mod green;
 mod houses;
 
-use crate::ground::{CROSS_HALF, ROAD_HALF};
-use crate::object::{Class, Surface};
+use crate::dimensions::CROSS_HALF;
+use crate::ground::Ground;
+use crate::object::{Class, Fixture, Surface};
 use crate::path::Path;
 use crate::rng::Rng;
-use crate::scene::Scene;
 use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// Width of a sidewalk, m.
-pub(crate) const SIDEWALK: f64 = 4.3;
-/// Distance of the sidewalk's far edge from the main road's centre line, m.
-const EDGE: f64 = ROAD_HALF + SIDEWALK;
 /// How far around the vehicle's path there is something to see, m.
 const VIEW: f64 = 125.0;
 
@@ -42,19 +38,21 @@ impl Extent {
     }
 }
 
-/// Builds the background into the scene.
-pub(crate) fn build(scene: &mut Scene, extent: Extent, crossing: f64, rng: &mut Rng) {
-    let mut yard = Yard { scene, crossing, rng };
+/// The background on this ground; `crossing` is x of the crossing road's centre line, m.
+pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Vec<Fixture> {
+    let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
     for side in [-1.0, 1.0] {
         yard.blocks(extent.x, side);
         yard.houses_along_crossing(extent.y, side);
         yard.kerb_side(extent.x, side);
     }
     yard.signals();
+    yard.fixtures
 }
 
 struct Yard<'a> {
-    scene: &'a mut Scene,
+    ground: &'a Ground,
+    fixtures: Vec<Fixture>,
     crossing: f64,
     rng: &'a mut Rng,
 }
@@ -80,6 +78,11 @@ impl Yard<'_> {
         }
     }
 
+    /// Adds a fixture; `pose` is `street_from_shape`.
+    fn fix(&mut self, class: Class, shape: Shape, pose: Pose, surface: Surface) {
+        self.fixtures.push(Fixture { class, shape, pose, surface });
+    }
+
     /// Puts a solid `height` tall with its foot at (x, y), `lift` above the ground.
     fn put(
         &mut self,
@@ -90,8 +93,8 @@ impl Yard<'_> {
         yaw: f64,
         surface: Surface,
     ) {
-        let z = self.scene.ground.height(at[0], at[1]) + at[2] + 0.5 * height;
-        self.scene.put(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
+        let z = self.ground.height(at[0], at[1]) + at[2] + 0.5 * height;
+        self.fix(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
     }
 
     /// A box of this length, width and height that stands at (x, y).
@@ -111,11 +114,11 @@ impl Yard<'_> {
     fn leaves(&mut self, at: [f64; 3], size: [f64; 3], porosity: f64) {
         let tilt = DQuat::from_rotation_y(self.rng.range(-0.3, 0.3));
         let turn = DQuat::from_rotation_z(self.rng.range(0.0, 3.0));
-        let z = self.scene.ground.height(at[0], at[1]) + at[2] + 0.5 * size[2];
+        let z = self.ground.height(at[0], at[1]) + at[2] + 0.5 * size[2];
         let pose = Pose::new(turn * tilt, DVec3::new(at[0], at[1], z));
         let shape = Shape::ellipsoid(0.5 * size[0], 0.5 * size[1], 0.5 * size[2]);
         let surface = Surface::porous(self.rng.range(0.3, 0.6), porosity);
-        self.scene.put(Class::Vegetation, shape, pose, surface);
+        self.fix(Class::Vegetation, shape, pose, surface);
     }
 
     fn pole(&mut self, x: f64, y: f64, radius: f64, height: f64) {

@@ -4,13 +4,12 @@
 mod footprint;
 mod routes;
 
+use crate::dimensions::{CROSS_HALF, ROAD_HALF};
 use crate::ego::{LANE, Plan};
-use crate::ground::{CROSS_HALF, ROAD_HALF};
 use crate::models;
-use crate::object::Object;
+use crate::object::{Fixture, Object};
 use crate::path::Path;
 use crate::rng::Rng;
-use crate::scene::Scene;
 use crate::street::Extent;
 use footprint::{Footprint, obstacle};
 use routes::Routes;
@@ -31,18 +30,18 @@ const DRIVERS: [(f64, Model, bool); 6] = [
     (0.05, models::tram, false),
 ];
 
-/// Fills the scene with traffic; `density` 1 is a busy street.
+/// Traffic among these fixtures, by ascending id from 1; `density` 1 is a busy street.
 pub(crate) fn fill(
-    scene: &mut Scene,
+    fixtures: &[Fixture],
     extent: Extent,
     plan: &Plan,
     duration_s: f64,
     density: f64,
     rng: &mut Rng,
-) {
+) -> Vec<Object> {
     let mut taken = vec![Footprint::new(&plan.path, 4.6, 1.9, duration_s)];
-    taken.extend(scene.fixtures.iter().filter_map(obstacle));
-    let mut fill = Fill { scene, plan, duration_s, taken, rng };
+    taken.extend(fixtures.iter().filter_map(obstacle));
+    let mut fill = Fill { objects: Vec::new(), plan, duration_s, taken, rng };
     fill.park(extent.x, density);
     let amount =
         |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
@@ -59,10 +58,11 @@ pub(crate) fn fill(
     for _ in 0..amount(16.0, 0.5) {
         fill.mover(models::pedestrian, |r| r.walker());
     }
+    fill.objects
 }
 
 struct Fill<'a> {
-    scene: &'a mut Scene,
+    objects: Vec<Object>,
     plan: &'a Plan,
     duration_s: f64,
     taken: Vec<Footprint>,
@@ -72,14 +72,14 @@ struct Fill<'a> {
 impl Fill<'_> {
     /// Adds the object if its path is clear.
     fn offer(&mut self, model: Model, path: Path) -> bool {
-        let object = model(self.scene.objects.len() as u32 + 1, path, self.rng);
+        let object = model(self.objects.len() as u32 + 1, path, self.rng);
         let footprint =
             Footprint::new(&object.path, object.size[0], object.size[1], self.duration_s);
         if self.taken.iter().any(|other| footprint.touches(other)) {
             return false;
         }
         self.taken.push(footprint);
-        self.scene.objects.push(object);
+        self.objects.push(object);
         true
     }
 

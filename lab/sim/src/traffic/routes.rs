@@ -1,7 +1,7 @@
 //! Paths that people take: along, across, turning, braking, overtaking.
 
+use crate::dimensions::ROAD_HALF;
 use crate::ego::{LANE, Plan};
-use crate::ground::ROAD_HALF;
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -7,7 +7,7 @@ use crate::eval::tables::{WITHIN_M, noted_table};
 use crate::eval::tally::{Estimate, Group, Motion, Tally, Truth};
 use crate::report::{Cell, Row, Table};
 use raywake::budget::device_bytes;
-use raywake::statistics::Spread;
+use raywake::order_statistics::median;
 use raywake_core::params::Profile;
 
 const COLUMNS: [&str; 18] = [
@@ -62,8 +62,9 @@ pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]
     }
     let [all, covered] = tally.coverage(Group::Labelled, Motion::Any);
     cells.push(percent(covered as f64 / all as f64));
-    cells.push(median(drives.iter().flat_map(|d| &d.totals).copied()));
-    cells.extend(PARTS.map(|names| median(drives.iter().flat_map(|d| part(d, names)))));
+    let time = |ms| Cell::Number(ms, 1);
+    cells.push(time(median(drives.iter().flat_map(|d| &d.totals).copied())));
+    cells.extend(PARTS.map(|names| time(median(drives.iter().flat_map(|d| part(d, names))))));
     cells.push(Cell::Number(device_bytes(profile) as f64 / 1e6, 1));
     Row::new(cells)
 }
@@ -78,11 +79,6 @@ pub fn failed(variant: &Variant) -> Row {
 fn part<'a>(facts: &'a Facts, names: &'a [&str]) -> impl Iterator<Item = f64> + 'a {
     let stages = || facts.stages.iter().filter(|s| names.contains(&s.name.as_str()));
     (0..facts.totals.len()).map(move |n| stages().filter_map(|s| s.ms.get(n)).sum())
-}
-
-fn median(ms: impl Iterator<Item = f64>) -> Cell {
-    let ms: Vec<f64> = ms.collect();
-    Cell::Number(Spread::of(&ms).map_or(f64::NAN, |s| s.median), 1)
 }
 
 /// The table of all rows; `failures`: why variants have no figures.
@@ -126,8 +122,8 @@ mod tests {
             ..Facts::default()
         };
         assert_eq!(part(&facts, PARTS[0]).collect::<Vec<_>>(), [31.0, 12.0, 23.0]);
-        assert_eq!(median(part(&facts, PARTS[0])), Cell::Number(23.0, 1));
-        assert_eq!(median(part(&facts, PARTS[2])), Cell::Number(0.0, 1));
+        assert_eq!(median(part(&facts, PARTS[0])), 23.0);
+        assert_eq!(median(part(&facts, PARTS[2])), 0.0);
         let row = row(&VARIANTS[0], &Profile::hdl64(), &Tally::new(), &[facts]);
         let whole = table(vec![row, failed(&VARIANTS[1])], &["refine-0: why".into()]);
         assert!(whole.text().contains("refine-0") && whole.notes.len() == 2);

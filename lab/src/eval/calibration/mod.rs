@@ -136,16 +136,12 @@ impl Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raywake_sim::Rng;
 
-    /// Normal pairs from a counter: a hash to two uniform numbers, then Box and Muller's.
+    /// The `n`-th pair of normal numbers (Box and Muller).
     fn normal(n: u64) -> [f64; 2] {
-        let hash = |n: u64| {
-            let mut z = n.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let (radius, turn) = ((1.0 - hash(2 * n)).ln(), hash(2 * n + 1));
+        let mut rng = Rng::split(1, n);
+        let (radius, turn) = ((1.0 - rng.unit()).ln(), rng.unit());
         let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
         [cos, sin].map(|v| v * (-2.0 * radius).sqrt())
     }

@@ -3,14 +3,12 @@
 use crate::labels::Kind;
 use crate::report::*;
 use raywake_core::pose::Pose;
+use raywake_sim::Rng;
 
 /// Errors of 10 cm or so: most small, some far off.
 fn errors(seed: u64, n: usize, typical: f64) -> Vec<f64> {
-    let mut state = seed;
-    let mut uniform = move || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    };
+    let mut rng = Rng::new(seed);
+    let mut uniform = move || 1.0 - rng.unit();
     let mut one = || {
         let far = if uniform() < 0.04 { 12.0 } else { 1.0 };
         far * typical * (-2.0 * uniform().ln()).sqrt()
