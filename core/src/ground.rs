@@ -16,7 +16,7 @@ const GROUND_PASSES: usize = 3;
 const GROUND_FALL: f32 = 0.33;
 
 /// Height of the ground, by cells of [`GROUND_CELL`] columns.
-pub(crate) struct Ground {
+pub struct Ground {
     side: usize,
     /// Columns along an axis of the window that `cell` is for.
     columns: usize,
@@ -27,7 +27,14 @@ pub(crate) struct Ground {
     followed: [f32; GROUND_SIDE * GROUND_SIDE],
 }
 
+impl Default for Ground {
+    fn default() -> Ground {
+        Ground::new()
+    }
+}
+
 impl Ground {
+    /// No ground yet.
     pub const fn new() -> Ground {
         let none = [0.0; GROUND_SIDE * GROUND_SIDE];
         let lowest = [[0.0; 3]; GROUND_SIDE * GROUND_SIDE];

@@ -3,14 +3,21 @@
 use crate::record::NONE;
 
 /// Groups of numbers below `N`.
-pub(crate) struct Groups<const N: usize> {
+pub struct Groups<const N: usize> {
     parent: [u32; N],
     members: heapless::Vec<u32, N>,
     /// Where each group ends in `members`.
     ends: heapless::Vec<u32, N>,
 }
 
+impl<const N: usize> Default for Groups<N> {
+    fn default() -> Groups<N> {
+        Groups::new()
+    }
+}
+
 impl<const N: usize> Groups<N> {
+    /// No numbers, no groups.
     pub const fn new() -> Groups<N> {
         Groups { parent: [0; N], members: heapless::Vec::new(), ends: heapless::Vec::new() }
     }
@@ -65,8 +72,8 @@ impl<const N: usize> Groups<N> {
         }
     }
 
-    /// How many groups there are.
-    pub fn len(&self) -> usize {
+    /// Number of groups.
+    pub fn count(&self) -> usize {
         self.ends.len()
     }
 

@@ -13,6 +13,7 @@
 use crate::background_filter::background_filter;
 use crate::compact::compact;
 use crate::continuity::Reset;
+use crate::dropped::DroppedReturns;
 use crate::flow::Em;
 use crate::grid::columns::columns;
 use crate::grid::ray_merge::ray_merge;
@@ -23,7 +24,7 @@ use crate::occupancy_constancy::{Scores, occupancy_constancy};
 use crate::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use crate::params::{COLUMNS_MAX, FOREGROUND_MAX, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
-use crate::prepare::{Dropped, Placed, Preparation, Window, central, place, step_of};
+use crate::prepare::{Placed, Preparation, Window, central, place, step_of};
 use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
@@ -147,7 +148,7 @@ pub struct Prepared {
     /// Sizes, shift and costs.
     pub step: Step,
     /// Returns left out.
-    pub dropped: Dropped,
+    pub dropped: DroppedReturns,
     /// Set where this sweep has no usable predecessor.
     pub reset: Option<Reset>,
 }

@@ -1,10 +1,12 @@
 //! Sweep preparation: returns to rays in the grid's frame (B.2.2), time and motion included.
 
+use crate::dropped::DroppedReturns;
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, EXTENT_VOXELS, Frame, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS,
 };
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, Step, ray};
+use crate::return_clock::{ReturnClock, slot_of};
 use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
 use crate::team::Team;
 use glam::DVec3;
@@ -76,73 +78,6 @@ pub fn step_of(profile: &Profile, rays: usize) -> Step {
     }
 }
 
-/// What preparation left out, and why.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
-    /// Returns after the first [`POINTS_MAX`].
-    pub over_capacity: u64,
-    /// Returns with a NaN or an infinity.
-    pub not_finite: u64,
-    /// Returns at exactly (0, 0, 0): a sensor's way to say that nothing came back.
-    pub no_return: u64,
-    /// Returns more than [`EXTENT_VOXELS`] voxels from the window's corner along an axis.
-    pub too_far: u64,
-    /// Returns of a sensor the rig does not have.
-    pub unknown_sensor: u64,
-    /// Returns on the own vehicle: their rays count as free space, without an end.
-    pub own_vehicle: u64,
-}
-
-impl core::ops::AddAssign for Dropped {
-    fn add_assign(&mut self, more: Dropped) {
-        self.over_capacity += more.over_capacity;
-        self.not_finite += more.not_finite;
-        self.no_return += more.no_return;
-        self.too_far += more.too_far;
-        self.unknown_sensor += more.unknown_sensor;
-        self.own_vehicle += more.own_vehicle;
-    }
-}
-
-impl Dropped {
-    /// Whether a return tells something, and if so whether it lies on the own vehicle, which is not
-    /// counted here; one that tells nothing is counted.
-    pub(crate) fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
-        let p = point.position;
-        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
-            self.not_finite += 1;
-            return None;
-        }
-        if p == [0.0; 3] {
-            self.no_return += 1;
-            return None;
-        }
-        if point.sensor as usize >= rig.sensors.len() {
-            self.unknown_sensor += 1;
-            return None;
-        }
-        let own = |[low, high]: [[f32; 2]; 2]| {
-            p[0] > low[0] && p[0] < high[0] && p[1] > low[1] && p[1] < high[1]
-        };
-        Some(rig.own_vehicle.is_some_and(own))
-    }
-
-    /// Every count with the name of its field and a name for people.
-    pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
-        [
-            ("over_capacity", "over the capacity", self.over_capacity),
-            ("not_finite", "not finite", self.not_finite),
-            ("no_return", "without an echo", self.no_return),
-            ("too_far", "too far", self.too_far),
-            ("unknown_sensor", "of an unknown sensor", self.unknown_sensor),
-            ("own_vehicle", "on the own vehicle", self.own_vehicle),
-        ]
-    }
-}
-
-/// Entries of the table from direction to time.
-const AZIMUTHS: usize = 1024;
-
 /// Where and when a return was, NaN where it was left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placed {
@@ -153,10 +88,9 @@ pub struct Placed {
     pub offset_s: f32,
 }
 
-/// Turns sweeps into rays. Holds only tables that do not change.
+/// Turns sweeps into rays.
 pub struct Preparation {
-    /// When in the turn, in slots, by [`pseudo_angle`].
-    slot_of_azimuth: [f32; AZIMUTHS + 1],
+    clock: ReturnClock,
 }
 
 /// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
@@ -171,16 +105,7 @@ impl Default for Preparation {
 impl Preparation {
     /// Makes the tables.
     pub fn new() -> Preparation {
-        let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
-        for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
-            // The inverse of `pseudo_angle`.
-            let p = n as f64 * 4.0 / AZIMUTHS as f64;
-            let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
-            let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
-            let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
-            *slot = (turn * SLOTS as f64) as f32;
-        }
-        Preparation { slot_of_azimuth }
+        Preparation { clock: ReturnClock::new() }
     }
 
     /// Rays of a sweep, the same however many are in the team.
@@ -200,7 +125,7 @@ impl Preparation {
         columns: &mut [u32],
         placed: &mut [Placed],
         origins: &mut [[i32; 4]],
-    ) -> (usize, Dropped) {
+    ) -> (usize, DroppedReturns) {
         assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
         let deskew = profile.deskew && rig.distorted;
         let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
@@ -208,10 +133,10 @@ impl Preparation {
         let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
         place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
         for (slot, matrix) in to_voxel.iter_mut().enumerate() {
-            let moved = if deskew && moving { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
+            let moved = if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
             *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
         }
-        let [from, to] = [0.0, SLOTS as f64].map(|when| time(rig, when) as f32);
+        let [from, to] = [0.0, SLOTS as f64].map(|when| rig.timing.offset_s(when) as f32);
         let slot_s = (to - from) / SLOTS as f32;
         let drift = Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 });
 
@@ -220,7 +145,7 @@ impl Preparation {
         let centre_f = centre.map(|c| c as f32);
         let part =
             |points: &[Point], rays: &mut [Ray], columns: &mut [u32], placed: &mut [Placed]| {
-                let mut dropped = Dropped::default();
+                let mut dropped = DroppedReturns::default();
                 let mut count = 0;
                 for (n, (point, column)) in points.iter().zip(columns).enumerate() {
                     *column = NONE;
@@ -229,7 +154,7 @@ impl Preparation {
                     }
                     let Some(own) = dropped.admit(rig, point) else { continue };
                     let (p, sensor) = (point.position, point.sensor as usize);
-                    let when = self.when(rig, point);
+                    let when = self.clock.slots(rig, point);
                     let slot = if moving { slot_of(when) } else { 0 };
                     let at = in_voxels(&to_voxel[slot], p);
                     let end = add(voxel(at), centre);
@@ -255,11 +180,12 @@ impl Preparation {
         // Two parts, the rays of the second behind those that the first may have.
         let taken = sweep.points.len().min(POINTS_MAX);
         let (first, second) = sweep.points[..taken].split_at(taken / 2);
-        let admitted = first.iter().filter(|p| Dropped::default().admit(rig, p).is_some()).count();
+        let admitted =
+            first.iter().filter(|p| DroppedReturns::default().admit(rig, p).is_some()).count();
         let (of_first, of_second) = rays.split_at_mut(admitted);
         let (columns, more_columns) = columns.split_at_mut(first.len());
         let (placed, more_placed) = placed.split_at_mut(first.len().min(placed.len()));
-        let mut found = [(0, Dropped::default()); 2];
+        let mut found = [(0, DroppedReturns::default()); 2];
         let [(count, dropped), (more, more_dropped)] = &mut found;
         team.join(
             || (*count, *dropped) = part(first, of_first, columns, placed),
@@ -274,43 +200,6 @@ impl Preparation {
         }
         (count + more, dropped)
     }
-
-    /// When in the sweep a return was, slots from its begin.
-    #[inline]
-    pub(crate) fn when(&self, rig: &Rig, point: &Point) -> f32 {
-        match rig.timing {
-            Timing::AtStamp => 0.0,
-            Timing::Offset { from_s, span_s } => {
-                let slots = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
-                if slots > 0.0 { slots.min(SLOTS as f32) } else { 0.0 }
-            }
-            Timing::Azimuth { .. } => {
-                let p = pseudo_angle(point.position[0], point.position[1]);
-                let p = p * (AZIMUTHS as f32 / 4.0);
-                let n = (p as i32 as usize).min(AZIMUTHS - 1);
-                let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
-                low + (p - n as f32) * (high - low)
-            }
-        }
-    }
-}
-
-/// A stand-in for the angle that needs no trigonometry: 0 at the rear, 1 to the left, 2 in front,
-/// 3 to the right, towards 4 at the rear.
-#[inline]
-fn pseudo_angle(x: f32, y: f32) -> f32 {
-    let sum = x.abs() + y.abs();
-    if sum == 0.0 {
-        return 2.0;
-    }
-    let c = x / sum;
-    if y >= 0.0 { 1.0 + c } else { 3.0 - c }
-}
-
-/// The slot of a time in slots.
-#[inline]
-pub(crate) fn slot_of(when: f32) -> usize {
-    (when as i32 as usize).min(SLOTS - 1)
 }
 
 /// What the vehicle's motion within a slot does to its returns: translation and yaw.
@@ -345,21 +234,6 @@ impl Drift {
             z + after * dz,
         ]
     }
-}
-
-/// A time in slots, s after the stamp.
-pub(crate) fn time(rig: &Rig, when: f64) -> f64 {
-    let turn = when / SLOTS as f64;
-    match rig.timing {
-        Timing::AtStamp => 0.0,
-        Timing::Offset { from_s, span_s } => from_s + turn * span_s,
-        Timing::Azimuth { span_s } => (turn - 0.5) * span_s,
-    }
-}
-
-/// The vehicle at the middle of a slot, in its frame at the stamp.
-pub(crate) fn moved_by(rig: &Rig, sweep: &Sweep, slot: usize) -> Pose {
-    sweep.twist.over(time(rig, slot as f64 + 0.5))
 }
 
 fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
@@ -409,7 +283,7 @@ fn place_origins(
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved = if moving { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
+            let moved = if moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
             let v = (at / profile.voxel_m)
                 .to_array()
@@ -458,7 +332,7 @@ mod tests {
         columns: Vec<u32>,
         placed: Vec<Placed>,
         origins: Vec<[i32; 4]>,
-        dropped: Dropped,
+        dropped: DroppedReturns,
         window: Window,
     }
 

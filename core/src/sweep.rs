@@ -68,3 +68,12 @@ pub struct Rig {
     /// maximum, m, at any height.
     pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
+
+impl Rig {
+    /// Whether a place in the vehicle frame, m, lies on the own vehicle.
+    #[inline]
+    pub fn is_own_vehicle(&self, [x, y, _]: [f32; 3]) -> bool {
+        self.own_vehicle
+            .is_some_and(|[low, high]| x > low[0] && x < high[0] && y > low[1] && y < high[1])
+    }
+}

@@ -4,9 +4,9 @@ use std::fmt;
 
 use raywake_core::continuity::Reset;
 use raywake_core::digest::Digest;
+use raywake_core::dropped::DroppedReturns;
 use raywake_core::output::TrackletState;
 use raywake_core::pipeline::Flows;
-use raywake_core::prepare;
 use raywake_core::tracklet::Turnover;
 use serde::{Serialize, Serializer};
 
@@ -55,7 +55,7 @@ pub fn in_words(reset: Reset) -> (&'static str, String) {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Returns left out by preparation.
-    pub returns: prepare::Dropped,
+    pub returns: DroppedReturns,
     /// Rows without a coordinate in the source's files.
     pub null_rows: u64,
     /// Sweeps the source's frame numbers say are missing.

@@ -54,7 +54,7 @@ impl Segments {
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.0.count()
     }
 
     /// Columns of a segment, ascending.

@@ -4,8 +4,9 @@
 //! State (3.15): position, heading, speed, turning rate. Positions are metres from the centre of
 //! the cell the tracklet lies in, so that they keep their precision wherever the vehicle drives.
 
+use crate::ctrv::TwoPointStart;
 use crate::params::{Birth, TrackletParams};
-use nalgebra::{Matrix2, Matrix4, Matrix5, Matrix5x2, Vector2, Vector5};
+use nalgebra::{Matrix2, Matrix5, Matrix5x2, Vector2, Vector5};
 
 /// Mean and covariance of (x, y, heading, speed, turning rate).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,62 +27,14 @@ const SCALE: [f32; 2] = [0.1, 10.0];
 
 /// Standard deviations at birth in the author's program.
 const BIRTH_SOURCE: [f32; 5] = [0.1, 0.1, 0.2, 1.5, 0.2];
-/// Variance of a heading of which nothing is known: uniform over a turn, pi²/3.
-const HEADING_UNKNOWN: f32 = 3.289_868;
-
-/// What two measured positions tell of a motion.
-pub(crate) struct Start {
-    /// rad.
-    pub heading: f32,
-    /// m/s.
-    pub speed: f32,
-    /// Of (x, y, heading, speed) at the second position.
-    pub covariance: Matrix4<f32>,
-}
-
-impl Start {
-    /// From the displacement `moved` (m) over `dt` seconds between positions of covariance `noise`,
-    /// R. The errors of position and velocity are correlated: var(v) = 2 R / dt²,
-    /// cov(x, v) = R / dt, turned into heading and speed.
-    pub fn of(noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> Start {
-        let distance = libm::sqrtf(moved[0] * moved[0] + moved[1] * moved[1]);
-        let (heading, speed) = (libm::atan2f(moved[1], moved[0]), distance / dt);
-        let ahead = if distance > 0.0 {
-            Vector2::new(moved[0] / distance, moved[1] / distance)
-        } else {
-            Vector2::new(1.0, 0.0)
-        };
-        let aside = Vector2::new(-ahead.y, ahead.x);
-        let (along, across) = (noise * ahead / dt, noise * aside / dt);
-        let of_speed = 2.0 * ahead.dot(&along) / dt;
-        let of_heading = 2.0 * aside.dot(&across) / (dt * speed * speed);
-        let known = of_heading < HEADING_UNKNOWN;
-        let mut p = Matrix4::zeros();
-        p.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise);
-        p[(2, 2)] = if known { of_heading } else { HEADING_UNKNOWN };
-        p[(3, 3)] = of_speed;
-        for axis in 0..2 {
-            (p[(axis, 3)], p[(3, axis)]) = (along[axis], along[axis]);
-            if known {
-                let c = across[axis] / speed;
-                (p[(axis, 2)], p[(2, axis)]) = (c, c);
-            }
-        }
-        if known {
-            let c = 2.0 * aside.dot(&along) / (dt * speed);
-            (p[(2, 3)], p[(3, 2)]) = (c, c);
-        }
-        Start { heading, speed, covariance: p }
-    }
-}
 
 impl Ekf {
     /// A tracklet born from the displacement `moved` (m) of its first match over `dt` seconds, as
     /// seen from where it moved to; `noise` is the covariance of a measured position, m².
     ///
-    /// At the target: as [`Start`] has it. At the source: the author's start, one step late.
+    /// At the target: as [`TwoPointStart`] has it. At the source: the author's start, one step late.
     pub fn birth(params: &TrackletParams, noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> Ekf {
-        let Start { heading, speed, covariance } = Start::of(noise, moved, dt);
+        let TwoPointStart { heading, speed, covariance } = TwoPointStart::of(noise, moved, dt);
         let mut mean = Vector5::new(0.0, 0.0, heading, speed, 0.0);
         let mut p = Matrix5::zeros();
         match params.birth {

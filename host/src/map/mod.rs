@@ -4,10 +4,11 @@ pub mod command;
 pub mod device;
 pub mod scalar;
 
+use raywake_core::dropped::DroppedReturns;
 use raywake_core::layout::{MAP_BUFFERS, MapBuffer};
 use raywake_core::map::Update;
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::{Dropped, Preparation, Window, place, step_of};
+use raywake_core::prepare::{Preparation, Window, place, step_of};
 use raywake_core::record::{NONE, Ray, Step};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
@@ -64,7 +65,7 @@ pub struct Mapped {
     /// The window: keys count from its corner.
     pub window: Window,
     /// Returns left out.
-    pub dropped: Dropped,
+    pub dropped: DroppedReturns,
     /// Rays.
     pub rays: usize,
 }

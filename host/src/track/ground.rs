@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use raywake_core::objects::front_end::GroundMap;
+use raywake_objects::front_end::GroundMap;
 
 use crate::error::Error;
 use crate::source::text;

@@ -18,8 +18,8 @@ use crate::report::bytes;
 use crate::source::{self, SweepData};
 use crate::summary::make_room;
 
-use raywake_core::objects::estimate::FixedLag;
 use raywake_gpu::guard;
+use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
 pub use report::Summary;

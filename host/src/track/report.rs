@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use raywake_core::digest::Digest;
-use raywake_core::objects::ObjectState;
-use raywake_core::objects::front_end::Turnover;
+use raywake_objects::ObjectState;
+use raywake_objects::front_end::Turnover;
 use serde::Serialize;
 
 use super::Ended;

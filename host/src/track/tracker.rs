@@ -3,16 +3,16 @@
 
 use std::time::Instant;
 
-use raywake_core::objects::ObjectState;
-use raywake_core::objects::estimate::{EstimateParams, Estimator, FixedLag, Report};
-use raywake_core::objects::front_end::{
-    Flows, FrontEnd, FrontEndParams, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, Turnover,
-};
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
 use raywake_gpu::GpuError;
 use raywake_gpu::guard::guarded;
+use raywake_objects::ObjectState;
+use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, Report};
+use raywake_objects::front_end::{
+    Flows, FrontEnd, FrontEndParams, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, Turnover,
+};
 
 use super::Ground;
 use crate::drive::Drive;

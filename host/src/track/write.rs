@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use raywake_core::objects::{ObjectReturn, ObjectState};
+use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::Ended;
 use crate::error::Error;

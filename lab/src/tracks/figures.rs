@@ -8,8 +8,8 @@ use super::tracker::{Track, baseline};
 use crate::report::{Axis, Chart, Cloud, Lines, Picture, Plot, Series, clouds};
 use glam::DVec3;
 use raywake::error::Error;
-use raywake_core::objects::centroid_ekf::CentroidParams;
-use raywake_core::objects::estimate::{Cost, Estimator};
+use raywake_objects::centroid_ekf::CentroidParams;
+use raywake_objects::estimate::{Cost, Estimator};
 use raywake_sim::Rng;
 
 /// Returns of a cloud that are drawn at most.

@@ -12,8 +12,8 @@ use raywake::drive::Drive;
 use raywake::error::Error;
 use raywake::source::{self, OpenOptions, SweepData};
 use raywake::track::Tracker;
-use raywake_core::objects::ObjectReturn;
-use raywake_core::objects::front_end::Track;
+use raywake_objects::ObjectReturn;
+use raywake_objects::front_end::Track;
 use std::ops::Range;
 use std::path::Path;
 

@@ -10,7 +10,7 @@ use glam::DVec3;
 use raywake::error::Error;
 use raywake::sink::atomic;
 use raywake_core::digest::Digest;
-use raywake_core::objects::ObjectReturn;
+use raywake_objects::ObjectReturn;
 use std::io::Write;
 use std::path::Path;
 

@@ -28,7 +28,7 @@ use front_ends::{Found, Settings};
 use object::Object;
 use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
 use raywake::error::Error;
-use raywake_core::objects::estimate::Estimator;
+use raywake_objects::estimate::Estimator;
 use recorded::Recorded;
 use simulated::Wanted;
 use std::path::PathBuf;

@@ -2,8 +2,8 @@
 
 use crate::labels::Kind;
 use glam::{DVec2, DVec3};
-use raywake_core::objects::panorama::Panorama;
-use raywake_core::objects::{ObjectReturn, ObjectState};
+use raywake_objects::panorama::Panorama;
+use raywake_objects::{ObjectReturn, ObjectState};
 use std::ops::Range;
 
 /// An object, with perfect segmentation and association.

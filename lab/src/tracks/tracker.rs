@@ -3,9 +3,9 @@
 use super::object::{Moment, Object, centroid, moment_at};
 use crate::labels::turn;
 use glam::DVec3;
-use raywake_core::objects::centroid_ekf::{CentroidEkf, CentroidParams, Revision};
-use raywake_core::objects::estimate::{EstimateParams, Estimator, FixedLag};
-use raywake_core::objects::{ObjectReturn, ObjectState};
+use raywake_objects::centroid_ekf::{CentroidEkf, CentroidParams, Revision};
+use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag};
+use raywake_objects::{ObjectReturn, ObjectState};
 
 /// What a tracker makes of an object.
 #[derive(Clone, Debug, Default)]

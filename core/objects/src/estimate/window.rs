@@ -17,8 +17,8 @@ use super::process::{Process, Weights};
 use super::returns;
 use super::start;
 use super::{Cost, EstimateParams, Estimator, Known, Report};
-use crate::objects::spline::{DEGREE, Knots};
-use crate::objects::{ObjectReturn, ObjectState};
+use crate::spline::{DEGREE, Knots};
+use crate::{ObjectReturn, ObjectState};
 use heapless::Vec;
 
 /// The window, s.

@@ -29,15 +29,15 @@ pub use track::{HISTORY_MAX, LATEST_MAX, Life, Thinned, Track};
 
 use super::centroid_ekf::{CentroidEkf, CentroidParams};
 use super::panorama::Panorama;
-use crate::params::COLUMNS_MAX;
-use crate::prepare::Dropped;
-use crate::record::NONE;
-use crate::sweep::{Rig, Sweep};
 use assignment::Assignment;
 use batch::{Batch, Seen};
 use cells::Cells;
 use chunks::{Chunks, Segment};
 use nalgebra::{Matrix2, Vector2};
+use raywake_core::dropped::DroppedReturns;
+use raywake_core::params::COLUMNS_MAX;
+use raywake_core::record::NONE;
+use raywake_core::sweep::{Rig, Sweep};
 
 /// Tracks followed at once at most.
 pub const TRACKS_MAX: usize = 160;
@@ -116,7 +116,7 @@ impl FrontEndParams {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Turnover {
     /// Returns left out before they were looked at.
-    pub dropped: Dropped,
+    pub dropped: DroppedReturns,
     /// Returns of objects.
     pub object_returns: u64,
     /// Returns of objects beyond the capacity for chunks.

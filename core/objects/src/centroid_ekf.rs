@@ -8,8 +8,8 @@
 //! explains, or for [`CentroidParams::start_s`], and is then born of both.
 
 use super::ObjectState;
-use crate::tracklet::ekf::Start;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
+use raywake_core::ctrv::TwoPointStart;
 
 /// Elements of the state.
 pub const STATE: usize = 7;
@@ -241,7 +241,7 @@ impl CentroidEkf {
             return Revision::None;
         }
         *self = CentroidEkf { phase: Phase::Moving, ..born };
-        let start = Start::of(
+        let start = TwoPointStart::of(
             Matrix2::from_diagonal_element(measured as f32),
             moved.map(|v| v as f32),
             elapsed as f32,

@@ -2,10 +2,10 @@
 
 extern crate std;
 use super::*;
-use crate::output::PointFlow;
-use crate::pose::{Pose, Twist};
-use crate::sweep::{Point, Timing};
 use glam::DVec3;
+use raywake_core::output::PointFlow;
+use raywake_core::pose::{Pose, Twist};
+use raywake_core::sweep::{Point, Timing};
 use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
@@ -340,7 +340,7 @@ fn beyond_a_capacity_all_is_counted() {
     run.take(0.0, &many, None);
     run.take(0.0, &many, None);
     let turnover = run.step();
-    assert_eq!(turnover.dropped.over_capacity, 140_000 - crate::params::POINTS_MAX as u64);
+    assert_eq!(turnover.dropped.over_capacity, 140_000 - raywake_core::params::POINTS_MAX as u64);
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! The returns of some 100 ms, of any number of sensors, in the world.
 
 use super::{CELL_M, SIDE};
-use crate::output::{Origin, PointFlow};
-use crate::params::{POINTS_MAX, SLOTS};
-use crate::pose::Pose;
-use crate::prepare::{Dropped, Preparation, moved_by, slot_of, time};
-use crate::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
 use glam::{DMat3, DVec3};
+use raywake_core::dropped::DroppedReturns;
+use raywake_core::output::{Origin, PointFlow};
+use raywake_core::params::{POINTS_MAX, SLOTS};
+use raywake_core::pose::Pose;
+use raywake_core::return_clock::{ReturnClock, slot_of};
+use raywake_core::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
 
 /// A velocity with a larger standard deviation tells nothing, m/s.
 const SURE_MPS: f32 = 0.7;
@@ -62,7 +63,7 @@ pub(super) fn cell(at: [f32; 3]) -> [usize; 2] {
 
 /// What has been taken since the last step.
 pub(super) struct Batch {
-    preparation: Preparation,
+    clock: ReturnClock,
     /// Stamp of the first sweep taken, s.
     pub stamp_s: Option<f64>,
     /// World position of the corner of the window: a corner of the lattice along x and y, the
@@ -70,24 +71,24 @@ pub(super) struct Batch {
     pub corner: DVec3,
     pub returns: heapless::Vec<Seen, POINTS_MAX>,
     /// Left out since the last step.
-    pub dropped: Dropped,
+    pub dropped: DroppedReturns,
 }
 
 impl Batch {
     pub fn new() -> Batch {
         Batch {
-            preparation: Preparation::new(),
+            clock: ReturnClock::new(),
             stamp_s: None,
             corner: DVec3::ZERO,
             returns: heapless::Vec::new(),
-            dropped: Dropped::default(),
+            dropped: DroppedReturns::default(),
         }
     }
 
     pub fn clear(&mut self) {
         self.stamp_s = None;
         self.returns.clear();
-        self.dropped = Dropped::default();
+        self.dropped = DroppedReturns::default();
     }
 
     /// Adds the returns of a sweep. Those of a sweep without a finite stamp or pose are not finite.
@@ -114,12 +115,12 @@ impl Batch {
         let timed = rig.timing != Timing::AtStamp;
         let mut places = [Place::default(); SLOTS];
         for (slot, place) in places[..if timed { SLOTS } else { 1 }].iter_mut().enumerate() {
-            let moved = if timed { moved_by(rig, sweep, slot) } else { Pose::IDENTITY };
+            let moved = if timed { sweep.motion(rig, slot) } else { Pose::IDENTITY };
             let then = sweep.world_from_vehicle * moved;
             let at = if rig.distorted { then } else { sweep.world_from_vehicle };
             place.turn = at.matrix();
             place.at = at.translation - self.corner;
-            place.offset_s = if timed { time(rig, slot as f64 + 0.5) } else { 0.0 };
+            place.offset_s = if timed { rig.timing.offset_s(slot as f64 + 0.5) } else { 0.0 };
             for (origin, mounted) in place.origins.iter_mut().zip(&rig.sensors) {
                 *origin = metres((then * *mounted).translation - self.corner);
             }
@@ -137,9 +138,9 @@ impl Batch {
                 }
                 None => continue,
             }
-            let when = self.preparation.when(rig, point);
+            let when = self.clock.slots(rig, point);
             let slot = if timed { slot_of(when) } else { 0 };
-            let offset_s = time(rig, f64::from(when));
+            let offset_s = rig.timing.offset_s(f64::from(when));
             let place = &places[slot];
             let [x, y, z] = point.position.map(f64::from);
             let drift = drift * (offset_s - place.offset_s);

@@ -2,8 +2,8 @@
 
 use super::batch::{Batch, Seen};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
-use crate::ground::Ground;
-use crate::params::{COLUMNS_MAX, POINTS_MAX};
+use raywake_core::ground::Ground;
+use raywake_core::params::{COLUMNS_MAX, POINTS_MAX};
 
 /// Heights of the ground on a grid of square cells, made beforehand.
 #[derive(Clone, Copy, Debug)]

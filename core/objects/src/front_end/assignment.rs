@@ -1,7 +1,7 @@
 //! Global nearest neighbour: which segment continues which track.
 
 use super::{SEGMENTS_MAX, TRACKS_MAX};
-use crate::record::NONE;
+use raywake_core::record::NONE;
 
 /// Segments, and one column for each track that none continues.
 const COLUMNS: usize = SEGMENTS_MAX + TRACKS_MAX;

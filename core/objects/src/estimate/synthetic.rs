@@ -3,8 +3,8 @@
 
 extern crate std;
 
-use crate::objects::{ObjectReturn, ObjectState};
 use crate::random::Random;
+use crate::{ObjectReturn, ObjectState};
 use std::vec::Vec;
 
 /// Body, then cabin: lowest and highest corner, m.

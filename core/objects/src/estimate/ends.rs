@@ -11,8 +11,8 @@
 use super::normal::{Equations, Seen, Surface, follow};
 use super::process::Weights;
 use super::returns::Kept;
-use crate::objects::ObjectState;
-use crate::objects::spline::Knots;
+use crate::ObjectState;
+use crate::spline::Knots;
 use heapless::Vec;
 
 /// A part of the track, s.

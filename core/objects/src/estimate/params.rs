@@ -55,7 +55,7 @@ pub struct EstimateParams {
     pub ends_m: f64,
     /// Model points that rays went through are taken away, and the rest is estimated again.
     pub carves: bool,
-    /// Rays that pass the object tell where it ends: [`crate::objects::panorama`].
+    /// Rays that pass the object tell where it ends: [`crate::panorama`].
     pub passing: bool,
     /// The start grows from the middle of the track, over a sparse model.
     pub grows: bool,

@@ -1,3 +1,6 @@
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
 //! Object tracks with shape (chapter 2): what the returns of one object say of its trajectory and
 //! its shape, together and in continuous time.
 //!
@@ -9,6 +12,9 @@ pub mod centroid_ekf;
 pub mod estimate;
 pub mod front_end;
 pub mod panorama;
+#[cfg(test)]
+#[path = "../../src/random.rs"]
+mod random;
 pub mod spline;
 
 /// Returns that a track keeps, and an estimate is made of, at most.
@@ -23,7 +29,7 @@ pub struct ObjectReturn {
     pub origin: [f32; 3],
     /// When, s after the track's start.
     pub time_s: f32,
-    /// Sensor that saw it, index in [`crate::sweep::Rig::sensors`].
+    /// Sensor that saw it, index in [`raywake_core::sweep::Rig::sensors`].
     pub sensor: u8,
     /// Whether the next rays pass it, to its left and to its right as the sensor sees it: there the
     /// object ends. See [`panorama`].

@@ -2,9 +2,9 @@
 
 use super::batch::{Batch, Seen, cell};
 use super::{CELL_M, CELLS, FrontEndParams, SEGMENTS_MAX, SIDE};
-use crate::groups::Groups;
-use crate::params::{COLUMNS_MAX, POINTS_MAX};
-use crate::record::NONE;
+use raywake_core::groups::Groups;
+use raywake_core::params::{COLUMNS_MAX, POINTS_MAX};
+use raywake_core::record::NONE;
 
 /// Chunks of a batch; returns that would need more are dropped and counted.
 pub(super) const CHUNKS_MAX: usize = 32_768;
@@ -232,7 +232,7 @@ impl Chunks {
     /// Lists the segments that may be objects.
     fn list(&mut self, params: &FrontEndParams, left: &mut LeftOut) {
         self.segments.clear();
-        for group in 0..self.groups.len() {
+        for group in 0..self.groups.count() {
             let members = self.groups.members(group);
             let mut sums = Sums::NONE;
             members.iter().for_each(|c| sums.add(&self.chunks.all[*c as usize].sums));

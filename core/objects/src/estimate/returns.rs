@@ -1,8 +1,8 @@
 //! The returns that take part: so many of a track, evenly in the order of their times.
 
-use crate::objects::ObjectReturn;
-use crate::objects::RETURNS_MAX;
-use crate::objects::spline::{Basis, Knots};
+use crate::ObjectReturn;
+use crate::RETURNS_MAX;
+use crate::spline::{Basis, Knots};
 
 /// Steps in which times are told apart where there are more returns than take part.
 const TICKS: usize = 4096;

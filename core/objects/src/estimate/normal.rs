@@ -11,7 +11,7 @@
 use super::process::Weights;
 use super::returns::Kept;
 use super::system::System;
-use crate::objects::spline::{BASES_MAX, SUPPORT};
+use crate::spline::{BASES_MAX, SUPPORT};
 
 /// Splines of a state.
 pub(super) const Z: usize = 2;
@@ -420,8 +420,8 @@ mod tests {
     extern crate std;
     use super::super::system::tests::gauss;
     use super::*;
-    use crate::objects::spline::Knots;
     use crate::random::Random;
+    use crate::spline::Knots;
     use std::boxed::Box;
     use std::vec;
     use std::vec::Vec;

@@ -5,8 +5,8 @@ use super::normal::{CLIMB, Equations, Z, planar, vertical};
 use super::process::{self, Process, Weights};
 use super::steady::Steady;
 use super::{EstimateParams, Estimator, steady};
-use crate::objects::ObjectState;
-use crate::objects::spline::{Basis, Knots};
+use crate::ObjectState;
+use crate::spline::{Basis, Knots};
 
 /// Growth from the middle of a track: how far it reaches with every step (at first twice as far), s,
 /// and how many steps may lead over a track; deviation of returns and model points meanwhile. A

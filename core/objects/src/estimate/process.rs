@@ -20,7 +20,7 @@
 use super::EstimateParams;
 use super::normal::{CLIMB, Equations, Z, planar, vertical};
 use super::system::System;
-use crate::objects::spline::{BASES_MAX, Knots, SUPPORT};
+use crate::spline::{BASES_MAX, Knots, SUPPORT};
 
 /// Weights of a state's seven splines: x, y, z, heading, speed, climb, turn rate.
 pub(super) type Weights = [f64; 7];

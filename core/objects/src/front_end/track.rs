@@ -1,8 +1,8 @@
 //! What is kept of an object from its birth to its end.
 
 use super::batch::Seen;
-use crate::objects::centroid_ekf::{CentroidEkf, CentroidParams};
-use crate::objects::{ObjectReturn, ObjectState, RETURNS_MAX};
+use crate::centroid_ekf::{CentroidEkf, CentroidParams};
+use crate::{ObjectReturn, ObjectState, RETURNS_MAX};
 
 /// States of the filter that a track keeps.
 pub const HISTORY_MAX: usize = 512;

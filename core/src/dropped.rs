@@ -1,0 +1,65 @@
+//! Returns that are left out of a sweep: invalid, too far, or too many.
+
+use crate::sweep::{Point, Rig};
+
+/// How many returns were left out, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DroppedReturns {
+    /// Returns after the first [`POINTS_MAX`](crate::params::POINTS_MAX).
+    pub over_capacity: u64,
+    /// Returns with a NaN or an infinity.
+    pub not_finite: u64,
+    /// Returns at exactly (0, 0, 0): a sensor's way to say that nothing came back.
+    pub no_return: u64,
+    /// Returns more than [`EXTENT_VOXELS`](crate::params::EXTENT_VOXELS) voxels from the window's
+    /// corner along an axis.
+    pub too_far: u64,
+    /// Returns of a sensor the rig does not have.
+    pub unknown_sensor: u64,
+    /// Returns on the own vehicle: their rays count as free space, without an end.
+    pub own_vehicle: u64,
+}
+
+impl core::ops::AddAssign for DroppedReturns {
+    fn add_assign(&mut self, more: DroppedReturns) {
+        self.over_capacity += more.over_capacity;
+        self.not_finite += more.not_finite;
+        self.no_return += more.no_return;
+        self.too_far += more.too_far;
+        self.unknown_sensor += more.unknown_sensor;
+        self.own_vehicle += more.own_vehicle;
+    }
+}
+
+impl DroppedReturns {
+    /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and counted,
+    /// where the return is not valid.
+    pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
+        let p = point.position;
+        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
+            self.not_finite += 1;
+            return None;
+        }
+        if p == [0.0; 3] {
+            self.no_return += 1;
+            return None;
+        }
+        if point.sensor as usize >= rig.sensors.len() {
+            self.unknown_sensor += 1;
+            return None;
+        }
+        Some(rig.is_own_vehicle(p))
+    }
+
+    /// Every count with the name of its field and a name for people.
+    pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
+        [
+            ("over_capacity", "over the capacity", self.over_capacity),
+            ("not_finite", "not finite", self.not_finite),
+            ("no_return", "without an echo", self.no_return),
+            ("too_far", "too far", self.too_far),
+            ("unknown_sensor", "of an unknown sensor", self.unknown_sensor),
+            ("own_vehicle", "on the own vehicle", self.own_vehicle),
+        ]
+    }
+}

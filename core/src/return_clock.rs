@@ -1,0 +1,102 @@
+//! When in its sweep a return was measured, and how far the vehicle had moved by then.
+//!
+//! A sweep is cut into [`SLOTS`] time slots of equal length; times are counted in slots from its
+//! beginning.
+
+use crate::params::SLOTS;
+use crate::pose::Pose;
+use crate::sweep::{Point, Rig, Sweep, Timing};
+
+/// Entries of the table from azimuth to time.
+const AZIMUTHS: usize = 1024;
+
+/// Tells the time of a return by its offset or, for a spinning sensor, by its azimuth.
+pub struct ReturnClock {
+    /// Slots since the beginning of the turn, by [`pseudo_angle`].
+    slot_of_azimuth: [f32; AZIMUTHS + 1],
+}
+
+impl Default for ReturnClock {
+    fn default() -> Self {
+        ReturnClock::new()
+    }
+}
+
+impl ReturnClock {
+    /// Makes the table.
+    pub fn new() -> ReturnClock {
+        let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
+        for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
+            // The inverse of `pseudo_angle`.
+            let p = n as f64 * 4.0 / AZIMUTHS as f64;
+            let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
+            let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
+            let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
+            *slot = (turn * SLOTS as f64) as f32;
+        }
+        ReturnClock { slot_of_azimuth }
+    }
+
+    /// Time of a return, slots from the beginning of its sweep.
+    #[inline]
+    pub fn slots(&self, rig: &Rig, point: &Point) -> f32 {
+        match rig.timing {
+            Timing::AtStamp => 0.0,
+            Timing::Offset { from_s, span_s } => {
+                let slots = (point.offset_s - from_s as f32) * (SLOTS as f32 / span_s as f32);
+                if slots > 0.0 { slots.min(SLOTS as f32) } else { 0.0 }
+            }
+            Timing::Azimuth { .. } => {
+                let p = pseudo_angle(point.position[0], point.position[1]);
+                let p = p * (AZIMUTHS as f32 / 4.0);
+                let n = (p as i32 as usize).min(AZIMUTHS - 1);
+                let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
+                low + (p - n as f32) * (high - low)
+            }
+        }
+    }
+
+    /// Time of a return after the sweep's stamp, s.
+    #[inline]
+    pub fn offset_s(&self, rig: &Rig, point: &Point) -> f64 {
+        rig.timing.offset_s(f64::from(self.slots(rig, point)))
+    }
+}
+
+/// The slot that holds a time in slots.
+#[inline]
+pub fn slot_of(slots: f32) -> usize {
+    (slots as i32 as usize).min(SLOTS - 1)
+}
+
+impl Timing {
+    /// Seconds after the stamp of a time in slots from the beginning of the sweep.
+    #[inline]
+    pub fn offset_s(self, slots: f64) -> f64 {
+        let turn = slots / SLOTS as f64;
+        match self {
+            Timing::AtStamp => 0.0,
+            Timing::Offset { from_s, span_s } => from_s + turn * span_s,
+            Timing::Azimuth { span_s } => (turn - 0.5) * span_s,
+        }
+    }
+}
+
+impl Sweep<'_> {
+    /// Pose of the vehicle at the middle of a slot, in its frame at the stamp.
+    pub fn motion(&self, rig: &Rig, slot: usize) -> Pose {
+        self.twist.over(rig.timing.offset_s(slot as f64 + 0.5))
+    }
+}
+
+/// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at the
+/// rear, 1 to the left, 2 in front, 3 to the right.
+#[inline]
+fn pseudo_angle(x: f32, y: f32) -> f32 {
+    let sum = x.abs() + y.abs();
+    if sum == 0.0 {
+        return 2.0;
+    }
+    let c = x / sum;
+    if y >= 0.0 { 1.0 + c } else { 3.0 - c }
+}
