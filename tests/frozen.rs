@@ -4,7 +4,6 @@
 #![forbid(unsafe_code)]
 
 use raywake::backend::Backend;
-use raywake::source::SweepData;
 use raywake::team;
 use raywake::track::{Ended, Tracker};
 use raywake_core::background_filter;
@@ -12,6 +11,7 @@ use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_gpu::guard::{self, Guard};
 use raywake_gpu::{Census, Options};
+use raywake_io::source::SweepData;
 use raywake_tests::drives::{Setup, pairs, street, sweep};
 
 #[global_allocator]

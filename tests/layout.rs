@@ -11,13 +11,24 @@ use std::path::Path;
 const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
 
 /// Which packages of the project each one may name. Whatever is not listed may name any.
-const MAY_NAME: [(&str, &[&str]); 6] = [
+const MAY_NAME: [(&str, &[&str]); 7] = [
     ("core", &[]),
     ("core/objects", &["raywake-core"]),
     ("gpu", &[]),
     ("kernels", &["raywake-core", "raywake-gpu"]),
     ("lab/sim", &["raywake-core"]),
-    ("host", &["raywake-core", "raywake-objects", "raywake-kernels", "raywake-gpu", "raywake-sim"]),
+    ("host/io", &["raywake-core", "raywake-sim"]),
+    (
+        "host",
+        &[
+            "raywake-core",
+            "raywake-objects",
+            "raywake-kernels",
+            "raywake-gpu",
+            "raywake-io",
+            "raywake-sim",
+        ],
+    ),
 ];
 
 #[test]
@@ -69,9 +80,11 @@ fn dependencies_run_one_way() {
             assert!(allowed.contains(&name), "{package} depends on {name}");
         }
     }
-    let host = read(&root().join("host/Cargo.toml"));
-    let simulator = host.lines().find(|l| l.starts_with("raywake-sim"));
-    assert!(simulator.is_none_or(|l| l.contains("optional = true")), "{simulator:?}");
+    for package in ["host", "host/io"] {
+        let manifest = read(&root().join(package).join("Cargo.toml"));
+        let simulator = manifest.lines().find(|l| l.starts_with("raywake-sim"));
+        assert!(simulator.is_none_or(|l| l.contains("optional = true")), "{simulator:?}");
+    }
 }
 
 #[test]
@@ -108,7 +121,9 @@ fn only_the_vulkan_executor_is_trusted() {
             assert!(lines.is_empty(), "{}: lines {lines:?}", file.display());
         }
     }
-    for library in ["core/src", "core/objects/src", "kernels/src", "host/src", "lab/sim/src"] {
+    for library in
+        ["core/src", "core/objects/src", "kernels/src", "host/src", "host/io/src", "lab/sim/src"]
+    {
         let text = read(&root().join(library).join("lib.rs"));
         assert!(text.contains("#![forbid(unsafe_code)]"), "{library}");
     }

@@ -2,10 +2,10 @@
 
 #![forbid(unsafe_code)]
 
-use raywake::source::{self, OpenOptions, Source, SweepData};
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_gpu::Options;
+use raywake_io::source::{self, OpenOptions, Source, SweepData};
 use raywake_tests::drives::Setup;
 use std::path::PathBuf;
 

@@ -11,8 +11,8 @@ use std::time::Duration;
 use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
-use crate::error::Error;
-use crate::source::{Format, OpenOptions, PosesFrame};
+use raywake_io::Error;
+use raywake_io::source::{Format, OpenOptions, PosesFrame};
 
 pub use flow::Flow;
 pub use sweeps::Sweeps;
@@ -278,7 +278,7 @@ impl Part {
 }
 
 impl Recording {
-    /// For [`crate::source::open`].
+    /// For [`raywake_io::source::open`].
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             format: self.format,

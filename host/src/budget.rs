@@ -18,12 +18,13 @@ use crate::backend::scalar::Scalar;
 use crate::config;
 use crate::drive::Drive;
 use crate::engine::say;
-use crate::error::Error;
+use crate::error::RunError;
 use crate::map::Mapper;
 use crate::report::bytes;
 use crate::statistics::BUDGET_MS;
 use crate::team;
 use crate::track::Tracker;
+use raywake_io::Error;
 
 pub use markdown::memory_layout;
 
@@ -39,12 +40,12 @@ pub fn shipped() -> [Profile; 4] {
 
 /// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where
 /// one of them takes more than the limit.
-pub fn budget(args: &args::Budget) -> Result<(), Error> {
+pub fn budget(args: &args::Budget) -> Result<(), RunError> {
     let profiles = profiles(&args.profile)?;
     say(false, &memory_layout(&profiles))?;
     let most = profiles.iter().map(|p| device_bytes(p) + host_bytes(p, false)).max();
     match (most, args.limit) {
-        (Some(bytes), Some(limit)) if bytes > limit => Err(Error::OverBudget { bytes, limit }),
+        (Some(bytes), Some(limit)) if bytes > limit => Err(RunError::OverBudget { bytes, limit }),
         _ => Ok(()),
     }
 }

@@ -7,7 +7,8 @@ use crate::args::{BackendChoice, BackendKind, Validate};
 use crate::backend::device::Device;
 use crate::backend::scalar::Scalar;
 use crate::backend::{Backend, Tables};
-use crate::error::Error;
+use crate::error::RunError;
+use raywake_io::Error;
 
 /// A backend with everything allocated, and why it is not a device where one might be expected.
 pub struct Chosen {
@@ -26,7 +27,11 @@ pub struct Wanted {
 }
 
 /// Makes the backend asked for.
-pub fn backend(choice: &BackendChoice, profile: &Profile, tables: Tables) -> Result<Chosen, Error> {
+pub fn backend(
+    choice: &BackendChoice,
+    profile: &Profile,
+    tables: Tables,
+) -> Result<Chosen, RunError> {
     let wanted = wanted(choice)?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
@@ -76,7 +81,7 @@ fn options(choice: &BackendChoice) -> Options {
 }
 
 /// The table of Vulkan devices, or why there is none.
-pub fn list_devices() -> Result<String, Error> {
+pub fn list_devices() -> Result<String, RunError> {
     match devices() {
         Ok(list) => Ok(table(&list)),
         Err(GpuError::NoLoader) => {
@@ -85,7 +90,7 @@ pub fn list_devices() -> Result<String, Error> {
         Err(GpuError::NoDevice) => {
             Ok("No Vulkan device on this machine: runs use the scalar backend.\n".into())
         }
-        Err(e) => Err(Error::Device(e)),
+        Err(e) => Err(RunError::Device(e)),
     }
 }
 

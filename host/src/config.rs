@@ -12,7 +12,7 @@ use serde::Deserialize;
 
 use crate::args::{Learned, ProfileChoice};
 use crate::backend::Tables;
-use crate::error::Error;
+use raywake_io::Error;
 
 /// The keys of a profile's file; those it lacks are taken from `base`.
 #[derive(Deserialize)]

@@ -10,12 +10,12 @@ use raywake_sim::Truth;
 use crate::args::{Demo, Learned, PictureFrame};
 use crate::config::Weights;
 use crate::engine::{self, Plan, say};
-use crate::error::Error;
+use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::outputs::Kinds;
-use crate::source::SweepData;
-use crate::source::simulated::Simulated;
 use crate::summary::Summary;
+use raywake_io::source::SweepData;
+use raywake_io::source::simulated::Simulated;
 
 const SEED: u64 = 1;
 const SWEEPS: usize = 20;
@@ -25,7 +25,7 @@ const AGE: u32 = 5;
 const MOVING_MPS: f32 = 1.0;
 
 /// Runs on the simulated drive, writes flow and pictures, prints the accuracy.
-pub fn demo(args: &Demo) -> Result<Summary, Error> {
+pub fn demo(args: &Demo) -> Result<Summary, RunError> {
     let profile = Profile::hdl64();
     let plan = Plan {
         weights: Weights::read(&Learned::default(), &profile)?,

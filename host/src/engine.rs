@@ -17,14 +17,15 @@ use crate::budget;
 use crate::choose;
 use crate::config::Weights;
 use crate::drive::Drive;
-use crate::error::Error;
+use crate::error::RunError;
 use crate::laps::Laps;
 use crate::outputs::{Kinds, Outputs};
 use crate::progress::Progress;
 use crate::report;
-use crate::source::{Source, SweepData};
 use crate::statistics::Statistics;
 use crate::summary::{self, Facts, Summary};
+use raywake_io::Error;
+use raywake_io::source::{Source, SweepData};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -71,7 +72,7 @@ pub fn execute<S: Source + ?Sized>(
     plan: &Plan,
     source: &mut S,
     observe: Observer<S>,
-) -> Result<Summary, Error> {
+) -> Result<Summary, RunError> {
     listen();
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let summary_path =
@@ -128,7 +129,7 @@ impl Running {
         plan: &Plan,
         source: &mut S,
         observe: Observer<S>,
-    ) -> Result<bool, Error> {
+    ) -> Result<bool, RunError> {
         let (mut now, mut before) = (SweepData::default(), SweepData::default());
         let mut progress = Progress::new(plan.sweeps.len(), plan.quiet);
         for (done, index) in plan.sweeps.clone().enumerate() {
@@ -155,7 +156,7 @@ impl Running {
         now: &SweepData,
         before: &SweepData,
         observe: Observer<S>,
-    ) -> Result<(), Error> {
+    ) -> Result<(), RunError> {
         let stepped = self.drive.step(&now.sweep(), &before.points)?;
         self.statistics.sweep(index, now, &stepped);
         let clock = Instant::now();

@@ -21,8 +21,6 @@ pub mod progress;
 pub mod registration;
 pub mod report;
 pub mod run;
-pub mod sink;
-pub mod source;
 pub mod statistics;
 pub mod summary;
 pub mod team;

@@ -8,7 +8,7 @@ use std::thread;
 
 use clap::Parser;
 use raywake::args::{Args, Command};
-use raywake::error::Error;
+use raywake::error::RunError;
 use raywake::summary::Summary;
 use raywake::{budget, choose, engine, flow, map, run, team, track};
 use raywake_gpu::guard::Guard;
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     ExitCode::from(code.unwrap_or(101))
 }
 
-fn execute(command: Command) -> Result<u8, Error> {
+fn execute(command: Command) -> Result<u8, RunError> {
     match command {
         Command::Run(args) => run::run(&args).map(code),
         Command::Flow(args) => flow::flow(&args).map(|()| 0),
@@ -52,7 +52,7 @@ fn execute(command: Command) -> Result<u8, Error> {
         #[cfg(feature = "demo")]
         Command::Demo(args) => raywake::demo::demo(&args).map(code),
         Command::Budget(args) => budget::budget(&args).map(|()| 0),
-        Command::Devices => engine::say(false, &choose::list_devices()?).map(|()| 0),
+        Command::Devices => Ok(engine::say(false, &choose::list_devices()?).map(|()| 0)?),
     }
 }
 

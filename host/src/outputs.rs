@@ -18,9 +18,9 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 
 use crate::args::{Export, PictureFrame, Results};
-use crate::error::Error;
-use crate::sink::{argoverse, atomic, feather, picture};
-use crate::source::SweepData;
+use raywake_io::Error;
+use raywake_io::sink::{argoverse, atomic, feather, picture};
+use raywake_io::source::SweepData;
 
 /// Which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,13 +3,13 @@
 use crate::args;
 use crate::config::{self, Weights};
 use crate::engine::{self, Plan};
-use crate::error::Error;
+use crate::error::RunError;
 use crate::outputs::Kinds;
-use crate::source;
 use crate::summary::Summary;
+use raywake_io::source;
 
 /// Estimates the flow of a recorded drive.
-pub fn run(args: &args::Run) -> Result<Summary, Error> {
+pub fn run(args: &args::Run) -> Result<Summary, RunError> {
     let mut profile = config::profile(&args.profile)?;
     // Asked for by name, it is wanted under every profile.
     profile.deskew |= args.recording.deskew == Some(true);

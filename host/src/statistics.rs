@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer};
 
 use crate::drive::Stepped;
 use crate::laps::Laps;
-use crate::source::SweepData;
+use raywake_io::source::SweepData;
 
 /// Classes of tracklets by age: name and least age.
 pub const AGES: [(&str, u32); 5] = [("0", 0), ("1-2", 1), ("3-5", 3), ("6-9", 6), ("10+", 10)];

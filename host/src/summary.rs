@@ -8,11 +8,11 @@ use raywake_core::params::Profile;
 use serde::{Serialize, Serializer};
 
 use crate::backend::Backend;
-use crate::error::Error;
 use crate::order_statistics::Spread;
-use crate::sink::atomic;
 use crate::statistics::{AGES, Dropped, ResetAt, Statistics, Tally};
 use crate::team;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 
 /// Entries of a JSON object in the order given.
 #[derive(Clone, Debug, PartialEq)]

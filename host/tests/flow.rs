@@ -256,8 +256,8 @@ fn files_that_are_none() {
 #[cfg(feature = "arrow")]
 #[test]
 fn tables_in_and_out() {
-    use raywake::sink::table::Table as Sink;
-    use raywake::source::feather::Table;
+    use raywake_io::sink::table::Table as Sink;
+    use raywake_io::source::feather::Table;
     let t = Temp::new();
     let cloud = first_cloud();
     let a = t.path().join("a.feather");

@@ -2,7 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::{ArgMatches, Args, FromArgMatches, Parser};
-use raywake::error::Error;
+use raywake::error::RunError;
 use raywake_lab::metrics::grade;
 use raywake_lab::{eval, matching, simulate, tracks, train};
 use std::process::ExitCode;
@@ -63,9 +63,9 @@ impl FromArgMatches for Eval {
 }
 
 impl Eval {
-    fn run(&self) -> Result<(), Error> {
+    fn run(&self) -> Result<(), RunError> {
         match self {
-            Eval::Flow(args) => eval::run(args),
+            Eval::Flow(args) => Ok(eval::run(args)?),
             Eval::Tracks(args) => tracks::run(args),
         }
     }

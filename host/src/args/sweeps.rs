@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::Error;
+use raywake_io::Error;
 
 /// A half-open range of sweeps as typed: either end may be missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

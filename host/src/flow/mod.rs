@@ -20,10 +20,11 @@ use crate::choose;
 use crate::config::{self, Weights};
 use crate::drive::Drive;
 use crate::engine::say;
-use crate::error::Error;
+use crate::error::RunError;
 use crate::laps::Laps;
-use crate::source::{SweepData, pose_row, read_cloud, read_pose};
 use crate::statistics::{Dropped, in_words};
+use raywake_io::Error;
+use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
 
 use rows::{Form, Row};
 
@@ -34,7 +35,7 @@ const MOUNTED_MIN_M: f64 = 0.6;
 const MOVING_MPS: f64 = 0.5;
 
 /// Reads, registers, finds the flow and writes it.
-pub fn flow(args: &args::Flow) -> Result<(), Error> {
+pub fn flow(args: &args::Flow) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
     let profile = config::profile(&args.profile)?;
     let weights = Weights::read(&args.learned, &profile)?;
@@ -76,7 +77,7 @@ pub fn flow(args: &args::Flow) -> Result<(), Error> {
     form.write(&args.out, &rows, &meta)?;
     laps.lap("write");
     let times: Vec<_> = laps.stages().map(|(name, ms)| format!("{name} {ms:.0} ms")).collect();
-    say(&format!("times      {}\n", times.join(", ")))
+    Ok(say(&format!("times      {}\n", times.join(", ")))?)
 }
 
 /// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.
@@ -137,7 +138,7 @@ fn points(
     rig: &Rig,
     [first, second]: [&SweepData; 2],
     say: &impl Fn(&str) -> Result<(), Error>,
-) -> Result<(Vec<PointFlow>, Dropped), Error> {
+) -> Result<(Vec<PointFlow>, Dropped), RunError> {
     let tables = weights.tables(profile)?;
     let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
     if let Some(note) = &chosen.note {
@@ -149,7 +150,10 @@ fn points(
     returns += stepped.prepared.dropped;
     if let Some(reset) = stepped.prepared.reset {
         let [a, b] = [&args.first, &args.second].map(|path| path.display());
-        return Err(Error::Usage(format!("{b} does not follow {a}: {}", in_words(reset).1)));
+        return Err(RunError::Io(Error::Usage(format!(
+            "{b} does not follow {a}: {}",
+            in_words(reset).1
+        ))));
     }
     let mut flows = stepped.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
     flows.resize(first.points.len(), PointFlow::default());

@@ -8,10 +8,10 @@ use raywake_core::output::{Origin, PointFlow};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
-use crate::error::Error;
-use crate::sink::argoverse::displacement;
-use crate::sink::table::Table;
-use crate::sink::{Meta, atomic};
+use raywake_io::Error;
+use raywake_io::sink::argoverse::displacement;
+use raywake_io::sink::table::Table;
+use raywake_io::sink::{Meta, atomic};
 
 /// What is put out for a point of the first cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]

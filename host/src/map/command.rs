@@ -9,13 +9,13 @@ use super::{MapBackend, Mapped, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
 use crate::choose;
 use crate::engine::{interrupted, listen, say};
-use crate::error::Error;
+use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::progress::Progress;
 use crate::report::bytes;
-use crate::sink::{atomic, feather};
-use crate::source::{self, SweepData};
 use crate::statistics::Dropped;
+use raywake_io::sink::{atomic, feather};
+use raywake_io::source::{self, SweepData};
 
 /// Voxels of one sweep, in columns as the file has them.
 #[derive(Default)]
@@ -26,7 +26,7 @@ struct Voxels {
 
 /// Maps every sweep of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand.
-pub fn map(args: &args::Map) -> Result<bool, Error> {
+pub fn map(args: &args::Map) -> Result<bool, RunError> {
     listen();
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use raywake_objects::front_end::GroundMap;
 
-use crate::error::Error;
-use crate::source::text;
+use raywake_io::Error;
+use raywake_io::source::text;
 
 /// Heights of the ground, with their memory.
 #[derive(Debug)]

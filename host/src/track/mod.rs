@@ -12,11 +12,11 @@ use crate::choose;
 use crate::config::{self, Weights};
 use crate::drive::Drive;
 use crate::engine::{interrupted, listen, say};
-use crate::error::Error;
+use crate::error::RunError;
 use crate::progress::Progress;
 use crate::report::bytes;
-use crate::source::{self, SweepData};
 use crate::summary::make_room;
+use raywake_io::source::{self, SweepData};
 
 use raywake_gpu::guard;
 use raywake_objects::estimate::FixedLag;
@@ -27,7 +27,7 @@ pub use tracker::{Ended, Tracker};
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand, and all tracks with it.
-pub fn track(args: &args::Track) -> Result<bool, Error> {
+pub fn track(args: &args::Track) -> Result<bool, RunError> {
     listen();
     let mut profile = config::profile(&args.profile)?;
     profile.deskew |= args.recording.deskew == Some(true);

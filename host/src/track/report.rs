@@ -12,11 +12,11 @@ use serde::Serialize;
 use super::Ended;
 use super::write::Files;
 use crate::args::FrontEndKind;
-use crate::error::Error;
 use crate::order_statistics::Spread;
-use crate::source::SweepData;
 use crate::statistics::Dropped;
 use crate::summary::write_json;
+use raywake_io::Error;
+use raywake_io::source::SweepData;
 
 /// Tracks that the report lists.
 const LISTED: usize = 20;

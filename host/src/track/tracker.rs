@@ -16,9 +16,9 @@ use raywake_objects::front_end::{
 
 use super::Ground;
 use crate::drive::Drive;
-use crate::error::Error;
-use crate::source::SweepData;
 use crate::team::{THREADS_MAX, Team};
+use raywake_io::Error;
+use raywake_io::source::SweepData;
 
 /// The front end with its tracks, and the estimate.
 pub struct Tracker {

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::Ended;
-use crate::error::Error;
-use crate::sink::atomic;
-use crate::sink::table::Table;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
+use raywake_io::sink::table::Table;
 
 /// Where files go, and the rows of `tracks.feather`.
 pub struct Files {

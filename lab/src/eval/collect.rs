@@ -8,7 +8,6 @@ use crate::labels::{Motion, View};
 use crate::simulate::truth::PointTruth;
 use glam::DVec3;
 use raywake::engine::Pair;
-use raywake::source::SweepData;
 use raywake_core::background_filter::score;
 use raywake_core::grid::shift::shift;
 use raywake_core::output::{ColumnFlow, PointFlow};
@@ -17,6 +16,7 @@ use raywake_core::pose::Pose;
 use raywake_core::prepare::{Window, place};
 use raywake_core::record::{Column, Step};
 use raywake_core::sweep::Rig;
+use raywake_io::source::SweepData;
 
 /// A copy of a pair, for another thread.
 #[derive(Clone)]
@@ -226,11 +226,11 @@ mod tests {
     use super::*;
     use crate::eval::row::CLASSES;
     use crate::labels::{Kind, Labels, Track};
-    use raywake::source::Source;
-    use raywake::source::simulated::Simulated;
     use raywake_core::background_filter::TABLE_WORDS;
     use raywake_core::output::Origin;
     use raywake_core::sweep::Point;
+    use raywake_io::source::Source;
+    use raywake_io::source::simulated::Simulated;
     use raywake_sim::Class;
 
     /// A truck of 8 m that goes 0.6 m on, and returns within its footprint and beside it.

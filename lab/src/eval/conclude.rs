@@ -10,7 +10,7 @@ use super::verdicts::Verdicts;
 use super::{figures, read_rows, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Table};
-use raywake::error::Error;
+use raywake_io::Error;
 use std::path::Path;
 
 /// Reads the rows of all drives, writes the report and returns the tables for the screen.

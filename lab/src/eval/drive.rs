@@ -11,11 +11,12 @@ use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
 use raywake::config::Weights;
 use raywake::engine::{self, Plan};
-use raywake::error::Error;
+use raywake::error::RunError;
 use raywake::outputs::Kinds;
-use raywake::source::{self, OpenOptions, Source};
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
+use raywake_io::Error;
+use raywake_io::source::{self, OpenOptions, Source};
 use serde_json::json;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -84,13 +85,13 @@ impl Settings {
 }
 
 /// Total time of every pair where every solid column is foreground, ms.
-fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, Error> {
+fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, RunError> {
     let mut totals = Vec::new();
     let plan = settings.plan(source, settings.weights.clone().without_filter());
     let summary = engine::execute(&plan, source, &mut |_, pair| {
         totals.push(pair.laps.stages().map(|s| s.1).sum());
     })?;
-    if summary.interrupted { Err(Error::Usage("interrupted".into())) } else { Ok(totals) }
+    if summary.interrupted { Err(Error::Usage("interrupted".into()).into()) } else { Ok(totals) }
 }
 
 /// Files of a drive's results.
@@ -132,7 +133,7 @@ pub fn evaluate(
     name: &str,
     settings: &Settings,
     out: &Path,
-) -> Result<(Facts, bool), Error> {
+) -> Result<(Facts, bool), RunError> {
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     let files = Files::of(out, name);
@@ -198,7 +199,7 @@ fn run(
     points: Points,
     exact: Option<Exact>,
     facts: &mut Facts,
-) -> Result<(), Error> {
+) -> Result<(), RunError> {
     let plan = settings.plan(source, settings.weights.clone());
     let (send, receive) = sync_channel(WAITING);
     let drive = facts.drive.clone();
@@ -217,7 +218,7 @@ fn run(
     });
     let summary = summary?;
     if summary.interrupted {
-        return Err(Error::Usage("interrupted".into()));
+        return Err(Error::Usage("interrupted".into()).into());
     }
     let collected = written?;
     facts.scores = collected.scores;
@@ -248,7 +249,7 @@ fn collect(
         let seen = match pairs.recv() {
             Ok(Some(seen)) => seen,
             Ok(None) => return Ok(None),
-            Err(_) => return Err(Error::Usage("interrupted".into())),
+            Err(_) => return Err(Error::Usage("interrupted".into()).into()),
         };
         let present = collector.present(&seen);
         let returns = exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;

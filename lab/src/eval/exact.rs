@@ -1,9 +1,9 @@
 //! What every return of a simulated drive really is, and with it every column.
 
 use crate::simulate::truth::{self, PointTruth};
-use raywake::error::Error;
-use raywake::source::{SweepData, recognise};
 use raywake_core::record::NONE;
+use raywake_io::Error;
+use raywake_io::source::{SweepData, recognise};
 use raywake_sim::Class;
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! What is kept of a drive beside its rows: settings, times, notes.
 
 use super::points::PointScores;
-use raywake::error::Error;
 use raywake::laps::Laps;
-use raywake::sink::atomic;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::Write;

@@ -32,8 +32,9 @@ use facts::Facts;
 use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
 use raywake::config::{self, Weights};
 use raywake::engine::interrupted;
-use raywake::error::Error;
-use raywake::sink::atomic;
+use raywake::error::RunError;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use row::Row;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -118,7 +119,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// What failed, where anything did.
-fn failures(what: &str, failed: &[(String, Error)]) -> Result<(), Error> {
+fn failures(what: &str, failed: &[(String, impl std::fmt::Display)]) -> Result<(), Error> {
     if failed.is_empty() {
         return Ok(());
     }
@@ -159,7 +160,7 @@ fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
 const STACK: usize = 64 << 20;
 
 /// Drives that were evaluated, and those that failed.
-type Outcome = (Vec<Facts>, Vec<(String, Error)>);
+type Outcome = (Vec<Facts>, Vec<(String, RunError)>);
 
 /// Evaluates all drives into the folder `out`, `jobs` at a time. Fails where the folder cannot be
 /// made, and after a signal: the drives that were finished stay.
@@ -205,7 +206,7 @@ fn all(
     Ok((good, bad))
 }
 
-fn say(result: &Result<(Facts, bool), Error>, name: &str, n: usize, of: usize) {
+fn say(result: &Result<(Facts, bool), RunError>, name: &str, n: usize, of: usize) {
     match result {
         Ok((_, true)) => eprintln!("[{n}/{of}] {name}: there already"),
         Ok((f, false)) => {

@@ -2,8 +2,8 @@
 
 use crate::labels::{Footprint, Kind, Labels, Motion, trajectories};
 use glam::DVec3;
-use raywake::source::Source;
 use raywake_core::pose::Pose;
+use raywake_io::source::Source;
 use std::collections::HashMap;
 
 /// An object in one sweep.

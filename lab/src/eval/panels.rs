@@ -7,9 +7,9 @@ use super::objects::Present;
 use super::row::Row;
 use crate::report::{Column, Look, Outline, Panel, birds_eye};
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::sink::atomic;
 use raywake_core::output::{ColumnFlow, Origin};
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use std::io::Write;
 use std::path::Path;
 

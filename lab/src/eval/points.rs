@@ -8,9 +8,9 @@ use crate::metrics::{
 };
 use crate::simulate::truth::{self, PointTruth};
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::sink::argoverse::displacement;
 use raywake_core::sweep::Point;
+use raywake_io::Error;
+use raywake_io::sink::argoverse::displacement;
 use raywake_sim::{Class, PERIOD_S};
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 use super::gather::{Gather, Row, heading};
 use super::{Error, Labels, View};
 use glam::DVec3;
-use raywake::source::text;
+use raywake_io::source::text;
 use std::path::Path;
 
 /// First columns, in this order; others may follow.

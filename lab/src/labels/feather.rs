@@ -4,7 +4,7 @@
 use super::gather::{Gather, Row};
 use super::{Error, Labels, View};
 use glam::DQuat;
-use raywake::source::feather::Table;
+use raywake_io::source::feather::Table;
 use std::path::Path;
 
 /// Names of the columns of such a file.

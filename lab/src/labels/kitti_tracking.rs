@@ -7,8 +7,8 @@
 use super::gather::{Gather, Row};
 use super::{Error, Labels, View};
 use glam::{DMat3, DQuat, DVec3};
-use raywake::source::text;
 use raywake_core::pose::Pose;
+use raywake_io::source::text;
 use std::path::Path;
 
 /// Fields of a line; results of trackers have a score after them.

@@ -19,7 +19,7 @@ mod tests;
 pub use footprint::Footprint;
 pub use kind::kind;
 pub use open::open;
-pub use raywake::error::Error;
+pub use raywake_io::Error;
 pub(crate) use sweeps::turn;
 pub use trajectory::{Motion, Trajectory, trajectories};
 
@@ -76,7 +76,7 @@ pub struct Track {
     pub kind: Kind,
     /// Length, width and height of the box, m.
     pub size: [f64; 3],
-    /// Where it is, by frame (as [`raywake::source::Source::frame`] counts): `vehicle_from_box`,
+    /// Where it is, by frame (as [`raywake_io::source::Source::frame`] counts): `vehicle_from_box`,
     /// the box's frame lying in its centre, x forward, y left, z up.
     pub boxes: BTreeMap<u64, Pose>,
 }

@@ -2,7 +2,7 @@
 
 use super::sweeps::{Sweeps, fit};
 use super::{Error, Labels, boxes_csv, feather, kitti_tracking, tracklets};
-use raywake::source::{Source, recognise};
+use raywake_io::source::{Source, recognise};
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
 //! Labels against the sweeps they belong to.
 
 use super::{Kind, Labels, Track};
-use raywake::source::Source;
 use raywake_core::pose::Pose;
+use raywake_io::source::Source;
 use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

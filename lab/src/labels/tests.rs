@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::scratch::Scratch;
-use raywake::source::simulated::Simulated;
-use raywake::source::{OpenOptions, Source, SweepData};
 use raywake_core::sweep::Rig;
+use raywake_io::source::simulated::Simulated;
+use raywake_io::source::{OpenOptions, Source, SweepData};
 use std::fs;
 use std::path::PathBuf;
 
@@ -96,7 +96,7 @@ fn a_drive_without_labels() {
 fn data(name: &str) -> (Box<dyn Source>, Labels) {
     let root = std::env::var_os("RAYWAKE_DATA").expect("RAYWAKE_DATA names the folder of the data");
     let path = PathBuf::from(root).join(name);
-    let source = raywake::source::open(&path, &OpenOptions::default()).unwrap();
+    let source = raywake_io::source::open(&path, &OpenOptions::default()).unwrap();
     let labels = open(&path, source.as_ref()).unwrap();
     (source, labels)
 }

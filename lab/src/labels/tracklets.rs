@@ -7,7 +7,7 @@
 use super::gather::{Gather, Row};
 use super::{Error, Labels, View};
 use glam::{DQuat, DVec3};
-use raywake::source::text;
+use raywake_io::source::text;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 

@@ -4,8 +4,8 @@ use super::smooth::{Sample, fit, polynomial};
 use super::sweeps::{Sweeps, turn};
 use super::{Labels, Track};
 use glam::DVec3;
-use raywake::source::Source;
 use raywake_core::pose::Pose;
+use raywake_io::source::Source;
 
 /// An object is parked where the boxes of its track lie no farther than this from their mean (root
 /// of the mean square, on the ground), m. A voxel's side: boxes of parked vehicles wander by up to

@@ -6,10 +6,10 @@ mod sequence;
 use differences::Differences;
 use raywake::order_statistics::quantiles;
 use raywake::registration::Options;
-use raywake::sink::atomic;
-use raywake::source::simulated::Simulated;
-use raywake::source::{OpenOptions, Source, SweepData, open, pose_row};
 use raywake_core::pose::Pose;
+use raywake_io::sink::atomic;
+use raywake_io::source::simulated::Simulated;
+use raywake_io::source::{OpenOptions, Source, SweepData, open, pose_row};
 use sequence::{Matched, Matcher};
 use std::error::Error;
 use std::io::Write;
@@ -151,7 +151,7 @@ impl Chain {
 }
 
 /// Writes poses as rows of 3x4 numbers that read back as they are.
-fn write(path: &Path, poses: &[Pose]) -> Result<(), raywake::error::Error> {
+fn write(path: &Path, poses: &[Pose]) -> Result<(), raywake_io::Error> {
     atomic::write(path, |to| poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose))))
 }
 

@@ -115,7 +115,7 @@ impl Matcher {
 mod tests {
     use super::*;
     use glam::DQuat;
-    use raywake::source::{OpenOptions, SweepData, open};
+    use raywake_io::source::{OpenOptions, SweepData, open};
     use raywake_sim::{Drive, Ego, Options as Sim};
 
     #[test]

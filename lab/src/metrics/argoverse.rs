@@ -6,9 +6,9 @@
 use super::ground::Ground;
 use super::{Category, Pair, Rules, TruePoint};
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::source::feather::Table;
-use raywake::source::{self, Format, OpenOptions, Source, SweepData};
+use raywake_io::Error;
+use raywake_io::source::feather::Table;
+use raywake_io::source::{self, Format, OpenOptions, Source, SweepData};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use super::argoverse::{Log, read_estimate};
 use super::{
     AccuracyTable, BucketedEpe, Pair, Range, Rules, ScoreError, ThreeWayEpe, print, reference,
 };
-use raywake::error::Error;
+use raywake_io::Error;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

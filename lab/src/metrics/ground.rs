@@ -6,7 +6,7 @@
 
 use super::npy::{self, Array};
 use glam::{DMat2, DVec2, DVec3};
-use raywake::error::Error;
+use raywake_io::Error;
 use serde::Deserialize;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! The one kind of NumPy file that is needed: a two-dimensional array of floats.
 
 use arrow_array::types::{ArrowPrimitiveType, Float16Type};
-use raywake::error::Error;
+use raywake_io::Error;
 use std::path::Path;
 
 /// First bytes of the format.

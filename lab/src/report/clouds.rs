@@ -3,7 +3,7 @@
 use super::palette::{self, INK, MUTED};
 use super::raster;
 use super::svg::{Anchor, Area, Svg};
-use raywake::error::Error;
+use raywake_io::Error;
 use resvg::tiny_skia::{Paint, Pixmap, Rect, Transform};
 
 /// Width of a panel, units.

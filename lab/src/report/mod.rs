@@ -24,8 +24,8 @@ pub use chart::{
 pub use clouds::{Cloud, clouds};
 pub use table::{Cell, Row, Table};
 
-use raywake::error::Error;
-use raywake::sink::atomic;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! SVG to PNG with an embedded font: a machine without fonts draws the same picture.
 
-use raywake::error::Error;
+use raywake_io::Error;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::fontdb::Database;
 use resvg::usvg::{Options, Tree};

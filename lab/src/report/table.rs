@@ -1,7 +1,7 @@
 //! Tables.
 
 use super::encode::{self, fixed, xml};
-use raywake::error::Error;
+use raywake_io::Error;
 
 /// A table with a name for its file.
 #[derive(Clone, Debug)]

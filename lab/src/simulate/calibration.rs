@@ -3,9 +3,9 @@
 
 use super::layout::{rotation_rows, spaced};
 use glam::{DMat3, DQuat, DVec3};
-use raywake::error::Error;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
+use raywake_io::Error;
 use std::fs;
 use std::path::Path;
 
@@ -82,7 +82,7 @@ pub fn write(day: &Path, rig: &Rig) -> Result<(), Error> {
     ] {
         let path = day.join(name);
         if !path.exists() {
-            raywake::sink::atomic::write(&path, |out| {
+            raywake_io::sink::atomic::write(&path, |out| {
                 std::io::Write::write_all(out, text.as_bytes())
             })?;
         } else if fs::read(&path).map_err(Error::reading(&path))? != text.as_bytes() {

@@ -4,10 +4,10 @@ use super::calibration::{Camera, imu};
 use super::layout::{drive_name, frame_name, spaced, timestamp};
 use super::tracklets::Tracklets;
 use super::{oxts, truth};
-use raywake::error::Error;
-use raywake::sink::atomic::create_folder;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
+use raywake_io::Error;
+use raywake_io::sink::atomic::create_folder;
 use raywake_sim::{Drive, Ego, Options, Rng, SensorRig, SimSweep};
 use serde_json::json;
 use std::fs;
@@ -267,7 +267,7 @@ fn span(rig: &Rig) -> [f64; 2] {
     }
 }
 
-/// `sensors.txt`, as `raywake::source` reads it.
+/// `sensors.txt`, as `raywake_io::source` reads it.
 fn sensors(rig: &Rig) -> String {
     let mut text = format!("span: {}\nground: {}\n", spaced(span(rig)), rig.ground_m);
     for pose in &rig.sensors {

@@ -18,9 +18,9 @@ pub use drive::{Motion, Recipe};
 
 use clap::builder::PossibleValuesParser;
 use drive::State;
-use raywake::error::Error;
 use raywake::progress::Progress;
-use raywake::sink::atomic;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use raywake_sim::SensorRig;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;

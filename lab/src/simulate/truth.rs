@@ -9,10 +9,10 @@
 
 use super::layout::{self, frame_name};
 use glam::{DQuat, DVec3};
-use raywake::error::Error;
-use raywake::sink::table::{Column, Table};
-use raywake::source::feather;
 use raywake_core::pose::Pose;
+use raywake_io::Error;
+use raywake_io::sink::table::{Column, Table};
+use raywake_io::source::feather;
 use raywake_sim::{Class, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
 

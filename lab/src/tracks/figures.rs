@@ -7,7 +7,7 @@ use super::tables::Set;
 use super::tracker::{Track, baseline};
 use crate::report::{Axis, Chart, Cloud, Lines, Picture, Plot, Series, clouds};
 use glam::DVec3;
-use raywake::error::Error;
+use raywake_io::Error;
 use raywake_objects::centroid_ekf::CentroidParams;
 use raywake_objects::estimate::{Cost, Estimator};
 use raywake_sim::Rng;

@@ -9,9 +9,9 @@ use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
 use raywake::choose;
 use raywake::config::{self, Weights};
 use raywake::drive::Drive;
-use raywake::error::Error;
-use raywake::source::{self, OpenOptions, SweepData};
+use raywake::error::RunError;
 use raywake::track::Tracker;
+use raywake_io::source::{self, OpenOptions, SweepData};
 use raywake_objects::ObjectReturn;
 use raywake_objects::front_end::Track;
 use std::ops::Range;
@@ -65,7 +65,7 @@ impl Found {
         labelled: &Recorded,
         settings: &Settings,
         jobs: usize,
-    ) -> Result<(), Error> {
+    ) -> Result<(), RunError> {
         let tracks = follow(path, kind, settings)?;
         let objects: Vec<&Object> = labelled.stationary.iter().chain(&labelled.moving).collect();
         let mut longest: Vec<Option<&Track>> = vec![None; objects.len()];
@@ -101,8 +101,8 @@ impl Found {
 const STACK: usize = 64 << 20;
 
 /// All tracks of a drive.
-fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, Error> {
-    let work = || -> Result<Vec<Track>, Error> {
+fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, RunError> {
+    let work = || -> Result<Vec<Track>, RunError> {
         let mut source = source::open(path, &OpenOptions::default())?;
         let profile = config::profile(settings.profile)?;
         let drive = match kind {

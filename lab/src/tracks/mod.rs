@@ -27,7 +27,8 @@ use evaluate::{OURS, evaluate, histories};
 use front_ends::{Found, Settings};
 use object::Object;
 use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
-use raywake::error::Error;
+use raywake::error::RunError;
+use raywake_io::Error;
 use raywake_objects::estimate::Estimator;
 use recorded::Recorded;
 use simulated::Wanted;
@@ -73,7 +74,7 @@ struct Objects {
 /// Evaluates, writes and prints.
 ///
 /// Fails where a drive cannot be read or the report not be written.
-pub fn run(args: &Args) -> Result<(), Error> {
+pub fn run(args: &Args) -> Result<(), RunError> {
     let jobs = args.jobs.unwrap_or_else(cores);
     let begin = Instant::now();
     let mut drives = Vec::new();
@@ -130,7 +131,7 @@ fn found(
     args: &Args,
     drives: &[Recorded],
     jobs: usize,
-) -> Result<Vec<(&'static str, Found)>, Error> {
+) -> Result<Vec<(&'static str, Found)>, RunError> {
     let settings =
         Settings { profile: &args.profile, learned: &args.learned, backend: &args.backend };
     let mut all = Vec::new();

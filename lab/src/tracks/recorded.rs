@@ -3,10 +3,10 @@
 use super::object::{Moment, Object, Seen, centroid, look_beside};
 use crate::labels::{self, Labels, Motion, Track, Trajectory, trajectories, turn};
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::source::{self, OpenOptions, Source, SweepData};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
+use raywake_io::Error;
+use raywake_io::source::{self, OpenOptions, Source, SweepData};
 use std::f64::consts::TAU;
 use std::path::Path;
 

@@ -2,10 +2,10 @@
 
 use crate::labels::Kind;
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::source::SweepData;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
+use raywake_io::Error;
+use raywake_io::source::SweepData;
 
 /// A labelled object as a sweep shows it.
 #[derive(Clone, Copy, Debug)]

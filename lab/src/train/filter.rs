@@ -9,8 +9,8 @@ use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::{quantise, text};
 use crate::curve::{Curve, Operating};
 use crate::labels::Kind;
-use raywake::error::Error;
 use raywake_core::background_filter::{PATCH, TABLE_WORDS, load};
+use raywake_io::Error;
 use serde::Serialize;
 
 /// Weights per unit.

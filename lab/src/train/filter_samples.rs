@@ -5,7 +5,7 @@ use super::features::{Features, features};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
 use crate::labels::Kind;
-use raywake::error::Error;
+use raywake_io::Error;
 use raywake_sim::Rng;
 
 /// Share of the background columns that is kept.

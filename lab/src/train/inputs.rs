@@ -5,8 +5,8 @@ use super::recorded::Recorded;
 use super::simulated::Simulated;
 use crate::grid::Grid;
 use glam::DVec3;
-use raywake::error::Error;
 use raywake_core::params::Profile;
+use raywake_io::Error;
 use raywake_sim::Rng;
 use std::path::PathBuf;
 

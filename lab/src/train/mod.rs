@@ -17,7 +17,7 @@ mod simulated;
 mod solve;
 mod weights_file;
 
-use raywake::error::Error;
+use raywake_io::Error;
 
 /// What can be trained.
 #[derive(clap::Subcommand)]

@@ -3,12 +3,12 @@
 use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
-use raywake::error::Error;
 use raywake_core::continuity::Limits;
 use raywake_core::grid::shift::shift;
 use raywake_core::params::REACH;
 use raywake_core::prepare::Window;
 use raywake_core::record::{Column, Step};
+use raywake_io::Error;
 use std::collections::HashMap;
 
 /// Over ground faster than this an object moves, m/s; labels of parked cars jitter below it.

@@ -3,9 +3,9 @@
 use super::drives::{Labelled, LabelledSweep, Seen};
 use crate::labels::{self, Labels};
 use glam::DVec3;
-use raywake::error::Error;
-use raywake::source::{OpenOptions, Source, open};
 use raywake_core::sweep::Rig;
+use raywake_io::Error;
+use raywake_io::source::{OpenOptions, Source, open};
 use std::path::Path;
 
 /// A recorded drive.

@@ -1,7 +1,7 @@
 //! What training writes: weights, and a report of how it went.
 
-use raywake::error::Error;
-use raywake::sink::atomic;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
 use serde::Serialize;
 use std::io::Write;
 use std::path::PathBuf;

@@ -3,11 +3,11 @@
 use super::drives::{Labelled, LabelledSweep, Seen};
 use crate::labels::Kind;
 use glam::{DQuat, DVec3};
-use raywake::error::Error;
-use raywake::source::{Dropped, SweepData};
 use raywake_core::pose::Pose;
 use raywake_core::record::NONE;
 use raywake_core::sweep::Rig;
+use raywake_io::Error;
+use raywake_io::source::{Dropped, SweepData};
 use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
 
 /// A drive of the simulator.

@@ -6,8 +6,8 @@ mod view;
 use super::raster;
 use super::svg::{Area, Svg};
 use crate::labels::Kind;
-use raywake::error::Error;
 use raywake_core::pose::Pose;
+use raywake_io::Error;
 use view::View;
 
 /// Width and height of a panel in units and pixels per unit: where panels stand side by side on a

@@ -8,7 +8,7 @@ use raywake_core::sweep::{Point, Rig};
 use super::poses::Track;
 use super::sidecars::Sidecars;
 use super::{Dropped, Source, SweepData, bin, pcd, ply};
-use crate::error::Error;
+use crate::Error;
 
 /// An open folder.
 pub(super) struct Clouds {

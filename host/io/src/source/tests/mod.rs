@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::{OpenOptions, Source, SweepData, open};
-use crate::error::Error;
+use crate::Error;
 
 /// A folder that goes away with the value.
 pub(crate) struct Temp(PathBuf);

@@ -8,7 +8,7 @@ use raywake_core::pose::Pose;
 
 use super::atomic;
 use super::table::{Column, Table};
-use crate::error::Error;
+use crate::Error;
 
 /// Writes `<out>/<log>/<timestamp_ns>.feather`: one row per return of the pair's first sweep, in
 /// its order, of `flow_tx_m flow_ty_m flow_tz_m` (float32: motion over `dt_s` in the vehicle frame

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::error::Error;
+use crate::Error;
 
 /// A text file as a string.
 pub fn read(path: &Path) -> Result<String, Error> {

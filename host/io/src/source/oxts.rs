@@ -8,7 +8,7 @@ use raywake_core::pose::Pose;
 
 use super::poses::{pose_from, shift};
 use super::text;
-use crate::error::Error;
+use crate::Error;
 
 /// Radius of the sphere of the Mercator projection, m.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;

@@ -19,7 +19,7 @@ use raywake_core::sweep::Point;
 
 use super::bin::SIZE_MAX;
 use super::text;
-use crate::error::Error;
+use crate::Error;
 
 /// Seconds that no date has reached: times beyond are ns.
 const SECONDS_MAX: f64 = 1e12;

@@ -19,7 +19,7 @@ use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
 
 use super::poses::pose_from;
 use super::text;
-use crate::error::Error;
+use crate::Error;
 
 /// Longest sweep that is believed, s.
 pub(super) const SPAN_MAX_S: f64 = 1.0;

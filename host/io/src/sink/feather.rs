@@ -12,7 +12,7 @@ use raywake_core::sweep::Point;
 
 use super::Meta;
 use super::table::{Column, Table};
-use crate::error::Error;
+use crate::Error;
 
 /// Names and places of the 15 upper entries of a tracklet's covariance; units are products of m, m,
 /// rad, m/s and rad/s.

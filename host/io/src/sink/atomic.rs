@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::Error;
+use crate::Error;
 
 /// Writes `path` through a temporary file `.NAME.partial` in the same folder, which takes the name
 /// only when everything is in it; whatever was at `path` stays until then.

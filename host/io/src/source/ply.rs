@@ -7,7 +7,7 @@ use std::path::Path;
 use raywake_core::sweep::Point;
 
 use super::returns::{Column, Fields, Head, Number, load, records, table};
-use crate::error::Error;
+use crate::Error;
 
 /// Replaces `points` by the vertices of a file; returns whether they have times.
 ///

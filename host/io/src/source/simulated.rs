@@ -5,7 +5,7 @@ use raywake_core::sweep::Rig;
 use raywake_sim::{Drive, Options, Truth, stamp_s};
 
 use super::{Dropped, Source, SweepData};
-use crate::error::Error;
+use crate::Error;
 
 /// A drive through a street that a seed draws.
 pub struct Simulated {

@@ -14,7 +14,7 @@ use super::feather::Table;
 use super::poses::{Track, check_rising};
 use super::recognise::numbered;
 use super::{Dropped, OpenOptions, Source, SweepData, apply, folder_name};
-use crate::error::Error;
+use crate::Error;
 
 /// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners turn once in
 /// 100 ms but do not start together.

@@ -15,7 +15,7 @@ use arrow_ipc::reader::FileReaderBuilder;
 use arrow_schema::{ArrowError, DataType};
 
 use super::feather_check;
-use crate::error::Error;
+use crate::Error;
 
 /// The columns of a file that were asked for.
 pub struct Table {

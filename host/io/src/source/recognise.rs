@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::Format;
 use super::clouds::EXTENSIONS;
-use crate::error::Error;
+use crate::Error;
 
 /// Levels of folders below the named one that are searched for a recording.
 const DEPTH: usize = 2;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use raywake_core::sweep::Point;
 
-use crate::error::Error;
+use crate::Error;
 
 /// Bytes of one return.
 const RETURN: usize = 16;

@@ -28,7 +28,7 @@ mod poses;
 mod recognise;
 mod returns;
 mod sidecars;
-#[cfg(feature = "demo")]
+#[cfg(feature = "simulated")]
 pub mod simulated;
 pub mod text;
 
@@ -40,7 +40,7 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig, Sweep};
 
-use crate::error::Error;
+use crate::Error;
 
 pub use clouds::read_cloud;
 pub use poses::{pose_row, read_pose};

@@ -6,7 +6,7 @@ use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::sweep::Point;
 
 use super::canvas::{Canvas, Colour, Pixel};
-use crate::error::Error;
+use crate::Error;
 
 /// Width and height of a picture, pixels.
 pub const SIZE: usize = 900;

@@ -9,7 +9,7 @@ use raywake_core::sweep::Point;
 
 use super::lzf;
 use super::returns::{Column, Fields, Head, Number, load, records, table};
-use crate::error::Error;
+use crate::Error;
 
 /// Replaces `points` by those of a file; returns whether they have times.
 ///

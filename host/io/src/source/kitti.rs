@@ -12,7 +12,7 @@ use super::poses::{self, Track};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::{SPAN_MAX_S, Sidecars};
 use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
-use crate::error::Error;
+use crate::Error;
 
 /// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
 /// own stamps in the raw drives.

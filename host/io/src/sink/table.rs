@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Meta;
-use crate::error::Error;
+use crate::Error;
 
 /// Values of one column.
 pub enum Column {

@@ -8,7 +8,7 @@ use raywake_core::continuity::Limits;
 use raywake_core::pose::{Pose, PoseError, Twist};
 
 use super::text;
-use crate::error::Error;
+use crate::Error;
 
 /// Interval between sweeps that is assumed where a source has no times, s.
 pub(super) const INTERVAL_S: f64 = 0.1;
