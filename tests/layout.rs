@@ -31,15 +31,24 @@ const MAY_NAME: [(&str, &[&str]); 7] = [
     ),
 ];
 
-#[test]
-fn the_memory_layout_is_what_the_code_says() {
-    let path = root().join("memory-layout.md");
-    let text = budget::memory_layout(&budget::shipped());
+/// Compares a file with what the code says; with `UPDATE=1`, writes it.
+fn assert_printed(name: &str, text: &str) {
+    let path = root().join(name);
     if std::env::var_os("UPDATE").is_some() {
-        std::fs::write(&path, &text).expect("the file can be written");
+        std::fs::write(&path, text).expect("the file can be written");
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == text, "memory-layout.md is out of date; UPDATE=1 rewrites it");
+    assert!(found == text, "{name} is out of date; UPDATE=1 rewrites it");
+}
+
+#[test]
+fn the_memory_layout_is_what_the_code_says() {
+    assert_printed("memory-layout.md", &budget::memory_layout(&budget::shipped()));
+}
+
+#[test]
+fn the_parameters_are_what_the_code_says() {
+    assert_printed("PARAMETERS.md", &budget::parameters());
 }
 
 #[test]

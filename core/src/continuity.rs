@@ -2,15 +2,18 @@
 
 use crate::pose::Pose;
 
-/// How far two consecutive sweeps may be apart.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Time between sweeps, s.
-    pub gap_s: f64,
-    /// Speed between poses, m/s.
-    pub jump_mps: f64,
-    /// Turning rate between poses, rad/s.
-    pub spin_radps: f64,
+crate::params! {
+    /// How far two consecutive sweeps may be apart. Any road vehicle at any rate above 2 Hz stays
+    /// within the defaults.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Limits {
+        /// Time between sweeps.
+        pub gap_s: f64 = 0.5, "s", (above 0 to 10);
+        /// Speed between poses.
+        pub jump_mps: f64 = 70.0, "m/s", (above 0 to 1000);
+        /// Turn rate between poses.
+        pub spin_radps: f64 = 6.0, "rad/s", (above 0 to 100);
+    }
 }
 
 /// Why a sweep does not continue the one before: tracklets are dropped, no flow is computed.
@@ -29,9 +32,6 @@ pub enum Reset {
 }
 
 impl Limits {
-    /// Any road vehicle at any rate above 2 Hz stays within these.
-    pub const DEFAULT: Limits = Limits { gap_s: 0.5, jump_mps: 70.0, spin_radps: 6.0 };
-
     /// Why the step from one pose to another in `dt_s` is no motion, if so.
     pub fn broken(&self, from: &Pose, to: &Pose, dt_s: f64) -> Option<Reset> {
         if dt_s <= 0.0 || dt_s.is_nan() {

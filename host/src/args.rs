@@ -120,6 +120,9 @@ pub struct ProfileChoice {
     /// A profile of one's own: `base = "hdl64"` and the fields to change
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Set one parameter of the profile, as PARAMETERS.md names it; may be given again
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
 }
 
 /// Learned numbers.
@@ -266,6 +269,9 @@ pub struct Budget {
     /// Fail with exit code 6 where device and host memory together exceed this, bytes
     #[arg(long, value_name = "BYTES")]
     pub limit: Option<u64>,
+    /// Print PARAMETERS.md instead: every parameter with its unit, range, default and reason
+    #[arg(long)]
+    pub parameters: bool,
 }
 
 impl Part {

@@ -1,6 +1,7 @@
 //! Every byte a run takes, known before its first sweep: `raywake budget` and `memory-layout.md`.
 
 mod markdown;
+mod parameters;
 mod traffic;
 
 use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
@@ -27,6 +28,7 @@ use crate::track::Tracker;
 use raywake_io::Error;
 
 pub use markdown::memory_layout;
+pub use parameters::parameters;
 
 /// Every buffer begins at a multiple of this, bytes; of more where the device asks for it.
 pub const ALIGNMENT: usize = 16;
@@ -41,6 +43,9 @@ pub fn shipped() -> [Profile; 4] {
 /// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where
 /// one of them takes more than the limit.
 pub fn budget(args: &args::Budget) -> Result<(), RunError> {
+    if args.parameters {
+        return say(false, &parameters());
+    }
     let profiles = profiles(&args.profile)?;
     say(false, &memory_layout(&profiles))?;
     let most = profiles.iter().map(|p| device_bytes(p) + host_bytes(p, false)).max();
@@ -54,7 +59,7 @@ pub fn budget(args: &args::Budget) -> Result<(), RunError> {
 fn profiles(choice: &args::ProfileChoice) -> Result<Vec<Profile>, Error> {
     let map = Profile::map();
     match (&choice.profile, &choice.config) {
-        (None, None) => Ok(shipped().to_vec()),
+        (None, None) if choice.set.is_empty() => Ok(shipped().to_vec()),
         (Some(name), _) if *name == map.name.as_str() => Ok(vec![map]),
         _ => Ok(vec![config::profile(choice)?]),
     }
@@ -197,7 +202,7 @@ mod tests {
         assert!(device_bytes(&Profile::map()) >= Mapper::bytes(&Profile::map()) as u64);
         let named = |name: &str| {
             let profile = Some(name.to_string());
-            profiles(&args::ProfileChoice { profile, config: None }).ok()
+            profiles(&args::ProfileChoice { profile, ..Default::default() }).ok()
         };
         assert_eq!(named("map"), Some(vec![Profile::map()]));
         assert_eq!((named("wide"), named("maps")), (Some(vec![Profile::wide()]), None));

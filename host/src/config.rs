@@ -1,154 +1,125 @@
 //! Profiles and learned numbers: shipped ones, or files named on the command line.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use raywake_core::background_filter::{self, TABLE_WORDS};
 use raywake_core::digest::Digest;
 use raywake_core::occupancy_constancy::{self, SCORES_MAX, WEIGHT_WORDS};
-use raywake_core::params::{Birth, Frame, Profile};
+use raywake_core::params::{Profile, ProfileError, Value};
 use raywake_core::weights::WeightsError;
-use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use crate::args::{Learned, ProfileChoice};
 use crate::backend::Tables;
 use raywake_io::Error;
 
-/// The keys of a profile's file; those it lacks are taken from `base`.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Keys {
-    base: Option<String>,
-    name: Option<String>,
-    side: Option<u32>,
-    levels: Option<u32>,
-    voxel_m: Option<f64>,
-    range_m: Option<f64>,
-    frame: Option<FrameKey>,
-    deskew: Option<bool>,
-    em_rounds: Option<u32>,
-    smoothing: Option<u32>,
-    displacement_cost: Option<u32>,
-    outside_cost: Option<u32>,
-    refinement_sweeps: Option<u32>,
-    gap_s: Option<f64>,
-    jump_mps: Option<f64>,
-    spin_radps: Option<f64>,
-    #[serde(default)]
-    tracklet: TrackletKeys,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TrackletKeys {
-    measurement_cells: Option<f32>,
-    pose_noise_m: Option<f32>,
-    speed_noise_mps2: Option<f32>,
-    turn_noise_radps2: Option<f32>,
-    turn_birth_radps: Option<f32>,
-    gate_d2: Option<f32>,
-    innovation_sweeps: Option<f32>,
-    birth: Option<BirthKey>,
-    takes_over: Option<bool>,
-    coast_sweeps: Option<u32>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum FrameKey {
-    Lattice,
-    Sensor,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum BirthKey {
-    Target,
-    Source,
-}
-
-/// Takes over a key where it is given.
-fn set<T>(field: &mut T, key: Option<T>) {
-    if let Some(value) = key {
-        *field = value;
-    }
-}
-
-impl Keys {
-    fn apply(self, p: &mut Profile) {
-        set(&mut p.side, self.side);
-        set(&mut p.levels, self.levels);
-        set(&mut p.voxel_m, self.voxel_m);
-        set(&mut p.range_m, self.range_m);
-        let frame = |key| match key {
-            FrameKey::Lattice => Frame::Lattice,
-            FrameKey::Sensor => Frame::Sensor,
-        };
-        set(&mut p.frame, self.frame.map(frame));
-        set(&mut p.deskew, self.deskew);
-        set(&mut p.em_rounds, self.em_rounds);
-        set(&mut p.smoothing, self.smoothing);
-        set(&mut p.displacement_cost, self.displacement_cost);
-        set(&mut p.outside_cost, self.outside_cost);
-        set(&mut p.refinement_sweeps, self.refinement_sweeps);
-        set(&mut p.limits.gap_s, self.gap_s);
-        set(&mut p.limits.jump_mps, self.jump_mps);
-        set(&mut p.limits.spin_radps, self.spin_radps);
-        let (t, keys) = (&mut p.tracklet, self.tracklet);
-        set(&mut t.measurement_cells, keys.measurement_cells);
-        set(&mut t.pose_noise_m, keys.pose_noise_m);
-        set(&mut t.speed_noise_mps2, keys.speed_noise_mps2);
-        set(&mut t.turn_noise_radps2, keys.turn_noise_radps2);
-        set(&mut t.turn_birth_radps, keys.turn_birth_radps);
-        set(&mut t.gate_d2, keys.gate_d2);
-        set(&mut t.innovation_sweeps, keys.innovation_sweeps);
-        let birth = |key| match key {
-            BirthKey::Target => Birth::Target,
-            BirthKey::Source => Birth::Source,
-        };
-        set(&mut t.birth, keys.birth.map(birth));
-        set(&mut t.takes_over, keys.takes_over);
-        set(&mut t.coast_sweeps, keys.coast_sweeps);
-    }
-}
-
 /// The profile asked for, checked. Errors name the file, and the key in it.
 pub fn profile(choice: &ProfileChoice) -> Result<Profile, Error> {
-    match (&choice.config, &choice.profile) {
-        (Some(path), _) => parse(path, &read(path)?),
-        (None, Some(name)) => named(name).ok_or_else(|| Error::Usage(no_profile(name))),
-        (None, None) => Ok(Profile::hdl64()),
+    let mut profile = match (&choice.config, &choice.profile) {
+        (Some(path), _) => parse(path, &read(path)?)?,
+        (None, Some(name)) => Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?,
+        (None, None) => Profile::hdl64(),
+    };
+    for assignment in &choice.set {
+        assign(&mut profile, assignment)
+            .map_err(|e| Error::Usage(format!("--set {assignment}: {e}")))?;
     }
-}
-
-fn named(name: &str) -> Option<Profile> {
-    Profile::named(name)
+    let rule = |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.must));
+    profile.check().map_err(rule)?;
+    Ok(profile)
 }
 
 fn no_profile(name: &str) -> String {
     format!("no profile `{name}`: there are hdl64, wide and dissertation")
 }
 
+/// Sets a parameter from `name=value` or `group.name=value`. The profile's name gets an asterisk.
+fn assign(profile: &mut Profile, assignment: &str) -> Result<(), String> {
+    let (name, text) = assignment.split_once('=').ok_or("NAME=VALUE is needed")?;
+    let (name, text) = (name.trim(), text.trim());
+    let (group, name) = match name.split_once('.') {
+        Some((group, name)) => (Some(group), name),
+        None => (None, name),
+    };
+    let value = match (text.parse(), text.parse()) {
+        (Ok(flag), _) => Value::Flag(flag),
+        (_, Ok(number)) => Value::Number(number),
+        _ => Value::Word(text),
+    };
+    set(profile, group, name, value)?;
+    if !profile.name.ends_with('*') {
+        // Where there is no room for it, the name stays.
+        let _ = profile.name.push('*');
+    }
+    Ok(())
+}
+
+/// Sets a parameter of a group, or of the one that has it. Parameters have different names.
+fn set(p: &mut Profile, group: Option<&str>, name: &str, value: Value) -> Result<(), String> {
+    let groups = p.groups().map(|(g, of)| (g, of.get(name).is_some()));
+    let found = groups.iter().find(|(g, has)| *has && group.is_none_or(|group| *g == group));
+    let Some((group, _)) = found else {
+        let place = group.map_or(String::new(), |g| format!(" in `{g}`"));
+        return Err(format!("there is no parameter `{name}`{place} (see PARAMETERS.md)"));
+    };
+    p.group_mut(group).set(name, value).map_err(|must| format!("`{name}` must be {must}"))
+}
+
 /// A profile from the text of a file.
 fn parse(path: &Path, text: &str) -> Result<Profile, Error> {
-    let mut keys: Keys = toml::from_str(text).map_err(|e| {
-        let line = e.span().map(|s| text[..s.start.min(text.len())].matches('\n').count() + 1);
-        let place = line.map_or(String::new(), |line| format!("line {line}"));
+    let line = |at: usize| format!("line {}", text[..at.min(text.len())].matches('\n').count() + 1);
+    let table = DeTable::parse(text).map_err(|e| {
+        let place = e.span().map_or(String::new(), |s| line(s.start));
         Error::input(path, place, e.message())
     })?;
-    let base = keys.base.take().unwrap_or_else(|| "hdl64".into());
+    let table = table.get_ref();
+    let word = |key: &'static str, default| match table.get(key).map(|v| v.get_ref()) {
+        None => Ok(default),
+        Some(DeValue::String(word)) => Ok(word.as_ref()),
+        Some(_) => Err(Error::input(path, format!("key `{key}`"), "must be a text")),
+    };
+    let base = word("base", "hdl64")?;
     let mut profile =
-        named(&base).ok_or_else(|| Error::input(path, "key `base`", no_profile(&base)))?;
-    let name = keys.name.take().unwrap_or_else(|| "custom".into());
-    profile.name = name
+        Profile::named(base).ok_or_else(|| Error::input(path, "key `base`", no_profile(base)))?;
+    profile.name = word("name", "custom")?
         .parse()
         .map_err(|_| Error::input(path, "key `name`", "must be at most 24 bytes long"))?;
-    keys.apply(&mut profile);
-    let rule = |e: raywake_core::params::ProfileError| {
+    for (key, value) in table.iter().filter(|(k, _)| !["base", "name"].contains(&&**k.get_ref())) {
+        let mut put = |group, key: &Spanned<Cow<str>>, value: &DeValue| {
+            let value = value_of(value).ok_or_else(|| format!("`{}` is no value", key.get_ref()));
+            value
+                .and_then(|v| set(&mut profile, group, key.get_ref(), v))
+                .map_err(|e| Error::input(path, line(key.span().start), e))
+        };
+        match value.get_ref() {
+            DeValue::Table(group) => {
+                let name = Some(key.get_ref().as_ref());
+                group.iter().try_for_each(|(key, value)| put(name, key, value.get_ref()))?;
+            }
+            value => put(None, key, value)?,
+        }
+    }
+    let rule = |e: ProfileError| {
         Error::input(path, format!("key `{}`", e.field), format!("must be {}", e.must))
     };
     profile.check().map_err(rule)?;
     Ok(profile)
+}
+
+/// The value of a parameter as it stands in a file.
+fn value_of<'a>(value: &'a DeValue) -> Option<Value<'a>> {
+    match value {
+        DeValue::String(word) => Some(Value::Word(word)),
+        DeValue::Integer(v) => {
+            Some(Value::Number(i64::from_str_radix(v.as_str(), v.radix()).ok()? as f64))
+        }
+        DeValue::Float(v) => v.as_str().parse().ok().map(Value::Number),
+        DeValue::Boolean(v) => Some(Value::Flag(*v)),
+        _ => None,
+    }
 }
 
 fn read(path: &Path) -> Result<String, Error> {
@@ -232,6 +203,7 @@ fn mistake(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raywake_core::params::{Birth, Frame};
 
     fn parsed(text: &str) -> Result<Profile, String> {
         parse(Path::new("p.toml"), text).map_err(|e| {
@@ -275,14 +247,43 @@ mod tests {
         let e = parsed("[tracklet]\ngate = 3\n").unwrap_err();
         assert!(e.contains("line 2") && e.contains("`gate`"), "{e}");
         assert!(parsed("side = -1").unwrap_err().contains("line 1"));
-        assert!(parsed("side = 257").unwrap_err().contains("key `side`: must be at most 255"));
+        assert!(parsed("side = 257").unwrap_err().contains("key `side`: must be 31 to 255"));
         assert!(parsed("voxel_m = nan").unwrap_err().contains("`voxel_m`"));
         assert!(parsed("range_m = inf").unwrap_err().contains("`range_m`"));
         assert!(parsed("[tracklet]\ngate_d2 = 1e300").unwrap_err().contains("`gate_d2`"));
         assert!(parsed("base = \"x\"").unwrap_err().contains("key `base`"));
         assert!(parsed("name = \"\"").unwrap_err().contains("key `name`"));
         assert!(parsed("name = \"a name of more than 24 bytes\"").unwrap_err().contains("24"));
+        let e = parsed("frame = \"x\"").unwrap_err();
+        assert!(e.contains("line 1") && e.contains("must be lattice or sensor"), "{e}");
+        assert!(parsed("[tracklet]\nside = 101").unwrap_err().contains("in `tracklet`"));
+        assert!(parsed("side = [1]").unwrap_err().contains("`side`"));
         assert!(parsed("side = ").is_err() && parsed("é = 1 =").is_err());
+    }
+
+    #[test]
+    fn single_parameters() {
+        let choice = |set: &[&str]| ProfileChoice {
+            set: set.iter().map(|s| s.to_string()).collect(),
+            ..ProfileChoice::default()
+        };
+        let p = profile(&choice(&["side=101", "tracklet.birth = source", "takes_over=false"]));
+        let p = p.unwrap();
+        assert_eq!((p.side, p.tracklet.birth, p.tracklet.takes_over), (101, Birth::Source, false));
+        assert_eq!((p.name.as_str(), p.voxel_m), ("hdl64*", 0.30));
+        for (set, words) in [
+            ("side", "NAME=VALUE"),
+            ("sied=3", "no parameter `sied`"),
+            ("limits.side=3", "in `limits`"),
+            ("side=1.5", "whole number"),
+            ("side=9", "`side` must be 31 to 255"),
+            ("side=100", "`side` must be odd"),
+            ("gap_s=x", "`gap_s` must be a number"),
+        ] {
+            let e = profile(&choice(&[set])).unwrap_err();
+            assert_eq!(e.exit_code(), 2);
+            assert!(e.to_string().contains(words), "{e}");
+        }
     }
 
     #[test]

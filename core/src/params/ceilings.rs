@@ -1,0 +1,70 @@
+//! Ceilings that size storage, and the constants of the wire format shared with the kernels.
+
+/// Returns of one sweep; further ones, in the source's order, are dropped and counted.
+/// (The dissertation's n_max is 150,000; no labelled KITTI sweep has more than 124,123.)
+pub const POINTS_MAX: usize = 131_072;
+/// Levels of a column: free and occupied masks share one 32-bit word.
+pub const LEVELS_MAX: usize = 16;
+/// Columns of the flow window: 256 x 256 cells, 76.8 m at 0.30 m.
+pub const COLUMNS_MAX: usize = 65_536;
+/// Foreground columns of one sweep; further ones, in column order, are dropped and counted.
+/// The busiest sweep seen has 8,795 solid columns in a 50 m window.
+pub const FOREGROUND_MAX: usize = 12_288;
+/// Time slots a sweep is divided into for ray origins and motion correction: 1.6 ms at 10 Hz.
+pub const SLOTS: usize = 64;
+/// Distinct ray origins of a sweep: every sensor in every slot.
+pub const ORIGINS_MAX: usize = crate::sweep::SENSORS_MAX * SLOTS;
+/// Half width of the search, cells (n_s = 31, section 3.8.1): 45 m/s at 0.30 m and 10 Hz.
+pub const REACH: i32 = 15;
+/// Width of the search, cells.
+pub const SIDE: usize = 2 * REACH as usize + 1;
+/// Elements from one line of the search to the next: [`SIDE`] and one of padding, so that an index
+/// is two shifts away from its displacement.
+pub const LINE: usize = 32;
+/// Elements of a row of costs, one row per foreground column: displacement `(du, dv)` is element
+/// `(du + REACH) * LINE + dv + REACH`, the order in which ties are broken.
+pub const ROW: usize = SIDE * LINE;
+/// Words of a row: two 16-bit costs a word.
+pub const ROW_WORDS: usize = ROW / 2;
+/// Slots of the table that merges equal rays: twice the points, so that it is at most half full.
+pub const MERGE_SLOTS: usize = 2 * POINTS_MAX;
+/// Probes of that table before a ray is traced alone.
+pub const MERGE_PROBES: u32 = 64;
+/// Voxels a return may lie from the window's corner along an axis; farther ones are dropped.
+pub const EXTENT_VOXELS: i32 = 4095;
+/// Voxels a ray may be traced for.
+pub const RANGE_STEPS_MAX: i32 = 2000;
+/// Sweeps the refinement of the flow may look at.
+pub const REFINEMENT_SWEEPS_MAX: usize = 4;
+/// Thinned returns of one sweep that the refinement keeps; those of the last columns are dropped
+/// and counted.
+pub const CLOUD_MAX: usize = 65_536;
+/// Updates (voxel, log-odds) of one band of the sparse map.
+pub const BAND_UPDATES: usize = 1 << 20;
+/// Threads of a workgroup of every one-dimensional kernel.
+pub const WORKGROUP: usize = 256;
+/// Threads of a workgroup where each handles a ray or a foreground column, or all of them one column.
+pub const ROW_WORKGROUP: usize = 64;
+/// Items a workgroup of the prefix sum and of the radix sort handles.
+pub const TILE: usize = 1024;
+/// Digit values of one radix pass (4 bits).
+pub const RADIX: usize = 16;
+
+/// Log-odds of a voxel a ray passes, tenths (Table B.1: -0.1).
+pub const LOG_ODDS_FREE: i32 = -1;
+/// Log-odds of a voxel a ray ends in, tenths (Table B.1: 1.0).
+pub const LOG_ODDS_OCCUPIED: i32 = 10;
+/// From these tenths on a voxel is solid: p > 0.6, the author's test for a column worth matching.
+pub const LOG_ODDS_SOLID: i32 = 5;
+/// Bounds of log-odds where probabilities are put out, tenths (Table B.1).
+pub const LOG_ODDS_CLIP: [i32; 2] = [-30, 30];
+/// `-log 0.5` in thousandths of a nat: the cost of a window neighbour that says nothing.
+pub const COST_UNKNOWN: u32 = 693;
+/// Height of the HDL-64E above ground on KITTI's car, m: levels are anchored to it, so that the
+/// learned weights of a level meet the same height on any vehicle.
+pub const ANCHOR_ABOVE_GROUND_M: f64 = 1.73;
+
+const _: () = assert!(SIDE < LINE && LINE.is_power_of_two() && ROW_WORDS.is_multiple_of(4));
+const _: () = assert!(MERGE_SLOTS.is_power_of_two());
+const _: () = assert!(BAND_UPDATES <= TILE * TILE);
+const _: () = assert!(COLUMNS_MAX <= TILE * TILE);
