@@ -37,12 +37,12 @@ crate::params! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct Profile {
         /// Columns of the square window along one axis; odd, so that one is the centre.
-        pub side: u32 = 167, "columns", (31 to 255), "50 m at 0.30 m, as in the dissertation.";
+        pub side: u32 = 167, "columns", (31 to 255), "50 m at 0.30 m: dissertation, section 3.8.1.";
         /// Levels of a column.
-        pub levels: u32 = 14, "voxels", (2 to 16), "Dissertation, section 3.4.";
+        pub levels: u32 = 14, "voxels", (2 to 16), "The author's program; the shipped weights are for 14.";
         /// Edge of a voxel.
         pub voxel_m: f64 = 0.30, "m", (0.05 to 2.0),
-            "Dissertation, table B.1 (r). Cells of 0.20 m in a window of 38 m: 3.3 cm mean error of \
+            "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: 3.3 cm mean error of \
              what moves against 4.0 cm (`raywake-lab ablate`).";
         /// Greatest range of a return, counted in voxels along the ray's longest axis as the update
         /// list of B.2.1 does; at most 2,000 voxels.
@@ -56,10 +56,10 @@ crate::params! {
         /// Rounds of expectation and maximisation (n_em).
         pub em_rounds: u32 = 6, "", (1 to 100),
             "20 rounds bring half a point within 30 cm: the refinement makes little of more \
-             (`raywake-lab ablate`). The dissertation has 20.";
+             (`raywake-lab ablate`). Dissertation, section 3.8.1: 20.";
         /// Weight of the smoothing term w_p.
         pub smoothing: u32 = 1000, "millinats per cell²", (0 to 10000),
-            "Dissertation, section 3.5.2. 0 / 0.1 / 3 nats: 8.1 / 4.1 / 4.5 cm mean error of what \
+            "Dissertation, section 3.8.1. 0 / 0.1 / 3 nats: 8.1 / 4.1 / 4.5 cm mean error of what \
              moves against 4.4 cm (`raywake-lab ablate`).";
         /// Cost of displacement.
         pub displacement_cost: u32 = 1, "millinats per cell²", (0 to 1000),
