@@ -44,7 +44,8 @@ pub fn shipped() -> [Profile; 4] {
 /// one of them takes more than the limit.
 pub fn budget(args: &args::Budget) -> Result<(), RunError> {
     if args.parameters {
-        return say(false, &parameters());
+        say(false, &parameters())?;
+        return Ok(());
     }
     let profiles = profiles(&args.profile)?;
     say(false, &memory_layout(&profiles))?;
