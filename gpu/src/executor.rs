@@ -3,13 +3,12 @@
 use crate::arena::{self, Slot};
 use crate::error::failed;
 use crate::instance::Instance;
-use crate::owner::{Census, Gpu};
+use crate::owner::{Census, Gpu, Ready};
 use crate::program::Pipelines;
 use crate::recorder::{Recorded, record};
 use crate::{Buffer, DeviceInfo, DeviceKind, During, GpuError, Heap, Options, Program};
 use crate::{check, device};
 use ash::vk;
-use std::mem::ManuallyDrop;
 use std::time::Duration;
 
 /// What merely missed its deadline gets this long to end before its objects are leaked.
@@ -20,7 +19,7 @@ const GRACE: Duration = Duration::from_secs(1);
 /// Buffers and programs are named by their index in the tables given to [`Executor::new`]; an
 /// index out of range, or a buffer of the wrong heap, panics.
 pub struct Executor {
-    gpu: ManuallyDrop<Gpu>,
+    gpu: Ready,
     slots: Vec<Slot>,
     programs: Vec<Recorded>,
     fence: vk::Fence,
@@ -54,18 +53,13 @@ impl Executor {
             .collect::<Result<_, _>>()?;
         Ok(Self {
             fence: gpu.fence()?,
-            gpu: ManuallyDrop::new(gpu),
+            gpu: Ready::new(gpu),
             slots,
             programs: recorded,
             timeout: options.timeout,
             in_flight: false,
             failure: None,
         })
-    }
-
-    /// Declares set-up finished: [`Census::after_seal`] counts from here.
-    pub fn seal(&mut self) {
-        self.gpu.seal();
     }
 
     /// The words of a [`Heap::Upload`] buffer. The device reads them in later runs, as they are.
@@ -195,7 +189,7 @@ impl Drop for Executor {
         // What still runs uses the objects, and might never end: they are leaked, device and all.
         if idle {
             // SAFETY: dropped here only, and never used again.
-            unsafe { ManuallyDrop::drop(&mut self.gpu) };
+            unsafe { self.gpu.destroy() };
         }
     }
 }

@@ -8,9 +8,9 @@
 //! # Contract
 //!
 //! - **Who allocates.** `Executor::new` alone, at most one device memory block per [`Heap`].
-//!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host and create, record or
-//!   update nothing on the device; [`Executor::census`] counts what would break that promise.
-//!   What a driver allocates inside a submit is its own affair.
+//!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host. They create, record and
+//!   update nothing on the device: what does takes a mutable reference that only set-up has. What a
+//!   driver allocates inside a submit is its own affair.
 //! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
 //!   does the caller's work in between. Programs never overlap, so nothing needs ordering between
 //!   two runs.
@@ -34,7 +34,6 @@ mod check;
 mod device;
 mod error;
 mod executor;
-pub mod guard;
 mod instance;
 mod messages;
 mod order;

@@ -1,8 +1,10 @@
 //! The logical device and everything created from it.
 //!
 //! Every create, allocate, record and update call of the crate goes through [`Gpu`], which counts
-//! it and remembers what has to be destroyed: the census and the clean-up are complete because
-//! there is no other way to the device.
+//! what it creates and remembers what has to be destroyed: the census and the clean-up are complete
+//! because there is no other way to the device. All these calls take `&mut Gpu`, and only set-up has
+//! that: afterwards the executor holds the device behind a shared reference ([`Ready`]), so that code
+//! which creates something during a run does not compile.
 
 mod create;
 
@@ -11,6 +13,8 @@ use crate::device::{DeviceInfo, Physical};
 use crate::error::failed;
 use crate::instance::Instance;
 use ash::vk;
+use std::mem::ManuallyDrop;
+use std::ops::Deref;
 use std::time::Duration;
 
 /// What an executor has created so far.
@@ -28,9 +32,6 @@ pub struct Census {
     pub objects: u64,
     /// Barriers recorded between the steps of all programs.
     pub barriers: u64,
-    /// Objects created, memory allocated, commands recorded or descriptors updated since
-    /// [`crate::Executor::seal`]. Stays zero.
-    pub after_seal: u64,
 }
 
 enum Object {
@@ -53,7 +54,6 @@ pub(crate) struct Gpu {
     queue: vk::Queue,
     owned: Vec<Object>,
     pub census: Census,
-    sealed: bool,
     pub physical: Physical,
     // Last, because fields are dropped in order.
     pub instance: Instance,
@@ -75,31 +75,14 @@ impl Gpu {
             .map_err(failed("vkCreateDevice"))?;
         // SAFETY: one queue of this family was just requested.
         let queue = unsafe { raw.get_device_queue(physical.queue_family, 0) };
-        Ok(Self {
-            raw,
-            queue,
-            owned: Vec::new(),
-            census: Census::default(),
-            sealed: false,
-            physical,
-            instance,
-        })
+        Ok(Self { raw, queue, owned: Vec::new(), census: Census::default(), physical, instance })
     }
 
     pub fn info(&self) -> &DeviceInfo {
         &self.physical.info
     }
 
-    pub fn seal(&mut self) {
-        self.sealed = true;
-    }
-
-    fn count(&mut self) {
-        self.census.after_seal += u64::from(self.sealed);
-    }
-
     fn own<T: Copy>(&mut self, handle: T, object: fn(T) -> Object) -> T {
-        self.count();
         self.census.objects += 1;
         self.owned.push(object(handle));
         handle
@@ -111,7 +94,6 @@ impl Gpu {
         commands: vk::CommandBuffer,
         record: impl FnOnce(&ash::Device) -> R,
     ) -> Result<R, GpuError> {
-        self.count();
         // SAFETY: the command buffer is of this device and was not begun before.
         unsafe { self.raw.begin_command_buffer(commands, &Default::default()) }
             .map_err(failed("vkBeginCommandBuffer"))?;
@@ -150,6 +132,32 @@ impl Gpu {
         // SAFETY: `ticks` has one element per query of the pool, of the size the flags imply.
         // An error (some not available yet) shows in the elements.
         let _ = unsafe { self.raw.get_query_pool_results(pool, 0, ticks, flags) };
+    }
+}
+
+/// A device whose set-up is over.
+pub(crate) struct Ready(ManuallyDrop<Gpu>);
+
+impl Ready {
+    pub fn new(gpu: Gpu) -> Self {
+        Self(ManuallyDrop::new(gpu))
+    }
+
+    /// Destroys everything. Where this is never called, all of it is leaked.
+    ///
+    /// # Safety
+    /// Nothing is running, and `self` is not used again.
+    pub unsafe fn destroy(&mut self) {
+        // SAFETY: the caller's promise.
+        unsafe { ManuallyDrop::drop(&mut self.0) }
+    }
+}
+
+impl Deref for Ready {
+    type Target = Gpu;
+
+    fn deref(&self) -> &Gpu {
+        &self.0
     }
 }
 

@@ -1,19 +1,24 @@
 //! One sweep through figure 3.1: the statements of `raywake_core::pipeline`, the heavy ones on the
 //! chosen backend. Nothing in here allocates.
 
+use raywake_alloc_guard::Sealed;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::{Flows, Output, Pipeline, Prepared};
 use raywake_core::sweep::{Point, Rig, Sweep};
-use raywake_gpu::GpuError;
-use raywake_gpu::guard::guarded;
 
 use crate::backend::{Backend, Tables};
+use crate::error::RunError;
 use crate::laps::Laps;
 use crate::team::Team;
 
-/// The pipeline with its backend and the storage of its results.
+/// The pipeline with its backend and the storage of its results. Nothing is allocated once it is
+/// made.
 pub struct Drive {
+    parts: Sealed<Parts>,
+}
+
+struct Parts {
     pipeline: Box<Pipeline>,
     backend: Backend,
     columns: Vec<ColumnFlow>,
@@ -40,7 +45,7 @@ impl Drive {
     /// Allocates for a checked profile. The pipeline is made on the stack before it moves to the
     /// heap: call it on a thread with 64 MiB of stack.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
-        Drive {
+        let parts = Parts {
             pipeline: Box::new(Pipeline::new(
                 profile.clone(),
                 rig.clone(),
@@ -50,7 +55,8 @@ impl Drive {
             backend,
             columns: vec![ColumnFlow::default(); profile.columns()],
             points: vec![PointFlow::default(); POINTS_MAX],
-        }
+        };
+        Drive { parts: Sealed::new("sweep", parts) }
     }
 
     /// Bytes of host memory held for a profile, the backend's apart.
@@ -62,24 +68,27 @@ impl Drive {
 
     /// The backend.
     pub fn backend(&self) -> &Backend {
-        &self.backend
+        &self.parts.backend
     }
 
     /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
-    pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, GpuError> {
-        guarded(|| {
+    ///
+    /// # Errors
+    /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after which the
+    /// next sweep may be given.
+    pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, RunError> {
+        self.parts.step(|Parts { pipeline, backend, columns, points }| {
             let mut laps = Laps::start();
-            let (rays, origins) = self.backend.input();
-            let prepared = self.pipeline.prepare(&Team, sweep, rays, origins);
+            let (rays, origins) = backend.input();
+            let prepared = pipeline.prepare(&Team, sweep, rays, origins);
             laps.lap("prepare");
-            let rounds = self.pipeline.profile().em_rounds;
+            let rounds = pipeline.profile().em_rounds;
             let mut unrefined = 0;
-            let meanwhile = || unrefined = self.pipeline.take(sweep);
-            let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps, meanwhile)?;
-            let output = Output { columns: &mut self.columns, points: &mut self.points };
+            let meanwhile = || unrefined = pipeline.take(sweep);
+            let perceived = backend.perceive(&prepared.step, rounds, &mut laps, meanwhile)?;
+            let output = Output { columns, points };
             let lap = &mut |name| laps.lap(name);
-            let flows =
-                self.pipeline.follow(&Team, &prepared.step, &perceived, before, output, lap);
+            let flows = pipeline.follow(&Team, &prepared.step, &perceived, before, output, lap);
             laps.lap("follow");
             let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
             Ok(Stepped { prepared, flows, unrefined, foreground, rays, laps })
@@ -88,6 +97,6 @@ impl Drive {
 
     /// Tracklets after the last step.
     pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
-        self.pipeline.tracklets()
+        self.parts.pipeline.tracklets()
     }
 }

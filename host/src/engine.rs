@@ -9,7 +9,6 @@ use std::time::Instant;
 use raywake_core::output::TrackletState;
 use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
-use raywake_gpu::guard;
 
 use crate::args::BackendChoice;
 use crate::backend::Backend;
@@ -81,14 +80,12 @@ pub fn execute<S: Source + ?Sized>(
     let outputs = Outputs::create(plan.out.as_deref(), plan.kinds, source.name(), profile)?;
     let tables = plan.weights.tables(profile)?;
     let chosen = choose::backend(plan.backend, profile, plan.weights.tables(profile)?)?;
-    let mut backend = chosen.backend;
+    let backend = chosen.backend;
     say(&format!("{}\n", source.describe()))?;
     for note in source.notes().iter().chain(&chosen.note) {
         say(&format!("note: {note}\n"))?;
     }
     say(&budget::paragraph(profile, &backend, &tables.provenance))?;
-    backend.seal();
-    let before = guard::allocations();
     let mut run = Running {
         drive: Drive::new(profile, source.rig(), &tables, backend),
         outputs,
@@ -104,7 +101,6 @@ pub fn execute<S: Source + ?Sized>(
         interrupted,
         validating: plan.backend.validation.is_some(),
         host_bytes: budget::host_bytes(profile, matches!(run.drive.backend(), Backend::Scalar(_))),
-        allocations: guard::allocations() - before,
     };
     let summary = Summary::new(&facts, &run.statistics);
     say(&report::text(&summary))?;

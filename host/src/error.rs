@@ -1,5 +1,6 @@
 //! What can end a command, and the exit code of each.
 
+use raywake_alloc_guard::Allocation;
 use raywake_gpu::GpuError;
 use raywake_io::Error;
 
@@ -12,6 +13,9 @@ pub enum RunError {
     /// The Vulkan device, or the lack of one.
     #[error("{}", device(.0))]
     Device(#[from] GpuError),
+    /// Memory allocated within a sweep.
+    #[error("a defect of this program: {0}")]
+    Allocation(#[from] Allocation),
     /// More memory than the user allows.
     #[error("{bytes} bytes are needed, the limit is {limit}")]
     OverBudget {
@@ -23,12 +27,14 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Exit code of the process: those of [`Error`], 5 for the device, 6 for memory over a limit.
+    /// Exit code of the process: those of [`Error`], 5 for the device, 6 for memory over a limit,
+    /// 7 for memory allocated within a sweep.
     pub fn exit_code(&self) -> u8 {
         match self {
             RunError::Io(e) => e.exit_code(),
             RunError::Device(_) => 5,
             RunError::OverBudget { .. } => 6,
+            RunError::Allocation(_) => 7,
         }
     }
 }

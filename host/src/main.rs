@@ -11,7 +11,7 @@ use raywake::args::{Args, Command};
 use raywake::error::RunError;
 use raywake::summary::Summary;
 use raywake::{budget, choose, engine, flow, map, run, team, track};
-use raywake_gpu::guard::Guard;
+use raywake_alloc_guard::Guard;
 
 /// Exit code of a process ended by SIGINT, as shells have it.
 const INTERRUPTED: u8 = 130;

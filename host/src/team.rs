@@ -4,7 +4,7 @@ use std::num::NonZero;
 use std::thread;
 
 use rayon_core::ThreadPoolBuilder;
-use raywake_gpu::guard::guarded;
+use raywake_alloc_guard::watch;
 
 /// Threads at most: more would wait for the longest piece of work.
 pub const THREADS_MAX: usize = 4;
@@ -33,15 +33,15 @@ pub fn available() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(THREADS_MAX)
 }
 
-/// Does `work` on this thread, with so many less one others that share it: they are under guard all
-/// their life, and sleep where there is nothing to do. Once a thread: there is no other team for it.
+/// Does `work` on this thread, with so many less one others that share it: they are watched for
+/// allocations all their life, and sleep where there is nothing to do. Once a thread: there is no other team for it.
 pub fn lead<R>(threads: usize, work: impl FnOnce() -> R) -> R {
     if threads < 2 {
         return work();
     }
     let pool = ThreadPoolBuilder::new().num_threads(threads).use_current_thread();
     let pool = pool.spawn_handler(|other| {
-        thread::Builder::new().spawn(|| guarded(|| other.run()))?;
+        thread::Builder::new().spawn(|| watch("helper thread", || other.run()))?;
         Ok(())
     });
     let pool = pool.build().expect("the system has threads");

@@ -117,7 +117,6 @@ fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
     assert!(number("device_bytes") <= DEVICE_BYTES, "{s}");
     assert!(number("vulkan_allocations") <= 3, "{s}");
     assert_eq!(on_device, number("device_bytes") > 0 && number("vulkan_allocations") > 0, "{s}");
-    assert_eq!(number("allocations_after_seal"), 0, "{s}");
     assert!(number("pairs") == 3 && number("valid_flows") > 0, "{s}");
     s["digest"].as_str().unwrap().to_string()
 }
@@ -140,7 +139,7 @@ fn track_digest(t: &Temp, program: &Path, way: Way, front_end: &str) -> String {
     let outcome = Outcome::of(command.output().unwrap());
     outcome.succeeded();
     let s = outcome.summary(&file);
-    assert_eq!((&s["sweeps"], &s["allocations_after_seal"]), (&4.into(), &0.into()), "{s}");
+    assert_eq!(s["sweeps"], 4, "{s}");
     assert!(s["tracks"].as_array().unwrap().len() > 10, "{s}");
     s["digest"].as_str().unwrap().to_string()
 }
@@ -234,7 +233,7 @@ fn a_recorded_drive() {
             let outcome = Outcome::of(command.output().unwrap());
             outcome.succeeded();
             let s = outcome.summary(&file);
-            assert!(s["sweeps"] == 154 && s["allocations_after_seal"] == 0, "{s}");
+            assert!(s["sweeps"] == 154, "{s}");
             assert!(s["device_bytes"].as_u64().unwrap() <= DEVICE_BYTES, "{s}");
             assert!(s["valid_flows_per_sweep"].as_f64().unwrap() >= 1000.0, "{s}");
             digests.push(s["digest"].to_string());

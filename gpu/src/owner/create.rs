@@ -145,7 +145,6 @@ impl Gpu {
         // SAFETY: pool and layout are of this device, and only this thread uses the pool.
         let set = unsafe { self.raw.allocate_descriptor_sets(&info) }
             .map_err(failed("vkAllocateDescriptorSets"))?[0];
-        self.count();
         let whole = |&buffer: &vk::Buffer| {
             [vk::DescriptorBufferInfo::default().buffer(buffer).range(vk::WHOLE_SIZE)]
         };
@@ -160,7 +159,6 @@ impl Gpu {
         let writes: Vec<_> = infos.iter().enumerate().map(|(i, b)| write((i, b))).collect();
         // SAFETY: the set is new and in no command buffer yet; the buffers are of this device.
         unsafe { self.raw.update_descriptor_sets(&writes, &[]) };
-        self.count();
         Ok(set)
     }
 
@@ -197,7 +195,6 @@ impl Gpu {
         // SAFETY: the pool is of this device, and only this thread uses it.
         let buffers = unsafe { self.raw.allocate_command_buffers(&info) }
             .map_err(failed("vkAllocateCommandBuffers"))?;
-        self.count();
         Ok(buffers)
     }
 }

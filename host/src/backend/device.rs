@@ -42,11 +42,6 @@ impl Device {
         Ok(device)
     }
 
-    /// From now on nothing may be created.
-    pub fn seal(&mut self) {
-        self.executor.seal();
-    }
-
     /// What was allocated and created.
     pub fn census(&self) -> Census {
         self.executor.census()

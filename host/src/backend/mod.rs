@@ -117,13 +117,6 @@ impl Backend {
         }
     }
 
-    /// From now on nothing may be allocated or created.
-    pub fn seal(&mut self) {
-        if let Backend::Device(b) = self {
-            b.seal();
-        }
-    }
-
     /// What a device allocated and created.
     pub fn census(&self) -> Option<Census> {
         match self {

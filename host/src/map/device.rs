@@ -25,8 +25,7 @@ impl DeviceMap {
     pub fn new(profile: &Profile, options: &Options) -> Result<DeviceMap, GpuError> {
         let buffers = schedule::buffers(MAP_BUFFERS, profile);
         let programs = [schedule::map_rays(), schedule::map_count(), schedule::map_band()];
-        let mut executor = Executor::new(options, &buffers, &programs)?;
-        executor.seal();
+        let executor = Executor::new(options, &buffers, &programs)?;
         Ok(DeviceMap { executor, bands: Bands::new(Mapper::keys(profile)) })
     }
 

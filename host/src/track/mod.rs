@@ -18,7 +18,6 @@ use crate::report::bytes;
 use crate::summary::make_room;
 use raywake_io::source::{self, SweepData};
 
-use raywake_gpu::guard;
 use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
@@ -50,9 +49,7 @@ pub fn track(args: &args::Track) -> Result<bool, RunError> {
             if let Some(note) = &chosen.note {
                 say(args.quiet, &format!("note: {note}\n"))?;
             }
-            let mut backend = chosen.backend;
-            backend.seal();
-            Some(Drive::new(&profile, source.rig(), &tables, backend))
+            Some(Drive::new(&profile, source.rig(), &tables, chosen.backend))
         }
     };
     let mut tracker = Tracker::new(source.rig(), &profile, drive, ground, args.fixed_lag);
@@ -64,7 +61,6 @@ pub fn track(args: &args::Track) -> Result<bool, RunError> {
         say(args.quiet, &format!("fixed lag: {most} at most a track and sweep\n"))?;
     }
 
-    let allocations = guard::allocations();
     let mut report = report::Report::default();
     let (mut now, mut before) = (SweepData::default(), SweepData::default());
     let mut progress = Progress::new(sweeps.len(), args.quiet);
@@ -87,15 +83,14 @@ pub fn track(args: &args::Track) -> Result<bool, RunError> {
     }
     progress.finish();
     let clock = Instant::now();
-    if let Some(turnover) = tracker.last(&before) {
+    if let Some(turnover) = tracker.last(&before)? {
         report.step(&turnover, clock);
         tracker.ended(|ended| report.track(ended, &mut files))?;
     }
-    report.tally.ended += u64::from(tracker.finish());
+    report.tally.ended += u64::from(tracker.finish()?);
     tracker.ended(|ended| report.track(ended, &mut files))?;
     files.finish()?;
     let figures = report.summary(source.name(), args.front_end, !whole);
-    let figures = Summary { allocations_after_seal: guard::allocations() - allocations, ..figures };
     say(args.quiet, &figures.text())?;
     if let Some(path) = &summary {
         figures.write(path)?;

@@ -173,7 +173,6 @@ impl Report {
             digest: format!("{:016x}", self.digest.value()),
             step_ms: Spread::of(&self.steps),
             estimate_ms: Spread::of(&self.estimates),
-            allocations_after_seal: 0,
             tally: self.tally,
             dropped: self.dropped,
             tracks: self.lines,
@@ -201,8 +200,6 @@ pub struct Summary {
     pub step_ms: Option<Spread>,
     /// Time of the estimate of a track at its end, ms; null without a track.
     pub estimate_ms: Option<Spread>,
-    /// Allocations of the program within sweeps and estimates.
-    pub allocations_after_seal: u64,
     /// Counts over all sweeps.
     pub tally: Tally,
     /// Left out.
@@ -260,7 +257,6 @@ impl Summary {
             "left out   {}; over a capacity: {} returns of objects, {} segments, {} tracks",
             self.dropped, t.unchunked, t.unlisted, t.unborn
         )?;
-        writeln!(out, "memory     {} allocations within sweeps", self.allocations_after_seal)?;
         writeln!(out, "digest     {}", self.digest)
     }
 

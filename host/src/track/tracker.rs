@@ -3,11 +3,10 @@
 
 use std::time::Instant;
 
+use raywake_alloc_guard::Sealed;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
-use raywake_gpu::GpuError;
-use raywake_gpu::guard::guarded;
 use raywake_objects::ObjectState;
 use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, Report};
 use raywake_objects::front_end::{
@@ -16,23 +15,27 @@ use raywake_objects::front_end::{
 
 use super::Ground;
 use crate::drive::Drive;
+use crate::error::RunError;
 use crate::team::{THREADS_MAX, Team};
-use raywake_io::Error;
 use raywake_io::source::SweepData;
 
-/// The front end with its tracks, and the estimate.
+/// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
 pub struct Tracker {
     rig: Rig,
     params: FrontEndParams,
     drive: Option<Drive>,
     reach_m: f64,
     ground: Option<Ground>,
+    parts: Sealed<Parts>,
+    /// Rooms of the tracks that ended.
+    ended: Vec<usize>,
+}
+
+struct Parts {
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
     /// One for each thread; fixed lags use the first.
     solvers: Vec<Solver>,
-    /// Rooms of the tracks that ended.
-    ended: Vec<usize>,
     /// One for each track, or none.
     lags: Vec<Lag>,
 }
@@ -101,6 +104,12 @@ impl Tracker {
         ground: Option<Ground>,
         fixed_lag: bool,
     ) -> Tracker {
+        let parts = Parts {
+            front_end: Box::new(FrontEnd::new()),
+            tracks: vec![Track::new(); TRACKS_MAX],
+            solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
+            lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),
+        };
         Tracker {
             rig: rig.clone(),
             params: FrontEndParams::street(),
@@ -108,11 +117,8 @@ impl Tracker {
             // The window's columns, but for one at the edge.
             reach_m: (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m,
             ground,
-            front_end: Box::new(FrontEnd::new()),
-            tracks: vec![Track::new(); TRACKS_MAX],
-            solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
+            parts: Sealed::new("tracks", parts),
             ended: Vec::with_capacity(TRACKS_MAX),
-            lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),
         }
     }
 
@@ -132,41 +138,41 @@ impl Tracker {
         &mut self,
         now: &SweepData,
         before: Option<&SweepData>,
-    ) -> Result<Option<Turnover>, GpuError> {
-        let Tracker {
-            rig, params, drive, reach_m, ground, front_end, tracks, solvers, lags, ..
-        } = self;
-        let estimator = &mut solvers[0].estimator;
+    ) -> Result<Option<Turnover>, RunError> {
+        let Tracker { rig, params, drive, reach_m, ground, parts, .. } = self;
         let map = ground.as_ref().map(Ground::map);
         let mut step = |sweep: &SweepData, flows: Option<Flows>| {
-            guarded(|| {
+            parts.step(|Parts { front_end, tracks, solvers, lags }| {
                 front_end.take(rig, &sweep.sweep(), flows);
                 let turnover = front_end.step(params, map.as_ref(), tracks);
+                let estimator = &mut solvers[0].estimator;
                 lags.iter_mut().zip(&*tracks).for_each(|(lag, track)| lag.follow(track, estimator));
-                turnover
+                Ok(turnover)
             })
         };
-        let Some(drive) = drive else { return Ok(Some(step(now, None))) };
+        let Some(drive) = drive else { return step(now, None).map(Some) };
         let points = before.map_or(&[][..], |b| &b.points);
         let flows = drive.step(&now.sweep(), points)?.flows;
         let flows = flows.map(|f| Flows { of: f.points, reach_m: *reach_m });
-        Ok(before.map(|before| step(before, flows)))
+        before.map(|before| step(before, flows)).transpose()
     }
 
     /// The last sweep, where it still waits for its flow, which will not come.
-    pub fn last(&mut self, sweep: &SweepData) -> Option<Turnover> {
-        self.drive.take()?;
-        self.sweep(sweep, None).ok()?
+    pub fn last(&mut self, sweep: &SweepData) -> Result<Option<Turnover>, RunError> {
+        match self.drive.take() {
+            Some(_) => self.sweep(sweep, None),
+            None => Ok(None),
+        }
     }
 
     /// Ends all tracks. Returns how many there were.
-    pub fn finish(&mut self) -> u32 {
-        self.front_end.finish(&mut self.tracks)
+    pub fn finish(&mut self) -> Result<u32, RunError> {
+        self.parts.step(|parts| Ok(parts.front_end.finish(&mut parts.tracks)))
     }
 
     /// The tracks that ended in the last step, in the order of their room.
     pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
-        self.tracks.iter().filter(|t| t.life == Life::Ended)
+        self.parts.tracks.iter().filter(|t| t.life == Life::Ended)
     }
 
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
@@ -174,17 +180,21 @@ impl Tracker {
     /// there is little to estimate.
     pub fn ended(
         &mut self,
-        mut show: impl FnMut(&Ended) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let Tracker { tracks, solvers, ended, lags, params, .. } = self;
+        mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,
+    ) -> Result<(), RunError> {
+        let Tracker { parts, ended, params, .. } = self;
         let sure = |track: &Track| track.observations >= params.observations_min;
-        let slots = tracks.iter().enumerate();
+        let slots = parts.tracks.iter().enumerate();
         let slots = slots.filter(|(_, track)| track.life == Life::Ended && sure(track));
         ended.clear();
         ended.extend(slots.map(|(slot, _)| slot));
-        for group in ended.chunks(solvers.len()) {
-            guarded(|| solve(solvers, tracks, group));
-            for (&slot, Solver { estimator, report, milliseconds }) in group.iter().zip(&*solvers) {
+        for group in ended.chunks(parts.solvers.len()) {
+            parts.step(|Parts { solvers, tracks, .. }| {
+                solve(solvers, tracks, group);
+                Ok::<_, RunError>(())
+            })?;
+            let Parts { tracks, solvers, lags, .. } = &**parts;
+            for (&slot, Solver { estimator, report, milliseconds }) in group.iter().zip(solvers) {
                 let lag = lags.get(slot).map(|lag| lag.states.kept());
                 let (track, milliseconds) = (&tracks[slot], *milliseconds);
                 show(&Ended { track, estimator, report, lag, milliseconds })?;

@@ -111,9 +111,8 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
                 let weights = Weights::read(settings.learned, &profile)?;
                 let chosen =
                     choose::backend(settings.backend, &profile, weights.tables(&profile)?)?;
-                let mut backend = chosen.backend;
-                backend.seal();
-                Some(Drive::new(&profile, source.rig(), &weights.tables(&profile)?, backend))
+                let tables = weights.tables(&profile)?;
+                Some(Drive::new(&profile, source.rig(), &tables, chosen.backend))
             }
         };
         let mut tracker = Tracker::new(source.rig(), &profile, drive, None, false);
@@ -127,10 +126,10 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
             }
             std::mem::swap(&mut now, &mut before);
         }
-        if tracker.last(&before).is_some() {
+        if tracker.last(&before)?.is_some() {
             keep(&tracker);
         }
-        tracker.finish();
+        tracker.finish()?;
         keep(&tracker);
         Ok(tracks)
     };
