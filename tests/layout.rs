@@ -11,9 +11,10 @@ use std::path::Path;
 const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
 
 /// Which packages of the project each one may name. Whatever is not listed may name any.
-const MAY_NAME: [(&str, &[&str]); 7] = [
+const MAY_NAME: [(&str, &[&str]); 8] = [
     ("core", &[]),
     ("core/objects", &["raywake-core"]),
+    ("core/registration", &["raywake-core"]),
     ("gpu", &[]),
     ("kernels", &["raywake-core", "raywake-gpu"]),
     ("lab/sim", &["raywake-core"]),
@@ -23,6 +24,7 @@ const MAY_NAME: [(&str, &[&str]); 7] = [
         &[
             "raywake-core",
             "raywake-objects",
+            "raywake-registration",
             "raywake-kernels",
             "raywake-gpu",
             "raywake-io",
@@ -130,9 +132,15 @@ fn only_the_vulkan_executor_is_trusted() {
             assert!(lines.is_empty(), "{}: lines {lines:?}", file.display());
         }
     }
-    for library in
-        ["core/src", "core/objects/src", "kernels/src", "host/src", "host/io/src", "lab/sim/src"]
-    {
+    for library in [
+        "core/src",
+        "core/objects/src",
+        "core/registration/src",
+        "kernels/src",
+        "host/src",
+        "host/io/src",
+        "lab/sim/src",
+    ] {
         let text = read(&root().join(library).join("lib.rs"));
         assert!(text.contains("#![forbid(unsafe_code)]"), "{library}");
     }

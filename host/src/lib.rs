@@ -18,7 +18,6 @@ pub mod map;
 pub mod order_statistics;
 pub mod outputs;
 pub mod progress;
-pub mod registration;
 pub mod report;
 pub mod run;
 pub mod statistics;

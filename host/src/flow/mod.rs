@@ -3,7 +3,6 @@
 //! The second cloud is registered with the first, then both go through the pipeline as the two
 //! sweeps of a drive whose world is the first cloud's frame.
 
-mod ground;
 mod motion;
 mod rows;
 
@@ -25,6 +24,7 @@ use crate::laps::Laps;
 use crate::statistics::{Dropped, in_words};
 use raywake_io::Error;
 use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
+use raywake_registration::ground::ground_height;
 
 use rows::{Form, Row};
 
@@ -100,7 +100,7 @@ fn rig(args: &args::Flow, first: &SweepData) -> Result<(Rig, String), Error> {
         Some(given) if given.is_finite() => (given, "given"),
         Some(_) => return Err(Error::Usage("the height of the ground is not finite".into())),
         None => {
-            let found = ground::find(&first.points).ok_or_else(|| {
+            let found = ground_height(&first.points).ok_or_else(|| {
                 let what = "no ground is found in it: give its height with --ground";
                 Error::input(&args.first, "", what)
             })?;

@@ -1,40 +1,27 @@
-//! The motion of the sensor from one cloud to the next.
+//! The motion of the sensor from one cloud to the next, and lines about it.
 
 use glam::{DVec3, EulerRot};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
-
-use crate::registration::{Cloud, Options, Registration, Thinned, register};
-
-/// Least share of a cloud's flat patches that must lie on the other's: of clouds of different
-/// places it is below 0.32, of sweeps 5 m apart above 0.5 (KITTI).
-const OVERLAP_MIN: f64 = 0.4;
-/// From this share on no better place is looked for: of neighbours in a drive it is above 0.65, of
-/// a street displaced along itself below 0.5 (KITTI, Argoverse 2, simulated streets at 33 m/s).
-const OVERLAP_SURE: f64 = 0.5;
-/// What registration from no motion does not reach is started this far off, in four directions, m.
-const AWAY_M: f64 = 5.0;
-/// And turned by this much to both sides, rad.
-const TURNED_RAD: f64 = 0.17;
+use raywake_registration::deskew::{TimedPoint, thin_sweep};
+use raywake_registration::multi_start::OVERLAP_MIN;
+use raywake_registration::{
+    CORRESPONDENCES, Correspondence, OrientedCloud, OrientedPoint, Registration,
+    register_multi_start,
+};
 
 /// The pose of the second cloud's frame in the first one's, and lines about it; or why there is
 /// none.
-pub fn find(points: [&[Point]; 2], rig: &Rig) -> Result<(Pose, String), String> {
-    let [target, source] = clouds(points, rig);
-    let mut best = register(&source, &target, Pose::IDENTITY, &Options::default());
-    let sure = |r: &Registration| r.converged && r.overlap >= OVERLAP_SURE && r.unobserved == 0;
-    let rank = |r: &Registration| (r.converged, r.overlap);
-    for start in starts() {
-        if sure(&best) {
-            break;
-        }
-        let other = register(&source, &target, start, &Options::default());
-        if rank(&other) > rank(&best) {
-            best = other;
-        }
-    }
-    let good = best.converged && best.overlap >= OVERLAP_MIN;
-    if good { Ok((best.pose, report(&best))) } else { Err(refusal(&best)) }
+pub fn find([first, second]: [&[Point]; 2], rig: &Rig) -> Result<(Pose, String), String> {
+    let (mut target, mut source) = (surface(first, rig), surface(second, rig));
+    let (target, source) = std::thread::scope(|scope| {
+        let source = scope.spawn(|| OrientedCloud::new(&mut source));
+        let target = OrientedCloud::new(&mut target);
+        (target, source.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    let mut correspondences = vec![Correspondence::default(); CORRESPONDENCES];
+    let best = register_multi_start(&source, &target, &mut correspondences);
+    if best.is_accepted() { Ok((best.pose, report(&best))) } else { Err(refusal(&best)) }
 }
 
 /// A pose that is known beforehand, and a line about it.
@@ -42,21 +29,11 @@ pub fn given(pose: Pose) -> (Pose, String) {
     (pose, format!("motion     {} (given)\n", describe(&pose)))
 }
 
-/// Both clouds ready for registration, each on a thread of its own.
-fn clouds(points: [&[Point]; 2], rig: &Rig) -> [Cloud; 2] {
-    let cloud = |points| Cloud::new(Thinned::new(points, rig).at_stamp(&Twist::ZERO));
-    std::thread::scope(|scope| {
-        let second = scope.spawn(|| cloud(points[1]));
-        let first = cloud(points[0]);
-        [first, second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))]
-    })
-}
-
-/// Where to start beside no motion.
-fn starts() -> impl Iterator<Item = Pose> {
-    let places = [(0.0, 0.0), (AWAY_M, 0.0), (-AWAY_M, 0.0), (0.0, AWAY_M), (0.0, -AWAY_M)];
-    let turned = move |yaw| places.map(|(x, y)| Pose::planar(x, y, 0.0, yaw));
-    [0.0, TURNED_RAD, -TURNED_RAD].into_iter().flat_map(turned).skip(1)
+/// The returns that registration uses.
+fn surface(points: &[Point], rig: &Rig) -> Vec<OrientedPoint> {
+    let mut storage = vec![TimedPoint::default(); points.len()];
+    let thinned = thin_sweep(points, rig, &mut storage);
+    thinned.iter().map(|p| p.at_stamp(&Twist::ZERO).into()).collect()
 }
 
 fn refusal(best: &Registration) -> String {
@@ -80,7 +57,7 @@ fn report(r: &Registration) -> String {
         describe(&r.pose),
         100.0 * r.overlap,
         r.inliers,
-        100.0 * r.rms,
+        100.0 * r.rms_m,
         r.iterations,
     );
     if r.unobserved > 0 {
@@ -100,27 +77,4 @@ fn describe(motion: &Pose) -> String {
     format!(
         "x {x:.3}, y {y:.3}, z {z:.3} m; roll {roll:.2}, pitch {pitch:.2}, yaw {yaw:.2} degrees"
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use raywake_sim::{Drive, Ego, Options as Sim};
-
-    /// A street looks like itself a few metres on; at 33 m/s and more no motion is a wrong answer
-    /// that registration settles on.
-    #[test]
-    fn fast_along_a_street() {
-        for (seed, speed) in [(2, 33.0), (8, 40.0)] {
-            let options = Sim { sweeps: 2, ego: Ego::Straight { speed }, ..Sim::default() };
-            let drive = Drive::new(seed, options);
-            let [first, second] = [0, 1].map(|index| drive.sweep(index));
-            let rig = Rig { distorted: false, ..drive.rig() };
-            let (found, text) = find([&first.points, &second.points], &rig).unwrap();
-            let truth = first.world_from_vehicle.inverse() * second.world_from_vehicle;
-            let off = (truth.inverse() * found).twist(1.0);
-            let (metres, degrees) = (off.linear.length(), off.angular.length().to_degrees());
-            assert!(metres < 0.05 && degrees < 0.15, "{metres} m, {degrees} degrees: {text}");
-        }
-    }
 }

@@ -5,7 +5,6 @@ mod sequence;
 
 use differences::Differences;
 use raywake::order_statistics::quantiles;
-use raywake::registration::Options;
 use raywake_core::pose::Pose;
 use raywake_io::sink::atomic;
 use raywake_io::source::simulated::Simulated;
@@ -80,7 +79,7 @@ struct Chain {
 }
 
 fn chain(source: &mut dyn Source, count: usize, initial: Initial) -> Result<Chain, Box<dyn Error>> {
-    let mut matcher = Matcher::new(source.rig(), Options::default());
+    let mut matcher = Matcher::new(source.rig());
     let mut sweep = SweepData::default();
     let (mut poses, mut given, mut matched) = (Vec::new(), Vec::<Pose>::new(), Vec::new());
     let mut times_ms = Vec::new();
@@ -117,7 +116,7 @@ impl Chain {
         let count = |of: &dyn Fn(&Matched) -> bool| self.matched.iter().filter(|m| of(m)).count();
         let of = |value: fn(&Matched) -> f64| self.matched.iter().map(value);
         let median_and_max = |value| quantiles(of(value), [0.5, 1.0]);
-        let rms = median_and_max(|m| m.registration.rms);
+        let rms = median_and_max(|m| m.registration.rms_m);
         let steps = median_and_max(|m| m.registration.iterations as f64);
         let rounds = median_and_max(|m| m.rounds as f64);
         let time = quantiles(self.times_ms.iter().copied(), [0.5, 0.95, 1.0]);

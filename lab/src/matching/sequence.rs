@@ -1,11 +1,13 @@
 //! Ego motion of a drive: each sweep registered with the few before it.
 
 use glam::DVec3;
-use raywake::registration::{
-    Cloud, Options, Registration, Thinned, VOXEL_M, register, span_s, thin,
-};
-use raywake_core::pose::Pose;
+use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
+use raywake_registration::deskew::{TimedPoint, VOXEL_M, span_s, thin, thin_sweep};
+use raywake_registration::{
+    CORRESPONDENCES, Correspondence, IcpOptions, OrientedCloud, OrientedPoint, Registration,
+    register,
+};
 use std::collections::VecDeque;
 
 /// Sweeps that the target has beside the one before. With four, simulated drives end closer to the
@@ -33,22 +35,33 @@ pub struct Matched {
 /// Registers sweeps in the order they come.
 pub struct Matcher {
     rig: Rig,
-    options: Options,
-    before: Option<(f64, Thinned)>,
+    before: Option<(f64, Vec<TimedPoint>)>,
     /// Points of sweeps before that one, in its frame, deskewed; the latest first.
     earlier: VecDeque<Vec<DVec3>>,
+    correspondences: Vec<Correspondence>,
+}
+
+/// The points where they were at the stamp, for a vehicle with this motion.
+fn at_stamp(points: &[TimedPoint], twist: Twist) -> impl Iterator<Item = DVec3> {
+    points.iter().map(move |p| p.at_stamp(&twist))
 }
 
 impl Matcher {
     /// For the sweeps of a rig.
-    pub fn new(rig: &Rig, options: Options) -> Matcher {
-        Matcher { rig: rig.clone(), options, before: None, earlier: VecDeque::new() }
+    pub fn new(rig: &Rig) -> Matcher {
+        Matcher {
+            rig: rig.clone(),
+            before: None,
+            earlier: VecDeque::new(),
+            correspondences: vec![Correspondence::default(); CORRESPONDENCES],
+        }
     }
 
     /// The motion from the sweep before this one, started at `initial` (`before_from_now`). `None`
     /// on the first sweep.
     pub fn next(&mut self, stamp_s: f64, points: &[Point], initial: Pose) -> Option<Matched> {
-        let now = Thinned::new(points, &self.rig);
+        let mut storage = vec![TimedPoint::default(); points.len()];
+        let now = thin_sweep(points, &self.rig, &mut storage).to_vec();
         let before = self.before.take();
         let matched = before.map(|(before_s, before)| {
             let dt_s = self.duration_s(stamp_s - before_s);
@@ -62,12 +75,12 @@ impl Matcher {
 
     /// Moves the sweep before to the earlier ones, and all of them into the frame of this one. Where
     /// the motion is unknown they are of no use.
-    fn remember(&mut self, before: &Thinned, dt_s: f64, matched: &Matched) {
+    fn remember(&mut self, before: &[TimedPoint], dt_s: f64, matched: &Matched) {
         if !matched.registration.converged {
             self.earlier.clear();
             return;
         }
-        self.earlier.push_front(before.at_stamp(&matched.motion.twist(dt_s)));
+        self.earlier.push_front(at_stamp(before, matched.motion.twist(dt_s)).collect());
         self.earlier.truncate(EARLIER);
         let now_from_before = matched.motion.inverse();
         for p in self.earlier.iter_mut().flatten() {
@@ -76,10 +89,10 @@ impl Matcher {
     }
 
     /// The sweep before, and where it leaves voxels empty the earlier ones.
-    fn target(&self, before: Vec<DVec3>) -> Cloud {
-        let all: Vec<DVec3> =
-            before.into_iter().chain(self.earlier.iter().flatten().copied()).collect();
-        Cloud::new(thin(all.iter().copied(), VOXEL_M).into_iter().map(|n| all[n]))
+    fn target(&self, before: impl Iterator<Item = DVec3>) -> Vec<OrientedPoint> {
+        let all = before.chain(self.earlier.iter().flatten().copied());
+        let mut all: Vec<TimedPoint> = all.map(TimedPoint::from).collect();
+        thin(&mut all, VOXEL_M).iter().map(|p| p.position.into()).collect()
     }
 
     /// Time between two stamps: whole turns where the sensor spins, as stamps are often coarser.
@@ -91,12 +104,21 @@ impl Matcher {
     }
 
     /// Both sweeps are deskewed as if the vehicle had moved evenly from stamp to stamp.
-    fn pair(&self, before: &Thinned, now: &Thinned, dt_s: f64, initial: Pose) -> Matched {
+    fn pair(
+        &mut self,
+        before: &[TimedPoint],
+        now: &[TimedPoint],
+        dt_s: f64,
+        initial: Pose,
+    ) -> Matched {
         let mut motion = initial;
         for rounds in 1.. {
-            let target = self.target(before.at_stamp(&motion.twist(dt_s)));
-            let source = Cloud::new(now.at_stamp(&motion.inverse().twist(-dt_s)));
-            let registration = register(&source, &target, motion, &self.options);
+            let mut target = self.target(at_stamp(before, motion.twist(dt_s)));
+            let source = at_stamp(now, motion.inverse().twist(-dt_s));
+            let mut source: Vec<OrientedPoint> = source.map(OrientedPoint::from).collect();
+            let [source, target] = [&mut source, &mut target].map(|p| OrientedCloud::new(p));
+            let pairs = &mut self.correspondences;
+            let registration = register(&source, &target, motion, &IcpOptions::default(), pairs);
             if !registration.converged {
                 return Matched { motion: initial, registration, rounds };
             }
@@ -122,7 +144,7 @@ mod tests {
     fn a_simulated_drive_from_nothing() {
         let ego = Ego::Straight { speed: 11.0 };
         let drive = Drive::new(4, Sim { sweeps: 3, ego, ..Sim::default() });
-        let mut matcher = Matcher::new(&drive.rig(), Options::default());
+        let mut matcher = Matcher::new(&drive.rig());
         let mut before = None;
         for sweep in drive {
             let found = matcher.next(sweep.stamp_s, &sweep.points, Pose::IDENTITY);
@@ -141,7 +163,7 @@ mod tests {
     #[test]
     fn sweeps_without_returns_fall_back() {
         let drive = Drive::new(4, Sim { sweeps: 1, ..Sim::default() });
-        let mut matcher = Matcher::new(&drive.rig(), Options::default());
+        let mut matcher = Matcher::new(&drive.rig());
         let initial = Pose::planar(1.0, 0.0, 0.0, 0.1);
         assert_eq!(matcher.next(0.0, &[], initial), None);
         let nan = Point { position: [f32::NAN; 3], ..Point::default() };
@@ -169,7 +191,7 @@ mod tests {
                 Pose::new(DQuat::from_rotation_x(2f64.to_radians()), DVec3::new(2.9, 0.0, 0.0)),
             ];
             for (n, off) in off.iter().enumerate() {
-                let mut matcher = Matcher::new(source.rig(), Options::default());
+                let mut matcher = Matcher::new(source.rig());
                 assert!(matcher.next(first.stamp_s, &first.points, Pose::IDENTITY).is_none());
                 let found = matcher.next(second.stamp_s, &second.points, given * *off).unwrap();
                 let apart = (given.inverse() * found.motion).twist(1.0);

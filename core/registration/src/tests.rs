@@ -1,8 +1,11 @@
 //! Clouds whose motion is known.
 
 use super::*;
+use crate::cloud::OrientedPoint;
 use glam::{DQuat, DVec3};
 use raywake_sim::Rng;
+use std::vec;
+use std::vec::Vec;
 
 /// Walls, a ground and a slope, every 0.3 m.
 fn corner() -> Vec<DVec3> {
@@ -18,8 +21,18 @@ fn corner() -> Vec<DVec3> {
     points
 }
 
-fn moved(points: &[DVec3], pose: &Pose) -> Cloud {
-    Cloud::new(points.iter().map(|p| pose.transform(*p)))
+/// Registers copies of two sets of points.
+fn registered(source: &[DVec3], target: &[DVec3], initial: Pose) -> Registration {
+    let oriented =
+        |points: &[DVec3]| -> Vec<_> { points.iter().copied().map(OrientedPoint::from).collect() };
+    let (mut source, mut target) = (oriented(source), oriented(target));
+    let [source, target] = [&mut source, &mut target].map(|points| OrientedCloud::new(points));
+    let mut correspondences = vec![Correspondence::default(); CORRESPONDENCES];
+    register(&source, &target, initial, &IcpOptions::default(), &mut correspondences)
+}
+
+fn moved(points: &[DVec3], pose: &Pose) -> Vec<DVec3> {
+    points.iter().map(|p| pose.transform(*p)).collect()
 }
 
 /// Length and angle (rad) between two poses.
@@ -34,25 +47,25 @@ fn motion(degrees: f64, axis: DVec3, translation: DVec3) -> Pose {
 
 #[test]
 fn an_exact_motion_comes_back() {
-    let (points, target) = (corner(), Cloud::new(corner()));
+    let target = corner();
     let cases = [
         motion(0.0, DVec3::X, DVec3::ZERO),
         motion(1.0, DVec3::new(0.2, -0.1, 1.0), DVec3::new(0.3, -0.1, 0.05)),
         motion(5.0, DVec3::new(0.1, 0.1, 1.0), DVec3::new(1.5, 0.5, -0.2)),
     ];
     for truth in cases {
-        let source = moved(&points, &truth.inverse());
-        let found = register(&source, &target, Pose::IDENTITY, &Options::default());
+        let source = moved(&target, &truth.inverse());
+        let found = registered(&source, &target, Pose::IDENTITY);
         let (metres, radians) = apart(&found.pose, &truth);
         assert!(found.converged && found.unobserved == 0, "{found:?}");
         assert!(metres < 1e-6 && radians < 1e-6, "{metres} m, {radians} rad, {found:?}");
-        assert!(found.rms < 1e-6 && found.inliers > 3000, "{found:?}");
-        assert_eq!(found, register(&source, &target, Pose::IDENTITY, &Options::default()));
+        assert!(found.rms_m < 1e-6 && found.inliers > 3000, "{found:?}");
+        assert_eq!(found, registered(&source, &target, Pose::IDENTITY));
     }
 }
 
 #[test]
-fn what_moves_by_itself_does_not_count() {
+fn moving_objects_do_not_count() {
     let truth = motion(2.0, DVec3::Z, DVec3::new(0.6, 0.0, 0.0));
     let mut rng = Rng::new(5);
     // A lorry's side and back, a seventh of all points, that goes half a metre its own way.
@@ -66,22 +79,22 @@ fn what_moves_by_itself_does_not_count() {
     let ahead = lorry.iter().map(|p| *p + DVec3::new(0.5, 0.3, 0.0));
     let second: Vec<DVec3> = corner().into_iter().chain(ahead).collect();
     let source = moved(&second, &truth.inverse());
-    let found = register(&source, &Cloud::new(first), Pose::IDENTITY, &Options::default());
+    let found = registered(&source, &first, Pose::IDENTITY);
     let (metres, radians) = apart(&found.pose, &truth);
     assert!(found.converged && metres < 0.005 && radians < 5e-4, "{metres} m, {radians} rad");
 }
 
 #[test]
-fn a_plane_tells_three_motions_and_no_more() {
+fn a_plane_determines_three_motions_and_no_more() {
     let mut rng = Rng::new(7);
     let mut plane = || -> Vec<DVec3> {
         let mut at = || rng.range(-10.0, 10.0);
         (0..4000).map(|_| DVec3::new(at(), at(), 0.001 * at())).collect()
     };
-    let target = Cloud::new(plane());
-    let source = Cloud::new(plane().into_iter().map(|p| p - DVec3::new(0.0, 0.0, 0.2)));
+    let target = plane();
+    let source: Vec<_> = plane().into_iter().map(|p| p - DVec3::new(0.0, 0.0, 0.2)).collect();
     let initial = Pose::planar(0.7, 0.1, 0.0, 0.02);
-    let found = register(&source, &target, initial, &Options::default());
+    let found = registered(&source, &target, initial);
     assert_eq!(found.unobserved, 3, "{found:?}");
     assert!(found.least_eigenvalue < OBSERVABLE);
     let t = found.pose.translation;
@@ -91,22 +104,22 @@ fn a_plane_tells_three_motions_and_no_more() {
 
 #[test]
 fn bad_clouds_do_not_converge() {
-    let good = Cloud::new(corner());
-    let empty = Cloud::new([]);
-    let identical = Cloud::new(vec![DVec3::ONE; 5000]);
-    let few = Cloud::new(corner().into_iter().take(12));
+    let good = corner();
+    let empty = Vec::new();
+    let identical = vec![DVec3::ONE; 5000];
+    let few = good[..12].to_vec();
     let initial = Pose::planar(0.3, 0.0, 0.0, 0.01);
     for bad in [&empty, &identical, &few] {
         for (source, target) in [(bad, &good), (&good, bad), (bad, bad)] {
-            let found = register(source, target, initial, &Options::default());
+            let found = registered(source, target, initial);
             assert!(!found.converged && found.pose == initial, "{found:?}");
-            assert!(found.rms == 0.0 && found.inliers == 0);
+            assert!(found.rms_m == 0.0 && found.inliers == 0);
         }
     }
     // Nothing within reach.
     let away = Pose::planar(1e300, 0.0, 0.0, 0.0);
-    assert!(!register(&good, &good, away, &Options::default()).converged);
+    assert!(!registered(&good, &good, away).converged);
     let nan = Pose { translation: DVec3::NAN, ..Pose::IDENTITY };
-    let found = register(&good, &good, nan, &Options::default());
+    let found = registered(&good, &good, nan);
     assert!(!found.converged && found.pose == Pose::IDENTITY);
 }

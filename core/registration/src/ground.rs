@@ -1,49 +1,55 @@
-//! The height of the ground in a cloud.
-
-use std::collections::HashMap;
+//! The height of the ground around a sensor: the mode of the lowest returns of cells.
 
 use raywake_core::sweep::Point;
 
-/// Farthest from the vertical axis that the ground is looked for, m.
-const REACH_M: f32 = 20.0;
-/// Cells that are asked, the nearest to the axis: a circle of 8 m where all are seen. Farther off,
-/// a road rises and falls.
-const CELLS_MAX: usize = 200;
-/// Side of the cells that tell one height each, m.
+/// Farthest from the vertical axis that the ground is looked for, cells.
+const REACH: i32 = 20;
+/// Side of the cells that give one height each, m.
 const CELL_M: f32 = 1.0;
+/// Cells that are used, the nearest to the axis: a circle of 8 m where all are seen. Farther off, a
+/// road rises and falls.
+const CELLS_MAX: usize = 200;
 /// The ground is the most frequent height within this width, m: what slopes, kerbs and noise leave
 /// of a plane.
 const WIDTH_M: f32 = 0.3;
-/// Fewest cells that tell the ground.
+/// Fewest cells that make a ground.
 const CELLS_MIN: usize = 20;
+
+const SIDE: usize = 2 * REACH as usize;
 
 /// Height of the ground around the vertical axis, m, in the cloud's frame (z up): the median of the
 /// most frequent heights of the lowest returns of cells. `None` where too few cells agree.
-pub fn find(points: &[Point]) -> Option<f64> {
-    let mut lowest = HashMap::<[i32; 2], f32>::new();
+pub fn ground_height(points: &[Point]) -> Option<f64> {
+    let mut lowest = [[f32::INFINITY; SIDE]; SIDE];
     for [x, y, z] in points.iter().map(|p| p.position) {
-        if z.is_finite() && x.hypot(y) < REACH_M {
-            let low = lowest.entry([x, y].map(|v| (v / CELL_M).floor() as i32)).or_insert(z);
-            *low = low.min(z);
+        if z.is_finite() && libm::hypotf(x, y) < REACH as f32 * CELL_M {
+            let [i, j] = [x, y].map(|v| (libm::floorf(v / CELL_M) as i32 + REACH) as usize);
+            lowest[i][j] = lowest[i][j].min(z);
         }
     }
-    let mut cells: Vec<_> = lowest.into_iter().collect();
-    // The index breaks ties, so that the hash map's order does not matter.
-    cells.sort_by_key(|([i, j], _)| (i * i + j * j, *i, *j));
-    let mut heights: Vec<f32> = cells.iter().take(CELLS_MAX).map(|c| c.1).collect();
-    heights.sort_by(f32::total_cmp);
+    let index = |n: usize| n as i32 - REACH;
+    let cells = lowest
+        .iter()
+        .enumerate()
+        .flat_map(|(i, row)| row.iter().enumerate().map(move |(j, z)| (index(i), index(j), *z)));
+    let mut cells: heapless::Vec<_, { SIDE * SIDE }> = cells.filter(|c| c.2.is_finite()).collect();
+    cells.sort_unstable_by_key(|(i, j, _)| (i * i + j * j, *i, *j));
+    cells.truncate(CELLS_MAX);
+    cells.sort_unstable_by(|a, b| a.2.total_cmp(&b.2));
+    let heights = |from: usize| cells[from..].iter().map(|c| c.2);
     let within = |from: usize| {
-        let count = heights[from..].partition_point(|h| *h <= heights[from] + WIDTH_M);
+        let count = heights(from).take_while(|h| *h <= cells[from].2 + WIDTH_M).count();
         (count, from)
     };
     // The lowest where several widths hold as many.
-    let (count, from) = (0..heights.len()).map(within).rev().max_by_key(|w| w.0)?;
-    (count >= CELLS_MIN).then(|| f64::from(heights[from + count / 2]))
+    let (count, from) = (0..cells.len()).map(within).rev().max_by_key(|w| w.0)?;
+    (count >= CELLS_MIN).then(|| f64::from(cells[from + count / 2].2))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
 
     fn point(x: f32, y: f32, z: f32) -> Point {
         Point { position: [x, y, z], ..Point::default() }
@@ -63,19 +69,19 @@ mod tests {
         points.extend((0..15).map(|n| point(n as f32, 2.0, -4.0 - n as f32 * 0.02)));
         points.extend([f32::NAN, f32::INFINITY].map(|bad| point(bad, 0.0, -9.0)));
         points.extend([f32::NAN, f32::NEG_INFINITY].map(|bad| point(0.0, 0.0, bad)));
-        let found = find(&points).unwrap();
+        let found = ground_height(&points).unwrap();
         assert!((found + 1.69).abs() < 0.06, "{found}");
     }
 
     #[test]
     fn no_ground() {
-        assert_eq!(find(&[]), None);
-        assert_eq!(find(&[point(f32::NAN, 0.0, 0.0), point(1.0, 0.0, 0.0)]), None);
+        assert_eq!(ground_height(&[]), None);
+        assert_eq!(ground_height(&[point(f32::NAN, 0.0, 0.0), point(1.0, 0.0, 0.0)]), None);
         // A pole is no ground, nor is what is far away.
         let pole: Vec<_> = (0..1000).map(|n| point(3.0, 0.0, n as f32 * 0.01)).collect();
-        assert_eq!(find(&pole), None);
+        assert_eq!(ground_height(&pole), None);
         let far: Vec<_> =
             plane(|_, _| -1.7).iter().map(|p| point(p.position[0] + 50.0, 0.0, -1.7)).collect();
-        assert_eq!(find(&far), None);
+        assert_eq!(ground_height(&far), None);
     }
 }

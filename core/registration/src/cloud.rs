@@ -1,0 +1,135 @@
+//! Clouds ready for registration: points in the order of a k-d tree, with normals.
+//!
+//! The normal of a point is the direction in which its nearest neighbours vary least (principal
+//! components: Hoppe et al. 1992), and there is none where these are not flat.
+
+use crate::{compact, tree};
+use core::ops::RangeInclusive;
+use glam::DVec3;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// Neighbours that give a normal, and the distance of the farthest, m. Not measured on their own.
+const NEIGHBOURS: RangeInclusive<usize> = 5..=12;
+const NEIGHBOUR_M: f64 = 1.5;
+/// A patch is flat where its least variance is below this share of the middle one.
+const FLAT: f64 = 0.1;
+/// A patch is not a line where its middle variance is above this share of the largest one. Along a
+/// line, as a single beam leaves it on the ground, the normal is arbitrary.
+const WIDE: f64 = 0.05;
+/// Coordinates beyond this are not measurements, m; their squares stay finite.
+const REACH_M: f64 = 1e4;
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OrientedPoint {
+    /// Where it is, m.
+    pub position: DVec3,
+    /// Unit normal of either sign; zero where the surroundings are not flat.
+    pub normal: DVec3,
+    /// Axis along which the k-d tree splits at this point.
+    pub(crate) axis: u8,
+}
+
+impl From<DVec3> for OrientedPoint {
+    /// A point whose normal is not known yet.
+    fn from(position: DVec3) -> OrientedPoint {
+        OrientedPoint { position, ..OrientedPoint::default() }
+    }
+}
+
+impl OrientedPoint {
+    /// Whether its surroundings are flat.
+    pub fn is_flat(&self) -> bool {
+        self.normal != DVec3::ZERO
+    }
+}
+
+/// Points with normals where their surroundings are flat.
+#[derive(Clone, Copy, Debug)]
+pub struct OrientedCloud<'a> {
+    points: &'a [OrientedPoint],
+    flat: usize,
+}
+
+impl<'a> OrientedCloud<'a> {
+    /// Orders the points and finds their normals. Points that are not finite or farther than 10 km
+    /// from the origin are left out.
+    pub fn new(points: &'a mut [OrientedPoint]) -> OrientedCloud<'a> {
+        let sane =
+            |p: &OrientedPoint| p.position.is_finite() && p.position.abs().max_element() < REACH_M;
+        let count = compact(points, sane);
+        let points = &mut points[..count];
+        tree::build(points);
+        for index in 0..count {
+            points[index].normal = normal(points, points[index].position);
+        }
+        let flat = points.iter().filter(|p| p.is_flat()).count();
+        OrientedCloud { points, flat }
+    }
+
+    /// All points, in the order of the tree.
+    pub fn points(&self) -> &'a [OrientedPoint] {
+        self.points
+    }
+
+    /// Number of points with a normal.
+    pub fn flat_count(&self) -> usize {
+        self.flat
+    }
+}
+
+/// Normal of the flat patch around a place, or zero.
+fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
+    let near = tree::nearest_few::<{ *NEIGHBOURS.end() }>(points, at, NEIGHBOUR_M * NEIGHBOUR_M);
+    if near.len() < *NEIGHBOURS.start() {
+        return DVec3::ZERO;
+    }
+    // Relative to the place, so that the difference of squares loses nothing.
+    let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
+    for (_, index) in &near {
+        let offset = Vector3::from((points[*index].position - at).to_array());
+        sum += offset;
+        squares += offset * offset.transpose();
+    }
+    let mean = sum / near.len() as f64;
+    let covariance = squares / near.len() as f64 - mean * mean.transpose();
+    let eigen = SymmetricEigen::new(covariance);
+    let mut order = [0, 1, 2];
+    order.sort_unstable_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let [least, middle, largest] = order.map(|n| eigen.eigenvalues[n]);
+    if least < FLAT * middle && middle > WIDE * largest {
+        let [x, y, z] = [0, 1, 2].map(|row| eigen.eigenvectors[(row, order[0])]);
+        return DVec3::new(x, y, z).normalize_or_zero();
+    }
+    DVec3::ZERO
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    #[test]
+    fn normals_of_planes_alone() {
+        let at = |n: usize| ((n % 20) as f64 * 0.3, (n / 20) as f64 * 0.3);
+        let plane = |(u, v)| OrientedPoint::from(DVec3::new(u, v, 0.5 * u));
+        let mut slope: Vec<_> = (0..400).map(at).map(plane).collect();
+        let cloud = OrientedCloud::new(&mut slope);
+        let expected = DVec3::new(-0.5, 0.0, 1.0).normalize();
+        assert_eq!(cloud.flat_count(), 400);
+        assert!(cloud.points().iter().all(|p| p.normal.dot(expected).abs() > 1.0 - 1e-12));
+        let mut line: Vec<_> =
+            (0..400).map(|n| OrientedPoint::from(DVec3::new(0.1 * n as f64, 0.0, 0.0))).collect();
+        let line = OrientedCloud::new(&mut line);
+        assert_eq!((line.points().len(), line.flat_count()), (400, 0));
+    }
+
+    #[test]
+    fn bad_points() {
+        let mut bad = [DVec3::NAN, DVec3::INFINITY, DVec3::splat(1e300)].map(OrientedPoint::from);
+        assert!(OrientedCloud::new(&mut bad).points().is_empty());
+        let mut same = vec![OrientedPoint::from(DVec3::ONE); 100];
+        assert_eq!(OrientedCloud::new(&mut same).flat_count(), 0);
+    }
+}

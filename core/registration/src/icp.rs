@@ -1,0 +1,198 @@
+//! Point-to-plane ICP (Chen and Medioni 1992): the rigid motion between two clouds.
+//!
+//! Points are matched to their nearest neighbours, the residual is the distance along the target's
+//! normal, Geman and McClure's kernel discounts what moves by itself, and Gauss-Newton steps find
+//! the motion. Kernel and search radius shrink in three stages, so that it can start far off.
+
+use crate::cloud::OrientedCloud;
+use crate::gauss_newton::{Correspondence, solve};
+use crate::tree;
+use raywake_core::pose::Pose;
+
+/// A good number of correspondences for [`register`]. Not measured on its own.
+pub const CORRESPONDENCES: usize = 6000;
+
+/// How to register.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IcpOptions {
+    /// Farthest that matched points lie apart at first, m: what the unknown part of the motion may
+    /// displace points by. The later stages have a half and a quarter of it.
+    pub distance_m: f64,
+    /// Residual at which a correspondence counts a quarter in the last stage, m; the earlier ones
+    /// have eight times and three times of it.
+    pub kernel_m: f64,
+    /// Steps of each stage at most.
+    pub iterations: usize,
+}
+
+impl Default for IcpOptions {
+    /// Motions that are unknown up to 3 m and 5 degrees. The dissertation's search radius is 3 m,
+    /// too.
+    fn default() -> IcpOptions {
+        IcpOptions { distance_m: 3.0, kernel_m: 0.1, iterations: 30 }
+    }
+}
+
+/// What came of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Registration {
+    /// `target_from_source`; always finite. Where nothing could be matched, the initial one.
+    pub pose: Pose,
+    /// Whether the steps died out in the last stage with enough correspondences. Otherwise the pose
+    /// is not to be trusted.
+    pub converged: bool,
+    /// Steps of all stages.
+    pub iterations: usize,
+    /// Root mean square distance of the inliers from their planes, m; 0 without any.
+    pub rms_m: f64,
+    /// Correspondences of the last step whose residual is below the kernel's width.
+    pub inliers: usize,
+    /// Their share (0..1) of the source's points that were to be matched: how much of the one cloud
+    /// the other one shows.
+    pub overlap: f64,
+    /// Least eigenvalue of the normal matrix (dimensionless, at most 1/3): zero where some motion
+    /// changes no residual.
+    pub least_eigenvalue: f64,
+    /// Independent motions that the clouds do not determine (a plane leaves three): in those the
+    /// pose keeps what the initial one has.
+    pub unobserved: usize,
+}
+
+impl Registration {
+    fn unmatched(pose: Pose) -> Registration {
+        Registration {
+            pose,
+            converged: false,
+            iterations: 0,
+            rms_m: 0.0,
+            inliers: 0,
+            overlap: 0.0,
+            least_eigenvalue: 0.0,
+            unobserved: 6,
+        }
+    }
+}
+
+/// Fewest correspondences that determine a motion.
+const CORRESPONDENCES_MIN: usize = 30;
+/// A step shorter than this ends a stage, m.
+const SETTLED_M: f64 = 2e-4;
+/// Motions with a smaller eigenvalue are not told apart from noise of the normals.
+pub(crate) const OBSERVABLE: f64 = 2e-3;
+/// Matched normals are at most 45 degrees apart (cosine).
+const ALIGNED: f64 = 0.7;
+
+/// A stage from coarse to fine.
+struct Stage {
+    /// Search radius, m.
+    radius_m: f64,
+    /// Width of the kernel, m.
+    kernel_m: f64,
+    /// Of the source's flat points every such one is matched.
+    stride: usize,
+}
+
+/// Share of the search radius, multiple of the kernel and multiple of the stride of each stage. Not
+/// measured on their own.
+const STAGES: [(f64, f64, usize); 3] = [(1.0, 8.0, 4), (0.5, 3.0, 2), (0.25, 1.0, 1)];
+
+/// The motion that lays `source` onto `target`, started at `initial` (`target_from_source`).
+/// At most as many points are matched as `correspondences` has room for, evenly chosen;
+/// [`CORRESPONDENCES`] is a good number.
+///
+/// Never fails: clouds without enough flat patches, or an initial pose that is not finite (then
+/// taken as the identity), give `converged: false`.
+pub fn register(
+    source: &OrientedCloud,
+    target: &OrientedCloud,
+    initial: Pose,
+    options: &IcpOptions,
+    correspondences: &mut [Correspondence],
+) -> Registration {
+    if !(initial.rotation.is_finite() && initial.translation.is_finite()) {
+        return Registration::unmatched(Pose::IDENTITY);
+    }
+    let mut result = Registration::unmatched(initial);
+    let stride = source.flat_count().div_ceil(correspondences.len().max(1)).max(1);
+    for (radius, kernel, every) in STAGES {
+        let stage = Stage {
+            radius_m: radius * options.distance_m,
+            kernel_m: kernel * options.kernel_m,
+            stride: every * stride,
+        };
+        result.converged = false;
+        let mut matched = 0;
+        for _ in 0..options.iterations {
+            matched = match_points(source, target, &result.pose, &stage, correspondences);
+            if !result.advance(&correspondences[..matched]) {
+                break;
+            }
+        }
+        let tried = source.flat_count().div_ceil(stage.stride);
+        result.judge(&correspondences[..matched], tried, stage.kernel_m);
+    }
+    result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobserved < 6;
+    result
+}
+
+/// Matches the source's flat points with the planes of their nearest neighbours. Returns how many
+/// `correspondences` there are.
+fn match_points(
+    source: &OrientedCloud,
+    target: &OrientedCloud,
+    pose: &Pose,
+    stage: &Stage,
+    correspondences: &mut [Correspondence],
+) -> usize {
+    let rotation = pose.matrix();
+    let flat = source.points().iter().filter(|p| p.is_flat()).step_by(stage.stride);
+    let found = flat.filter_map(|of| {
+        let point = rotation * of.position + pose.translation;
+        let near = tree::nearest(target.points(), point, stage.radius_m * stage.radius_m)?;
+        let on = &target.points()[near];
+        if on.normal.dot(rotation * of.normal).abs() < ALIGNED {
+            return None;
+        }
+        let (on, normal) = (on.position, on.normal);
+        let mut found = Correspondence { point, on, normal, weight: 1.0 };
+        found.weight = geman_mcclure(found.residual() / stage.kernel_m);
+        Some(found)
+    });
+    correspondences.iter_mut().zip(found).map(|(slot, found)| *slot = found).count()
+}
+
+/// Weight of a residual in units of the kernel's width (Geman and McClure 1985).
+fn geman_mcclure(ratio: f64) -> f64 {
+    let q = 1.0 + ratio * ratio;
+    1.0 / (q * q)
+}
+
+impl Registration {
+    /// One step. Returns whether another one may follow.
+    fn advance(&mut self, correspondences: &[Correspondence]) -> bool {
+        if correspondences.len() < CORRESPONDENCES_MIN {
+            return false;
+        }
+        let Some(step) = solve(correspondences, OBSERVABLE) else { return false };
+        self.pose = step.motion * self.pose;
+        self.iterations += 1;
+        self.least_eigenvalue = step.least_eigenvalue;
+        self.unobserved = step.unobserved;
+        self.converged = step.length_m < SETTLED_M;
+        !self.converged
+    }
+
+    /// Counts the inliers, also as a share of the points tried, and how far they are off.
+    fn judge(&mut self, correspondences: &[Correspondence], tried: usize, kernel_m: f64) {
+        let squares = correspondences.iter().map(|c| c.residual() * c.residual());
+        let inliers = squares.filter(|r2| *r2 < kernel_m * kernel_m);
+        let (count, sum) = inliers.fold((0, 0.0), |(n, sum), r2| (n + 1, sum + r2));
+        self.inliers = count;
+        self.overlap = count as f64 / tried.max(1) as f64;
+        self.rms_m = libm::sqrt(sum / count.max(1) as f64);
+    }
+}
+
+#[cfg(test)]
+#[path = "tests.rs"]
+mod tests;
