@@ -9,7 +9,8 @@ use raywake_sim::Truth;
 
 use crate::args::{Demo, Learned, PictureFrame};
 use crate::config::Weights;
-use crate::engine::{self, Plan, say};
+use crate::console::say;
+use crate::engine::{self, Plan};
 use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::outputs::Kinds;

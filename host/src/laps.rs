@@ -2,6 +2,11 @@
 
 use std::time::Instant;
 
+/// Time since a moment, ms.
+pub fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
 /// Stages a sweep may have.
 const LAPS_MAX: usize = 24;
 

@@ -1,26 +1,65 @@
 #![forbid(unsafe_code)]
-#![warn(missing_docs)]
+#![deny(missing_docs)]
 //! The onboard program: sweeps and poses in, temporal scene flow out.
+//!
+//! Commands over three libraries: `raywake-core` and its kernels (chapter 3 of the dissertation),
+//! `raywake-objects` and `raywake-registration`, with files by `raywake-io`.
+//!
+//! | module | subject |
+//! |---|---|
+//! | [`args`] | the command line |
+//! | [`config`], [`choose`] | profile, learned tables and backend that it asks for |
+//! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
+//! | [`track`], [`map`], `flow`, [`budget`] | the other commands |
+//! | `session` | the run loop over a source's sweeps, until the last one or a signal |
+//! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
+//! | [`outputs`], [`summary`], `figures` | files of a run, its figures, and where these go |
+//! | [`statistics`], [`order_statistics`], [`laps`] | what is counted and timed |
+//! | [`console`], [`progress`], `report` | what the user reads |
+//! | [`error`] | what can end a command, and its exit code |
 
 pub mod args;
 pub mod backend;
 pub mod budget;
 pub mod choose;
 pub mod config;
+pub mod console;
 #[cfg(feature = "demo")]
-pub mod demo;
+mod demo;
 pub mod drive;
 pub mod engine;
 pub mod error;
-pub mod flow;
+mod figures;
+mod flow;
 pub mod laps;
 pub mod map;
 pub mod order_statistics;
 pub mod outputs;
 pub mod progress;
-pub mod report;
-pub mod run;
+mod report;
+mod run;
+mod session;
 pub mod statistics;
 pub mod summary;
 pub mod team;
 pub mod track;
+
+use args::Command;
+use error::RunError;
+
+/// Carries out a command. Returns whether it got to the end: a signal ends it early.
+pub fn execute(command: Command) -> Result<bool, RunError> {
+    match command {
+        Command::Run(args) => Ok(!run::run(&args)?.interrupted),
+        Command::Flow(args) => flow::flow(&args).map(|()| true),
+        Command::Track(args) => track::track(&args),
+        Command::Map(args) => map::command::map(&args),
+        #[cfg(feature = "demo")]
+        Command::Demo(args) => Ok(!demo::demo(&args)?.interrupted),
+        Command::Budget(args) => budget::budget(&args).map(|()| true),
+        Command::Devices => {
+            console::say(false, &choose::list_devices()?)?;
+            Ok(true)
+        }
+    }
+}

@@ -7,10 +7,8 @@ use std::process::ExitCode;
 use std::thread;
 
 use clap::Parser;
-use raywake::args::{Args, Command};
-use raywake::error::RunError;
-use raywake::summary::Summary;
-use raywake::{budget, choose, engine, flow, map, run, team, track};
+use raywake::args::Args;
+use raywake::{execute, team};
 use raywake_alloc_guard::Guard;
 
 /// Exit code of a process ended by SIGINT, as shells have it.
@@ -26,7 +24,8 @@ const STACK: usize = 64 << 20;
 fn main() -> ExitCode {
     let command = Args::parse().command;
     let work = || match team::lead(team::available(), || execute(command)) {
-        Ok(code) => code,
+        Ok(true) => 0,
+        Ok(false) => INTERRUPTED,
         Err(e) => {
             // Nobody is left to tell where standard error is closed.
             let _ = writeln!(stderr(), "raywake: {e}");
@@ -37,25 +36,4 @@ fn main() -> ExitCode {
     let code = worker.expect("the system has threads").join();
     // A panic has said what it had to say; 101 is what Rust ends with.
     ExitCode::from(code.unwrap_or(101))
-}
-
-fn execute(command: Command) -> Result<u8, RunError> {
-    match command {
-        Command::Run(args) => run::run(&args).map(code),
-        Command::Flow(args) => flow::flow(&args).map(|()| 0),
-        Command::Track(args) => {
-            track::track(&args).map(|whole| if whole { 0 } else { INTERRUPTED })
-        }
-        Command::Map(args) => {
-            map::command::map(&args).map(|whole| if whole { 0 } else { INTERRUPTED })
-        }
-        #[cfg(feature = "demo")]
-        Command::Demo(args) => raywake::demo::demo(&args).map(code),
-        Command::Budget(args) => budget::budget(&args).map(|()| 0),
-        Command::Devices => Ok(engine::say(false, &choose::list_devices()?).map(|()| 0)?),
-    }
-}
-
-fn code(summary: Summary) -> u8 {
-    if summary.interrupted { INTERRUPTED } else { 0 }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use crate::console::bytes;
 use crate::order_statistics::Spread;
 use crate::summary::Summary;
 
@@ -89,13 +90,4 @@ fn left_out(out: &mut String, s: &Summary) -> std::fmt::Result {
         writeln!(out, "{label:10} sweep {} (frame {}): {}", reset.sweep, reset.frame, reset.text)?;
     }
     Ok(())
-}
-
-/// Bytes in the unit that suits them.
-pub fn bytes(bytes: u64) -> String {
-    match bytes {
-        0..10_000 => format!("{bytes} B"),
-        10_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
-        _ => format!("{:.1} MB", bytes as f64 * 1e-6),
-    }
 }

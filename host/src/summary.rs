@@ -1,9 +1,5 @@
 //! The figures of a run: what `--summary` writes as JSON and what the report prints.
 
-use std::fs::{self, File};
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
 use raywake_core::params::Profile;
 use serde::{Serialize, Serializer};
 
@@ -11,8 +7,6 @@ use crate::backend::Backend;
 use crate::order_statistics::Spread;
 use crate::statistics::{AGES, Dropped, ResetAt, Statistics, Tally};
 use crate::team;
-use raywake_io::Error;
-use raywake_io::sink::atomic;
 
 /// Entries of a JSON object in the order given.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,38 +157,5 @@ impl Summary {
             tracklets_by_age: Ordered(ages.collect()),
             resets: s.resets.clone(),
         }
-    }
-
-    /// Writes the summary as JSON.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
-        write_json(self, path)
-    }
-}
-
-/// Writes figures as JSON.
-pub fn write_json(figures: &impl Serialize, path: &Path) -> Result<(), Error> {
-    let text = serde_json::to_string_pretty(figures).map_err(|e| Error::writing(path)(e.into()))?;
-    replace(path, &(text + "\n"))
-}
-
-/// Writes a file whole or not at all; to what is no file (a pipe, a terminal) as it comes, because
-/// a file must not take its place.
-fn replace(path: &Path, text: &str) -> Result<(), Error> {
-    if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        let mut out = File::options().write(true).open(path).map_err(Error::writing(path))?;
-        return out.write_all(text.as_bytes()).map_err(Error::writing(path));
-    }
-    atomic::write(path, |out| out.write_all(text.as_bytes()))
-}
-
-/// Creates the folder a summary will go to, so that a wrong path shows before the first sweep.
-pub fn make_room(path: &Option<PathBuf>) -> Result<(), Error> {
-    // That of an earlier run would vouch for this one, should this one fail.
-    if let Some(old) = path.as_deref().filter(|p| p.is_file()) {
-        std::fs::remove_file(old).map_err(Error::writing(old))?;
-    }
-    match path.as_deref().and_then(Path::parent) {
-        Some(folder) if !folder.as_os_str().is_empty() => atomic::create_folder(folder),
-        _ => Ok(()),
     }
 }

@@ -17,8 +17,8 @@ use raywake_core::sweep::{Rig, Timing};
 use crate::args;
 use crate::choose;
 use crate::config::{self, Weights};
+use crate::console::{note, say};
 use crate::drive::Drive;
-use crate::engine::say;
 use crate::error::RunError;
 use crate::laps::Laps;
 use crate::statistics::{Dropped, in_words};
@@ -58,7 +58,7 @@ pub fn flow(args: &args::Flow) -> Result<(), RunError> {
     say(&text)?;
     laps.lap("registration");
 
-    let (flows, left_out) = points(args, &profile, &weights, &rig, [&first, &second], &say)?;
+    let (flows, left_out) = points(args, &profile, &weights, &rig, [&first, &second])?;
     let second_from_first = motion.inverse();
     let rows: Vec<Row> = first
         .points
@@ -137,13 +137,10 @@ fn points(
     weights: &Weights,
     rig: &Rig,
     [first, second]: [&SweepData; 2],
-    say: &impl Fn(&str) -> Result<(), Error>,
 ) -> Result<(Vec<PointFlow>, Dropped), RunError> {
     let tables = weights.tables(profile)?;
     let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
-    if let Some(note) = &chosen.note {
-        say(&format!("note: {note}\n"))?;
-    }
+    note(args.quiet, &chosen.note)?;
     let mut drive = Drive::new(profile, rig, &tables, chosen.backend);
     let mut returns = drive.step(&first.sweep(), &[])?.prepared.dropped;
     let stepped = drive.step(&second.sweep(), &first.points)?;

@@ -5,29 +5,22 @@ use std::time::Instant;
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 
-use super::{MapBackend, Mapped, Mapper, device::DeviceMap, scalar::ScalarMap};
+use super::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
 use crate::choose;
-use crate::engine::{interrupted, listen, say};
+use crate::console::{bytes, note, say};
 use crate::error::RunError;
+use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
-use crate::progress::Progress;
-use crate::report::bytes;
+use crate::session::each_sweep;
 use crate::statistics::Dropped;
-use raywake_io::sink::{atomic, feather};
+use raywake_io::sink::atomic;
+use raywake_io::sink::feather::{self, Voxel};
 use raywake_io::source::{self, SweepData};
-
-/// Voxels of one sweep, in columns as the file has them.
-#[derive(Default)]
-struct Voxels {
-    index: [Vec<i32>; 3],
-    log_odds: Vec<i32>,
-}
 
 /// Maps every sweep of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand.
 pub fn map(args: &args::Map) -> Result<bool, RunError> {
-    listen();
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
@@ -38,69 +31,74 @@ pub fn map(args: &args::Map) -> Result<bool, RunError> {
         None => MapBackend::Scalar(Box::new(ScalarMap::new(&profile))),
     };
     say(args.quiet, &format!("{}\n", source.describe()))?;
-    for note in source.notes().iter().chain(&wanted.note) {
-        say(args.quiet, &format!("note: {note}\n"))?;
-    }
+    note(args.quiet, source.notes().iter().chain(&wanted.note))?;
     let budget = bytes(Mapper::bytes(&profile) as u64);
     say(args.quiet, &format!("{}; memory budget: at most {budget} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
-    let (mut sweep, mut voxels) = (SweepData::default(), Voxels::default());
-    let (mut digest, mut times, mut count) = (Digest::default(), Vec::new(), 0);
-    let mut left_out = Dropped::default();
-    let mut progress = Progress::new(sweeps.len(), args.quiet);
-    for (done, index) in sweeps.clone().enumerate() {
-        if interrupted() {
-            progress.finish();
-            return Ok(false);
-        }
-        source.read(index, &mut sweep)?;
+    let mut tally = MapTally::default();
+    let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
+        let (voxels, origin_m) = tally.sweep(&mut mapper, &profile, visit.now)?;
+        let path = args.out.join(format!("{:010}.feather", visit.now.frame));
+        let meta =
+            [("frame", visit.now.frame.to_string()), ("stamp_s", visit.now.stamp_s.to_string())];
+        Ok(feather::write_map(&path, &voxels, origin_m, profile.voxel_m, &meta)?)
+    })?;
+    if !end.interrupted {
+        say(args.quiet, &tally.text())?;
+    }
+    Ok(!end.interrupted)
+}
+
+/// What is counted over all maps.
+#[derive(Default)]
+struct MapTally {
+    digest: Digest,
+    milliseconds: Vec<f64>,
+    voxels: usize,
+    dropped: Dropped,
+}
+
+impl MapTally {
+    /// Maps a sweep: its voxels, and the corner of the voxel (0, 0, 0) in the world, m.
+    fn sweep(
+        &mut self,
+        mapper: &mut Mapper,
+        profile: &Profile,
+        sweep: &SweepData,
+    ) -> Result<(Vec<Voxel>, [f64; 3]), RunError> {
         let clock = Instant::now();
         let mut found = Vec::new();
         let mapped = mapper.map(&sweep.sweep(), &mut |band| found.extend_from_slice(band))?;
-        left_out.returns += mapped.dropped;
-        left_out.null_rows += u64::from(sweep.dropped.null_rows);
-        times.push(clock.elapsed().as_secs_f64() * 1e3);
-        found.iter().flatten().for_each(|word| digest.word(*word));
-        voxels.set(&mapper, &mapped, &found);
-        count += found.len();
-        let path = args.out.join(format!("{:010}.feather", sweep.frame));
-        // The lattice's origin is the centre of its voxel (0, 0, 0), the file's a corner.
+        self.milliseconds.push(milliseconds(clock));
+        self.dropped.returns += mapped.dropped;
+        self.dropped.null_rows += u64::from(sweep.dropped.null_rows);
+        found.iter().flatten().for_each(|word| self.digest.word(*word));
+        self.voxels += found.len();
+        let voxel = |&[key, log_odds]: &[u32; 2]| Voxel {
+            index: mapper.cell(&mapped, key),
+            log_odds_tenths: log_odds as i32,
+        };
+        // The lattice's origin is the centre of its voxel (0, 0, 0).
         let half = 0.5 * profile.voxel_m;
-        let origin = mapped.window.lattice_origin.to_array().map(|c| c - half);
-        let meta = [("frame", sweep.frame.to_string()), ("stamp_s", sweep.stamp_s.to_string())];
-        let [i, j, k] = &voxels.index;
-        feather::write_map(&path, i, j, k, &voxels.log_odds, origin, profile.voxel_m, &meta)?;
-        progress.update(done + 1);
+        let origin_m = mapped.window.lattice_origin.to_array().map(|c| c - half);
+        Ok((found.iter().map(voxel).collect(), origin_m))
     }
-    progress.finish();
-    if let Some(t) = Spread::of(&times) {
-        let mean = count / times.len();
-        let text = format!(
-            "{} sweeps, {mean} voxels a sweep; {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max a map\n\
-             left out   {left_out}\n\
+
+    fn text(&self) -> String {
+        let Some(t) = Spread::of(&self.milliseconds) else { return String::new() };
+        let count = self.milliseconds.len();
+        format!(
+            "{count} sweeps, {} voxels per sweep; map: {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max\n\
+             dropped    {}\n\
              digest     {:016x}\n",
-            times.len(),
+            self.voxels / count,
             t.median,
             t.sd,
             t.p99,
             t.max,
-            digest.value()
-        );
-        say(args.quiet, &text)?;
-    }
-    Ok(true)
-}
-
-impl Voxels {
-    fn set(&mut self, mapper: &Mapper, mapped: &Mapped, found: &[[u32; 2]]) {
-        self.index.iter_mut().for_each(Vec::clear);
-        self.log_odds.clear();
-        for &[key, log_odds] in found {
-            for (column, value) in self.index.iter_mut().zip(mapper.cell(mapped, key)) {
-                column.push(value);
-            }
-            self.log_odds.push(log_odds as i32);
-        }
+            self.dropped,
+            self.digest.value()
+        )
     }
 }

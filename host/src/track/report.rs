@@ -1,7 +1,6 @@
 //! The figures of a run of tracks.
 
 use std::fmt::Write;
-use std::path::Path;
 use std::time::Instant;
 
 use raywake_core::digest::Digest;
@@ -14,7 +13,6 @@ use super::write::Files;
 use crate::args::FrontEndKind;
 use crate::order_statistics::Spread;
 use crate::statistics::Dropped;
-use crate::summary::write_json;
 use raywake_io::Error;
 use raywake_io::source::SweepData;
 
@@ -209,11 +207,6 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Writes the summary as JSON.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
-        write_json(self, path)
-    }
-
     /// For people.
     pub fn text(&self) -> String {
         let mut out = String::new();

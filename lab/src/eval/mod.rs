@@ -31,7 +31,7 @@ use drive::{Files, Settings};
 use facts::Facts;
 use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
 use raywake::config::{self, Weights};
-use raywake::engine::interrupted;
+use raywake::console::interrupted;
 use raywake::error::RunError;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
@@ -173,7 +173,7 @@ fn all(
     for folder in ["rows", "drives", "panels"] {
         atomic::create_folder(&out.join(folder))?;
     }
-    raywake::engine::listen();
+    raywake::console::listen();
     let list: Vec<_> = names.iter().collect();
     let (next, done) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {

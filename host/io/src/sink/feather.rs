@@ -11,7 +11,7 @@ use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use raywake_core::sweep::Point;
 
 use super::Meta;
-use super::table::{Column, Table};
+use super::table::Table;
 use crate::Error;
 
 /// Names and places of the 15 upper entries of a tracklet's covariance; units are products of m, m,
@@ -73,8 +73,8 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 
 /// Writes the flow of returns, one row each in the sweep's order.
 ///
-/// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy cov_yy` of the world velocity float32; `age`
-/// uint32; `foreground`, `valid` bool. `points` and `flows` are of the same sweep; fails with
+/// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
+/// cov_yy` of the world velocity float32; `age` uint32; `foreground`, `valid` bool. `points` and `flows` are of the same sweep; fails with
 /// [`Error::Usage`] where their lengths differ.
 pub fn write_points(
     path: &Path,
@@ -82,7 +82,10 @@ pub fn write_points(
     flows: &[PointFlow],
     meta: Meta<'_>,
 ) -> Result<(), Error> {
-    same_length(path, &[points.len(), flows.len()])?;
+    if points.len() != flows.len() {
+        let lengths = format!("{} returns, {} flows", points.len(), flows.len());
+        return Err(Error::Usage(format!("{}: {lengths}", path.display())));
+    }
     let mut t = Table::default();
     t.f32s("x_m", points, |p| p.position[0]);
     t.f32s("y_m", points, |p| p.position[1]);
@@ -132,28 +135,33 @@ pub fn write_tracklets(
     t.write(path, meta)
 }
 
+/// A voxel of a map of occupancy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Voxel {
+    /// Place on the map's lattice.
+    pub index: [i32; 3],
+    /// Log-odds of being occupied, tenths of nats.
+    pub log_odds_tenths: i32,
+}
+
 /// Writes a map of occupancy, one row per voxel: `i j k` int32, `log_odds` float32 (nats, positive
 /// is occupied).
 ///
 /// Voxel (i, j, k) spans from `origin_m + resolution_m * (i, j, k)` one resolution further along
 /// every axis of the world; both go to the metadata as `origin_x_m`, `origin_y_m`, `origin_z_m`,
-/// `resolution_m`. Fails with [`Error::Usage`] where lengths differ.
+/// `resolution_m`.
 pub fn write_map(
     path: &Path,
-    i: &[i32],
-    j: &[i32],
-    k: &[i32],
-    log_odds_tenths: &[i32],
+    voxels: &[Voxel],
     origin_m: [f64; 3],
     resolution_m: f64,
     meta: Meta<'_>,
 ) -> Result<(), Error> {
-    same_length(path, &[i.len(), j.len(), k.len(), log_odds_tenths.len()])?;
     let mut t = Table::default();
-    for (name, values) in [("i", i), ("j", j), ("k", k)] {
-        t.push(name, Column::I32(values.to_vec()));
+    for (axis, name) in ["i", "j", "k"].iter().enumerate() {
+        t.i32s(name, voxels, |v| v.index[axis]);
     }
-    t.f32s("log_odds", log_odds_tenths, |&v| v as f32 / 10.0);
+    t.f32s("log_odds", voxels, |v| v.log_odds_tenths as f32 / 10.0);
     let place = [
         ("origin_x_m", origin_m[0].to_string()),
         ("origin_y_m", origin_m[1].to_string()),
@@ -161,13 +169,4 @@ pub fn write_map(
         ("resolution_m", resolution_m.to_string()),
     ];
     t.write(path, &[meta, &place].concat())
-}
-
-/// Fails where the columns of a table would not be of one length.
-fn same_length(path: &Path, lengths: &[usize]) -> Result<(), Error> {
-    if lengths.iter().all(|n| *n == lengths[0]) {
-        return Ok(());
-    }
-    let what = format!("{}: columns of different lengths {lengths:?}", path.display());
-    Err(Error::Usage(what))
 }

@@ -10,7 +10,7 @@ use crate::report::{self, Report};
 use clap::builder::PossibleValuesParser;
 use raywake::args::Learned;
 use raywake::config::Weights;
-use raywake::engine::interrupted;
+use raywake::console::interrupted;
 use raywake_core::params::Profile;
 use raywake_io::Error;
 use std::collections::BTreeMap;

@@ -1,0 +1,47 @@
+//! The user's terminal: what a command says, and the signals that interrupt it.
+
+use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use raywake_io::Error;
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Whether a signal came.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// From now on SIGINT and SIGTERM end a command after the sweep in hand.
+pub fn listen() {
+    // Fails where a handler is there already: another run's, which sets the same flag.
+    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+}
+
+/// Prints to standard output unless quiet. A reader that has gone away is not an error.
+pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
+    if quiet {
+        return Ok(());
+    }
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Error::Write { path: "standard output".into(), source: e })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints what the user should know, a line each.
+pub fn note<'a>(quiet: bool, notes: impl IntoIterator<Item = &'a String>) -> Result<(), Error> {
+    notes.into_iter().try_for_each(|note| say(quiet, &format!("note: {note}\n")))
+}
+
+/// Bytes in the unit that suits them.
+pub fn bytes(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} B"),
+        10_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
+        _ => format!("{:.1} MB", bytes as f64 * 1e-6),
+    }
+}
