@@ -35,6 +35,8 @@ pub mod laps;
 pub mod map;
 pub mod order_statistics;
 pub mod outputs;
+#[cfg(feature = "png")]
+pub mod picture;
 pub mod progress;
 mod report;
 mod run;

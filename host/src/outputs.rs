@@ -18,8 +18,10 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 
 use crate::args::{Export, PictureFrame, Results};
+#[cfg(feature = "png")]
+use crate::picture;
 use raywake_io::Error;
-use raywake_io::sink::{argoverse, atomic, feather, picture};
+use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::SweepData;
 
 /// Which files are written.
@@ -39,7 +41,9 @@ pub struct Kinds {
 pub struct Outputs {
     folders: Option<Folders>,
     log: String,
-    half_extent_m: f32,
+    profile: Profile,
+    /// Stamp of the first pair, s.
+    start_s: Option<f64>,
 }
 
 struct Folders {
@@ -86,13 +90,13 @@ impl Outputs {
         profile: &Profile,
     ) -> Result<Outputs, Error> {
         let folders = root.map(|root| Folders::create(root, kinds)).transpose()?;
-        let half_extent_m = (0.5 * profile.side as f64 * profile.voxel_m) as f32;
-        Ok(Outputs { folders, log: log.to_string(), half_extent_m })
+        Ok(Outputs { folders, log: log.to_string(), profile: profile.clone(), start_s: None })
     }
 
     /// Writes what a pair of sweeps yields for its first sweep.
-    pub fn pair(&self, first: &SweepData, flows: &Flows) -> Result<(), Error> {
+    pub fn pair(&mut self, first: &SweepData, flows: &Flows) -> Result<(), Error> {
         let Some(folders) = &self.folders else { return Ok(()) };
+        let start_s = *self.start_s.get_or_insert(first.stamp_s);
         let meta = meta(first, flows.dt_s);
         if let Some(folder) = &folders.columns {
             feather::write_columns(&named(folder, first, "feather"), flows.columns, &meta)?;
@@ -102,15 +106,18 @@ impl Outputs {
             let points = &first.points[..flows.points.len().min(first.points.len())];
             feather::write_points(&named(folder, first, "feather"), points, flows.points, &meta)?;
         }
+        #[cfg(feature = "png")]
         if let Some((folder, frame)) = &folders.png {
-            let yaw = first.world_from_vehicle.yaw_rad();
-            let velocity = match frame {
-                PictureFrame::World => picture::Velocity::World { vehicle_yaw_rad: yaw },
-                PictureFrame::Ego => picture::Velocity::Ego,
+            let scene = picture::FlowScene {
+                title: self.log.clone(),
+                note: picture::note(first, start_s),
+                points: &first.points,
+                columns: flows.columns,
+                world_from_vehicle: first.world_from_vehicle,
+                profile: &self.profile,
+                frame: *frame,
             };
-            let half = self.half_extent_m;
-            let rgb = picture::birdseye(&first.points, flows.columns, half, velocity);
-            picture::write_png(&named(folder, first, "png"), &rgb)?;
+            picture::flow(&named(folder, first, "png"), &scene)?;
         }
         if let Some(folder) = &folders.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);

@@ -5,7 +5,7 @@
 //! | module | subject |
 //! |---|---|
 //! | [`source`] | sweeps and poses of recorded (KITTI, Argoverse 2, folders of clouds) and simulated drives |
-//! | [`sink`] | feather tables, Argoverse 2 submissions, pictures, each file whole or absent |
+//! | [`sink`] | feather tables, Argoverse 2 submissions, each file whole or absent |
 //! | [`error`] | what can be wrong with a file, and the exit code of it |
 
 pub mod error;

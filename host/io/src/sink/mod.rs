@@ -1,11 +1,9 @@
-//! Where results go: feather files, Argoverse 2 submissions and pictures, each written whole or
-//! not at all.
+//! Where results go: feather files and Argoverse 2 submissions, each written whole or not at
+//! all.
 
 pub mod argoverse;
 pub mod atomic;
-mod canvas;
 pub mod feather;
-pub mod picture;
 pub mod table;
 
 #[cfg(test)]

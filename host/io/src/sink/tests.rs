@@ -4,10 +4,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
-use raywake_core::output::{ColumnFlow, Origin};
-use raywake_core::sweep::Point;
-
-use super::{atomic, picture};
+use super::atomic;
 use crate::source::tests::Temp;
 
 fn names(folder: &Path) -> Vec<String> {
@@ -46,76 +43,6 @@ fn a_file_is_whole_or_absent() {
     assert!(atomic::create_folder(&path).is_err());
 }
 
-#[test]
-fn arrows_point_where_things_go() {
-    let point = |x, y, z| Point { position: [x, y, z], ..Point::default() };
-    let points: Vec<Point> = (0..100).map(|i| point(i as f32 * 0.1, 8.0, -1.7)).collect();
-    let column = ColumnFlow {
-        position_vehicle_m: [10.0, 0.0],
-        velocity_world_mps: [10.0, 0.0],
-        velocity_ego_mps: [0.0, -10.0],
-        origin: Origin::Matched,
-        age: 3,
-        ..ColumnFlow::default()
-    };
-    // Too young to be drawn.
-    let young = ColumnFlow { position_vehicle_m: [-10.0, 0.0], age: 2, ..column };
-    let red = |velocity| {
-        let rgb = picture::birdseye(&points, &[column, young], 30.0, velocity);
-        assert_eq!(rgb.len(), 3 * picture::SIZE * picture::SIZE);
-        let is_red = |p: &[u8]| p[0].saturating_sub(p[1]) > 40 && p[0] > p[2];
-        let pixels = rgb.chunks_exact(3).enumerate().filter(|(_, p)| is_red(p));
-        let places = pixels.map(|(i, _)| ((i % picture::SIZE) as f64, (i / picture::SIZE) as f64));
-        let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
-        for (u, v) in places {
-            (n, x, y) = (n + 1.0, x + u, y + v);
-        }
-        assert!(n > 50.0);
-        // Metres to the left and forward of the vehicle.
-        ((450.0 - x / n) / 15.0, (450.0 - y / n) / 15.0)
-    };
-    let (left, forward) = red(picture::Velocity::Ego);
-    assert!(left < -1.0 && (forward - 10.0).abs() < 0.3, "{left} {forward}");
-    // The vehicle heads along world y: world x is to its right.
-    let heading = picture::Velocity::World { vehicle_yaw_rad: core::f64::consts::FRAC_PI_2 };
-    let (left, forward) = red(heading);
-    assert!(left < -1.0 && (forward - 10.0).abs() < 0.3, "{left} {forward}");
-    let (left, forward) = red(picture::Velocity::World { vehicle_yaw_rad: 0.0 });
-    assert!(left.abs() < 0.3 && forward > 11.0, "{left} {forward}");
-}
-
-#[test]
-fn pictures_bear_nonsense() {
-    let point = |v| Point { position: [v; 3], ..Point::default() };
-    let points = [point(f32::NAN), point(f32::INFINITY), point(1e30), point(-1e30)];
-    let column = |v| ColumnFlow {
-        velocity_ego_mps: [v; 2],
-        origin: Origin::Matched,
-        age: 9,
-        ..ColumnFlow::default()
-    };
-    let columns = [column(f32::NAN), column(1e30), column(f32::INFINITY)];
-    for extent in [f32::NAN, 0.0, 50.0, 1e9] {
-        picture::birdseye(&points, &columns, extent, picture::Velocity::Ego);
-    }
-}
-
-#[cfg(feature = "png")]
-#[test]
-fn a_picture_is_a_png() {
-    let t = Temp::new();
-    let path = t.path().join("p.png");
-    let rgb = picture::birdseye(&[], &[], 40.0, picture::Velocity::Ego);
-    picture::write_png(&path, &rgb).unwrap();
-    let decoder = png::Decoder::new(io::BufReader::new(fs::File::open(&path).unwrap()));
-    let mut reader = decoder.read_info().unwrap();
-    let mut back = vec![0; reader.output_buffer_size().unwrap()];
-    reader.next_frame(&mut back).unwrap();
-    assert_eq!(back, rgb);
-    assert!(picture::write_png(&path, &rgb[1..]).is_err());
-    assert_eq!(names(t.path()), ["p.png"]);
-}
-
 #[cfg(feature = "arrow")]
 mod tables {
     use super::*;
@@ -124,8 +51,9 @@ mod tables {
     use arrow_array::cast::AsArray;
     use arrow_array::types::{Float32Type, Float64Type, Int32Type, UInt32Type};
     use arrow_ipc::reader::FileReader;
-    use raywake_core::output::{PointFlow, TrackletState};
+    use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
     use raywake_core::pose::Pose;
+    use raywake_core::sweep::Point;
 
     fn back(path: &Path) -> RecordBatch {
         let mut reader = FileReader::try_new(fs::File::open(path).unwrap(), None).unwrap();

@@ -1,0 +1,27 @@
+//! Bird's-eye pictures: returns, motion, objects, maps and a legend, drawn to PNG.
+//!
+//! Plain data in, pixels out. All places are in metres in a frame of the caller's choice, x up and
+//! y to the left on the picture, so that a vehicle's frame (x forward, y left) is drawn with its
+//! front up. The same scene gives the same bytes on every machine: the font is embedded, the
+//! rasteriser runs scalar code, and no function of the platform's maths library is called.
+//!
+//! What is static is drawn pale, what moves in strong colours that colour-blind readers can tell
+//! apart (see [`colours`]).
+
+#![deny(missing_docs)]
+#![forbid(unsafe_code)]
+
+pub mod canvas;
+pub mod colours;
+mod legend;
+mod panel;
+pub mod scene;
+mod text;
+
+#[cfg(test)]
+mod tests;
+
+pub use canvas::{Canvas, Error};
+pub use colours::Colour;
+pub use panel::WINDOW;
+pub use scene::{Arrow, Cell, Entry, Look, Outline, Panel, Sign, Trail, birds_eye};

@@ -1,0 +1,172 @@
+//! What a bird's-eye picture shows, as plain data, and how its parts lie on the page.
+
+use crate::canvas::{Align, Canvas, Error, Pen};
+use crate::colours::{Colour, INK, MUTED, PAPER};
+use crate::panel::View;
+use crate::{legend, text};
+
+/// Around the page, units.
+const MARGIN: f32 = 14.0;
+/// Between panels, units.
+const GAP: f32 = 28.0;
+/// Height of a panel's title, units.
+const TITLE: f32 = 30.0;
+/// Height of a title's and of a note's font, units.
+const TITLE_SIZE: f32 = 16.0;
+const NOTE_SIZE: f32 = 13.0;
+
+/// One view from above. Places are in metres, x up and y to the left on the picture; the origin is
+/// in the middle. What is not finite, or lies outside, is left out.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    /// Above the panel, left.
+    pub title: String,
+    /// Above the panel, right: frame and time, for example.
+    pub note: String,
+    /// Points, m: coloured by height, pale.
+    pub points: Vec<[f32; 3]>,
+    /// Squares below everything else, [`Look::cell_m`] wide.
+    pub tiles: Vec<Cell>,
+    /// Columns of the grid with their motion.
+    pub cells: Vec<Cell>,
+    /// Boxes of objects.
+    pub outlines: Vec<Outline>,
+    /// Ways of objects.
+    pub trails: Vec<Trail>,
+    /// Corners of the window in which motion is estimated; what lies outside is shaded. None: no
+    /// window.
+    pub window: Option<[[f32; 2]; 4]>,
+    /// Whether the own vehicle stands at the origin, its front up.
+    pub vehicle: bool,
+}
+
+/// A square of one colour, perhaps with motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Its centre, m.
+    pub at: [f32; 2],
+    /// Its colour.
+    pub colour: Colour,
+    /// Arrows from its centre, the second upon the first. Of every block of 2 x 2 cells, only the
+    /// first cell given has its arrows drawn: all of them would hide the cells.
+    pub arrows: [Option<Arrow>; 2],
+}
+
+/// An arrow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrow {
+    /// From its foot to its tip, m on the picture.
+    pub way: [f32; 2],
+    /// Its colour.
+    pub colour: Colour,
+    /// Width of its shaft, units.
+    pub width: f32,
+}
+
+/// A box on the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Its centre, m.
+    pub at: [f32; 2],
+    /// Direction of its front, of length 1.
+    pub forward: [f32; 2],
+    /// Length and width, m.
+    pub size: [f32; 2],
+    /// Its colour.
+    pub colour: Colour,
+    /// Beside it.
+    pub label: String,
+    /// From its centre.
+    pub arrow: Option<Arrow>,
+}
+
+/// The way of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trail {
+    /// Places in the order of time, m.
+    pub places: Vec<[f32; 2]>,
+    /// Its colour.
+    pub colour: Colour,
+    /// Its width, units.
+    pub width: f32,
+}
+
+/// What all panels of a picture share.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// How far a panel reaches to every side, m.
+    pub half_extent_m: f32,
+    /// Width of a cell, m.
+    pub cell_m: f32,
+    /// Height above the ground from which on points have the darkest colour, m.
+    pub height_m: f32,
+    /// Colours of points, from the ground up.
+    pub heights: &'static [Colour],
+    /// Width and height of a panel, units.
+    pub side: f32,
+    /// Pixels per unit; text is 13 units high.
+    pub scale: f32,
+    /// What colours and arrows mean, in rows below the panels.
+    pub legend: Vec<Entry>,
+}
+
+/// A sign of the legend and its meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// The sign.
+    pub sign: Sign,
+    /// What it means.
+    pub text: String,
+}
+
+/// A sign of the legend.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sign {
+    /// Colours of a range, with its ends in words.
+    Ramp(&'static [Colour], [String; 2]),
+    /// An arrow, `way` m long at the picture's scale.
+    Arrow(Arrow),
+    /// A cell.
+    Cell(Colour),
+    /// A box.
+    Outline(Colour),
+    /// A line.
+    Line(Pen),
+}
+
+/// Draws panels side by side above one legend.
+///
+/// Fails where `half_extent_m` or `cell_m` is not positive and finite, or the picture has no pixels or more than 16,384
+/// in a row.
+pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Canvas, Error> {
+    for metres in [look.half_extent_m, look.cell_m] {
+        if !(metres > 0.0 && metres.is_finite()) {
+            return Err(Error::Extent(metres));
+        }
+    }
+    let n = panels.len().max(1) as f32;
+    let width = look.side * n + GAP * (n - 1.0);
+    let rows = legend::rows(look, width);
+    let height = TITLE + look.side + legend::height(&rows);
+    let page = [width, height].map(|v| v + 2.0 * MARGIN);
+    let mut canvas = Canvas::new(page, look.scale, PAPER)?;
+    for (i, panel) in panels.iter().enumerate() {
+        let left = MARGIN + i as f32 * (look.side + GAP);
+        draw_title(&mut canvas, panel, [left, MARGIN + TITLE - 11.0], look.side);
+        canvas.place(&View::new(look).draw(panel)?, [left, MARGIN + TITLE]);
+    }
+    legend::draw(&mut canvas, &rows, look, [MARGIN, MARGIN + TITLE + look.side]);
+    Ok(canvas)
+}
+
+/// Title and note on one baseline; the title ends before the note.
+fn draw_title(canvas: &mut Canvas, panel: &Panel, [left, y]: [f32; 2], wide: f32) {
+    let room = wide - text::width(&panel.note, NOTE_SIZE) - GAP;
+    let fits = |title: &String| text::width(title, TITLE_SIZE) <= room;
+    let cut = |end| format!("{}…", panel.title[..end].trim_end());
+    let ends = panel.title.char_indices().rev().map(|(end, _)| end);
+    let title = Some(panel.title.clone()).into_iter().chain(ends.map(cut)).find(fits);
+    let title = title.unwrap_or_default();
+    canvas.text([left, y], &title, TITLE_SIZE, Align::Start, INK);
+    canvas.text([left + wide, y], &panel.note, NOTE_SIZE, Align::End, MUTED);
+}

@@ -1,0 +1,86 @@
+//! Pictures of known motion.
+
+use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::params::Profile;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
+use raywake_render::Canvas;
+
+use super::flow::{FlowScene, canvas};
+use crate::args::PictureFrame;
+
+fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
+    let point = |i: u8| Point { position: [0.1 * f32::from(i), 8.0, -1.7], ..Point::default() };
+    let scene = FlowScene {
+        title: "drive".into(),
+        note: String::new(),
+        points: &(0..100).map(point).collect::<Vec<_>>(),
+        columns,
+        world_from_vehicle: Pose::planar(5.0, -3.0, 0.0, yaw_rad),
+        profile: &Profile::hdl64(),
+        frame,
+    };
+    canvas(&scene).unwrap()
+}
+
+/// Middle of the strong colours of the panel, m forward and left, and how many pixels have such.
+fn motion(canvas: &Canvas) -> ([f64; 2], usize) {
+    let width = canvas.size()[0] as usize;
+    // The panel is 900 pixels wide and high and stands 14 from the left and 44 from the top.
+    let rows = canvas.rgba().chunks(4 * width).skip(44).take(900);
+    let pixels = rows.enumerate().flat_map(|(y, row)| {
+        let strong = |p: &[u8]| p[0].saturating_sub(p[2]) > 60 || p[0].saturating_sub(p[1]) > 60;
+        let row = row.chunks(4).skip(14).enumerate().filter(move |(_, p)| strong(p));
+        row.map(move |(x, _)| [449.5 - y as f64, 449.5 - x as f64])
+    });
+    let pixels: Vec<[f64; 2]> = pixels.collect();
+    let profile = Profile::hdl64();
+    let per_m = 450.0 / (1.16 * 0.5 * f64::from(profile.side) * profile.voxel_m);
+    let n = pixels.len();
+    ([0, 1].map(|a| pixels.iter().map(|p| p[a]).sum::<f64>() / n as f64 / per_m), n)
+}
+
+const COLUMN: ColumnFlow = ColumnFlow {
+    cell: [0; 2],
+    position_world_m: [0.0; 2],
+    position_vehicle_m: [10.0, 0.0],
+    displacement_cells: [0; 2],
+    displacement_m: [1.0, 0.0],
+    displacement_covariance: [0.0; 3],
+    energy: 0,
+    velocity_world_mps: [10.0, 0.0],
+    velocity_ego_mps: [0.0, -10.0],
+    covariance: [0.0; 3],
+    age: 3,
+    origin: Origin::Matched,
+};
+
+#[test]
+fn arrows_point_where_columns_go() {
+    let ([x, y], _) = motion(&draw(&[COLUMN], 0.0, PictureFrame::Ego));
+    assert!(y < -1.0 && (x - 10.0).abs() < 0.3, "{x} {y}");
+    // The vehicle heads along world y: world x is to its right.
+    let quarter = core::f64::consts::FRAC_PI_2;
+    let ([x, y], _) = motion(&draw(&[COLUMN], quarter, PictureFrame::World));
+    assert!(y < -1.0 && (x - 10.0).abs() < 0.3, "{x} {y}");
+    let ([x, y], _) = motion(&draw(&[COLUMN], 0.0, PictureFrame::World));
+    assert!(y.abs() < 0.3 && x > 11.0, "{x} {y}");
+}
+
+#[test]
+fn motion_shows_from_the_first_observation_on_and_the_young_is_thinner() {
+    let pixels = |column| motion(&draw(&[column], 0.0, PictureFrame::World)).1;
+    let young = pixels(ColumnFlow { age: 0, ..COLUMN });
+    assert!(young > 50, "{young}");
+    assert!(pixels(COLUMN) > young);
+    assert!(pixels(ColumnFlow { origin: Origin::Joined, ..COLUMN }) > young);
+}
+
+#[test]
+fn what_is_static_or_unknown_has_no_arrow() {
+    let static_ = ColumnFlow { velocity_world_mps: [0.3, 0.0], ..COLUMN };
+    let unmatched = ColumnFlow { origin: Origin::Unmatched, ..COLUMN };
+    let nonsense = ColumnFlow { velocity_world_mps: [f32::NAN; 2], ..COLUMN };
+    let picture = draw(&[static_, unmatched, nonsense], 0.0, PictureFrame::World);
+    assert_eq!(motion(&picture).1, 0);
+}
