@@ -116,7 +116,7 @@ fn write_static(
     }
     let _ = writeln!(
         table,
-        "/// Kernel `{name}`.\npub static {}: Kernel = Kernel {{ name: {name:?}, entry: {name:?}, \
+        "/// Kernel `{name}`.\npub static {}: Kernel = Kernel {{ name: {name:?}, \
          workgroup: {:?}, bindings: &[{list}], spirv: &{words:?} }};",
         name.to_uppercase(),
         entry.workgroup_size,

@@ -1,5 +1,5 @@
-//! Nothing is allocated, created or recorded between the first sweep and the last, however many threads
-//! share the work; and all of them together find the same as one.
+//! Nothing is allocated, created or recorded between the first sweep and the last, however many
+//! threads share the work; and all of them together find the same as one.
 
 #![forbid(unsafe_code)]
 

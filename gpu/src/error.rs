@@ -1,16 +1,21 @@
+//! What can go wrong between the caller's tables and the device.
+
 use crate::Heap;
 use ash::vk;
 use std::fmt;
 use std::time::Duration;
 
 /// Why the device cannot be set up or a program did not finish.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
     /// There is no Vulkan loader (`libvulkan`) on this machine.
+    #[error("no Vulkan loader found")]
     NoLoader,
     /// The loader knows no device, or none of the index asked for.
+    #[error("no such Vulkan device")]
     NoDevice,
     /// The device or the Vulkan installation lacks something needed.
+    #[error("{device} lacks {what}")]
     Unsupported {
         /// The device's name.
         device: String,
@@ -18,6 +23,7 @@ pub enum GpuError {
         what: String,
     },
     /// The buffers of one heap do not fit.
+    #[error("the {heap:?} heap cannot hold {bytes} bytes")]
     OutOfMemory {
         /// The heap.
         heap: Heap,
@@ -25,11 +31,13 @@ pub enum GpuError {
         bytes: u64,
     },
     /// The device stopped working. Final.
+    #[error("device lost during {during}")]
     DeviceLost {
         /// How far it came.
         during: During,
     },
     /// A run missed its deadline. Final, because the device may still be at it.
+    #[error("no end of {during} within {after:?}")]
     Timeout {
         /// How far it came.
         during: During,
@@ -37,6 +45,7 @@ pub enum GpuError {
         after: Duration,
     },
     /// The buffer table or a program contradicts itself or the device's limits.
+    #[error("`{dispatch}` of `{program}`: {what}")]
     Schedule {
         /// The program's name.
         program: &'static str,
@@ -46,6 +55,7 @@ pub enum GpuError {
         what: String,
     },
     /// A Vulkan call failed in a way none of the above describes.
+    #[error("{call} failed: {result}")]
     Vulkan {
         /// The function.
         call: &'static str,
@@ -74,29 +84,6 @@ impl fmt::Display for During {
         }
     }
 }
-
-impl fmt::Display for GpuError {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::NoLoader => write!(f, "no Vulkan loader found"),
-            Self::NoDevice => write!(f, "no such Vulkan device"),
-            Self::Unsupported { device, what } => write!(f, "{device} lacks {what}"),
-            Self::OutOfMemory { heap, bytes } => {
-                write!(f, "the {heap:?} heap cannot hold {bytes} bytes")
-            }
-            Self::DeviceLost { during } => write!(f, "device lost during {during}"),
-            Self::Timeout { during, after } => {
-                write!(f, "no end of {during} within {after:?}")
-            }
-            Self::Schedule { program, dispatch, what } => {
-                write!(f, "`{dispatch}` of `{program}`: {what}")
-            }
-            Self::Vulkan { call, result } => write!(f, "{call} failed: {result}"),
-        }
-    }
-}
-
-impl std::error::Error for GpuError {}
 
 /// For `map_err`: names the call that failed.
 pub(crate) fn failed(call: &'static str) -> impl Fn(vk::Result) -> GpuError {

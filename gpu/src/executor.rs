@@ -99,8 +99,8 @@ impl Executor {
         self.run_beside(program, || ())
     }
 
-    /// Runs a program to its end, and `work` on this thread while the device is at it: its time does
-    /// not count against [`Options::timeout`].
+    /// Runs a program to its end, and `work` on this thread while the device is busy. The time of
+    /// `work` does not count against [`Options::timeout`].
     ///
     /// # Errors
     /// As [`Executor::run`]. `work` has not been done where the submission failed.

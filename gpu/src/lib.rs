@@ -8,15 +8,15 @@
 //! # Contract
 //!
 //! - **Who allocates.** `Executor::new` alone, at most one device memory block per [`Heap`].
-//!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host. They create, record and
-//!   update nothing on the device: what does takes a mutable reference that only set-up has. What a
-//!   driver allocates inside a submit is its own affair.
+//!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host. They create, record
+//!   and update nothing on the device: that takes a mutable reference which only set-up has. What
+//!   a driver allocates inside a submit is its own affair.
 //! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
 //!   does the caller's work in between. Programs never overlap, so nothing needs ordering between
 //!   two runs.
 //! - **Who orders.** Within a program a barrier stands exactly where declared accesses conflict
 //!   ([`Binding::reads`], [`Binding::writes`]): a kernel that touches what it does not declare is
-//!   not ordered. Every recording is checked a second time, pair by pair, before it is accepted.
+//!   not ordered.
 //! - **Contents.** Mapped buffers start as zeros; [`Heap::Device`] buffers start undefined, so a
 //!   program has to fill or write what it reads. All contents stay from one run to the next.
 //! - **What is trusted.** The SPIR-V: it must be valid, stay within its bindings and use no
@@ -27,7 +27,7 @@
 //!   in use.
 //!
 //! This is the only crate of the project that contains `unsafe`.
-#![warn(missing_docs)]
+#![deny(missing_docs)]
 
 mod arena;
 mod check;
@@ -82,13 +82,11 @@ pub struct Binding {
     pub writes: bool,
 }
 
-/// A compiled compute shader. Kernels are the same if their name and entry are.
+/// A compiled compute shader. Each has one static of its own: its address tells it from others.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
-    /// For messages and identity.
+    /// The entry point's name in the module; also for messages.
     pub name: &'static str,
-    /// The entry point's name in the module.
-    pub entry: &'static str,
     /// SPIR-V words, valid for Vulkan 1.1 (SPIR-V 1.3 or older).
     pub spirv: &'static [u32],
     /// Invocations per workgroup, as compiled in.

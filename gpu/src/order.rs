@@ -43,18 +43,14 @@ pub(crate) fn accesses(op: &Op) -> Vec<Access> {
 }
 
 /// What was read and written since the last barrier.
-pub(crate) struct Hazards {
+struct Hazards {
     read: Vec<bool>,
     written: Vec<bool>,
 }
 
 impl Hazards {
-    pub fn new(buffers: usize) -> Self {
-        Self { read: vec![false; buffers], written: vec![false; buffers] }
-    }
-
     /// Takes up the next step, and says whether a barrier has to stand before it.
-    pub fn admit(&mut self, step: &[Access]) -> bool {
+    fn admit(&mut self, step: &[Access]) -> bool {
         let barrier = step.iter().any(|a| {
             let (read, written) = (self.read[a.buffer], self.written[a.buffer]);
             (a.reads && written) || (a.writes && (read || written))
@@ -71,38 +67,10 @@ impl Hazards {
     }
 }
 
-/// What a recording consists of, as far as order goes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Step {
-    Op(Vec<Access>),
-    Barrier,
-}
-
-/// The first two steps that conflict without a barrier between them, by index among the
-/// operations. Deliberately not built on [`Hazards`]: it compares every pair, so that one can
-/// find the other wrong.
-pub(crate) fn unordered(steps: &[Step]) -> Option<(usize, usize)> {
-    let mut epoch = 0;
-    let mut earlier: Vec<(usize, &[Access])> = Vec::new();
-    for step in steps {
-        let Step::Op(later) = step else {
-            epoch += 1;
-            continue;
-        };
-        let conflicting = |(e, first): &(usize, &[Access])| *e == epoch && conflict(first, later);
-        if let Some(i) = earlier.iter().position(conflicting) {
-            return Some((i, earlier.len()));
-        }
-        earlier.push((epoch, later));
-    }
-    None
-}
-
-fn conflict(first: &[Access], second: &[Access]) -> bool {
-    let pairs = first.iter().flat_map(|a| second.iter().map(move |b| (a, b)));
-    pairs
-        .filter(|(a, b)| a.buffer == b.buffer)
-        .any(|(a, b)| (a.writes && (b.reads || b.writes)) || (a.reads && b.writes))
+/// For each step, whether a barrier has to stand before it.
+pub(crate) fn barriers(steps: &[Vec<Access>], buffers: usize) -> Vec<bool> {
+    let mut hazards = Hazards { read: vec![false; buffers], written: vec![false; buffers] };
+    steps.iter().map(|step| hazards.admit(step)).collect()
 }
 
 #[cfg(test)]
@@ -111,8 +79,23 @@ mod tests {
     use crate::{Binding, Kernel};
 
     fn barriers(steps: &[Vec<Access>]) -> Vec<bool> {
-        let mut hazards = Hazards::new(4);
-        steps.iter().map(|step| hazards.admit(step)).collect()
+        super::barriers(steps, 4)
+    }
+
+    /// The first two steps that conflict without a barrier between them. It compares every pair, so
+    /// that it can find the rule wrong.
+    fn unordered(steps: &[Vec<Access>], barriers: &[bool]) -> Option<(usize, usize)> {
+        let pairs = (0..steps.len()).flat_map(|later| (0..later).map(move |first| (first, later)));
+        pairs
+            .filter(|&(first, later)| !barriers[first + 1..=later].contains(&true))
+            .find(|&(first, later)| conflict(&steps[first], &steps[later]))
+    }
+
+    fn conflict(first: &[Access], second: &[Access]) -> bool {
+        let pairs = first.iter().flat_map(|a| second.iter().map(move |b| (a, b)));
+        pairs
+            .filter(|(a, b)| a.buffer == b.buffer)
+            .any(|(a, b)| (a.writes && (b.reads || b.writes)) || (a.reads && b.writes))
     }
 
     #[test]
@@ -139,7 +122,6 @@ mod tests {
     fn fills_write_copies_read_and_write_indirect_counts_are_read() {
         static KERNEL: Kernel = Kernel {
             name: "k",
-            entry: "k",
             spirv: &[],
             workgroup: [1; 3],
             bindings: &[Binding { name: "b", reads: true, writes: true }],
@@ -161,48 +143,39 @@ mod tests {
 
     #[test]
     fn a_missing_barrier_is_found() {
-        let (r, w) = (Step::Op(vec![Access::read(0)]), Step::Op(vec![Access::write(0)]));
-        let other = Step::Op(vec![Access::write(1)]);
-        let missing = |steps: &[&Step]| {
+        let (r, w) = (vec![Access::read(0)], vec![Access::write(0)]);
+        let other = vec![Access::write(1)];
+        let missing = |steps: &[&Vec<Access>], barriers: &[bool]| {
             let steps: Vec<_> = steps.iter().map(|&s| s.clone()).collect();
-            unordered(&steps)
+            unordered(&steps, barriers)
         };
-        assert_eq!(missing(&[&r, &r, &other]), None);
-        assert_eq!(missing(&[&w, &other, &r]), Some((0, 2)));
-        assert_eq!(missing(&[&r, &w]), Some((0, 1)));
-        assert_eq!(missing(&[&w, &Step::Barrier, &w]), None);
-        assert_eq!(missing(&[&w, &Step::Barrier, &r, &w]), Some((1, 2)));
+        assert_eq!(missing(&[&r, &r, &other], &[false; 3]), None);
+        assert_eq!(missing(&[&w, &other, &r], &[false; 3]), Some((0, 2)));
+        assert_eq!(missing(&[&r, &w], &[false; 2]), Some((0, 1)));
+        assert_eq!(missing(&[&w, &w], &[false, true]), None);
+        assert_eq!(missing(&[&w, &r, &w], &[false, true, false]), Some((1, 2)));
     }
 
-    /// Random schedules: what the recorder's rule lets pass, the pairwise check must accept, and
-    /// no barrier may be superfluous.
+    /// Random schedules: the rule leaves no pair unordered, and none of its barriers can go.
     #[test]
-    fn the_rule_and_the_check_agree() {
+    fn the_rule_and_the_pairs_agree() {
         let mut state = 1u32;
         let mut next = |n: u32| {
             state = state.wrapping_mul(1664525).wrapping_add(1013904223);
             (state >> 16) % n
         };
-        for _ in 0..200 {
-            let mut hazards = Hazards::new(4);
-            let mut steps = Vec::new();
-            for _ in 0..12 {
-                let step: Vec<_> = (0..1 + next(2))
-                    .map(|_| Access {
-                        buffer: next(4) as usize,
-                        reads: next(2) == 0,
-                        writes: next(3) == 0,
-                    })
-                    .collect();
-                if hazards.admit(&step) {
-                    let mut without = steps.clone();
-                    without.push(Step::Op(step.clone()));
-                    assert!(unordered(&without).is_some());
-                    steps.push(Step::Barrier);
-                }
-                steps.push(Step::Op(step));
+        let mut access =
+            || Access { buffer: next(4) as usize, reads: next(2) == 0, writes: next(3) == 0 };
+        for round in 0..200 {
+            let steps: Vec<_> =
+                (0..12).map(|i| (0..1 + (round + i) % 2).map(|_| access()).collect()).collect();
+            let barriers = barriers(&steps);
+            assert_eq!(unordered(&steps, &barriers), None);
+            for i in (0..steps.len()).filter(|&i| barriers[i]) {
+                let mut without = barriers.clone();
+                without[i] = false;
+                assert!(unordered(&steps[..=i], &without[..=i]).is_some());
             }
-            assert_eq!(unordered(&steps), None);
         }
     }
 }

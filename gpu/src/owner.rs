@@ -1,10 +1,10 @@
 //! The logical device and everything created from it.
 //!
 //! Every create, allocate, record and update call of the crate goes through [`Gpu`], which counts
-//! what it creates and remembers what has to be destroyed: the census and the clean-up are complete
-//! because there is no other way to the device. All these calls take `&mut Gpu`, and only set-up has
-//! that: afterwards the executor holds the device behind a shared reference ([`Ready`]), so that code
-//! which creates something during a run does not compile.
+//! what it creates and remembers what has to be destroyed: the census and the clean-up are
+//! complete because there is no other way to the device. All these calls take `&mut Gpu`, which
+//! ends with set-up: afterwards the executor has only shared access ([`Ready`]), so that code which
+//! creates something during a run does not compile.
 
 mod create;
 

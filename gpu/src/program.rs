@@ -1,11 +1,11 @@
 //! Pipelines and descriptor sets: one pipeline per kernel, one set per kernel and buffer list.
 
 use crate::arena::Slot;
-use crate::error::failed;
 use crate::owner::Gpu;
 use crate::{GpuError, Kernel, Op, Program};
 use ash::vk;
 use std::ffi::CString;
+use std::ptr;
 
 struct Pipeline {
     kernel: &'static Kernel,
@@ -63,14 +63,14 @@ impl Pipelines {
         let set = self
             .sets
             .iter()
-            .find(|s| same(self.pipelines[s.pipeline].kernel, kernel) && s.buffers == buffers)?;
+            .find(|s| ptr::eq(self.pipelines[s.pipeline].kernel, kernel) && s.buffers == buffers)?;
         let pipeline = &self.pipelines[set.pipeline];
         Some(Bound { pipeline: pipeline.handle, layout: pipeline.layout, set: set.handle })
     }
 
     /// The kernel's pipeline, made if there is none yet.
     fn pipeline(&mut self, gpu: &mut Gpu, kernel: &'static Kernel) -> Result<usize, GpuError> {
-        let known = self.pipelines.iter().position(|p| same(p.kernel, kernel));
+        let known = self.pipelines.iter().position(|p| ptr::eq(p.kernel, kernel));
         if let Some(known) = known {
             return Ok(known);
         }
@@ -83,8 +83,7 @@ impl Pipelines {
         });
         let set_layout = gpu.set_layout(&bindings.collect::<Vec<_>>())?;
         let layout = gpu.pipeline_layout(set_layout)?;
-        let entry = CString::new(kernel.entry)
-            .map_err(|_| failed("the kernel's entry")(vk::Result::ERROR_UNKNOWN))?;
+        let entry = CString::new(kernel.name).expect("the check saw no zero");
         self.pipelines.push(Pipeline {
             kernel,
             set_layout,
@@ -93,10 +92,6 @@ impl Pipelines {
         });
         Ok(self.pipelines.len() - 1)
     }
-}
-
-fn same(a: &Kernel, b: &Kernel) -> bool {
-    (a.name, a.entry) == (b.name, b.entry)
 }
 
 fn dispatches(programs: &[Program]) -> impl Iterator<Item = (&'static Kernel, &[usize])> {

@@ -1,7 +1,7 @@
 //! Turns a program into a command buffer, with a barrier exactly where accesses conflict.
 
 use crate::arena::Slot;
-use crate::order::{Access, Hazards, Step, accesses, unordered};
+use crate::order::{Access, accesses, barriers};
 use crate::owner::Gpu;
 use crate::program::{Bound, Pipelines};
 use crate::timer::Timer;
@@ -16,7 +16,7 @@ pub(crate) struct Recorded {
     pub timer: Timer,
 }
 
-/// Records `program` and checks the result pair by pair.
+/// Records `program`.
 pub(crate) fn record(
     gpu: &mut Gpu,
     commands: vk::CommandBuffer,
@@ -25,19 +25,18 @@ pub(crate) fn record(
     pipelines: &Pipelines,
 ) -> Result<Recorded, GpuError> {
     let timer = Timer::new(gpu, program.ops.iter().map(Op::name).collect())?;
-    let steps = gpu.record(commands, |device| {
+    let steps: Vec<_> = program.ops.iter().map(accesses).collect();
+    let barriers = barriers(&steps, slots.len());
+    gpu.census.barriers += barriers.iter().filter(|&&b| b).count() as u64;
+    let read_by_host = |a: &Access| a.writes && slots[a.buffer].row.heap == Heap::Readback;
+    let to_host = steps.iter().flatten().any(read_by_host);
+    gpu.record(commands, |device| {
         let recorder = Recorder { device, commands, slots, pipelines };
-        recorder.program(program, timer.pool)
+        recorder.program(program, &barriers, timer.pool);
+        if to_host {
+            recorder.hand_to_host();
+        }
     })?;
-    let barriers = steps.iter().filter(|s| **s == Step::Barrier).count();
-    gpu.census.barriers += barriers as u64;
-    if let Some((first, second)) = unordered(&steps) {
-        return Err(GpuError::Schedule {
-            program: program.name,
-            dispatch: program.ops[second].name(),
-            what: format!("not ordered after step {first}: a defect of the recorder"),
-        });
-    }
     Ok(Recorded { name: program.name, commands, timer })
 }
 
@@ -49,36 +48,22 @@ struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    fn program(&self, program: &Program, queries: Option<vk::QueryPool>) -> Vec<Step> {
-        let mut hazards = Hazards::new(self.slots.len());
-        let mut steps = Vec::new();
+    fn program(&self, program: &Program, barriers: &[bool], queries: Option<vk::QueryPool>) {
         if let Some(pool) = queries {
             let count = program.ops.len() as u32 + 1;
             // SAFETY: recording; the pool has this many queries.
             unsafe { self.device.cmd_reset_query_pool(self.commands, pool, 0, count) };
             self.timestamp(pool, 0);
         }
-        for (i, op) in program.ops.iter().enumerate() {
-            let touched = accesses(op);
-            if hazards.admit(&touched) {
+        for (i, (op, &barrier)) in program.ops.iter().zip(barriers).enumerate() {
+            if barrier {
                 self.barrier();
-                steps.push(Step::Barrier);
             }
             self.op(op);
             if let Some(pool) = queries {
                 self.timestamp(pool, i as u32 + 1);
             }
-            steps.push(Step::Op(touched));
         }
-        if steps.iter().any(|step| self.reaches_host(step)) {
-            self.hand_to_host();
-        }
-        steps
-    }
-
-    fn reaches_host(&self, step: &Step) -> bool {
-        let readback = |a: &Access| a.writes && self.slots[a.buffer].row.heap == Heap::Readback;
-        matches!(step, Step::Op(touched) if touched.iter().any(readback))
     }
 
     fn op(&self, op: &Op) {

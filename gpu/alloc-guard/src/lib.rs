@@ -1,4 +1,4 @@
-//! Memory is allocated during set-up and never again: a global allocator that holds a program to it.
+//! Memory is allocated during set-up and never again: a global allocator that checks this.
 //!
 //! What works under this rule goes through three states, each a type:
 //!
@@ -93,8 +93,8 @@ impl<T> Sealed<T> {
     /// The only way to change the value.
     ///
     /// # Errors
-    /// That of `work`; otherwise an [`Allocation`] in this step, or by a watched thread since the step
-    /// before. The value is then as `work` left it.
+    /// That of `work`; otherwise an [`Allocation`] in this step, or by a watched thread since the
+    /// step before. The value is then as `work` left it.
     pub fn step<'a, R, E: From<Allocation>>(
         &'a mut self,
         work: impl FnOnce(&'a mut T) -> Result<R, E>,

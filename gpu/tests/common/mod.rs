@@ -23,9 +23,10 @@ struct Words { d: array<u32> }
 struct Counts { d: array<atomic<u32>> }
 ";
 
-/// A kernel of 64 invocations with the entry point `main`.
+/// A kernel of 64 invocations from a module whose entry point is `main`.
 pub fn kernel(name: &'static str, wgsl: &str, bindings: &'static [Binding]) -> &'static Kernel {
-    let module = naga::front::wgsl::parse_str(&format!("{PRELUDE}{wgsl}")).expect(name);
+    let mut module = naga::front::wgsl::parse_str(&format!("{PRELUDE}{wgsl}")).expect(name);
+    module.entry_points[0].name = name.to_string();
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
     let info = validator.validate(&module).expect(name);
     let options = spv::Options {
@@ -38,13 +39,7 @@ pub fn kernel(name: &'static str, wgsl: &str, bindings: &'static [Binding]) -> &
         ..Default::default()
     };
     let spirv = spv::write_vec(&module, &info, &options, None).expect(name);
-    Box::leak(Box::new(Kernel {
-        name,
-        entry: "main",
-        spirv: spirv.leak(),
-        workgroup: [64, 1, 1],
-        bindings,
-    }))
+    Box::leak(Box::new(Kernel { name, spirv: spirv.leak(), workgroup: [64, 1, 1], bindings }))
 }
 
 pub fn row(name: &'static str, heap: Heap, words: u64) -> Buffer {
