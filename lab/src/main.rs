@@ -1,7 +1,7 @@
 #![forbid(unsafe_code)]
 //! `raywake-lab`: one command per experiment.
 
-use clap::{ArgMatches, Args, FromArgMatches, Parser};
+use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
 use raywake_lab::{eval, matching, simulate, tracks, train};
@@ -26,47 +26,28 @@ enum Command {
     Sim(simulate::Args),
 }
 
-/// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2: a command that has arguments of its
-/// own beside a subcommand.
-enum Eval {
-    Flow(eval::Args),
+/// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2.
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct Eval {
+    #[command(flatten)]
+    flow: Option<eval::Args>,
+    #[command(subcommand)]
+    tracks: Option<Tracks>,
+}
+
+#[derive(clap::Subcommand)]
+enum Tracks {
+    /// Trajectory and shape of objects against their truth (chapter 2).
     Tracks(tracks::Args),
-}
-
-const TRACKS: &str = "tracks";
-
-impl Args for Eval {
-    fn augment_args(command: clap::Command) -> clap::Command {
-        let about = "Trajectory and shape of objects against their truth (chapter 2)";
-        let tracks = tracks::Args::augment_args(clap::Command::new(TRACKS)).about(about);
-        let command = eval::Args::augment_args(command).subcommand(tracks);
-        command.args_conflicts_with_subcommands(true).subcommand_negates_reqs(true)
-    }
-
-    fn augment_args_for_update(command: clap::Command) -> clap::Command {
-        Eval::augment_args(command)
-    }
-}
-
-impl FromArgMatches for Eval {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Eval, clap::Error> {
-        match matches.subcommand() {
-            Some((TRACKS, matches)) => tracks::Args::from_arg_matches(matches).map(Eval::Tracks),
-            _ => eval::Args::from_arg_matches(matches).map(Eval::Flow),
-        }
-    }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Eval::from_arg_matches(matches)?;
-        Ok(())
-    }
 }
 
 impl Eval {
     fn run(&self) -> Result<(), RunError> {
-        match self {
-            Eval::Flow(args) => Ok(eval::run(args)?),
-            Eval::Tracks(args) => tracks::run(args),
+        match (&self.tracks, &self.flow) {
+            (Some(Tracks::Tracks(args)), _) => tracks::run(args),
+            (None, Some(args)) => Ok(eval::run(args)?),
+            (None, None) => unreachable!("the drives are required"),
         }
     }
 }
@@ -97,9 +78,9 @@ mod tests {
     fn eval_takes_drives_or_a_chapter() {
         let parse = |line: &str| Command::try_parse_from(line.split(' '));
         let flow = parse("lab eval a/drive other --out results --jobs 2");
-        assert!(matches!(flow, Ok(Command::Eval(e)) if matches!(*e, Eval::Flow(_))));
+        assert!(matches!(flow, Ok(Command::Eval(e)) if e.flow.is_some() && e.tracks.is_none()));
         let tracks = parse("lab eval tracks --out results a/drive");
-        assert!(matches!(tracks, Ok(Command::Eval(e)) if matches!(*e, Eval::Tracks(_))));
+        assert!(matches!(tracks, Ok(Command::Eval(e)) if e.tracks.is_some()));
         for wrong in ["lab eval", "lab eval a/drive", "lab eval tracks", "lab eval --out results"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -41,15 +41,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What is evaluated, and how.
+/// How drives are evaluated.
 #[derive(clap::Args)]
 struct Inputs {
-    /// Labelled drives: simulated, KITTI or Argoverse 2
-    #[arg(required = true, value_name = "DRIVE")]
-    drives: Vec<PathBuf>,
-    /// Folder of results
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
     #[command(flatten)]
     profile: ProfileChoice,
     #[command(flatten)]
@@ -91,6 +85,12 @@ impl Inputs {
 /// `raywake-lab eval`: report.html, rows/DRIVE.parquet, drives/DRIVE.json and charts.
 #[derive(clap::Args)]
 pub struct Args {
+    /// Labelled drives: simulated, KITTI or Argoverse 2
+    #[arg(required = true, value_name = "DRIVE")]
+    drives: Vec<PathBuf>,
+    /// Folder of results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
     #[command(flatten)]
     inputs: Inputs,
     /// Drives at a time; each keeps two cores busy
@@ -107,7 +107,7 @@ pub struct Args {
 /// Evaluates, writes and prints. Drives that fail are named at the end; the others are evaluated.
 pub fn run(args: &Args) -> Result<(), Error> {
     let settings = Settings { all_columns: args.all_columns, ..args.inputs.settings()? };
-    let (names, out) = (names(&args.inputs.drives)?, &args.inputs.out);
+    let (names, out) = (names(&args.drives)?, &args.out);
     let (done, failed) = all(&names, &settings, out, args.jobs.max(1))?;
     if !done.is_empty() && !args.rows_only {
         for table in conclude(&done, &settings, out)? {

@@ -14,12 +14,18 @@ use raywake::console::interrupted;
 use raywake_core::params::Profile;
 use raywake_io::Error;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use variants::{BASE, Numbers, VARIANTS, Variant};
 
 /// `raywake-lab ablate`.
 #[derive(clap::Args)]
 pub struct Args {
+    /// Labelled drives: simulated, KITTI or Argoverse 2
+    #[arg(required = true, value_name = "DRIVE")]
+    drives: Vec<PathBuf>,
+    /// Folder of results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
     #[command(flatten)]
     inputs: Inputs,
     /// Only these variants, in the order of the table
@@ -32,13 +38,13 @@ pub struct Args {
 /// end; the others are in the table.
 pub fn run(args: &Args) -> Result<(), Error> {
     let (inputs, base) = (&args.inputs, args.inputs.settings()?);
-    let names = names(&inputs.drives)?;
+    let names = names(&args.drives)?;
     let (mut rows, mut failed) = (Vec::new(), Vec::new());
     let wanted = |v: &&Variant| args.only.is_empty() || args.only.iter().any(|n| n == v.name);
     for variant in VARIANTS.iter().filter(wanted) {
         eprintln!("{}: {}", variant.name, variant.what);
         let name = if variant.is_base(&base.profile) { BASE } else { variant.name };
-        let out = inputs.out.join(name);
+        let out = args.out.join(name);
         let row = settings(variant, &base, &inputs.learned)
             .and_then(|settings| row(variant, &settings, &names, &out));
         match row {
@@ -54,8 +60,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let why: Vec<String> = failed.iter().map(|(name, e)| format!("`{name}`: {e}")).collect();
     let table = table::table(rows, &why);
     println!("{}", table.text());
-    write(&base, &names, table, &inputs.out)?;
-    println!("report: {}", inputs.out.join("report.html").display());
+    write(&base, &names, table, &args.out)?;
+    println!("report: {}", args.out.join("report.html").display());
     failures("variants", &failed)
 }
 
