@@ -9,6 +9,7 @@ pub mod labels;
 pub mod matching;
 pub mod metrics;
 pub mod report;
+pub mod results;
 #[cfg(test)]
 mod scratch;
 pub mod simulate;

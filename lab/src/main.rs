@@ -4,7 +4,7 @@
 use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, matching, simulate, tracks, train};
+use raywake_lab::{eval, matching, results, simulate, tracks, train};
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -22,6 +22,8 @@ enum Command {
     Grade(grade::Args),
     /// Ego motion of a drive by scan matching, against the drive's own poses.
     Match(matching::Args),
+    /// Write RESULTS.md from the results of evaluations.
+    Results(results::Args),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
 }
@@ -60,6 +62,7 @@ fn main() -> ExitCode {
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => matching::run(&args),
         Command::Sim(args) => simulate::run(&args),
+        Command::Results(args) => results::run(&args).map_err(Into::into),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

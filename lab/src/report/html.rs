@@ -85,7 +85,7 @@ fn section_html(number: usize, section: &Section, numbers: &mut Numbers) -> Stri
                 let what = caption("above", "Table", numbers.tables, &table.caption);
                 let link = csv_link(&table.id, &table.csv());
                 let _ = writeln!(out, "<figure id=\"{}\">{what}{link}</figcaption>", table.id);
-                out += &table.html();
+                out += &table.shown().html();
                 for note in &table.notes {
                     out += &format!("<p class=\"note\">{}</p>\n", prose(note));
                 }

@@ -22,10 +22,12 @@ pub use chart::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
 pub use clouds::{Cloud, clouds};
-pub use table::{Cell, Row, Table};
+pub use table::{Cell, Line, Row, Shown, Table};
 
+use crate::results;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
@@ -44,6 +46,18 @@ pub struct Report {
     headlines: Vec<[String; 3]>,
     facts: Vec<[String; 2]>,
     sections: Vec<Section>,
+}
+
+/// Facts and tables of a report: `results.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Results {
+    /// Of the report.
+    pub title: String,
+    /// Names and values: command, machine, drives.
+    pub facts: Vec<[String; 2]>,
+    /// In the order of the report.
+    pub tables: Vec<Shown>,
 }
 
 /// A section of a report under way.
@@ -83,13 +97,16 @@ impl Picture {
 }
 
 impl Report {
-    /// An empty report.
+    /// A report that tells no more than this command and machine.
     pub fn new(title: &str, subtitle: &str) -> Report {
         Report {
             title: title.into(),
             subtitle: subtitle.into(),
             headlines: Vec::new(),
-            facts: Vec::new(),
+            facts: vec![
+                [results::COMMAND.into(), results::command()],
+                ["Machine".into(), results::machine()],
+            ],
             sections: Vec::new(),
         }
     }
@@ -114,9 +131,9 @@ impl Report {
         &mut self.sections[last]
     }
 
-    /// Writes `report.html`, `charts/ID.svg`, `.png` and `.csv`, `tables/ID.csv` and
-    /// `pictures/ID.png` in a folder, which is made where it is missing; each file whole or not at
-    /// all, the page last.
+    /// Writes `report.html`, `results.json`, `charts/ID.svg`, `.png` and `.csv`, `tables/ID.csv`
+    /// and `pictures/ID.png` in a folder, which is made where it is missing; each file whole or not
+    /// at all, the page last.
     ///
     /// Fails before anything is written with [`Error::Usage`] on an id that is no file name or
     /// that is given twice, a table whose rows do not fit its columns, or a picture that is no PNG;
@@ -127,7 +144,19 @@ impl Report {
         for element in self.sections.iter().flat_map(|s| &s.elements) {
             write_files(element, folder)?;
         }
+        let results = serde_json::to_string_pretty(&self.results()).expect("plain text");
+        put(folder, "results.json", (results + "\n").as_bytes())?;
         put(folder, "report.html", html::page(self).as_bytes())
+    }
+
+    /// Its facts and tables.
+    fn results(&self) -> Results {
+        let elements = self.sections.iter().flat_map(|s| &s.elements);
+        let tables = elements.filter_map(|element| match element {
+            Element::Table(table) => Some(table.shown()),
+            _ => None,
+        });
+        Results { title: self.title.clone(), facts: self.facts.clone(), tables: tables.collect() }
     }
 
     fn check(&self) -> Result<(), Error> {

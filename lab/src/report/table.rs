@@ -2,6 +2,10 @@
 
 use super::encode::{self, fixed, xml};
 use raywake_io::Error;
+use serde::{Deserialize, Serialize};
+
+/// What is shown where there is nothing to tell.
+const NOTHING: &str = "–";
 
 /// A table with a name for its file.
 #[derive(Clone, Debug)]
@@ -81,7 +85,7 @@ impl Cell {
             // Not by way of a float: counts are exact.
             Cell::Count(count) => encode::grouped(&count.to_string()),
             Cell::Number(value, decimals) => fixed(*value, *decimals),
-            Cell::Empty => "–".into(),
+            Cell::Empty => NOTHING.into(),
         }
     }
 
@@ -113,19 +117,75 @@ impl Table {
         encode::csv(&rows)
     }
 
-    /// For a screen: the caption, then columns of equal width, numbers flush right.
+    /// For a screen.
     pub fn text(&self) -> String {
-        let shown: Vec<Vec<String>> = [self.columns.clone()]
-            .into_iter()
-            .chain(self.rows.iter().map(|r| r.cells.iter().map(Cell::shown).collect()))
-            .collect();
-        let widths: Vec<usize> = (0..self.columns.len())
-            .map(|c| shown.iter().map(|r| r[c].chars().count()).max().unwrap_or(0))
-            .collect();
+        self.shown().text()
+    }
+
+    /// With every cell as the text that is shown of it.
+    pub fn shown(&self) -> Shown {
+        let row = |r: &Row| Line {
+            cells: r.cells.iter().map(Cell::shown).collect(),
+            reference: r.reference,
+        };
+        Shown {
+            id: self.id.clone(),
+            caption: self.caption.clone(),
+            columns: self.columns.clone(),
+            rows: self.rows.iter().map(row).collect(),
+            notes: self.notes.clone(),
+        }
+    }
+}
+
+/// A table whose cells are text, as it stands on a page and in `results.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shown {
+    /// As of [`Table`].
+    pub id: String,
+    /// What it tells.
+    pub caption: String,
+    /// Names of the columns with their units.
+    pub columns: Vec<String>,
+    /// As many cells each as there are columns.
+    pub rows: Vec<Line>,
+    /// Below the table.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+/// A row of text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// One for each column.
+    pub cells: Vec<String>,
+    /// Whether these are somebody else's figures, to compare with.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reference: bool,
+}
+
+impl Shown {
+    /// Whether a column, never the first, holds numbers: those are set flush right.
+    fn is_number(&self, column: usize) -> bool {
+        let number = |line: &Line| {
+            let text = line.cells[column].trim_start_matches('\u{2212}');
+            text == NOTHING || text == "inf" || text.starts_with(|c: char| c.is_ascii_digit())
+        };
+        column > 0 && !self.rows.is_empty() && self.rows.iter().all(number)
+    }
+
+    /// For a screen: the caption, then columns of equal width.
+    pub fn text(&self) -> String {
+        let lines = || [&self.columns].into_iter().chain(self.rows.iter().map(|r| &r.cells));
+        let width = |c: usize| lines().map(|r| r[c].chars().count()).max().unwrap_or(0);
+        let columns: Vec<_> =
+            (0..self.columns.len()).map(|c| (width(c), self.is_number(c))).collect();
         let mut out = format!("{}\n", self.caption);
-        for row in &shown {
-            let cells = row.iter().zip(&widths).enumerate().map(|(c, (cell, width))| {
-                if self.is_text(c) { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+        for line in lines() {
+            let cells = line.iter().zip(&columns).map(|(cell, &(width, number))| {
+                if number { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
             out += cells.collect::<Vec<_>>().join("  ").trim_end();
             out.push('\n');
@@ -133,16 +193,26 @@ impl Table {
         out
     }
 
-    /// Whether a column holds words.
-    fn is_text(&self, column: usize) -> bool {
-        let text = |r: &Row| matches!(r.cells[column], Cell::Text(_));
-        self.rows.is_empty() || self.rows.iter().any(text)
+    /// As a table of GitHub's Markdown.
+    pub fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let rule = |c| if self.is_number(c) { "--:" } else { "---" };
+        let mut out = line(self.columns.iter().map(|c| c.replace('|', "\\|")).collect());
+        out += &line((0..self.columns.len()).map(|c| rule(c).into()).collect());
+        for row in &self.rows {
+            let cell = |text: &String| match text.replace('|', "\\|") {
+                text if row.reference && text != NOTHING => format!("*{text}*"),
+                text => text,
+            };
+            out += &line(row.cells.iter().map(cell).collect());
+        }
+        out
     }
 
-    /// As `<table>`; columns of numbers are flush right.
+    /// As `<table>`.
     pub(super) fn html(&self) -> String {
         let class: Vec<&str> = (0..self.columns.len())
-            .map(|c| if self.is_text(c) { "" } else { " class=\"n\"" })
+            .map(|c| if self.is_number(c) { " class=\"n\"" } else { "" })
             .collect();
         let mut out = String::from("<div class=\"wide\"><table>\n<thead><tr>");
         for (name, class) in self.columns.iter().zip(&class) {
@@ -152,7 +222,7 @@ impl Table {
         for row in &self.rows {
             out += if row.reference { "<tr class=\"reference\">" } else { "<tr>" };
             for (cell, class) in row.cells.iter().zip(&class) {
-                out += &format!("<td{class}>{}</td>", xml(&cell.shown()));
+                out += &format!("<td{class}>{}</td>", xml(cell));
             }
             out += "</tr>\n";
         }
