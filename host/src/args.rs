@@ -20,27 +20,27 @@ pub use track::{FrontEndKind, Track};
 
 const EXIT_CODES: &str = "\
 Exit codes:
-    0  done
-    2  the command line, or a feature this build lacks
-    3  an input file is unreadable or makes no sense
+    0  success
+    2  usage error, or a feature not compiled in
+    3  an input file is missing, unreadable or invalid
     4  an output file cannot be written
-    5  the Vulkan device
-    6  over the limit of `budget --limit`
-  130  interrupted; what was finished stays";
+    5  Vulkan device error
+    6  more memory than `budget --limit` allows
+  130  interrupted; results so far are kept";
 
 /// Temporal scene flow from LIDAR sweeps and poses.
 #[derive(Debug, Parser)]
 #[command(name = "raywake", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub struct Args {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// A command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Estimate the flow of a recorded drive
+    /// Estimate the scene flow of a recorded drive
     #[command(after_help = EXIT_CODES)]
     Run(Box<Run>),
     #[allow(missing_docs)]
@@ -49,22 +49,25 @@ pub enum Command {
     #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = track::after_help(EXIT_CODES))]
     Track(Box<Track>),
-    /// Map the occupancy of every sweep over the sensor's whole range
+    /// Write an occupancy map of every sweep over the sensor's full range
     Map(Box<Map>),
-    /// Run on a small simulated drive and compare with its truth
+    /// Run on a small simulated drive and compare with ground truth
     #[cfg(feature = "demo")]
     Demo(Demo),
-    /// Print every byte a profile takes, and who writes and reads it
+    /// Print the memory layout: every buffer, its size, and who writes and reads it
     Budget(Budget),
-    /// List the Vulkan devices
+    /// List Vulkan devices
     Devices,
 }
 
 /// `raywake run`.
 #[derive(Debug, clap::Args)]
 pub struct Run {
-    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub recording: Recording,
@@ -83,67 +86,64 @@ pub struct Run {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub part: Part,
-    /// No progress and no report, errors only
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
-/// What the user says about the recording.
+/// How to read a recording.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct Recording {
-    /// Kind of recording, where the folder does not tell
+    /// Recording format [default: detected]
     #[arg(long)]
     pub format: Option<Format>,
-    /// 3x4 poses, one row per sweep
+    /// Poses, 12 numbers (a 3x4 matrix) per line, one line per sweep
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Whose motion the poses tell
+    /// Frame the poses refer to
     #[arg(long, value_name = "FRAME")]
     pub poses_frame: Option<PosesFrame>,
-    /// Whether the vehicle's motion within a sweep is still to be removed
+    /// Whether sweeps still contain motion distortion
     #[arg(long, value_name = "on|off", hide_possible_values = true)]
     #[arg(value_parser = BoolishValueParser::new())]
     pub deskew: Option<bool>,
-    /// Height of the ground in the vehicle frame, m (KITTI: -1.73)
+    /// Ground height in the vehicle frame, m (KITTI: -1.73)
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
 }
 
-/// Which profile.
+/// The profile.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Profile")]
 pub struct ProfileChoice {
-    /// A shipped profile: hdl64 (50 m, the default), wide (70.5 m) or dissertation
+    /// Built-in profile: hdl64 (window of 50 m x 50 m, the default), wide (70.5 m) or dissertation
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     pub profile: Option<String>,
-    /// A profile of one's own: `base = "hdl64"` and the fields to change
+    /// Custom profile (TOML): `base = "hdl64"` and the parameters to change
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Set one parameter of the profile, as PARAMETERS.md names it; may be given again
+    /// Set a parameter of the profile, as named in PARAMETERS.md; may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
 }
 
-/// Learned numbers.
+/// Trained weights.
 #[derive(Debug, Default, clap::Args)]
-#[command(next_help_heading = "Learned numbers")]
+#[command(next_help_heading = "Model weights")]
 pub struct Learned {
-    /// Weights of the background filter; `none`: every solid column may move
+    /// Background filter weights; `none` treats every occupied column as foreground
     #[arg(long, value_name = "FILE|none")]
     pub filter: Option<PathBuf>,
-    /// Weights of the occupancy constancy
+    /// Occupancy constancy weights
     #[arg(long, value_name = "FILE")]
     pub constancy: Option<PathBuf>,
 }
 
-/// Where the heavy half runs.
+/// What the grid and flow stages run on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum BackendKind {
-    /// The fastest Vulkan device that is not a CPU, else scalar
+    /// The fastest Vulkan GPU, or the CPU if there is none
     #[default]
     Auto,
-    /// A Vulkan device, a CPU too if there is nothing else
+    /// A Vulkan device, even if it is a CPU
     Vulkan,
     /// The CPU
     Scalar,
@@ -157,47 +157,47 @@ pub enum Validate {
     Gpu,
 }
 
-/// Which backend.
+/// The backend.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Backend")]
 pub struct BackendChoice {
-    /// Where the heavy half runs
+    /// Compute backend
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub backend: BackendKind,
-    /// Index of the device in `raywake devices`
+    /// Device index, see `raywake devices`
     #[arg(long, value_name = "N")]
     pub device: Option<usize>,
-    /// The longest a sweep may take on the device, s
+    /// GPU time limit per sweep, in seconds
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
     pub timeout: Duration,
-    /// Run under the validation layer
+    /// Run with the validation layer
     #[arg(long, hide = true)]
     pub validation: Option<Validate>,
 }
 
-/// What is written.
+/// The results.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Results {
-    /// Folder for `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
+    /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Bird's-eye pictures too, with the flow over ground or as the moving vehicle sees it
+    /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
     #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
     #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
     pub png: Option<PictureFrame>,
-    /// No files of single returns
+    /// Do not write per-point files
     #[arg(long)]
     pub no_points: bool,
-    /// Submission files: DIR/argoverse/LOG/TIMESTAMP.feather
+    /// Also write submission files: DIR/argoverse/LOG/TIMESTAMP.feather
     #[arg(long, value_name = "FORMAT", requires = "out")]
     pub export: Option<Export>,
-    /// Figures of the run as JSON; with --out they go to DIR/summary.json otherwise
+    /// Write run statistics as JSON [default with --out: DIR/summary.json]
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
 }
 
-/// Velocities a picture shows.
+/// The velocities in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PictureFrame {
     /// Over ground
@@ -206,7 +206,7 @@ pub enum PictureFrame {
     Ego,
 }
 
-/// Formats of other programs.
+/// Formats of other tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Export {
     /// Argoverse 2 scene flow
@@ -216,9 +216,12 @@ pub enum Export {
 /// `raywake map`.
 #[derive(Debug, clap::Args)]
 pub struct Map {
-    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
-    /// Folder for one map a sweep: FRAME.feather with i, j, k and log-odds of every voxel touched
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Output folder: FRAME.feather per sweep, with i, j, k and log-odds of every observed voxel
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
@@ -230,18 +233,16 @@ pub struct Map {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub part: Part,
-    /// No progress and no report, errors only
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
-/// Which sweeps.
+/// Part of a recording.
 #[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Sweeps")]
 pub struct Part {
-    /// Stop after this many sweeps
+    /// Process at most this many sweeps
     #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
     pub count: Option<usize>,
-    /// Only these sweeps, the last one excluded; `A..` and `..B` are open ends
+    /// Process only sweeps A to B (B excluded); either end may be omitted
     #[arg(long, value_name = "A..B", value_parser = Sweeps::parse)]
     pub sweeps: Option<Sweeps>,
 }
@@ -249,13 +250,13 @@ pub struct Part {
 /// `raywake demo`.
 #[derive(Debug, clap::Args)]
 pub struct Demo {
-    /// Folder for the results
+    /// Output folder
     #[arg(long, value_name = "DIR", default_value = "raywake-demo")]
     pub out: PathBuf,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub backend: BackendChoice,
-    /// Errors only
+    /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -266,10 +267,10 @@ pub struct Budget {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub profile: ProfileChoice,
-    /// Fail with exit code 6 where device and host memory together exceed this, bytes
+    /// Exit with code 6 if device and host memory together exceed this many bytes
     #[arg(long, value_name = "BYTES")]
     pub limit: Option<u64>,
-    /// Print PARAMETERS.md instead: every parameter with its unit, range, default and reason
+    /// Print PARAMETERS.md instead: every parameter with unit, range, default and rationale
     #[arg(long)]
     pub parameters: bool,
 }
@@ -297,14 +298,14 @@ impl Recording {
 }
 
 fn count(text: &str) -> Result<usize, String> {
-    let count = text.parse().map_err(|_| "no number")?;
-    if count > 0 { Ok(count) } else { Err("at least one sweep".into()) }
+    let count = text.parse().map_err(|_| "not a number")?;
+    if count > 0 { Ok(count) } else { Err("must be at least 1".into()) }
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "no number")?;
+    let seconds: f64 = text.parse().map_err(|_| "not a number")?;
     let duration = Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())?;
-    if duration.is_zero() { Err("more than 0 is needed".into()) } else { Ok(duration) }
+    if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
 }
 
 #[cfg(test)]

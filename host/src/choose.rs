@@ -45,7 +45,7 @@ pub fn wanted(choice: &BackendChoice) -> Result<Wanted, Error> {
     let device_wanted = choice.device.is_some() || choice.validation.is_some();
     let lacking = match choice.backend {
         BackendKind::Scalar if device_wanted => {
-            let what = "--device and --validation are for Vulkan, --backend scalar is not";
+            let what = "--device needs the Vulkan backend, not --backend scalar";
             return Err(Error::Usage(what.into()));
         }
         BackendKind::Scalar => return Ok(Wanted { device: None, note: None }),
@@ -54,7 +54,9 @@ pub fn wanted(choice: &BackendChoice) -> Result<Wanted, Error> {
         BackendKind::Auto => no_device(),
     };
     Ok(match lacking {
-        Some(why) => Wanted { device: None, note: Some(format!("{why}: scalar backend")) },
+        Some(why) => {
+            Wanted { device: None, note: Some(format!("{why}: using the scalar backend")) }
+        }
         None => Wanted { device: Some(options(choice)), note: None },
     })
 }
@@ -63,7 +65,7 @@ pub fn wanted(choice: &BackendChoice) -> Result<Wanted, Error> {
 fn no_device() -> Option<String> {
     match devices() {
         Ok(list) if list.iter().any(|d| usable(d) && d.kind != DeviceKind::Cpu) => None,
-        Ok(_) => Some("no Vulkan device other than a CPU".into()),
+        Ok(_) => Some("no Vulkan GPU".into()),
         Err(e) => Some(e.to_string()),
     }
 }
@@ -85,10 +87,10 @@ pub fn list_devices() -> Result<String, RunError> {
     match devices() {
         Ok(list) => Ok(table(&list)),
         Err(GpuError::NoLoader) => {
-            Ok("No Vulkan loader on this machine: runs use the scalar backend.\n".into())
+            Ok("No Vulkan loader found: the scalar backend will be used.\n".into())
         }
         Err(GpuError::NoDevice) => {
-            Ok("No Vulkan device on this machine: runs use the scalar backend.\n".into())
+            Ok("No Vulkan device found: the scalar backend will be used.\n".into())
         }
         Err(e) => Err(RunError::Device(e)),
     }
@@ -96,7 +98,7 @@ pub fn list_devices() -> Result<String, RunError> {
 
 fn table(list: &[DeviceInfo]) -> String {
     if list.is_empty() {
-        return "No Vulkan device on this machine: runs use the scalar backend.\n".into();
+        return "No Vulkan device found: the scalar backend will be used.\n".into();
     }
     let head = ["index", "name", "kind", "Vulkan", "driver", "usable"].map(String::from);
     let rows: Vec<[String; 6]> = std::iter::once(head).chain(list.iter().map(row)).collect();
@@ -112,7 +114,7 @@ fn table(list: &[DeviceInfo]) -> String {
 fn row(d: &DeviceInfo) -> [String; 6] {
     let missing = match usable(d) {
         true => "yes".to_string(),
-        false => format!("no: lacks {}", d.missing.join(", ")),
+        false => format!("no: missing {}", d.missing.join(", ")),
     };
     let kind = match d.kind {
         DeviceKind::Discrete => "discrete GPU",

@@ -126,7 +126,7 @@ fn read(path: &Path) -> Result<String, Error> {
     let bytes = fs::read(path).map_err(Error::reading(path))?;
     String::from_utf8(bytes).map_err(|e| {
         let place = format!("byte {}", e.utf8_error().valid_up_to());
-        Error::input(path, place, "is no text")
+        Error::input(path, place, "is not UTF-8 text")
     })
 }
 

@@ -17,7 +17,7 @@ pub enum RunError {
     #[error("a defect of this program: {0}")]
     Allocation(#[from] Allocation),
     /// More memory than the user allows.
-    #[error("{bytes} bytes are needed, the limit is {limit}")]
+    #[error("{bytes} bytes needed, over the limit of {limit}")]
     OverBudget {
         /// What is needed, bytes.
         bytes: u64,
@@ -43,7 +43,7 @@ impl RunError {
 fn device(e: &GpuError) -> String {
     match e {
         GpuError::NoLoader | GpuError::NoDevice => {
-            format!("{e}: see `raywake devices`, or give --backend scalar")
+            format!("{e}: see `raywake devices`, or use --backend scalar")
         }
         e => format!("device: {e}"),
     }

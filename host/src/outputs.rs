@@ -72,9 +72,9 @@ impl Kinds {
             (self.png.is_some(), cfg!(feature = "png"), "png"),
         ];
         match needs.iter().find(|(wanted, there, _)| *wanted && !there) {
-            Some((_, _, name)) => {
-                Err(Error::Unsupported(format!("this build lacks the feature `{name}` for --out")))
-            }
+            Some((_, _, name)) => Err(Error::Unsupported(format!(
+                "--out needs the feature `{name}`, which is not compiled in"
+            ))),
             None => Ok(()),
         }
     }

@@ -16,7 +16,7 @@ pub fn text(s: &Summary) -> String {
 
 fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
     let end = if s.interrupted { ", INTERRUPTED" } else { "" };
-    writeln!(out, "\n{} sweeps, {} with a pair{end}", s.sweeps, s.pairs)?;
+    writeln!(out, "\n{} sweeps, {} pairs{end}", s.sweeps, s.pairs)?;
     times(out, s)?;
     amounts(out, s)?;
     tracklets(out, s)?;
@@ -37,7 +37,7 @@ fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
 
 fn times(out: &mut String, s: &Summary) -> std::fmt::Result {
     let Some(total) = &s.total_ms else {
-        return writeln!(out, "no pair of sweeps, no flow, no times");
+        return writeln!(out, "no pair of consecutive sweeps: no flow, no times");
     };
     let names = s.stage_ms.0.iter().map(|(name, _)| name.len());
     let width = names.max().unwrap_or(0).max(5);
@@ -52,16 +52,16 @@ fn times(out: &mut String, s: &Summary) -> std::fmt::Result {
     let share = 100.0 * s.share_under_100_ms.unwrap_or(0.0);
     writeln!(
         out,
-        "{share:.1} % of the pairs in less than 100 ms, at {:.0} solid and {:.0} foreground columns",
+        "{share:.1} % of the pairs in under 100 ms, with {:.0} occupied and {:.0} foreground columns",
         s.solid_columns, s.foreground_columns
     )?;
-    writeln!(out, "files besides: {:.1} ms reading, {:.1} ms writing", s.read_ms, s.write_ms)
+    writeln!(out, "file I/O per sweep: {:.1} ms read, {:.1} ms write", s.read_ms, s.write_ms)
 }
 
 fn amounts(out: &mut String, s: &Summary) -> std::fmt::Result {
     writeln!(
         out,
-        "\nmean       {:.0} returns, {:.0} distinct rays, {:.0} solid columns, {:.0} foreground, \
+        "\nper sweep  {:.0} returns, {:.0} distinct rays, {:.0} occupied columns, {:.0} foreground, \
          {:.0} valid flows",
         s.points, s.distinct_rays, s.solid_columns, s.foreground_columns, s.valid_flows_per_sweep
     )
@@ -78,13 +78,13 @@ fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
     let t = &s.tracklet_turnover;
     writeln!(
         out,
-        "           {} born, {} updates, {} waits; ended: {} unobserved, {} by the gate, {} merged, {} out of the window",
+        "           {} born, {} updated, {} coasting; lost {}, gated out {}, merged {}, left the window {}",
         t.born, t.updated, t.waiting, t.lost, t.gated, t.merged, t.left
     )
 }
 
 fn left_out(out: &mut String, s: &Summary) -> std::fmt::Result {
-    writeln!(out, "left out   {}", s.dropped)?;
+    writeln!(out, "dropped    {}", s.dropped)?;
     for (n, reset) in s.resets.iter().enumerate() {
         let label = if n == 0 { "resets" } else { "" };
         writeln!(out, "{label:10} sweep {} (frame {}): {}", reset.sweep, reset.frame, reset.text)?;

@@ -44,7 +44,7 @@ impl ResetAt {
 pub fn in_words(reset: Reset) -> (&'static str, String) {
     match reset {
         Reset::First => ("first", "first sweep".to_string()),
-        Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the sweep before")),
+        Reset::Backwards(dt) => ("backwards", format!("{dt:.3} s after the previous sweep")),
         Reset::Gap(dt) => ("gap", format!("gap of {dt:.3} s")),
         Reset::Jump(mps) => ("jump", format!("poses jump at {mps:.0} m/s")),
         Reset::Spin(radps) => ("spin", format!("poses turn at {radps:.1} rad/s")),
@@ -71,9 +71,9 @@ impl Dropped {
     pub fn counts(&self) -> impl Iterator<Item = (&'static str, &'static str, u64)> {
         self.returns.counts().into_iter().chain([
             ("null_rows", "null rows", self.null_rows),
-            ("missing_sweeps", "sweeps missing", self.missing_sweeps),
-            ("foreground", "foreground columns over the capacity", self.foreground),
-            ("unrefined", "returns the refinement had no room for", self.unrefined),
+            ("missing_sweeps", "missing sweeps", self.missing_sweeps),
+            ("foreground", "foreground columns over capacity", self.foreground),
+            ("unrefined", "returns over the refinement's capacity", self.unrefined),
         ])
     }
 }
@@ -88,7 +88,7 @@ impl fmt::Display for Dropped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let some = self.counts().filter(|c| c.2 > 0).map(|(_, what, n)| format!("{n} {what}"));
         let some = some.collect::<Vec<_>>().join(", ");
-        f.write_str(if some.is_empty() { "nothing" } else { &some })
+        f.write_str(if some.is_empty() { "none" } else { &some })
     }
 }
 

@@ -32,7 +32,7 @@ fn figures_and_files() {
     let first = run(&t, &more);
     first.succeeded();
     assert!(first.stdout.contains("memory budget") && first.stdout.contains("100 ms per sweep"));
-    for text in ["ray_trace", "median", "tracklets", "left out", "digest"] {
+    for text in ["ray_trace", "median", "tracklets", "dropped", "digest"] {
         assert!(first.stdout.contains(text), "{text} in {}", first.stdout);
     }
     for folder in ["columns", "points", "png"] {
@@ -229,7 +229,7 @@ fn absurd_files_are_refused() {
     let cloud = t.path().join("drive/velodyne_points/data/0000000001.bin");
     std::fs::File::create(&cloud).unwrap().set_len(1 << 40).unwrap();
     let o = run(&t, &[]);
-    o.failed(3, &["0000000001.bin", "bytes are more than any sweep has"]);
+    o.failed(3, &["0000000001.bin", "bytes are too many for a sweep"]);
 }
 
 #[test]
@@ -276,7 +276,7 @@ fn budgets() {
     one.succeeded();
     assert!(one.stdout.contains("`ray") && !one.stdout.contains("dissertation"));
     let over = raywake(&["budget", "--limit", "1"]);
-    over.failed(6, &["the limit is 1"]);
+    over.failed(6, &["the limit of 1"]);
     assert!(over.stdout.contains("## Totals"));
 }
 

@@ -99,8 +99,7 @@ fn a_vehicle_that_moves_and_a_car_that_comes() {
     let out = t.path().join("flow.bin");
     let o = flow(&a, &b, &out, &[]);
     o.succeeded();
-    for word in ["ground     at -1.7", "% of the flat patches", "points: ", "times", "3 not finite"]
-    {
+    for word in ["ground     at -1.7", "overlap", "points: ", "times", "3 not finite"] {
         assert!(o.stdout.contains(word), "{word} in {}", o.stdout);
     }
     let (truth, found) = (ego_motion(), printed(&o));
@@ -198,19 +197,19 @@ fn clouds_that_tell_nothing() {
         assert!(!out.exists());
     };
     let empty = t.write("empty.bin", []);
-    refused(&empty, &good, &["empty.bin: 0 returns"]);
-    refused(&good, &empty, &["empty.bin: 0 returns"]);
+    refused(&empty, &good, &["empty.bin: none of its 0 points"]);
+    refused(&good, &empty, &["empty.bin: none of its 0 points"]);
     let nan = t.write("nan.ply", ply(&[[f32::NAN; 3]; 5]));
-    refused(&good, &nan, &["nan.ply: 5 returns, none with finite coordinates"]);
+    refused(&good, &nan, &["nan.ply: none of its 5 points has finite coordinates"]);
     refused(&nan, &good, &["nan.ply"]);
     let one = t.write("one.ply", ply(&[[5.0, 1.0, -1.7]]));
     refused(&one, &good, &["one.ply", "no ground", "--ground"]);
-    refused(&good, &one, &["one.ply", "too few flat patches", "--pose"]);
-    flow(&one, &one, &out, &["--ground", "-1.7"]).failed(3, &["too few flat patches"]);
+    refused(&good, &one, &["one.ply", "too few planar patches", "--pose"]);
+    flow(&one, &one, &out, &["--ground", "-1.7"]).failed(3, &["too few planar patches"]);
     // Another place.
     let other = Drive::new(78, Options { sweeps: 1, ..Options::default() }).sweep(0);
     let other = t.write("other.bin", bin(&positions(&other)));
-    refused(&good, &other, &["other.bin", "cannot be laid", "% of the flat patches"]);
+    refused(&good, &other, &["other.bin", "cannot be registered", "overlap"]);
     // A floor and nothing on it.
     let floor: Vec<[f32; 3]> = (0..40_000)
         .map(|n| [(n % 200) as f32 * 0.2 - 20.0, (n / 200) as f32 * 0.2 - 20.0, -1.7])
@@ -218,7 +217,11 @@ fn clouds_that_tell_nothing() {
     let floor = t.write("floor.bin", bin(&floor));
     let o = flow(&floor, &floor, &out, &[]);
     o.succeeded();
-    assert!(o.stdout.contains("note: the clouds leave 3 of 6 motions open"), "{}", o.stdout);
+    assert!(
+        o.stdout.contains("note: 3 of 6 degrees of freedom are not observable"),
+        "{}",
+        o.stdout
+    );
 }
 
 fn ply(cloud: &[[f32; 3]]) -> Vec<u8> {
@@ -240,7 +243,7 @@ fn files_that_are_none() {
     let good = t.write("good.bin", &cloud);
     let out = t.path().join("flow.bin");
     flow(&good, &t.path().join("absent.bin"), &out, &[]).failed(3, &["absent.bin"]);
-    flow(t.path(), &good, &out, &[]).failed(3, &["no cloud by its name"]);
+    flow(t.path(), &good, &out, &[]).failed(3, &["unknown extension"]);
     let las = t.write("cloud.las", &cloud);
     flow(&las, &good, &out, &[]).failed(3, &["cloud.las", ".feather"]);
     let cut = t.write("cut.bin", &cloud[..1001]);

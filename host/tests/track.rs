@@ -52,7 +52,7 @@ fn figures_and_files() {
         let more = ["--front-end", kind, "--fixed-lag", "--out", out.to_str().unwrap()];
         let o = track(&t, &more);
         o.succeeded();
-        for text in ["memory budget", "updates", "left out", "digest"] {
+        for text in ["memory budget", "updates", "dropped", "digest"] {
             assert!(o.stdout.contains(text), "{text} in {}", o.stdout);
         }
         let s = o.summary(&out.join("summary.json"));

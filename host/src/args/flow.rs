@@ -8,50 +8,53 @@ use raywake_core::params::POINTS_MAX;
 use super::{BackendChoice, Learned, ProfileChoice, seconds};
 
 const ABOUT: &str = "\
-Flow of every point of cloud A until cloud B, without poses
+Scene flow from cloud A to cloud B; no poses needed
 
-The motion between the clouds is found by registration, then the clouds go through the pipeline as \
-two sweeps of a drive. The clouds are files as a spinning sensor makes them, upright (z up) and in \
-the frame of their sensor or vehicle: .bin (float32 x, y, z, intensity), .pcd, .ply or .feather \
-(columns x, y, z), each of its own kind. Times of single returns are not looked at.";
+The motion of the sensor is estimated by registration, then both clouds are processed as two sweeps \
+of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or the \
+vehicle: .bin (float32 x, y, z, intensity), .pcd, .ply or .feather (columns x, y, z); A and B may \
+differ in format. Times of individual returns are ignored.";
 
 const FILES: &str = "\
-Columns of --out FILE.feather, a row per point of A in its order, points without a place too:
+Columns of --out FILE.feather, one row per point of A in file order, including invalid points:
     x_m y_m z_m                      the point
-    flow_x_m flow_y_m flow_z_m       where it is in B's frame less where it was in A's
-    motion_x_m motion_y_m motion_z_m over ground, the sensor's own motion removed, along A's axes
-    cov_dx_dx cov_dx_dy cov_dy_dy    covariance of the motion, m^2; 0 where nothing was matched
-    foreground                       not explained by the sensor's own motion
-    valid                            matched, or part of a thing that moves
-Flow and motion are NaN where a coordinate is. FILE.bin holds flow and motion alone, 6 little-endian
-float32 a row. The file's metadata has dt_s, ground_m and a_from_b, the motion found (3x4 numbers,
-row by row: the pose of B's frame in A's).
-Points outside the profile's window, and those of A after its first";
+    flow_x_m flow_y_m flow_z_m       its position in B's frame minus its position in A's frame
+    motion_x_m motion_y_m motion_z_m motion over ground (ego motion removed), along A's axes
+    cov_dx_dx cov_dx_dy cov_dy_dy    covariance of the motion, m^2; 0 where unmatched
+    foreground                       may move: not rejected by the background filter
+    valid                            matched, or part of a moving cluster
+Flow and motion are NaN where a coordinate is. FILE.bin has flow and motion only: 6 little-endian
+float32 per row. The metadata of the feather file has dt_s, ground_m and a_from_b, the estimated
+motion (a row-major 3x4 matrix: the pose of B's frame in A's).
+Points outside the profile's window, and points of A after the first";
 
 /// `raywake flow`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct Flow {
-    /// The cloud whose flow is wanted
+    /// First cloud; its points get the flow
     #[arg(value_name = "A")]
     pub first: PathBuf,
-    /// The cloud after it
+    /// Second cloud
     #[arg(value_name = "B")]
     pub second: PathBuf,
-    /// File of the flow: .feather or .bin
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Output file: .feather or .bin
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub out: PathBuf,
     /// Time from A to B, s
     #[arg(long, value_name = "SECONDS", default_value = "0.1", value_parser = seconds)]
     pub dt: Duration,
-    /// Height of the ground in A's frame, m; found in A where not given
+    /// Ground height in A's frame, m [default: estimated from A]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
-    /// Place of the sensor in the clouds' frame, m; else their origin, or 1.73 m above the ground
-    /// where the ground is found at the origin
+    /// Sensor position in the clouds' frame, m [default: the origin, or 1.73 m above the ground if
+    /// the origin is at ground level]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = place)]
     pub sensor: Option<[f64; 3]>,
-    /// The motion, where it is known: 3x4 numbers, the pose of B's frame in A's
+    /// Known motion instead of registration: a 3x4 matrix, the pose of B's frame in A's
     #[arg(long, value_name = "FILE")]
     pub pose: Option<PathBuf>,
     #[command(flatten)]
@@ -63,14 +66,11 @@ pub struct Flow {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub backend: BackendChoice,
-    /// No report, errors only
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
-/// What `--help` ends with.
+/// The end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
-    format!("{FILES} {POINTS_MAX}, count as standing still.\n\n{exit_codes}")
+    format!("{FILES} {POINTS_MAX}, are reported as static.\n\n{exit_codes}")
 }
 
 /// Three finite numbers with commas between them.
@@ -79,7 +79,7 @@ fn place(text: &str) -> Result<[f64; 3], String> {
     let place = numbers.ok().and_then(|n| <[f64; 3]>::try_from(n).ok());
     place
         .filter(|p| p.iter().all(|v| v.is_finite()))
-        .ok_or_else(|| "write X,Y,Z, for example 0,0,1.73".into())
+        .ok_or_else(|| "expected X,Y,Z, for example 0,0,1.73".into())
 }
 
 #[cfg(test)]

@@ -16,12 +16,12 @@ pub struct Sweeps {
 impl Sweeps {
     /// From `A..B`, `A..`, `..B` or `..`.
     pub(super) fn parse(text: &str) -> Result<Sweeps, String> {
-        let (from, to) = text.split_once("..").ok_or("write A..B, for example 10..20")?;
-        let index = |s: &str| s.parse::<usize>().map_err(|_| format!("`{s}` is no sweep's index"));
+        let (from, to) = text.split_once("..").ok_or("expected A..B, for example 10..20")?;
+        let index = |s: &str| s.parse::<usize>().map_err(|_| format!("`{s}` is not a sweep index"));
         let from = if from.is_empty() { 0 } else { index(from)? };
         let to = if to.is_empty() { None } else { Some(index(to)?) };
         if to.is_some_and(|to| to <= from) {
-            return Err(format!("{text} holds no sweep"));
+            return Err(format!("{text} is an empty range"));
         }
         Ok(Sweeps { from, to })
     }
@@ -34,7 +34,7 @@ impl Sweeps {
         }
         let end = self.to.map_or(String::new(), |to| to.to_string());
         let what =
-            format!("--sweeps {}..{end}: the recording has {len} sweeps, 0..{len}", self.from);
+            format!("--sweeps {}..{end}: the recording has {len} sweeps (0..{len})", self.from);
         Err(Error::Usage(what))
     }
 }

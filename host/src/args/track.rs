@@ -7,42 +7,46 @@ use clap::ValueEnum;
 use super::{BackendChoice, Learned, Part, ProfileChoice, Recording};
 
 const ABOUT: &str = "\
-Follow the objects of a recorded drive, trajectory and shape
+Track the objects of a recorded drive: trajectory and shape
 
-Returns of objects are segmented and associated from sweep to sweep; each track has a filter of its \
-segments' centroids, and at its end an estimate of trajectory and shape together, with every return \
+Returns of objects are segmented and associated from sweep to sweep. Each track is filtered by its \
+centroids (EKF); when it ends, trajectory and shape are estimated jointly from all its returns, each \
 at its own time.";
 
 const FILES: &str = "\
 Files of --out DIR:
-    tracks.feather   a row per track and update: track, time_s, and as the estimate at the track's
-                     end has it, the filter (ekf_) and the estimate of the sweep (lag_; NaN without
-                     --fixed-lag): x_m y_m z_m (world), heading_rad (unwrapped), speed_mps,
-                     climb_mps, turn_rate_radps; lag_time_s, as that of the sweep is for its end
-    clouds/ID.ply    returns of a track in the object's frame at their own times: x y z (m), time (s
-                     after the track's start)
-    summary.json     the figures of the report";
+    tracks.feather   one row per track and update: track, time_s, and x_m y_m z_m (world),
+                     heading_rad (unwrapped), speed_mps, climb_mps, turn_rate_radps three times:
+                     by the estimate at the end of the track, by the EKF (ekf_), and by the
+                     fixed-lag estimate (lag_; NaN without --fixed-lag), which refers to
+                     lag_time_s, the end of the sweep
+    clouds/ID.ply    returns of a track in the object's frame: x y z (m), time (s since the start
+                     of the track)
+    summary.json     statistics of the run";
 
 /// `raywake track`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct Track {
-    /// Folder of the recording: a KITTI drive, an Argoverse 2 log or a folder of clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
-    /// What tells objects from the rest and from each other
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Detection and association method
     #[arg(long, value_enum, value_name = "KIND", default_value = "variance")]
     pub front_end: FrontEndKind,
-    /// Heights of the ground in the frame of the poses, an ESRI ASCII grid; found in the returns where
-    /// it has none
+    /// Ground heights in the frame of the poses, an ESRI ASCII grid; where it has no data they are
+    /// estimated from the returns
     #[arg(long, value_name = "FILE")]
     pub ground_map: Option<PathBuf>,
-    /// Estimate with every sweep too, from the last seconds alone
+    /// Also estimate with every sweep, from a sliding window
     #[arg(long)]
     pub fixed_lag: bool,
-    /// Folder for `tracks.feather`, `clouds` and `summary.json`
+    /// Output folder: `tracks.feather`, `clouds` and `summary.json`
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     pub out: Option<PathBuf>,
-    /// Figures as JSON; with --out they go to DIR/summary.json otherwise
+    /// Write run statistics as JSON [default with --out: DIR/summary.json]
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub summary: Option<PathBuf>,
     #[command(flatten)]
@@ -60,21 +64,18 @@ pub struct Track {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub part: Part,
-    /// No progress and no report, errors only
-    #[arg(short, long)]
-    pub quiet: bool,
 }
 
-/// What segments and associates.
+/// Detection and association.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FrontEndKind {
-    /// Height and its variance in cells on the ground, positions alone
+    /// Height variance in cells of a ground grid; association by position
     Variance,
-    /// The scene flow too: what moves is an object, and velocities join the association
+    /// Scene flow as well: moving points are objects; association by position and velocity
     Flow,
 }
 
-/// What `--help` ends with.
+/// The end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
     format!("{FILES}\n\n{exit_codes}")
 }

@@ -1,4 +1,4 @@
-//! `raywake flow`: flow between two clouds alone.
+//! `raywake flow`: scene flow between two clouds, without poses.
 //!
 //! The second cloud is registered with the first, then both go through the pipeline as the two
 //! sweeps of a drive whose world is the first cloud's frame.
@@ -58,7 +58,7 @@ pub fn flow(args: &args::Flow) -> Result<(), RunError> {
     say(&text)?;
     laps.lap("registration");
 
-    let (flows, left_out) = points(args, &profile, &weights, &rig, [&first, &second])?;
+    let (flows, dropped) = points(args, &profile, &weights, &rig, [&first, &second])?;
     let second_from_first = motion.inverse();
     let rows: Vec<Row> = first
         .points
@@ -66,7 +66,7 @@ pub fn flow(args: &args::Flow) -> Result<(), RunError> {
         .zip(&flows)
         .map(|(point, flow)| Row::new(point, flow, &second_from_first, dt_s))
         .collect();
-    say(&census(&rows, dt_s, &left_out))?;
+    say(&census(&rows, dt_s, &dropped))?;
     laps.lap("flow");
 
     let meta = [
@@ -88,7 +88,7 @@ fn cloud(path: &Path, stamp_s: f64) -> Result<SweepData, Error> {
     match sweep.points.iter().any(|p| there(&p.position)) {
         true => Ok(sweep),
         false => {
-            let what = format!("{} returns, none with finite coordinates", sweep.points.len());
+            let what = format!("none of its {} points has finite coordinates", sweep.points.len());
             Err(Error::input(path, "", what))
         }
     }
@@ -98,21 +98,21 @@ fn cloud(path: &Path, stamp_s: f64) -> Result<SweepData, Error> {
 fn rig(args: &args::Flow, first: &SweepData) -> Result<(Rig, String), Error> {
     let (ground_m, how) = match args.ground {
         Some(given) if given.is_finite() => (given, "given"),
-        Some(_) => return Err(Error::Usage("the height of the ground is not finite".into())),
+        Some(_) => return Err(Error::Usage("--ground must be finite".into())),
         None => {
             let found = ground_height(&first.points).ok_or_else(|| {
-                let what = "no ground is found in it: give its height with --ground";
+                let what = "no ground found in this cloud: give its height with --ground";
                 Error::input(&args.first, "", what)
             })?;
-            (found, "found")
+            (found, "estimated")
         }
     };
     let (place, why) = match args.sensor {
         Some(place) => (DVec3::from_array(place), "given"),
-        None if ground_m < -MOUNTED_MIN_M => (DVec3::ZERO, "taken to be the clouds' origin"),
+        None if ground_m < -MOUNTED_MIN_M => (DVec3::ZERO, "assumed at the origin of the clouds"),
         None => {
             let height = ground_m + ANCHOR_ABOVE_GROUND_M;
-            (DVec3::new(0.0, 0.0, height), "assumed, as the origin is too near to the ground")
+            (DVec3::new(0.0, 0.0, height), "assumed, as the origin is too close to the ground")
         }
     };
     let rig = Rig {
@@ -158,12 +158,12 @@ fn points(
 }
 
 /// A line on what was found.
-fn census(rows: &[Row], dt_s: f64, left_out: &Dropped) -> String {
+fn census(rows: &[Row], dt_s: f64, dropped: &Dropped) -> String {
     let count = |of: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| of(row)).count();
     let moving = |row: &Row| f64::from(row.motion[0].hypot(row.motion[1])) >= MOVING_MPS * dt_s;
     format!(
-        "flow       {} points: {} foreground, {} of them matched, {} moving over ground at \
-         {MOVING_MPS} m/s or more\nleft out   {left_out}\n",
+        "flow       {} points: {} foreground, {} of them matched, {} moving at {MOVING_MPS} m/s or \
+         more\ndropped    {dropped}\n",
         rows.len(),
         count(&|row| row.origin != Origin::Background),
         count(&Row::valid),

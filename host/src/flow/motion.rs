@@ -39,21 +39,20 @@ fn surface(points: &[Point], rig: &Rig) -> Vec<OrientedPoint> {
 fn refusal(best: &Registration) -> String {
     let share = 100.0 * best.overlap;
     let why = match best {
-        r if r.iterations == 0 => "too few flat patches are within 3 m of each other".into(),
+        r if r.iterations == 0 => "too few planar patches are within 3 m of each other".into(),
         r if r.overlap < OVERLAP_MIN => {
-            format!("at most {share:.0} % of the flat patches lie on each other")
+            format!("the clouds overlap by {share:.0} % at most")
         }
-        r => format!("no place is settled on in {} steps", r.iterations),
+        r => format!("no convergence in {} iterations", r.iterations),
     };
     format!(
-        "cannot be laid onto the first cloud: {why}; give the motion with --pose if it is known"
+        "cannot be registered to the first cloud: {why}; if the motion is known, give it with --pose"
     )
 }
 
 fn report(r: &Registration) -> String {
     let mut text = format!(
-        "motion     {}\n           {:.0} % of the flat patches lie on each other, {} of them {:.1} cm \
-         rms apart; {} steps\n",
+        "motion     {}\n           overlap {:.0} %, {} inliers, rms {:.1} cm, {} iterations\n",
         describe(&r.pose),
         100.0 * r.overlap,
         r.inliers,
@@ -62,7 +61,7 @@ fn report(r: &Registration) -> String {
     );
     if r.unobserved > 0 {
         text += &format!(
-            "note: the clouds leave {} of 6 motions open, of which none is taken to have happened\n",
+            "note: {} of 6 degrees of freedom are not observable; no motion is assumed in these\n",
             r.unobserved
         );
     }

@@ -45,7 +45,7 @@ impl Row {
         }
     }
 
-    /// Matched, or part of a thing that moves.
+    /// Matched, or part of a moving cluster.
     pub fn valid(&self) -> bool {
         self.origin >= Origin::Matched
     }
@@ -67,10 +67,10 @@ impl Form {
         match path.extension().and_then(|e| e.to_str()) {
             Some("feather") if cfg!(feature = "arrow") => Ok(Form::Feather),
             Some("feather") => Err(Error::Unsupported(unable(
-                "this build lacks the feature `arrow` to write feather files; name a .bin",
+                "the feature `arrow` for feather files is not compiled in; use .bin",
             ))),
             Some("bin") => Ok(Form::Bin),
-            _ => Err(Error::Usage(unable("the name ends neither in .feather nor in .bin"))),
+            _ => Err(Error::Usage(unable("the extension must be .feather or .bin"))),
         }
     }
 

@@ -113,8 +113,8 @@ NODATA_value -9999
             ("cellsize 2", "cellsize -2", "above 0"),
             ("ncols 3", "ncols 4", "line 7: 4 heights expected, 3 found"),
             ("nrows 2", "nrows 3", "3 rows"),
-            ("nrows 2", "nrows two", "line 2: `two` is no number"),
-            ("1 nan 3", "1 x 3", "line 8: `x` is no number"),
+            ("nrows 2", "nrows two", "line 2: `two` is not a number"),
+            ("1 nan 3", "1 x 3", "line 8: `x` is not a number"),
         ];
         for (from, to, what) in wrong {
             let e = parse(Path::new("g.asc"), &GRID.replace(from, to)).unwrap_err().to_string();

@@ -220,7 +220,7 @@ impl Summary {
         let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
         writeln!(
             out,
-            "\n{} sweeps, {} tracks, {brief} too brief to count{end}",
+            "\n{} sweeps, {} tracks ({brief} shorter ones omitted){end}",
             self.sweeps,
             self.tracks.len()
         )?;
@@ -237,17 +237,17 @@ impl Summary {
         let t = &self.tally;
         writeln!(
             out,
-            "segments   {} that may be objects, {} too small, {} too large",
+            "segments   {} candidates, {} too small, {} too large",
             t.segments, t.too_small, t.too_large
         )?;
         writeln!(
             out,
-            "tracks     {} begun, {} updates, {} waits, {} ended by time that ran backwards",
+            "tracks     {} born, {} updated, {} coasting, {} ended because time went backwards",
             t.born, t.updated, t.waiting, t.reset
         )?;
         writeln!(
             out,
-            "left out   {}; over a capacity: {} returns of objects, {} segments, {} tracks",
+            "dropped    {}; over capacity: {} object returns, {} segments, {} tracks",
             self.dropped, t.unchunked, t.unlisted, t.unborn
         )?;
         writeln!(out, "digest     {}", self.digest)
@@ -257,7 +257,7 @@ impl Summary {
     fn longest(&self, out: &mut String) -> std::fmt::Result {
         let mut lines: Vec<&Line> = self.tracks.iter().collect();
         lines.sort_by_key(|l| (u32::MAX - l.updates, l.track));
-        let head = ["track", "from s", "for s", "updates", "returns", "moved m", "m/s", "off m"];
+        let head = ["track", "start s", "s", "updates", "returns", "dist m", "m/s", "resid m"];
         writeln!(out, "\n{}", head.map(|h| format!("{h:>8}")).join(""))?;
         for l in lines.iter().take(LISTED) {
             writeln!(

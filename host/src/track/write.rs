@@ -40,7 +40,7 @@ impl Files {
     pub fn create(root: Option<&Path>) -> Result<Files, Error> {
         if let Some(root) = root {
             if !cfg!(feature = "arrow") {
-                let what = "this build lacks the feature `arrow` for --out";
+                let what = "--out needs the feature `arrow`, which is not compiled in";
                 return Err(Error::Unsupported(what.into()));
             }
             atomic::create_folder(&root.join("clouds"))?;

@@ -153,7 +153,7 @@ mod tests {
             annotations(&path).unwrap_err().to_string()
         };
         assert!(refused(&whole[..whole.len() / 2]).contains("annotations.feather: truncated"));
-        assert!(refused(&[]).contains("annotations.feather: is no feather file"));
+        assert!(refused(&[]).contains("annotations.feather: is not a feather file"));
         let path = write(&t, "annotations.feather", vec![("qw", floats([1.0; 2]))]);
         let e = annotations(&path).unwrap_err().to_string();
         assert!(e.ends_with("annotations.feather: has no column `timestamp_ns`"), "{e}");

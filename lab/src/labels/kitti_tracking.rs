@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, calib: &Path) -> Result<Labels, Error> {
             continue;
         }
         let bad = |n: usize| {
-            let what = format!("field {}: `{}` is no number", n + 1, fields[n]);
+            let what = format!("field {}: `{}` is not a number", n + 1, fields[n]);
             Error::input(path, format!("line {line}"), what)
         };
         let frame = fields[0].parse().map_err(|_| bad(0))?;
@@ -131,8 +131,10 @@ mod tests {
         let refused = |text: &str| labels(&t, text).unwrap_err().to_string();
         assert!(refused("0 7 Van 0 0\n").ends_with("0000.txt, line 1: 5 fields, 17 expected"));
         let line = "0 7 Van 0 0 -1.8 1 2 3 4 2.0 1.8 4.4 -4.9 1.7 13.3 0";
-        assert!(refused(&line.replace("4.4", "x")).contains("line 1: field 13: `x` is no number"));
-        assert!(refused(&line.replace("0 7", "-1 7")).contains("field 1: `-1` is no number"));
+        assert!(
+            refused(&line.replace("4.4", "x")).contains("line 1: field 13: `x` is not a number")
+        );
+        assert!(refused(&line.replace("0 7", "-1 7")).contains("field 1: `-1` is not a number"));
         let notes = |text: &str| labels(&t, text).unwrap().notes.join("; ");
         assert!(notes(&line.replace("13.3", "nan")).contains("a NaN or infinite"));
         assert!(notes(&line.replace("4.4", "-1")).contains("no length"));

@@ -77,7 +77,7 @@ impl<'a> File<'a> {
 
     fn number<T: std::str::FromStr>(&self, node: Node<'a, 'a>, name: &str) -> Result<T, Error> {
         let text = self.text(node, name)?;
-        text.parse().map_err(|_| self.error(node, format!("<{name}>: `{text}` is no number")))
+        text.parse().map_err(|_| self.error(node, format!("<{name}>: `{text}` is not a number")))
     }
 
     /// The items of a list, as many as its `count` says.
@@ -150,12 +150,12 @@ mod tests {
         assert!(refused("").contains("no XML"));
         let without = |part: &str, instead: &str| refused(&whole.replace(part, instead));
         assert!(without("<h>2</h>", "").ends_with("line 6: <item> has no <h>"));
-        assert!(without("<h>2</h>", "<h>tall</h>").contains("<h>: `tall` is no number"));
+        assert!(without("<h>2</h>", "<h>tall</h>").contains("<h>: `tall` is not a number"));
         assert!(
             without("<count>3</count>", "<count>4</count>").contains("<poses> of 4 items has 3")
         );
         assert!(without("<count>1</count>", "<count>0</count>").contains("<tracklets> of 0 items"));
-        assert!(without("<first_frame>5", "<first_frame>-5").contains("`-5` is no number"));
+        assert!(without("<first_frame>5", "<first_frame>-5").contains("`-5` is not a number"));
         assert!(without("tracklets", "others").contains("has no <tracklets>"));
         assert!(without("<rz>1.5</rz>", "").contains("<item> has no <rz>"));
     }

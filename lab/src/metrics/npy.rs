@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path) -> Result<Array, Error> {
 pub(super) fn parse(bytes: &[u8]) -> Result<Array, String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("is no NumPy file")?;
     let (header, data) = split(rest).ok_or("truncated within the header")?;
-    let header = std::str::from_utf8(header).map_err(|_| "the header is no text")?;
+    let header = std::str::from_utf8(header).map_err(|_| "the header is not UTF-8 text")?;
     let kind = value(header, "descr")?.trim_matches(['\'', '"']);
     let number: fn(&[u8]) -> f64 = match kind {
         "<f2" => |b| <Float16Type as ArrowPrimitiveType>::Native::from_le_bytes(all(b)).into(),

@@ -135,7 +135,7 @@ impl Report {
     /// and `pictures/ID.png` in a folder, which is made where it is missing; each file whole or not
     /// at all, the page last.
     ///
-    /// Fails before anything is written with [`Error::Usage`] on an id that is no file name or
+    /// Fails before anything is written with [`Error::Usage`] on an id that is not a file name or
     /// that is given twice, a table whose rows do not fit its columns, or a picture that is no PNG;
     /// later where a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {

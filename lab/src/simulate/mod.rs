@@ -63,7 +63,7 @@ pub struct Args {
 
 /// Reads a density.
 fn density(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     let fits = (0.0..=DENSITY_MAX).contains(&value);
     fits.then_some(value).ok_or_else(|| format!("not within 0 to {DENSITY_MAX}"))
 }

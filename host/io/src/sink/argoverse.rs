@@ -27,7 +27,7 @@ pub fn export(
     dt_s: f64,
 ) -> Result<PathBuf, Error> {
     if log.is_empty() || log == "." || log == ".." || log.contains(['/', '\\']) {
-        return Err(Error::Usage(format!("`{log}` is no name of a log")));
+        return Err(Error::Usage(format!("`{log}` is not a valid log name")));
     }
     let folder = out.join(log);
     atomic::create_folder(&folder)?;

@@ -35,7 +35,7 @@ pub fn create_folder(path: &Path) -> Result<(), Error> {
 /// The temporary name.
 fn partial_path(path: &Path) -> Result<PathBuf, Error> {
     let name = path.file_name().ok_or_else(|| {
-        Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "is no file name"))
+        Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "is not a file name"))
     })?;
     let mut partial = std::ffi::OsString::from(".");
     partial.push(name);

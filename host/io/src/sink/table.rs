@@ -84,7 +84,7 @@ impl Table {
     /// Fails: this build has no feather files.
     #[cfg(not(feature = "arrow"))]
     pub fn write(self, path: &Path, _: Meta<'_>) -> Result<(), Error> {
-        let what = "this build lacks the feature `arrow` to write feather files";
+        let what = "the feature `arrow` for feather files is not compiled in";
         Err(Error::Unsupported(format!("{}: {what}", path.display())))
     }
 }

@@ -64,7 +64,7 @@ impl Argoverse {
         let clouds = root.join("sensors/lidar");
         let (files, by_number) = numbered(&clouds, "feather")?;
         if !by_number {
-            return Err(Error::input(&clouds, "", "a sweep's name is no timestamp"));
+            return Err(Error::input(&clouds, "", "a sweep's name is not a timestamp"));
         }
         let mut notes = Vec::new();
         let track = read_track(&root.join("city_SE3_egovehicle.feather"), &files, &mut notes)?;
@@ -109,7 +109,8 @@ impl Argoverse {
         let offsets = table.integers("offset_ns")?;
         let lasers = table.integers("laser_number")?;
         if let Some(row) = lasers.iter().position(|l| !(0..2 * LASERS).contains(l)) {
-            let what = format!("laser_number {} is none of 0 to {}", lasers[row], 2 * LASERS - 1);
+            let what =
+                format!("laser_number {} is not one of 0 to {}", lasers[row], 2 * LASERS - 1);
             return Err(Error::input(path, format!("row {row}"), what));
         }
         into.points.extend((0..table.rows()).map(|i| Point {
@@ -229,7 +230,7 @@ fn read_track(
     }
     if inexact > 0 {
         notes.push(format!(
-            "{inexact} sweeps without a pose at their stamp; the nearest within 1 ms was taken"
+            "{inexact} sweeps without a pose at their stamp; the nearest within 1 ms is used"
         ));
     }
     Ok(track)

@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
     let mut file = File::open(path).map_err(Error::reading(path))?;
     let size = file.metadata().map_err(Error::reading(path))?.len();
     if size > SIZE_MAX {
-        let what = format!("{size} bytes are more than any sweep has ({SIZE_MAX} at most)");
+        let what = format!("{size} bytes are too many for a sweep (at most {SIZE_MAX})");
         return Err(Error::input(path, "", what));
     }
     points.reserve((size / RETURN as u64) as usize);
@@ -43,7 +43,9 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
         let (returns, rest) = chunk[..read].as_chunks::<RETURN>();
         if !rest.is_empty() {
             points.clear();
-            let what = format!("truncated: {total} bytes are no multiple of {RETURN}");
+            let what = format!(
+                "{total} bytes, not a multiple of {RETURN} (float32 x, y, z, intensity): truncated?"
+            );
             return Err(Error::input(path, "", what));
         }
         points.extend(returns.iter().map(decode));

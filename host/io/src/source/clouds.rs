@@ -87,7 +87,7 @@ pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
         Some("ply") => ply::read(path, points),
         Some("feather") => read_feather(path, points).map(|()| false),
         _ => {
-            let what = "no cloud by its name, which ends in .bin, .pcd, .ply or .feather";
+            let what = "unknown extension, expected .bin, .pcd, .ply or .feather";
             Err(Error::input(path, "", what))
         }
     }
@@ -106,7 +106,7 @@ fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
 
 #[cfg(not(feature = "arrow"))]
 fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
-    let what = "is a feather file, and this build lacks the feature `arrow` to read it";
+    let what = "is a feather file: the feature `arrow` is not compiled in";
     Err(Error::Unsupported(format!("{} {what}", path.display())))
 }
 

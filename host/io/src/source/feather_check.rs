@@ -15,7 +15,7 @@ const UNPACKED_MAX: i64 = 1 << 30;
 /// `Err` with what is wrong.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(MAGIC) {
-        return Err("is no feather file (it does not start with ARROW1)".into());
+        return Err("is not a feather file (it does not start with ARROW1)".into());
     }
     if bytes.len() < MAGIC.len() + TRAILER || !bytes.ends_with(MAGIC) {
         let what = "truncated: the feather file does not end with ARROW1";
@@ -68,7 +68,7 @@ fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<(), String> {
     let nodes = batch.nodes().into_iter().flatten();
     let mut counts = nodes.flat_map(|n| [n.length(), n.null_count()]);
     if !sensible(batch.length()) || !counts.all(sensible) {
-        return Err("damaged: a negative or absurd number of rows".into());
+        return Err("damaged: invalid number of rows".into());
     }
     for buffer in batch.buffers().into_iter().flatten() {
         let range =

@@ -62,26 +62,28 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     let mut kinds = extensions(folder)?;
     let kind = kinds.next().unwrap_or("bin");
     if let Some(other) = kinds.next() {
-        let what = format!("holds `.{kind}` and `.{other}` files; one kind of clouds is expected");
+        let what = format!("contains both `.{kind}` and `.{other}` files, expected one format");
         return Err(Error::input(folder, "", what));
     }
     let mut opening = Opening::new(folder, folder, kind, "folder of clouds")?;
     opening.read_times(&["times.txt"])?;
-    let path = options.poses.as_ref().ok_or_else(|| no_poses(folder, "clouds alone"))?;
+    let path = options.poses.as_ref().ok_or_else(|| no_poses(folder, "point clouds only"))?;
     opening.read_poses(path, options, PosesFrame::Vehicle)?;
     opening.span = opening.find_span()?;
     let spins = match opening.span {
-        Some(_) => "mounted",
-        None => "mounted and to spin",
+        Some(_) => "",
+        None => " and spins",
     };
-    let note = format!("sensor taken to be {spins} as KITTI's HDL-64E (1.73 m above ground)");
+    let note = format!(
+        "assuming that the sensor is mounted{spins} like KITTI's HDL-64E (1.73 m above ground)"
+    );
     opening.notes.push(note);
     Ok(opening.finish(options))
 }
 
 /// The error of a recording whose motion is unknown.
 fn no_poses(path: &Path, found: &str) -> Error {
-    let what = format!("{found}: poses are needed; name a file of them with --poses");
+    let what = format!("{found}: poses are needed, give a file with --poses");
     Error::input(path, "", what)
 }
 
@@ -110,7 +112,7 @@ impl Opening {
         let (files, by_number) = numbered(clouds, extension)?;
         let mut notes = Vec::new();
         if !by_number {
-            notes.push("names of sweeps are no numbers; counted from 0 in their order".into());
+            notes.push("sweep file names are not numbers: numbered from 0 in order".into());
         }
         let frames: Vec<u64> = files.iter().map(|f| f.0).collect();
         note_gaps(&frames, &mut notes);
@@ -187,7 +189,7 @@ impl Opening {
             return Err(Error::input(&folder, "", "no packet has the number of a sweep"));
         }
         if left_out > 0 {
-            self.notes.push(format!("{left_out} sweeps left out: no packet in oxts/data"));
+            self.notes.push(format!("{left_out} sweeps skipped: no packet in oxts/data"));
         }
         (self.files, self.track, self.poses_from) = (files, track, "oxts".into());
         Ok(())

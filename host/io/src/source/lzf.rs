@@ -28,7 +28,8 @@ pub(super) fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, &'static str
                 length += next()?;
             }
             let back = ((control & 31) << 8 | next()?) + 1;
-            let from = out.len().checked_sub(back).ok_or("damaged: a repetition of nothing")?;
+            let from =
+                out.len().checked_sub(back).ok_or("damaged: a back reference before the start")?;
             // One by one: it may repeat what it has just written.
             for at in from..from + length {
                 out.push(out[at]);

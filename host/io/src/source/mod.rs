@@ -201,7 +201,7 @@ fn open_argoverse(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>,
 
 #[cfg(not(feature = "arrow"))]
 fn open_argoverse(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "is an Argoverse 2 log, and this build lacks the feature `arrow` to read it";
+    let what = "is an Argoverse 2 log: the feature `arrow` is not compiled in";
     Err(Error::Unsupported(format!("{} {what}", root.display())))
 }
 

@@ -56,7 +56,7 @@ fn check(packet: &[f64; FIELDS]) -> Result<(), String> {
     }
     // The Mercator projection has no poles.
     if packet[0].abs() > 89.0 || packet[1].abs() > 360.0 {
-        return Err(format!("({}, {}) is no latitude and longitude", packet[0], packet[1]));
+        return Err(format!("({}, {}) is not a latitude and longitude", packet[0], packet[1]));
     }
     Ok(())
 }

@@ -131,7 +131,7 @@ impl Header {
                     return Ok(Header { fields, rows, data });
                 }
                 _ if key.starts_with('#') => {}
-                _ => return Err(head.wrong(format!("`{key:.20}` is no entry of a PCD header"))),
+                _ => return Err(head.wrong(format!("`{key:.20}` is not an entry of a PCD header"))),
             }
         }
     }
@@ -192,7 +192,7 @@ fn fields(
 
 /// Whole numbers of a header's line.
 fn whole(head: &Head, words: &[&str]) -> Result<Vec<usize>, Error> {
-    let number = |w: &&str| w.parse().map_err(|_| head.wrong(format!("`{w:.20}` is no count")));
+    let number = |w: &&str| w.parse().map_err(|_| head.wrong(format!("`{w:.20}` is not a count")));
     words.iter().map(number).collect()
 }
 

@@ -54,7 +54,7 @@ enum Element {
 impl Header {
     fn read(head: &mut Head) -> Result<Header, Error> {
         if head.words()? != ["ply"] {
-            return Err(head.wrong("is no PLY file (it does not start with `ply`)"));
+            return Err(head.wrong("is not a PLY file (it does not start with `ply`)"));
         }
         let (mut big, mut rows, mut fields) = (None, 0, Vec::new());
         let mut element = Element::None;
@@ -66,7 +66,7 @@ impl Header {
                 ["format", "binary_little_endian", "1.0"] => big = Some(Some(false)),
                 ["format", "binary_big_endian", "1.0"] => big = Some(Some(true)),
                 ["element", "vertex", count] if element == Element::None => {
-                    let bad = |_| head.wrong(format!("`{count:.20}` is no count"));
+                    let bad = |_| head.wrong(format!("`{count:.20}` is not a count"));
                     (rows, element) = (count.parse().map_err(bad)?, Element::Vertex);
                 }
                 ["element", ..] if element == Element::None => {

@@ -72,7 +72,7 @@ pub(super) fn pose_from(rows: &[f64; 12], path: &Path, place: String) -> Result<
     Pose::from_rows(rows).map_err(|e| {
         let what = match e {
             PoseError::NotFinite => "a pose with a NaN or infinite number",
-            PoseError::NotRigid => "the 3x3 part of the pose is no rotation",
+            PoseError::NotRigid => "the 3x3 part of the pose is not a rotation",
         };
         Error::input(path, place, what)
     })
@@ -187,7 +187,7 @@ fn read_stamps(path: &Path) -> Result<Vec<(usize, f64)>, Error> {
     for (line, content) in text::lines(&text) {
         let stamp = if content.contains(':') {
             let ns = date_ns(content).ok_or_else(|| {
-                Error::input(path, format!("line {line}"), format!("`{content}` is no date"))
+                Error::input(path, format!("line {line}"), format!("`{content}` is not a date"))
             })?;
             // Differences in whole nanoseconds: a double of seconds since 1970 keeps only 0.2 us.
             (ns - *first_ns.get_or_insert(ns)) as f64 * 1e-9

@@ -16,7 +16,7 @@ const DEPTH: usize = 2;
 pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
     let meta = fs::metadata(path).map_err(Error::reading(path))?;
     if !meta.is_dir() {
-        let what = "is a file; name the folder of the recording";
+        let what = "expected a folder, found a file";
         return Err(Error::input(path, "", what));
     }
     if let Some(format) = format_of(path)? {
@@ -33,7 +33,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
-            let what = format!("holds {n} recordings; name one: {}", some.join(", "));
+            let what = format!("contains {n} recordings, choose one: {}", some.join(", "));
             Err(Error::input(path, "", what))
         }
     }
@@ -88,7 +88,7 @@ pub(super) fn entries(path: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 /// Files of a folder with this extension and their numbers (`0000000012.bin` is 12), in the order
-/// of the numbers; in the order of names and counted from 0 where a name is no number.
+/// of the numbers; in the order of names and counted from 0 where a name is not a number.
 ///
 /// The second value is false in that case. Fails where there are none, or where two files have the
 /// same number.

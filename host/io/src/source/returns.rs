@@ -157,8 +157,9 @@ pub(super) fn table(
     rows: usize,
     width: usize,
 ) -> Result<Vec<f64>, Error> {
-    let text = std::str::from_utf8(bytes.get(at..).unwrap_or_default())
-        .map_err(|e| Error::input(path, format!("byte {}", at + e.valid_up_to()), "is no text"))?;
+    let text = std::str::from_utf8(bytes.get(at..).unwrap_or_default()).map_err(|e| {
+        Error::input(path, format!("byte {}", at + e.valid_up_to()), "is not UTF-8 text")
+    })?;
     let mut numbers = Vec::new();
     let mut found = 0;
     for (n, content) in text::lines(text).take(rows) {
@@ -181,7 +182,7 @@ pub(super) fn table(
 pub(super) fn load(path: &Path) -> Result<Vec<u8>, Error> {
     let size = fs::metadata(path).map_err(Error::reading(path))?.len();
     if size > SIZE_MAX {
-        let what = format!("{size} bytes are more than any sweep has ({SIZE_MAX} at most)");
+        let what = format!("{size} bytes are too many for a sweep (at most {SIZE_MAX})");
         return Err(Error::input(path, "", what));
     }
     fs::read(path).map_err(Error::reading(path))
@@ -200,14 +201,14 @@ impl<'a> Head<'a> {
         Head { path, bytes, next: (0, 1) }
     }
 
-    /// The words of the next line. Fails where the file ends without one, or it is no text.
+    /// The words of the next line. Fails where the file ends without one, or it is not UTF-8 text.
     pub fn words(&mut self) -> Result<Vec<&'a str>, Error> {
         let (at, line) = self.next;
         let rest = &self.bytes[at..];
         let end = rest.iter().position(|&b| b == b'\n');
         let end = end.ok_or_else(|| self.error("truncated: the header does not end"))?;
         let text = std::str::from_utf8(&rest[..end]);
-        let text = text.map_err(|_| self.error("the header is no text"))?;
+        let text = text.map_err(|_| self.error("the header is not UTF-8 text"))?;
         self.next = (at + end + 1, line + 1);
         Ok(text.split_ascii_whitespace().collect())
     }

@@ -21,7 +21,7 @@ pub fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, Error> 
     text.split_ascii_whitespace()
         .map(|word| {
             word.parse().map_err(|_| {
-                Error::input(path, format!("line {line}"), format!("`{word}` is no number"))
+                Error::input(path, format!("line {line}"), format!("`{word}` is not a number"))
             })
         })
         .collect()
@@ -62,7 +62,7 @@ mod tests {
         let e = exactly::<2>(path, 4, "1 2 3").unwrap_err().to_string();
         assert_eq!(e, "f.txt, line 4: 2 numbers expected, 3 found");
         let e = exactly::<1>(path, 5, "x1").unwrap_err().to_string();
-        assert_eq!(e, "f.txt, line 5: `x1` is no number");
+        assert_eq!(e, "f.txt, line 5: `x1` is not a number");
         let text = "P0: 1\n\nTr: 5 6\n";
         assert_eq!(keyed::<2>(path, text, "Tr").unwrap(), Some((3, [5.0, 6.0])));
         assert_eq!(keyed::<2>(path, text, "T").unwrap(), None);

@@ -6,7 +6,7 @@ const THIN: f64 = 1e-6;
 
 /// Content of the least ellipse of a covariance (xx, xy, yy) that holds an error, 0..1: where the
 /// errors are normal and the covariance is theirs, any `p` is exceeded by `1 - p` of them. 1 for
-/// what no ellipse holds: a covariance that is none, or an error that is no number.
+/// what no ellipse holds: a covariance that is none, or an error that is not a number.
 pub fn content(error: [f32; 2], covariance: [f32; 3]) -> f64 {
     let d2 = squared_distance(error.map(f64::from), covariance.map(f64::from));
     // The distribution of chi-square with two degrees of freedom.

@@ -85,14 +85,16 @@ fn pcd_headers_that_do_not_fit_together() {
     assert!(refused("COUNT 1 1 1 3", "COUNT 1 1 1 0").contains("field `_`: COUNT 0"));
     assert!(refused("1 1 1 3", "1 1 1 18446744073709551615").contains("field `_`: COUNT 184"));
     assert!(refused("POINTS 2", "POINTS 3").contains("3 POINTS are not WIDTH times HEIGHT"));
-    assert!(refused("POINTS 2", "POINTS -2").contains("line 10: `-2` is no count"));
+    assert!(refused("POINTS 2", "POINTS -2").contains("line 10: `-2` is not a count"));
     assert!(refused("POINTS 2", "POINTS").contains("line 10: one number expected"));
-    assert!(refused("VERSION", "VERSIEN").contains("line 2: `VERSIEN` is no entry"));
+    assert!(refused("VERSION", "VERSIEN").contains("line 2: `VERSIEN` is not an entry"));
     assert!(refused("ascii", "base64").contains("line 11: unknown DATA base64"));
     assert!(cloud(&t, "a.pcd", "").unwrap_err().contains("line 1: truncated: the header"));
     assert!(cloud(&t, "a.pcd", "DATA ascii\n").unwrap_err().contains("no POINTS before"));
     assert!(
-        cloud(&t, "a.pcd", [0xff, b'\n']).unwrap_err().contains("line 1: the header is no text")
+        cloud(&t, "a.pcd", [0xff, b'\n'])
+            .unwrap_err()
+            .contains("line 1: the header is not UTF-8 text")
     );
     assert!(cloud(&t, "a.pcd", HEAD).unwrap_err().contains("line 11: truncated: the header"));
 }
@@ -115,7 +117,7 @@ fn pcd_bodies_that_end_early() {
     let mut odd = text().into_bytes();
     let n = odd.len();
     odd[n - 3] = 0xff;
-    assert!(cloud(&t, "a.pcd", odd).unwrap_err().contains("is no text"));
+    assert!(cloud(&t, "a.pcd", odd).unwrap_err().contains("is not UTF-8 text"));
     let packed = compressed(&[1; 50]);
     assert!(cloud(&t, "a.pcd", &packed[..packed.len() - 1]).unwrap_err().contains("packed bytes"));
     assert!(cloud(&t, "a.pcd", &packed[..packed.len() - 53]).unwrap_err().contains("two lengths"));
@@ -124,7 +126,7 @@ fn pcd_bodies_that_end_early() {
     let body = packed.len() - 52;
     let mut damaged = packed;
     damaged[body] = 0xff;
-    assert!(cloud(&t, "a.pcd", damaged).unwrap_err().contains("a repetition of nothing"));
+    assert!(cloud(&t, "a.pcd", damaged).unwrap_err().contains("a back reference before the start"));
 }
 
 const PLY: &str = "ply\nformat FORMAT 1.0\ncomment made by hand\nelement vertex 2\n\
@@ -177,10 +179,10 @@ fn ply_headers_that_do_not_fit_together() {
         assert!(whole.contains(part), "{part}");
         cloud(&t, "a.ply", whole.replace(part, instead)).unwrap_err()
     };
-    assert!(refused("ply", "plx").contains("line 1: is no PLY file"));
+    assert!(refused("ply", "plx").contains("line 1: is not a PLY file"));
     assert!(refused("ascii", "ebcdic").contains("line 2: `format ebcdic 1.0` makes no sense"));
     assert!(refused("format ascii 1.0\n", "").contains("no format before"));
-    assert!(refused("vertex 2", "vertex -2").contains("line 4: `-2` is no count"));
+    assert!(refused("vertex 2", "vertex -2").contains("line 4: `-2` is not a count"));
     assert!(refused("element vertex", "element camera").contains("comes before the vertices"));
     assert!(refused("float y", "quad y").contains("line 6: unknown type `quad`"));
     assert!(refused("float z", "float w").ends_with("a.ply: has no field `z`"));
@@ -210,8 +212,8 @@ fn folders_of_clouds() {
     let long = refused_with(t.path(), &options);
     assert!(long.contains("0.pcd: times of returns 5.040 s apart; 1 s at most"), "{long}");
     t.write("0.ply", "");
-    assert!(refused_with(t.path(), &options).contains("holds `.pcd` and `.ply` files"));
+    assert!(refused_with(t.path(), &options).contains("contains both `.pcd` and `.ply` files"));
     t.remove("0.pcd");
     t.remove("1.pcd");
-    assert!(refused(t.path()).contains("clouds alone: poses are needed"));
+    assert!(refused(t.path()).contains("point clouds only: poses are needed"));
 }

@@ -115,7 +115,7 @@ fn oxts_with_calibration_of_the_day() {
     t.remove("day/drive/oxts/data/0000000000.txt");
     let source = opened(&t.path().join("day/drive"));
     assert_eq!((source.len(), source.frame(0)), (2, 1));
-    assert!(source.notes().iter().any(|n| n.starts_with("1 sweeps left out")));
+    assert!(source.notes().iter().any(|n| n.starts_with("1 sweeps skipped")));
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn folder_of_clouds() {
     assert!(sweep.stamp_s == 0.1 && sweep.points[0].position == [2.0; 3]);
     assert!(near(sweep.twist.linear, [5.0, 0.0, 0.0]));
     let notes = source.notes().join("; ");
-    assert!(notes.contains("10 Hz") && notes.contains("no numbers"), "{notes}");
+    assert!(notes.contains("10 Hz") && notes.contains("not numbers"), "{notes}");
     // A single sweep stands still.
     t.remove("b.bin");
     let poses = t.write("elsewhere/p.txt", row(9.0, 0.0, 0.0));

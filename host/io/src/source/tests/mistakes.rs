@@ -9,11 +9,11 @@ fn folders() {
     assert!(refused(&t.path().join("absent")).contains("absent: "));
     assert!(refused(t.path()).contains("no recording found"));
     let file = t.write("file.txt", "");
-    assert!(refused(&file).contains("is a file"));
+    assert!(refused(&file).contains("found a file"));
     fs::create_dir_all(t.path().join("d/velodyne_points/data")).unwrap();
     assert!(refused(t.path()).contains("velodyne_points/data: no sweeps"));
     t.write("e/0.bin", []);
-    assert!(refused(t.path()).contains("holds 2 recordings; name one"));
+    assert!(refused(t.path()).contains("contains 2 recordings, choose one"));
     t.write("e/00.bin", []);
     assert!(refused(&t.path().join("e")).contains("has the same number as"));
 }
@@ -53,7 +53,7 @@ fn times() {
     t.write("times.txt", "0\n0.1\n");
     assert!(refused(t.path()).contains("2 times for 3 sweeps"));
     t.write("times.txt", "0\n12:00\n0.3\n");
-    assert!(refused(t.path()).contains("line 2: `12:00` is no date"));
+    assert!(refused(t.path()).contains("line 2: `12:00` is not a date"));
     // More lines than sweeps: by frame number.
     t.write("times.txt", "0\n1\n2\n3\n4\n5\n6\n7\n");
     let mut source = opened(t.path());
@@ -69,7 +69,7 @@ fn clouds() {
     source.read(0, &mut sweep).unwrap();
     let e = source.read(1, &mut sweep).unwrap_err();
     let text = e.to_string();
-    assert!(text.contains("0000000004.bin: truncated: 40 bytes"), "{text}");
+    assert!(text.contains("0000000004.bin: 40 bytes"), "{text}");
     assert!(sweep.points.is_empty() && e.exit_code() == 3);
     t.remove("velodyne_points/data/0000000006.bin");
     assert!(source.read(2, &mut sweep).unwrap_err().to_string().contains("0000000006.bin"));
@@ -123,5 +123,5 @@ fn clouds_alone() {
 fn argoverse_needs_a_feature() {
     let t = Temp::new();
     fs::create_dir_all(t.path().join("log/sensors/lidar")).unwrap();
-    assert!(refused(t.path()).contains("lacks the feature `arrow`"));
+    assert!(refused(t.path()).contains("the feature `arrow`"));
 }
