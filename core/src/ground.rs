@@ -1,75 +1,83 @@
-//! Height of the ground under a window, from the returns in it. Lengths are in edges of a column.
+//! Height of the ground under a window of square columns, from the returns in it.
+//!
+//! The third-lowest return of each cell, or of its neighbours where the ground descends that way:
+//! returns mirrored by glass or puddles come from below, but seldom together. Parameters are in
+//! metres, places and heights in the caller's unit, the edge of a column.
 
-use crate::params::COLUMNS_MAX;
+use crate::params::{COLUMNS_MAX, GroundParams};
 
-/// Columns along an axis of a cell of the ground: 1.5 m at 0.30 m.
-const GROUND_CELL: usize = 5;
-/// Ground cells along an axis at most.
-const GROUND_SIDE: usize = 256usize.div_ceil(GROUND_CELL);
-/// How far below the vehicle's ground another may begin, and by how much it may fall from
-/// there: what lies lower is mirrored.
-const STEP: f32 = 1.5;
-const SLOPE: f32 = 0.1;
-/// How far the ground of a cell follows from others, cells: nothing is seen of it behind cars.
-const GROUND_PASSES: usize = 3;
-/// By how much the ground may fall from one of its cells to the next: 7 %.
-const GROUND_FALL: f32 = 0.33;
+/// Least number of columns along an edge of a cell: bounds the number of cells.
+const CELL_COLUMNS_MIN: usize = 4;
+/// Cells along an axis at most.
+const CELLS_SIDE_MAX: usize = 256usize.div_ceil(CELL_COLUMNS_MIN);
+const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
-/// Height of the ground, by cells of [`GROUND_CELL`] columns.
+/// Height of the ground in cells of several columns.
 pub struct Ground {
+    /// Columns along an axis of the window, and along an edge of a cell, that `cell` is for.
+    columns: [usize; 2],
+    /// Cells along an axis of the window.
     side: usize,
-    /// Columns along an axis of the window that `cell` is for.
-    columns: usize,
     cell: [u16; COLUMNS_MAX],
     /// The three lowest returns of each.
-    lowest: [[f32; 3]; GROUND_SIDE * GROUND_SIDE],
-    height: [f32; GROUND_SIDE * GROUND_SIDE],
-    followed: [f32; GROUND_SIDE * GROUND_SIDE],
+    lowest: [[f32; 3]; CELLS_MAX],
+    height: [f32; CELLS_MAX],
+    extrapolated: [f32; CELLS_MAX],
 }
 
 impl Default for Ground {
-    fn default() -> Ground {
+    fn default() -> Self {
         Ground::new()
     }
 }
 
 impl Ground {
-    /// No ground yet.
+    /// No ground.
     pub const fn new() -> Ground {
-        let none = [0.0; GROUND_SIDE * GROUND_SIDE];
-        let lowest = [[0.0; 3]; GROUND_SIDE * GROUND_SIDE];
-        Ground { side: 0, columns: 0, cell: [0; COLUMNS_MAX], lowest, height: none, followed: none }
+        Ground {
+            columns: [0; 2],
+            side: 0,
+            cell: [0; COLUMNS_MAX],
+            lowest: [[0.0; 3]; CELLS_MAX],
+            height: [0.0; CELLS_MAX],
+            extrapolated: [0.0; CELLS_MAX],
+        }
     }
 
     /// Lists the cell of every column: divisions take longer than looking it up.
-    fn list_cells(&mut self, side: usize) {
-        if self.columns == side {
+    fn list_cells(&mut self, side: usize, edge: usize) {
+        if self.columns == [side, edge] {
             return;
         }
-        self.columns = side;
-        self.side = side.div_ceil(GROUND_CELL);
+        self.columns = [side, edge];
+        self.side = side.div_ceil(edge);
         for i in 0..side {
             for j in 0..side {
-                let cell = i / GROUND_CELL * self.side + j / GROUND_CELL;
+                let cell = i / edge * self.side + j / edge;
                 self.cell[i * side + j] = cell as u16;
             }
         }
     }
 
-    /// The third-lowest return of each cell, or of its neighbours if the ground falls that way:
-    /// mirrored returns come from below, but seldom together. `returns` are given by their column
-    /// and place; `under` is the place of the vehicle's ground.
+    /// Estimates the ground of a window of `side` columns along an axis (at most 256), whose edges
+    /// measure `column_m`. `returns` are given by column and place, `under` is the place of the
+    /// ground beneath the vehicle.
     pub fn estimate(
         &mut self,
+        params: &GroundParams,
+        column_m: f64,
         side: usize,
         under: [f32; 3],
         returns: impl Iterator<Item = (usize, [f32; 3])>,
     ) {
-        self.list_cells(side);
+        let edge = libm::round(params.ground_cell_m / column_m) as usize;
+        let edge = edge.max(CELL_COLUMNS_MIN);
+        self.list_cells(side, edge);
+        let drop = (params.ground_drop_m / column_m) as f32;
         self.lowest.fill([f32::INFINITY; 3]);
         for (column, p) in returns {
             let away = (p[0] - under[0]).abs().max((p[1] - under[1]).abs());
-            if p[2] < under[2] - STEP - SLOPE * away {
+            if p[2] < under[2] - drop - params.ground_drop_slope * away {
                 continue;
             }
             let cell = self.cell[column] as usize;
@@ -81,21 +89,27 @@ impl Ground {
         for (height, lowest) in self.height.iter_mut().zip(&self.lowest) {
             *height = lowest[2];
         }
-        let n = self.side;
-        for _ in 0..GROUND_PASSES {
-            for i in 0..n {
-                for j in 0..n {
-                    let mut height = self.height[i * n + j];
-                    for a in i.saturating_sub(1)..(i + 2).min(n) {
-                        for b in j.saturating_sub(1)..(j + 2).min(n) {
-                            height = height.min(self.height[a * n + b] + GROUND_FALL);
-                        }
-                    }
-                    self.followed[i * n + j] = height;
-                }
-            }
-            core::mem::swap(&mut self.height, &mut self.followed);
+        let fall = (params.ground_fall_slope * edge as f64) as f32;
+        for _ in 0..params.ground_passes {
+            self.extrapolate(fall);
         }
+    }
+
+    /// Lowers each cell to what its lowest neighbour allows, which may fall by `fall` to it.
+    fn extrapolate(&mut self, fall: f32) {
+        let n = self.side;
+        for i in 0..n {
+            for j in 0..n {
+                let mut height = self.height[i * n + j];
+                for a in i.saturating_sub(1)..(i + 2).min(n) {
+                    for b in j.saturating_sub(1)..(j + 2).min(n) {
+                        height = height.min(self.height[a * n + b] + fall);
+                    }
+                }
+                self.extrapolated[i * n + j] = height;
+            }
+        }
+        core::mem::swap(&mut self.height, &mut self.extrapolated);
     }
 
     /// Height of the ground under a column; infinite where nothing tells it.

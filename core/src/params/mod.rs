@@ -7,10 +7,12 @@
 
 mod ceilings;
 mod profile;
+mod refinement;
 mod tracklet;
 
 pub use ceilings::*;
 pub use profile::{Frame, Profile};
+pub use refinement::{GroundParams, RefinementParams};
 pub use tracklet::{Birth, TrackletParams};
 
 use core::fmt;

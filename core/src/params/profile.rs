@@ -1,8 +1,8 @@
 //! A profile: the parameters of one run of the flow pipeline.
 
 use super::{
-    COLUMNS_MAX, COST_UNKNOWN, Kind, LEVELS_MAX, Parameters, ProfileError, RANGE_STEPS_MAX,
-    TrackletParams, Value,
+    COLUMNS_MAX, COST_UNKNOWN, GroundParams, Kind, LEVELS_MAX, Parameters, ProfileError,
+    RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
 };
 use crate::continuity::Limits;
 use heapless::String;
@@ -76,6 +76,10 @@ crate::params! {
     } and {
         /// Name shown in reports.
         pub name: String<24> = String::new();
+        /// Ground.
+        pub ground: GroundParams = GroundParams::DEFAULT;
+        /// Refinement.
+        pub refinement: RefinementParams = RefinementParams::DEFAULT;
         /// Tracklet filter.
         pub tracklet: TrackletParams = TrackletParams::DEFAULT;
         /// Beyond these two sweeps make no pair, and tracklets are dropped.
@@ -124,13 +128,21 @@ impl Profile {
     }
 
     /// Its groups of parameters, each with its name; that of the first is empty.
-    pub fn groups(&self) -> [(&'static str, &dyn Parameters); 3] {
-        [("", self), ("tracklet", &self.tracklet), ("limits", &self.limits)]
+    pub fn groups(&self) -> [(&'static str, &dyn Parameters); 5] {
+        [
+            ("", self),
+            ("ground", &self.ground),
+            ("refinement", &self.refinement),
+            ("tracklet", &self.tracklet),
+            ("limits", &self.limits),
+        ]
     }
 
     /// One of these groups, to change it. An unknown name is that of the first.
     pub fn group_mut(&mut self, name: &str) -> &mut dyn Parameters {
         match name {
+            "ground" => &mut self.ground,
+            "refinement" => &mut self.refinement,
             "tracklet" => &mut self.tracklet,
             "limits" => &mut self.limits,
             _ => self,

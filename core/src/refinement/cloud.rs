@@ -1,36 +1,32 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
-use super::align::{NOISE, Sample, Weight};
 use super::places::Places;
+use super::sample::{Sample, SurfaceWeight};
+use super::scaled::Scaled;
+use super::surface::{self, LazyWeight};
 use crate::ground::Ground;
 use crate::params::{
-    ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, LEVELS_MAX, POINTS_MAX, Profile,
+    ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
+    SUBVOXELS_MAX,
 };
 use crate::prepare::{Placed, central};
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
 use core::ops::Range;
-use core::sync::atomic::AtomicU32;
-use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
-use nalgebra::Matrix3;
 
-/// Returns higher above the ground than this belong to things, voxels.
-pub const GROUND_HEIGHT: f32 = 0.6;
-/// Returns lower than this above the ground belong to it in any column, voxels.
-const GROUND_RETURN: f32 = 0.35;
-/// Returns from this height on belong to no thing, voxels: 4.2 m at 0.30 m.
-const THING_HEIGHT: f32 = 14.0;
-/// Returns so near tell which way the surface faces, voxels; and so near where those lie on a line, as
-/// of one ring on a hood: a line would hold a thing across the surface and along it.
-const AROUND: [f32; 2] = [1.5, 2.5];
-/// Variance across a line, voxels².
-const LINE: f32 = 0.05;
-/// Sub-voxels along an axis, of which each keeps one return: 10 cm at 0.30 m.
-const THINNED: f32 = 3.0;
-/// Words of a mask of the sub-voxels of a column: 3 x 3 x 3 x 16.
-const MASK_WORDS: usize = (3 * 3 * 3 * LEVELS_MAX).div_ceil(32);
+/// Words of a mask of the sub-voxels of a column.
+const MASK_WORDS: usize =
+    (SUBVOXELS_MAX * SUBVOXELS_MAX * SUBVOXELS_MAX * CLUSTER_LEVELS_MAX).div_ceil(32);
 
-/// Scratch of [`Cloud::fill`]: returns above the ground, as they come and by column.
+/// The returns of a sweep: their places in the window, voxels, and their columns, or [`NONE`].
+#[derive(Clone, Copy)]
+pub struct Returns<'a> {
+    pub points: &'a [Point],
+    pub placed: &'a [Placed],
+    pub columns: &'a [u32],
+}
+
+/// Scratch of [`Cloud::fill`]: indices of the returns above the ground, as they come and by column.
 pub struct Scratch {
     listed: [u32; POINTS_MAX],
     order: [u32; POINTS_MAX],
@@ -39,32 +35,6 @@ pub struct Scratch {
 impl Scratch {
     pub(super) const fn new() -> Scratch {
         Scratch { listed: [0; POINTS_MAX], order: [0; POINTS_MAX] }
-    }
-}
-
-/// Bits of a weight, all zero until it is asked for: that takes no room in a program. Threads that ask
-/// at the same time find the same.
-struct Memo([AtomicU32; 6]);
-
-impl Memo {
-    const fn unknown() -> Memo {
-        Memo([const { AtomicU32::new(0) }; 6])
-    }
-
-    /// The weight, or what `find` says it is.
-    fn get(&self, find: impl FnOnce() -> Weight) -> Weight {
-        // That of a known weight is positive. It is written last and read first.
-        let [first, rest @ ..] = &self.0;
-        let known = first.load(Acquire);
-        if known != 0 {
-            let [a, b, c, d, e] = rest.each_ref().map(|bits| bits.load(Relaxed));
-            return [known, a, b, c, d, e].map(f32::from_bits);
-        }
-        let weight = find();
-        let [known, more @ ..] = weight.map(f32::to_bits);
-        rest.iter().zip(more).for_each(|(to, bits)| to.store(bits, Relaxed));
-        first.store(known, Release);
-        weight
     }
 }
 
@@ -80,11 +50,11 @@ pub struct Cloud {
     places: Places,
     /// When each was, s after the sweep's stamp: seldom asked for.
     offset_s: [f32; CLOUD_MAX],
+    /// Where the returns of each column begin, and those of the last one end.
     start: [u32; COLUMNS_MAX + 1],
-    /// What each return tells of its surface, once asked for: the upper half of a symmetric matrix.
-    weights: [Memo; CLOUD_MAX],
+    weights: [LazyWeight; CLOUD_MAX],
     /// Levels above the ground of each column in which something was hit, a bit each.
-    levels: [u16; COLUMNS_MAX],
+    levels: [u32; COLUMNS_MAX],
 }
 
 impl Cloud {
@@ -97,103 +67,141 @@ impl Cloud {
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
-            weights: [const { Memo::unknown() }; CLOUD_MAX],
+            weights: [const { LazyWeight::unknown() }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
         }
     }
 
-    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than things
+    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than clusters
     /// are. Returns how many returns were left out for want of room: those of the last columns.
     pub(super) fn fill(
         &mut self,
         profile: &Profile,
-        points: &[Point],
-        placed: &[Placed],
-        columns: &[u32],
+        scaled: &Scaled,
+        returns: Returns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
-        let side = profile.side as usize;
-        self.side = side;
+        self.side = profile.side as usize;
+        self.find_ground(profile, returns);
+        let (count, sensors) = self.count_columns(scaled, returns, apart, &mut scratch.listed);
+        self.sort(returns.columns, &scratch.listed[..count], &mut scratch.order);
+        let dropped = self.thin(scaled, returns, &scratch.order, sensors);
+        self.weights[..self.places.len()].fill_with(LazyWeight::unknown);
+        dropped
+    }
+
+    fn find_ground(&mut self, profile: &Profile, returns: Returns) {
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
-        let found = columns.iter().zip(placed).filter(|(column, _)| **column != NONE);
+        let found = returns.columns.iter().zip(returns.placed);
+        let found = found.filter(|(column, _)| **column != NONE);
         let found = found.map(|(column, placed)| (*column as usize, placed.at));
-        self.ground.estimate(side, [middle[0], middle[1], level], found);
-        let ground = &self.ground;
-        let height = |n: usize| ground.above(columns[n] as usize, placed[n].at[2]);
-        // A counting sort keeps the source's order within a column.
-        let columns_used = side * side;
-        let start = &mut self.start[..columns_used + 1];
-        start.fill(0);
-        let Scratch { listed, order } = scratch;
-        let (mut count, mut all_sensors) = (0, 0u32);
+        let under = [middle[0], middle[1], level];
+        self.ground.estimate(&profile.ground, profile.voxel_m, self.side, under, found);
+    }
+
+    /// Lists the returns of clusters and counts them by column, one place farther in `start`. Returns
+    /// how many there are, and the sensors that saw them, a bit each.
+    fn count_columns(
+        &mut self,
+        scaled: &Scaled,
+        returns: Returns,
+        apart: &mut [bool],
+        listed: &mut [u32],
+    ) -> (usize, u32) {
+        let Returns { points, placed, columns } = returns;
+        self.start[..self.side * self.side + 1].fill(0);
+        let (mut count, mut sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
             *apart = false;
             if column == NONE {
                 continue;
             }
-            let height = height(n);
-            *apart = !(GROUND_RETURN..THING_HEIGHT).contains(&height);
-            if (GROUND_HEIGHT..THING_HEIGHT).contains(&height) {
-                start[column as usize + 1] += 1;
+            let height = self.ground.above(column as usize, placed[n].at[2]);
+            *apart = !(scaled.ground_height..scaled.height_max).contains(&height);
+            if (scaled.height_min..scaled.height_max).contains(&height) {
+                self.start[column as usize + 1] += 1;
                 listed[count] = n as u32;
-                all_sensors |= 1 << points[n].sensor;
+                sensors |= 1 << points[n].sensor;
                 count += 1;
             }
         }
-        for c in 0..columns_used {
-            start[c + 1] += start[c];
+        (count, sensors)
+    }
+
+    /// A counting sort, which keeps the source's order within a column. Each start becomes its end.
+    fn sort(&mut self, columns: &[u32], listed: &[u32], order: &mut [u32]) {
+        for c in 0..self.side * self.side {
+            self.start[c + 1] += self.start[c];
         }
-        for &n in &listed[..count] {
-            let at = &mut start[columns[n as usize] as usize];
+        for &n in listed {
+            let at = &mut self.start[columns[n as usize] as usize];
             order[*at as usize] = n;
             *at += 1;
         }
+    }
+
+    /// Keeps of each sub-voxel the first return of each sensor. Returns how many had no room.
+    fn thin(&mut self, scaled: &Scaled, returns: Returns, order: &[u32], sensors: u32) -> usize {
         // By column they are looked up far apart: only where there are several.
-        let only = all_sensors.is_power_of_two().then(|| all_sensors.trailing_zeros());
-        let sensor_of = |n: u32| only.unwrap_or_else(|| points[n as usize].sensor);
+        let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
+        let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points[n as usize].sensor);
         // Each start has become its end; what is kept is written from the front again.
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);
-        for (c, end) in start[..columns_used].iter_mut().enumerate() {
-            let listed = &order[from..*end as usize];
-            from = *end as usize;
-            *end = self.places.len() as u32;
+        for c in 0..self.side * self.side {
+            let end = self.start[c] as usize;
+            let listed = &order[from..end];
+            from = end;
+            self.start[c] = self.places.len() as u32;
             self.levels[c] = 0;
-            let corner = [(c / side) as f32, (c % side) as f32];
             let sensors = listed.iter().fold(0u32, |s, n| s | 1 << sensor_of(*n));
             for sensor in (0..SENSORS_MAX as u32).filter(|s| sensors & 1 << s != 0) {
-                let mut taken = [0u32; MASK_WORDS];
-                for &n in listed {
-                    if sensor_of(n) != sensor {
-                        continue;
-                    }
-                    let Placed { at: p, offset_s } = placed[n as usize];
-                    let part = |v: f32| (v * THINNED).clamp(0.0, THINNED - 1.0) as usize;
-                    let level = (height(n as usize) * THINNED) as usize;
-                    let bit = (level * 3 + part(p[0] - corner[0])) * 3 + part(p[1] - corner[1]);
-                    let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
-                    if *word & 1 << (bit % 32) == 0 {
-                        *word |= 1 << (bit % 32);
-                        let kept = self.places.len();
-                        if self.places.push(p, sensor) {
-                            self.offset_s[kept] = offset_s;
-                            self.levels[c] |= 1 << height(n as usize) as u32;
-                        } else {
-                            dropped += 1;
-                        }
-                    }
+                let own = listed.iter().filter(|n| sensor_of(**n) == sensor);
+                let own = own.map(|n| returns.placed[*n as usize]);
+                dropped += self.thin_column(scaled.subvoxels, c, sensor, own);
+            }
+        }
+        self.start[self.side * self.side] = self.places.len() as u32;
+        dropped
+    }
+
+    /// The same of one column and sensor.
+    fn thin_column(
+        &mut self,
+        subvoxels: usize,
+        column: usize,
+        sensor: u32,
+        returns: impl Iterator<Item = Placed>,
+    ) -> usize {
+        let corner = [(column / self.side) as f32, (column % self.side) as f32];
+        let scale = subvoxels as f32;
+        let mut taken = [0u32; MASK_WORDS];
+        let mut dropped = 0;
+        for Placed { at: p, offset_s } in returns {
+            let part = |v: f32| (v * scale).clamp(0.0, scale - 1.0) as usize;
+            let height = self.ground.above(column, p[2]);
+            let level = (height * scale) as usize;
+            let bit =
+                (level * subvoxels + part(p[0] - corner[0])) * subvoxels + part(p[1] - corner[1]);
+            let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
+            if *word & 1 << (bit % 32) == 0 {
+                *word |= 1 << (bit % 32);
+                let kept = self.places.len();
+                if self.places.push(p, sensor) {
+                    self.offset_s[kept] = offset_s;
+                    self.levels[column] |= 1 << height as u32;
+                } else {
+                    dropped += 1;
                 }
             }
         }
-        start[columns_used] = self.places.len() as u32;
-        self.weights[..self.places.len()].fill_with(Memo::unknown);
         dropped
     }
 
     /// Levels of a column in which something was hit, a bit each.
-    pub fn levels(&self, column: usize) -> u16 {
+    pub fn levels(&self, column: usize) -> u32 {
         self.levels[column]
     }
 
@@ -206,7 +214,8 @@ impl Cloud {
         }
         let column = at[0] as usize * self.side + at[1] as usize;
         let height = self.ground.above(column, at[2]);
-        (0.0..LEVELS_MAX as f32).contains(&height) && self.levels[column] >> height as u32 & 1 != 0
+        let in_levels = (0.0..CLUSTER_LEVELS_MAX as f32).contains(&height);
+        in_levels && self.levels[column] >> height as u32 & 1 != 0
     }
 
     /// Indices of the thinned returns in a column.
@@ -220,9 +229,15 @@ impl Cloud {
         self.start[row + j_from] as usize..self.start[row + j_to] as usize
     }
 
-    /// The nearest return of a sensor closer than a voxel's edge to `at`: its squared distance
-    /// (voxels²) and itself; of two as near one, always the same. One closer than `enough` will do.
-    pub fn nearest(&self, at: [f32; 3], sensor: u32, enough: f32) -> Option<(f32, Sample)> {
+    /// The nearest return of a sensor closer than `reach` to `at`, 1 at most: its squared distance
+    /// (voxels²) and itself; of several as near, always the same. The first one found within `enough`
+    /// will do.
+    pub fn nearest(
+        &self,
+        at: [f32; 3],
+        sensor: u32,
+        [reach, enough]: [f32; 2],
+    ) -> Option<(f32, Sample)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
         if !(near(at[0]) && near(at[1])) {
@@ -231,7 +246,7 @@ impl Cloud {
         // One beyond the window on either side would still have neighbours inside.
         let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
-        let (mut least, mut best) = (1.0, None);
+        let (mut least, mut best) = (reach * reach, None);
         let (in_row, in_column) = (at[0] + 1.0 - i as f32, at[1] + 1.0 - j as f32);
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
@@ -261,26 +276,14 @@ impl Cloud {
         Sample { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
     }
 
-    /// What the returns around a return tell about the surface it lies on.
-    pub fn weight(&self, n: u32) -> Weight {
+    /// What the returns of its sensor around a return tell about the surface it lies on.
+    pub fn weight(&self, scaled: &Scaled, n: u32) -> SurfaceWeight {
         let n = n as usize;
-        self.weights[n].get(|| self.surface(self.places.at(n), self.places.sensor(n)))
+        self.weights[n].get(|| surface::weight(scaled, |radius| self.sums_around(n, radius)))
     }
 
-    /// Inverse covariance of the returns around a place and of their noise, relative to the noise's.
-    fn surface(&self, at: [f32; 3], sensor: u32) -> Weight {
-        let mut spread = self.spread(at, sensor, AROUND[0]);
-        if across(&spread) < LINE {
-            spread = self.spread(at, sensor, AROUND[1]);
-        }
-        // Positive definite by the noise.
-        let noise = Matrix3::from_diagonal_element(NOISE * NOISE);
-        let w = (spread + noise).try_inverse().unwrap_or_default() * (NOISE * NOISE);
-        [w[(0, 0)], w[(0, 1)], w[(0, 2)], w[(1, 1)], w[(1, 2)], w[(2, 2)]]
-    }
-
-    /// Covariance of the returns of a sensor around a place, voxels².
-    fn spread(&self, at: [f32; 3], sensor: u32, radius: f32) -> Matrix3<f32> {
+    fn sums_around(&self, n: usize, radius: f32) -> [f32; 10] {
+        let (at, sensor) = (self.places.at(n), self.places.sensor(n));
         let [i, j] = [at[0] as usize, at[1] as usize];
         let reach = radius as usize;
         let mut sums = [0.0; 10];
@@ -288,36 +291,6 @@ impl Cloud {
             let row = self.row(a, j.saturating_sub(reach), (j + reach + 1).min(self.side));
             self.places.add_around(row, at, sensor, radius, &mut sums);
         }
-        let [n, x, y, z, square @ ..] = sums;
-        let [x, y, z] = [x, y, z].map(|m| m / n);
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
-        Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-    }
-}
-
-/// Variance across the longest direction, voxels²: the middle eigenvalue where the least is small.
-fn across(spread: &Matrix3<f32>) -> f32 {
-    let minor =
-        |a: usize, b: usize| spread[(a, a)] * spread[(b, b)] - spread[(a, b)] * spread[(b, a)];
-    let trace = spread.trace();
-    if trace > 0.0 { (minor(0, 1) + minor(0, 2) + minor(1, 2)) / trace } else { 0.0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_line_is_told_from_a_surface() {
-        let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1);
-        let turned = |variances: [f32; 3]| {
-            let spread = Matrix3::from_diagonal(&variances.into());
-            across(&(turn * spread * turn.inverse()))
-        };
-        // One ring with its noise, two rings 0.3 m apart, a single return.
-        assert!(turned([0.5, 0.005, 0.005]) < LINE);
-        assert!(turned([0.5, 0.25, 0.005]) > LINE);
-        assert!(turned([0.0; 3]) < LINE);
+        sums
     }
 }

@@ -1,24 +1,23 @@
-//! Where a thing may have gone if nothing else tells: every displacement within reach, by voxels.
+//! Where a cluster may have gone if nothing else tells: every displacement within reach, by voxels.
 
-use super::align::Thing;
+use super::cluster::Cluster;
 
-/// Displacements searched either way, voxels: 30 m/s at 0.30 m and 10 Hz.
-const FARTHEST: i32 = 10;
-
-/// The displacement that puts most of the thing's returns on returns of the newest sweep; what
-/// stood there before counts half. The first of those as good.
-pub fn search(thing: &Thing) -> [f32; 2] {
-    let other = &thing.sweeps.others[0];
+/// The displacement that puts most of the cluster's returns on returns of the second sweep; what was
+/// occupied before counts half. The first of those as good.
+pub fn search(cluster: &Cluster) -> [f32; 2] {
+    let scans = &cluster.scans;
+    let target = &scans.targets[0];
+    let reach = scans.scaled.search_reach(scans.span_s);
     let mut best = (0, [0.0; 2]);
-    for du in -FARTHEST..=FARTHEST {
-        for dv in -FARTHEST..=FARTHEST {
+    for du in -reach..=reach {
+        for dv in -reach..=reach {
             let by = [du as f32, dv as f32];
             let mut score = 0;
-            for s in &thing.samples {
+            for s in &cluster.samples {
                 let at = [s.at[0] + by[0], s.at[1] + by[1], s.at[2]];
-                let there = core::array::from_fn(|a| at[a] + other.offset[a]);
-                if other.cloud.is_hit(there) {
-                    score += 2 - thing.sweeps.first.is_hit(at) as u32;
+                let there = core::array::from_fn(|a| at[a] + target.offset[a]);
+                if target.cloud.is_hit(there) {
+                    score += 2 - scans.first.is_hit(at) as u32;
                 }
             }
             if score > best.0 {

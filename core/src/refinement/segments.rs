@@ -1,14 +1,11 @@
-//! Things: columns of the first sweep that touch and may move together.
+//! Segmentation: columns of the first sweep that touch and may move together are one cluster.
 
-use super::cloud::Cloud;
+use super::scans::Scans;
 use crate::groups::Groups;
 use crate::params::COLUMNS_MAX;
 use crate::record::{Flow, VALID, flow_displacement};
 
-/// Matched neighbours that differ by more cells than this do not touch.
-const DIFFERENT: i32 = 2;
-
-/// Groups of columns.
+/// Connected components of columns.
 pub struct Segments(Groups<COLUMNS_MAX>);
 
 impl Segments {
@@ -16,23 +13,23 @@ impl Segments {
         Segments(Groups::new())
     }
 
-    /// Segments of the columns of a cloud that may be `part` of any. `flow` tells the flow of a
-    /// column, as far as there is one.
+    /// Finds the segments of those columns of the first sweep that may be `part` of any. `flow` tells
+    /// the match of a column, if there is one.
     pub(super) fn find(
         &mut self,
-        cloud: &Cloud,
+        scans: &Scans,
         part: impl Fn(usize) -> bool,
         flow: impl Fn(usize) -> Flow,
     ) {
-        let side = cloud.side;
+        let (cloud, side) = (scans.first, scans.first.side);
+        let disparity_max = scans.scaled.params.cluster_disparity_cells;
         self.0.start(side * side, |c| cloud.levels(c) != 0 && part(c));
         for c in 0..side * side {
-            let near = cloud.levels(c);
             if !self.0.contains(c) {
                 continue;
             }
-            let near = near | near << 1 | near >> 1;
-            let near = near | near << 1 | near >> 1;
+            let gap = 0..scans.scaled.gap_levels;
+            let near = gap.fold(cloud.levels(c), |near, _| near | near << 1 | near >> 1);
             let (i, j) = (c / side, c % side);
             // The four neighbours before it in scan order.
             for (di, dj) in [(1, 1), (1, 0), (1, -1), (0, 1)] {
@@ -43,7 +40,7 @@ impl Segments {
                 let other = (i - di) * side + b as usize;
                 if self.0.contains(other)
                     && cloud.levels(other) & near != 0
-                    && together(flow(c), flow(other))
+                    && disparity(flow(c), flow(other)) <= disparity_max
                 {
                     self.0.join(c as u32, other as u32);
                 }
@@ -63,11 +60,11 @@ impl Segments {
     }
 }
 
-/// Whether two flows may be those of one thing.
-fn together(a: Flow, b: Flow) -> bool {
+/// By how many cells two matches differ along an axis, 0 where one is missing.
+fn disparity(a: Flow, b: Flow) -> u32 {
     if a & b & VALID == 0 {
-        return true;
+        return 0;
     }
     let (a, b) = (flow_displacement(a), flow_displacement(b));
-    (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) <= DIFFERENT
+    a[0].abs_diff(b[0]).max(a[1].abs_diff(b[1]))
 }

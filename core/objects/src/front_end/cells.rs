@@ -3,7 +3,11 @@
 use super::batch::{Batch, Seen};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
 use raywake_core::ground::Ground;
-use raywake_core::params::{COLUMNS_MAX, POINTS_MAX};
+use raywake_core::params::{COLUMNS_MAX, GroundParams, POINTS_MAX};
+
+/// Ground in cells of five columns.
+const GROUND: GroundParams =
+    GroundParams { ground_cell_m: 2.0, ground_drop_m: 0.6, ..GroundParams::DEFAULT };
 
 /// Heights of the ground on a grid of square cells, made beforehand.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +98,8 @@ impl Cells {
     fn find_ground(&mut self, batch: &Batch, map: Option<&GroundMap>) {
         let cells = batch.returns.iter().map(|s| (s.cell(), s.at.map(|v| v / CELL_M)));
         let middle = 0.5 * SIDE as f32;
-        self.ground.estimate(SIDE, [middle, middle, 0.0], cells);
+        let under = [middle, middle, 0.0];
+        self.ground.estimate(&GROUND, f64::from(CELL_M), SIDE, under, cells);
         for cell in 0..CELLS {
             let centre = |n: usize| (n as f64 + 0.5) * CELL_M as f64;
             let at = [batch.corner.x + centre(cell / SIDE), batch.corner.y + centre(cell % SIDE)];

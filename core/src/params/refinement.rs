@@ -1,0 +1,148 @@
+//! Parameters of the refinement and of the ground it stands on.
+
+/// What the constants of the refinement were chosen on, unless they say more.
+const SIMULATED: &str = "Chosen on six simulated drives (`raywake-lab sim --drives 6 --sweeps 40 \
+                         --seed 1100`), not measured on its own.";
+/// The same of the spread of covariances.
+const CALIBRATED: &str = "Chosen on sixty simulated drives so that the 68 % and 95 % ellipses hold \
+                          75.5 % and 90.4 % of the true displacements.";
+
+crate::params! {
+    /// How the ground is found, see [`crate::ground`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct GroundParams {
+        /// Edge of the square cells that have a ground height each; rounded to whole columns, and
+        /// at least four of them.
+        pub ground_cell_m: f64 = 1.5, "m", (0.1 to 20), SIMULATED;
+        /// How far below the vehicle's ground other ground may begin; lower returns are mirrored.
+        pub ground_drop_m: f64 = 0.45, "m", (0 to 10), SIMULATED;
+        /// How much farther below it may lie per metre of distance.
+        pub ground_drop_slope: f32 = 0.1, "", (0 to 10), SIMULATED;
+        /// Steepest descent of the ground from a cell to the next.
+        pub ground_fall_slope: f64 = 0.066, "", (0 to 10), SIMULATED;
+        /// How many cells the ground is extrapolated: behind a car nothing is seen of it.
+        pub ground_passes: u32 = 3, "cells", (0 to 20), SIMULATED;
+    }
+}
+
+crate::params! {
+    /// The refinement's numbers, see [`crate::refinement`].
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct RefinementParams {
+        /// Returns lower above the ground than this belong to it, in any column.
+        pub ground_height_m: f64 = 0.105, "m", (0 to 2), SIMULATED;
+        /// Returns higher above the ground than this belong to clusters.
+        pub cluster_height_min_m: f64 = 0.18, "m", (0 to 2), SIMULATED;
+        /// Returns from this height on belong to none; at most 32 voxels count.
+        pub cluster_height_max_m: f64 = 4.2, "m", (0.5 to 64), SIMULATED;
+        /// Edge of the sub-voxels that keep one return each; a voxel is divided in at most four.
+        pub thinning_m: f64 = 0.10, "m", (0.01 to 2), SIMULATED;
+        /// Levels so far apart still touch, as parts of one cluster.
+        pub cluster_gap_m: f64 = 0.6, "m", (0 to 10), SIMULATED;
+        /// Matched neighbours whose displacements differ by more are two clusters.
+        pub cluster_disparity_cells: u32 = 2, "cells", (0 to 30), SIMULATED;
+        /// Larger clusters are static.
+        pub cluster_extent_max_m: f64 = 30.0, "m", (1 to 1000), "The longest trams.";
+
+        /// Radius around a return in which others tell the orientation of its surface.
+        pub surface_radius_m: f64 = 0.45, "m", (0.01 to 5), SIMULATED;
+        /// The same where those lie on a line, as of one ring on a bonnet.
+        pub surface_radius_wide_m: f64 = 0.75, "m", (0.01 to 5), SIMULATED;
+        /// Returns whose variance across their longest direction is less lie on a line.
+        pub surface_line_m2: f64 = 0.0045, "m²", (0 to 1),
+            "A ring with its noise is below, two rings 0.3 m apart above.";
+        /// Standard deviation of a return.
+        pub return_sigma_m: f64 = 0.045, "m", (0.001 to 1), SIMULATED;
+
+        /// Farthest nearest neighbour, at most a voxel's edge.
+        pub match_distance_m: f64 = 0.30, "m", (0.01 to 2), SIMULATED;
+        /// Width of the Geman-McClure kernel in the first iterations.
+        pub kernel_wide_m: f64 = 0.30, "m", (0.01 to 5), SIMULATED;
+        /// Its width in those that follow.
+        pub kernel_m: f64 = 0.105, "m", (0.01 to 5), SIMULATED;
+        /// Iterations with the wide kernel, at most.
+        pub iterations_wide: u32 = 3, "", (0 to 100), SIMULATED;
+        /// Gauss-Newton iterations, at most.
+        pub iterations: u32 = 8, "", (1 to 100), SIMULATED;
+        /// A step that moves by less is the last with its kernel; a turn counts as what it moves at
+        /// one voxel's distance.
+        pub converged_m: f64 = 0.003, "m", (0 to 1), SIMULATED;
+        /// Share of the information of a pair of returns that is its own: neighbours err alike.
+        pub information_ratio: f32 = 0.25, "", (0.001 to 1), CALIBRATED;
+        /// Standard deviation of the turn between two sweeps.
+        pub turn_sigma_rad: f32 = 0.03, "rad", (0.0001 to 10), SIMULATED;
+        /// Standard deviation of the prior that holds a displacement where nothing is near.
+        pub hold_sigma_m: f64 = 9.486833, "m", (0.01 to 1000), SIMULATED;
+
+        /// A return within this distance fits.
+        pub inlier_m: f64 = 0.045, "m", (0.001 to 2), SIMULATED;
+        /// Truncation of the residual: a return farther off than this across its surface is missed.
+        pub truncation_m: f64 = 0.15, "m", (0.001 to 2), SIMULATED;
+
+        /// A cluster with so low a residual at rest is static without further test.
+        pub residual_static: f32 = 0.08, "", (0 to 1), SIMULATED;
+        /// A start that leads to so low a residual is the last.
+        pub residual_good: f32 = 0.05, "", (0 to 1), SIMULATED;
+        /// A residual above this is a bad fit: it calls for a search, and for twice the evidence.
+        pub residual_bad: f32 = 0.3, "", (0 to 1), SIMULATED;
+        /// Evidence against rest from which on a cluster is dynamic, see [`crate::refinement`].
+        pub evidence_min: f32 = 0.12, "", (0 to 1), SIMULATED;
+        /// Difference in evidence that makes motion e times likelier.
+        pub evidence_scale: f32 = 0.04, "", (0.0001 to 1), CALIBRATED;
+        /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in the
+        /// last sweep, or beside one that moves.
+        pub evidence_prior_ratio: f32 = 0.4, "", (0 to 1),
+            "The least that keeps false motion in a still simulated street within its bound.";
+        /// From this length on a cluster that moved needs less, in inverse proportion: its sides
+        /// slide along themselves.
+        pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
+        /// Least displacement of what moves.
+        pub displacement_min_m: f64 = 0.039, "m", (0 to 10), SIMULATED;
+        /// Returns that a cluster needs to move by itself.
+        pub returns_min: u32 = 5, "returns", (1 to 96), SIMULATED;
+        /// Returns that it needs for a search: fewer fit anywhere.
+        pub search_returns_min: u32 = 12, "returns", (1 to 96), SIMULATED;
+        /// Speed up to which is searched, at most 15 cells from sweep to sweep.
+        pub search_speed_mps: f64 = 30.0, "m/s", (0 to 1000), SIMULATED;
+        /// Starts nearer to each other are one.
+        pub start_spacing_m: f64 = 0.225, "m", (0 to 10), SIMULATED;
+        /// A start is first tried with every k-th return.
+        pub start_stride: u32 = 3, "returns", (1 to 96), SIMULATED;
+
+        /// Mean residual at rest from which on a column may belong to a part that moves.
+        pub column_residual: f32 = 0.15, "", (0 to 1), SIMULATED;
+        /// Returns of a column that are looked at for that.
+        pub column_returns: u32 = 4, "returns", (1 to 1000), SIMULATED;
+        /// By how much the motion of a part may fit a column beside it worse than rest does.
+        pub growth_residual: f32 = 0.03, "", (0 to 1), SIMULATED;
+        /// By how much the motion of its larger part may fit the remainder of a cluster worse than
+        /// rest does.
+        pub remainder_residual: f32 = 0.05, "", (0 to 1), SIMULATED;
+        /// Share of a cluster's extent that a part must exceed to take the remainder along.
+        pub remainder_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
+        /// Share of its returns that must be visible before rest is believed.
+        pub visible_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
+        /// How far a fragment may lie from a moving cluster that takes it along.
+        pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;
+        /// How far a column of low returns may lie from a moving cluster whose edge it is.
+        pub edge_distance_m: f64 = 0.6, "m", (0 to 20), SIMULATED;
+        /// How far the match of such a column may lie from the cluster's motion.
+        pub edge_match_cells: f32 = 1.5, "cells", (0 to 30), SIMULATED;
+
+        /// Standard deviation of the displacement of what is static and fits perfectly.
+        pub static_sigma_m: f64 = 0.0075, "m", (0.0001 to 10), CALIBRATED;
+        /// The residual that doubles a variance.
+        pub inflation_residual: f32 = 0.008, "", (0.0001 to 1), CALIBRATED;
+        /// Area, range times edge of the footprint, at which the covariance of a perfect fit is kept:
+        /// a near cluster shows another side with every sweep, a small one has returns that err
+        /// alike.
+        pub confidence_m2: f64 = 0.117, "m²", (0.0001 to 1000), CALIBRATED;
+        /// Nearest range of a cluster for that: the vehicle's own sides.
+        pub range_min_m: f64 = 2.1, "m", (0.1 to 100), SIMULATED;
+        /// Standard deviation of a motion as a share of itself, however well it fits.
+        pub motion_sigma_ratio: f32 = 0.01, "", (0 to 1), CALIBRATED;
+        /// Variance of whether a static cluster moves as its column's match says.
+        pub mismatch_variance: f32 = 0.25, "", (0 to 1),
+            "p (1 - p) of two motions that are equally likely.";
+    }
+}

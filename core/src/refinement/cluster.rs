@@ -1,0 +1,174 @@
+//! A cluster and how well a motion explains its returns.
+
+use super::motion::Motion;
+use super::sample::{Mean, Sample};
+use super::scans::Scans;
+use crate::params::COLUMNS_MAX;
+
+/// Returns of a cluster that are registered, at most; as many of the second sweep are registered
+/// back. Bounds the time a cluster takes.
+pub const SAMPLES_MAX: usize = 96;
+/// Columns of the second sweep that are looked at, at most; bounds the stack.
+const TARGET_COLUMNS_MAX: usize = 1024;
+/// Residual from which on a return is rather missed than found.
+const HALF_MISSED: f32 = 0.5;
+
+pub type Samples = heapless::Vec<Sample, SAMPLES_MAX>;
+
+/// Columns that were visited, a bit each: small enough for a stack.
+pub struct VisitedColumns([u64; COLUMNS_MAX.div_ceil(64)]);
+
+impl VisitedColumns {
+    pub fn new() -> VisitedColumns {
+        VisitedColumns([0; COLUMNS_MAX.div_ceil(64)])
+    }
+
+    /// Adds a column. Returns whether it was not among them.
+    fn insert(&mut self, column: usize) -> bool {
+        let (word, bit) = (&mut self.0[column / 64], 1 << (column % 64));
+        let first = *word & bit == 0;
+        *word |= bit;
+        first
+    }
+
+    fn remove(&mut self, columns: &[u32]) {
+        columns.iter().for_each(|c| self.0[*c as usize / 64] &= !(1 << (c % 64)));
+    }
+}
+
+/// A cluster: its columns, some of its returns, and what they are registered with.
+pub struct Cluster<'a> {
+    pub scans: Scans<'a>,
+    pub columns: &'a [u32],
+    /// Every k-th of its returns.
+    pub samples: Samples,
+    /// Their mean, voxels from the first sweep's window corner.
+    pub centre: [f32; 2],
+    /// Largest extent along an axis, voxels.
+    pub extent: f32,
+}
+
+impl<'a> Cluster<'a> {
+    /// Of some columns of the first sweep.
+    pub fn new(scans: Scans<'a>, columns: &'a [u32]) -> Cluster<'a> {
+        let first = scans.first;
+        let returns = || columns.iter().flat_map(|c| first.column(*c as usize));
+        let stride = returns().count().div_ceil(SAMPLES_MAX).max(1);
+        let samples: Samples = returns().step_by(stride).map(|n| first.sample(n)).collect();
+        let count = samples.len() as f32;
+        let along = |a: usize| samples.iter().map(move |s| s.at[a]);
+        let centre = [0, 1].map(|a| along(a).sum::<f32>() / count);
+        let extent = [0, 1].map(|a| {
+            along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
+        });
+        let extent = extent[0].max(extent[1]);
+        Cluster { scans, columns, samples, centre, extent }
+    }
+
+    /// Distance from the middle of the window, where the vehicle is, voxels, but not below the least
+    /// range there is.
+    pub fn range(&self) -> f32 {
+        let middle = 0.5 * self.scans.first.side as f32;
+        let [x, y] = self.centre.map(|c| c - middle);
+        libm::sqrtf(x * x + y * y).max(self.scans.scaled.range_min)
+    }
+
+    /// Columns of the second sweep, beside those the cluster would be in, that have returns, and how
+    /// many. Of a cluster too large for the list the first columns tell enough.
+    fn target_columns(
+        &self,
+        motion: &Motion,
+        visited: &mut VisitedColumns,
+    ) -> (heapless::Vec<u32, TARGET_COLUMNS_MAX>, usize) {
+        let target = &self.scans.targets[0];
+        let side = self.scans.first.side;
+        let mut list = heapless::Vec::new();
+        let mut total = 0;
+        'columns: for &c in self.columns {
+            let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
+            let d = motion.of(at);
+            let i = (at[0] + d[0] + target.offset[0]) as i32;
+            let j = (at[1] + d[1] + target.offset[1]) as i32;
+            for a in i.saturating_sub(1).max(0)..i.saturating_add(2).min(side as i32) {
+                for b in j.saturating_sub(1).max(0)..j.saturating_add(2).min(side as i32) {
+                    let column = a as usize * side + b as usize;
+                    let n = target.cloud.column(column).len();
+                    if list.is_full() {
+                        break 'columns;
+                    }
+                    if n > 0 && visited.insert(column) {
+                        let _ = list.push(column as u32);
+                        total += n;
+                    }
+                }
+            }
+        }
+        visited.remove(&list);
+        (list, total)
+    }
+
+    /// Returns of the second sweep where the cluster would be.
+    pub fn target_samples(&self, motion: &Motion, visited: &mut VisitedColumns) -> Samples {
+        let cloud = self.scans.targets[0].cloud;
+        let (columns, total) = self.target_columns(motion, visited);
+        let returns = columns.iter().flat_map(|c| cloud.column(*c as usize));
+        let stride = total.div_ceil(SAMPLES_MAX).max(1);
+        returns.step_by(stride).map(|n| cloud.sample(n)).collect()
+    }
+
+    /// Mean truncated residual of a motion, both ways, 0 (all lie on something) to 1 (none does).
+    pub fn residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
+        let scans = &self.scans;
+        let mut mean = Mean::default();
+        for target in scans.targets {
+            for s in &self.samples {
+                mean.add(scans.dynamic_residual(s, motion, target));
+            }
+        }
+        let target = &scans.targets[0];
+        for q in &self.target_samples(motion, visited) {
+            let at = target.retrace(q, motion);
+            let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
+            let residual = scans.residual(target.cloud, q, at, found);
+            // What is static was there before.
+            if residual < HALF_MISSED || !self.was_there(q) {
+                mean.add(residual);
+            }
+        }
+        mean.value()
+    }
+
+    /// The same at rest, by what can be seen, 0 where nothing can; and the share of its returns that
+    /// can be seen in the second sweep.
+    pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
+        let scans = &self.scans;
+        let mut mean = Mean::default();
+        self.samples.iter().filter_map(|s| scans.static_residual(s)).for_each(|m| mean.add(m));
+        let visible = mean.count / self.samples.len().max(1) as f32;
+        for target in &scans.targets[1..] {
+            for s in &self.samples {
+                let at = target.predict(s, &Motion::default());
+                if let Some(found) = target.cloud.nearest(at, s.sensor, scans.reach_inlier()) {
+                    mean.add(scans.residual(scans.first, s, at, Some(found)));
+                }
+            }
+        }
+        let (still, target) = (Motion::around(self.centre), &scans.targets[0]);
+        for q in &self.target_samples(&still, visited) {
+            let at = target.retrace(q, &still);
+            let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
+            if found.is_some() || scans.is_free(scans.before, q.at) {
+                mean.add(scans.residual(target.cloud, q, at, found));
+            }
+        }
+        (mean.value(), visible)
+    }
+
+    /// Whether something was where a return of the second sweep is.
+    fn was_there(&self, q: &Sample) -> bool {
+        let at = self.scans.targets[0].retrace(q, &Motion::default());
+        let truncation = self.scans.scaled.truncation;
+        let nearest = self.scans.first.nearest(at, q.sensor, self.scans.reach_inlier());
+        nearest.is_some_and(|n| n.0 < truncation * truncation)
+    }
+}

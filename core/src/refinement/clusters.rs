@@ -1,0 +1,237 @@
+//! The clusters of a pair's first sweep: as they touch, then their moving parts, then what those
+//! take along.
+
+use super::cluster::{Cluster, VisitedColumns};
+use super::hypothesis::{self, Hypothesis, evidence};
+use super::motion::Motion;
+use super::scans::Scans;
+use super::segments::Segments;
+use crate::params::COLUMNS_MAX;
+use crate::record::{Flow, NONE, VALID};
+use crate::team::{Team, fill};
+
+/// Moving clusters near a fragment that are tried; the first ones are enough.
+const NEIGHBOURS_MAX: usize = 8;
+
+/// The clusters, and what became of them.
+pub struct Clusters {
+    segments: Segments,
+    /// Cluster of each column of the first sweep's window.
+    of_column: [u32; COLUMNS_MAX],
+    found: heapless::Vec<Hypothesis, COLUMNS_MAX>,
+    /// Columns that may be part of something that moves, a bit each.
+    suspects: [u64; COLUMNS_MAX.div_ceil(64)],
+}
+
+impl Clusters {
+    pub const fn new() -> Clusters {
+        Clusters {
+            segments: Segments::new(),
+            of_column: [0; COLUMNS_MAX],
+            found: heapless::Vec::new(),
+            suspects: [0; COLUMNS_MAX.div_ceil(64)],
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.found.clear();
+        self.of_column.fill(NONE);
+    }
+
+    /// What became of the cluster of a column.
+    pub fn of(&self, column: usize) -> Option<&Hypothesis> {
+        self.found.get(*self.of_column.get(column)? as usize)
+    }
+
+    /// What became of all of them.
+    #[cfg(test)]
+    pub fn found(&self) -> &[Hypothesis] {
+        &self.found
+    }
+
+    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` the
+    /// displacement that its tracklet predicts, voxels.
+    pub fn find(
+        &mut self,
+        team: &impl Team,
+        scans: Scans,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+    ) {
+        self.segments.find(&scans, |_| true, flow);
+        self.test_segments(team, scans, flow, predicted);
+        for (n, found) in self.found.iter_mut().enumerate() {
+            let columns = self.segments.columns(n);
+            columns.iter().for_each(|c| self.of_column[*c as usize] = n as u32);
+            found.parent = n as u32;
+        }
+        self.find_suspects(team, scans, flow);
+        let suspects = &self.suspects;
+        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_| 0);
+        let whole = self.found.len();
+        self.test_segments(team, scans, flow, predicted);
+        self.keep_moving_parts(scans, whole);
+        self.take_along(scans);
+    }
+
+    /// Appends the best motion of each segment to what was found.
+    fn test_segments(
+        &mut self,
+        team: &impl Team,
+        scans: Scans,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+    ) {
+        let before = self.found.len();
+        // Parts are of what is static, and few: there is room.
+        let all = (before + self.segments.len()).min(COLUMNS_MAX);
+        let _ = self.found.resize(all, Hypothesis::default());
+        fill(team, 0, &mut self.found[before..], &|n| {
+            let cluster = Cluster::new(scans, self.segments.columns(n));
+            hypothesis::test(&cluster, flow, predicted, &mut VisitedColumns::new())
+        });
+    }
+
+    /// A static cluster may have a part that moves: columns with a match that fit badly at rest.
+    fn find_suspects(
+        &mut self,
+        team: &impl Team,
+        scans: Scans,
+        flow: impl Fn(usize) -> Flow + Copy + Sync,
+    ) {
+        let residual_max = scans.scaled.params.column_residual;
+        let suspect = |c: usize| {
+            is_static(&self.of_column, &self.found, c)
+                && flow(c) & VALID != 0
+                && scans.column_residual(c, |s| scans.static_residual(s)) > residual_max
+        };
+        let columns = scans.first.side * scans.first.side;
+        fill(team, 0, &mut self.suspects[..columns.div_ceil(64)], &|word| {
+            let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
+            bits.fold(0, |bits, (n, c)| bits | u64::from(suspect(c)) << n)
+        });
+    }
+
+    /// Keeps those parts, from the index `whole` on, that move, and grows them.
+    fn keep_moving_parts(&mut self, scans: Scans, whole: usize) {
+        let mut kept = whole;
+        for n in whole..self.found.len() {
+            let found = self.found[n];
+            if found.is_dynamic {
+                let columns = self.segments.columns(n - whole);
+                let (id, parent) = (kept as u32, self.of_column[columns[0] as usize]);
+                columns.iter().for_each(|c| self.of_column[*c as usize] = id);
+                for &c in columns {
+                    grow(scans, c as usize, &found.motion, [parent, id], &mut self.of_column);
+                }
+                self.found[kept] = Hypothesis { parent, ..found };
+                kept += 1;
+            }
+        }
+        self.found.truncate(kept);
+    }
+
+    /// What remains of a cluster with a moving part, and fragments beside others that move, go with
+    /// these where they fit.
+    fn take_along(&mut self, scans: Scans) {
+        let visited = &mut VisitedColumns::new();
+        self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_| 0);
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            let near = self.moving_neighbours(scans, columns);
+            if near.is_empty() {
+                continue;
+            }
+            let cluster = Cluster::new(scans, columns);
+            if cluster.extent > scans.scaled.extent_max {
+                continue;
+            }
+            if let Some(with) = self.joined(&cluster, &near, visited) {
+                columns.iter().for_each(|c| self.of_column[*c as usize] = with);
+            }
+        }
+    }
+
+    /// Which of some moving clusters a fragment goes with.
+    fn joined(
+        &self,
+        fragment: &Cluster,
+        near: &[u32],
+        visited: &mut VisitedColumns,
+    ) -> Option<u32> {
+        let params = &fragment.scans.scaled.params;
+        let (rest, visible) = fragment.static_residual(visited);
+        let parent = self.of_column[fragment.columns[0] as usize];
+        let extent_min = params.remainder_ratio * self.found[parent as usize].extent;
+        let mut best = (1.0, None);
+        for m in near {
+            let found = &self.found[*m as usize];
+            let residual = fragment.residual(&found.motion, visited);
+            let is_remainder = found.parent == parent && found.extent > extent_min;
+            let hidden = visible < params.visible_ratio && residual < params.residual_bad;
+            let joins = evidence(rest, residual)
+                > params.evidence_min * params.evidence_prior_ratio
+                || hidden
+                || is_remainder && residual < rest + params.remainder_residual;
+            if joins && residual < best.0 {
+                best = (residual, Some(*m));
+            }
+        }
+        best.1
+    }
+
+    /// Moving clusters near a fragment.
+    fn moving_neighbours(
+        &self,
+        scans: Scans,
+        columns: &[u32],
+    ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
+        let (side, reach) = (scans.first.side, scans.scaled.fragment_distance);
+        let mut near = heapless::Vec::new();
+        for &c in columns {
+            let (i, j) = (c as usize / side, c as usize % side);
+            for a in i.saturating_sub(reach)..(i + reach + 1).min(side) {
+                for b in j.saturating_sub(reach)..(j + reach + 1).min(side) {
+                    let other = self.of_column[a * side + b];
+                    let moves = self.found.get(other as usize).is_some_and(|f| f.is_dynamic);
+                    if moves && !near.contains(&other) {
+                        // Beyond the capacity: the first ones are enough.
+                        let _ = near.push(other);
+                    }
+                }
+            }
+        }
+        near
+    }
+}
+
+/// Whether a column is part of a cluster that is static.
+fn is_static(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
+    found.get(of_column[column] as usize).is_some_and(|f| !f.is_dynamic)
+}
+
+/// Gives columns of the `parent` beside one of its moving part to that if their returns fit its motion
+/// about as well as rest.
+fn grow(
+    scans: Scans,
+    column: usize,
+    motion: &Motion,
+    [parent, part]: [u32; 2],
+    of_column: &mut [u32],
+) {
+    let (side, target) = (scans.first.side, &scans.targets[0]);
+    let (i, j) = (column / side, column % side);
+    for a in i.saturating_sub(1)..(i + 2).min(side) {
+        for b in j.saturating_sub(1)..(j + 2).min(side) {
+            let beside = a * side + b;
+            if of_column[beside] == parent {
+                let moved = scans
+                    .column_residual(beside, |s| Some(scans.dynamic_residual(s, motion, target)));
+                let rest = scans.column_residual(beside, |s| scans.static_residual(s));
+                if moved < rest + scans.scaled.params.growth_residual {
+                    of_column[beside] = part;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Static or dynamic: the motion that explains a cluster best, against rest.
+
+use super::cluster::{Cluster, VisitedColumns};
+use super::motion::Motion;
+use super::scaled::Scaled;
+use super::search::search;
+use super::starts::{Votes, mean};
+use crate::record::Flow;
+
+/// Displacements that many columns voted for, tried as starts. A choice of time: each start costs a
+/// registration.
+const VOTED_STARTS: usize = 3;
+/// Beside them: rest, the prediction and the search.
+const STARTS_MAX: usize = VOTED_STARTS + 3;
+/// A motion that fits badly is left to the parts of its cluster unless it has this many times the
+/// evidence.
+const BAD_FIT_EVIDENCE: f32 = 2.0;
+
+/// What became of a cluster.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hypothesis {
+    /// The motion that explains it best.
+    pub motion: Motion,
+    /// Whether it moved so, or was static.
+    pub is_dynamic: bool,
+    /// Variance of whether it did: p (1 - p) where p is how likely that is.
+    pub variance: f32,
+    /// Residual at rest.
+    pub static_residual: f32,
+    /// Largest extent along an axis, voxels.
+    pub extent: f32,
+    /// The cluster it is a part of, or itself.
+    pub parent: u32,
+}
+
+/// Evidence for a motion against rest, by the residuals of both: 0 to 1.
+pub fn evidence(rest: f32, moved: f32) -> f32 {
+    if moved < rest { (1.0 - moved / rest) * libm::sqrtf(rest - moved) } else { 0.0 }
+}
+
+/// By how much more uncertain a motion is than its returns say, for how badly it fits them.
+pub fn variance_inflation(scaled: &Scaled, residual: f32) -> f32 {
+    let ratio = residual / scaled.params.inflation_residual;
+    1.0 + ratio * ratio
+}
+
+/// Whether two displacements are one start.
+fn is_same(scaled: &Scaled, a: &[f32; 2], b: [f32; 2]) -> bool {
+    (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) < scaled.start_spacing
+}
+
+/// The best motion so far.
+struct Trials<'a> {
+    cluster: &'a Cluster<'a>,
+    visited: &'a mut VisitedColumns,
+    tried: heapless::Vec<[f32; 2], STARTS_MAX>,
+    residual: f32,
+    motion: Motion,
+}
+
+impl Trials<'_> {
+    /// Registers the cluster from a start, with few returns, and with all of them where that leads to
+    /// a better fit than the best so far.
+    fn start(&mut self, by: [f32; 2]) {
+        let (cluster, scaled) = (self.cluster, self.cluster.scans.scaled);
+        if self.tried.iter().any(|t| is_same(scaled, t, by)) {
+            return;
+        }
+        // There is room for every start.
+        let _ = self.tried.push(by);
+        let start = Motion::around(cluster.centre).displaced(by);
+        let motion = cluster.align(start, scaled.params.start_stride as usize, self.visited);
+        if cluster.residual(&motion, self.visited) < self.residual {
+            let motion = cluster.align(motion, 1, self.visited);
+            let residual = cluster.residual(&motion, self.visited);
+            if residual < self.residual {
+                (self.residual, self.motion) = (residual, motion);
+            }
+        }
+    }
+
+    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search.
+    fn run(&mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) {
+        let cluster = self.cluster;
+        let params = &cluster.scans.scaled.params;
+        self.start([0.0; 2]);
+        if let Some(by) = predicted {
+            self.start(by);
+        }
+        let mut votes = Votes::new(cluster.columns.iter().map(|c| flow(*c as usize)));
+        for _ in 0..VOTED_STARTS {
+            let wanted = self.residual > params.residual_good;
+            let Some(by) = votes.take_mode().filter(|_| wanted) else { break };
+            self.start(by);
+        }
+        let enough = cluster.samples.len() >= params.search_returns_min as usize;
+        if self.residual > params.residual_bad && enough {
+            self.start(search(cluster));
+        }
+    }
+}
+
+/// Tests whether a cluster is dynamic. `predicted` is the displacement, voxels, that the tracklet of
+/// a column predicts, `flow` the match of a column.
+pub fn test(
+    cluster: &Cluster,
+    flow: impl Fn(usize) -> Flow,
+    predicted: impl Fn(usize) -> Option<[f32; 2]>,
+    visited: &mut VisitedColumns,
+) -> Hypothesis {
+    let scaled = cluster.scans.scaled;
+    let params = &scaled.params;
+    let static_residual = cluster.static_residual(visited).0;
+    let found = Hypothesis { static_residual, extent: cluster.extent, ..Hypothesis::default() };
+    let least = scaled.displacement_min;
+    let predicted = mean(cluster.columns.iter().filter_map(|c| predicted(*c as usize)));
+    let predicted = predicted.filter(|by| by[0] * by[0] + by[1] * by[1] > least * least);
+    let prior_ratio =
+        params.evidence_prior_ratio * (scaled.evidence_length / cluster.extent).min(1.0);
+    let ease = if predicted.is_some() { prior_ratio } else { 1.0 };
+    if static_residual < params.residual_static * ease || cluster.extent > scaled.extent_max {
+        return found;
+    }
+    let tried = heapless::Vec::new();
+    let motion = Motion::around(cluster.centre);
+    let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
+    trials.run(predicted, flow);
+    let Trials { residual, motion, .. } = trials;
+    let as_predicted =
+        predicted.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
+    let needed = params.evidence_min;
+    decide(
+        cluster,
+        found,
+        motion,
+        residual,
+        if as_predicted { needed * prior_ratio } else { needed },
+    )
+}
+
+/// Whether a motion is believed, which takes `needed` evidence, and how uncertain it is.
+fn decide(
+    cluster: &Cluster,
+    found: Hypothesis,
+    motion: Motion,
+    residual: f32,
+    needed: f32,
+) -> Hypothesis {
+    let scaled = cluster.scans.scaled;
+    let params = &scaled.params;
+    let evidence = evidence(found.static_residual, residual);
+    let fits = residual < params.residual_bad;
+    let convinces = evidence > if fits { needed } else { BAD_FIT_EVIDENCE * needed };
+    let likely = 1.0 / (1.0 + libm::expf((needed - evidence) / params.evidence_scale));
+    let footprint = libm::sqrtf(cluster.columns.len() as f32);
+    let confidence = scaled.confidence / (cluster.range() * footprint);
+    let covariance = motion.covariance * (confidence * variance_inflation(scaled, residual));
+    Hypothesis {
+        is_dynamic: convinces
+            && motion.delta.xy().norm() > scaled.displacement_min
+            && cluster.samples.len() >= params.returns_min as usize,
+        variance: likely * (1.0 - likely),
+        motion: Motion { covariance, ..motion },
+        ..found
+    }
+}

@@ -1,0 +1,47 @@
+//! How a column moved, and how certain that is.
+
+use super::hypothesis::{Hypothesis, variance_inflation};
+use super::scaled::Scaled;
+
+/// How a column moved over the pair, voxels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Refined {
+    /// Displacement; zero where it is static.
+    pub by: [f32; 2],
+    /// Its covariance (xx, xy, yy).
+    pub covariance: [f32; 3],
+    /// Whether it is part of a cluster that moves.
+    pub moves: bool,
+}
+
+impl Refined {
+    /// As part of a cluster.
+    pub fn of(scaled: &Scaled, cluster: &Hypothesis, at: [f32; 2]) -> Refined {
+        let by = cluster.motion.of(at);
+        let ratio = scaled.params.motion_sigma_ratio;
+        let variance = cluster.variance + if cluster.is_dynamic { ratio * ratio } else { 0.0 };
+        let own = match cluster.is_dynamic {
+            true => Refined { by, covariance: cluster.motion.covariance_of(at), moves: true },
+            false => Refined::at_rest(scaled, cluster.static_residual),
+        };
+        own.with_alternative(by, variance)
+    }
+
+    /// As one of two motions `by` apart, of which one is right: so large is the variance of which.
+    fn with_alternative(self, [x, y]: [f32; 2], variance: f32) -> Refined {
+        let apart = [x * x, x * y, y * y];
+        let covariance = [0, 1, 2].map(|n| self.covariance[n] + variance * apart[n]);
+        Refined { covariance, ..self }
+    }
+
+    /// As static although its column's match, cells, may say otherwise.
+    pub fn despite(self, scaled: &Scaled, matched: Option<[f32; 2]>) -> Refined {
+        self.with_alternative(matched.unwrap_or_default(), scaled.params.mismatch_variance)
+    }
+
+    pub fn at_rest(scaled: &Scaled, residual: f32) -> Refined {
+        let sigma = scaled.static_sigma;
+        let variance = sigma * sigma * variance_inflation(scaled, residual);
+        Refined { by: [0.0; 2], covariance: [variance, 0.0, variance], moves: false }
+    }
+}

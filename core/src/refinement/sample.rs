@@ -1,0 +1,47 @@
+//! A return as it is registered, and what it tells of its surface.
+
+/// Information on the surface a return lies on, the upper half of a symmetric matrix: the inverse
+/// covariance of the returns around it and of their noise, relative to the noise's. 1 across a
+/// surface, little along it: point-to-plane without a plane to fit (generalised ICP).
+pub type SurfaceWeight = [f32; 6];
+
+/// A return of a cluster.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Voxels from the window's corner of its sweep.
+    pub at: [f32; 3],
+    /// Sensor that saw it.
+    pub sensor: u32,
+    /// When, s after the stamp of its sweep.
+    pub offset_s: f32,
+    /// Its index in the cloud of its sweep.
+    pub index: u32,
+}
+
+/// Squared distance across the surface, voxels².
+pub fn squared_distance(weight: &SurfaceWeight, [x, y, z]: [f32; 3]) -> f32 {
+    let [xx, xy, xz, yy, yz, zz] = *weight;
+    x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z
+}
+
+pub fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// A running mean, 0 of nothing.
+#[derive(Default)]
+pub struct Mean {
+    sum: f32,
+    pub count: f32,
+}
+
+impl Mean {
+    pub fn add(&mut self, value: f32) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    pub fn value(&self) -> f32 {
+        self.sum / self.count.max(1.0)
+    }
+}

@@ -1,0 +1,133 @@
+//! The sweeps that clusters are registered with, and the residual of one return.
+
+use super::cloud::Cloud;
+use super::motion::Motion;
+use super::sample::{Mean, Sample, minus, squared_distance};
+use super::scaled::Scaled;
+use crate::params::{LEVELS_MAX, REFINEMENT_SWEEPS_MAX};
+use crate::record::Column;
+
+/// Sweeps that a cluster is registered with, at most.
+pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX - 1;
+
+/// A sweep that clusters are registered with: where its window lies seen from the first sweep's, and
+/// how much of the motion over the pair has happened from stamp to stamp.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    pub index: usize,
+    pub cloud: &'a Cloud,
+    pub offset: [f32; 3],
+    pub share: f32,
+}
+
+impl Target<'_> {
+    /// How much of a motion over the pair has happened when a cluster is seen in this sweep.
+    pub fn share(&self, motion: &Motion) -> f32 {
+        self.share + motion.delay[self.index]
+    }
+
+    /// Where a return of the first sweep is seen in this one, voxels of this one's window.
+    pub fn predict(&self, s: &Sample, motion: &Motion) -> [f32; 3] {
+        let d = motion.of([s.at[0], s.at[1]]);
+        let share = self.share(motion);
+        [
+            s.at[0] + share * d[0] + self.offset[0],
+            s.at[1] + share * d[1] + self.offset[1],
+            s.at[2] + self.offset[2],
+        ]
+    }
+
+    /// Where a return of this sweep was, voxels of the first sweep's window.
+    pub fn retrace(&self, q: &Sample, motion: &Motion) -> [f32; 3] {
+        let share = self.share(motion);
+        let at = minus(q.at, self.offset);
+        let d = motion.of([at[0] - share * motion.delta.x, at[1] - share * motion.delta.y]);
+        [at[0] - share * d[0], at[1] - share * d[1], at[2]]
+    }
+}
+
+/// What clusters are registered with.
+#[derive(Clone, Copy)]
+pub struct Scans<'a> {
+    pub scaled: &'a Scaled,
+    /// The pair's first sweep, which the clusters are of.
+    pub first: &'a Cloud,
+    /// The pair's second sweep, then earlier ones.
+    pub targets: &'a [Target<'a>],
+    /// Columns of the first sweep in the second's window.
+    pub before: &'a [Column],
+    /// Columns of the second sweep.
+    pub now: &'a [Column],
+    /// From the pair's first stamp to the second, s.
+    pub span_s: f64,
+}
+
+impl Scans<'_> {
+    /// Whether rays passed through the voxel of a place of the second sweep's window, and none ended
+    /// there: what was there is gone, or has come.
+    pub fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {
+        let side = self.first.side as f32;
+        let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
+        let in_levels = at[2] >= 0.0 && at[2] < LEVELS_MAX as f32;
+        inside
+            && in_levels
+            && columns[at[0] as usize * self.first.side + at[1] as usize][0] >> at[2] as u32 & 1
+                != 0
+    }
+
+    /// Truncated residual of a return of the cloud `of` against what was found at the place it is
+    /// predicted to be, 0 to 1: whatever is missed counts the same.
+    pub fn residual(
+        &self,
+        of: &Cloud,
+        s: &Sample,
+        at: [f32; 3],
+        found: Option<(f32, Sample)>,
+    ) -> f32 {
+        let Some((d2, q)) = found else { return 1.0 };
+        let Scaled { inlier, truncation, .. } = *self.scaled;
+        // So near that the surface hardly matters.
+        if d2 < inlier * inlier {
+            return 0.0;
+        }
+        let weight = of.weight(self.scaled, s.index);
+        (squared_distance(&weight, minus(q.at, at)) / (truncation * truncation)).min(1.0)
+    }
+
+    /// Residual of a return of the first sweep in a target sweep, if it moved.
+    pub fn dynamic_residual(&self, s: &Sample, motion: &Motion, target: &Target) -> f32 {
+        let at = target.predict(s, motion);
+        self.residual(self.first, s, at, target.cloud.nearest(at, s.sensor, self.reach_inlier()))
+    }
+
+    /// Residual of a return of the first sweep in the second, if it was static: nothing where it
+    /// cannot be seen.
+    pub fn static_residual(&self, s: &Sample) -> Option<f32> {
+        let target = &self.targets[0];
+        let at = target.predict(s, &Motion::default());
+        let found = target.cloud.nearest(at, s.sensor, self.reach_inlier());
+        let visible = found.is_some() || self.is_free(self.now, at);
+        visible.then(|| self.residual(self.first, s, at, found))
+    }
+
+    /// Mean residual of some returns of a column, 0 where it cannot be told.
+    pub fn column_residual(&self, column: usize, residual: impl Fn(&Sample) -> Option<f32>) -> f32 {
+        let returns = self.first.column(column);
+        let looked_at = self.scaled.params.column_returns as usize;
+        let stride = returns.len().div_ceil(looked_at).max(1);
+        let mut mean = Mean::default();
+        let samples = returns.step_by(stride).map(|n| self.first.sample(n));
+        samples.filter_map(|s| residual(&s)).for_each(|m| mean.add(m));
+        mean.value()
+    }
+
+    /// The search of nearest returns: how far it goes, and how near is near enough.
+    pub fn reach_inlier(&self) -> [f32; 2] {
+        [self.scaled.match_distance, self.scaled.inlier]
+    }
+
+    /// The same where the nearest of all is needed.
+    pub fn reach_exact(&self) -> [f32; 2] {
+        [self.scaled.match_distance, 0.0]
+    }
+}

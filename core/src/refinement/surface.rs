@@ -1,0 +1,88 @@
+//! Which way the surface faces that a return lies on, from the returns around it.
+//!
+//! Their covariance, and their noise, are that of generalised ICP (Segal, Haehnel and Thrun,
+//! "Generalized-ICP", RSS 2009), of one cloud alone: a return counts across its surface, little along
+//! it, so that rings of returns on a bonnet, which move with the sensor, do not hold a car.
+
+use super::places::Sums;
+use super::sample::SurfaceWeight;
+use super::scaled::Scaled;
+use core::sync::atomic::AtomicU32;
+use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use nalgebra::Matrix3;
+
+/// Bits of a weight, all zero until it is asked for: few of them are. Threads that ask at the same
+/// time find the same.
+pub struct LazyWeight([AtomicU32; 6]);
+
+impl LazyWeight {
+    pub const fn unknown() -> LazyWeight {
+        LazyWeight([const { AtomicU32::new(0) }; 6])
+    }
+
+    /// The weight, or what `find` says it is.
+    pub fn get(&self, find: impl FnOnce() -> SurfaceWeight) -> SurfaceWeight {
+        // That of a known weight is positive. It is written last and read first.
+        let [first, rest @ ..] = &self.0;
+        let known = first.load(Acquire);
+        if known != 0 {
+            let [a, b, c, d, e] = rest.each_ref().map(|bits| bits.load(Relaxed));
+            return [known, a, b, c, d, e].map(f32::from_bits);
+        }
+        let weight = find();
+        let [known, more @ ..] = weight.map(f32::to_bits);
+        rest.iter().zip(more).for_each(|(to, bits)| to.store(bits, Relaxed));
+        first.store(known, Release);
+        weight
+    }
+}
+
+/// The weight of a return from the sums over the returns within a radius around it.
+pub fn weight(scaled: &Scaled, sums_within: impl Fn(f32) -> Sums) -> SurfaceWeight {
+    let mut spread = covariance(sums_within(scaled.surface_radius));
+    // A line, as of one ring, would hold a cluster across the surface and along it.
+    if across(&spread) < scaled.surface_line {
+        spread = covariance(sums_within(scaled.surface_radius_wide));
+    }
+    // Positive definite by the noise.
+    let variance = scaled.return_sigma * scaled.return_sigma;
+    let noise = Matrix3::from_diagonal_element(variance);
+    let w = (spread + noise).try_inverse().unwrap_or_default() * variance;
+    [w[(0, 0)], w[(0, 1)], w[(0, 2)], w[(1, 1)], w[(1, 2)], w[(2, 2)]]
+}
+
+/// Covariance of places, voxels².
+fn covariance([n, x, y, z, square @ ..]: Sums) -> Matrix3<f32> {
+    let [x, y, z] = [x, y, z].map(|m| m / n);
+    let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+    let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+/// Variance across the longest direction, voxels²: the middle eigenvalue where the least is small.
+fn across(spread: &Matrix3<f32>) -> f32 {
+    let minor =
+        |a: usize, b: usize| spread[(a, a)] * spread[(b, b)] - spread[(a, b)] * spread[(b, a)];
+    let trace = spread.trace();
+    if trace > 0.0 { (minor(0, 1) + minor(0, 2) + minor(1, 2)) / trace } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::Profile;
+
+    #[test]
+    fn a_line_is_told_from_a_surface() {
+        let line = Scaled::new(&Profile::hdl64()).surface_line;
+        let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1);
+        let turned = |variances: [f32; 3]| {
+            let spread = Matrix3::from_diagonal(&variances.into());
+            across(&(turn * spread * turn.inverse()))
+        };
+        // One ring with its noise, two rings 0.3 m apart, a single return.
+        assert!(turned([0.5, 0.005, 0.005]) < line);
+        assert!(turned([0.5, 0.25, 0.005]) > line);
+        assert!(turned([0.0; 3]) < line);
+    }
+}

@@ -1,0 +1,193 @@
+//! Clusters whose motion is known.
+
+use super::super::hypothesis::Hypothesis;
+use super::*;
+
+/// What is found of a car that moves steadily, over some sweeps: columns of it that move, the median
+/// and the largest error of their motion, voxels.
+fn error_of_steady(sweeps: u32, by: [f32; 2], turn: f32, seed: u64) -> (usize, f32, f32) {
+    let mut random = Random(seed);
+    let start = [0; 2].map(|_| random.between(27.0, 36.0));
+    let yaw = random.between(-3.0, 3.0);
+    let at = |n: f32| Car { centre: [0, 1].map(|a| start[a] + n * by[a]), yaw: yaw + n * turn };
+    let profile = Profile { refinement_sweeps: sweeps, ..profile() };
+    let all: Vec<Returns> = (0..3).map(|n| sweep_of(&at(n as f32 - 1.0), &mut random)).collect();
+    let mut refinement = Box::new(Refinement::new());
+    all.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &profile, r, n));
+    run(&mut refinement, &[&all[1], &all[2]], &no_flow());
+    let found = motions(&refinement);
+    check_sane(&found);
+    let mut errors = Vec::new();
+    for (c, found) in found.iter().enumerate() {
+        let Some((moved, _)) = found else { continue };
+        let [x, y] = [(c / SIDE) as f32 + 0.5 - start[0], (c % SIDE) as f32 + 0.5 - start[1]];
+        let truth = [
+            by[0] + turn.cos() * x - turn.sin() * y - x,
+            by[1] + turn.sin() * x + turn.cos() * y - y,
+        ];
+        errors.push((moved[0] - truth[0]).hypot(moved[1] - truth[1]));
+    }
+    errors.sort_by(f32::total_cmp);
+    match errors.len() {
+        0 => (0, f32::INFINITY, f32::INFINITY),
+        n => (n, errors[n / 2], errors[n - 1]),
+    }
+}
+
+#[test]
+fn cars_move_by_fractions_of_a_voxel() {
+    // Measured: at most 0.015 and 0.02 voxels, 5 mm.
+    for sweeps in [2, 3] {
+        for n in 0..16 {
+            let direction = n as f32 * std::f32::consts::TAU / 16.0;
+            for distance in [0.4, 0.9, 2.6, 5.3] {
+                for turn in [0.0, 0.02] {
+                    let by = [distance * direction.cos(), distance * direction.sin()];
+                    let (count, median, most) = error_of_steady(sweeps, by, turn, n + 100);
+                    let case = std::format!("{sweeps} sweeps, {by:?}, {turn} rad");
+                    assert!(count >= 15, "{case}: {count} columns move");
+                    assert!(median < 0.03 && most < 0.04, "{case}: {median} {most}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_seen_later_has_moved_for_longer() {
+    // Seen 4 ms later in every sweep, as one that is overtaken.
+    let late = 0.004;
+    for n in 0..16 {
+        let mut random = Random(300 + n);
+        let direction = n as f32 * std::f32::consts::TAU / 16.0;
+        let by = [4.0 * direction.cos(), 4.0 * direction.sin()];
+        let sweep = |n: usize| {
+            let shown = (n as f32 - 1.0) * (1.0 + late / 0.1);
+            let at = [0, 1].map(|a| 31.0 + shown * by[a]);
+            let mut returns = sweep_of(&Car { centre: at, yaw: direction }, &mut random);
+            returns.placed.iter_mut().for_each(|p| p.offset_s = n as f32 * late);
+            returns
+        };
+        let sweeps: Vec<Returns> = (0..3).map(sweep).collect();
+        let found = found_in(&sweeps, &vec![flow(by.map(|v| v.round() as i32)); SIDE * SIDE]);
+        check_sane(&found);
+        let moved: Vec<_> = found.iter().flatten().map(|m| m.0).collect();
+        assert!(moved.len() >= 15, "{n}: {}", moved.len());
+        for m in moved {
+            // As seen it would be 0.16.
+            assert!((m[0] - by[0]).hypot(m[1] - by[1]) < 0.04, "{n}: {m:?}, not {by:?}");
+        }
+    }
+}
+
+#[test]
+fn what_stands_is_exactly_still() {
+    let mut random = Random(5);
+    for n in 0..30 {
+        let car = Car { centre: [30.0 + 0.1 * n as f32, 31.0], yaw: 0.2 * n as f32 };
+        let all: Vec<Returns> = (0..3).map(|_| sweep_of(&car, &mut random)).collect();
+        let mut refinement = Box::new(Refinement::new());
+        all.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
+        // Whatever energy minimisation made of it.
+        let wrong = vec![flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
+        run(&mut refinement, &[&all[1], &all[2]], &wrong);
+        assert!(motions(&refinement).iter().all(Option::is_none), "{n}");
+    }
+}
+
+#[test]
+fn few_returns_move_nothing_by_themselves() {
+    for count in 0..5 {
+        let cluster = |n: usize| {
+            let mut returns = Returns::flat();
+            for k in 0..count {
+                let x = 20.5 + 1.1 * n as f32;
+                returns.add([x, 30.1 + 0.4 * k as f32, GROUND + 1.2], 0);
+            }
+            returns
+        };
+        let sweeps: Vec<Returns> = (0..3).map(cluster).collect();
+        let flows = vec![flow([1, 0]); SIDE * SIDE];
+        assert!(found_in(&sweeps, &flows).iter().all(Option::is_none), "{count}");
+    }
+}
+
+#[test]
+fn a_wall_that_seems_to_move_stands() {
+    // Longer than anything that moves, with a pattern that does.
+    let big = Profile { side: 167, ..Profile::hdl64() };
+    let wall = |n: usize| {
+        let mut returns = Returns::default();
+        for k in 0..4 * 160 {
+            let along = 2.0 + 0.25 * k as f32;
+            if (k / 40 + n).is_multiple_of(2) {
+                returns.add([along, 40.3, GROUND + 1.5], 0);
+            }
+            returns.add([along, 40.3, GROUND + 3.0], 0);
+        }
+        for placed in &returns.placed {
+            assert!(placed.at[0] < 167.0);
+        }
+        let column = |placed: &Placed| placed.at[0] as u32 * 167 + placed.at[1] as u32;
+        returns.columns = returns.placed.iter().map(column).collect();
+        for c in 0..167 * 167 {
+            let [x, y] = [(c / 167) as f32 + 0.5, (c % 167) as f32 + 0.5];
+            returns.points.push(Point::default());
+            returns.placed.push(Placed { at: [x, y, GROUND], offset_s: 0.0 });
+            returns.columns.push(c);
+        }
+        returns
+    };
+    let mut refinement = Box::new(Refinement::new());
+    let sweeps: Vec<Returns> = (0..3).map(wall).collect();
+    sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
+    let masks = vec![[0xffff, 0]; 167 * 167];
+    let flows = vec![flow([10, 0]); 167 * 167];
+    let perceived = Perceived {
+        before: &masks,
+        now: &masks,
+        foreground: &[],
+        marked: 0,
+        rays: 0,
+        state: &flows,
+        proposal: &[] as &[Proposal],
+    };
+    let step = Step { side: 167, ..Step::default() };
+    refinement.run(&Alone, &step, &perceived, |_| Some([10.0, 0.0]));
+    let extent_max = scaled().extent_max;
+    let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);
+    assert!(longest > extent_max, "{longest}");
+    let moves = |f: &Hypothesis| f.extent > extent_max && f.is_dynamic;
+    assert!(!refinement.clusters.found().iter().any(moves));
+}
+
+/// A long side slides along itself; only a few returns before it tell.
+#[test]
+fn what_moved_goes_on_by_less() {
+    let side = |moved: f32| {
+        let mut returns = Returns::flat();
+        for k in 0..100 {
+            let along = 12.0 + 0.4 * k as f32;
+            returns.add([along, 30.3, GROUND + 1.5], 0);
+            returns.add([along, 30.3, GROUND + 2.5], 0);
+        }
+        for k in 0..5 {
+            for n in 0..2 {
+                let (beside, height) = (29.4 - 0.35 * n as f32, GROUND + 1.2 + 0.4 * k as f32);
+                returns.add([30.2 + moved, beside, height], 0);
+            }
+        }
+        returns
+    };
+    let moving = |sweeps: &[Returns; 3], expected| {
+        let mut refinement = Box::new(Refinement::new());
+        sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
+        run_expecting(&mut refinement, &[&sweeps[1], &sweeps[2]], &no_flow(), expected);
+        motions(&refinement).iter().flatten().count()
+    };
+    let steady = [0.0, 1.2, 2.4].map(side);
+    let still = [0.0; 3].map(side);
+    assert_eq!(moving(&steady, None), 0);
+    assert!(moving(&steady, Some([1.2, 0.0])) > 40);
+    assert_eq!(moving(&still, Some([1.2, 0.0])), 0);
+}
