@@ -103,7 +103,7 @@ crate::params! {
         /// Returns that it needs for a search: fewer fit anywhere.
         pub search_returns_min: u32 = 12, "returns", (1 to 96), SIMULATED;
         /// Speed up to which is searched, at most 15 cells from sweep to sweep.
-        pub search_speed_mps: f64 = 30.0, "m/s", (0 to 1000), SIMULATED;
+        pub search_speed_mps: f64 = 28.6, "m/s", (0 to 1000), SIMULATED;
         /// Starts nearer to each other are one.
         pub start_spacing_m: f64 = 0.225, "m", (0 to 10), SIMULATED;
         /// A start is first tried with every k-th return.

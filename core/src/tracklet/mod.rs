@@ -63,10 +63,6 @@ pub struct Turnover {
     pub left: u32,
 }
 
-/// Sweeps over which the first displacement of a tracklet at rest is taken to have happened, at
-/// most: what stood for long and starts is not slow. Whole cells only: finer ones tell at once.
-const DEPARTURE_SWEEPS: u32 = 10;
-
 /// Predicts and updates a tracklet with a displacement. Returns whether it passed the gate.
 pub(crate) fn observe(
     t: &mut Tracklet,
@@ -86,7 +82,7 @@ pub(crate) fn observe(
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
         // From the sweep before its birth to this one.
         let sweeps = if refined { 1 } else { t.age + 2 };
-        let elapsed = dt * sweeps.min(DEPARTURE_SWEEPS) as f32;
+        let elapsed = (dt * sweeps as f32).min(params.departure_s.max(dt));
         let departed = t.ekf.depart(params, noise, moved, elapsed, dt);
         t.ekf = departed.unwrap_or(t.ekf);
         return departed.is_some();
@@ -126,7 +122,7 @@ impl Tracklets {
         Tracklets {
             now: heapless::Vec::new(),
             next: heapless::Vec::new(),
-            slot_of_column: [NONE; COLUMNS_MAX],
+            slot_of_column: [0; COLUMNS_MAX],
             observation_of_column: [0; COLUMNS_MAX],
             claimed: [false; FOREGROUND_MAX],
         }
@@ -137,7 +133,7 @@ impl Tracklets {
         &self.now
     }
 
-    /// The tracklet in a column of the new window, once placed there.
+    /// The tracklet in a column of the new window, after [`Tracklets::place`].
     pub(crate) fn at(&self, column: usize) -> Option<&Tracklet> {
         self.now.get(self.slot_of_column[column] as usize)
     }
