@@ -116,7 +116,7 @@ fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
         + occupancy_constancy::SCORES_MAX;
     let mut parts = vec![
         part("tracklets", "Tracklets", tracklets),
-        part("things and their returns", "Refinement", refinement),
+        part("clusters and their returns", "Refinement", refinement),
         part("rest of the pipeline", "Pipeline", pipeline - tracklets - refinement),
         part(
             "flow of columns and returns",
