@@ -14,9 +14,9 @@ use clap::{Parser, Subcommand, ValueEnum};
 use raywake_io::Error;
 use raywake_io::source::{Format, OpenOptions, PosesFrame};
 
-pub use flow::Flow;
-pub use sweeps::Sweeps;
-pub use track::{FrontEndKind, Track};
+pub use flow::FlowArgs;
+pub use sweeps::SweepRange;
+pub use track::{FrontEndKind, TrackArgs};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -42,27 +42,27 @@ pub struct Args {
 pub enum Command {
     /// Estimate the scene flow of a recorded drive
     #[command(after_help = EXIT_CODES)]
-    Run(Box<Run>),
+    Run(Box<RunArgs>),
     #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = flow::after_help(EXIT_CODES))]
-    Flow(Box<Flow>),
+    Flow(Box<FlowArgs>),
     #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = track::after_help(EXIT_CODES))]
-    Track(Box<Track>),
+    Track(Box<TrackArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
-    Map(Box<Map>),
+    Map(Box<MapArgs>),
     /// Run on a small simulated drive and compare with ground truth
     #[cfg(feature = "demo")]
-    Demo(Demo),
+    Demo(DemoArgs),
     /// Print the memory layout: every buffer, its size, and who writes and reads it
-    Budget(Budget),
+    Budget(BudgetArgs),
     /// List Vulkan devices
     Devices,
 }
 
 /// `raywake run`.
 #[derive(Debug, clap::Args)]
-pub struct Run {
+pub struct RunArgs {
     /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
     /// Print errors only
@@ -85,7 +85,7 @@ pub struct Run {
     pub results: Results,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub part: Part,
+    pub part: Selection,
 }
 
 /// How to read a recording.
@@ -215,7 +215,7 @@ pub enum Export {
 
 /// `raywake map`.
 #[derive(Debug, clap::Args)]
-pub struct Map {
+pub struct MapArgs {
     /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
     /// Print errors only
@@ -232,24 +232,24 @@ pub struct Map {
     pub backend: BackendChoice,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub part: Part,
+    pub part: Selection,
 }
 
-/// Part of a recording.
+/// Selection of a recording.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Sweeps")]
-pub struct Part {
+pub struct Selection {
     /// Process at most this many sweeps
     #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
     pub count: Option<usize>,
     /// Process only sweeps A to B (B excluded); either end may be omitted
-    #[arg(long, value_name = "A..B", value_parser = Sweeps::parse)]
-    pub sweeps: Option<Sweeps>,
+    #[arg(long, value_name = "A..B", value_parser = SweepRange::parse)]
+    pub sweeps: Option<SweepRange>,
 }
 
 /// `raywake demo`.
 #[derive(Debug, clap::Args)]
-pub struct Demo {
+pub struct DemoArgs {
     /// Output folder
     #[arg(long, value_name = "DIR", default_value = "raywake-demo")]
     pub out: PathBuf,
@@ -263,7 +263,7 @@ pub struct Demo {
 
 /// `raywake budget`.
 #[derive(Debug, clap::Args)]
-pub struct Budget {
+pub struct BudgetArgs {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub profile: ProfileChoice,
@@ -275,7 +275,7 @@ pub struct Budget {
     pub parameters: bool,
 }
 
-impl Part {
+impl Selection {
     /// The sweeps asked for of a recording of `len`.
     pub fn range(&self, len: usize) -> Result<Range<usize>, Error> {
         let range = self.sweeps.unwrap_or_default().within(len)?;

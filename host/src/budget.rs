@@ -41,7 +41,7 @@ pub fn shipped() -> [Profile; 4] {
 
 /// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where
 /// one of them takes more than the limit.
-pub fn budget(args: &args::Budget) -> Result<(), RunError> {
+pub fn budget(args: &args::BudgetArgs) -> Result<(), RunError> {
     if args.parameters {
         say(false, &parameters())?;
         return Ok(());

@@ -7,14 +7,14 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 use raywake_sim::Truth;
 
-use crate::args::{Demo, Learned, PictureFrame};
+use crate::args::{DemoArgs, Learned, PictureFrame};
 use crate::config::Weights;
 use crate::console::say;
-use crate::engine::{self, Plan};
+use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::outputs::Kinds;
-use crate::summary::Summary;
+use crate::summary::RunSummary;
 use raywake_io::source::SweepData;
 use raywake_io::source::simulated::Simulated;
 
@@ -26,9 +26,9 @@ const AGE: u32 = 5;
 const MOVING_MPS: f32 = 1.0;
 
 /// Runs on the simulated drive, writes flow and pictures, prints the accuracy.
-pub fn demo(args: &Demo) -> Result<Summary, RunError> {
+pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
     let profile = Profile::hdl64();
-    let plan = Plan {
+    let plan = RunPlan {
         weights: Weights::read(&Learned::default(), &profile)?,
         backend: &args.backend,
         sweeps: 0..SWEEPS,
@@ -44,10 +44,10 @@ pub fn demo(args: &Demo) -> Result<Summary, RunError> {
         profile,
     };
     let mut source = Simulated::new(SEED, SWEEPS);
-    let mut errors = Errors::default();
+    let mut errors = SpeedErrors::default();
     let voxel_m = plan.profile.voxel_m;
     let summary = engine::execute(&plan, &mut source, &mut |source, pair| {
-        let truth = Field::new(source, pair.first, source.truth(pair.index), voxel_m);
+        let truth = VelocityField::new(source, pair.first, source.truth(pair.index), voxel_m);
         errors.add(&truth, pair.flows);
     })?;
     say(args.quiet, &errors.line())?;
@@ -56,15 +56,15 @@ pub fn demo(args: &Demo) -> Result<Summary, RunError> {
 }
 
 /// True velocities of moving objects by cell of the world.
-struct Field {
+struct VelocityField {
     sums: HashMap<[i64; 2], ([f32; 2], f32)>,
     cell_m: f64,
 }
 
-impl Field {
+impl VelocityField {
     /// From the returns of a sweep, each at the place where the vehicle was at its time.
-    fn new(source: &Simulated, sweep: &SweepData, truth: &[Truth], cell_m: f64) -> Field {
-        let mut field = Field { sums: HashMap::new(), cell_m };
+    fn new(source: &Simulated, sweep: &SweepData, truth: &[Truth], cell_m: f64) -> VelocityField {
+        let mut field = VelocityField { sums: HashMap::new(), cell_m };
         for (point, truth) in sweep.points.iter().zip(truth) {
             let [x, y, _] = truth.velocity_world;
             if x.hypot(y) < MOVING_MPS {
@@ -92,14 +92,14 @@ impl Field {
 
 /// How far velocities are from the truth.
 #[derive(Default)]
-struct Errors {
+struct SpeedErrors {
     speed_mps: Vec<f64>,
     velocity_mps: Vec<f64>,
 }
 
-impl Errors {
+impl SpeedErrors {
     /// Matched columns of moving objects whose tracklet is old enough.
-    fn add(&mut self, truth: &Field, flows: &Flows) {
+    fn add(&mut self, truth: &VelocityField, flows: &Flows) {
         let old = |c: &&ColumnFlow| c.origin == Origin::Matched && c.age >= AGE;
         for column in flows.columns.iter().filter(old) {
             let Some([x, y]) = truth.at(column) else { continue };

@@ -22,11 +22,11 @@ use crate::outputs::{Kinds, Outputs};
 use crate::report;
 use crate::session::{Visit, each_sweep};
 use crate::statistics::Statistics;
-use crate::summary::{Facts, Summary};
+use crate::summary::{Facts, RunSummary};
 use raywake_io::source::{Source, SweepData};
 
 /// What is to be done with a source.
-pub struct Plan<'a> {
+pub struct RunPlan<'a> {
     /// Checked.
     pub profile: Profile,
     /// Read and checked.
@@ -65,10 +65,10 @@ pub type Observer<'a, S> = &'a mut dyn FnMut(&S, &Pair);
 /// Runs to the end, or to a signal: then the sweep in hand is finished and the summary says so.
 /// After an error the files already written stay.
 pub fn execute<S: Source + ?Sized>(
-    plan: &Plan,
+    plan: &RunPlan,
     source: &mut S,
     observe: Observer<S>,
-) -> Result<Summary, RunError> {
+) -> Result<RunSummary, RunError> {
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let figures = FiguresFile::create(plan.summary.as_deref(), plan.out.as_deref())?;
     let outputs = Outputs::create(plan.out.as_deref(), plan.kinds, source.name(), profile)?;
@@ -96,7 +96,7 @@ pub fn execute<S: Source + ?Sized>(
         validating: plan.backend.validation.is_some(),
         host_bytes: budget::host_bytes(profile, matches!(run.drive.backend(), Backend::Scalar(_))),
     };
-    let summary = Summary::new(&facts, &run.statistics);
+    let summary = RunSummary::new(&facts, &run.statistics);
     say(&report::text(&summary))?;
     figures.write(&summary)?;
     Ok(summary)

@@ -4,17 +4,17 @@ use std::fmt::Write;
 
 use crate::console::bytes;
 use crate::order_statistics::Spread;
-use crate::summary::Summary;
+use crate::summary::RunSummary;
 
 /// Everything a summary holds, for people.
-pub fn text(s: &Summary) -> String {
+pub fn text(s: &RunSummary) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = write(&mut out, s);
     out
 }
 
-fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
+fn write(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let end = if s.interrupted { ", INTERRUPTED" } else { "" };
     writeln!(out, "\n{} sweeps, {} pairs{end}", s.sweeps, s.pairs)?;
     times(out, s)?;
@@ -35,7 +35,7 @@ fn write(out: &mut String, s: &Summary) -> std::fmt::Result {
     writeln!(out, "digest     {}", s.digest)
 }
 
-fn times(out: &mut String, s: &Summary) -> std::fmt::Result {
+fn times(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let Some(total) = &s.total_ms else {
         return writeln!(out, "no pair of consecutive sweeps: no flow, no times");
     };
@@ -58,7 +58,7 @@ fn times(out: &mut String, s: &Summary) -> std::fmt::Result {
     writeln!(out, "file I/O per sweep: {:.1} ms read, {:.1} ms write", s.read_ms, s.write_ms)
 }
 
-fn amounts(out: &mut String, s: &Summary) -> std::fmt::Result {
+fn amounts(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     writeln!(
         out,
         "\nper sweep  {:.0} returns, {:.0} distinct rays, {:.0} occupied columns, {:.0} foreground, \
@@ -67,7 +67,7 @@ fn amounts(out: &mut String, s: &Summary) -> std::fmt::Result {
     )
 }
 
-fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
+fn tracklets(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let ages = &s.tracklets_by_age.0;
     let cells = |cell: &dyn Fn(usize) -> String| -> String {
         (0..ages.len()).map(|n| format!("{:>8}", cell(n))).collect()
@@ -83,7 +83,7 @@ fn tracklets(out: &mut String, s: &Summary) -> std::fmt::Result {
     )
 }
 
-fn left_out(out: &mut String, s: &Summary) -> std::fmt::Result {
+fn left_out(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     writeln!(out, "dropped    {}", s.dropped)?;
     for (n, reset) in s.resets.iter().enumerate() {
         let label = if n == 0 { "resets" } else { "" };

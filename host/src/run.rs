@@ -2,20 +2,20 @@
 
 use crate::args;
 use crate::config::{self, Weights};
-use crate::engine::{self, Plan};
+use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::outputs::Kinds;
-use crate::summary::Summary;
+use crate::summary::RunSummary;
 use raywake_io::source;
 
 /// Estimates the flow of a recorded drive.
-pub fn run(args: &args::Run) -> Result<Summary, RunError> {
+pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
     let mut profile = config::profile(&args.profile)?;
     // Asked for by name, it is wanted under every profile.
     profile.deskew |= args.recording.deskew == Some(true);
     let weights = Weights::read(&args.learned, &profile)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
-    let plan = Plan {
+    let plan = RunPlan {
         sweeps: args.part.range(source.len())?,
         profile,
         weights,

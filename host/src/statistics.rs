@@ -128,7 +128,7 @@ impl Tally {
 
 /// Times of one stage.
 #[derive(Clone, Debug)]
-pub struct Stage {
+pub struct StageTimes {
     /// Its name.
     pub name: &'static str,
     /// One value per pair of sweeps, ms.
@@ -154,7 +154,7 @@ pub struct Statistics {
     /// Valid flows of all pairs.
     pub valid: u64,
     /// Times by stage, in the order of the first pair.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<StageTimes>,
     /// Sums of the stages of each pair, ms.
     pub totals: Vec<f64>,
     /// Time to read sweeps, ms.
@@ -212,7 +212,7 @@ impl Statistics {
             total += ms;
             match self.stages.iter_mut().find(|s| s.name == name) {
                 Some(stage) => stage.milliseconds.push(ms),
-                None => self.stages.push(Stage { name, milliseconds: vec![ms] }),
+                None => self.stages.push(StageTimes { name, milliseconds: vec![ms] }),
             }
         }
         self.totals.push(total);

@@ -33,7 +33,7 @@ pub struct Aged {
 /// What a run was and what came of it. Means are per sweep for points and rays, per pair of sweeps
 /// for the rest; times are of sweeps that complete a pair, without reading and writing files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub struct RunSummary {
     /// Version of this program.
     pub version: &'static str,
     /// Name of the recording.
@@ -115,9 +115,9 @@ pub struct Facts<'a> {
     pub host_bytes: u64,
 }
 
-impl Summary {
+impl RunSummary {
     /// Puts the figures together.
-    pub fn new(facts: &Facts, s: &Statistics) -> Summary {
+    pub fn new(facts: &Facts, s: &Statistics) -> RunSummary {
         let census = facts.backend.census().unwrap_or_default();
         let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
         let spreads =
@@ -125,7 +125,7 @@ impl Summary {
         let ages = AGES.iter().zip(s.ages_at_end.iter().zip(s.ages_sum));
         let ages =
             ages.map(|((name, _), (&end, sum))| (*name, Aged { end, mean: per(sum, s.pairs) }));
-        Summary {
+        RunSummary {
             version: env!("CARGO_PKG_VERSION"),
             source: facts.source.to_string(),
             profile: facts.profile.name.to_string(),

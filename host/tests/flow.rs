@@ -259,8 +259,8 @@ fn files_that_are_none() {
 #[cfg(feature = "arrow")]
 #[test]
 fn tables_in_and_out() {
-    use raywake_io::sink::table::Table as Sink;
-    use raywake_io::source::feather::Table;
+    use raywake_io::sink::table::TableWriter as Sink;
+    use raywake_io::source::feather::FeatherTable;
     let t = Temp::new();
     let cloud = first_cloud();
     let a = t.path().join("a.feather");
@@ -288,7 +288,7 @@ fn tables_in_and_out() {
         "cov_dx_dy",
         "cov_dy_dy",
     ];
-    let table = Table::read(&out, &[&names[..], &["foreground", "valid"]].concat()).unwrap();
+    let table = FeatherTable::read(&out, &[&names[..], &["foreground", "valid"]].concat()).unwrap();
     let columns = names.map(|name| table.floats(name).unwrap());
     let [foreground, valid] = ["foreground", "valid"].map(|name| table.booleans(name).unwrap());
     assert_eq!(table.rows(), cloud.len());

@@ -2,7 +2,7 @@
 //!
 //! Points are matched to their nearest neighbours, the residual is the distance along the target's
 //! normal, Geman and McClure's kernel discounts what moves by itself, and Gauss-Newton steps find
-//! the motion. Kernel and search radius shrink in three stages, so that it can start far off.
+//! the motion. Kernel and search radius shrink in three levels, so that it can start far off.
 
 use crate::cloud::OrientedCloud;
 use crate::gauss_newton::{Correspondence, solve};
@@ -16,12 +16,12 @@ pub const CORRESPONDENCES: usize = 6000;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IcpOptions {
     /// Farthest that matched points lie apart at first, m: what the unknown part of the motion may
-    /// displace points by. The later stages have a half and a quarter of it.
+    /// displace points by. The later levels have a half and a quarter of it.
     pub distance_m: f64,
-    /// Residual at which a correspondence counts a quarter in the last stage, m; the earlier ones
+    /// Residual at which a correspondence counts a quarter in the last level, m; the earlier ones
     /// have eight times and three times of it.
     pub kernel_m: f64,
-    /// Steps of each stage at most.
+    /// Steps of each level at most.
     pub iterations: usize,
 }
 
@@ -38,10 +38,10 @@ impl Default for IcpOptions {
 pub struct Registration {
     /// `target_from_source`; always finite. Where nothing could be matched, the initial one.
     pub pose: Pose,
-    /// Whether the steps died out in the last stage with enough correspondences. Otherwise the pose
+    /// Whether the steps died out in the last level with enough correspondences. Otherwise the pose
     /// is not to be trusted.
     pub converged: bool,
-    /// Steps of all stages.
+    /// Steps of all levels.
     pub iterations: usize,
     /// Root mean square distance of the inliers from their planes, m; 0 without any.
     pub rms_m: f64,
@@ -75,15 +75,15 @@ impl Registration {
 
 /// Fewest correspondences that determine a motion.
 const CORRESPONDENCES_MIN: usize = 30;
-/// A step shorter than this ends a stage, m.
+/// A step shorter than this ends a level, m.
 const SETTLED_M: f64 = 2e-4;
 /// Motions with a smaller eigenvalue are not told apart from noise of the normals.
 pub(crate) const OBSERVABLE: f64 = 2e-3;
 /// Matched normals are at most 45 degrees apart (cosine).
 const ALIGNED: f64 = 0.7;
 
-/// A stage from coarse to fine.
-struct Stage {
+/// A level from coarse to fine.
+struct Level {
     /// Search radius, m.
     radius_m: f64,
     /// Width of the kernel, m.
@@ -92,9 +92,9 @@ struct Stage {
     stride: usize,
 }
 
-/// Share of the search radius, multiple of the kernel and multiple of the stride of each stage. Not
+/// Share of the search radius, multiple of the kernel and multiple of the stride of each level. Not
 /// measured on their own.
-const STAGES: [(f64, f64, usize); 3] = [(1.0, 8.0, 4), (0.5, 3.0, 2), (0.25, 1.0, 1)];
+const LEVELS: [(f64, f64, usize); 3] = [(1.0, 8.0, 4), (0.5, 3.0, 2), (0.25, 1.0, 1)];
 
 /// The motion that lays `source` onto `target`, started at `initial` (`target_from_source`).
 /// At most as many points are matched as `correspondences` has room for, evenly chosen;
@@ -114,8 +114,8 @@ pub fn register(
     }
     let mut result = Registration::unmatched(initial);
     let stride = source.flat_count().div_ceil(correspondences.len().max(1)).max(1);
-    for (radius, kernel, every) in STAGES {
-        let stage = Stage {
+    for (radius, kernel, every) in LEVELS {
+        let level = Level {
             radius_m: radius * options.distance_m,
             kernel_m: kernel * options.kernel_m,
             stride: every * stride,
@@ -123,13 +123,13 @@ pub fn register(
         result.converged = false;
         let mut matched = 0;
         for _ in 0..options.iterations {
-            matched = match_points(source, target, &result.pose, &stage, correspondences);
+            matched = match_points(source, target, &result.pose, &level, correspondences);
             if !result.advance(&correspondences[..matched]) {
                 break;
             }
         }
-        let tried = source.flat_count().div_ceil(stage.stride);
-        result.judge(&correspondences[..matched], tried, stage.kernel_m);
+        let tried = source.flat_count().div_ceil(level.stride);
+        result.judge(&correspondences[..matched], tried, level.kernel_m);
     }
     result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobserved < 6;
     result
@@ -141,21 +141,21 @@ fn match_points(
     source: &OrientedCloud,
     target: &OrientedCloud,
     pose: &Pose,
-    stage: &Stage,
+    level: &Level,
     correspondences: &mut [Correspondence],
 ) -> usize {
     let rotation = pose.matrix();
-    let flat = source.points().iter().filter(|p| p.is_flat()).step_by(stage.stride);
+    let flat = source.points().iter().filter(|p| p.is_flat()).step_by(level.stride);
     let found = flat.filter_map(|of| {
         let point = rotation * of.position + pose.translation;
-        let near = tree::nearest(target.points(), point, stage.radius_m * stage.radius_m)?;
+        let near = tree::nearest(target.points(), point, level.radius_m * level.radius_m)?;
         let on = &target.points()[near];
         if on.normal.dot(rotation * of.normal).abs() < ALIGNED {
             return None;
         }
         let (on, normal) = (on.position, on.normal);
         let mut found = Correspondence { point, on, normal, weight: 1.0 };
-        found.weight = geman_mcclure(found.residual() / stage.kernel_m);
+        found.weight = geman_mcclure(found.residual() / level.kernel_m);
         Some(found)
     });
     correspondences.iter_mut().zip(found).map(|(slot, found)| *slot = found).count()

@@ -31,7 +31,7 @@ Points outside the profile's window, and points of A after the first";
 /// `raywake flow`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
-pub struct Flow {
+pub struct FlowArgs {
     /// First cloud; its points get the flow
     #[arg(value_name = "A")]
     pub first: PathBuf,

@@ -6,16 +6,16 @@ use raywake_io::Error;
 
 /// A half-open range of sweeps as typed: either end may be missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sweeps {
+pub struct SweepRange {
     /// First sweep.
     pub from: usize,
     /// Sweep after the last one.
     pub to: Option<usize>,
 }
 
-impl Sweeps {
+impl SweepRange {
     /// From `A..B`, `A..`, `..B` or `..`.
-    pub(super) fn parse(text: &str) -> Result<Sweeps, String> {
+    pub(super) fn parse(text: &str) -> Result<SweepRange, String> {
         let (from, to) = text.split_once("..").ok_or("expected A..B, for example 10..20")?;
         let index = |s: &str| s.parse::<usize>().map_err(|_| format!("`{s}` is not a sweep index"));
         let from = if from.is_empty() { 0 } else { index(from)? };
@@ -23,7 +23,7 @@ impl Sweeps {
         if to.is_some_and(|to| to <= from) {
             return Err(format!("{text} is an empty range"));
         }
-        Ok(Sweeps { from, to })
+        Ok(SweepRange { from, to })
     }
 
     /// The range in a recording of `len` sweeps; fails where it reaches beyond.
@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn ranges_of_sweeps() {
-        let within = |text: &str| Sweeps::parse(text).unwrap().within(10).ok();
+        let within = |text: &str| SweepRange::parse(text).unwrap().within(10).ok();
         assert_eq!(within("2..5"), Some(2..5));
         assert_eq!(
             (within("..5"), within("9.."), within("..")),
@@ -53,9 +53,9 @@ mod tests {
         );
         assert_eq!((within("10.."), within("0..11")), (None, None));
         for wrong in ["3", "5..5", "-1..3", "a..", "..0"] {
-            assert!(Sweeps::parse(wrong).is_err(), "{wrong}");
+            assert!(SweepRange::parse(wrong).is_err(), "{wrong}");
         }
-        let text = Sweeps::parse("3..12").unwrap().within(10).unwrap_err().to_string();
+        let text = SweepRange::parse("3..12").unwrap().within(10).unwrap_err().to_string();
         assert!(text.contains("--sweeps 3..12") && text.contains("10 sweeps"), "{text}");
     }
 }

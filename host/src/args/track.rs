@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{BackendChoice, Learned, Part, ProfileChoice, Recording};
+use super::{BackendChoice, Learned, ProfileChoice, Recording, Selection};
 
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
@@ -27,7 +27,7 @@ Files of --out DIR:
 /// `raywake track`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
-pub struct Track {
+pub struct TrackArgs {
     /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
     pub data: PathBuf,
     /// Print errors only
@@ -63,7 +63,7 @@ pub struct Track {
     pub backend: BackendChoice,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub part: Part,
+    pub part: Selection,
 }
 
 /// Detection and association.

@@ -26,7 +26,7 @@ use raywake_io::Error;
 use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
 
-use rows::{Form, Row};
+use rows::{Form, PointRow};
 
 /// A sensor is not mounted this near to the ground, m: such clouds are in a vehicle's frame, with
 /// its origin at an axle or below.
@@ -35,7 +35,7 @@ const MOUNTED_MIN_M: f64 = 0.6;
 const MOVING_MPS: f64 = 0.5;
 
 /// Reads, registers, finds the flow and writes it.
-pub fn flow(args: &args::Flow) -> Result<(), RunError> {
+pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
     let profile = config::profile(&args.profile)?;
     let weights = Weights::read(&args.learned, &profile)?;
@@ -60,11 +60,11 @@ pub fn flow(args: &args::Flow) -> Result<(), RunError> {
 
     let (flows, dropped) = points(args, &profile, &weights, &rig, [&first, &second])?;
     let second_from_first = motion.inverse();
-    let rows: Vec<Row> = first
+    let rows: Vec<PointRow> = first
         .points
         .iter()
         .zip(&flows)
-        .map(|(point, flow)| Row::new(point, flow, &second_from_first, dt_s))
+        .map(|(point, flow)| PointRow::new(point, flow, &second_from_first, dt_s))
         .collect();
     say(&census(&rows, dt_s, &dropped))?;
     laps.lap("flow");
@@ -95,7 +95,7 @@ fn cloud(path: &Path, stamp_s: f64) -> Result<SweepData, Error> {
 }
 
 /// Sensor and ground as the user says, or as the first cloud tells; and a line about them.
-fn rig(args: &args::Flow, first: &SweepData) -> Result<(Rig, String), Error> {
+fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error> {
     let (ground_m, how) = match args.ground {
         Some(given) if given.is_finite() => (given, "given"),
         Some(_) => return Err(Error::Usage("--ground must be finite".into())),
@@ -132,7 +132,7 @@ fn rig(args: &args::Flow, first: &SweepData) -> Result<(Rig, String), Error> {
 /// Flow of every point of the first sweep, those over the pipeline's capacity included, and what
 /// the pipeline left out of both.
 fn points(
-    args: &args::Flow,
+    args: &args::FlowArgs,
     profile: &Profile,
     weights: &Weights,
     rig: &Rig,
@@ -158,15 +158,16 @@ fn points(
 }
 
 /// A line on what was found.
-fn census(rows: &[Row], dt_s: f64, dropped: &Dropped) -> String {
-    let count = |of: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| of(row)).count();
-    let moving = |row: &Row| f64::from(row.motion[0].hypot(row.motion[1])) >= MOVING_MPS * dt_s;
+fn census(rows: &[PointRow], dt_s: f64, dropped: &Dropped) -> String {
+    let count = |of: &dyn Fn(&PointRow) -> bool| rows.iter().filter(|row| of(row)).count();
+    let moving =
+        |row: &PointRow| f64::from(row.motion[0].hypot(row.motion[1])) >= MOVING_MPS * dt_s;
     format!(
         "flow       {} points: {} foreground, {} of them matched, {} moving at {MOVING_MPS} m/s or \
          more\ndropped    {dropped}\n",
         rows.len(),
         count(&|row| row.origin != Origin::Background),
-        count(&Row::valid),
+        count(&PointRow::valid),
         count(&moving),
     )
 }

@@ -10,12 +10,12 @@ use raywake_core::sweep::Point;
 
 use raywake_io::Error;
 use raywake_io::sink::argoverse::displacement;
-use raywake_io::sink::table::Table;
+use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{Meta, atomic};
 
 /// What is put out for a point of the first cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct PointRow {
     /// Where it is, m, in the first cloud's frame.
     pub position: [f32; 3],
     /// Where it is in the second cloud's frame less `position`, m.
@@ -28,15 +28,15 @@ pub struct Row {
     pub origin: Origin,
 }
 
-impl Row {
+impl PointRow {
     /// Of a point and the flow found for it in `dt_s`; `second_from_first` is the inverse of the
     /// sensor's motion.
-    pub fn new(point: &Point, flow: &PointFlow, second_from_first: &Pose, dt_s: f64) -> Row {
+    pub fn new(point: &Point, flow: &PointFlow, second_from_first: &Pose, dt_s: f64) -> PointRow {
         let at = Vec3::from_array(point.position);
         let measured = if at.is_finite() { 1.0 } else { f32::NAN };
         let motion = displacement(flow, &Pose::IDENTITY, dt_s).map(|v| v * measured);
         let then = second_from_first.transform((at + Vec3::from_array(motion)).as_dvec3());
-        Row {
+        PointRow {
             position: point.position,
             flow: (then - at.as_dvec3()).as_vec3().to_array(),
             motion,
@@ -75,7 +75,7 @@ impl Form {
     }
 
     /// Writes the rows, whole or not at all; `meta` goes to a table's metadata.
-    pub fn write(self, path: &Path, rows: &[Row], meta: Meta<'_>) -> Result<(), Error> {
+    pub fn write(self, path: &Path, rows: &[PointRow], meta: Meta<'_>) -> Result<(), Error> {
         match self {
             Form::Feather => table(rows).write(path, meta),
             Form::Bin => atomic::write(path, |out| {
@@ -86,9 +86,9 @@ impl Form {
     }
 }
 
-fn table(rows: &[Row]) -> Table {
-    let mut t = Table::default();
-    let mut triple = |names: [&str; 3], of: fn(&Row) -> [f32; 3]| {
+fn table(rows: &[PointRow]) -> TableWriter {
+    let mut t = TableWriter::default();
+    let mut triple = |names: [&str; 3], of: fn(&PointRow) -> [f32; 3]| {
         for (n, name) in names.iter().enumerate() {
             t.f32s(name, rows, |r| of(r)[n]);
         }
@@ -98,7 +98,7 @@ fn table(rows: &[Row]) -> Table {
     triple(["motion_x_m", "motion_y_m", "motion_z_m"], |r| r.motion);
     triple(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], |r| r.covariance);
     t.bools("foreground", rows, |r| r.origin != Origin::Background);
-    t.bools("valid", rows, Row::valid);
+    t.bools("valid", rows, PointRow::valid);
     t
 }
 
@@ -119,7 +119,7 @@ mod tests {
                 ..PointFlow::default()
             };
             let point = Point { position, ..Point::default() };
-            Row::new(&point, &flow, &second_from_first, 0.5)
+            PointRow::new(&point, &flow, &second_from_first, 0.5)
         };
         let near =
             |a: [f32; 3], b: [f32; 3]| (Vec3::from_array(a) - Vec3::from_array(b)).length() < 1e-5;

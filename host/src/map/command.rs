@@ -20,7 +20,7 @@ use raywake_io::source::{self, SweepData};
 
 /// Maps every sweep of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand.
-pub fn map(args: &args::Map) -> Result<bool, RunError> {
+pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;

@@ -20,12 +20,12 @@ use raywake_io::source;
 use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
-pub use report::Summary;
+pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand, and all tracks with it.
-pub fn track(args: &args::Track) -> Result<bool, RunError> {
+pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut profile = config::profile(&args.profile)?;
     profile.deskew |= args.recording.deskew == Some(true);
     let mut source = source::open(&args.data, &args.recording.options())?;

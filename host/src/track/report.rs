@@ -158,8 +158,8 @@ impl Report {
     }
 
     /// Puts the figures together.
-    pub fn summary(self, source: &str, kind: FrontEndKind, interrupted: bool) -> Summary {
-        Summary {
+    pub fn summary(self, source: &str, kind: FrontEndKind, interrupted: bool) -> TrackSummary {
+        TrackSummary {
             version: env!("CARGO_PKG_VERSION"),
             source: source.to_string(),
             front_end: match kind {
@@ -180,7 +180,7 @@ impl Report {
 
 /// What a run was and what came of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub struct TrackSummary {
     /// Version of this program.
     pub version: &'static str,
     /// Name of the recording.
@@ -206,7 +206,7 @@ pub struct Summary {
     pub tracks: Vec<Line>,
 }
 
-impl Summary {
+impl TrackSummary {
     /// For people.
     pub fn text(&self) -> String {
         let mut out = String::new();

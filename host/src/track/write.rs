@@ -8,17 +8,17 @@ use raywake_objects::{ObjectReturn, ObjectState};
 use super::Ended;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_io::sink::table::Table;
+use raywake_io::sink::table::TableWriter;
 
 /// Where files go, and the rows of `tracks.feather`.
 pub struct Files {
     folder: Option<PathBuf>,
-    rows: Vec<Row>,
+    rows: Vec<TrackRow>,
 }
 
 /// A track at the time of one of its updates: times of the recording, s, and positions in the world,
 /// m.
-struct Row {
+struct TrackRow {
     track: u32,
     filter: ObjectState,
     estimate: ObjectState,
@@ -58,7 +58,7 @@ impl Files {
             ..state
         };
         let lag = |n: usize| ended.lag.and_then(|states| states.get(n)).copied().unwrap_or(NONE);
-        self.rows.extend(track.history().iter().enumerate().map(|(n, filter)| Row {
+        self.rows.extend(track.history().iter().enumerate().map(|(n, filter)| TrackRow {
             track: track.id,
             filter: placed(*filter),
             estimate: placed(estimator.state(filter.time_s)),
@@ -75,10 +75,10 @@ impl Files {
     /// All tracks have been seen.
     pub fn finish(self) -> Result<(), Error> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let mut t = Table::default();
+        let mut t = TableWriter::default();
         t.u32s("track", &self.rows, |r| r.track);
         t.f64s("time_s", &self.rows, |r| r.filter.time_s);
-        let mut states = |prefix: &str, of: fn(&Row) -> &ObjectState| {
+        let mut states = |prefix: &str, of: fn(&TrackRow) -> &ObjectState| {
             for (a, axis) in ["x_m", "y_m", "z_m"].iter().enumerate() {
                 t.f64s(&format!("{prefix}{axis}"), &self.rows, |r| of(r).position[a]);
             }

@@ -10,7 +10,7 @@ use super::rows_file;
 use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
 use raywake::config::Weights;
-use raywake::engine::{self, Plan};
+use raywake::engine::{self, RunPlan};
 use raywake::error::RunError;
 use raywake::outputs::Kinds;
 use raywake_core::digest::Digest;
@@ -52,8 +52,8 @@ pub struct Settings {
 
 impl Settings {
     /// A run that writes nothing.
-    fn plan(&self, source: &dyn Source, weights: Weights) -> Plan<'_> {
-        Plan {
+    fn plan(&self, source: &dyn Source, weights: Weights) -> RunPlan<'_> {
+        RunPlan {
             profile: self.profile.clone(),
             weights,
             backend: &self.backend,

@@ -4,7 +4,7 @@
 use super::gather::{Gather, Row};
 use super::{Error, Labels, View};
 use glam::DQuat;
-use raywake_io::source::feather::Table;
+use raywake_io::source::feather::FeatherTable;
 use std::path::Path;
 
 /// Names of the columns of such a file.
@@ -43,7 +43,7 @@ pub(super) fn annotations(path: &Path) -> Result<Labels, Error> {
 
 /// Objects of a simulated drive, exact.
 pub(super) fn objects(path: &Path) -> Result<Labels, Error> {
-    let ids = |table: &Table| {
+    let ids = |table: &FeatherTable| {
         Ok(table.integers(OBJECTS.id)?.iter().map(i64::to_string).collect::<Vec<_>>())
     };
     Ok(Labels { exact: true, ..read(path, &OBJECTS, ids)? })
@@ -52,10 +52,11 @@ pub(super) fn objects(path: &Path) -> Result<Labels, Error> {
 fn read(
     path: &Path,
     names: &Names,
-    ids: impl Fn(&Table) -> Result<Vec<String>, Error>,
+    ids: impl Fn(&FeatherTable) -> Result<Vec<String>, Error>,
 ) -> Result<Labels, Error> {
     let keys = [names.frame, names.id, names.class];
-    let table = Table::read(path, &[&keys[..], &names.centre, &names.size, &ROTATION].concat())?;
+    let table =
+        FeatherTable::read(path, &[&keys[..], &names.centre, &names.size, &ROTATION].concat())?;
     let floats = |names: &[&str]| {
         names.iter().map(|name| table.floats(name)).collect::<Result<Vec<_>, Error>>()
     };

@@ -7,7 +7,7 @@ use super::ground::Ground;
 use super::{Category, Pair, Rules, TruePoint};
 use glam::DVec3;
 use raywake_io::Error;
-use raywake_io::source::feather::Table;
+use raywake_io::source::feather::FeatherTable;
 use raywake_io::source::{self, Format, OpenOptions, Source, SweepData};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -91,7 +91,7 @@ impl Log {
         self.load(sweep)?;
         let [(_, first), (_, second)] = &self.sweeps;
         let path = &self.truth[&sweep];
-        let table = Table::read(path, &[&FLOW[..], &["is_valid", "classes_0"]].concat())?;
+        let table = FeatherTable::read(path, &[&FLOW[..], &["is_valid", "classes_0"]].concat())?;
         let flow = read_flow(&table)?;
         same_rows(path, flow.len(), first)?;
         let valid = table.booleans("is_valid")?;
@@ -142,7 +142,7 @@ impl Estimate {
 
 /// Reads an estimate of a pair with so many returns.
 pub fn read_estimate(path: &Path, pair: &Pair) -> Result<Estimate, Error> {
-    let table = Table::read(path, &[&FLOW[..], &["is_valid"]].concat())?;
+    let table = FeatherTable::read(path, &[&FLOW[..], &["is_valid"]].concat())?;
     let (flow_m, valid) = (read_flow(&table)?, table.booleans("is_valid")?);
     rows(path, flow_m.len(), pair.points.len())?;
     Ok(Estimate { flow_m, valid })
@@ -153,7 +153,7 @@ fn position(p: [f32; 3]) -> DVec3 {
 }
 
 /// The flow of every row in f32, which is what files hold.
-fn read_flow(table: &Table) -> Result<Vec<[f32; 3]>, Error> {
+fn read_flow(table: &FeatherTable) -> Result<Vec<[f32; 3]>, Error> {
     let [x, y, z] = [table.floats(FLOW[0])?, table.floats(FLOW[1])?, table.floats(FLOW[2])?];
     Ok((0..table.rows()).map(|row| [x[row] as f32, y[row] as f32, z[row] as f32]).collect())
 }

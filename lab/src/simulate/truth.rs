@@ -11,7 +11,7 @@ use super::layout::{self, frame_name};
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use raywake_io::Error;
-use raywake_io::sink::table::{Column, Table};
+use raywake_io::sink::table::{TableWriter, Values};
 use raywake_io::source::feather;
 use raywake_sim::{Class, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
@@ -149,11 +149,11 @@ pub(super) fn of_objects(
 
 /// Writes the truth of a sweep's returns.
 pub fn write_points(path: &Path, rows: &[PointTruth]) -> Result<(), Error> {
-    let mut t = Table::compressed();
+    let mut t = TableWriter::compressed();
     t.f32s("offset_s", rows, |r| r.offset_s);
-    t.push("sensor", Column::U8(rows.iter().map(|r| r.sensor).collect()));
+    t.push("sensor", Values::U8(rows.iter().map(|r| r.sensor).collect()));
     t.u32s("object", rows, |r| r.object);
-    t.push("class", Column::U8(rows.iter().map(|r| r.class as u8).collect()));
+    t.push("class", Values::U8(rows.iter().map(|r| r.class as u8).collect()));
     for (axis, name) in ["flow_x", "flow_y", "flow_z"].into_iter().enumerate() {
         t.f32s(name, rows, |r| r.flow[axis]);
     }
@@ -165,7 +165,7 @@ pub fn write_points(path: &Path, rows: &[PointTruth]) -> Result<(), Error> {
 /// Fails where the file is unreadable or damaged, lacks a column, or has a value that cannot be.
 pub fn read_points(path: &Path) -> Result<Vec<PointTruth>, Error> {
     let names = ["offset_s", "sensor", "object", "class", "flow_x", "flow_y", "flow_z"];
-    let t = feather::Table::read(path, &names)?;
+    let t = feather::FeatherTable::read(path, &names)?;
     let (offsets, sensors) = (t.floats("offset_s")?, t.integers("sensor")?);
     let (objects, classes) = (t.integers("object")?, t.integers("class")?);
     let flow = [t.floats("flow_x")?, t.floats("flow_y")?, t.floats("flow_z")?];
@@ -202,11 +202,11 @@ fn numbers(o: &ObjectTruth) -> [f64; 14] {
 
 /// Writes the truth of objects.
 pub fn write_objects(path: &Path, rows: &[ObjectTruth]) -> Result<(), Error> {
-    let mut t = Table::compressed();
-    t.push("frame", Column::U64(rows.iter().map(|o| o.frame).collect()));
+    let mut t = TableWriter::compressed();
+    t.push("frame", Values::U64(rows.iter().map(|o| o.frame).collect()));
     t.u32s("id", rows, |o| o.id);
     let class = |o: &ObjectTruth| class_name(o.class).to_owned();
-    t.push("class", Column::Text(rows.iter().map(class).collect()));
+    t.push("class", Values::Text(rows.iter().map(class).collect()));
     for (n, name) in NUMBERS.into_iter().enumerate() {
         t.f64s(name, rows, |o| numbers(o)[n]);
     }
@@ -218,7 +218,7 @@ pub fn write_objects(path: &Path, rows: &[ObjectTruth]) -> Result<(), Error> {
 /// Fails where the file is unreadable or damaged, lacks a column, or has a value that cannot be.
 pub fn read_objects(path: &Path) -> Result<Vec<ObjectTruth>, Error> {
     let names: Vec<&str> = ["frame", "id", "class"].into_iter().chain(NUMBERS).collect();
-    let t = feather::Table::read(path, &names)?;
+    let t = feather::FeatherTable::read(path, &names)?;
     let (frames, ids, classes) = (t.integers("frame")?, t.integers("id")?, t.strings("class")?);
     let columns = NUMBERS.map(|name| t.floats(name));
     let columns: Vec<Vec<f64>> = columns.into_iter().collect::<Result<_, _>>()?;

@@ -7,7 +7,7 @@ use raywake_core::pose::Pose;
 use raywake_core::record::NONE;
 use raywake_core::sweep::Rig;
 use raywake_io::Error;
-use raywake_io::source::{Dropped, SweepData};
+use raywake_io::source::{SourceGaps, SweepData};
 use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
 
 /// A drive of the simulator.
@@ -123,7 +123,7 @@ impl Labelled for Simulated {
             points: sweep.points,
             world_from_vehicle: self.tilt * sweep.world_from_vehicle,
             twist: sweep.twist,
-            dropped: Dropped::default(),
+            dropped: SourceGaps::default(),
         };
         Ok(())
     }

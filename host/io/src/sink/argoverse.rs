@@ -7,7 +7,7 @@ use raywake_core::output::{Origin, PointFlow};
 use raywake_core::pose::Pose;
 
 use super::atomic;
-use super::table::{Column, Table};
+use super::table::{TableWriter, Values};
 use crate::Error;
 
 /// Writes `<out>/<log>/<timestamp_ns>.feather`: one row per return of the pair's first sweep, in
@@ -33,12 +33,12 @@ pub fn export(
     atomic::create_folder(&folder)?;
     let path = folder.join(format!("{timestamp_ns}.feather"));
     let motion: Vec<[f32; 3]> = flows.iter().map(|f| displacement(f, first, dt_s)).collect();
-    let mut table = Table::default();
+    let mut table = TableWriter::default();
     for (axis, name) in ["flow_tx_m", "flow_ty_m", "flow_tz_m"].iter().enumerate() {
         table.f32s(name, &motion, |m| m[axis]);
     }
     let valid = flows.iter().map(|f| f.origin != Origin::Unmatched).collect();
-    table.push("is_valid", Column::Bool(valid));
+    table.push("is_valid", Values::Bool(valid));
     table.write(&path, &[])?;
     Ok(path)
 }

@@ -11,7 +11,7 @@ use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
 use raywake_core::sweep::Point;
 
 use super::Meta;
-use super::table::Table;
+use super::table::TableWriter;
 use crate::Error;
 
 /// Names and places of the 15 upper entries of a tracklet's covariance; units are products of m, m,
@@ -43,7 +43,7 @@ const COVARIANCE: [(&str, usize, usize); 15] = [
 /// cov_dy_dy` (m^2) float32; `age` uint32; `foreground` (not explained by odometry) and `valid`
 /// (with a match of its own or part of a thing that moves) bool.
 pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
-    let mut t = Table::default();
+    let mut t = TableWriter::default();
     t.i32s("cell_i", columns, |c| c.cell[0]);
     t.i32s("cell_j", columns, |c| c.cell[1]);
     t.f64s("x_world_m", columns, |c| c.position_world_m[0]);
@@ -86,7 +86,7 @@ pub fn write_points(
         let lengths = format!("{} returns, {} flows", points.len(), flows.len());
         return Err(Error::Usage(format!("{}: {lengths}", path.display())));
     }
-    let mut t = Table::default();
+    let mut t = TableWriter::default();
     t.f32s("x_m", points, |p| p.position[0]);
     t.f32s("y_m", points, |p| p.position[1]);
     t.f32s("z_m", points, |p| p.position[2]);
@@ -114,7 +114,7 @@ pub fn write_tracklets(
     tracklets: &[TrackletState],
     meta: Meta<'_>,
 ) -> Result<(), Error> {
-    let mut t = Table::default();
+    let mut t = TableWriter::default();
     t.i32s("cell_i", tracklets, |s| s.cell[0]);
     t.i32s("cell_j", tracklets, |s| s.cell[1]);
     t.f64s("x_world_m", tracklets, |s| s.position_world_m[0]);
@@ -157,7 +157,7 @@ pub fn write_map(
     resolution_m: f64,
     meta: Meta<'_>,
 ) -> Result<(), Error> {
-    let mut t = Table::default();
+    let mut t = TableWriter::default();
     for (axis, name) in ["i", "j", "k"].iter().enumerate() {
         t.i32s(name, voxels, |v| v.index[axis]);
     }

@@ -6,7 +6,7 @@ use super::Meta;
 use crate::Error;
 
 /// Values of one column.
-pub enum Column {
+pub enum Values {
     /// float32.
     F32(Vec<f32>),
     /// float64.
@@ -27,46 +27,46 @@ pub enum Column {
 
 /// A table under construction.
 #[derive(Default)]
-pub struct Table {
-    columns: Vec<(String, Column)>,
+pub struct TableWriter {
+    columns: Vec<(String, Values)>,
     #[cfg_attr(not(feature = "arrow"), allow(dead_code))]
     compressed: bool,
 }
 
-impl Table {
+impl TableWriter {
     /// A table that is written with LZ4: of a simulated sweep's truth a twentieth is left.
-    pub fn compressed() -> Table {
-        Table { compressed: true, ..Table::default() }
+    pub fn compressed() -> TableWriter {
+        TableWriter { compressed: true, ..TableWriter::default() }
     }
 
     /// Adds a column; all must be of the same length.
-    pub fn push(&mut self, name: &str, column: Column) {
+    pub fn push(&mut self, name: &str, column: Values) {
         self.columns.push((name.to_owned(), column));
     }
 
     /// Adds a column of float32 made of every row.
     pub fn f32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f32) {
-        self.push(name, Column::F32(rows.iter().map(value).collect()));
+        self.push(name, Values::F32(rows.iter().map(value).collect()));
     }
 
     /// Adds a column of float64 made of every row.
     pub fn f64s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f64) {
-        self.push(name, Column::F64(rows.iter().map(value).collect()));
+        self.push(name, Values::F64(rows.iter().map(value).collect()));
     }
 
     /// Adds a column of int32 made of every row.
     pub fn i32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> i32) {
-        self.push(name, Column::I32(rows.iter().map(value).collect()));
+        self.push(name, Values::I32(rows.iter().map(value).collect()));
     }
 
     /// Adds a column of uint32 made of every row.
     pub fn u32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> u32) {
-        self.push(name, Column::U32(rows.iter().map(value).collect()));
+        self.push(name, Values::U32(rows.iter().map(value).collect()));
     }
 
     /// Adds a column of booleans made of every row.
     pub fn bools<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> bool) {
-        self.push(name, Column::Bool(rows.iter().map(value).collect()));
+        self.push(name, Values::Bool(rows.iter().map(value).collect()));
     }
 
     /// Writes the table, uncompressed unless it was made so: a sweep's worth takes a millisecond
@@ -103,11 +103,11 @@ mod arrow {
     use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
     use arrow_schema::{ArrowError, Field, Schema};
 
-    use super::{Column, Meta};
+    use super::{Meta, Values};
 
     /// The columns with their metadata.
     pub fn batch(
-        columns: Vec<(String, Column)>,
+        columns: Vec<(String, Values)>,
         meta: Meta<'_>,
     ) -> Result<RecordBatch, ArrowError> {
         let arrays: Vec<(String, ArrayRef)> =
@@ -122,16 +122,16 @@ mod arrow {
     }
 
     /// Takes over the memory of a column.
-    fn array(column: Column) -> ArrayRef {
+    fn array(column: Values) -> ArrayRef {
         match column {
-            Column::F32(v) => Arc::new(Float32Array::from(v)),
-            Column::F64(v) => Arc::new(Float64Array::from(v)),
-            Column::I32(v) => Arc::new(Int32Array::from(v)),
-            Column::U8(v) => Arc::new(UInt8Array::from(v)),
-            Column::U32(v) => Arc::new(UInt32Array::from(v)),
-            Column::U64(v) => Arc::new(UInt64Array::from(v)),
-            Column::Bool(v) => Arc::new(BooleanArray::from(v)),
-            Column::Text(v) => Arc::new(StringArray::from(v)),
+            Values::F32(v) => Arc::new(Float32Array::from(v)),
+            Values::F64(v) => Arc::new(Float64Array::from(v)),
+            Values::I32(v) => Arc::new(Int32Array::from(v)),
+            Values::U8(v) => Arc::new(UInt8Array::from(v)),
+            Values::U32(v) => Arc::new(UInt32Array::from(v)),
+            Values::U64(v) => Arc::new(UInt64Array::from(v)),
+            Values::Bool(v) => Arc::new(BooleanArray::from(v)),
+            Values::Text(v) => Arc::new(StringArray::from(v)),
         }
     }
 

@@ -10,10 +10,10 @@ use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
 
-use super::feather::Table;
-use super::poses::{Track, check_rising};
+use super::feather::FeatherTable;
+use super::poses::{PoseTrack, check_rising};
 use super::recognise::numbered;
-use super::{Dropped, OpenOptions, Source, SweepData, apply, folder_name};
+use super::{OpenOptions, Source, SourceGaps, SweepData, apply, folder_name};
 use crate::Error;
 
 /// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners turn once in
@@ -47,7 +47,7 @@ pub(super) struct Argoverse {
     root: PathBuf,
     name: String,
     files: Vec<(u64, PathBuf)>,
-    track: Track,
+    track: PoseTrack,
     rig: Rig,
     /// Index in [`SCANNERS`] of lasers 0 to 31.
     low_lasers: u32,
@@ -103,7 +103,7 @@ impl Argoverse {
     fn read_points(&self, index: usize, into: &mut SweepData) -> Result<Vec<i64>, Error> {
         let path = &self.files[index].1;
         into.points.clear();
-        let table = Table::read(path, &COLUMNS)?;
+        let table = FeatherTable::read(path, &COLUMNS)?;
         let (x, y, z) = (table.floats("x")?, table.floats("y")?, table.floats("z")?);
         let intensity = table.integers("intensity")?;
         let offsets = table.integers("offset_ns")?;
@@ -163,7 +163,7 @@ impl Source for Argoverse {
         into.world_from_vehicle = self.track.poses[index];
         into.twist = self.track.twist(index);
         let null = into.points.iter().filter(|p| p.position.iter().any(|v| v.is_nan())).count();
-        into.dropped = Dropped { sweeps_before: 0, null_rows: null as u32 };
+        into.dropped = SourceGaps { sweeps_before: 0, null_rows: null as u32 };
         Ok(())
     }
 
@@ -196,7 +196,7 @@ fn elevation_spread(points: &[Point], lasers: &[i64], scanners: &[Pose; 2], low:
 
 /// `vehicle_from_sensor` of the [`SCANNERS`].
 fn read_scanners(path: &Path) -> Result<[Pose; 2], Error> {
-    let table = Table::read(path, &[&["sensor_name"][..], &POSE_COLUMNS].concat())?;
+    let table = FeatherTable::read(path, &[&["sensor_name"][..], &POSE_COLUMNS].concat())?;
     let names = table.strings("sensor_name")?;
     let poses = PoseTable::read(&table, path)?;
     let find = |scanner: &str| match names.iter().position(|n| n == scanner) {
@@ -211,14 +211,14 @@ fn read_track(
     path: &Path,
     files: &[(u64, PathBuf)],
     notes: &mut Vec<String>,
-) -> Result<Track, Error> {
-    let table = Table::read(path, &[&["timestamp_ns"][..], &POSE_COLUMNS].concat())?;
+) -> Result<PoseTrack, Error> {
+    let table = FeatherTable::read(path, &[&["timestamp_ns"][..], &POSE_COLUMNS].concat())?;
     let stamps = table.integers("timestamp_ns")?;
     let poses = PoseTable::read(&table, path)?;
     let mut by_time: Vec<(u64, usize)> =
         stamps.iter().enumerate().filter_map(|(row, &t)| Some((t.try_into().ok()?, row))).collect();
     by_time.sort_unstable();
-    let (mut track, mut inexact) = (Track::default(), 0);
+    let (mut track, mut inexact) = (PoseTrack::default(), 0);
     let first = files.first().map_or(0, |f| f.0);
     for &(stamp, _) in files {
         let (distance, row) = nearest(&by_time, stamp)
@@ -250,7 +250,7 @@ struct PoseTable<'a> {
 }
 
 impl<'a> PoseTable<'a> {
-    fn read(table: &Table, path: &'a Path) -> Result<PoseTable<'a>, Error> {
+    fn read(table: &FeatherTable, path: &'a Path) -> Result<PoseTable<'a>, Error> {
         let columns = POSE_COLUMNS.iter().map(|c| table.floats(c)).collect::<Result<_, _>>()?;
         Ok(PoseTable { path, columns })
     }

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig};
 
-use super::poses::Track;
+use super::poses::PoseTrack;
 use super::sidecars::Sidecars;
-use super::{Dropped, Source, SweepData, bin, pcd, ply};
+use super::{Source, SourceGaps, SweepData, bin, pcd, ply};
 use crate::Error;
 
 /// An open folder.
@@ -19,7 +19,7 @@ pub(super) struct Clouds {
     pub poses_from: String,
     /// Frame number and file, in order.
     pub files: Vec<(u64, PathBuf)>,
-    pub track: Track,
+    pub track: PoseTrack,
     pub rig: Rig,
     /// Files that tell times and sensors of returns.
     pub sidecars: Option<Sidecars>,
@@ -60,7 +60,7 @@ impl Source for Clouds {
         let (frame, path) = &self.files[index];
         let before = index.checked_sub(1).map_or(*frame, |i| self.files[i].0 + 1);
         into.frame = *frame;
-        into.dropped = Dropped { sweeps_before: frame - before, null_rows: 0 };
+        into.dropped = SourceGaps { sweeps_before: frame - before, null_rows: 0 };
         into.stamp_s = self.track.stamps_s[index];
         into.world_from_vehicle = self.track.poses[index];
         into.twist = self.track.twist(index);
@@ -95,7 +95,7 @@ pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
 
 #[cfg(feature = "arrow")]
 fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
-    let table = super::feather::Table::read(path, &["x", "y", "z"])?;
+    let table = super::feather::FeatherTable::read(path, &["x", "y", "z"])?;
     let [x, y, z] = [table.floats("x")?, table.floats("y")?, table.floats("z")?];
     points.extend((0..table.rows()).map(|row| Point {
         position: [x[row] as f32, y[row] as f32, z[row] as f32],

@@ -18,19 +18,19 @@ use super::feather_check;
 use crate::Error;
 
 /// The columns of a file that were asked for.
-pub struct Table {
+pub struct FeatherTable {
     path: PathBuf,
     batches: Vec<RecordBatch>,
 }
 
-impl Table {
+impl FeatherTable {
     /// Reads `columns`. Fails where the file is unreadable or damaged, or lacks one of them.
-    pub fn read(path: &Path, columns: &[&str]) -> Result<Table, Error> {
-        Table::parse(path, &fs::read(path).map_err(Error::reading(path))?, columns)
+    pub fn read(path: &Path, columns: &[&str]) -> Result<FeatherTable, Error> {
+        FeatherTable::parse(path, &fs::read(path).map_err(Error::reading(path))?, columns)
     }
 
     /// Takes `columns` from the content of the file at `path`.
-    pub fn parse(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<Table, Error> {
+    pub fn parse(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<FeatherTable, Error> {
         feather_check::check(bytes).map_err(|what| Error::input(path, "", what))?;
         let damaged = |e: ArrowError| Error::input(path, "", format!("damaged: {e}"));
         // Once for the schema, once with the columns: others may have types nobody here needs.
@@ -45,7 +45,7 @@ impl Table {
             .build(Cursor::new(bytes))
             .map_err(damaged)?;
         let batches = reader.collect::<Result<_, _>>().map_err(damaged)?;
-        Ok(Table { path: path.to_path_buf(), batches })
+        Ok(FeatherTable { path: path.to_path_buf(), batches })
     }
 
     /// Number of rows.

@@ -8,7 +8,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 
 use super::clouds::{Clouds, read_cloud};
-use super::poses::{self, Track};
+use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::{SPAN_MAX_S, Sidecars};
 use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
@@ -93,7 +93,7 @@ struct Opening {
     kind: &'static str,
     poses_from: String,
     files: Vec<(u64, PathBuf)>,
-    track: Track,
+    track: PoseTrack,
     /// Whether the stamps were read and not assumed.
     timed: bool,
     sidecars: Option<Sidecars>,
@@ -116,7 +116,7 @@ impl Opening {
         }
         let frames: Vec<u64> = files.iter().map(|f| f.0).collect();
         note_gaps(&frames, &mut notes);
-        let (root, track) = (root.to_path_buf(), Track::default());
+        let (root, track) = (root.to_path_buf(), PoseTrack::default());
         Ok(Opening {
             root,
             kind,
@@ -172,7 +172,7 @@ impl Opening {
         let imu_from_velo = self.velo_from_imu()?.inverse();
         let folder = self.root.join("oxts/data");
         let (packets, _) = numbered(&folder, "txt")?;
-        let (mut files, mut track, mut first) = (Vec::new(), Track::default(), None);
+        let (mut files, mut track, mut first) = (Vec::new(), PoseTrack::default(), None);
         for (sweep, &stamp_s) in self.files.iter().zip(&self.track.stamps_s) {
             let Ok(i) = packets.binary_search_by_key(&sweep.0, |p| p.0) else { continue };
             let packet = oxts::read_packet(&packets[i].1)?;

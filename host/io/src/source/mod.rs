@@ -60,7 +60,7 @@ pub struct SweepData {
     /// Velocity of the vehicle, along the axes it has at the stamp.
     pub twist: Twist,
     /// What the source lacks at this sweep.
-    pub dropped: Dropped,
+    pub dropped: SourceGaps,
 }
 
 impl Default for SweepData {
@@ -71,7 +71,7 @@ impl Default for SweepData {
             points: Vec::new(),
             world_from_vehicle: Pose::IDENTITY,
             twist: Twist::ZERO,
-            dropped: Dropped::default(),
+            dropped: SourceGaps::default(),
         }
     }
 }
@@ -90,7 +90,7 @@ impl SweepData {
 
 /// What a source lacks at a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
+pub struct SourceGaps {
     /// Sweeps that frame numbers say are missing between the one before and this one.
     pub sweeps_before: u64,
     /// Rows without a coordinate (null in a feather file); their points hold NaN.

@@ -8,7 +8,7 @@ use std::path::Path;
 use raywake_core::sweep::Point;
 
 use super::lzf;
-use super::returns::{Column, Fields, Head, Number, load, records, table};
+use super::returns::{Attribute, Fields, Head, Number, load, records, table};
 use crate::Error;
 
 /// Replaces `points` by those of a file; returns whether they have times.
@@ -19,7 +19,7 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
     points.clear();
     let bytes = load(path)?;
     let mut head = Head::new(path, &bytes);
-    let header = Header::read(&mut head)?;
+    let header = PcdHeader::read(&mut head)?;
     let named: Vec<_> = header.fields.iter().map(|f| (f.name.clone(), f.number)).collect();
     let fields = Fields::find(&named).map_err(|what| Error::input(path, "", what))?;
     let (rows, at) = (header.rows, head.next.0);
@@ -87,7 +87,7 @@ impl Field {
     }
 }
 
-struct Header {
+struct PcdHeader {
     fields: Vec<Field>,
     rows: usize,
     data: Data,
@@ -96,8 +96,8 @@ struct Header {
 /// Fields and numbers of a field that are believed.
 const FIELDS_MAX: usize = 1 << 10;
 
-impl Header {
-    fn read(head: &mut Head) -> Result<Header, Error> {
+impl PcdHeader {
+    fn read(head: &mut Head) -> Result<PcdHeader, Error> {
         let (mut names, mut sizes, mut types) = (Vec::new(), Vec::new(), Vec::new());
         let (mut counts, mut width, mut height, mut points) = (None, None, None, None);
         loop {
@@ -128,7 +128,7 @@ impl Header {
                         ["binary_compressed"] => Data::Compressed,
                         _ => return Err(head.wrong(format!("unknown DATA {}", rest.join(" ")))),
                     };
-                    return Ok(Header { fields, rows, data });
+                    return Ok(PcdHeader { fields, rows, data });
                 }
                 _ if key.starts_with('#') => {}
                 _ => return Err(head.wrong(format!("`{key:.20}` is not an entry of a PCD header"))),
@@ -152,10 +152,10 @@ impl Header {
     }
 
     /// The columns of the fields, by start and step.
-    fn columns(&self, place: impl Fn(usize) -> (usize, usize)) -> Vec<Column> {
+    fn columns(&self, place: impl Fn(usize) -> (usize, usize)) -> Vec<Attribute> {
         let column = |(n, field): (usize, &Field)| {
             let (start, step) = place(n);
-            Column { number: field.number, start, step }
+            Attribute { number: field.number, start, step }
         };
         self.fields.iter().enumerate().map(column).collect()
     }

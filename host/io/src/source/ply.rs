@@ -6,7 +6,7 @@ use std::path::Path;
 
 use raywake_core::sweep::Point;
 
-use super::returns::{Column, Fields, Head, Number, load, records, table};
+use super::returns::{Attribute, Fields, Head, Number, load, records, table};
 use crate::Error;
 
 /// Replaces `points` by the vertices of a file; returns whether they have times.
@@ -17,7 +17,7 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
     points.clear();
     let bytes = load(path)?;
     let mut head = Head::new(path, &bytes);
-    let header = Header::read(&mut head)?;
+    let header = PlyHeader::read(&mut head)?;
     let fields = Fields::find(&header.fields).map_err(|what| Error::input(path, "", what))?;
     let (rows, width) = (header.rows, header.fields.len());
     let Some(big) = header.big else {
@@ -29,13 +29,13 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
     let mut start = 0;
     let column = |&(_, number): &(String, Number)| {
         start += number.size();
-        Column { number, start: start - number.size(), step: size }
+        Attribute { number, start: start - number.size(), step: size }
     };
-    let columns: Vec<Column> = header.fields.iter().map(column).collect();
+    let columns: Vec<Attribute> = header.fields.iter().map(column).collect();
     Ok(fields.returns(rows, |row, f| columns[f].value(records, row, big), points))
 }
 
-struct Header {
+struct PlyHeader {
     /// Name and type of the properties of a vertex.
     fields: Vec<(String, Number)>,
     rows: usize,
@@ -51,8 +51,8 @@ enum Element {
     After,
 }
 
-impl Header {
-    fn read(head: &mut Head) -> Result<Header, Error> {
+impl PlyHeader {
+    fn read(head: &mut Head) -> Result<PlyHeader, Error> {
         if head.words()? != ["ply"] {
             return Err(head.wrong("is not a PLY file (it does not start with `ply`)"));
         }
@@ -81,7 +81,7 @@ impl Header {
                 ["property", "list", ..] => return Err(head.wrong("a vertex with a list")),
                 ["end_header"] if element != Element::None => {
                     let big = big.ok_or_else(|| head.wrong("no format before"))?;
-                    return Ok(Header { fields, rows, big });
+                    return Ok(PlyHeader { fields, rows, big });
                 }
                 _ => {
                     let text = words.join(" ");

@@ -18,12 +18,12 @@ const REACH_MAX_M: f64 = 1e6;
 
 /// Stamp (s) and pose of every sweep of a source.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Track {
+pub(super) struct PoseTrack {
     pub stamps_s: Vec<f64>,
     pub poses: Vec<Pose>,
 }
 
-impl Track {
+impl PoseTrack {
     /// Velocity at sweep `i`, in the vehicle frame at its stamp: what leads from the sweep before
     /// it to it, or from it to the next where that is no motion, as on the first sweep or after a
     /// jump. Between two of those it stands still.
@@ -260,14 +260,14 @@ mod tests {
         // A turn to the left at 1 rad/s while driving 10 m/s forward.
         let step = Pose::planar(1.0, 0.0, 0.0, 0.1);
         let poses = vec![Pose::planar(5.0, 5.0, 0.0, 2.0), Pose::planar(5.0, 5.0, 0.0, 2.0) * step];
-        let track = Track { stamps_s: vec![0.0, 0.1], poses };
+        let track = PoseTrack { stamps_s: vec![0.0, 0.1], poses };
         let (first, second) = (track.twist(0), track.twist(1));
         assert!((first.linear - DVec3::new(10.0, 0.0, 0.0)).length() < 1e-9);
         assert!((first.angular.z - 1.0).abs() < 1e-9 && (second.angular.z - 1.0).abs() < 1e-9);
         // Going back from the second sweep must lead to the first one.
         let back = second.over(-0.1);
         assert!((back * step).translation.length() < 1e-9);
-        assert_eq!(Track { stamps_s: vec![0.0], poses: vec![step] }.twist(0), Twist::ZERO);
+        assert_eq!(PoseTrack { stamps_s: vec![0.0], poses: vec![step] }.twist(0), Twist::ZERO);
     }
 
     #[test]

@@ -121,13 +121,13 @@ impl Fields {
 
 /// A column of numbers in bytes: its first at `start`, the others `step` bytes apart.
 #[derive(Clone, Copy)]
-pub(super) struct Column {
+pub(super) struct Attribute {
     pub number: Number,
     pub start: usize,
     pub step: usize,
 }
 
-impl Column {
+impl Attribute {
     pub fn value(&self, bytes: &[u8], row: usize, big: bool) -> f64 {
         self.number.read(&bytes[self.start + row * self.step..], big)
     }

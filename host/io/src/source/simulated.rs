@@ -4,7 +4,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
 use raywake_sim::{Drive, Options, Truth, stamp_s};
 
-use super::{Dropped, Source, SweepData};
+use super::{Source, SourceGaps, SweepData};
 use crate::Error;
 
 /// A drive through a street that a seed draws.
@@ -76,7 +76,7 @@ impl Source for Simulated {
             points: sweep.points,
             world_from_vehicle: sweep.world_from_vehicle,
             twist: sweep.twist,
-            dropped: Dropped::default(),
+            dropped: SourceGaps::default(),
         };
         self.truth.swap(0, 1);
         self.truth[1] = (index, sweep.truth);

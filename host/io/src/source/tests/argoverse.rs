@@ -11,7 +11,7 @@ use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
 use raywake_core::sweep::Timing;
 
-use super::super::feather::Table;
+use super::super::feather::FeatherTable;
 use super::*;
 
 const STAMP: i64 = 315_966_265_259_836_000;
@@ -186,7 +186,7 @@ fn no_cut_or_flipped_byte_panics() {
     let columns = ["x", "intensity", "offset_ns"];
     for compression in [None, Some(CompressionType::LZ4_FRAME), Some(CompressionType::ZSTD)] {
         let good = file(&[sweep(10.0, &many)], compression);
-        let parse = |bytes: &[u8]| Table::parse(Path::new("f.feather"), bytes, &columns);
+        let parse = |bytes: &[u8]| FeatherTable::parse(Path::new("f.feather"), bytes, &columns);
         assert!(parse(&good).is_ok());
         for cut in 0..good.len() {
             let text = parse(&good[..cut]).map(|_| ()).unwrap_err().to_string();
@@ -213,8 +213,8 @@ fn booleans_and_small_integers() {
         ("holey", Arc::new(BooleanArray::from(vec![Some(true), None]))),
     ];
     let bytes = file(&[batch(columns)], None);
-    let table =
-        Table::parse(Path::new("f.feather"), &bytes, &["classes", "valid", "holey"]).unwrap();
+    let table = FeatherTable::parse(Path::new("f.feather"), &bytes, &["classes", "valid", "holey"])
+        .unwrap();
     assert_eq!(table.integers("classes").unwrap(), [-1, 29]);
     assert_eq!(table.booleans("valid").unwrap(), [true, false]);
     let refused = |name| table.booleans(name).unwrap_err().to_string();
