@@ -33,7 +33,7 @@ enum Command {
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Eval {
     #[command(flatten)]
-    flow: Option<eval::Args>,
+    flow: eval::Args,
     #[command(subcommand)]
     tracks: Option<Tracks>,
 }
@@ -46,10 +46,9 @@ enum Tracks {
 
 impl Eval {
     fn run(&self) -> Result<(), RunError> {
-        match (&self.tracks, &self.flow) {
-            (Some(Tracks::Tracks(args)), _) => tracks::run(args),
-            (None, Some(args)) => Ok(eval::run(args)?),
-            (None, None) => unreachable!("the drives are required"),
+        match &self.tracks {
+            Some(Tracks::Tracks(args)) => tracks::run(args),
+            None => Ok(eval::run(&self.flow)?),
         }
     }
 }
@@ -80,8 +79,12 @@ mod tests {
     #[test]
     fn eval_takes_drives_or_a_chapter() {
         let parse = |line: &str| Command::try_parse_from(line.split(' '));
-        let flow = parse("lab eval a/drive other --out results --jobs 2");
-        assert!(matches!(flow, Ok(Command::Eval(e)) if e.flow.is_some() && e.tracks.is_none()));
+        let Ok(Command::Eval(flow)) = parse("lab eval no/drive other --out results --jobs 2")
+        else {
+            panic!("no command");
+        };
+        let error = flow.run().unwrap_err().to_string();
+        assert!(error.contains("no/drive"), "{error}");
         let tracks = parse("lab eval tracks --out results a/drive");
         assert!(matches!(tracks, Ok(Command::Eval(e)) if e.tracks.is_some()));
         for wrong in ["lab eval", "lab eval a/drive", "lab eval tracks", "lab eval --out results"] {

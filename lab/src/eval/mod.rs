@@ -89,8 +89,8 @@ pub struct Args {
     #[arg(required = true, value_name = "DRIVE")]
     drives: Vec<PathBuf>,
     /// Folder of results
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, required = true, value_name = "DIR")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     inputs: Inputs,
     /// Drives at a time; each keeps two cores busy
@@ -107,7 +107,8 @@ pub struct Args {
 /// Evaluates, writes and prints. Drives that fail are named at the end; the others are evaluated.
 pub fn run(args: &Args) -> Result<(), Error> {
     let settings = Settings { all_columns: args.all_columns, ..args.inputs.settings()? };
-    let (names, out) = (names(&args.drives)?, &args.out);
+    let out = args.out.as_deref().ok_or_else(|| Error::Usage("--out is missing".into()))?;
+    let names = names(&args.drives)?;
     let (done, failed) = all(&names, &settings, out, args.jobs.max(1))?;
     if !done.is_empty() && !args.rows_only {
         for table in conclude(&done, &settings, out)? {
