@@ -224,6 +224,9 @@ pub struct MapArgs {
     /// Output folder: FRAME.feather per sweep, with i, j, k and log-odds of every observed voxel
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Also draw each map from above: DIR/FRAME.png
+    #[arg(long)]
+    pub png: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub recording: Recording,

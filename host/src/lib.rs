@@ -35,7 +35,6 @@ pub mod laps;
 pub mod map;
 pub mod order_statistics;
 pub mod outputs;
-#[cfg(feature = "png")]
 pub mod picture;
 pub mod progress;
 mod report;

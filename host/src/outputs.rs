@@ -18,8 +18,7 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Flows;
 
 use crate::args::{Export, PictureFrame, Results};
-#[cfg(feature = "png")]
-use crate::picture;
+use crate::picture::{Pictures, Scene};
 use raywake_io::Error;
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::SweepData;
@@ -42,15 +41,13 @@ pub struct Outputs {
     folders: Option<Folders>,
     log: String,
     profile: Profile,
-    /// Stamp of the first pair, s.
-    start_s: Option<f64>,
+    pictures: Option<(Pictures, PictureFrame)>,
 }
 
 struct Folders {
     columns: Option<PathBuf>,
     tracklets: Option<PathBuf>,
     points: Option<PathBuf>,
-    png: Option<(PathBuf, PictureFrame)>,
     argoverse: Option<PathBuf>,
 }
 
@@ -67,16 +64,11 @@ impl Kinds {
 
     /// Fails where this build lacks a feature that the files need.
     fn check(&self) -> Result<(), Error> {
-        let needs = [
-            (self.columns || self.points || self.argoverse, cfg!(feature = "arrow"), "arrow"),
-            (self.png.is_some(), cfg!(feature = "png"), "png"),
-        ];
-        match needs.iter().find(|(wanted, there, _)| *wanted && !there) {
-            Some((_, _, name)) => Err(Error::Unsupported(format!(
-                "--out needs the feature `{name}`, which is not compiled in"
-            ))),
-            None => Ok(()),
+        if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
+            let what = "--out needs the feature `arrow`, which is not compiled in";
+            return Err(Error::Unsupported(what.into()));
         }
+        Ok(())
     }
 }
 
@@ -90,13 +82,16 @@ impl Outputs {
         profile: &Profile,
     ) -> Result<Outputs, Error> {
         let folders = root.map(|root| Folders::create(root, kinds)).transpose()?;
-        Ok(Outputs { folders, log: log.to_string(), profile: profile.clone(), start_s: None })
+        let pictures = match root.zip(kinds.png) {
+            Some((root, frame)) => Some((Pictures::folder(&root.join("png"), log)?, frame)),
+            None => None,
+        };
+        Ok(Outputs { folders, log: log.to_string(), profile: profile.clone(), pictures })
     }
 
     /// Writes what a pair of sweeps yields for its first sweep.
     pub fn pair(&mut self, first: &SweepData, flows: &Flows) -> Result<(), Error> {
         let Some(folders) = &self.folders else { return Ok(()) };
-        let start_s = *self.start_s.get_or_insert(first.stamp_s);
         let meta = meta(first, flows.dt_s);
         if let Some(folder) = &folders.columns {
             feather::write_columns(&named(folder, first, "feather"), flows.columns, &meta)?;
@@ -106,18 +101,9 @@ impl Outputs {
             let points = &first.points[..flows.points.len().min(first.points.len())];
             feather::write_points(&named(folder, first, "feather"), points, flows.points, &meta)?;
         }
-        #[cfg(feature = "png")]
-        if let Some((folder, frame)) = &folders.png {
-            let scene = picture::FlowScene {
-                title: self.log.clone(),
-                note: picture::note(first, start_s),
-                points: &first.points,
-                columns: flows.columns,
-                world_from_vehicle: first.world_from_vehicle,
-                profile: &self.profile,
-                frame: *frame,
-            };
-            picture::flow(&named(folder, first, "png"), &scene)?;
+        if let Some((pictures, frame)) = &mut self.pictures {
+            let (columns, profile, frame) = (flows.columns, &self.profile, *frame);
+            pictures.write(first, &Scene::Flow { columns, profile, frame })?;
         }
         if let Some(folder) = &folders.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);
@@ -158,7 +144,6 @@ impl Folders {
             columns: folder("columns", kinds.columns)?,
             tracklets: folder("tracklets", kinds.columns)?,
             points: folder("points", kinds.points)?,
-            png: folder("png", kinds.png.is_some())?.zip(kinds.png),
             argoverse: folder("argoverse", kinds.argoverse)?,
         })
     }

@@ -18,6 +18,8 @@ pub const RING: Colour = [208, 214, 223];
 pub const BORDER: Colour = [126, 136, 152];
 /// What is static.
 pub const STATIC: Colour = [212, 221, 233];
+/// Observed and empty.
+pub const FREE: Colour = [226, 236, 240];
 /// The own vehicle.
 pub const VEHICLE: Colour = [58, 64, 76];
 

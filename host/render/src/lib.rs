@@ -21,7 +21,7 @@ mod text;
 #[cfg(test)]
 mod tests;
 
-pub use canvas::{Canvas, Error};
+pub use canvas::{Canvas, Error, Pen};
 pub use colours::Colour;
 pub use panel::WINDOW;
 pub use scene::{Arrow, Cell, Entry, Look, Outline, Panel, Sign, Trail, birds_eye};

@@ -44,6 +44,10 @@ pub struct FlowArgs {
     /// Output file: .feather or .bin
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub out: PathBuf,
+    /// Also draw the flow from above; without a name, beside --out
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    #[arg(help_heading = "Results")]
+    pub png: Option<Option<PathBuf>>,
     /// Time from A to B, s
     #[arg(long, value_name = "SECONDS", default_value = "0.1", value_parser = seconds)]
     pub dt: Duration,

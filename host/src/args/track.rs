@@ -46,6 +46,9 @@ pub struct TrackArgs {
     /// Output folder: `tracks.feather`, `clouds` and `summary.json`
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     pub out: Option<PathBuf>,
+    /// Also draw the tracks of each sweep from above: DIR/png/FRAME.png
+    #[arg(long, requires = "out", help_heading = "Results")]
+    pub png: bool,
     /// Write run statistics as JSON [default with --out: DIR/summary.json]
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub summary: Option<PathBuf>,

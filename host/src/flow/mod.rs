@@ -6,7 +6,7 @@
 mod motion;
 mod rows;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use raywake_core::output::{Origin, PointFlow};
@@ -14,13 +14,14 @@ use raywake_core::params::{ANCHOR_ABOVE_GROUND_M, Profile};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 
-use crate::args;
+use crate::args::{self, PictureFrame};
 use crate::choose;
 use crate::config::{self, Weights};
 use crate::console::{note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::laps::Laps;
+use crate::picture::{Pictures, Scene};
 use crate::statistics::{Dropped, in_words};
 use raywake_io::Error;
 use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
@@ -40,6 +41,9 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let profile = config::profile(&args.profile)?;
     let weights = Weights::read(&args.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
+    let beside = |file: &Option<PathBuf>| file.clone().unwrap_or(args.out.with_extension("png"));
+    let mut png =
+        args.png.as_ref().map(|file| Pictures::file(&beside(file), &title(args))).transpose()?;
     let mut laps = Laps::start();
 
     let dt_s = args.dt.as_secs_f64();
@@ -58,7 +62,7 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     say(&text)?;
     laps.lap("registration");
 
-    let (flows, dropped) = points(args, &profile, &weights, &rig, [&first, &second])?;
+    let (flows, dropped) = points(args, &profile, &weights, &rig, [&first, &second], &mut png)?;
     let second_from_first = motion.inverse();
     let rows: Vec<PointRow> = first
         .points
@@ -78,6 +82,12 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     laps.lap("write");
     let times: Vec<_> = laps.stages().map(|(name, ms)| format!("{name} {ms:.0} ms")).collect();
     Ok(say(&format!("times      {}\n", times.join(", ")))?)
+}
+
+/// From which cloud to which.
+fn title(args: &args::FlowArgs) -> String {
+    let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
+    format!("from {} to {}", name(&args.first), name(&args.second))
 }
 
 /// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.
@@ -137,6 +147,7 @@ fn points(
     weights: &Weights,
     rig: &Rig,
     [first, second]: [&SweepData; 2],
+    png: &mut Option<Pictures>,
 ) -> Result<(Vec<PointFlow>, Dropped), RunError> {
     let tables = weights.tables(profile)?;
     let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
@@ -151,6 +162,10 @@ fn points(
             "{b} does not follow {a}: {}",
             in_words(reset).1
         ))));
+    }
+    if let Some((pictures, flows)) = png.as_mut().zip(stepped.flows.as_ref()) {
+        let (columns, frame) = (flows.columns, PictureFrame::World);
+        pictures.write(first, &Scene::Flow { columns, profile, frame })?;
     }
     let mut flows = stepped.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
     flows.resize(first.points.len(), PointFlow::default());

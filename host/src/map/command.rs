@@ -12,6 +12,7 @@ use crate::console::{bytes, note, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
+use crate::picture::{Pictures, Scene};
 use crate::session::each_sweep;
 use crate::statistics::Dropped;
 use raywake_io::sink::atomic;
@@ -36,10 +37,15 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     say(args.quiet, &format!("{}; memory budget: at most {budget} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
+    let mut pictures = args.png.then(|| Pictures::folder(&args.out, source.name())).transpose()?;
     let mut tally = MapTally::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         let (voxels, origin_m) = tally.sweep(&mut mapper, &profile, visit.now)?;
         let path = args.out.join(format!("{:010}.feather", visit.now.frame));
+        if let Some(pictures) = &mut pictures {
+            let (voxels, voxel_m) = (&voxels, profile.voxel_m);
+            pictures.write(visit.now, &Scene::Map { voxels, origin_m, voxel_m })?;
+        }
         let meta =
             [("frame", visit.now.frame.to_string()), ("stamp_s", visit.now.stamp_s.to_string())];
         Ok(feather::write_map(&path, &voxels, origin_m, profile.voxel_m, &meta)?)

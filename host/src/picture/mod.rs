@@ -1,49 +1,51 @@
 //! Pictures of what the program finds, seen from above.
 
+#[cfg(not(feature = "png"))]
+mod absent;
+#[cfg(feature = "png")]
 mod flow;
+#[cfg(feature = "png")]
+mod map;
+#[cfg(feature = "png")]
+mod pictures;
+#[cfg(feature = "png")]
+mod tracks;
 
-use std::io::Write;
-use std::path::Path;
-
-use raywake_render::{Canvas, Look, Panel, birds_eye, colours};
-
-use raywake_io::Error;
-use raywake_io::sink::atomic;
-use raywake_io::source::SweepData;
-
-#[cfg(test)]
+#[cfg(all(test, feature = "png"))]
 mod tests;
 
-pub use flow::{FlowScene, flow};
+use raywake_core::output::ColumnFlow;
+use raywake_core::params::Profile;
+use raywake_io::sink::feather::Voxel;
+use raywake_objects::front_end::Track;
 
-/// Width and height of a picture's panel, pixels.
-const SIDE: f32 = 900.0;
-/// Height above the ground of the darkest returns, m.
-const HEIGHT_M: f32 = 2.5;
+use crate::args::PictureFrame;
 
-/// How a picture that reaches so far, in cells of this width, looks; m.
-fn look(half_extent_m: f64, cell_m: f64) -> Look {
-    Look {
-        half_extent_m: half_extent_m as f32,
-        cell_m: cell_m as f32,
-        height_m: HEIGHT_M,
-        heights: colours::HEIGHTS,
-        side: SIDE,
-        scale: 1.0,
-        legend: Vec::new(),
-    }
-}
+#[cfg(not(feature = "png"))]
+pub use absent::Pictures;
+#[cfg(feature = "png")]
+pub use pictures::Pictures;
 
-/// Frame and time of a sweep of a recording that began at `start_s`.
-pub fn note(sweep: &SweepData, start_s: f64) -> String {
-    format!("frame {}, {:.2} s", sweep.frame, sweep.stamp_s - start_s)
-}
-
-fn draw(panel: Panel, look: &Look) -> Result<Canvas, Error> {
-    birds_eye(&[panel], look).map_err(|e| Error::Unsupported(e.to_string()))
-}
-
-fn write(path: &Path, canvas: &Canvas) -> Result<(), Error> {
-    let png = canvas.png();
-    atomic::write(path, |out| out.write_all(&png))
+/// What a picture shows besides the returns of its sweep.
+pub enum Scene<'a> {
+    /// The flow of the sweep's columns.
+    Flow {
+        /// Its columns.
+        columns: &'a [ColumnFlow],
+        /// Gives the window.
+        profile: &'a Profile,
+        /// Which velocity is drawn.
+        frame: PictureFrame,
+    },
+    /// The sweep's sparse map, in place of its returns.
+    Map {
+        /// Its voxels, those of a column one after the other.
+        voxels: &'a [Voxel],
+        /// Corner of the voxel (0, 0, 0) in the world, m.
+        origin_m: [f64; 3],
+        /// Edge of a voxel, m.
+        voxel_m: f64,
+    },
+    /// The tracks after the sweep; those that are not live are left out.
+    Tracks(&'a [Track]),
 }

@@ -4,23 +4,24 @@ use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
-use raywake_render::Canvas;
+use raywake_io::sink::feather::Voxel;
+use raywake_io::source::SweepData;
+use raywake_render::{Canvas, colours};
 
-use super::flow::{FlowScene, canvas};
+use super::Scene;
+use super::flow::BEYOND;
+use super::pictures;
 use crate::args::PictureFrame;
 
 fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
     let point = |i: u8| Point { position: [0.1 * f32::from(i), 8.0, -1.7], ..Point::default() };
-    let scene = FlowScene {
-        title: "drive".into(),
-        note: String::new(),
-        points: &(0..100).map(point).collect::<Vec<_>>(),
-        columns,
+    let sweep = SweepData {
+        points: (0..100).map(point).collect(),
         world_from_vehicle: Pose::planar(5.0, -3.0, 0.0, yaw_rad),
-        profile: &Profile::hdl64(),
-        frame,
+        ..SweepData::default()
     };
-    canvas(&scene).unwrap()
+    let scene = Scene::Flow { columns, profile: &Profile::hdl64(), frame };
+    pictures::draw(&sweep, &scene, "drive", String::new()).unwrap()
 }
 
 /// Middle of the strong colours of the panel, m forward and left, and how many pixels have such.
@@ -35,7 +36,7 @@ fn motion(canvas: &Canvas) -> ([f64; 2], usize) {
     });
     let pixels: Vec<[f64; 2]> = pixels.collect();
     let profile = Profile::hdl64();
-    let per_m = 450.0 / (1.16 * 0.5 * f64::from(profile.side) * profile.voxel_m);
+    let per_m = 450.0 / (BEYOND * 0.5 * f64::from(profile.side) * profile.voxel_m);
     let n = pixels.len();
     ([0, 1].map(|a| pixels.iter().map(|p| p[a]).sum::<f64>() / n as f64 / per_m), n)
 }
@@ -83,4 +84,31 @@ fn what_is_static_or_unknown_has_no_arrow() {
     let nonsense = ColumnFlow { velocity_world_mps: [f32::NAN; 2], ..COLUMN };
     let picture = draw(&[static_, unmatched, nonsense], 0.0, PictureFrame::World);
     assert_eq!(motion(&picture).1, 0);
+}
+
+#[test]
+fn a_map_shows_what_stands_and_what_is_free() {
+    // A wall 3 m high and 20 m ahead, and a free lane up to it, in a lattice of 0.4 m voxels whose
+    // corner is not the vehicle.
+    let voxel = |i, j, k, log_odds_tenths| Voxel { index: [i, j, k], log_odds_tenths };
+    let lane = (0..50).map(|i| voxel(i, 0, 0, -20));
+    let wall =
+        (-10..10).flat_map(|j| [voxel(50, j, 0, 20), voxel(50, j, 7, 20), voxel(50, j, 8, -5)]);
+    let voxels: Vec<Voxel> = lane.chain(wall).collect();
+    let scene = Scene::Map { voxels: &voxels, origin_m: [100.0, 50.0, -1.7], voxel_m: 0.4 };
+    let sweep = SweepData {
+        world_from_vehicle: Pose::planar(100.0, 50.0, 0.0, 0.0),
+        ..SweepData::default()
+    };
+    let picture = pictures::draw(&sweep, &scene, "drive", String::new()).unwrap();
+    let width = picture.size()[0] as usize;
+    // 4.5 pixels per metre, the vehicle in the middle of the panel.
+    let at = |x_m: f64, y_m: f64| {
+        let (row, column) = (44.0 + 450.0 - 4.5 * x_m, 14.0 + 450.0 - 4.5 * y_m);
+        let pixel = 4 * (row as usize * width + column as usize);
+        [0, 1, 2].map(|c| picture.rgba()[pixel + c])
+    };
+    assert_eq!(at(10.0, 0.2), colours::FREE);
+    assert_eq!(at(10.0, 8.0), colours::GROUND);
+    assert!(at(20.2, 2.2)[1] < 200, "{:?}", at(20.2, 2.2));
 }

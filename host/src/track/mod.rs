@@ -14,14 +14,16 @@ use crate::console::{bytes, note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
+use crate::picture::{Pictures, Scene};
 use crate::session::each_sweep;
-use raywake_io::source;
+use raywake_io::source::{self, SweepData};
 
 use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
 pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
+pub(crate) use write::local;
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand, and all tracks with it.
@@ -32,6 +34,8 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
+    let folder = args.out.as_ref().filter(|_| args.png).map(|out| out.join("png"));
+    let mut pictures = folder.map(|f| Pictures::folder(&f, source.name())).transpose()?;
     let mut files = write::Files::create(args.out.as_deref())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes())?;
@@ -60,6 +64,9 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         let clock = Instant::now();
         if let Some(turnover) = tracker.sweep(visit.now, visit.before)? {
             report.step(&turnover, clock);
+            // Flow of a sweep is known with the next one.
+            let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
+            draw(&mut pictures, stepped, &tracker)?;
             tracker.ended(|ended| report.track(ended, &mut files))?;
         }
         Ok(())
@@ -67,6 +74,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let clock = Instant::now();
     if let Some(turnover) = tracker.last(&end.last)? {
         report.step(&turnover, clock);
+        draw(&mut pictures, &end.last, &tracker)?;
         tracker.ended(|ended| report.track(ended, &mut files))?;
     }
     report.tally.ended += u64::from(tracker.finish()?);
@@ -76,4 +84,15 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
     Ok(!end.interrupted)
+}
+
+fn draw(
+    pictures: &mut Option<Pictures>,
+    sweep: &SweepData,
+    tracker: &Tracker,
+) -> Result<(), raywake_io::Error> {
+    match pictures {
+        Some(pictures) => pictures.write(sweep, &Scene::Tracks(tracker.tracks())),
+        None => Ok(()),
+    }
 }

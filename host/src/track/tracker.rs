@@ -170,6 +170,16 @@ impl Tracker {
         self.parts.step(|parts| Ok(parts.front_end.finish(&mut parts.tracks)))
     }
 
+    /// Room for tracks, with those that live.
+    pub fn tracks(&self) -> &[Track] {
+        &self.parts.tracks
+    }
+
+    /// Whether the tracks are those of the sweep before the last.
+    pub fn lags(&self) -> bool {
+        self.drive.is_some()
+    }
+
     /// The tracks that ended in the last step, in the order of their room.
     pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
         self.parts.tracks.iter().filter(|t| t.life == Life::Ended)

@@ -96,7 +96,7 @@ impl Files {
 }
 
 /// A place (m from the track's anchor) in the frame of an object.
-fn local(state: &ObjectState, at: [f32; 3]) -> [f32; 3] {
+pub(crate) fn local(state: &ObjectState, at: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - state.position[a]);
     let (sin, cos) = libm::sincos(state.heading);
     [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
