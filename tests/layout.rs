@@ -11,11 +11,12 @@ use std::path::Path;
 const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
 
 /// Which packages of the project each one may name. Whatever is not listed may name any.
-const MAY_NAME: [(&str, &[&str]); 8] = [
+const MAY_NAME: [(&str, &[&str]); 9] = [
     ("core", &[]),
     ("core/objects", &["raywake-core"]),
     ("core/registration", &["raywake-core"]),
     ("gpu", &[]),
+    ("gpu/alloc-guard", &[]),
     ("kernels", &["raywake-core", "raywake-gpu"]),
     ("lab/sim", &["raywake-core"]),
     ("host/io", &["raywake-core", "raywake-sim"]),
@@ -27,6 +28,7 @@ const MAY_NAME: [(&str, &[&str]); 8] = [
             "raywake-registration",
             "raywake-kernels",
             "raywake-gpu",
+            "raywake-alloc-guard",
             "raywake-io",
             "raywake-sim",
         ],
