@@ -173,7 +173,7 @@ fn born_at_once(estimator: &mut Estimator, batches: &[Vec<ObjectReturn>], histor
         for ((batch, baseline), fastest) in batches.iter().zip(history).zip(&mut fastest) {
             let clock = Instant::now();
             for lag in &mut lags {
-                lag.push(estimator, &EstimateParams::default(), batch, baseline);
+                lag.push(estimator, &EstimateParams::DEFAULT, batch, baseline);
             }
             *fastest = fastest.min(milliseconds(clock));
         }
@@ -207,7 +207,7 @@ fn tracks(sweeps: &[SimSweep]) {
     };
     let batches: Vec<Vec<ObjectReturn>> =
         sweeps.iter().map(seen).filter(|b| !b.is_empty()).collect();
-    let filter = CentroidParams::dissertation();
+    let filter = CentroidParams::DEFAULT;
     let mut ekf: Option<CentroidEkf> = None;
     let mut history: Vec<ObjectState> = Vec::new();
     for batch in &batches {
@@ -237,7 +237,8 @@ fn tracks(sweeps: &[SimSweep]) {
             returns.len()
         ));
         let mut solve = |iterations: usize| {
-            let params = EstimateParams { iterations, model, ..EstimateParams::dissertation() };
+            let params =
+                EstimateParams { iterations, model_points: model, ..EstimateParams::DISSERTATION };
             let clock = Instant::now();
             let report = estimator.solve(&params, &returns, &history);
             (milliseconds(clock), report.iterations)
@@ -257,7 +258,7 @@ fn tracks(sweeps: &[SimSweep]) {
     let mut lag = FixedLag::new();
     for (n, (batch, baseline)) in batches.iter().zip(&history).enumerate() {
         let clock = Instant::now();
-        let state = lag.push(&mut estimator, &EstimateParams::default(), batch, baseline);
+        let state = lag.push(&mut estimator, &EstimateParams::DEFAULT, batch, baseline);
         variant.add(n, "total", milliseconds(clock));
         state.position.iter().for_each(|v| variant.digest.double(*v));
     }

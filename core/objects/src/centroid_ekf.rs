@@ -5,53 +5,42 @@
 //! (2.6). Positions are metres from the track's anchor, times seconds after its start. The first
 //! centroid tells no velocity, and a polar state without speed could only ever learn motion along
 //! its own heading: the filter rests until a centroid lies farther from the first than noise
-//! explains, or for [`CentroidParams::start_s`], and is then born of both.
+//! explains, or for [`CentroidParams::rest_max_s`], and is then born of both.
 
-use super::ObjectState;
+use crate::ObjectState;
+use crate::noise::ProcessNoise;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
-use raywake_core::ctrv::TwoPointStart;
+use raywake_core::ctrv::{CHI2_99_2DOF, TwoPointStart};
 
 /// Elements of the state.
 pub const STATE: usize = 7;
 type Mean = SVector<f64, STATE>;
 type Covariance = SMatrix<f64, STATE, STATE>;
 
-/// 99 % quantile of chi-square with two degrees of freedom.
-const DEPARTED_D2: f64 = 9.2103;
-/// What departs faster has shown another side to another sensor, m/s.
-const FASTEST_MPS: f64 = 60.0;
-/// Standard deviations from zero from which on the sign of a speed is sure.
-const SURE: f64 = 3.0;
-
-/// The filter's numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CentroidParams {
-    /// Process noise of the state per square root of a second: m, m, m, rad, m/s, m/s, rad/s.
-    pub process: [f64; STATE],
-    /// Standard deviation of a centroid along each axis, m.
-    pub centroid_m: f64,
-    /// Standard deviation of the velocity of what was seen once, along x and y each, m/s.
-    pub speed_birth_mps: f64,
-    /// Of its speed upwards, m/s.
-    pub climb_birth_mps: f64,
-    /// Of its turning rate, rad/s.
-    pub turn_birth_radps: f64,
-    /// The longest it rests after its first centroid, s.
-    pub start_s: f64,
-}
-
-impl CentroidParams {
-    /// The process noise is Q_u of 2.6.2, its entries read as standard deviations after a second.
-    /// The dissertation does not give the rest.
-    pub const fn dissertation() -> CentroidParams {
-        CentroidParams {
-            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
-            centroid_m: 0.2,
-            speed_birth_mps: 10.0,
-            climb_birth_mps: 0.5,
-            turn_birth_radps: 0.2,
-            start_s: 0.5,
-        }
+raywake_core::params! {
+    /// The filter of centroids.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct CentroidParams {
+        /// Standard deviation of a centroid along each axis.
+        pub centroid_sigma_m: f64 = 0.2, "m", (above 0);
+        /// Standard deviation of the velocity at birth, along x and y each.
+        pub birth_sigma_mps: f64 = 10.0, "m/s", (above 0);
+        /// Standard deviation of the climb at birth.
+        pub birth_climb_sigma_mps: f64 = 0.5, "m/s", (above 0);
+        /// Standard deviation of the turn rate at birth.
+        pub birth_turn_rate_sigma_radps: f64 = 0.2, "rad/s", (above 0);
+        /// Longest rest after the first centroid.
+        pub rest_max_s: f64 = 0.5, "s", (0 to 10);
+        /// Squared Mahalanobis distance from the first centroid at which the filter leaves its rest.
+        pub departure_d2: f64 = CHI2_99_2DOF, "", (above 0),
+            "99 % quantile of chi-square with two degrees of freedom.";
+        /// Speed above which a departure is the view of another sensor on another side.
+        pub departure_max_mps: f64 = 60.0, "m/s", (above 0);
+        /// Standard deviations from zero from which the sign of a speed is certain.
+        pub facing_sigmas: f64 = 3.0, "", (above 0);
+    } and {
+        /// Process noise.
+        pub noise: ProcessNoise = ProcessNoise::DEFAULT;
     }
 }
 
@@ -106,15 +95,15 @@ impl CentroidEkf {
     /// Of an object first seen at `centroid` at `time_s`.
     pub fn birth(params: &CentroidParams, time_s: f64, centroid: [f64; 3]) -> CentroidEkf {
         let [x, y, z] = centroid;
-        let measured = params.centroid_m;
+        let measured = params.centroid_sigma_m;
         let deviations = [
             measured,
             measured,
             measured,
             0.0,
-            params.speed_birth_mps,
-            params.climb_birth_mps,
-            params.turn_birth_radps,
+            params.birth_sigma_mps,
+            params.birth_climb_sigma_mps,
+            params.birth_turn_rate_sigma_radps,
         ];
         CentroidEkf {
             time_s,
@@ -133,7 +122,7 @@ impl CentroidEkf {
         self.time_s = time_s;
         let mut transition = if let Phase::Resting { .. } = self.phase {
             // Any direction is as likely.
-            let spread = params.speed_birth_mps * params.speed_birth_mps * dt * dt;
+            let spread = params.birth_sigma_mps * params.birth_sigma_mps * dt * dt;
             self.covariance[(0, 0)] += spread;
             self.covariance[(1, 1)] += spread;
             Covariance::identity()
@@ -143,7 +132,7 @@ impl CentroidEkf {
         transition[(2, 5)] = dt;
         // Noise that enters all along, half of it carried on: exact to the second order.
         let noise =
-            Covariance::from_diagonal(&Mean::from(params.process.map(|s| 0.5 * s * s * dt)));
+            Covariance::from_diagonal(&Mean::from(params.noise.sigmas().map(|s| 0.5 * s * s * dt)));
         self.covariance = transition * (self.covariance + noise) * transition.transpose() + noise;
         self.mean = advance(&self.mean, dt);
     }
@@ -160,7 +149,7 @@ impl CentroidEkf {
         if let Phase::Resting { first, since_s } = self.phase {
             return self.rest(params, centroid, first, since_s);
         }
-        let r = params.centroid_m * params.centroid_m;
+        let r = params.centroid_sigma_m * params.centroid_sigma_m;
         let innovation = self.innovation(centroid);
         let gain = self.covariance.fixed_view::<STATE, 3>(0, 0) * self.weight(params);
         self.mean += gain * innovation;
@@ -169,7 +158,7 @@ impl CentroidEkf {
         seen_part -= gain;
         let joseph = keep * self.covariance * keep.transpose() + gain * gain.transpose() * r;
         self.covariance = (joseph + joseph.transpose()) * 0.5;
-        self.face()
+        self.face(params.facing_sigmas)
     }
 
     /// Time of the state, s.
@@ -190,7 +179,7 @@ impl CentroidEkf {
         }
     }
 
-    /// Covariance of the state, in the order of [`CentroidParams::process`].
+    /// Covariance of the state, in the order of [`ProcessNoise::sigmas`].
     pub fn covariance(&self) -> &SMatrix<f64, STATE, STATE> {
         &self.covariance
     }
@@ -217,7 +206,8 @@ impl CentroidEkf {
 
     /// Inverse covariance of a centroid where it is expected.
     fn weight(&self, params: &CentroidParams) -> Matrix3<f64> {
-        let measured = Matrix3::from_diagonal_element(params.centroid_m * params.centroid_m);
+        let measured =
+            Matrix3::from_diagonal_element(params.centroid_sigma_m * params.centroid_sigma_m);
         // Positive definite by the noise.
         (self.covariance.fixed_view::<3, 3>(0, 0) + measured).try_inverse().unwrap_or_default()
     }
@@ -231,11 +221,12 @@ impl CentroidEkf {
         since_s: f64,
     ) -> Revision {
         let born = CentroidEkf::birth(params, self.time_s, centroid);
-        let (elapsed, measured) = (self.time_s - since_s, params.centroid_m * params.centroid_m);
+        let (elapsed, measured) =
+            (self.time_s - since_s, params.centroid_sigma_m * params.centroid_sigma_m);
         let moved = [centroid[0] - first[0], centroid[1] - first[1]];
         let moved2 = moved[0] * moved[0] + moved[1] * moved[1];
-        let departs = moved2 > 2.0 * measured * DEPARTED_D2 || elapsed >= params.start_s;
-        let fastest = FASTEST_MPS * elapsed.max(0.0);
+        let departs = moved2 > 2.0 * measured * params.departure_d2 || elapsed >= params.rest_max_s;
+        let fastest = params.departure_max_mps * elapsed.max(0.0);
         if !departs || moved2 > fastest * fastest || moved2 == 0.0 {
             *self = CentroidEkf { phase: self.phase, ..born };
             return Revision::None;
@@ -256,9 +247,9 @@ impl CentroidEkf {
     }
 
     /// Once the sign of the speed is sure, the heading leads forwards.
-    fn face(&mut self) -> Revision {
+    fn face(&mut self, sure: f64) -> Revision {
         let (speed, variance) = (self.mean[4], self.covariance[(4, 4)]);
-        if self.phase == Phase::Facing || speed * speed <= SURE * SURE * variance {
+        if self.phase == Phase::Facing || speed * speed <= sure * sure * variance {
             return Revision::None;
         }
         self.phase = Phase::Facing;
@@ -306,7 +297,7 @@ mod tests {
     use crate::random::Random;
     use std::vec::Vec;
 
-    const PARAMS: CentroidParams = CentroidParams::dissertation();
+    const PARAMS: CentroidParams = CentroidParams::DEFAULT;
 
     #[test]
     fn the_jacobian_is_that_of_the_motion() {

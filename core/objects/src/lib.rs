@@ -11,6 +11,7 @@
 pub mod centroid_ekf;
 pub mod estimate;
 pub mod front_end;
+pub mod noise;
 pub mod panorama;
 #[cfg(test)]
 #[path = "../../src/random.rs"]
@@ -51,4 +52,9 @@ pub struct ObjectState {
     pub climb: f64,
     /// Turning rate, rad/s.
     pub turn_rate: f64,
+}
+
+/// An angle within half a turn of zero.
+pub(crate) fn wrap_angle(angle: f64) -> f64 {
+    angle - core::f64::consts::TAU * libm::round(angle / core::f64::consts::TAU)
 }

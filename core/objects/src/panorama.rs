@@ -12,12 +12,18 @@ const LOWEST: f32 = -0.6;
 const RISE: f32 = 0.015;
 /// Bins beside a return whose rays may pass.
 const BESIDE: usize = 3;
-/// What is farther by more than this is something else, m, and by so much more for every metre of
-/// distance: a side that is seen at a slant goes on that far.
-const MARGIN_M: f32 = 1.0;
-const SLANT: f32 = 0.05;
-/// So many times as many must pass as end at the thing, or before it.
-const NEARLY_ALL: usize = 3;
+raywake_core::params! {
+    /// Rays that pass an object.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct PassingParams {
+        /// What is farther than a return by more than this is another object,
+        pub passing_margin_m: f32 = 1.0, "m", (0 to 10);
+        /// and by this for each metre of its distance: a side that is seen at a slant goes on that far.
+        pub passing_margin_ratio: f32 = 0.05, "", (0 to 1);
+        /// Directions that rays must pass in, for each in which they end at the object or before it.
+        pub passing_ratio: u32 = 3, "", (1 to 100);
+    }
+}
 
 /// Nearest and farthest distance, m; none has the first beyond the second.
 type Reach = [f32; 2];
@@ -45,6 +51,7 @@ impl Panorama {
     /// whether the next rays pass on its left and on its right.
     pub fn look<T>(
         &mut self,
+        params: &PassingParams,
         returns: &mut [T],
         ray: impl Fn(&T) -> (u8, [f32; 3], [f32; 3]),
         wanted: impl Fn(usize) -> bool,
@@ -59,7 +66,7 @@ impl Panorama {
             for (n, one) in returns.iter_mut().enumerate() {
                 let (of, from, to) = ray(one);
                 if of == sensor && wanted(n) {
-                    found(one, self.passed(from, to));
+                    found(one, self.passed(params, from, to));
                 }
             }
         }
@@ -80,11 +87,12 @@ impl Panorama {
     /// Whether the next rays to the left and to the right of a return, as the sensor sees it, pass
     /// what it is of: over the whole height of that, nearly all that end, end farther away. Through a
     /// window or between wheels only some do.
-    fn passed(&self, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
+    fn passed(&self, params: &PassingParams, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
         let Some(Direction { azimuth, rise: own, range }) = direction(from, to) else {
             return [false; 2];
         };
-        let farther = range + MARGIN_M + SLANT * range;
+        let margin_m = params.passing_margin_m;
+        let farther = range + margin_m + params.passing_margin_ratio * range;
         [1, AZIMUTHS - 1].map(|step| {
             let beside: [_; BESIDE] =
                 core::array::from_fn(|n| &self.reach[(azimuth + (n + 1) * step) % AZIMUTHS]);
@@ -95,7 +103,7 @@ impl Panorama {
             }
             let (mut pass, mut end) = (0, 0);
             for (rise, [near, far]) in self.reach[azimuth].iter().enumerate() {
-                if *near > range + MARGIN_M || *far < range - MARGIN_M {
+                if *near > range + margin_m || *far < range - margin_m {
                     continue;
                 }
                 if ends(rise) {
@@ -104,7 +112,7 @@ impl Panorama {
                     pass += 1;
                 }
             }
-            pass > NEARLY_ALL * end
+            pass > params.passing_ratio * end
         })
     }
 }
@@ -142,6 +150,7 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
+    const PARAMS: PassingParams = PassingParams::DEFAULT;
     const FROM: [f32; 3] = [3.0, -2.0, 1.8];
     const BEAMS: [f32; 5] = [-0.06, -0.04, -0.02, 0.0, 0.02];
 
@@ -170,7 +179,8 @@ mod tests {
         for middle in [0.0, 45.0, 90.0, 179.0, 230.0, 300.0] {
             let panorama = scene(middle, |_, _| None);
             for beam in 0..BEAMS.len() {
-                let passed = |off: f32| panorama.passed(FROM, at(middle + off, beam, 20.0));
+                let passed =
+                    |off: f32| panorama.passed(&PARAMS, FROM, at(middle + off, beam, 20.0));
                 assert_eq!(passed(10.0), [true, false], "{middle}");
                 assert_eq!(passed(-10.0), [false, true], "{middle}");
                 assert_eq!(passed(0.0), [false, false], "{middle}");
@@ -182,8 +192,8 @@ mod tests {
     fn none_pass_where_something_is_before_it_or_beside() {
         for range in [8.0, 20.5] {
             let panorama = scene(60.0, |_, off| (9.1..15.0).contains(&off).then_some(range));
-            assert_eq!(panorama.passed(FROM, at(60.0 + 9.0, 1, 20.0)), [false, false]);
-            assert_eq!(panorama.passed(FROM, at(60.0 - 10.0, 1, 20.0)), [false, true]);
+            assert_eq!(panorama.passed(&PARAMS, FROM, at(60.0 + 9.0, 1, 20.0)), [false, false]);
+            assert_eq!(panorama.passed(&PARAMS, FROM, at(60.0 - 10.0, 1, 20.0)), [false, true]);
         }
     }
 
@@ -192,7 +202,7 @@ mod tests {
         let window = |beam, off: f32| (beam == 2 && off.abs() < 2.9).then_some(40.0);
         let panorama = scene(60.0, window);
         for beam in 0..BEAMS.len() {
-            assert_eq!(panorama.passed(FROM, at(60.0 - 3.0, beam, 20.0)), [false, false]);
+            assert_eq!(panorama.passed(&PARAMS, FROM, at(60.0 - 3.0, beam, 20.0)), [false, false]);
         }
     }
 
@@ -209,6 +219,7 @@ mod tests {
                 })
                 .collect();
             panorama.look(
+                &PARAMS,
                 &mut returns,
                 |(sensor, to, _)| (*sensor, FROM, *to),
                 |n| n != 49,
@@ -224,11 +235,11 @@ mod tests {
     fn where_nothing_is_known_nothing_passes() {
         let mut panorama = scene(60.0, |_, _| None);
         panorama.clear();
-        assert_eq!(panorama.passed(FROM, at(70.0, 1, 20.0)), [false; 2]);
+        assert_eq!(panorama.passed(&PARAMS, FROM, at(70.0, 1, 20.0)), [false; 2]);
         for odd in [[f32::NAN; 3], FROM, [FROM[0], FROM[1], 9.0], [3.1, -2.0, 90.0], [f32::MAX; 3]]
         {
             panorama.add(FROM, odd);
-            assert_eq!(panorama.passed(FROM, odd), [false; 2]);
+            assert_eq!(panorama.passed(&PARAMS, FROM, odd), [false; 2]);
         }
         let seen: Vec<_> =
             panorama.reach.iter().flatten().filter(|reach| **reach != NOTHING).collect();

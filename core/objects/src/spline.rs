@@ -6,14 +6,14 @@
 
 /// Degree of the polynomials.
 pub const DEGREE: usize = 4;
-/// Basis functions that are not zero at a time.
+/// Number of basis functions that are not zero at a time.
 pub const SUPPORT: usize = DEGREE + 1;
 /// Basis functions of the longest splines.
 pub const BASES_MAX: usize = 64;
-/// Shortest domain, s: what happens at one time still has a basis.
+/// Shortest domain, s: so that returns of one instant have a basis.
 pub const DOMAIN_MIN_S: f64 = 0.1;
 
-/// Evenly spaced knots.
+/// Uniform knots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Knots {
     start: f64,
@@ -21,43 +21,57 @@ pub struct Knots {
     pieces: usize,
 }
 
-/// What the basis functions are at a time.
+/// The basis functions at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Basis {
-    /// Number of the first that is not zero there.
+    /// Index of the first that is not zero there.
     pub first: usize,
     /// Its value, and that of the four after it.
     pub values: [f64; SUPPORT],
 }
 
-/// How the knots were laid.
+impl Basis {
+    /// The first four elements of splines with the given control points: position and heading of a
+    /// state.
+    pub fn pose<const D: usize>(&self, control_points: &[[f64; D]]) -> [f64; 4] {
+        let mut pose = [0.0; 4];
+        for (control_point, value) in control_points[self.first..].iter().zip(self.values) {
+            for (sum, element) in pose.iter_mut().zip(control_point) {
+                *sum += element * value;
+            }
+        }
+        pose
+    }
+}
+
+/// How the spacing of knots differs from what was asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Laid {
-    /// The domain is too short for five basis functions: the knots are nearer than asked for.
+pub struct KnotFit {
+    /// Closer: the domain is too short for five basis functions.
     pub compressed: bool,
-    /// It is too long for [`BASES_MAX`]: they are further apart.
+    /// Wider: it is too long for [`BASES_MAX`].
     pub stretched: bool,
 }
 
 impl Knots {
-    /// No knots, of a place that waits for them: no splines are over these.
+    /// No knots: no spline is over these.
     pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
-    /// One basis function for each `every` seconds from `start` to `end`, five at least and
-    /// [`BASES_MAX`] at most.
-    pub fn over(start: f64, end: f64, every: f64) -> (Knots, Laid) {
+    /// One basis function for every `every` seconds from `start` to `end`, at least five and at most
+    /// [`BASES_MAX`].
+    pub fn over(start: f64, end: f64, every: f64) -> (Knots, KnotFit) {
         let domain = (end - start).max(DOMAIN_MIN_S);
         let wanted = libm::ceil(domain / every - 1e-9);
         let bases = wanted.clamp(SUPPORT as f64, BASES_MAX as f64);
         let pieces = bases as usize - DEGREE;
-        let laid = Laid {
+        let fit = KnotFit {
             compressed: domain / every < SUPPORT as f64 - 1e-9,
             stretched: wanted > BASES_MAX as f64,
         };
-        (Knots { start, spacing: domain / pieces as f64, pieces }, laid)
+        (Knots { start, spacing: domain / pieces as f64, pieces }, fit)
     }
 
-    /// So many pieces of a given length.
+    /// A number of pieces of a given length.
     pub fn pieces(start: f64, spacing: f64, pieces: usize) -> Knots {
         Knots { start, spacing, pieces: pieces.clamp(1, BASES_MAX - DEGREE) }
     }
@@ -92,13 +106,14 @@ impl Knots {
         self.start + (i as f64 - DEGREE as f64) * self.spacing
     }
 
-    /// Mean of the knots inside basis function `i`, s: splines with these for weights are the time.
+    /// Mean of the knots inside basis function `i`, s (Greville abscissa): the spline with these for
+    /// control points is the time.
     pub fn centre(&self, i: usize) -> f64 {
         self.knot(i) + 0.5 * SUPPORT as f64 * self.spacing
     }
 
-    /// The piece that `time` falls into, and how far into it, 0 to 1. The domain's ends hold what is
-    /// outside it.
+    /// The piece that `time` falls into, and how far into it, 0 to 1. Times outside the domain are
+    /// clamped to its ends.
     fn locate(&self, time: f64) -> (usize, f64) {
         let at = ((time - self.start) / self.spacing).clamp(0.0, self.pieces as f64);
         let piece = (at as usize).min(self.pieces - 1);
@@ -111,7 +126,7 @@ impl Knots {
         Basis { first, values: cox_de_boor::<DEGREE>(u) }
     }
 
-    /// Their values and derivatives (1/s) at the place `u`, 0 to 1, of every piece.
+    /// Values and derivatives (1/s) of the basis functions at `u`, 0 to 1, of every piece.
     pub fn shape(&self, u: f64) -> ([f64; SUPPORT], [f64; SUPPORT]) {
         let lower = cox_de_boor::<{ DEGREE - 1 }>(u);
         let rate = 1.0 / self.spacing;
@@ -124,10 +139,10 @@ impl Knots {
         (cox_de_boor::<DEGREE>(u), slopes)
     }
 
-    /// Splines with the given weights at `time`, by de Boor's algorithm (2.19 to 2.21).
-    pub fn value<const D: usize>(&self, weights: &[[f64; D]], time: f64) -> [f64; D] {
+    /// Splines with the given control points at `time`, by de Boor's algorithm (2.19 to 2.21).
+    pub fn value<const D: usize>(&self, control_points: &[[f64; D]], time: f64) -> [f64; D] {
         let (first, u) = self.locate(time);
-        let mut d: [[f64; D]; SUPPORT] = core::array::from_fn(|i| weights[first + i]);
+        let mut d: [[f64; D]; SUPPORT] = core::array::from_fn(|i| control_points[first + i]);
         for r in 1..=DEGREE {
             for i in (r..=DEGREE).rev() {
                 let alpha = (u + (DEGREE - i) as f64) / (SUPPORT - r) as f64;
@@ -141,8 +156,7 @@ impl Knots {
     }
 }
 
-/// Basis functions of degree `P` that are not zero at the place `u`, 0 to 1, of a piece, in order,
-/// and zeros.
+/// Basis functions of degree `P` that are not zero at `u`, 0 to 1, of a piece, in order; then zeros.
 fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
     let mut values = [0.0; SUPPORT];
     values[0] = 1.0;
@@ -243,16 +257,16 @@ mod tests {
 
     #[test]
     fn short_tracks_compress_and_long_ones_stretch() {
-        let laid = |domain: f64| {
-            let (knots, laid) = Knots::over(0.0, domain, 0.5);
-            (knots.bases(), laid.compressed, laid.stretched)
+        let fit = |domain: f64| {
+            let (knots, fit) = Knots::over(0.0, domain, 0.5);
+            (knots.bases(), fit.compressed, fit.stretched)
         };
-        assert_eq!(laid(0.0), (5, true, false));
-        assert_eq!(laid(2.4), (5, true, false));
-        assert_eq!(laid(2.5), (5, false, false));
-        assert_eq!(laid(2.6), (6, false, false));
-        assert_eq!(laid(32.0), (BASES_MAX, false, false));
-        assert_eq!(laid(1e6), (BASES_MAX, false, true));
+        assert_eq!(fit(0.0), (5, true, false));
+        assert_eq!(fit(2.4), (5, true, false));
+        assert_eq!(fit(2.5), (5, false, false));
+        assert_eq!(fit(2.6), (6, false, false));
+        assert_eq!(fit(32.0), (BASES_MAX, false, false));
+        assert_eq!(fit(1e6), (BASES_MAX, false, true));
         let (knots, _) = Knots::over(5.0, 5.0, 0.5);
         assert_eq!(knots.end(), 5.0 + DOMAIN_MIN_S);
     }

@@ -1,6 +1,7 @@
 //! Parameters of the tracklet filter.
 
 use super::{Kind, Value};
+use crate::ctrv::CHI2_99_2DOF;
 
 /// Where a tracklet is born.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +45,7 @@ crate::params! {
         /// Standard deviation of the turn rate at birth.
         pub turn_birth_radps: f32 = 0.2, "rad/s", (above 0);
         /// Limit of the squared Mahalanobis distance of an innovation (3.25).
-        pub gate_d2: f32 = 9.2103, "", (above 0),
+        pub gate_d2: f32 = CHI2_99_2DOF as f32, "", (above 0),
             "99 % quantile of chi-square with two degrees of freedom.";
         /// Sweeps over which the normalised innovations squared of a tracklet scale its noise, as
         /// an exponential mean; 0: noise as assumed.

@@ -8,7 +8,7 @@ use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
 use raywake_objects::ObjectState;
-use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, Report};
+use raywake_objects::estimate::{EstimateParams, EstimateReport, Estimator, FixedLag};
 use raywake_objects::front_end::{
     Flows, FrontEnd, FrontEndParams, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, Turnover,
 };
@@ -44,7 +44,7 @@ struct Parts {
 #[derive(Default)]
 struct Solver {
     estimator: Estimator,
-    report: Report,
+    report: EstimateReport,
     milliseconds: f64,
 }
 
@@ -52,7 +52,7 @@ impl Solver {
     fn solve(&mut self, track: &Track) {
         let clock = Instant::now();
         let (returns, history) = (track.returns(), track.history());
-        self.report = self.estimator.solve(&EstimateParams::default(), returns, history);
+        self.report = self.estimator.solve(&EstimateParams::DEFAULT, returns, history);
         self.milliseconds = clock.elapsed().as_secs_f64() * 1e3;
     }
 }
@@ -87,7 +87,7 @@ impl Lag {
             self.states.clear();
         }
         if self.states.seen() < u64::from(track.observations) {
-            let params = EstimateParams::default();
+            let params = EstimateParams::DEFAULT;
             self.states.push(self.filter.push(estimator, &params, track.latest(), &state));
         }
     }
@@ -221,7 +221,7 @@ pub struct Ended<'a> {
     /// With its trajectory and shape.
     pub estimator: &'a Estimator,
     /// How these were found.
-    pub report: &'a Report,
+    pub report: &'a EstimateReport,
     /// The estimates of every sweep where there are any, one for each state of its history.
     pub lag: Option<&'a [ObjectState]>,
     /// How long the estimate at its end took, ms.

@@ -7,7 +7,9 @@ use super::object::{Moment, Object, moment_at};
 use super::tracker::{Track, baseline, baseline_live, fixed_lag, motion};
 use crate::labels::Kind;
 use raywake_objects::centroid_ekf::CentroidParams;
-use raywake_objects::estimate::{Cost, EstimateParams, Estimator, Stop};
+use raywake_objects::estimate::{
+    Cost, EndpointParams, EstimateParams, Estimator, FreeSpaceParams, GrowthParams, Termination,
+};
 use raywake_objects::{ObjectReturn, ObjectState};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -28,29 +30,28 @@ pub enum Method {
 }
 
 /// The trackers of the tables and their names: those of the dissertation, then each option by itself.
-pub fn methods() -> [(&'static str, Method); 17] {
-    let of =
-        |params: EstimateParams, model: usize| Method::Proposed(EstimateParams { model, ..params });
-    let (printed, ours) = (EstimateParams::dissertation(), EstimateParams::default());
+pub fn methods() -> [(&'static str, Method); 16] {
+    let (printed, ours) = (EstimateParams::DISSERTATION, EstimateParams::DEFAULT);
+    let of = Method::Proposed;
+    let dense = |params| of(EstimateParams { model_points: 3000, ..params });
+    let carving = |carving_rounds| FreeSpaceParams { carving_rounds, ..FreeSpaceParams::DEFAULT };
+    let endpoints = EndpointParams { endpoint_sigma_m: 0.0, ..ours.endpoints };
+    let growth = GrowthParams { growth: false, ..ours.growth };
     [
         ("baseline EKF", Method::Baseline),
-        ("as printed, n_m = 300", of(printed, 300)),
-        ("as printed, n_m = 3000", of(printed, 3000)),
-        ("ours, n_m = 300", of(ours, 300)),
-        ("ours, n_m = 3000", of(ours, 3000)),
-        ("as printed, damped", Method::Proposed(EstimateParams { damping: true, ..printed })),
-        ("as printed, robust loss", Method::Proposed(EstimateParams { robust: 3.0, ..printed })),
-        (
-            "as printed, carved by rays",
-            Method::Proposed(EstimateParams { carves: true, ..printed }),
-        ),
-        ("ours without ends", Method::Proposed(EstimateParams { ends_m: 0.0, ..ours })),
-        ("ours without passing rays", Method::Proposed(EstimateParams { passing: false, ..ours })),
-        ("ours not carved", Method::Proposed(EstimateParams { carves: false, ..ours })),
-        ("ours not grown", Method::Proposed(EstimateParams { grows: false, ..ours })),
-        ("ours from one start", Method::Proposed(EstimateParams { starts: false, ..ours })),
-        ("ours without surfaces", Method::Proposed(EstimateParams { surfaces: false, ..ours })),
-        ("ours, Gaussian turns", Method::Proposed(EstimateParams { tails: 0.0, ..ours })),
+        ("as printed, n_m = 300", of(printed)),
+        ("as printed, n_m = 3000", dense(printed)),
+        ("ours, n_m = 300", of(ours)),
+        ("ours, n_m = 3000", dense(ours)),
+        ("as printed, damped", of(EstimateParams { damping: true, ..printed })),
+        ("as printed, carved by rays", of(EstimateParams { free_space: carving(3), ..printed })),
+        ("ours without ends", of(EstimateParams { endpoints, ..ours })),
+        ("ours without passing rays", of(EstimateParams { passing: false, ..ours })),
+        ("ours not carved", of(EstimateParams { free_space: carving(0), ..ours })),
+        ("ours not grown", of(EstimateParams { growth, ..ours })),
+        ("ours from one start", of(EstimateParams { multi_start: false, ..ours })),
+        ("ours without surfaces", of(EstimateParams { surfaces: false, ..ours })),
+        ("ours, Gaussian turns", of(EstimateParams { student_dof: 0.0, ..ours })),
         ("baseline EKF, at the time", Method::BaselineLive),
         ("ours, fixed lag", Method::FixedLag(ours)),
     ]
@@ -73,7 +74,7 @@ pub struct Score {
     /// At the start and after each iteration; empty for the baseline.
     pub costs: Vec<Cost>,
     /// Why it stopped.
-    pub stop: Stop,
+    pub stop: Termination,
     /// Time of the estimate, or of all of them where there is one a batch, s; 0 for the baseline.
     pub seconds: f64,
 }
@@ -110,7 +111,7 @@ pub struct Run {
     /// What it makes of the object.
     pub track: Track,
     costs: Vec<Cost>,
-    stop: Stop,
+    stop: Termination,
     seconds: f64,
 }
 
@@ -125,7 +126,7 @@ pub fn track(
     let done = |track: Track, seconds: f64| Run {
         track,
         costs: Vec::new(),
-        stop: Stop::default(),
+        stop: Termination::default(),
         seconds,
     };
     let live = match method {
@@ -135,9 +136,9 @@ pub fn track(
             let seconds = begin.elapsed().as_secs_f64();
             let track = Track::of(object, |t| estimator.state(t).into());
             let costs = report.costs.to_vec();
-            return Run { costs, stop: report.stop, ..done(track, seconds) };
+            return Run { costs, stop: report.termination, ..done(track, seconds) };
         }
-        Method::BaselineLive => baseline_live(object, &CentroidParams::dissertation()),
+        Method::BaselineLive => baseline_live(object, &CentroidParams::DEFAULT),
         Method::FixedLag(params) => fixed_lag(object, params, estimator),
     };
     let seconds = begin.elapsed().as_secs_f64();
@@ -192,7 +193,7 @@ const STACK: usize = 64 << 20;
 
 /// The baseline's history of every object.
 pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
-    objects.iter().map(|o| baseline(o, &CentroidParams::dissertation())).collect()
+    objects.iter().map(|o| baseline(o, &CentroidParams::DEFAULT)).collect()
 }
 
 /// Evaluates all trackers on all objects, with the baseline's history of each, `jobs` at a time; in

@@ -55,7 +55,7 @@ fn means(scores: &[&Score], value: fn(&Cost) -> f64) -> Vec<[f64; 2]> {
 /// The trackers that are drawn: the baseline, as printed, ours.
 fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 3] {
     let methods: [(&str, Method); 3] = [0, 1, OURS].map(|n| methods()[n]);
-    let history = baseline(object, &CentroidParams::dissertation());
+    let history = baseline(object, &CentroidParams::DEFAULT);
     methods.map(|(name, method)| (name, track(object, &history, &method, estimator).track))
 }
 

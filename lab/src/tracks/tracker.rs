@@ -55,7 +55,7 @@ pub fn fixed_lag(
     estimator: &mut Estimator,
 ) -> Vec<ObjectState> {
     let (mut filter, mut history) = (Box::new(FixedLag::new()), Vec::new());
-    follow(object, &CentroidParams::dissertation(), |state, _, batch| {
+    follow(object, &CentroidParams::DEFAULT, |state, _, batch| {
         history.push(filter.push(estimator, params, batch, &state));
     });
     history

@@ -6,7 +6,7 @@ const SIDE: usize = 64;
 const POINTS_PER_CELL: f32 = 0.5;
 
 /// Points ordered by the cell they lie in.
-pub(super) struct Nearest<const N: usize> {
+pub(super) struct NearestGrid<const N: usize> {
     low: [f32; 2],
     per_m: f32,
     cell_m: f32,
@@ -17,9 +17,9 @@ pub(super) struct Nearest<const N: usize> {
     count: usize,
 }
 
-impl<const N: usize> Nearest<N> {
-    pub const fn new() -> Nearest<N> {
-        Nearest {
+impl<const N: usize> NearestGrid<N> {
+    pub const fn new() -> NearestGrid<N> {
+        NearestGrid {
             low: [0.0; 2],
             per_m: 0.0,
             cell_m: 0.0,
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn is_that_of_brute_force() {
         let mut random = Random(1);
-        let mut grid = Box::new(Nearest::<300>::new());
+        let mut grid = Box::new(NearestGrid::<300>::new());
         for (count, size) in [(1, 1.0), (2, 0.0), (40, 3.0), (300, 5.0), (300, 0.01), (300, 900.0)]
         {
             // On a lattice, so that there are ties.

@@ -1,141 +1,306 @@
-//! The choices of an estimate: the dissertation's and ours.
+//! Parameters of the estimate of trajectory and shape: the dissertation's and ours.
 
-/// Objects beyond these lengths move like those of them, m.
-const LENGTHS_M: [f64; 2] = [0.6, 30.0];
+use crate::noise::ProcessNoise;
 
-/// Basis functions of short objects are no shorter than this share.
-const BASIS_LEAST: f64 = 2.0 / 3.0;
+raywake_core::params! {
+    /// The estimate of trajectory and shape.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct EstimateParams {
+        /// Returns that take part at most, evenly spaced in time.
+        pub returns: usize = 5000, "returns", (1 to 8192), "Dissertation, section 2.6.2.";
+        /// Model points (`n_m`).
+        pub model_points: usize = 300, "points", (1 to 3000), "Dissertation, section 2.6.2.";
+        /// Time between knots.
+        pub basis_s: f64 = 0.3, "s", (0.05 to 10), "The dissertation has 0.5 s.";
+        /// Standard deviation of a model point about the origin.
+        pub shape_sigma_m: f64 = 10.0, "m", (above 0), "Dissertation, section 2.6.2.";
+        /// Standard deviation of a return about its model point (`σ_z`).
+        pub return_sigma_m: f64 = 0.05, "m", (above 0), "The dissertation has 0.5 m.";
+        /// Gauss-Newton iterations of a descent at most.
+        pub iterations: usize = 10, "iterations", (0 to 64), "Dissertation, section 2.6.2.";
+        /// A descent has converged when an iteration lowers the cost by no more than this fraction.
+        pub convergence: f64 = 1e-4, "", (0 to 1);
+        /// Whether steps that raise the cost are undone and damped (Levenberg and Marquardt).
+        pub damping: bool = true, "", (any), "`raywake-lab eval tracks` has a row of it alone.";
+        /// Damping of the first iteration, a fraction of the diagonal.
+        pub damping_first: f64 = 1e-4, "", (0 to 1);
+        /// Factor of the damping after a step that raised the cost.
+        pub damping_up: f64 = 10.0, "", (above 1);
+        /// Factor of the damping after a step that lowered the cost.
+        pub damping_down: f64 = 0.3, "", (above 0 to 1);
+        /// Whether returns weigh by the surface that their model point stands for: fully across it,
+        /// little along it.
+        pub surfaces: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
+        /// Additional standard deviation of a return along its surface.
+        pub tangential_sigma_m: f64 = 0.3, "m", (0 to 10);
+        /// Whether the descent starts from a smoothed history and from motions that a search found.
+        pub multi_start: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
+        /// Whether rays that pass an object tell where it ends (see [`crate::panorama`]).
+        pub passing: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
+        /// Length of an object for which the noise, `basis_s` and `tangential_sigma_m` hold; 0: for
+        /// objects of any length. Turn rate noise is inversely proportional to the length, as is the
+        /// speed noise of longer objects; knots of shorter ones are closer, and their returns less
+        /// free along surfaces; `shape_sigma_m` is no more than the length.
+        pub reference_length_m: f64 = 4.5, "m", (0 to 100), "A car's.";
+        /// Objects that look shorter count as of this length.
+        pub length_min_m: f64 = 0.6, "m", (above 0);
+        /// Objects that look longer count as of this length.
+        pub length_max_m: f64 = 30.0, "m", (above 0);
+        /// Knots of short objects are no closer than this fraction of `basis_s`.
+        pub basis_ratio_min: f64 = 2.0 / 3.0, "", (above 0 to 1);
+        /// Time in which a turn rate decays to a third.
+        pub turn_decay_s: f64 = 1.5, "s", (at least 0.01);
+        /// Degrees of freedom of the turn rate's Student-t noise; 0: Gaussian noise.
+        pub student_dof: f64 = 0.5, "", (0 to 100), "`raywake-lab eval tracks` has a row without.";
+        /// Scale of the Student-t noise, as a fraction of the Gaussian's.
+        pub student_scale: f64 = 0.05, "", (above 0 to 1);
+        /// Time over which the Student-t noise has one variance.
+        pub manoeuvre_s: f64 = 1.7, "s", (0 to 60);
+    } and {
+        /// Process noise (`Q_u`).
+        pub noise: ProcessNoise = ProcessNoise {
+            // Town traffic turns into a bend within a second.
+            turn_rate_sigma_radps: 0.15,
+            ..ProcessNoise::DEFAULT
+        };
+        /// Where the object ends.
+        pub endpoints: EndpointParams = EndpointParams::DEFAULT;
+        /// Free-space carving.
+        pub free_space: FreeSpaceParams = FreeSpaceParams::DEFAULT;
+        /// Growth of the first trajectory from the middle of the track.
+        pub growth: GrowthParams = GrowthParams::DEFAULT;
+        /// First trajectories from a history.
+        pub smoothing: SmoothingParams = SmoothingParams::DEFAULT;
+        /// Search for steady motions.
+        pub search: SearchParams = SearchParams::DEFAULT;
+        /// The estimate of the last seconds.
+        pub fixed_lag: FixedLagParams = FixedLagParams::DEFAULT;
+    }
+}
 
-/// The choices of an estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimateParams {
-    /// Returns that take part, evenly in time as far as there are as many.
-    pub returns: usize,
-    /// Model points (`n_m`).
-    pub model: usize,
-    /// Time for each basis function, s.
-    pub basis_s: f64,
-    /// Square root of the diagonal of `Q_u`: x, y, z (m), heading (rad), speed, climb (m/s), turn
-    /// rate (rad/s).
-    pub process: [f64; 7],
-    /// Length of an object for which `basis_s`, `process` and `loose_m` hold, m: the turn rate of
-    /// others varies in inverse proportion to theirs, and so does the speed of longer ones; bases of
-    /// shorter ones are shorter, as somebody on foot turns within half a second, and they are less
-    /// loose; no model point is expected further from the origin than an object is long. 0 where all
-    /// holds for all.
-    pub length_m: f64,
-    /// Time in which a turn rate fades to a third, s; infinite where turns go on.
-    pub turn_s: f64,
-    /// Degrees of freedom of the turn rate's noise, which is then Student's; 0 for a Gaussian: steady
-    /// motion with a few hard turns. It refines what a Gaussian finds.
-    pub tails: f64,
-    /// Scale of Student's noise as a share of the deviation in `process`.
-    pub calm: f64,
-    /// A manoeuvre's length, s: so long Student's noise has one variance.
-    pub manoeuvre_s: f64,
-    /// Standard deviation of a model point about the origin, m.
-    pub extent_m: f64,
-    /// Standard deviation of a return about its model point (`σ_z`), m.
-    pub deviation_m: f64,
-    /// Iterations at most.
-    pub iterations: usize,
-    /// A return further off than so many deviations counts for a quarter; 0 for no robust loss.
-    pub robust: f64,
-    /// Steps that raise the cost are taken back and damped (Levenberg and Marquardt).
-    pub damping: bool,
-    /// Returns weigh across the surface that their model point stands for, little along it.
-    pub surfaces: bool,
-    /// Additional deviation along a surface, m; with `surfaces`.
-    pub loose_m: f64,
-    /// The start is smoothed with the process model, and steady motions that lay the returns over each
-    /// other are tried beside it.
-    pub starts: bool,
-    /// Deviation of a return at an end of the object, m; 0 to leave ends out. They lead the first
-    /// iterations, as many again; then the returns know better. See [`ends`].
-    pub ends_m: f64,
-    /// Model points that rays went through are taken away, and the rest is estimated again.
-    pub carves: bool,
-    /// Rays that pass the object tell where it ends: [`crate::panorama`].
-    pub passing: bool,
-    /// The start grows from the middle of the track, over a sparse model.
-    pub grows: bool,
+raywake_core::params! {
+    /// Endpoints: where an object begins and ends along itself.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct EndpointParams {
+        /// Standard deviation of a return at an end of the object; 0: ends are not used. They lead the
+        /// first descent, after which the returns alone decide.
+        pub endpoint_sigma_m: f64 = 0.2, "m", (0 to 10),
+            "`raywake-lab eval tracks` has a row without.";
+        /// Time over which one foremost and one hindmost return are taken.
+        pub endpoint_part_s: f32 = 0.2, "s", (above 0);
+        /// Returns that such a time needs to tell the ends.
+        pub endpoint_returns_min: usize = 6, "returns", (1 to 1000);
+        /// Residual beyond which the cost of an end grows linearly (Huber).
+        pub endpoint_bound_m: f64 = 0.3, "m", (above 0);
+        /// Scale of the bounded cost of a return that falls short: something may hide the end.
+        pub endpoint_hidden_m: f64 = 1.0, "m", (above 0);
+        /// Weight of a return that falls short.
+        pub endpoint_hidden_weight: f64 = 0.3, "", (0 to 1);
+        /// Slope of the view, across to along, from which the far end counts in full.
+        pub endpoint_slope: f64 = 0.3, "", (above 0);
+        /// Rays that pass a return no farther than this from an end show that nothing hides it.
+        pub endpoint_passing_m: f64 = 0.5, "m", (0 to 10);
+    }
+}
+
+raywake_core::params! {
+    /// Free-space carving: model points that rays went through are removed.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct FreeSpaceParams {
+        /// Rounds of carving and descent at most; 0: nothing is carved.
+        pub carving_rounds: usize = 3, "rounds", (0 to 20),
+            "`raywake-lab eval tracks` has a row without.";
+        /// Rays that carve, evenly spaced in time.
+        pub carving_rays: usize = 1000, "rays", (1 to 8192);
+        /// A ray goes through a model point that it passes this closely.
+        pub carving_radius_m: f64 = 0.12, "m", (above 0);
+        /// Length at the end of a ray that carves nothing.
+        pub carving_clearance_m: f64 = 0.25, "m", (0 to 10);
+        /// Least cosine between a ray and the normal of a surface that it crosses.
+        pub carving_cosine: f64 = 0.2, "", (0 to 1);
+        /// Least precision across a surface, as a fraction of a return's, of a thin surface.
+        pub carving_thinness: f64 = 0.05, "", (0 to 1);
+        /// Returns of a model point that outweigh a ray through it, inverted: rays per return.
+        pub carving_rays_weight: usize = 8, "", (1 to 1000);
+    }
+}
+
+raywake_core::params! {
+    /// Growth of the first trajectory from the middle of the track, over a sparse model: a dense one
+    /// would hold it where it starts.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct GrowthParams {
+        /// Whether it grows.
+        pub growth: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
+        /// Time by which a step reaches farther either way; the first reaches twice as far.
+        pub growth_step_s: f64 = 0.2, "s", (0.01 to 100);
+        /// Standard deviation of a return meanwhile.
+        pub growth_sigma_m: f64 = 0.15, "m", (above 0);
+        /// Model points meanwhile.
+        pub growth_points: usize = 75, "points", (1 to 3000);
+        /// Models made in the first step.
+        pub growth_first_rounds: usize = 6, "rounds", (1 to 100);
+        /// Iterations with each of them.
+        pub growth_first_iterations: usize = 6, "iterations", (0 to 64);
+        /// Models made in a later step.
+        pub growth_rounds: usize = 2, "rounds", (1 to 100);
+        /// Iterations with each of them.
+        pub growth_iterations: usize = 2, "iterations", (0 to 64);
+    }
+}
+
+raywake_core::params! {
+    /// The first trajectory, smoothed from a history of states and the process model.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SmoothingParams {
+        /// Standard deviation of a position of the history.
+        pub history_sigma_m: f64 = 0.3, "m", (above 0);
+        /// Standard deviation of the heading of what moves fast.
+        pub history_heading_sigma_rad: f64 = 0.1, "rad", (above 0);
+        /// Standard deviation of the turn rate about zero.
+        pub turn_rate_prior_radps: f64 = 0.3, "rad/s", (above 0);
+        /// Speed at which a heading weighs a quarter, and above which a direction of motion is one.
+        pub heading_speed_mps: f64 = 2.0, "m/s", (above 0);
+        /// Gauss-Newton iterations.
+        pub smoothing_iterations: usize = 6, "iterations", (1 to 64);
+        /// Iterations after which positions are weighed by their residual.
+        pub smoothing_plain_iterations: usize = 2, "iterations", (0 to 64);
+        /// Residual of a position at which it weighs a quarter (Geman and McClure).
+        pub smoothing_outlier_m: f64 = 1.0, "m", (above 0);
+    }
+}
+
+raywake_core::params! {
+    /// Search for the steady motion that makes a cloud crispest.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SearchParams {
+        /// Time over which a motion that is not steady is taken to be.
+        pub unsteady_s: f64 = 1.0, "s", (above 0);
+        /// Returns needed.
+        pub search_returns_min: usize = 10, "returns", (2 to 1500);
+        /// Time that the returns must span.
+        pub search_span_min_s: f32 = 0.2, "s", (above 0);
+        /// Time about the middle of the returns that is used.
+        pub search_span_max_s: f32 = 10.0, "s", (above 0);
+        /// Returns that rays pass and that weigh as much as all others together.
+        pub search_edges: usize = 100, "returns", (1 to 500);
+        /// Edge of a cell of the entropy; cells are twice as high.
+        pub search_cell_m: f32 = 0.3, "m", (0.05 to 10);
+        /// Cells along a long object: its cells are larger.
+        pub search_cells_along: f32 = 60.0, "cells", (1 to 1000);
+        /// Lengths of the object that its centroid may move along it while it is seen.
+        pub search_lengths: f32 = 1.3, "lengths", (0 to 10);
+        /// Further error of the centroid's velocity.
+        pub search_error_mps: f32 = 0.5, "m/s", (0 to 10);
+        /// Finer lattices about the best velocity, each of half the step.
+        pub search_refinements: usize = 2, "lattices", (0 to 10);
+        /// Factor of the cells' edge from one lattice to the next finer one.
+        pub search_cell_ratio: f32 = 0.7, "", (above 0 to 1);
+        /// Steps that a finer lattice reaches either way.
+        pub search_refined_steps: u32 = 2, "steps", (1 to 10);
+    }
+}
+
+raywake_core::params! {
+    /// The fixed-lag estimate: one over the last 2.5 s, with every sweep.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct FixedLagParams {
+        /// Gauss-Newton iterations with a sweep.
+        pub lag_iterations: usize = 2, "iterations", (1 to 10);
+        /// Additional standard deviation of a return along its surface, whatever the length.
+        pub lag_tangential_sigma_m: f64 = 0.5, "m", (0 to 10);
+        /// Distance between model points where one is added.
+        pub lag_point_spacing_m: f32 = 0.3, "m", (above 0);
+        /// Factor of this distance when there is no room for more model points.
+        pub lag_spacing_growth: f32 = 1.25, "", (above 1);
+        /// Returns that have left the window and still hold a model point, at most.
+        pub lag_prior_returns: f32 = 20.0, "returns", (1 to 1000);
+        /// Standard deviation of the state that the window begins with: position,
+        pub lag_prior_m: f64 = 0.1, "m", (above 0);
+        /// heading,
+        pub lag_prior_heading_rad: f64 = 0.02, "rad", (above 0);
+        /// speed,
+        pub lag_prior_speed_mps: f64 = 0.5, "m/s", (above 0);
+        /// climb,
+        pub lag_prior_climb_mps: f64 = 0.2, "m/s", (above 0);
+        /// and turn rate.
+        pub lag_prior_turn_rate_radps: f64 = 0.05, "rad/s", (above 0);
+        /// Age below which other starts are tried with every sweep.
+        pub young_s: f64 = 1.5, "s", (0 to 10);
+        /// Displacement below which a young track counts as stationary; its heading is then
+        /// unobservable and kept.
+        pub young_stationary_m: f64 = 0.5, "m", (0 to 10);
+        /// Standard deviation of a return while the track is young.
+        pub young_sigma_m: f64 = 0.15, "m", (above 0);
+        /// Returns per model point while the track is young: with fewer, a model explains motion by
+        /// points of its own for every sweep.
+        pub young_returns_per_point: usize = 6, "returns", (1 to 1000);
+        /// Least model points while the track is young.
+        pub young_points_min: usize = 12, "points", (1 to 3000);
+        /// Most model points while the track is young.
+        pub young_points_max: usize = 75, "points", (1 to 3000);
+        /// Net displacement backwards from which an object is turned round.
+        pub reversed_m: f64 = 0.3, "m", (0 to 10);
+        /// Length of the object, at most, by which the tracker's centroid may differ from the estimate.
+        pub strayed_length_m: f64 = 15.0, "m", (0 to 100);
+    }
 }
 
 impl EstimateParams {
     /// The dissertation's (2.6.2).
-    pub const fn dissertation() -> EstimateParams {
-        EstimateParams {
-            returns: 5000,
-            model: 300,
-            basis_s: 0.5,
-            process: [0.01, 0.01, 0.01, 0.001, 0.9, 0.1, 0.08165],
-            length_m: 0.0,
-            turn_s: f64::INFINITY,
-            tails: 0.0,
-            calm: 1.0,
-            manoeuvre_s: 0.0,
-            extent_m: 10.0,
-            deviation_m: 0.5,
-            iterations: 10,
-            robust: 0.0,
-            damping: false,
-            surfaces: false,
-            loose_m: 0.0,
-            starts: false,
-            ends_m: 0.0,
-            carves: false,
-            passing: false,
-            grows: false,
-        }
-    }
+    pub const DISSERTATION: EstimateParams = EstimateParams {
+        basis_s: 0.5,
+        return_sigma_m: 0.5,
+        damping: false,
+        surfaces: false,
+        tangential_sigma_m: 0.0,
+        multi_start: false,
+        passing: false,
+        reference_length_m: 0.0,
+        turn_decay_s: f64::INFINITY,
+        student_dof: 0.0,
+        student_scale: 1.0,
+        manoeuvre_s: 0.0,
+        noise: ProcessNoise::DEFAULT,
+        endpoints: EndpointParams { endpoint_sigma_m: 0.0, ..EndpointParams::DEFAULT },
+        free_space: FreeSpaceParams { carving_rounds: 0, ..FreeSpaceParams::DEFAULT },
+        growth: GrowthParams { growth: false, ..GrowthParams::DEFAULT },
+        ..EstimateParams::DEFAULT
+    };
 
-    /// Those for an object so long, m; these where it is not known.
-    pub(super) fn of(&self, length_m: f32) -> EstimateParams {
+    /// Those for an object of a length, m; unchanged where it is not known.
+    pub(super) fn for_length(&self, length_m: f32) -> EstimateParams {
         let mut params = *self;
-        if self.length_m > 0.0 && length_m > 0.0 {
-            let [shortest, longest] = LENGTHS_M;
-            let length_m = f64::from(length_m).clamp(shortest, longest);
-            let shorter = self.length_m / length_m;
-            params.process[6] *= shorter;
-            params.process[4] *= shorter.min(1.0);
-            params.basis_s *= shorter.recip().clamp(BASIS_LEAST, 1.0);
-            params.loose_m *= shorter.recip().min(1.0);
-            params.extent_m = params.extent_m.min(length_m);
+        if self.reference_length_m > 0.0 && length_m > 0.0 {
+            // No `clamp`: it panics where a user's bounds are the wrong way round.
+            let length_m = f64::from(length_m).max(self.length_min_m).min(self.length_max_m);
+            let shorter = self.reference_length_m / length_m;
+            params.noise.turn_rate_sigma_radps *= shorter;
+            params.noise.speed_sigma_mps *= shorter.min(1.0);
+            params.basis_s *= shorter.recip().clamp(self.basis_ratio_min, 1.0);
+            params.tangential_sigma_m *= shorter.recip().min(1.0);
+            params.shape_sigma_m = params.shape_sigma_m.min(length_m);
         }
         params
     }
 
     /// The same with Gaussian noise alone.
-    pub(super) fn plain(&self) -> EstimateParams {
-        EstimateParams { tails: 0.0, ..*self }
+    pub(super) fn gaussian(&self) -> EstimateParams {
+        EstimateParams { student_dof: 0.0, ..*self }
+    }
+
+    /// The same without endpoints.
+    pub(super) fn without_endpoints(&self) -> EstimateParams {
+        let endpoints = EndpointParams { endpoint_sigma_m: 0.0, ..self.endpoints };
+        EstimateParams { endpoints, ..*self }
     }
 }
 
-impl Default for EstimateParams {
-    /// Ours.
-    fn default() -> EstimateParams {
-        let mut process = EstimateParams::dissertation().process;
-        // Town traffic turns into a bend within a second.
-        process[6] = 0.15;
-        EstimateParams {
-            basis_s: 0.3,
-            deviation_m: 0.05,
-            damping: true,
-            surfaces: true,
-            loose_m: 0.3,
-            starts: true,
-            ends_m: 0.2,
-            carves: true,
-            passing: true,
-            grows: true,
-            process,
-            // A car's.
-            length_m: 4.5,
-            turn_s: 1.5,
-            tails: 0.5,
-            calm: 0.05,
-            manoeuvre_s: 1.7,
-            ..EstimateParams::dissertation()
-        }
+impl FixedLagParams {
+    /// Standard deviations of the state that the window begins with, by element.
+    pub(super) fn prior_sigmas(&self) -> [f64; 7] {
+        let m = self.lag_prior_m;
+        let (heading, speed) = (self.lag_prior_heading_rad, self.lag_prior_speed_mps);
+        [m, m, m, heading, speed, self.lag_prior_climb_mps, self.lag_prior_turn_rate_radps]
     }
 }

@@ -1,5 +1,5 @@
-//! Process model (2.5.1.1): `J_u = 1/2 ∫ e_u' Q_u^-1 e_u`, with `e_u` the splines' derivative less the
-//! unicycle's.
+//! Process model (2.5.1.1): `J_u = 1/2 ∫ e_u' Q_u^-1 e_u`, with `e_u` the derivative of the splines minus
+//! that of the unicycle.
 //!
 //! The integral is taken over every piece of the splines by Gauss and Legendre's rule with six nodes,
 //! which is exact for polynomials of degree 11. All but the unicycle's `v cos` and `v sin` of the
@@ -7,26 +7,21 @@
 //! heading turns by a fraction of a radian, six nodes leave less than a millionth of the integral
 //! (`the_integral_is_exact_enough`).
 //!
-//! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_s`. And most of the time an object
-//! goes steadily, which one variance for all times cannot say: it lets the steady jitter and smooths
-//! the hard turns. So the variance is another one for each manoeuvre of `m` pieces of the splines,
-//! unknown, and its reciprocal of Gamma's distribution with `ν` degrees of freedom. Integrated out, it
-//! leaves Student's distribution: with `S = ∫ e² / q²` over the manoeuvre its cost is
-//! `(ν + m) / 2 ln(1 + S / ν)` where a Gaussian's is `S / 2`. Nobody knows when manoeuvres begin: the
-//! cost is the mean over all `m` ways to cut the track into them. Gauss-Newton takes that as a
-//! Gaussian whose precision is `(ν + m) / (ν + S)` of `1 / q²`, which has the same slope. It has other
-//! minima than the one looked for, so trajectories are found with a Gaussian first.
+//! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_decay_s`. And motion is steady but
+//! for a few hard turns, which no Gaussian says: it lets the steady parts jitter and smooths the turns.
+//! The noise is Student-t instead (as in Roth, Özkan and Gustafsson, ICASSP 2013): the variance of each
+//! manoeuvre of `m` pieces is unknown, its reciprocal Gamma distributed with `ν` degrees of freedom.
+//! Integrated out, with `S = ∫ e² / q²` over the manoeuvre, its cost is `(ν + m) / 2 ln(1 + S / ν)` where
+//! a Gaussian's is `S / 2`. As nobody knows when manoeuvres begin, the cost is the mean over all `m` ways
+//! to cut the track into them. Gauss-Newton takes it as a Gaussian of precision `(ν + m) / (ν + S)` times
+//! `1 / q²` (iteratively reweighted least squares), which has the same gradient. It has further minima,
+//! so trajectories are found with Gaussian noise first.
 
-use super::EstimateParams;
-use super::normal::{CLIMB, Equations, Z, planar, vertical};
-use super::system::System;
+use super::cholesky::CholeskySystem;
+use super::equations::Equations;
+use super::params::EstimateParams;
+use super::state::{ControlPoint, TURN_RATE, is_vertical, planar, vertical};
 use crate::spline::{BASES_MAX, Knots, SUPPORT};
-
-/// Weights of a state's seven splines: x, y, z, heading, speed, climb, turn rate.
-pub(super) type Weights = [f64; 7];
-
-/// The turn rate's.
-const TURN: usize = 6;
 
 const NODES: usize = 6;
 /// Half of the nodes on -1 to 1, and their weights; the others mirror them.
@@ -36,44 +31,44 @@ const GAUSS: [(f64, f64); NODES / 2] = [
     (0.932_469_514_203_152, 0.171_324_492_379_170_36),
 ];
 
-/// A value and its derivative with respect to the weights of up to three splines.
+/// A value and its derivatives with respect to the control points of up to three splines.
 struct Row {
     value: f64,
     parts: [(usize, [f64; SUPPORT]); 3],
 }
 
-/// Nothing of a spline.
+/// No derivative.
 const NO_PART: (usize, [f64; SUPPORT]) = (0, [0.0; SUPPORT]);
 
-/// How an object moves.
+/// The unicycle with its noise.
 #[derive(Clone, Copy)]
-pub(super) struct Process {
+pub(super) struct ProcessModel {
     /// `Q_u^-1`.
-    precision: Weights,
-    /// By how much of itself a turn rate falls, 1/s.
-    fading: f64,
-    /// Degrees of freedom of the turn rate's noise; 0 for a Gaussian.
-    freedom: f64,
+    precision: ControlPoint,
+    /// Decay of a turn rate, 1/s.
+    turn_decay: f64,
+    /// Degrees of freedom of the turn rate's Student-t noise; 0: Gaussian noise.
+    student_dof: f64,
     manoeuvre_s: f64,
 }
 
-impl Process {
-    pub fn of(params: &EstimateParams) -> Process {
-        let mut deviations = params.process;
-        if params.tails > 0.0 {
-            deviations[TURN] *= params.calm;
+impl ProcessModel {
+    pub fn of(params: &EstimateParams) -> ProcessModel {
+        let mut sigmas = params.noise.sigmas();
+        if params.student_dof > 0.0 {
+            sigmas[TURN_RATE] *= params.student_scale;
         }
-        Process {
-            precision: deviations.map(|deviation| 1.0 / (deviation * deviation)),
-            fading: 1.0 / params.turn_s,
-            freedom: params.tails,
+        ProcessModel {
+            precision: sigmas.map(|sigma| 1.0 / (sigma * sigma)),
+            turn_decay: 1.0 / params.turn_decay_s,
+            student_dof: params.student_dof,
             manoeuvre_s: params.manoeuvre_s,
         }
     }
 
-    /// Cost of the turn rate's noise; replaces its square in every piece by how much it counts there.
-    fn turning(&self, spacing_s: f64, pieces: &mut [f64]) -> f64 {
-        let nu = self.freedom;
+    /// Cost of the turn rate's noise; replaces its square in every piece by its weight there.
+    fn turn_rate_cost(&self, spacing_s: f64, pieces: &mut [f64]) -> f64 {
+        let nu = self.student_dof;
         if nu <= 0.0 {
             let cost = 0.5 * pieces.iter().sum::<f64>();
             pieces.fill(1.0);
@@ -99,33 +94,34 @@ impl Process {
 /// Adds the process term to `equations` and returns it.
 pub(super) fn add(
     knots: &Knots,
-    weights: &[Weights],
-    process: &Process,
+    control_points: &[ControlPoint],
+    process: &ProcessModel,
     equations: &mut Equations,
 ) -> f64 {
     let mut turns = [0.0; BASES_MAX];
     let turns = &mut turns[..knots.spans()];
     nodes(knots, |values, slopes, length| {
-        let weight = process.precision[TURN] * length;
-        for (turn, weights) in turns.iter_mut().zip(weights.windows(SUPPORT)) {
-            let noise = residuals(weights, values, slopes, process.fading)[TURN].value;
+        let weight = process.precision[TURN_RATE] * length;
+        for (turn, control_points) in turns.iter_mut().zip(control_points.windows(SUPPORT)) {
+            let noise =
+                residuals(control_points, values, slopes, process.turn_decay)[TURN_RATE].value;
             *turn += weight * noise * noise;
         }
     });
-    let mut cost = process.turning(knots.spacing(), turns);
+    let mut cost = process.turn_rate_cost(knots.spacing(), turns);
     nodes(knots, |values, slopes, length| {
         for (piece, turn) in turns.iter().enumerate() {
-            let weights = &weights[piece..piece + SUPPORT];
-            let rows = residuals(weights, values, slopes, process.fading);
+            let control_points = &control_points[piece..piece + SUPPORT];
+            let rows = residuals(control_points, values, slopes, process.turn_decay);
             for (d, (row, precision)) in rows.iter().zip(process.precision).enumerate() {
                 let mut weight = precision * length;
-                if d == TURN {
+                if d == TURN_RATE {
                     weight *= turn;
                 } else {
                     cost += 0.5 * weight * row.value * row.value;
                 }
                 let bases = equations.bases;
-                if d == Z || d == CLIMB {
+                if is_vertical(d) {
                     let index = |i, d| vertical(bases, piece + i, d);
                     accumulate(&mut equations.vertical, index, row, weight);
                 } else {
@@ -138,27 +134,27 @@ pub(super) fn add(
     cost
 }
 
-/// Shows the basis functions' values and slopes at every node of a piece, and the node's share of its
-/// length, s.
-fn nodes(knots: &Knots, mut show: impl FnMut(&[f64; SUPPORT], &[f64; SUPPORT], f64)) {
+/// Calls `visit` with the basis functions' values and slopes at every node of a piece, and the node's
+/// share of its length, s.
+fn nodes(knots: &Knots, mut visit: impl FnMut(&[f64; SUPPORT], &[f64; SUPPORT], f64)) {
     for (place, share) in GAUSS {
         for u in [0.5 - 0.5 * place, 0.5 + 0.5 * place] {
             let (values, slopes) = knots.shape(u);
-            show(&values, &slopes, 0.5 * share * knots.spacing());
+            visit(&values, &slopes, 0.5 * share * knots.spacing());
         }
     }
 }
 
 /// The seven elements of `e_u` (2.8), where the basis functions have `values` and `slopes`.
 fn residuals(
-    weights: &[Weights],
+    control_points: &[ControlPoint],
     values: &[f64; SUPPORT],
     slopes: &[f64; SUPPORT],
-    fading: f64,
+    turn_decay: f64,
 ) -> [Row; 7] {
     let mut state = [0.0; 7];
     let mut rate = [0.0; 7];
-    for ((weight, value), slope) in weights.iter().zip(values).zip(slopes) {
+    for ((weight, value), slope) in control_points.iter().zip(values).zip(slopes) {
         for d in 0..7 {
             state[d] += weight[d] * value;
             rate[d] += weight[d] * slope;
@@ -171,7 +167,7 @@ fn residuals(
         value: rate[d] - predicted,
         parts: [(d, *slopes), second, third],
     };
-    let faded = core::array::from_fn(|i| slopes[i] + fading * values[i]);
+    let decayed = core::array::from_fn(|i| slopes[i] + turn_decay * values[i]);
     [
         row(0, v * cos, (3, times(v * sin)), (4, times(-cos))),
         row(1, v * sin, (3, times(-v * cos)), (4, times(-sin))),
@@ -179,7 +175,7 @@ fn residuals(
         row(3, state[6], (6, times(-1.0)), NO_PART),
         row(4, 0.0, NO_PART, NO_PART),
         row(5, 0.0, NO_PART, NO_PART),
-        Row { value: rate[6] + fading * state[6], parts: [(6, faded), NO_PART, NO_PART] },
+        Row { value: rate[6] + turn_decay * state[6], parts: [(6, decayed), NO_PART, NO_PART] },
     ]
 }
 
@@ -191,7 +187,7 @@ fn parts(row: &Row) -> &[(usize, [f64; SUPPORT])] {
 
 /// Adds a row to the system whose unknowns `index` numbers by basis function and spline.
 fn accumulate<const N: usize, const L: usize>(
-    system: &mut System<N, L>,
+    system: &mut CholeskySystem<N, L>,
     index: impl Fn(usize, usize) -> usize,
     row: &Row,
     weight: f64,
@@ -221,10 +217,10 @@ mod tests {
     use crate::random::Random;
     use std::boxed::Box;
 
-    fn weights<const N: usize>() -> [Weights; N] {
+    fn control_points<const N: usize>() -> [ControlPoint; N] {
         let mut random = Random(7);
         core::array::from_fn(|k| {
-            let mut weight: Weights = core::array::from_fn(|_| 0.3 * random.normal());
+            let mut weight: ControlPoint = core::array::from_fn(|_| 0.3 * random.normal());
             weight[0] += 5.0 * k as f64;
             weight[3] += 0.1 * k as f64;
             weight[4] += 10.0;
@@ -236,16 +232,16 @@ mod tests {
     fn derivatives_are_differences() {
         let (knots, _) = Knots::over(0.0, 1.0, 0.5);
         let (values, slopes) = knots.shape(0.3);
-        let weights = weights::<SUPPORT>();
-        let rows = residuals(&weights, &values, &slopes, 0.8);
+        let control_points = control_points::<SUPPORT>();
+        let rows = residuals(&control_points, &values, &slopes, 0.8);
         let step = 1e-5;
         for (d, row) in rows.iter().enumerate() {
             for spline in 0..7 {
                 for k in 0..SUPPORT {
                     let at = |step: f64| {
-                        let mut weights = weights;
-                        weights[k][spline] += step;
-                        residuals(&weights, &values, &slopes, 0.8)[d].value
+                        let mut control_points = control_points;
+                        control_points[k][spline] += step;
+                        residuals(&control_points, &values, &slopes, 0.8)[d].value
                     };
                     let slope = (at(step) - at(-step)) / (2.0 * step);
                     let part = parts(row).iter().find(|part| part.0 == spline);
@@ -258,36 +254,40 @@ mod tests {
 
     #[test]
     fn gradient_is_that_of_the_cost() {
-        for params in [EstimateParams::dissertation(), EstimateParams::default()] {
+        for params in [EstimateParams::DISSERTATION, EstimateParams::DEFAULT] {
             // Noise that is neither all steady nor all turning.
-            let process = Process::of(&EstimateParams { calm: 1.0, manoeuvre_s: 1.0, ..params });
+            let process = ProcessModel::of(&EstimateParams {
+                student_scale: 1.0,
+                manoeuvre_s: 1.0,
+                ..params
+            });
             let (knots, _) = Knots::over(0.0, 4.0, 0.5);
             let mut equations = Box::new(Equations::new());
-            let mut weights = weights::<8>();
-            let mut cost = |weights: &[Weights]| {
+            let mut control_points = control_points::<8>();
+            let mut cost = |control_points: &[ControlPoint]| {
                 equations.clear(8);
-                let cost = add(&knots, weights, &process, &mut equations);
+                let cost = add(&knots, control_points, &process, &mut equations);
                 (cost, equations.planar.vector, equations.vertical.vector)
             };
-            let (_, plane, height) = cost(&weights);
+            let (_, plane, height) = cost(&control_points);
             let step = 1e-6;
             for k in 0..8 {
                 for d in 0..7 {
-                    let before = weights[k][d];
-                    weights[k][d] = before + step;
-                    let (more, ..) = cost(&weights);
-                    weights[k][d] = before - step;
-                    let (less, ..) = cost(&weights);
-                    weights[k][d] = before;
-                    let pull = if d == Z || d == CLIMB {
+                    let before = control_points[k][d];
+                    control_points[k][d] = before + step;
+                    let (more, ..) = cost(&control_points);
+                    control_points[k][d] = before - step;
+                    let (less, ..) = cost(&control_points);
+                    control_points[k][d] = before;
+                    let rhs = if is_vertical(d) {
                         height[vertical(8, k, d)]
                     } else {
                         plane[planar(8, k, d)]
                     };
                     let known = (less - more) / (2.0 * step);
                     assert!(
-                        (pull - known).abs() < 1e-5 * known.abs() + 0.3,
-                        "{k} {d} {pull} {known}"
+                        (rhs - known).abs() < 1e-5 * known.abs() + 0.3,
+                        "{k} {d} {rhs} {known}"
                     );
                 }
             }
@@ -296,12 +296,12 @@ mod tests {
 
     #[test]
     fn a_turn_costs_the_logarithm_of_its_noise() {
-        let process = Process::of(&EstimateParams {
-            tails: 1.0,
+        let process = ProcessModel::of(&EstimateParams {
+            student_dof: 1.0,
             manoeuvre_s: 1.0,
-            ..EstimateParams::default()
+            ..EstimateParams::DEFAULT
         });
-        let turning = |mut pieces: [f64; 6]| (process.turning(0.5, &mut pieces), pieces);
+        let turning = |mut pieces: [f64; 6]| (process.turn_rate_cost(0.5, &mut pieces), pieces);
         // As manoeuvres of two pieces, and of one at either end.
         let (cost, counts) = turning([0.0, 0.0, 7.0, 0.0, 0.0, 0.0]);
         assert!((cost - 0.5 * (3.0 * 8f64.ln())).abs() < 1e-12, "{cost}");
@@ -319,25 +319,26 @@ mod tests {
             let slope = (at(step).0 - at(-step).0) / (2.0 * step);
             assert!((slope - 0.5 * at(0.0).1[piece]).abs() < 1e-8, "piece {piece}: {slope}");
         }
-        let plain = Process::of(&EstimateParams::dissertation());
+        let plain = ProcessModel::of(&EstimateParams::DISSERTATION);
         let mut pieces = [1.0, 4.0, 9.0];
-        assert_eq!((plain.turning(0.5, &mut pieces), pieces), (7.0, [1.0; 3]));
+        assert_eq!((plain.turn_rate_cost(0.5, &mut pieces), pieces), (7.0, [1.0; 3]));
     }
 
     #[test]
     fn the_integral_is_exact_enough() {
         let (knots, _) = Knots::over(0.0, 6.0, 0.5);
-        let weights = weights::<12>();
-        let process = Process::of(&EstimateParams::dissertation());
+        let control_points = control_points::<12>();
+        let process = ProcessModel::of(&EstimateParams::DISSERTATION);
         let mut equations = Box::new(Equations::new());
         equations.clear(12);
-        let ours = add(&knots, &weights, &process, &mut equations);
+        let ours = add(&knots, &control_points, &process, &mut equations);
         let mut fine = 0.0;
         let steps = 4000;
         for i in 0..steps {
             let (values, slopes) = knots.shape((f64::from(i) + 0.5) / f64::from(steps));
             for piece in 0..knots.spans() {
-                let rows = residuals(&weights[piece..piece + SUPPORT], &values, &slopes, 0.0);
+                let rows =
+                    residuals(&control_points[piece..piece + SUPPORT], &values, &slopes, 0.0);
                 for (row, precision) in rows.iter().zip(process.precision) {
                     fine += 0.5 * precision * row.value * row.value;
                 }

@@ -2,7 +2,7 @@
 
 use super::ITERATIONS_MAX;
 
-/// What the terms of the cost are.
+/// The terms of the cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// `J_m`.
@@ -16,7 +16,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Their sum.
+    /// Sum of the terms.
     pub fn total(&self) -> f64 {
         self.model + self.process + self.returns
     }
@@ -24,35 +24,35 @@ impl Cost {
 
 /// Why a solve stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stop {
+pub enum Termination {
     /// No return is sound: there is no estimate.
     #[default]
     NoReturns,
-    /// The cost fell no more.
+    /// The cost has converged.
     Converged,
-    /// It made as many iterations as it may.
+    /// After the last iteration it was allowed.
     Iterations,
-    /// A step had no finite solution; the estimate is that before it.
+    /// A step had no finite solution; the estimate is the one before.
     NotFinite,
 }
 
 /// Where a solve starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Start {
+pub enum InitialGuess {
     /// The tracker's history.
     #[default]
     History,
-    /// The steady motion that lays all returns over each other.
+    /// The one velocity that makes the cloud of all returns crispest.
     Steady,
-    /// Motion that is steady for a second at a time.
+    /// Such velocities of parts of the track.
     Unsteady,
 }
 
 /// How a solve went.
 #[derive(Clone, Debug, Default)]
-pub struct Report {
+pub struct EstimateReport {
     /// Why it stopped.
-    pub stop: Stop,
+    pub termination: Termination,
     /// Iterations that led to the estimate.
     pub iterations: usize,
     /// Cost at the start and after each of them.
@@ -61,18 +61,18 @@ pub struct Report {
     pub returns: usize,
     /// Returns left out because there were more.
     pub thinned: usize,
-    /// Returns left out because they or their times are no numbers, or beyond 100 km and a day.
+    /// Returns left out because they or their times are not finite, or beyond 100 km and a day.
     pub unsound: usize,
-    /// Returns that took part, and lie further from the object's origin than the prior's `extent_m`.
+    /// Returns that took part, and lie farther from the object's origin than `shape_sigma_m`.
     pub outside: usize,
-    /// Model points that were taken away because rays went through them.
+    /// Model points removed because rays went through them.
     pub carved: usize,
-    /// The knots are nearer together than asked for: the track is short.
+    /// The knots are closer than asked for: the track is short.
     pub compressed: bool,
-    /// They are further apart: the track is long.
+    /// They are farther apart: the track is long.
     pub stretched: bool,
-    /// There was no history: the start stands at the returns' mean.
+    /// There was no history: the first trajectory rests at the mean of the returns.
     pub no_history: bool,
-    /// Which start led to it.
-    pub from: Start,
+    /// The start that led to the estimate.
+    pub from: InitialGuess,
 }

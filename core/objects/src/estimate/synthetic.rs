@@ -302,7 +302,7 @@ pub fn errors(truth: &[ObjectState], estimate: impl Fn(f64) -> ObjectState) -> E
             e.climb - t.climb,
         ];
         sums[1] += v.iter().map(|v| v * v).sum::<f64>();
-        let turned = super::start::turn(e.heading + off - t.heading);
+        let turned = crate::wrap_angle(e.heading + off - t.heading);
         sums[2] += turned * turned;
         sums[3] += (e.turn_rate - t.turn_rate) * (e.turn_rate - t.turn_rate);
     }

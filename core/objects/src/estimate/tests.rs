@@ -1,7 +1,11 @@
 extern crate std;
 
+use super::samples::Samples;
+use super::state::is_sound;
 use super::synthetic::{self, Drive, Errors, Plan, drive, errors, history_errors};
 use super::*;
+use crate::RETURNS_MAX;
+use crate::noise::ProcessNoise;
 use crate::random::Random;
 use std::boxed::Box;
 use std::vec::Vec;
@@ -42,7 +46,7 @@ fn point() -> (Vec<ObjectReturn>, Vec<ObjectState>) {
 #[test]
 fn finds_the_optimum_of_a_point_in_uniform_motion() {
     let (returns, history) = point();
-    let params = EstimateParams { model: 1, ..EstimateParams::dissertation() };
+    let params = EstimateParams { model_points: 1, ..EstimateParams::DISSERTATION };
     let mut estimator = Box::new(Estimator::new());
     let report = estimator.solve(&params, &returns, &history);
     assert!(report.costs.last().unwrap().total() < 1e-4 * report.costs[0].total(), "{report:?}");
@@ -64,7 +68,7 @@ fn finds_the_optimum_of_a_point_in_uniform_motion() {
 fn goes_on_as_at_the_end() {
     let (returns, history) = point();
     let mut estimator = Box::new(Estimator::new());
-    estimator.solve(&EstimateParams::dissertation(), &returns, &history);
+    estimator.solve(&EstimateParams::DISSERTATION, &returns, &history);
     let (last, later) = (estimator.state(2.99), estimator.state(4.99));
     assert_eq!(later.time_s, 4.99);
     assert!((later.position[0] - last.position[0] - 6.0).abs() < 0.1, "{later:?}");
@@ -75,12 +79,12 @@ fn parked_cars_stand() {
     let mut estimator = Box::new(Estimator::new());
     let drives: Vec<Drive> = (0..4).map(|seed| drive(synthetic::parked(seed))).collect();
     let all: Vec<_> =
-        drives.iter().map(|d| estimated(&mut estimator, &EstimateParams::default(), d)).collect();
+        drives.iter().map(|d| estimated(&mut estimator, &EstimateParams::DEFAULT, d)).collect();
     let [position, velocity, heading, turn_rate] = root_mean(&all);
     assert!(position < 0.1 && velocity < 0.2, "{all:?}");
     assert!(heading < 0.05 && turn_rate < 0.02, "{all:?}");
     // The plain method is better than the history it starts from.
-    let params = EstimateParams::dissertation();
+    let params = EstimateParams::DISSERTATION;
     let plain: Vec<_> = drives.iter().map(|d| estimated(&mut estimator, &params, d)).collect();
     let before: Vec<_> = drives.iter().map(history_errors).collect();
     assert!(root_mean(&plain)[0] < root_mean(&before)[0], "{plain:?}");
@@ -91,7 +95,7 @@ fn moving_cars_are_followed() {
     let mut estimator = Box::new(Estimator::new());
     for seed in 0..5 {
         let drive = drive(synthetic::moving(seed));
-        let ours = estimated(&mut estimator, &EstimateParams::default(), &drive);
+        let ours = estimated(&mut estimator, &EstimateParams::DEFAULT, &drive);
         let before = history_errors(&drive);
         assert!(ours[0] < 0.15 && ours[1] < 0.2, "{seed}: {ours:?}");
         assert!(ours[2] < 0.05 && ours[0] < 0.5 * before[0], "{seed}: {ours:?} {before:?}");
@@ -118,7 +122,7 @@ fn tram(seed: u64, speed: f64) -> Plan {
 #[test]
 fn long_sides_move_with_their_ends() {
     let mut estimator = Box::new(Estimator::new());
-    let params = EstimateParams::default();
+    let params = EstimateParams::DEFAULT;
     let without = EstimateParams { passing: false, ..params };
     let mut worst: f64 = 0.0;
     for (seed, speed) in [(1, 5.0), (2, 7.0), (3, 9.0)] {
@@ -136,23 +140,21 @@ fn unsteady_motion_has_a_start() {
     let mut estimator = Box::new(Estimator::new());
     let plan = Plan { acceleration: -1.2, turn_rate: 0.1, speed: 9.0, ..synthetic::moving(2) };
     let drive = drive(plan);
-    estimator.solve(
-        &EstimateParams { iterations: 0, ..EstimateParams::default() },
-        &drive.returns,
-        &[],
-    );
-    assert!(estimator.start_unsteady());
-    estimator.best.copy(&estimator.now);
+    let params = EstimateParams::DEFAULT;
+    let still = EstimateParams { iterations: 0, ..params };
+    estimator.solve(&still, &drive.returns, &[]);
+    assert!(estimator.start(InitialGuess::Unsteady, &params));
+    estimator.best.copy(&estimator.problem.solution);
     let found = errors(&drive.truth, |time| estimator.state(time));
-    assert!(estimator.start_steady());
-    estimator.best.copy(&estimator.now);
+    assert!(estimator.start(InitialGuess::Steady, &params));
+    estimator.best.copy(&estimator.problem.solution);
     let steady = errors(&drive.truth, |time| estimator.state(time));
     assert!(found[0] < 0.5 && found[1] < 1.0, "{found:?}");
     assert!(found[0] < 0.5 * steady[0] && found[1] < 0.7 * steady[1], "{found:?} {steady:?}");
     // What is too short for two such has none.
     let short = &drive.returns[..drive.returns.partition_point(|seen| seen.time_s < 1.5)];
-    estimator.solve(&EstimateParams::default(), short, &[]);
-    assert!(!estimator.start_unsteady());
+    estimator.solve(&EstimateParams::DEFAULT, short, &[]);
+    assert!(!estimator.start(InitialGuess::Unsteady, &params));
 }
 
 /// One and the same optimum from histories that are off in different ways.
@@ -170,7 +172,7 @@ fn perturbed_starts_converge() {
             // Wraps are nothing to it.
             state.heading += turned + core::f64::consts::TAU * random.below(3) as f64;
         }
-        estimator.solve(&EstimateParams::default(), &drive.returns, &history);
+        estimator.solve(&EstimateParams::DEFAULT, &drive.returns, &history);
         let ours = errors(&drive.truth, |time| estimator.state(time));
         assert!(ours[0] < 0.1 && ours[2] < 0.05, "{ours:?}");
     }
@@ -182,16 +184,17 @@ fn perturbed_starts_converge() {
 fn conditioning_leaves_the_step_exact() {
     let (returns, history) = point();
     let mut estimator = Box::new(Estimator::new());
-    let params = EstimateParams { iterations: 1, model: 40, ..EstimateParams::dissertation() };
+    let params = EstimateParams { iterations: 1, model_points: 40, ..EstimateParams::DISSERTATION };
     let one = estimator.solve(&params, &returns, &history).costs[1].total();
     let state = estimator.state(1.3);
-    let tenth = |values: [f64; 7]| values.map(|value| 0.1 * value);
-    let params = EstimateParams {
-        process: tenth(params.process),
-        extent_m: 1.0,
-        deviation_m: 0.05,
-        ..params
+    let noise = ProcessNoise {
+        position_sigma_m: 0.001,
+        heading_sigma_rad: 0.0001,
+        speed_sigma_mps: 0.09,
+        climb_sigma_mps: 0.01,
+        turn_rate_sigma_radps: 0.008165,
     };
+    let params = EstimateParams { noise, shape_sigma_m: 1.0, return_sigma_m: 0.05, ..params };
     let hundred = estimator.solve(&params, &returns, &history).costs[1].total();
     let heavy = estimator.state(1.3);
     assert!((hundred / one / 100.0 - 1.0).abs() < 1e-5, "{one} {hundred}");
@@ -205,7 +208,7 @@ fn is_the_same_again() {
     let drive = drive(Plan { seconds: 2.0, ..synthetic::moving(2) });
     let mut estimator = Box::new(Estimator::new());
     let mut bits = || {
-        estimator.solve(&EstimateParams::default(), &drive.returns, &drive.history);
+        estimator.solve(&EstimateParams::DEFAULT, &drive.returns, &drive.history);
         let state = estimator.state(1.0);
         (state.position.map(f64::to_bits), state.heading.to_bits(), estimator.model().to_vec())
     };
@@ -214,7 +217,7 @@ fn is_the_same_again() {
 
 fn sane(estimator: &Estimator) {
     for time_s in [-10.0, 0.0, 0.3, 5.0, 100.0] {
-        assert!(start::sound(&estimator.state(time_s)), "{:?}", estimator.state(time_s));
+        assert!(is_sound(&estimator.state(time_s)), "{:?}", estimator.state(time_s));
     }
     assert!(estimator.model().as_flattened().iter().all(|value| value.is_finite()));
 }
@@ -226,13 +229,13 @@ fn bad_input_is_bounded_and_reported() {
     let between = |from: f32, to: f32| -> Vec<ObjectReturn> {
         whole.returns.iter().filter(|seen| (from..to).contains(&seen.time_s)).copied().collect()
     };
-    for params in [EstimateParams::dissertation(), EstimateParams::default()] {
+    for params in [EstimateParams::DISSERTATION, EstimateParams::DEFAULT] {
         let mut solve = |returns: &[ObjectReturn], history: &[ObjectState]| {
             let report = estimator.solve(&params, returns, history);
             sane(&estimator);
             report
         };
-        assert_eq!(solve(&[], &whole.history).stop, Stop::NoReturns);
+        assert_eq!(solve(&[], &whole.history).termination, Termination::NoReturns);
         let one = solve(&whole.returns[..1], &whole.history);
         assert_eq!((one.returns, one.compressed, one.thinned), (1, true, 0));
         // All at one time.
@@ -260,7 +263,7 @@ fn bad_input_is_bounded_and_reported() {
         history[3].heading = f64::NAN;
         history[4].position[0] = f64::INFINITY;
         assert_eq!(solve(&broken, &history).unsound, 90);
-        assert_eq!(solve(&broken[..1], &history).stop, Stop::NoReturns);
+        assert_eq!(solve(&broken[..1], &history).termination, Termination::NoReturns);
         // Longer than the knots reach.
         let mut long: Vec<_> = whole.returns.iter().step_by(50).copied().collect();
         for seen in &mut long {
@@ -295,17 +298,17 @@ fn takes_as_many_as_it_may_evenly_in_time() {
             }
         })
         .collect();
-    let params = EstimateParams { iterations: 1, ..EstimateParams::dissertation() };
+    let params = EstimateParams { iterations: 1, ..EstimateParams::DISSERTATION };
     for (asked, least, most) in [(5000, 4800, 5000), (1_000_000, 6000, RETURNS_MAX), (1, 1, 128)] {
-        let params = EstimateParams { returns: asked, model: MODEL_MAX + 1, ..params };
+        let params = EstimateParams { returns: asked, model_points: MODEL_MAX + 1, ..params };
         let report = estimator.solve(&params, &returns, &[]);
         assert!((least..=most).contains(&report.returns), "{}", report.returns);
         assert_eq!(report.returns + report.thinned, returns.len());
         assert!(estimator.model().len() <= MODEL_MAX);
-        let kept = estimator.returns.all();
-        assert!(kept.windows(2).all(|pair| pair[0].time_s <= pair[1].time_s));
+        let samples = estimator.problem.samples.all();
+        assert!(samples.windows(2).all(|pair| pair[0].time_s <= pair[1].time_s));
         if asked == 5000 {
-            let early = kept.iter().filter(|kept| kept.time_s < 9.0).count();
+            let early = samples.iter().filter(|one| one.time_s < 9.0).count();
             assert!(early > 3500, "{early}");
         }
     }
@@ -315,12 +318,16 @@ fn takes_as_many_as_it_may_evenly_in_time() {
 #[test]
 fn carved_points_are_those_that_lack() {
     let mut estimator = Box::new(Estimator::new());
-    let params = EstimateParams::default();
+    let params = EstimateParams::DEFAULT;
     let mut carved = 0;
     for seed in 0..4 {
         let drive = drive(synthetic::parked(seed));
         let report = estimator.solve(&params, &drive.returns, &drive.history);
-        assert_eq!(report.carved + estimator.model().len(), params.model, "{seed}: {report:?}");
+        assert_eq!(
+            report.carved + estimator.model().len(),
+            params.model_points,
+            "{seed}: {report:?}"
+        );
         carved += report.carved;
     }
     assert!(carved > 0);
@@ -347,7 +354,7 @@ fn whole_turns_are_taken_back() {
                 ..Default::default()
             })
             .collect();
-        estimator.solve(&EstimateParams::default(), &returns, &history);
+        estimator.solve(&EstimateParams::DEFAULT, &returns, &history);
         let state = estimator.state(0.0);
         assert!(state.heading.abs() <= core::f64::consts::PI, "{state:?}");
     }
@@ -368,7 +375,7 @@ fn a_wrong_association_does_not_break_a_track() {
         .collect();
     drive.returns.extend(wrong);
     let mut estimator = Box::new(Estimator::new());
-    let ours = estimated(&mut estimator, &EstimateParams::default(), &drive);
+    let ours = estimated(&mut estimator, &EstimateParams::DEFAULT, &drive);
     assert!(ours[0] < 0.2 && ours[2] < 0.05, "{ours:?}");
 }
 
@@ -382,7 +389,7 @@ fn pushed(estimator: &mut Estimator, drive: &Drive) -> Vec<(ObjectState, usize)>
         if until > from {
             let returns = &drive.returns[from..until];
             let state = history.next().unwrap();
-            let state = lag.push(estimator, &EstimateParams::default(), returns, state);
+            let state = lag.push(estimator, &EstimateParams::DEFAULT, returns, state);
             states.push((state, lag.iterations()));
             from = until;
         }
@@ -450,7 +457,7 @@ fn a_window_finds_out_that_a_long_side_moves() {
 #[test]
 fn a_window_survives_bad_input() {
     let mut estimator = Box::new(Estimator::new());
-    let params = EstimateParams::default();
+    let params = EstimateParams::DEFAULT;
     let mut lag = FixedLag::new();
     let mut random = Random(8);
     let mut push = |lag: &mut FixedLag, time_s: f64, count: usize, scale: f32| {
@@ -471,7 +478,7 @@ fn a_window_survives_bad_input() {
             &returns,
             &ObjectState { time_s, ..Default::default() },
         );
-        assert!(start::sound(&state), "{state:?}");
+        assert!(is_sound(&state), "{state:?}");
         state
     };
     // Nothing, one return, many, very many, nothing again.
@@ -496,7 +503,7 @@ fn a_window_survives_bad_input() {
 
 #[test]
 fn a_glance_tells_how_long_an_object_is() {
-    let mut returns = Box::new(Returns::new());
+    let mut returns = Box::new(Samples::new());
     // 8 m along the diagonal of the plane at 5 m/s; half of it hidden for half a second.
     let mut look = |count: usize| {
         let seen = (0..count).map(|i| {
@@ -516,18 +523,20 @@ fn a_glance_tells_how_long_an_object_is() {
 
 #[test]
 fn what_is_long_is_sluggish() {
-    let ours = EstimateParams::default();
+    let ours = EstimateParams::DEFAULT;
     let by = |length_m: f32| {
-        let of = ours.of(length_m);
-        let process: [f64; 7] = core::array::from_fn(|d| of.process[d] / ours.process[d]);
-        (process, [of.loose_m / ours.loose_m, of.basis_s / ours.basis_s], of.extent_m)
+        let of = ours.for_length(length_m);
+        let noise = of.noise.sigmas().into_iter().zip(ours.noise.sigmas()).map(|(a, b)| a / b);
+        let ratios = [of.tangential_sigma_m / ours.tangential_sigma_m, of.basis_s / ours.basis_s];
+        (noise.collect::<Vec<f64>>(), ratios, of.shape_sigma_m)
     };
-    let all = |speed, turn| [1.0, 1.0, 1.0, 1.0, speed, 1.0, turn];
+    let all = |speed, turn| [1.0, 1.0, 1.0, 1.0, speed, 1.0, turn].to_vec();
     assert_eq!(by(9.0), (all(0.5, 0.5), [1.0; 2], 9.0));
     assert_eq!(by(2.25), (all(1.0, 2.0), [0.5, 2.0 / 3.0], 2.25));
     assert_eq!(by(500.0), by(30.0));
-    assert_eq!(by(30.0).2, ours.extent_m);
-    // Nothing is known of the length, or nothing hangs on it.
-    assert_eq!(ours.of(0.0), ours);
-    assert_eq!(EstimateParams::dissertation().of(9.0), EstimateParams::dissertation());
+    assert_eq!(by(30.0).2, ours.shape_sigma_m);
+    // The length is not known, or does not matter.
+    assert_eq!(ours.for_length(0.0), ours);
+    let plain = EstimateParams::DISSERTATION;
+    assert_eq!(plain.for_length(9.0), plain);
 }

@@ -1,4 +1,4 @@
-//! Global nearest neighbour: which segment continues which track.
+//! The assignment of segments to tracks with the least sum of costs (Kuhn, 1955; Munkres, 1957).
 
 use super::{SEGMENTS_MAX, TRACKS_MAX};
 use raywake_core::record::NONE;
@@ -6,8 +6,8 @@ use raywake_core::record::NONE;
 /// Segments, and one column for each track that none continues.
 const COLUMNS: usize = SEGMENTS_MAX + TRACKS_MAX;
 
-/// The assignment of tracks (rows) to segments (columns) with the least sum of costs, where a track
-/// without a segment costs the gate: augmented a row at a time along shortest paths (Kuhn, Munkres).
+/// Tracks are rows, segments columns; a track without a segment costs the gate. Rows are added one at a
+/// time along shortest augmenting paths (Jonker and Volgenant, 1987).
 pub(super) struct Assignment {
     /// Cost of a segment for a track; infinite beyond the gate.
     cost: [[f32; SEGMENTS_MAX]; TRACKS_MAX],

@@ -1,22 +1,19 @@
 //! The returns of some 100 ms, of any number of sensors, in the world.
 
-use super::{CELL_M, SIDE};
+use super::{CELL_M, FrontEndParams, SIDE};
 use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::output::{Origin, PointFlow};
 use raywake_core::params::{POINTS_MAX, SLOTS};
 use raywake_core::pose::Pose;
 use raywake_core::return_clock::{ReturnClock, slot_of};
-use raywake_core::sweep::{Rig, SENSORS_MAX, Sweep, Timing};
-
-/// A velocity with a larger standard deviation tells nothing, m/s.
-const SURE_MPS: f32 = 0.7;
+use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
 
 /// A return in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct BatchReturn {
     /// m from the batch's corner.
-    pub at: [f32; 3],
+    pub position: [f32; 3],
     /// Where its ray began, m from there.
     pub origin: [f32; 3],
     /// s after the batch's stamp.
@@ -29,10 +26,10 @@ pub(super) struct Seen {
     pub velocity: Option<[f32; 2]>,
 }
 
-impl Seen {
+impl BatchReturn {
     /// Index of the cell it lies in.
     pub fn cell(&self) -> usize {
-        let [i, j] = cell(self.at);
+        let [i, j] = cell(self.position);
         i * SIDE + j
     }
 }
@@ -47,12 +44,13 @@ pub struct Flows<'a> {
 }
 
 impl Flows<'_> {
-    /// Velocity of a return `away` from the vehicle, m/s.
-    fn velocity(&self, n: usize, away: [f64; 2]) -> Option<[f32; 2]> {
+    /// Velocity of a return `away` (m) from the vehicle, m/s.
+    fn velocity(&self, n: usize, away: [f64; 2], sigma_max_mps: f32) -> Option<[f32; 2]> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
         let flow = self.of.get(n).filter(|f| inside && f.origin != Origin::Unmatched)?;
-        let sure = flow.covariance[0] + flow.covariance[2] < 2.0 * SURE_MPS * SURE_MPS;
-        sure.then_some(flow.velocity_world_mps)
+        let sum = flow.covariance[0] + flow.covariance[2];
+        let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
+        certain.then_some(flow.velocity_world_mps)
     }
 }
 
@@ -69,7 +67,7 @@ pub(super) struct Batch {
     /// World position of the corner of the window: a corner of the lattice along x and y, the
     /// ground under the vehicle along z.
     pub corner: DVec3,
-    pub returns: heapless::Vec<Seen, POINTS_MAX>,
+    pub returns: heapless::Vec<BatchReturn, POINTS_MAX>,
     /// Left out since the last step.
     pub dropped: DroppedReturns,
 }
@@ -91,15 +89,21 @@ impl Batch {
         self.dropped = DroppedReturns::default();
     }
 
+    /// A place given from the corner, in the world, m.
+    pub fn in_world(&self, at: [f64; 3]) -> [f64; 3] {
+        let corner = self.corner.to_array();
+        [0, 1, 2].map(|a| corner[a] + at[a])
+    }
+
     /// Adds the returns of a sweep. Those of a sweep without a finite stamp or pose are not finite.
-    pub fn take(&mut self, rig: &Rig, sweep: &Sweep, flows: Option<Flows>) {
-        let Pose { rotation, translation } = sweep.world_from_vehicle;
-        let twist = [sweep.twist.linear, sweep.twist.angular];
-        let finite = sweep.stamp_s.is_finite()
-            && rotation.is_finite()
-            && translation.is_finite()
-            && twist.iter().all(|v| v.is_finite());
-        if !finite {
+    pub fn take(
+        &mut self,
+        params: &FrontEndParams,
+        rig: &Rig,
+        sweep: &Sweep,
+        flows: Option<Flows>,
+    ) {
+        if !is_finite(sweep) {
             self.dropped.not_finite += sweep.points.len() as u64;
             return;
         }
@@ -111,22 +115,7 @@ impl Batch {
             self.corner = DVec3::new(first(under.x), first(under.y), under.z);
         }
         let after_s = sweep.stamp_s - self.stamp_s.unwrap_or(sweep.stamp_s);
-
-        let timed = rig.timing != Timing::AtStamp;
-        let mut places = [Place::default(); SLOTS];
-        for (slot, place) in places[..if timed { SLOTS } else { 1 }].iter_mut().enumerate() {
-            let moved = if timed { sweep.motion(rig, slot) } else { Pose::IDENTITY };
-            let then = sweep.world_from_vehicle * moved;
-            let at = if rig.distorted { then } else { sweep.world_from_vehicle };
-            place.turn = at.matrix();
-            place.at = at.translation - self.corner;
-            place.offset_s = if timed { rig.timing.offset_s(slot as f64 + 0.5) } else { 0.0 };
-            for (origin, mounted) in place.origins.iter_mut().zip(&rig.sensors) {
-                *origin = metres((then * *mounted).translation - self.corner);
-            }
-        }
-        // What the vehicle moves on within a slot.
-        let drift = if rig.distorted { rotation * sweep.twist.linear } else { DVec3::ZERO };
+        let motion = SweepMotion::new(rig, sweep, self.corner);
         let edge = SIDE as f32 * CELL_M;
         let vehicle = under - self.corner;
         for (n, point) in sweep.points.iter().enumerate() {
@@ -138,46 +127,87 @@ impl Batch {
                 }
                 None => continue,
             }
-            let when = self.clock.slots(rig, point);
-            let slot = if timed { slot_of(when) } else { 0 };
-            let offset_s = rig.timing.offset_s(f64::from(when));
-            let place = &places[slot];
-            let [x, y, z] = point.position.map(f64::from);
-            let drift = drift * (offset_s - place.offset_s);
-            let at = metres(place.turn * DVec3::new(x, y, z) + place.at + drift);
+            let (placed, offset_s) = motion.place(rig, point, self.clock.slots(rig, point));
+            let at = placed.position;
             let inside = at[..2].iter().all(|v| *v >= 0.0 && *v < edge) && at[2].abs() < edge;
             if !inside {
                 self.dropped.too_far += 1;
                 continue;
             }
             let away = [at[0] as f64 - vehicle.x, at[1] as f64 - vehicle.y];
-            let velocity = flows.as_ref().and_then(|f| f.velocity(n, away));
-            let seen = Seen {
-                at,
-                origin: place.origins[point.sensor as usize],
-                time_s: (after_s + offset_s) as f32,
-                // Admitted: there is such a sensor, and there are few.
-                sensor: point.sensor as u8,
-                passed: [false; 2],
-                velocity,
-            };
-            self.dropped.over_capacity += self.returns.push(seen).is_err() as u64;
+            let sigma_max_mps = params.flow_sigma_max_mps;
+            let velocity = flows.as_ref().and_then(|f| f.velocity(n, away, sigma_max_mps));
+            let time_s = (after_s + offset_s) as f32;
+            let one = BatchReturn { time_s, velocity, ..placed };
+            self.dropped.over_capacity += self.returns.push(one).is_err() as u64;
         }
     }
 }
 
+fn is_finite(sweep: &Sweep) -> bool {
+    let Pose { rotation, translation } = sweep.world_from_vehicle;
+    let vectors = [translation, sweep.twist.linear, sweep.twist.angular];
+    sweep.stamp_s.is_finite() && rotation.is_finite() && vectors.iter().all(|v| v.is_finite())
+}
+
 /// The vehicle in one time slot.
 #[derive(Clone, Copy, Default)]
-struct Place {
-    turn: DMat3,
+struct SlotPose {
+    rotation: DMat3,
     /// m from the corner.
-    at: DVec3,
+    translation: DVec3,
     /// s after the sweep's stamp.
     offset_s: f64,
     /// Of the sensors, m from the corner.
     origins: [[f32; 3]; SENSORS_MAX],
 }
 
-fn metres(v: DVec3) -> [f32; 3] {
+/// The vehicle's motion over a sweep.
+struct SweepMotion {
+    slots: [SlotPose; SLOTS],
+    /// Whether returns have times.
+    timed: bool,
+    /// Velocity of the vehicle within a slot, where it distorts the sweep, m/s.
+    drift: DVec3,
+}
+
+impl SweepMotion {
+    fn new(rig: &Rig, sweep: &Sweep, corner: DVec3) -> SweepMotion {
+        let timed = rig.timing != Timing::AtStamp;
+        let mut slots = [SlotPose::default(); SLOTS];
+        for (slot, pose) in slots[..if timed { SLOTS } else { 1 }].iter_mut().enumerate() {
+            let moved = if timed { sweep.motion(rig, slot) } else { Pose::IDENTITY };
+            let then = sweep.world_from_vehicle * moved;
+            let at = if rig.distorted { then } else { sweep.world_from_vehicle };
+            pose.rotation = at.matrix();
+            pose.translation = at.translation - corner;
+            pose.offset_s = if timed { rig.timing.offset_s(slot as f64 + 0.5) } else { 0.0 };
+            for (origin, mounted) in pose.origins.iter_mut().zip(&rig.sensors) {
+                *origin = single((then * *mounted).translation - corner);
+            }
+        }
+        let rotation = sweep.world_from_vehicle.rotation;
+        let drift = if rig.distorted { rotation * sweep.twist.linear } else { DVec3::ZERO };
+        SweepMotion { slots, timed, drift }
+    }
+
+    /// An admitted point at its time in slots, and that time after the stamp, s.
+    fn place(&self, rig: &Rig, point: &Point, when: f32) -> (BatchReturn, f64) {
+        let slot = &self.slots[if self.timed { slot_of(when) } else { 0 }];
+        let offset_s = rig.timing.offset_s(f64::from(when));
+        let [x, y, z] = point.position.map(f64::from);
+        let drift = self.drift * (offset_s - slot.offset_s);
+        let one = BatchReturn {
+            position: single(slot.rotation * DVec3::new(x, y, z) + slot.translation + drift),
+            origin: slot.origins[point.sensor as usize],
+            // There is such a sensor, and there are few.
+            sensor: point.sensor as u8,
+            ..BatchReturn::default()
+        };
+        (one, offset_s)
+    }
+}
+
+fn single(v: DVec3) -> [f32; 3] {
     v.to_array().map(|c| c as f32)
 }

@@ -1,6 +1,7 @@
-//! What is kept of an object from its birth to its end.
+//! A track: an object from its birth to its end.
 
-use super::batch::Seen;
+use super::batch::BatchReturn;
+use super::thinned::Thinned;
 use crate::centroid_ekf::{CentroidEkf, CentroidParams};
 use crate::{ObjectReturn, ObjectState, RETURNS_MAX};
 
@@ -9,75 +10,15 @@ pub const HISTORY_MAX: usize = 512;
 /// Returns of its last batch that a track keeps.
 pub const LATEST_MAX: usize = 256;
 
-/// Every k-th of a sequence, with k doubled whenever there is no room for more.
-#[derive(Clone, Debug)]
-pub struct Thinned<T, const N: usize> {
-    kept: heapless::Vec<T, N>,
-    every: u64,
-    seen: u64,
-}
-
-impl<T: Copy, const N: usize> Thinned<T, N> {
-    /// Nothing yet.
-    pub const fn new() -> Thinned<T, N> {
-        // What is kept stays at even multiples when every other one goes.
-        assert!(N >= 2 && N.is_multiple_of(2));
-        Thinned { kept: heapless::Vec::new(), every: 0, seen: 0 }
-    }
-
-    /// The next one.
-    pub fn push(&mut self, item: T) {
-        if self.seen.is_multiple_of(self.every()) {
-            if self.kept.is_full() {
-                for n in 0..N / 2 {
-                    self.kept[n] = self.kept[2 * n];
-                }
-                self.kept.truncate(N / 2);
-                self.every = 2 * self.every();
-            }
-            // There is room.
-            let _ = self.kept.push(item);
-        }
-        self.seen += 1;
-    }
-
-    /// Those kept, in their order.
-    pub fn kept(&self) -> &[T] {
-        &self.kept
-    }
-
-    /// Of how many one is kept.
-    pub fn every(&self) -> u64 {
-        self.every.max(1)
-    }
-
-    /// How many there were.
-    pub fn seen(&self) -> u64 {
-        self.seen
-    }
-
-    /// As if there had been none.
-    pub fn clear(&mut self) {
-        self.kept.clear();
-        (self.every, self.seen) = (0, 0);
-    }
-}
-
-impl<T: Copy, const N: usize> Default for Thinned<T, N> {
-    fn default() -> Self {
-        Thinned::new()
-    }
-}
-
 /// Where a track is in its life.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
     /// Room for one.
     #[default]
     Free,
-    /// It is followed.
+    /// Tracked.
     Live,
-    /// It has ended; its room is free from the next step on.
+    /// Ended; its room is free from the next step on.
     Ended,
 }
 
@@ -120,11 +61,6 @@ impl Track {
     /// knew the one or the other are those it learned.
     pub fn history(&self) -> &[ObjectState] {
         self.history.kept()
-    }
-
-    /// Of how many updates the history holds one.
-    pub fn history_every(&self) -> u64 {
-        self.history.every()
     }
 
     /// Its returns, batch by batch, in the order of their sweeps.
@@ -184,43 +120,23 @@ impl Track {
         ekf.predict(params, time_s - self.start_s);
         let revision = ekf.update(params, place);
         let state = ekf.state();
-        revision.revise(&state, &mut self.history.kept);
+        revision.revise(&state, self.history.kept_mut());
         self.history.push(state);
         self.latest.clear();
         self.observations += 1;
     }
 
     /// Keeps a return that lies and began at places in the world.
-    pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], seen: &Seen) {
+    pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], one: &BatchReturn) {
         let place = |at| self.place(at).map(|v| v as f32);
-        let seen = ObjectReturn {
+        let one = ObjectReturn {
             position: place(at),
             origin: place(origin),
             time_s: (time_s - self.start_s) as f32,
-            sensor: seen.sensor,
-            passed: seen.passed,
+            sensor: one.sensor,
+            passed: one.passed,
         };
-        self.returns.push(seen);
-        self.latest.push(seen);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-    use super::*;
-    use std::vec::Vec;
-
-    #[test]
-    fn every_kth_is_kept() {
-        for count in [0, 1, 8, 9, 16, 17, 33, 1000] {
-            let mut thinned = Thinned::<usize, 8>::new();
-            (0..count).for_each(|n| thinned.push(n));
-            let every = thinned.every() as usize;
-            let wanted: Vec<usize> = (0..count).step_by(every).collect();
-            assert_eq!(thinned.kept(), wanted, "{count}");
-            assert_eq!(thinned.seen(), count as u64);
-            assert!(every == 1 || wanted.len() > 4, "{count}: one of {every}");
-        }
+        self.returns.push(one);
+        self.latest.push(one);
     }
 }

@@ -1,19 +1,19 @@
-//! A symmetric system of equations, dense: small once the model points are eliminated.
+//! A dense symmetric system of equations of fixed capacity: small once the model points are eliminated.
 
 /// `A x = b` of a size set at run time, at most `N`; `L` is `N * N`.
-pub(super) struct System<const N: usize, const L: usize> {
+pub(super) struct CholeskySystem<const N: usize, const L: usize> {
     size: usize,
-    /// Lower triangle by rows; after [`System::solve`] its Cholesky factor.
+    /// Lower triangle by rows; after [`CholeskySystem::solve`] its Cholesky factor.
     matrix: [f64; L],
-    /// Right-hand side; after [`System::solve`] the solution.
+    /// Right-hand side; after [`CholeskySystem::solve`] the solution.
     pub vector: [f64; N],
     scale: [f64; N],
 }
 
-impl<const N: usize, const L: usize> System<N, L> {
-    pub const fn new() -> System<N, L> {
+impl<const N: usize, const L: usize> CholeskySystem<N, L> {
+    pub const fn new() -> CholeskySystem<N, L> {
         assert!(N * N == L);
-        System { size: 0, matrix: [0.0; L], vector: [0.0; N], scale: [0.0; N] }
+        CholeskySystem { size: 0, matrix: [0.0; L], vector: [0.0; N], scale: [0.0; N] }
     }
 
     pub fn clear(&mut self, size: usize) {
@@ -27,14 +27,19 @@ impl<const N: usize, const L: usize> System<N, L> {
         self.matrix[i.max(j) * self.size + i.min(j)] += value;
     }
 
-    /// Takes `row row' / by` from the block that begins at `from` on the diagonal.
-    pub fn eliminate(&mut self, from: usize, row: &[f64], by: f64) {
+    /// Eliminates an unknown whose own element is `diagonal`, with the right-hand side `rhs`: takes
+    /// `row row' / diagonal` from the block that begins at `from`.
+    pub fn eliminate(&mut self, from: usize, row: &[f64], diagonal: f64, rhs: f64) {
         for (i, &own) in row.iter().enumerate() {
-            let factor = own / by;
+            let factor = own / diagonal;
             let at = (from + i) * self.size + from;
             for (element, other) in self.matrix[at..=at + i].iter_mut().zip(row) {
                 *element -= factor * other;
             }
+        }
+        let share = rhs / diagonal;
+        for (sum, value) in self.vector[from..].iter_mut().zip(row) {
+            *sum -= share * value;
         }
     }
 
@@ -46,9 +51,9 @@ impl<const N: usize, const L: usize> System<N, L> {
         }
     }
 
-    /// Solves by Cholesky's factorisation after scaling the diagonal to ones. A pivot that rounding
-    /// leaves at nothing, of a direction that nothing determines, is raised to `least` of its scale:
-    /// the solution then hardly goes there. False where the system is not finite.
+    /// Solves by Cholesky factorisation after scaling the diagonal to ones. A pivot below `least`, of a
+    /// direction that nothing determines, is raised to it: the solution then hardly goes there. False
+    /// where the system is not finite.
     pub fn solve(&mut self, least: f64) -> bool {
         let n = self.size;
         for i in 0..n {
@@ -135,7 +140,7 @@ pub(super) mod tests {
     #[test]
     fn solves_what_elimination_solves() {
         let mut random = Random(9);
-        let mut system = System::<23, 529>::new();
+        let mut system = CholeskySystem::<23, 529>::new();
         for n in [1, 2, 7, 23] {
             system.clear(n);
             let mut rows = vec![vec![0.0; n + 1]; n];
@@ -165,7 +170,7 @@ pub(super) mod tests {
 
     #[test]
     fn hardly_goes_where_nothing_determines() {
-        let mut system = System::<2, 4>::new();
+        let mut system = CholeskySystem::<2, 4>::new();
         system.clear(2);
         for (i, j) in [(0, 0), (1, 0), (1, 1)] {
             system.add(i, j, 1.0);

@@ -1,6 +1,6 @@
-//! Which returns belong to objects: 2-D cells, and the variance of z in each.
+//! Which returns belong to objects: by the variance of z in 2-D cells, and by their height.
 
-use super::batch::{Batch, Seen};
+use super::batch::{Batch, BatchReturn};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
 use raywake_core::ground::Ground;
 use raywake_core::params::{COLUMNS_MAX, GroundParams, POINTS_MAX};
@@ -35,28 +35,39 @@ impl GroundMap<'_> {
     }
 }
 
-/// Count, mean and sum of squared deviations of z, m.
+/// Count, mean (m) and sum of squared deviations (m²) of z (Welford).
 #[derive(Clone, Copy)]
-struct Spread {
+struct HeightVariance {
     count: f32,
     mean: f32,
     squares: f32,
 }
 
-pub(super) struct Cells {
+impl HeightVariance {
+    const NONE: HeightVariance = HeightVariance { count: 0.0, mean: 0.0, squares: 0.0 };
+
+    fn add(&mut self, z: f32) {
+        let off = z - self.mean;
+        self.count += 1.0;
+        self.mean += off / self.count;
+        self.squares += off * (z - self.mean);
+    }
+}
+
+pub(super) struct ObjectReturns {
     ground: Ground,
     /// Of the ground above the batch's corner, m; infinite where unknown.
     height: [f32; COLUMNS_MAX],
-    spread: [Spread; COLUMNS_MAX],
+    variance: [HeightVariance; COLUMNS_MAX],
     is_object: [bool; POINTS_MAX],
 }
 
-impl Cells {
-    pub const fn new() -> Cells {
-        Cells {
+impl ObjectReturns {
+    pub const fn new() -> ObjectReturns {
+        ObjectReturns {
             ground: Ground::new(),
             height: [0.0; COLUMNS_MAX],
-            spread: [Spread { count: 0.0, mean: 0.0, squares: 0.0 }; COLUMNS_MAX],
+            variance: [HeightVariance::NONE; COLUMNS_MAX],
             is_object: [false; POINTS_MAX],
         }
     }
@@ -64,26 +75,24 @@ impl Cells {
     /// Finds the returns of objects: those of cells whose z varies and those well above the ground.
     /// What the flow has moving is an object's in any cell. Ground and what is overhead are none's,
     /// as far as the ground is known.
-    pub fn label(&mut self, params: &FrontEndParams, batch: &Batch, map: Option<&GroundMap>) {
+    pub fn find(&mut self, params: &FrontEndParams, batch: &Batch, map: Option<&GroundMap>) {
         self.find_ground(batch, map);
-        self.spread[..CELLS].fill(Spread { count: 0.0, mean: 0.0, squares: 0.0 });
-        for seen in &batch.returns {
-            let cell = seen.cell();
-            if self.above(cell, seen).is_none_or(|h| h < params.high_m) {
-                let s = &mut self.spread[cell];
-                let off = seen.at[2] - s.mean;
-                s.count += 1.0;
-                s.mean += off / s.count;
-                s.squares += off * (seen.at[2] - s.mean);
+        self.variance[..CELLS].fill(HeightVariance::NONE);
+        for one in &batch.returns {
+            let cell = one.cell();
+            if self.above(cell, one).is_none_or(|h| h < params.overhead_m) {
+                self.variance[cell].add(one.position[2]);
             }
         }
-        for (n, seen) in batch.returns.iter().enumerate() {
-            let cell = seen.cell();
-            let varies = self.spread[cell].squares > params.variance_m2 * self.spread[cell].count;
-            self.is_object[n] = match self.above(cell, seen) {
-                None => varies || params.moves(seen.velocity),
-                Some(h) if (params.low_m..params.high_m).contains(&h) => {
-                    varies || h >= params.raised_m || params.moves(seen.velocity)
+        for (n, one) in batch.returns.iter().enumerate() {
+            let cell = one.cell();
+            let HeightVariance { count, squares, .. } = self.variance[cell];
+            let varies = squares > params.variance_m2 * count;
+            let is_object = varies || params.is_moving(one.velocity);
+            self.is_object[n] = match self.above(cell, one) {
+                None => is_object,
+                Some(h) if (params.ground_clearance_m..params.overhead_m).contains(&h) => {
+                    is_object || h >= params.object_height_m
                 }
                 Some(_) => false,
             };
@@ -91,12 +100,12 @@ impl Cells {
     }
 
     /// Whether a return of the batch belongs to an object.
-    pub fn is_object(&self, n: usize) -> bool {
+    pub fn contain(&self, n: usize) -> bool {
         self.is_object[n]
     }
 
     fn find_ground(&mut self, batch: &Batch, map: Option<&GroundMap>) {
-        let cells = batch.returns.iter().map(|s| (s.cell(), s.at.map(|v| v / CELL_M)));
+        let cells = batch.returns.iter().map(|r| (r.cell(), r.position.map(|v| v / CELL_M)));
         let middle = 0.5 * SIDE as f32;
         let under = [middle, middle, 0.0];
         self.ground.estimate(&GROUND, f64::from(CELL_M), SIDE, under, cells);
@@ -112,8 +121,8 @@ impl Cells {
     }
 
     /// Height above the ground, m, where that is known.
-    fn above(&self, cell: usize, seen: &Seen) -> Option<f32> {
+    fn above(&self, cell: usize, one: &BatchReturn) -> Option<f32> {
         let ground = self.height[cell];
-        ground.is_finite().then(|| seen.at[2] - ground)
+        ground.is_finite().then(|| one.position[2] - ground)
     }
 }
