@@ -6,6 +6,7 @@
 use std::hint::black_box;
 
 use raywake::backend::Backend;
+use raywake::config::Settings;
 use raywake::error::RunError;
 use raywake::team::{self, Team};
 use raywake::track::{Ended, Tracker};
@@ -104,7 +105,8 @@ fn check(setup: &Setup, backend: Backend) -> u64 {
 fn check_tracks(flow: bool) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.to_string()));
     let drive = flow.then(|| setup.drive(setup.scalar()));
-    let mut tracker = Tracker::new(&setup.rig, &setup.profile, drive, None, true);
+    let settings = Settings::new(setup.profile.clone());
+    let mut tracker = Tracker::new(&setup.rig, &settings, drive, None, true);
     let sweeps: Vec<SweepData> = street()
         .iter()
         .map(|s| SweepData {
@@ -126,7 +128,7 @@ fn check_tracks(flow: bool) {
     let show = |ended: &Ended| {
         let lag = ended.lag.expect("asked for");
         assert_eq!(lag.len() as u32, ended.track.observations);
-        estimated += (ended.report.returns > 0) as u32;
+        estimated += (ended.report.returns > 0) as u64;
         Ok(())
     };
     tracker.ended(show).unwrap_or_else(|e| panic!("{e}"));

@@ -9,6 +9,7 @@ use raywake_core::digest::Digest;
 use raywake_core::occupancy_constancy::{self, SCORES_MAX, WEIGHT_WORDS};
 use raywake_core::params::{Profile, ProfileError, Value};
 use raywake_core::weights::WeightsError;
+use raywake_objects::params::TrackingParams;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -16,20 +17,49 @@ use crate::args::{Learned, ProfileChoice};
 use crate::backend::Tables;
 use raywake_io::Error;
 
+/// The group of the parameters of tracking, which has groups of its own.
+const OBJECTS: &str = "objects";
+
+/// All that can be set.
+pub struct Settings {
+    /// The flow.
+    pub profile: Profile,
+    /// Tracks of objects.
+    pub objects: TrackingParams,
+}
+
+impl Settings {
+    /// A profile, with the defaults of tracking.
+    pub fn new(profile: Profile) -> Settings {
+        Settings { profile, objects: TrackingParams::DEFAULT }
+    }
+
+    fn check(&self) -> Result<(), ProfileError> {
+        self.profile.check().and_then(|()| self.objects.check())
+    }
+}
+
 /// The profile asked for, checked. Errors name the file, and the key in it.
 pub fn profile(choice: &ProfileChoice) -> Result<Profile, Error> {
-    let mut profile = match (&choice.config, &choice.profile) {
+    settings(choice).map(|settings| settings.profile)
+}
+
+/// The same with the parameters of tracking.
+pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
+    let mut settings = match (&choice.config, &choice.profile) {
         (Some(path), _) => parse(path, &read(path)?)?,
-        (None, Some(name)) => Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?,
-        (None, None) => Profile::hdl64(),
+        (None, Some(name)) => {
+            Settings::new(Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?)
+        }
+        (None, None) => Settings::new(Profile::hdl64()),
     };
     for assignment in &choice.set {
-        assign(&mut profile, assignment)
+        assign(&mut settings, assignment)
             .map_err(|e| Error::Usage(format!("--set {assignment}: {e}")))?;
     }
     let rule = |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.must));
-    profile.check().map_err(rule)?;
-    Ok(profile)
+    settings.check().map_err(rule)?;
+    Ok(settings)
 }
 
 fn no_profile(name: &str) -> String {
@@ -37,7 +67,7 @@ fn no_profile(name: &str) -> String {
 }
 
 /// Sets a parameter from `name=value` or `group.name=value`. The profile's name gets an asterisk.
-fn assign(profile: &mut Profile, assignment: &str) -> Result<(), String> {
+fn assign(settings: &mut Settings, assignment: &str) -> Result<(), String> {
     let (name, text) = assignment.split_once('=').ok_or("NAME=VALUE is needed")?;
     let (name, text) = (name.trim(), text.trim());
     let (group, name) = match name.split_once('.') {
@@ -49,16 +79,20 @@ fn assign(profile: &mut Profile, assignment: &str) -> Result<(), String> {
         (_, Ok(number)) => Value::Number(number),
         _ => Value::Word(text),
     };
-    set(profile, group, name, value)?;
-    if !profile.name.ends_with('*') {
+    set(settings, group, name, value)?;
+    if group != Some(OBJECTS) && !settings.profile.name.ends_with('*') {
         // Where there is no room for it, the name stays.
-        let _ = profile.name.push('*');
+        let _ = settings.profile.name.push('*');
     }
     Ok(())
 }
 
 /// Sets a parameter of a group, or of the one that has it. Parameters have different names.
-fn set(p: &mut Profile, group: Option<&str>, name: &str, value: Value) -> Result<(), String> {
+fn set(s: &mut Settings, group: Option<&str>, name: &str, value: Value) -> Result<(), String> {
+    if group == Some(OBJECTS) {
+        return set_of_objects(&mut s.objects, name, value);
+    }
+    let p = &mut s.profile;
     let groups = p.groups().map(|(g, of)| (g, of.get(name).is_some()));
     let found = groups.iter().find(|(g, has)| *has && group.is_none_or(|group| *g == group));
     let Some((group, _)) = found else {
@@ -68,8 +102,24 @@ fn set(p: &mut Profile, group: Option<&str>, name: &str, value: Value) -> Result
     p.group_mut(group).set(name, value).map_err(|must| format!("`{name}` must be {must}"))
 }
 
-/// A profile from the text of a file.
-fn parse(path: &Path, text: &str) -> Result<Profile, Error> {
+/// Sets a parameter of tracking by `name` or `group.name`.
+fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Result<(), String> {
+    let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
+    let mut found = Vec::new();
+    objects.each(&mut |own, parameters| {
+        if parameters.get(name).is_some() && group.is_none_or(|group| group == own) {
+            found.push((own, parameters.set(name, value)));
+        }
+    });
+    match found[..] {
+        [] => Err(format!("there is no parameter `objects.{path}` (see PARAMETERS.md)")),
+        [(_, set)] => set.map_err(|must| format!("`{name}` must be {must}")),
+        [(a, _), (b, _), ..] => Err(format!("`{a}.{name}` or `{b}.{name}`?")),
+    }
+}
+
+/// Settings from the text of a file.
+fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
     let line = |at: usize| format!("line {}", text[..at.min(text.len())].matches('\n').count() + 1);
     let table = DeTable::parse(text).map_err(|e| {
         let place = e.span().map_or(String::new(), |s| line(s.start));
@@ -82,17 +132,27 @@ fn parse(path: &Path, text: &str) -> Result<Profile, Error> {
         Some(_) => Err(Error::input(path, format!("key `{key}`"), "must be a text")),
     };
     let base = word("base", "hdl64")?;
-    let mut profile =
+    let profile =
         Profile::named(base).ok_or_else(|| Error::input(path, "key `base`", no_profile(base)))?;
-    profile.name = word("name", "custom")?
+    let mut settings = Settings::new(profile);
+    settings.profile.name = word("name", "custom")?
         .parse()
         .map_err(|_| Error::input(path, "key `name`", "must be at most 24 bytes long"))?;
     for (key, value) in table.iter().filter(|(k, _)| !["base", "name"].contains(&&**k.get_ref())) {
         let mut put = |group, key: &Spanned<Cow<str>>, value: &DeValue| {
-            let value = value_of(value).ok_or_else(|| format!("`{}` is no value", key.get_ref()));
-            value
-                .and_then(|v| set(&mut profile, group, key.get_ref(), v))
-                .map_err(|e| Error::input(path, line(key.span().start), e))
+            let mut one = |name: &str, value: &DeValue| {
+                let value = value_of(value).ok_or_else(|| format!("`{name}` is no value"));
+                value
+                    .and_then(|v| set(&mut settings, group, name, v))
+                    .map_err(|e| Error::input(path, line(key.span().start), e))
+            };
+            match value {
+                DeValue::Table(inner) if group == Some(OBJECTS) => {
+                    let name = |inner: &str| format!("{}.{inner}", key.get_ref());
+                    inner.iter().try_for_each(|(k, v)| one(&name(k.get_ref()), v.get_ref()))
+                }
+                value => one(key.get_ref(), value),
+            }
         };
         match value.get_ref() {
             DeValue::Table(group) => {
@@ -105,8 +165,8 @@ fn parse(path: &Path, text: &str) -> Result<Profile, Error> {
     let rule = |e: ProfileError| {
         Error::input(path, format!("key `{}`", e.field), format!("must be {}", e.must))
     };
-    profile.check().map_err(rule)?;
-    Ok(profile)
+    settings.check().map_err(rule)?;
+    Ok(settings)
 }
 
 /// The value of a parameter as it stands in a file.
@@ -206,7 +266,7 @@ mod tests {
     use raywake_core::params::{Birth, Frame};
 
     fn parsed(text: &str) -> Result<Profile, String> {
-        parse(Path::new("p.toml"), text).map_err(|e| {
+        parse(Path::new("p.toml"), text).map(|settings| settings.profile).map_err(|e| {
             assert_eq!(e.exit_code(), 3);
             e.to_string()
         })

@@ -13,6 +13,7 @@ pub mod estimate;
 pub mod front_end;
 pub mod noise;
 pub mod panorama;
+pub mod params;
 #[cfg(test)]
 #[path = "../../src/random.rs"]
 mod random;

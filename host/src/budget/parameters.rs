@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use raywake_core::params::{Parameter, Profile};
 
 use super::shipped;
+use raywake_objects::params::TrackingParams;
 
 const HEAD: &str = "\
 # Parameters
@@ -15,19 +16,38 @@ table called as its group. Defaults are those of profile `hdl64`, followed by th
 differ. Figures are described in the README.
 ";
 
+const OBJECTS: &str = "
+## objects
+
+Those of `raywake track`: `--set objects.NAME=VALUE`, or keys of the table `objects`.
+`objects.GROUP.NAME` tells apart what two groups have.
+";
+
+const COLUMNS: &str = "\
+| name | default | unit | range | meaning | why this default |
+|---|---|---|---|---|---|
+";
+
 /// The text of `PARAMETERS.md`.
 pub fn parameters() -> String {
     let mut text = HEAD.to_string();
     let profiles = shipped();
     for (n, (name, group)) in profiles[0].groups().iter().enumerate() {
         let title = if name.is_empty() { "Profile" } else { name };
-        let _ = write!(text, "\n## {title}\n\n");
-        text += "| name | default | unit | range | meaning | why this default |\n";
-        text += "|---|---|---|---|---|---|\n";
+        let _ = write!(text, "\n## {title}\n\n{COLUMNS}");
         for p in group.declared() {
             text += &row(p, &default_of(p.name, n, &profiles));
         }
     }
+    text += OBJECTS;
+    let mut objects = TrackingParams::DEFAULT;
+    objects.each(&mut |name, group| {
+        let _ = write!(text, "\n### objects.{name}\n\n{COLUMNS}");
+        for p in group.declared() {
+            let default = group.get(p.name).map_or(String::new(), |v| v.to_string());
+            text += &row(p, &default);
+        }
+    });
     text
 }
 

@@ -16,8 +16,9 @@ use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::picture::{Pictures, Scene};
 use crate::session::each_sweep;
+use raywake_core::params::Profile;
+use raywake_core::sweep::Rig;
 use raywake_io::source::{self, SweepData};
-
 use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
@@ -28,8 +29,8 @@ pub(crate) use write::local;
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after the
 /// sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
-    let mut profile = config::profile(&args.profile)?;
-    profile.deskew |= args.recording.deskew == Some(true);
+    let mut settings = config::settings(&args.profile)?;
+    settings.profile.deskew |= args.recording.deskew == Some(true);
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
@@ -41,29 +42,16 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     note(args.quiet, source.notes())?;
     let drive = match args.front_end {
         args::FrontEndKind::Variance => None,
-        args::FrontEndKind::Flow => {
-            let weights = Weights::read(&args.learned, &profile)?;
-            let tables = weights.tables(&profile)?;
-            let chosen = choose::backend(&args.backend, &profile, weights.tables(&profile)?)?;
-            note(args.quiet, &chosen.note)?;
-            Some(Drive::new(&profile, source.rig(), &tables, chosen.backend))
-        }
+        args::FrontEndKind::Flow => Some(flow(args, &settings.profile, source.rig())?),
     };
-    let mut tracker = Tracker::new(source.rig(), &profile, drive, ground, args.fixed_lag);
-    let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
-    say(args.quiet, &format!("memory budget: {}\n", parts.join(", ")))?;
-    if args.fixed_lag {
-        let (iterations, returns) = (FixedLag::ITERATIONS_MAX, FixedLag::RETURNS_MAX);
-        let most = format!("{iterations} iterations over {returns} returns");
-        say(args.quiet, &format!("fixed lag: {most} at most a track and sweep\n"))?;
-    }
-
+    let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
+    say(args.quiet, &budget(args.fixed_lag))?;
     let mut report = report::Report::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         report.read(visit.now);
         let clock = Instant::now();
-        if let Some(turnover) = tracker.sweep(visit.now, visit.before)? {
-            report.step(&turnover, clock);
+        if let Some(counts) = tracker.sweep(visit.now, visit.before)? {
+            report.step(&counts, clock);
             // Flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
             draw(&mut pictures, stepped, &tracker)?;
@@ -72,12 +60,12 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         Ok(())
     })?;
     let clock = Instant::now();
-    if let Some(turnover) = tracker.last(&end.last)? {
-        report.step(&turnover, clock);
+    if let Some(counts) = tracker.last(&end.last)? {
+        report.step(&counts, clock);
         draw(&mut pictures, &end.last, &tracker)?;
         tracker.ended(|ended| report.track(ended, &mut files))?;
     }
-    report.tally.ended += u64::from(tracker.finish()?);
+    report.counts.ended += tracker.finish()?;
     tracker.ended(|ended| report.track(ended, &mut files))?;
     files.finish()?;
     let summary = report.summary(source.name(), args.front_end, end.interrupted);
@@ -95,4 +83,26 @@ fn draw(
         Some(pictures) => pictures.write(sweep, &Scene::Tracks(tracker.tracks())),
         None => Ok(()),
     }
+}
+
+/// The flow, for the front end that takes it.
+fn flow(args: &args::TrackArgs, profile: &Profile, rig: &Rig) -> Result<Drive, RunError> {
+    let weights = Weights::read(&args.learned, profile)?;
+    let tables = weights.tables(profile)?;
+    let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
+    note(args.quiet, &chosen.note)?;
+    Ok(Drive::new(profile, rig, &tables, chosen.backend))
+}
+
+/// What the run holds, and what bounds its work.
+fn budget(fixed_lag: bool) -> String {
+    let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
+    let mut text = format!("memory budget: {}\n", parts.join(", "));
+    if fixed_lag {
+        let (iterations, returns) = (FixedLag::ITERATIONS_MAX, FixedLag::RETURNS_MAX);
+        text += &format!(
+            "fixed lag: {iterations} iterations over {returns} returns at most a track and sweep\n"
+        );
+    }
+    text
 }

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use raywake_core::digest::Digest;
 use raywake_objects::ObjectState;
-use raywake_objects::front_end::Turnover;
-use serde::Serialize;
+use raywake_objects::front_end::TrackingCounts;
+use serde::{Serialize, Serializer};
 
 use super::Ended;
 use super::write::Files;
@@ -19,52 +19,13 @@ use raywake_io::source::SweepData;
 /// Tracks that the report lists.
 const LISTED: usize = 20;
 
-/// Counts over all sweeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Tally {
-    /// Returns of objects.
-    pub object_returns: u64,
-    /// Of these, beyond the capacity for chunks.
-    pub unchunked: u64,
-    /// Segments that may be objects.
-    pub segments: u64,
-    /// Segments too small for one.
-    pub too_small: u64,
-    /// Segments too large.
-    pub too_large: u64,
-    /// Segments beyond the capacity.
-    pub unlisted: u64,
-    /// Tracks begun.
-    pub born: u64,
-    /// Segments without room for a track.
-    pub unborn: u64,
-    /// Updates of tracks.
-    pub updated: u64,
-    /// Tracks that waited, a count for every sweep.
-    pub waiting: u64,
-    /// Tracks ended.
-    pub ended: u64,
-    /// Of these, because time went backwards.
-    pub reset: u64,
-}
+/// Counts over all sweeps, but those of dropped returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts(TrackingCounts);
 
-impl Tally {
-    fn add(&mut self, t: &Turnover) {
-        self.object_returns += t.object_returns;
-        self.unchunked += t.unchunked;
-        let pairs = [
-            (&mut self.segments, t.segments),
-            (&mut self.too_small, t.too_small),
-            (&mut self.too_large, t.too_large),
-            (&mut self.unlisted, t.unlisted),
-            (&mut self.born, t.born),
-            (&mut self.unborn, t.unborn),
-            (&mut self.updated, t.updated),
-            (&mut self.waiting, t.waiting),
-            (&mut self.ended, t.ended),
-            (&mut self.reset, t.reset),
-        ];
-        pairs.into_iter().for_each(|(sum, n)| *sum += u64::from(n));
+impl Serialize for Counts {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.named())
     }
 }
 
@@ -95,7 +56,7 @@ pub struct Line {
 #[derive(Default)]
 pub struct Report {
     /// Counts.
-    pub tally: Tally,
+    pub counts: TrackingCounts,
     dropped: Dropped,
     sweeps: u64,
     steps: Vec<f64>,
@@ -106,10 +67,10 @@ pub struct Report {
 
 impl Report {
     /// A step of the front end that began at `clock`.
-    pub fn step(&mut self, turnover: &Turnover, clock: Instant) {
+    pub fn step(&mut self, counts: &TrackingCounts, clock: Instant) {
         self.steps.push(clock.elapsed().as_secs_f64() * 1e3);
-        self.tally.add(turnover);
-        self.dropped.returns += turnover.dropped;
+        self.counts += *counts;
+        self.dropped.returns += counts.dropped;
     }
 
     /// A sweep as it was read.
@@ -171,7 +132,7 @@ impl Report {
             digest: format!("{:016x}", self.digest.value()),
             step_ms: Spread::of(&self.steps),
             estimate_ms: Spread::of(&self.estimates),
-            tally: self.tally,
+            tally: Counts(self.counts),
             dropped: self.dropped,
             tracks: self.lines,
         }
@@ -199,7 +160,7 @@ pub struct TrackSummary {
     /// Time of the estimate of a track at its end, ms; null without a track.
     pub estimate_ms: Option<Spread>,
     /// Counts over all sweeps.
-    pub tally: Tally,
+    pub tally: Counts,
     /// Left out.
     pub dropped: Dropped,
     /// Every track that was seen often enough, in the order of their ends.
@@ -217,7 +178,7 @@ impl TrackSummary {
 
     fn print(&self, out: &mut String) -> std::fmt::Result {
         let end = if self.interrupted { ", INTERRUPTED" } else { "" };
-        let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
+        let brief = self.tally.0.ended.saturating_sub(self.tracks.len() as u64);
         writeln!(
             out,
             "\n{} sweeps, {} tracks ({brief} shorter ones omitted){end}",
@@ -234,7 +195,7 @@ impl TrackSummary {
                 )?;
             }
         }
-        let t = &self.tally;
+        let t = &self.tally.0;
         writeln!(
             out,
             "segments   {} candidates, {} too small, {} too large",

@@ -4,16 +4,18 @@
 use std::time::Instant;
 
 use raywake_alloc_guard::Sealed;
-use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
 use raywake_objects::ObjectState;
 use raywake_objects::estimate::{EstimateParams, EstimateReport, Estimator, FixedLag};
 use raywake_objects::front_end::{
-    Flows, FrontEnd, FrontEndParams, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, Turnover,
+    Flows, FrontEnd, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, TrackingCounts,
 };
 
+use raywake_objects::params::TrackingParams;
+
 use super::Ground;
+use crate::config::Settings;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::team::{THREADS_MAX, Team};
@@ -22,7 +24,7 @@ use raywake_io::source::SweepData;
 /// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
 pub struct Tracker {
     rig: Rig,
-    params: FrontEndParams,
+    params: TrackingParams,
     drive: Option<Drive>,
     reach_m: f64,
     ground: Option<Ground>,
@@ -49,23 +51,22 @@ struct Solver {
 }
 
 impl Solver {
-    fn solve(&mut self, track: &Track) {
+    fn solve(&mut self, params: &EstimateParams, track: &Track) {
         let clock = Instant::now();
-        let (returns, history) = (track.returns(), track.history());
-        self.report = self.estimator.solve(&EstimateParams::DEFAULT, returns, history);
+        self.report = self.estimator.solve(params, track.returns(), track.history());
         self.milliseconds = clock.elapsed().as_secs_f64() * 1e3;
     }
 }
 
 /// Solves some of the tracks, each in a room of its own.
-fn solve(solvers: &mut [Solver], tracks: &[Track], slots: &[usize]) {
+fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slots: &[usize]) {
     match (solvers, slots) {
         ([], _) | (_, []) => {}
-        ([solver, ..], [slot]) => solver.solve(&tracks[*slot]),
+        ([solver, ..], [slot]) => solver.solve(params, &tracks[*slot]),
         (solvers, slots) => {
             let half = slots.len() / 2;
             let ((a, b), (c, d)) = (solvers.split_at_mut(half), slots.split_at(half));
-            Team.join(|| solve(a, tracks, c), || solve(b, tracks, d));
+            Team.join(|| solve(params, a, tracks, c), || solve(params, b, tracks, d));
         }
     }
 }
@@ -80,15 +81,14 @@ struct Lag {
 
 impl Lag {
     /// Takes in what the last step saw of a track.
-    fn follow(&mut self, track: &Track, estimator: &mut Estimator) {
+    fn update(&mut self, params: &EstimateParams, track: &Track, estimator: &mut Estimator) {
         let Some(state) = track.state().filter(|_| track.life == Life::Live) else { return };
         if track.observations == 1 {
             self.filter.clear();
             self.states.clear();
         }
         if self.states.seen() < u64::from(track.observations) {
-            let params = EstimateParams::DEFAULT;
-            self.states.push(self.filter.push(estimator, &params, track.latest(), &state));
+            self.states.push(self.filter.push(estimator, params, track.latest(), &state));
         }
     }
 }
@@ -99,7 +99,7 @@ impl Tracker {
     /// says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
     pub fn new(
         rig: &Rig,
-        profile: &Profile,
+        settings: &Settings,
         drive: Option<Drive>,
         ground: Option<Ground>,
         fixed_lag: bool,
@@ -112,10 +112,10 @@ impl Tracker {
         };
         Tracker {
             rig: rig.clone(),
-            params: FrontEndParams::street(),
+            params: settings.objects,
             drive,
             // The window's columns, but for one at the edge.
-            reach_m: (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m,
+            reach_m: (0.5 * f64::from(settings.profile.side) - 1.0) * settings.profile.voxel_m,
             ground,
             parts: Sealed::new("tracks", parts),
             ended: Vec::with_capacity(TRACKS_MAX),
@@ -138,16 +138,18 @@ impl Tracker {
         &mut self,
         now: &SweepData,
         before: Option<&SweepData>,
-    ) -> Result<Option<Turnover>, RunError> {
+    ) -> Result<Option<TrackingCounts>, RunError> {
         let Tracker { rig, params, drive, reach_m, ground, parts, .. } = self;
         let map = ground.as_ref().map(Ground::map);
         let mut step = |sweep: &SweepData, flows: Option<Flows>| {
             parts.step(|Parts { front_end, tracks, solvers, lags }| {
-                front_end.take(rig, &sweep.sweep(), flows);
-                let turnover = front_end.step(params, map.as_ref(), tracks);
+                front_end.take(&params.front_end, rig, &sweep.sweep(), flows);
+                let counts = front_end.step(&params.front_end, map.as_ref(), tracks);
                 let estimator = &mut solvers[0].estimator;
-                lags.iter_mut().zip(&*tracks).for_each(|(lag, track)| lag.follow(track, estimator));
-                Ok(turnover)
+                for (lag, track) in lags.iter_mut().zip(&*tracks) {
+                    lag.update(&params.estimate, track, estimator);
+                }
+                Ok(counts)
             })
         };
         let Some(drive) = drive else { return step(now, None).map(Some) };
@@ -158,7 +160,7 @@ impl Tracker {
     }
 
     /// The last sweep, where it still waits for its flow, which will not come.
-    pub fn last(&mut self, sweep: &SweepData) -> Result<Option<Turnover>, RunError> {
+    pub fn last(&mut self, sweep: &SweepData) -> Result<Option<TrackingCounts>, RunError> {
         match self.drive.take() {
             Some(_) => self.sweep(sweep, None),
             None => Ok(None),
@@ -166,7 +168,7 @@ impl Tracker {
     }
 
     /// Ends all tracks. Returns how many there were.
-    pub fn finish(&mut self) -> Result<u32, RunError> {
+    pub fn finish(&mut self) -> Result<u64, RunError> {
         self.parts.step(|parts| Ok(parts.front_end.finish(&mut parts.tracks)))
     }
 
@@ -193,14 +195,14 @@ impl Tracker {
         mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,
     ) -> Result<(), RunError> {
         let Tracker { parts, ended, params, .. } = self;
-        let sure = |track: &Track| track.observations >= params.observations_min;
+        let sure = |track: &Track| track.observations >= params.front_end.observations_min;
         let slots = parts.tracks.iter().enumerate();
         let slots = slots.filter(|(_, track)| track.life == Life::Ended && sure(track));
         ended.clear();
         ended.extend(slots.map(|(slot, _)| slot));
         for group in ended.chunks(parts.solvers.len()) {
             parts.step(|Parts { solvers, tracks, .. }| {
-                solve(solvers, tracks, group);
+                solve(&params.estimate, solvers, tracks, group);
                 Ok::<_, RunError>(())
             })?;
             let Parts { tracks, solvers, lags, .. } = &**parts;

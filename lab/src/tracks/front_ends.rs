@@ -104,18 +104,18 @@ const STACK: usize = 64 << 20;
 fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, RunError> {
     let work = || -> Result<Vec<Track>, RunError> {
         let mut source = source::open(path, &OpenOptions::default())?;
-        let profile = config::profile(settings.profile)?;
+        let tracking = config::settings(settings.profile)?;
+        let profile = &tracking.profile;
         let drive = match kind {
             FrontEndKind::Variance => None,
             FrontEndKind::Flow => {
-                let weights = Weights::read(settings.learned, &profile)?;
-                let chosen =
-                    choose::backend(settings.backend, &profile, weights.tables(&profile)?)?;
-                let tables = weights.tables(&profile)?;
-                Some(Drive::new(&profile, source.rig(), &tables, chosen.backend))
+                let weights = Weights::read(settings.learned, profile)?;
+                let chosen = choose::backend(settings.backend, profile, weights.tables(profile)?)?;
+                let tables = weights.tables(profile)?;
+                Some(Drive::new(profile, source.rig(), &tables, chosen.backend))
             }
         };
-        let mut tracker = Tracker::new(source.rig(), &profile, drive, None, false);
+        let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);
         let mut tracks = Vec::new();
         let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
         let (mut now, mut before) = (SweepData::default(), SweepData::default());

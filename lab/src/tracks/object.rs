@@ -2,7 +2,7 @@
 
 use crate::labels::Kind;
 use glam::{DVec2, DVec3};
-use raywake_objects::panorama::Panorama;
+use raywake_objects::panorama::{Panorama, PassingParams};
 use raywake_objects::{ObjectReturn, ObjectState};
 use std::ops::Range;
 
@@ -49,7 +49,7 @@ pub struct Seen {
 pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
     let ray = |s: &Seen| (s.sensor, [0.0; 3], (s.at - s.from).as_vec3().to_array());
     let mut panorama = Box::new(Panorama::new());
-    panorama.look(seen, ray, wanted, |s, passed| s.passed = passed);
+    panorama.look(&PassingParams::DEFAULT, seen, ray, wanted, |s, passed| s.passed = passed);
 }
 
 impl Seen {

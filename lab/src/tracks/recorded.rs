@@ -4,10 +4,10 @@ use super::object::{Moment, Object, Seen, centroid, look_beside};
 use crate::labels::{self, Labels, Motion, Track, Trajectory, trajectories, turn};
 use glam::DVec3;
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig, Timing};
+use raywake_core::return_clock::ReturnClock;
+use raywake_core::sweep::{Point, Rig};
 use raywake_io::Error;
 use raywake_io::source::{self, OpenOptions, Source, SweepData};
-use std::f64::consts::TAU;
 use std::path::Path;
 
 /// How far a box reaches beyond its sides, m.
@@ -43,10 +43,10 @@ pub fn read(path: &Path) -> Result<Recorded, Error> {
     let labels = labels::open(path, source.as_ref())?;
     let trajectories = trajectories(&labels, source.as_ref());
     let mut gathered: Vec<Gathered> = vec![Gathered::default(); labels.tracks.len()];
-    let mut sweep = SweepData::default();
+    let (clock, mut sweep) = (ReturnClock::new(), SweepData::default());
     for index in 0..source.len() {
         source.read(index, &mut sweep)?;
-        gather(source.rig(), &sweep, &labels, &trajectories, &mut gathered);
+        gather(&clock, source.rig(), &sweep, &labels, &trajectories, &mut gathered);
     }
     let mut found =
         Recorded { stationary: Vec::new(), moving: Vec::new(), labels: Vec::new(), left_out: 0 };
@@ -67,13 +67,15 @@ pub fn read(path: &Path) -> Result<Recorded, Error> {
 type Gathered = Vec<Vec<Seen>>;
 
 fn gather(
+    clock: &ReturnClock,
     rig: &Rig,
     sweep: &SweepData,
     labels: &Labels,
     trajectories: &[Trajectory],
     gathered: &mut [Gathered],
 ) {
-    let mut seen: Vec<Seen> = sweep.points.iter().filter_map(|p| seen(rig, sweep, p)).collect();
+    let seen = |p| seen(clock, rig, sweep, p);
+    let mut seen: Vec<Seen> = sweep.points.iter().filter_map(seen).collect();
     look_beside(&mut seen, |_| true);
     for ((track, trajectory), gathered) in labels.tracks.iter().zip(trajectories).zip(gathered) {
         let (Some(labelled), Some(state)) =
@@ -99,30 +101,18 @@ fn gather(
 }
 
 /// A return in the world, at its own time.
-fn seen(rig: &Rig, sweep: &SweepData, point: &Point) -> Option<Seen> {
+fn seen(clock: &ReturnClock, rig: &Rig, sweep: &SweepData, point: &Point) -> Option<Seen> {
     let at = DVec3::from_array(point.position.map(f64::from));
     let sensor = rig.sensors.get(point.sensor as usize)?;
     if !at.is_finite() || at == DVec3::ZERO {
         return None;
     }
-    let offset_s = offset_s(rig, point);
+    let offset_s = clock.offset_s(rig, point);
     let moved = sweep.world_from_vehicle * sweep.twist.over(offset_s);
     let place = if rig.distorted { moved } else { sweep.world_from_vehicle };
     let from = moved.transform(sensor.translation);
     let (at, time_s) = (place.transform(at), sweep.stamp_s + offset_s);
     Some(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] })
-}
-
-/// Time of a return after the sweep's stamp, s.
-fn offset_s(rig: &Rig, point: &Point) -> f64 {
-    match rig.timing {
-        Timing::AtStamp => 0.0,
-        Timing::Offset { .. } => f64::from(point.offset_s),
-        Timing::Azimuth { span_s } => {
-            let [x, y, _] = point.position.map(f64::from);
-            -y.atan2(x) / TAU * span_s
-        }
-    }
 }
 
 /// The object of a track and its labels as they are; none where it is left out.
@@ -196,6 +186,7 @@ fn moments(states: &[(f64, Pose, DVec3)], anchor: DVec3, start_s: f64) -> Vec<Mo
 mod tests {
     use super::*;
     use raywake_core::pose::Twist;
+    use raywake_core::sweep::Timing;
 
     #[test]
     fn a_return_of_a_spinning_sensor_has_its_own_time_and_place() {
@@ -213,15 +204,17 @@ mod tests {
             ..SweepData::default()
         };
         let point = |position| Point { position, ..Point::default() };
+        let clock = ReturnClock::new();
         // It turns clockwise: the left comes a quarter of a turn before the stamp.
         for ([x, y], early) in [([5.0, 0.0], 0.0), ([0.0, 5.0], 0.025), ([0.0, -5.0], -0.025)] {
-            let Seen { at, from, time_s, .. } = seen(&rig, &sweep, &point([x, y, 0.0])).unwrap();
+            let Seen { at, from, time_s, .. } =
+                seen(&clock, &rig, &sweep, &point([x, y, 0.0])).unwrap();
             assert!((time_s - 7.0 + early).abs() < 1e-9);
             assert!((from.x - (100.0 - 8.0 * early)).abs() < 1e-9);
             assert!((at - from - DVec3::new(f64::from(x), f64::from(y), 0.0)).length() < 1e-6);
         }
-        assert!(seen(&rig, &sweep, &point([f32::NAN; 3])).is_none());
-        assert!(seen(&rig, &sweep, &point([0.0; 3])).is_none());
+        assert!(seen(&clock, &rig, &sweep, &point([f32::NAN; 3])).is_none());
+        assert!(seen(&clock, &rig, &sweep, &point([0.0; 3])).is_none());
     }
 
     #[test]

@@ -212,7 +212,7 @@ raywake_core::params! {
         /// Distance between model points where one is added.
         pub lag_point_spacing_m: f32 = 0.3, "m", (above 0);
         /// Factor of this distance when there is no room for more model points.
-        pub lag_spacing_growth: f32 = 1.25, "", (above 1);
+        pub lag_spacing_growth: f32 = 1.25, "", (1.01 to 10);
         /// Returns that have left the window and still hold a model point, at most.
         pub lag_prior_returns: f32 = 20.0, "returns", (1 to 1000);
         /// Standard deviation of the state that the window begins with: position,

@@ -413,7 +413,7 @@ fn unseen_tracks_wait_then_end() {
     run.take(1.0, &[], None);
     let counts = run.step();
     assert_eq!((counts.waiting, counts.ended), (1, 0));
-    assert_eq!(run.step(), Turnover::default());
+    assert_eq!(run.step(), TrackingCounts::default());
     // It is found again where it has gone.
     let counts = run.see(&car, 1.1);
     assert_eq!((counts.updated, counts.born), (1, 0));

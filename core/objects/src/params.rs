@@ -1,0 +1,44 @@
+//! All parameters of this package, by group.
+
+use crate::estimate::EstimateParams;
+use crate::front_end::FrontEndParams;
+use raywake_core::params::{Parameters, ProfileError};
+
+/// What tracking can be set to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackingParams {
+    /// From sweeps to tracks.
+    pub front_end: FrontEndParams,
+    /// From tracks to trajectories and shapes.
+    pub estimate: EstimateParams,
+}
+
+impl TrackingParams {
+    /// The defaults.
+    pub const DEFAULT: TrackingParams =
+        TrackingParams { front_end: FrontEndParams::DEFAULT, estimate: EstimateParams::DEFAULT };
+
+    /// Visits every group of parameters, with its name.
+    pub fn each(&mut self, visit: &mut dyn FnMut(&'static str, &mut dyn Parameters)) {
+        let TrackingParams { front_end, estimate } = self;
+        visit("front_end", front_end);
+        visit("passing", &mut front_end.passing);
+        visit("filter", &mut front_end.centroid);
+        visit("filter_noise", &mut front_end.centroid.noise);
+        visit("estimate", estimate);
+        visit("estimate_noise", &mut estimate.noise);
+        visit("endpoints", &mut estimate.endpoints);
+        visit("free_space", &mut estimate.free_space);
+        visit("growth", &mut estimate.growth);
+        visit("smoothing", &mut estimate.smoothing);
+        visit("search", &mut estimate.search);
+        visit("fixed_lag", &mut estimate.fixed_lag);
+    }
+
+    /// Whether every parameter lies within its bounds.
+    pub fn check(mut self) -> Result<(), ProfileError> {
+        let mut result = Ok(());
+        self.each(&mut |_, group| result = result.and(group.within_bounds()));
+        result
+    }
+}
