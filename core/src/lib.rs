@@ -7,6 +7,7 @@
 pub mod background_filter;
 pub mod compact;
 pub mod continuity;
+pub mod counters;
 pub mod ctrv;
 pub mod digest;
 pub mod dropped;

@@ -29,7 +29,7 @@ use crate::record::{Column, Flow, NONE, Proposal, Ray, Step, VALID, flow_displac
 use crate::refinement::Refinement;
 use crate::sweep::{Point, Rig, Sweep};
 use crate::team::Team;
-use crate::tracklet::{Observation, Tracklet, Tracklets, Turnover};
+use crate::tracklet::{Observation, Tracklet, TrackletTurnover, Tracklets};
 use crate::window::window;
 use glam::DVec3;
 
@@ -163,7 +163,7 @@ pub struct Flows<'a> {
     /// Time between the sweeps, s.
     pub dt_s: f64,
     /// What happened to tracklets.
-    pub turnover: Turnover,
+    pub turnover: TrackletTurnover,
     /// Matched columns.
     pub valid: usize,
     /// Solid columns beyond the capacity for foreground, which count as background, and those beyond

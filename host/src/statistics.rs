@@ -7,7 +7,7 @@ use raywake_core::digest::Digest;
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::output::TrackletState;
 use raywake_core::pipeline::Flows;
-use raywake_core::tracklet::Turnover;
+use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
 
 use crate::drive::Stepped;
@@ -92,40 +92,6 @@ impl fmt::Display for Dropped {
     }
 }
 
-/// Tracklets born and ended. Counts over all sweeps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Tally {
-    /// Born.
-    pub born: u64,
-    /// Updated.
-    pub updated: u64,
-    /// Ended by the gate.
-    pub gated: u64,
-    /// Waited for an observation, a count for every sweep.
-    pub waiting: u64,
-    /// Ended for another one in the same cell.
-    pub merged: u64,
-    /// Ended unobserved.
-    pub lost: u64,
-    /// Ended because their cell left the window.
-    pub left: u64,
-}
-
-impl Tally {
-    fn add(&mut self, t: &Turnover) {
-        let pairs = [
-            (&mut self.born, t.born),
-            (&mut self.updated, t.updated),
-            (&mut self.gated, t.gated),
-            (&mut self.waiting, t.waiting),
-            (&mut self.merged, t.merged),
-            (&mut self.lost, t.lost),
-            (&mut self.left, t.left),
-        ];
-        pairs.into_iter().for_each(|(sum, n)| *sum += u64::from(n));
-    }
-}
-
 /// Times of one stage.
 #[derive(Clone, Debug)]
 pub struct StageTimes {
@@ -164,7 +130,7 @@ pub struct Statistics {
     /// Left out.
     pub dropped: Dropped,
     /// Tracklets born and ended.
-    pub turnover: Tally,
+    pub turnover: TrackletTurnover,
     /// Tracklets after the last sweep, by class of [`AGES`].
     pub ages_at_end: [u64; AGES.len()],
     /// Tracklets after every sweep that completed a pair.
@@ -202,7 +168,7 @@ impl Statistics {
         self.foreground += foreground as u64;
         self.valid += flows.valid as u64;
         self.dropped.foreground += flows.foreground_dropped as u64;
-        self.turnover.add(&flows.turnover);
+        self.turnover += flows.turnover;
         flows.columns.iter().for_each(|c| self.digest.column(c));
     }
 

@@ -1,11 +1,12 @@
 //! The figures of a run: what `--summary` writes as JSON and what the report prints.
 
 use raywake_core::params::Profile;
+use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
 
 use crate::backend::Backend;
 use crate::order_statistics::Spread;
-use crate::statistics::{AGES, Dropped, ResetAt, Statistics, Tally};
+use crate::statistics::{AGES, Dropped, ResetAt, Statistics};
 use crate::team;
 
 /// Entries of a JSON object in the order given.
@@ -19,6 +20,10 @@ impl<T: Serialize> Serialize for Ordered<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
     }
+}
+
+fn by_name<S: Serializer>(counts: &TrackletTurnover, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(counts.counts())
 }
 
 /// Tracklets of one class of age.
@@ -90,7 +95,8 @@ pub struct RunSummary {
     /// Left out.
     pub dropped: Dropped,
     /// Tracklets born and ended.
-    pub tracklet_turnover: Tally,
+    #[serde(serialize_with = "by_name")]
+    pub tracklet_turnover: TrackletTurnover,
     /// Tracklets by observations after birth.
     pub tracklets_by_age: Ordered<Aged>,
     /// Sweeps without a usable predecessor.

@@ -44,23 +44,24 @@ pub struct Observation {
     pub slot: u32,
 }
 
-/// What happened to tracklets in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Turnover {
-    /// Born.
-    pub born: u32,
-    /// Updated.
-    pub updated: u32,
-    /// Ended by the gate.
-    pub gated: u32,
-    /// Waiting unobserved.
-    pub waiting: u32,
-    /// Ended for another one in the same cell.
-    pub merged: u32,
-    /// Ended unobserved.
-    pub lost: u32,
-    /// Ended because their cell left the window.
-    pub left: u32,
+crate::counters! {
+    /// What happened to tracklets in a step.
+    pub struct TrackletTurnover {
+        /// Born.
+        pub born,
+        /// Updated.
+        pub updated,
+        /// Ended by the gate.
+        pub gated,
+        /// Waiting unobserved.
+        pub waiting,
+        /// Ended for another one in the same cell.
+        pub merged,
+        /// Ended unobserved.
+        pub lost,
+        /// Ended because their cell left the window.
+        pub left,
+    }
 }
 
 /// Predicts and updates a tracklet with a displacement. Returns whether it passed the gate.
@@ -154,8 +155,8 @@ impl Tracklets {
         turned: f32,
         left: u32,
         observed: &mut [Observation],
-    ) -> Turnover {
-        let mut turnover = Turnover { left, ..Turnover::default() };
+    ) -> TrackletTurnover {
+        let mut turnover = TrackletTurnover { left: left.into(), ..TrackletTurnover::default() };
         self.observation_of_column.fill(NONE);
         self.claimed.fill(false);
         for (n, o) in observed.iter_mut().enumerate() {
@@ -242,7 +243,7 @@ impl Tracklets {
         column: u32,
         by: [f32; 2],
         t: Tracklet,
-        turnover: &mut Turnover,
+        turnover: &mut TrackletTurnover,
     ) -> u32 {
         let side = step.side;
         let from = [column as i32 / side, column as i32 % side];
@@ -274,7 +275,7 @@ impl Tracklets {
     }
 
     /// Unobserved tracklets go on as predicted for a while, their covariance growing (5.2.2).
-    fn wait(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut Turnover) {
+    fn wait(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut TrackletTurnover) {
         for slot in 0..self.now.len() {
             let t = self.now[slot];
             let waits = t.missed < profile.tracklet.coast_sweeps && t.age > t.missed;

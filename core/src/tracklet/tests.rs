@@ -35,7 +35,7 @@ fn advance(
     profile: &Profile,
     shift: [i32; 2],
     observed: &mut [Observation],
-) -> (Turnover, u32) {
+) -> (TrackletTurnover, u32) {
     let step = step(profile.side as i32, shift);
     let left = tracklets.place(&step);
     (tracklets.update(profile, &step, DT, 0.0, left, observed), left)
@@ -61,7 +61,7 @@ fn a_column_beside_takes_the_tracklet_over() {
             advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(10, 10), [2.0, 0.0])]);
             let mut observed = [seen(cell(12 + by[0], 10 + by[1]), [2.4, 0.0])];
             let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut observed);
-            assert_eq!((turnover.updated, turnover.born), (age, 1 - age));
+            assert_eq!((turnover.updated, turnover.born), (age.into(), u64::from(1 - age)));
             assert_eq!(tracklets.all().len(), 1);
             assert_eq!((tracklets.all()[0].age, observed[0].slot), (age, 0));
             let to = if takes_over { to } else { 14 + by[0] };
@@ -114,7 +114,7 @@ fn unobserved_tracklets_wait_ever_less_sure() {
         let (mut last, mut column) = (tracklets.all()[0].ekf, tracklets.all()[0].column);
         for n in 1..=coast_sweeps {
             let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut []);
-            assert_eq!(turnover, Turnover { waiting: 1, ..Turnover::default() });
+            assert_eq!(turnover, TrackletTurnover { waiting: 1, ..TrackletTurnover::default() });
             let t = tracklets.all()[0];
             assert_eq!((t.missed, t.age), (n, 7));
             for k in 0..5 {
@@ -126,7 +126,7 @@ fn unobserved_tracklets_wait_ever_less_sure() {
             (last, column) = (t.ekf, t.column);
         }
         let (turnover, _) = advance(&mut tracklets, &profile, [0, 0], &mut []);
-        assert_eq!(turnover, Turnover { lost: 1, ..Turnover::default() });
+        assert_eq!(turnover, TrackletTurnover { lost: 1, ..TrackletTurnover::default() });
         assert!(tracklets.all().is_empty());
     }
 }
@@ -149,17 +149,18 @@ fn what_leaves_the_window_is_counted() {
     // By that of the window.
     advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(2, 10), [0.0, 0.0])]);
     let (turnover, left) = advance(&mut tracklets, &profile(), [3, 0], &mut []);
-    assert_eq!((turnover, left), (Turnover { left: 1, ..Turnover::default() }, 1));
+    assert_eq!((turnover, left), (TrackletTurnover { left: 1, ..TrackletTurnover::default() }, 1));
     assert!(tracklets.all().is_empty());
 }
 
 /// Where every tracklet went, and where those that are there came from.
-fn check_counts(before: usize, after: usize, turnover: &Turnover, left_behind: u32) {
+fn check_counts(before: usize, after: usize, turnover: &TrackletTurnover, left_behind: u32) {
     let t = turnover;
+    let left_behind = u64::from(left_behind);
     let ends = left_behind + t.updated + t.gated + t.waiting + t.lost;
-    assert_eq!(before as u32, ends, "{t:?}");
+    assert_eq!(before as u64, ends, "{t:?}");
     let went_out = t.left - left_behind;
-    assert_eq!(after as u32, t.born + t.updated + t.waiting - t.merged - went_out, "{t:?}");
+    assert_eq!(after as u64, t.born + t.updated + t.waiting - t.merged - went_out, "{t:?}");
 }
 
 #[test]
@@ -168,7 +169,7 @@ fn counts_add_up_and_no_two_share_a_cell() {
     for profile in [profile(), late_start] {
         let mut random = Random(11);
         let mut tracklets = new();
-        let mut total = Turnover::default();
+        let mut total = TrackletTurnover::default();
         for _ in 0..300 {
             let share = random.between(0.0, 0.4) as f64;
             let mut observed: Vec<Observation> = (0..SIDE * SIDE)
@@ -191,11 +192,7 @@ fn counts_add_up_and_no_two_share_a_cell() {
             for o in observed.iter().filter(|o| o.slot != NONE) {
                 assert!((o.slot as usize) < tracklets.all().len());
             }
-            total.gated += turnover.gated;
-            total.waiting += turnover.waiting;
-            total.merged += turnover.merged;
-            total.lost += turnover.lost;
-            total.left += turnover.left;
+            total += turnover;
         }
         let t = total;
         let waits = profile.tracklet.coast_sweeps > 0;
