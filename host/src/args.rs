@@ -1,4 +1,7 @@
-//! The command line.
+//! The command line; the help text of a field is its documentation.
+
+// Flattened groups and plain choices have none.
+#![allow(missing_docs)]
 
 mod flow;
 mod sweeps;
@@ -43,10 +46,8 @@ pub enum Command {
     /// Estimate the scene flow of a recorded drive
     #[command(after_help = EXIT_CODES)]
     Run(Box<RunArgs>),
-    #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = flow::after_help(EXIT_CODES))]
     Flow(Box<FlowArgs>),
-    #[allow(missing_docs)]
     #[command(after_help = EXIT_CODES, after_long_help = track::after_help(EXIT_CODES))]
     Track(Box<TrackArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
@@ -69,22 +70,16 @@ pub struct RunArgs {
     #[arg(short, long)]
     pub quiet: bool,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub recording: Recording,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub profile: ProfileChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub learned: Learned,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub backend: BackendChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub results: Results,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub part: Selection,
 }
 
@@ -151,7 +146,6 @@ pub enum BackendKind {
 
 /// Checks of the Khronos validation layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs)]
 pub enum Validate {
     Sync,
     Gpu,
@@ -228,13 +222,10 @@ pub struct MapArgs {
     #[arg(long)]
     pub png: bool,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub recording: Recording,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub backend: BackendChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub part: Selection,
 }
 
@@ -257,7 +248,6 @@ pub struct DemoArgs {
     #[arg(long, value_name = "DIR", default_value = "raywake-demo")]
     pub out: PathBuf,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub backend: BackendChoice,
     /// Print errors only
     #[arg(short, long)]
@@ -268,7 +258,6 @@ pub struct DemoArgs {
 #[derive(Debug, clap::Args)]
 pub struct BudgetArgs {
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub profile: ProfileChoice,
     /// Exit with code 6 if device and host memory together exceed this many bytes
     #[arg(long, value_name = "BYTES")]

@@ -1,4 +1,4 @@
-//! Profiles and learned numbers: shipped ones, or files named on the command line.
+//! Profiles and model weights: built-in ones, or files named on the command line.
 
 use std::borrow::Cow;
 use std::fs;

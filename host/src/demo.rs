@@ -51,7 +51,8 @@ pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
         errors.add(&truth, pair.flows);
     })?;
     say(args.quiet, &errors.line())?;
-    say(args.quiet, &format!("results in {}\n", args.out.display()))?;
+    let pictures = if cfg!(feature = "png") { "; pictures in png/" } else { "" };
+    say(args.quiet, &format!("results in {}{pictures}\n", args.out.display()))?;
     Ok(summary)
 }
 

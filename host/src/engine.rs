@@ -23,6 +23,7 @@ use crate::report;
 use crate::session::{Visit, each_sweep};
 use crate::statistics::Statistics;
 use crate::summary::{Facts, RunSummary};
+use crate::team;
 use raywake_io::source::{Source, SweepData};
 
 /// What is to be done with a source.
@@ -87,16 +88,23 @@ pub fn execute<S: Source + ?Sized>(
     let end = each_sweep(source, plan.sweeps.clone(), plan.quiet, |source, visit| {
         run.sweep(source, visit, observe)
     })?;
+    let backend = run.drive.backend();
+    let census = backend.census().unwrap_or_default();
     let facts = Facts {
-        source: source.name(),
-        profile,
-        backend: run.drive.backend(),
-        filter: &tables.provenance,
+        version: env!("CARGO_PKG_VERSION"),
+        source: source.name().to_string(),
+        profile: profile.name.to_string(),
+        backend: backend.name(),
+        device: backend.device().to_string(),
+        threads: team::threads(),
+        filter: tables.provenance,
         interrupted: end.interrupted,
-        validating: plan.backend.validation.is_some(),
-        host_bytes: budget::host_bytes(profile, matches!(run.drive.backend(), Backend::Scalar(_))),
+        device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
+        host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_))),
+        vulkan_allocations: census.memory_allocations,
+        validation_messages: plan.backend.validation.map(|_| backend.messages()),
     };
-    let summary = RunSummary::new(&facts, &run.statistics);
+    let summary = RunSummary::new(facts, &run.statistics);
     say(&report::text(&summary))?;
     figures.write(&summary)?;
     Ok(summary)

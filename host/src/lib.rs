@@ -51,12 +51,12 @@ use error::RunError;
 /// Carries out a command. Returns whether it got to the end: a signal ends it early.
 pub fn execute(command: Command) -> Result<bool, RunError> {
     match command {
-        Command::Run(args) => Ok(!run::run(&args)?.interrupted),
+        Command::Run(args) => Ok(!run::run(&args)?.facts.interrupted),
         Command::Flow(args) => flow::flow(&args).map(|()| true),
         Command::Track(args) => track::track(&args),
         Command::Map(args) => map::command::map(&args),
         #[cfg(feature = "demo")]
-        Command::Demo(args) => Ok(!demo::demo(&args)?.interrupted),
+        Command::Demo(args) => Ok(!demo::demo(&args)?.facts.interrupted),
         Command::Budget(args) => budget::budget(&args).map(|()| true),
         Command::Devices => {
             console::say(false, &choose::list_devices()?)?;

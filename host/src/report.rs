@@ -15,20 +15,20 @@ pub fn text(s: &RunSummary) -> String {
 }
 
 fn write(out: &mut String, s: &RunSummary) -> std::fmt::Result {
-    let end = if s.interrupted { ", INTERRUPTED" } else { "" };
+    let end = if s.facts.interrupted { ", INTERRUPTED" } else { "" };
     writeln!(out, "\n{} sweeps, {} pairs{end}", s.sweeps, s.pairs)?;
     times(out, s)?;
     amounts(out, s)?;
     tracklets(out, s)?;
-    left_out(out, s)?;
+    dropped(out, s)?;
     writeln!(
         out,
-        "memory     {} device, {} host; {} Vulkan allocations, none within sweeps",
-        bytes(s.device_bytes),
-        bytes(s.host_bytes),
-        s.vulkan_allocations
+        "memory     {} device, {} host; {} Vulkan allocations, none during sweeps",
+        bytes(s.facts.device_bytes),
+        bytes(s.facts.host_bytes),
+        s.facts.vulkan_allocations
     )?;
-    if let Some(messages) = &s.validation_messages {
+    if let Some(messages) = &s.facts.validation_messages {
         writeln!(out, "validation {} messages", messages.len())?;
         messages.iter().try_for_each(|m| writeln!(out, "  {m}"))?;
     }
@@ -52,7 +52,7 @@ fn times(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let share = 100.0 * s.share_under_100_ms.unwrap_or(0.0);
     writeln!(
         out,
-        "{share:.1} % of the pairs in under 100 ms, with {:.0} occupied and {:.0} foreground columns",
+        "{share:.1} % of the pairs in under 100 ms; {:.0} occupied columns, {:.0} foreground",
         s.solid_columns, s.foreground_columns
     )?;
     writeln!(out, "file I/O per sweep: {:.1} ms read, {:.1} ms write", s.read_ms, s.write_ms)
@@ -61,8 +61,8 @@ fn times(out: &mut String, s: &RunSummary) -> std::fmt::Result {
 fn amounts(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     writeln!(
         out,
-        "\nper sweep  {:.0} returns, {:.0} distinct rays, {:.0} occupied columns, {:.0} foreground, \
-         {:.0} valid flows",
+        "\nper sweep  {:.0} returns, {:.0} distinct rays, {:.0} occupied columns, {:.0} foreground \
+         columns, {:.0} valid flows",
         s.points, s.distinct_rays, s.solid_columns, s.foreground_columns, s.valid_flows_per_sweep
     )
 }
@@ -78,12 +78,13 @@ fn tracklets(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let t = &s.tracklet_turnover;
     writeln!(
         out,
-        "           {} born, {} updated, {} coasting; lost {}, gated out {}, merged {}, left the window {}",
+        "           {} born, {} updated, {} coasting; {} lost, {} gated out, {} merged, {} left the \
+         window",
         t.born, t.updated, t.waiting, t.lost, t.gated, t.merged, t.left
     )
 }
 
-fn left_out(out: &mut String, s: &RunSummary) -> std::fmt::Result {
+fn dropped(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     writeln!(out, "dropped    {}", s.dropped)?;
     for (n, reset) in s.resets.iter().enumerate() {
         let label = if n == 0 { "resets" } else { "" };

@@ -1,13 +1,10 @@
 //! The figures of a run: what `--summary` writes as JSON and what the report prints.
 
-use raywake_core::params::Profile;
 use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
 
-use crate::backend::Backend;
 use crate::order_statistics::Spread;
 use crate::statistics::{AGES, Dropped, ResetAt, Statistics};
-use crate::team;
 
 /// Entries of a JSON object in the order given.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,22 +36,9 @@ pub struct Aged {
 /// for the rest; times are of sweeps that complete a pair, without reading and writing files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
-    /// Version of this program.
-    pub version: &'static str,
-    /// Name of the recording.
-    pub source: String,
-    /// Name of the profile.
-    pub profile: String,
-    /// `scalar` or `vulkan`.
-    pub backend: &'static str,
-    /// Name of the device.
-    pub device: String,
-    /// Threads that share the CPU's part of a sweep.
-    pub threads: usize,
-    /// Where the background filter comes from.
-    pub filter: String,
-    /// Whether the run was ended by a signal.
-    pub interrupted: bool,
+    /// What was run.
+    #[serde(flatten)]
+    pub facts: Facts,
     /// Sweeps done.
     pub sweeps: u64,
     /// Of these, sweeps that completed a pair.
@@ -83,15 +67,6 @@ pub struct RunSummary {
     pub read_ms: f64,
     /// Mean time to write a sweep's results, ms.
     pub write_ms: f64,
-    /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
-    pub device_bytes: u64,
-    /// Bytes of host memory held throughout.
-    pub host_bytes: u64,
-    /// Calls of vkAllocateMemory.
-    pub vulkan_allocations: u64,
-    /// Messages of the validation layer, where it is on.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub validation_messages: Option<Vec<String>>,
     /// Left out.
     pub dropped: Dropped,
     /// Tracklets born and ended.
@@ -103,28 +78,39 @@ pub struct RunSummary {
     pub resets: Vec<ResetAt>,
 }
 
-/// What a summary tells besides the statistics.
-pub struct Facts<'a> {
+/// What was run, and on what.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Facts {
+    /// Version of this program.
+    pub version: &'static str,
     /// Name of the recording.
-    pub source: &'a str,
-    /// The profile.
-    pub profile: &'a Profile,
-    /// The backend, after the run.
-    pub backend: &'a Backend,
+    pub source: String,
+    /// Name of the profile.
+    pub profile: String,
+    /// `scalar` or `vulkan`.
+    pub backend: &'static str,
+    /// Name of the device.
+    pub device: String,
+    /// Threads that share the CPU's part of a sweep.
+    pub threads: usize,
     /// Where the background filter comes from.
-    pub filter: &'a str,
-    /// Ended by a signal.
+    pub filter: String,
+    /// Whether the run was ended by a signal.
     pub interrupted: bool,
-    /// Runs under the validation layer.
-    pub validating: bool,
-    /// Bytes of host memory.
+    /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
+    pub device_bytes: u64,
+    /// Bytes of host memory held throughout.
     pub host_bytes: u64,
+    /// Calls of vkAllocateMemory.
+    pub vulkan_allocations: u64,
+    /// Messages of the validation layer, where it is on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_messages: Option<Vec<String>>,
 }
 
 impl RunSummary {
     /// Puts the figures together.
-    pub fn new(facts: &Facts, s: &Statistics) -> RunSummary {
-        let census = facts.backend.census().unwrap_or_default();
+    pub fn new(facts: Facts, s: &Statistics) -> RunSummary {
         let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
         let spreads =
             s.stages.iter().filter_map(|t| Some((t.name, Spread::of(&t.milliseconds)?))).collect();
@@ -132,14 +118,7 @@ impl RunSummary {
         let ages =
             ages.map(|((name, _), (&end, sum))| (*name, Aged { end, mean: per(sum, s.pairs) }));
         RunSummary {
-            version: env!("CARGO_PKG_VERSION"),
-            source: facts.source.to_string(),
-            profile: facts.profile.name.to_string(),
-            backend: facts.backend.name(),
-            device: facts.backend.device().to_string(),
-            threads: team::threads(),
-            filter: facts.filter.to_string(),
-            interrupted: facts.interrupted,
+            facts,
             sweeps: s.sweeps,
             pairs: s.pairs,
             digest: format!("{:016x}", s.digest.value()),
@@ -154,10 +133,6 @@ impl RunSummary {
             share_under_100_ms: s.share_in_time(),
             read_ms: s.read_ms / s.sweeps.max(1) as f64,
             write_ms: s.write_ms / s.sweeps.max(1) as f64,
-            device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
-            host_bytes: facts.host_bytes,
-            vulkan_allocations: census.memory_allocations,
-            validation_messages: facts.validating.then(|| facts.backend.messages()),
             dropped: s.dropped,
             tracklet_turnover: s.turnover,
             tracklets_by_age: Ordered(ages.collect()),

@@ -180,7 +180,7 @@ fn what_is_known_beforehand() {
     let still = rows(&out).iter().filter(|r| r[0] == DVec3::new(-0.5, -0.25, 0.0)).count();
     assert!(still > 10_000, "{still}");
     let two = t.write("two.txt", [row(0.0), row(1.0)].concat());
-    flow(&a, &b, &out, &["--pose", two.to_str().unwrap()]).failed(3, &["two.txt", "2 rows"]);
+    flow(&a, &b, &out, &["--pose", two.to_str().unwrap()]).failed(3, &["two.txt", "2 poses"]);
     flow(&a, &b, &out, &["--pose", "absent.txt"]).failed(3, &["absent.txt"]);
     flow(&a, &b, &out, &["--ground", "nan"]).failed(2, &["ground"]);
     flow(&a, &b, &out, &["--sensor", "1,2"]).failed(2, &["X,Y,Z"]);

@@ -4,9 +4,9 @@
 //!
 //! | module | subject |
 //! |---|---|
-//! | [`source`] | sweeps and poses of recorded (KITTI, Argoverse 2, folders of clouds) and simulated drives |
+//! | [`source`] | sweeps and poses of KITTI, Argoverse 2, folders of clouds, simulated drives |
 //! | [`sink`] | feather tables, Argoverse 2 submissions, each file whole or absent |
-//! | [`error`] | what can be wrong with a file, and the exit code of it |
+//! | [`error`] | what can be wrong with a file or an option, and the exit code for it |
 
 pub mod error;
 pub mod sink;

@@ -10,9 +10,9 @@ use super::{BackendChoice, Learned, ProfileChoice, seconds};
 const ABOUT: &str = "\
 Scene flow from cloud A to cloud B; no poses needed
 
-The motion of the sensor is estimated by registration, then both clouds are processed as two sweeps \
-of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or the \
-vehicle: .bin (float32 x, y, z, intensity), .pcd, .ply or .feather (columns x, y, z); A and B may \
+The motion of the sensor is estimated by registration, then both clouds are processed as two \
+sweeps of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or \
+the vehicle: .bin (float32 x, y, z, intensity), .pcd, .ply or .feather (columns x, y, z); A and B may \
 differ in format. Times of individual returns are ignored.";
 
 const FILES: &str = "\
@@ -62,13 +62,10 @@ pub struct FlowArgs {
     #[arg(long, value_name = "FILE")]
     pub pose: Option<PathBuf>,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub profile: ProfileChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub learned: Learned,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub backend: BackendChoice,
 }
 

@@ -10,8 +10,8 @@ const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
 
 Returns of objects are segmented and associated from sweep to sweep. Each track is filtered by its \
-centroids (EKF); when it ends, trajectory and shape are estimated jointly from all its returns, each \
-at its own time.";
+centroids (EKF); when it ends, trajectory and shape are estimated jointly from all its returns, \
+each at its own time.";
 
 const FILES: &str = "\
 Files of --out DIR:
@@ -53,19 +53,14 @@ pub struct TrackArgs {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub summary: Option<PathBuf>,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub recording: Recording,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub profile: ProfileChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub learned: Learned,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub backend: BackendChoice,
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub part: Selection,
 }
 

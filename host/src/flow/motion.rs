@@ -46,7 +46,8 @@ fn refusal(best: &Registration) -> String {
         r => format!("no convergence in {} iterations", r.iterations),
     };
     format!(
-        "cannot be registered to the first cloud: {why}; if the motion is known, give it with --pose"
+        "cannot be registered to the first cloud: {why}; if the motion is known, give it with \
+         --pose"
     )
 }
 

@@ -95,7 +95,8 @@ impl MapTally {
         let Some(t) = Spread::of(&self.milliseconds) else { return String::new() };
         let count = self.milliseconds.len();
         format!(
-            "{count} sweeps, {} voxels per sweep; map: {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max\n\
+            "{count} sweeps, {} voxels per sweep\n\
+             map        {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max\n\
              dropped    {}\n\
              digest     {:016x}\n",
             self.voxels / count,

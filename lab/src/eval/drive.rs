@@ -91,7 +91,11 @@ fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, 
     let summary = engine::execute(&plan, source, &mut |_, pair| {
         totals.push(pair.laps.stages().map(|s| s.1).sum());
     })?;
-    if summary.interrupted { Err(Error::Usage("interrupted".into()).into()) } else { Ok(totals) }
+    if summary.facts.interrupted {
+        Err(Error::Usage("interrupted".into()).into())
+    } else {
+        Ok(totals)
+    }
 }
 
 /// Files of a drive's results.
@@ -210,14 +214,14 @@ fn run(
             // Fails where the other thread has; it will say why.
             let _ = send.send(Some(Seen::of(pair)));
         });
-        if summary.as_ref().is_ok_and(|s| !s.interrupted) {
+        if summary.as_ref().is_ok_and(|s| !s.facts.interrupted) {
             let _ = send.send(None);
         }
         drop(send);
         (summary, rows.join().expect("the thread that makes rows panicked"))
     });
     let summary = summary?;
-    if summary.interrupted {
+    if summary.facts.interrupted {
         return Err(Error::Usage("interrupted".into()).into());
     }
     let collected = written?;

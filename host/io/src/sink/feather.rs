@@ -74,8 +74,10 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 /// Writes the flow of returns, one row each in the sweep's order.
 ///
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
-/// cov_yy` of the world velocity float32; `age` uint32; `foreground`, `valid` bool. `points` and `flows` are of the same sweep; fails with
-/// [`Error::Usage`] where their lengths differ.
+/// cov_yy` of the world velocity float32; `age` uint32; `foreground`, `valid` bool.
+///
+/// `points` and `flows` are of the same sweep; fails with [`Error::Usage`] where their lengths
+/// differ.
 pub fn write_points(
     path: &Path,
     points: &[Point],

@@ -68,7 +68,7 @@ mod tests {
         let refused = |packed: &[u8], size: usize| unpack(packed, size).unwrap_err();
         assert!(refused(&[2, 97, 98], 3).contains("end early"));
         assert!(refused(&[0, 97, 0x20], 4).contains("end early"));
-        assert!(refused(&[0, 97, 0x20, 1], 4).contains("of nothing"));
+        assert!(refused(&[0, 97, 0x20, 1], 4).contains("before the start"));
         assert!(refused(&[2, 97, 98, 99], 2).contains("more than they claim"));
         assert!(refused(&[0, 97], usize::MAX).contains("can hold"));
         assert!(refused(&[0, 97], 5).contains("end early"));

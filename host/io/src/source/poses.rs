@@ -80,7 +80,8 @@ pub(super) fn pose_from(rows: &[f64; 12], path: &Path, place: String) -> Result<
 
 /// The rows of a `poses.txt`, one per sweep.
 ///
-/// Fails where a line is no pose, where one lies beyond any drive's reach, or where there are more or fewer rows than `sweeps`.
+/// Fails where a line is not a pose, where one lies out of reach of any drive, or where there are
+/// more or fewer rows than `sweeps`.
 pub(super) fn read_rows(path: &Path, sweeps: usize) -> Result<Vec<Pose>, Error> {
     let text = text::read(path)?;
     let mut poses = Vec::with_capacity(sweeps);
@@ -96,8 +97,7 @@ pub(super) fn read_rows(path: &Path, sweeps: usize) -> Result<Vec<Pose>, Error> 
         poses.push(pose);
     }
     if poses.len() != sweeps {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let what = format!("{name} has {} rows, {sweeps} sweeps", poses.len());
+        let what = format!("{} poses, expected {sweeps}", poses.len());
         return Err(Error::input(path, "", what));
     }
     Ok(poses)

@@ -23,9 +23,9 @@ fn poses() {
     let t = drive();
     let two = row(0.0, 0.0, 0.0) + &row(1.0, 0.0, 0.0);
     t.write("poses.txt", &two);
-    assert!(refused(t.path()).ends_with("poses.txt: poses.txt has 2 rows, 3 sweeps"));
+    assert!(refused(t.path()).ends_with("poses.txt: 2 poses, expected 3"));
     t.write("poses.txt", two.repeat(2));
-    assert!(refused(t.path()).ends_with("poses.txt has 4 rows, 3 sweeps"));
+    assert!(refused(t.path()).ends_with("poses.txt: 4 poses, expected 3"));
     t.write("poses.txt", two.clone() + "1 0 0 0 0 1 0 0 0 0 nan 0\n");
     assert!(refused(t.path()).contains("poses.txt, line 3: a pose with a NaN"));
     t.write("poses.txt", two.clone() + "\n1 0 0 0 0 2 0 0 0 0 1 0\n");
