@@ -1,6 +1,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
-#![warn(missing_docs)]
+#![deny(missing_docs)]
 //! Temporal scene flow from LIDAR (Ushani 2018, chapter 3 and appendix B) as scalar functions over
 //! caller-owned storage: no allocation, no operating system, no unsafe code.
 

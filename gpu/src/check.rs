@@ -31,7 +31,7 @@ fn ensure(holds: bool, otherwise: impl FnOnce() -> String) -> Result<(), String>
 }
 
 fn whole(row: &Buffer) -> Result<(), String> {
-    let words = row.bytes > 0 && row.bytes % 4 == 0;
+    let words = row.bytes > 0 && row.bytes.is_multiple_of(4);
     ensure(words, || format!("{} bytes are not whole words", row.bytes))
 }
 
@@ -118,7 +118,7 @@ fn counts(limits: &Limits, table: &[Buffer], groups: &Groups) -> Result<(), Stri
             let inside = offset.checked_add(INDIRECT_BYTES);
             let inside = inside.is_some_and(|end| end <= row.bytes);
             let place = || format!("no group counts at byte {offset} of {}", row.name);
-            ensure(offset % 4 == 0 && inside, place)
+            ensure(offset.is_multiple_of(4) && inside, place)
         }
     }
 }

@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-#![warn(missing_docs)]
+#![deny(missing_docs)]
 //! The kernels and the order in which a device runs them.
 //!
 //! Each kernel mirrors a scalar function of `raywake-core`, its twin, at the same path under the

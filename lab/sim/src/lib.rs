@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-#![warn(missing_docs)]
+#![deny(missing_docs)]
 //! A small deterministic LIDAR simulator: a street with buildings, trees, parked and moving
 //! traffic, seen by spinning sensors on a moving vehicle, with the exact truth of every return.
 //!
