@@ -42,6 +42,11 @@ say "format and lints"
 cargo fmt --all --check
 cargo clippy --workspace --all-targets --quiet -- -D warnings
 
+say "documentation"
+# Links to private items resolve, as these are documented too.
+RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
+    cargo doc --workspace --no-deps --document-private-items --quiet
+
 say "core without an operating system"
 if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
     cargo check --quiet -p raywake-core -p raywake-objects --target thumbv7em-none-eabihf
@@ -52,10 +57,10 @@ fi
 
 say "the program alone, onboard, with every index clamped, and for aarch64"
 cargo build --quiet --release -p raywake
-cargo build --quiet --release -p raywake --no-default-features --target-dir target/onboard
+cargo build --quiet --profile onboard -p raywake --no-default-features
 RAYWAKE_KERNELS=restrict cargo build --quiet --release -p raywake --target-dir target/restrict
-ls -l target/onboard/release/raywake | awk '{print "onboard binary: " $5 " bytes"}'
-others=(target/release/raywake target/onboard/release/raywake target/restrict/release/raywake)
+ls -l target/onboard/raywake | awk '{print "onboard binary: " $5 " bytes"}'
+others=(target/release/raywake target/onboard/raywake target/restrict/release/raywake)
 
 # The same bits on another instruction set: an emulator wrapped up as one more program.
 aarch64() {

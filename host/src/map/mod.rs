@@ -71,7 +71,7 @@ pub struct Mapped {
 }
 
 impl Mapper {
-    /// A mapper for a profile that passed [`Profile::check_map`].
+    /// A mapper for a profile that passed [`Profile::check`].
     pub fn new(profile: Profile, rig: Rig, backend: MapBackend) -> Mapper {
         Mapper {
             profile,

@@ -152,7 +152,7 @@ pub struct TrackSummary {
     pub interrupted: bool,
     /// Sweeps done.
     pub sweeps: u64,
-    /// Digest of all results, 16 hexadecimal digits; see [`Report::track`].
+    /// Digest of all tracks and their estimates, 16 hexadecimal digits.
     pub digest: String,
     /// Time of a sweep, ms: that of its flow, of the front end and of the fixed lag, as far as they
     /// are asked for. Null without a sweep.
