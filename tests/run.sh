@@ -49,7 +49,7 @@ RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
 
 say "core without an operating system"
 if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
-    cargo check --quiet -p raywake-core -p raywake-objects --target thumbv7em-none-eabihf
+    cargo check --quiet -p raywake-core -p raywake-objects -p raywake-registration --target thumbv7em-none-eabihf
     echo "checks for thumbv7em-none-eabihf"
 else
     echo "skipped: the target thumbv7em-none-eabihf cannot be installed"

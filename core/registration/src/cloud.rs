@@ -3,6 +3,7 @@
 //! The normal of a point is the direction in which its nearest neighbours vary least (principal
 //! components: Hoppe et al. 1992), and there is none where these are not flat.
 
+use crate::point::OrientedPoint;
 use crate::{compact, tree};
 use core::ops::RangeInclusive;
 use glam::DVec3;
@@ -18,31 +19,6 @@ const FLAT: f64 = 0.1;
 const WIDE: f64 = 0.05;
 /// Coordinates beyond this are not measurements, m; their squares stay finite.
 const REACH_M: f64 = 1e4;
-
-/// A point of a surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct OrientedPoint {
-    /// Where it is, m.
-    pub position: DVec3,
-    /// Unit normal of either sign; zero where the surroundings are not flat.
-    pub normal: DVec3,
-    /// Axis along which the k-d tree splits at this point.
-    pub(crate) axis: u8,
-}
-
-impl From<DVec3> for OrientedPoint {
-    /// A point whose normal is not known yet.
-    fn from(position: DVec3) -> OrientedPoint {
-        OrientedPoint { position, ..OrientedPoint::default() }
-    }
-}
-
-impl OrientedPoint {
-    /// Whether its surroundings are flat.
-    pub fn is_flat(&self) -> bool {
-        self.normal != DVec3::ZERO
-    }
-}
 
 /// Points with normals where their surroundings are flat.
 #[derive(Clone, Copy, Debug)]

@@ -40,6 +40,9 @@ pub struct GaussNewtonStep {
     pub unobserved: usize,
 }
 
+/// Points closer together than this have no direction, m.
+const SPREAD_MIN_M: f64 = 1e-9;
+
 /// The step that minimises the weighted squares of the linearised residuals. Motions whose
 /// eigenvalue is not above `observable` are left out. `None` where the weights sum to nothing.
 ///
@@ -52,7 +55,8 @@ pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<Gaus
     }
     let centre = correspondences.iter().map(|c| c.weight * c.point).sum::<DVec3>() / total;
     let square = |c: &Correspondence| c.weight * c.point.distance_squared(centre);
-    let spread = libm::sqrt(correspondences.iter().map(square).sum::<f64>() / total).max(1e-9);
+    let spread = libm::sqrt(correspondences.iter().map(square).sum::<f64>() / total);
+    let spread = spread.max(SPREAD_MIN_M);
     let (mut matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for correspondence in correspondences {
         let row = jacobian(correspondence, centre, spread);

@@ -20,6 +20,22 @@ const SIDE: usize = 2 * REACH as usize;
 /// Height of the ground around the vertical axis, m, in the cloud's frame (z up): the median of the
 /// most frequent heights of the lowest returns of cells. `None` where too few cells agree.
 pub fn ground_height(points: &[Point]) -> Option<f64> {
+    let mut cells = lowest_returns(points);
+    cells.sort_unstable_by_key(|(i, j, _)| (i * i + j * j, *i, *j));
+    cells.truncate(CELLS_MAX);
+    cells.sort_unstable_by(|a, b| a.2.total_cmp(&b.2));
+    let heights = |from: usize| cells[from..].iter().map(|c| c.2);
+    let within = |from: usize| {
+        let count = heights(from).take_while(|h| *h <= cells[from].2 + WIDTH_M).count();
+        (count, from)
+    };
+    // The lowest where several widths hold as many.
+    let (count, from) = (0..cells.len()).map(within).rev().max_by_key(|w| w.0)?;
+    (count >= CELLS_MIN).then(|| f64::from(cells[from + count / 2].2))
+}
+
+/// Index and height of the lowest return in every cell that has one, m.
+fn lowest_returns(points: &[Point]) -> heapless::Vec<(i32, i32, f32), { SIDE * SIDE }> {
     let mut lowest = [[f32::INFINITY; SIDE]; SIDE];
     for [x, y, z] in points.iter().map(|p| p.position) {
         if z.is_finite() && libm::hypotf(x, y) < REACH as f32 * CELL_M {
@@ -32,18 +48,7 @@ pub fn ground_height(points: &[Point]) -> Option<f64> {
         .iter()
         .enumerate()
         .flat_map(|(i, row)| row.iter().enumerate().map(move |(j, z)| (index(i), index(j), *z)));
-    let mut cells: heapless::Vec<_, { SIDE * SIDE }> = cells.filter(|c| c.2.is_finite()).collect();
-    cells.sort_unstable_by_key(|(i, j, _)| (i * i + j * j, *i, *j));
-    cells.truncate(CELLS_MAX);
-    cells.sort_unstable_by(|a, b| a.2.total_cmp(&b.2));
-    let heights = |from: usize| cells[from..].iter().map(|c| c.2);
-    let within = |from: usize| {
-        let count = heights(from).take_while(|h| *h <= cells[from].2 + WIDTH_M).count();
-        (count, from)
-    };
-    // The lowest where several widths hold as many.
-    let (count, from) = (0..cells.len()).map(within).rev().max_by_key(|w| w.0)?;
-    (count >= CELLS_MIN).then(|| f64::from(cells[from + count / 2].2))
+    cells.filter(|c| c.2.is_finite()).collect()
 }
 
 #[cfg(test)]

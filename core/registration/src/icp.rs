@@ -25,12 +25,10 @@ pub struct IcpOptions {
     pub iterations: usize,
 }
 
-impl Default for IcpOptions {
+impl IcpOptions {
     /// Motions that are unknown up to 3 m and 5 degrees. The dissertation's search radius is 3 m,
     /// too.
-    fn default() -> IcpOptions {
-        IcpOptions { distance_m: 3.0, kernel_m: 0.1, iterations: 30 }
-    }
+    pub const DEFAULT: IcpOptions = IcpOptions { distance_m: 3.0, kernel_m: 0.1, iterations: 30 };
 }
 
 /// What came of it.

@@ -27,12 +27,14 @@ mod gauss_newton;
 pub mod ground;
 pub mod icp;
 pub mod multi_start;
+mod point;
 mod tree;
 
-pub use cloud::{OrientedCloud, OrientedPoint};
+pub use cloud::OrientedCloud;
 pub use gauss_newton::Correspondence;
 pub use icp::{CORRESPONDENCES, IcpOptions, Registration, register};
 pub use multi_start::register_multi_start;
+pub use point::OrientedPoint;
 
 /// Moves the items to keep to the front, in their order. Returns their number.
 fn compact<T: Copy>(items: &mut [T], mut keep: impl FnMut(&T) -> bool) -> usize {

@@ -35,7 +35,7 @@ pub fn register_multi_start(
     target: &OrientedCloud,
     correspondences: &mut [Correspondence],
 ) -> Registration {
-    let mut from = |start| register(source, target, start, &IcpOptions::default(), correspondences);
+    let mut from = |start| register(source, target, start, &IcpOptions::DEFAULT, correspondences);
     let rank = |r: &Registration| (r.converged, r.overlap);
     let mut best = from(Pose::IDENTITY);
     for start in starts() {
@@ -60,9 +60,9 @@ fn starts() -> impl Iterator<Item = Pose> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::OrientedPoint;
     use crate::deskew::{TimedPoint, thin_sweep};
     use crate::icp::CORRESPONDENCES;
+    use crate::point::OrientedPoint;
     use raywake_core::pose::Twist;
     use raywake_core::sweep::{Point, Rig};
     use raywake_sim::{Drive, Ego, Options as Sim};

@@ -1,7 +1,7 @@
 //! Clouds whose motion is known.
 
 use super::*;
-use crate::cloud::OrientedPoint;
+use crate::point::OrientedPoint;
 use glam::{DQuat, DVec3};
 use raywake_sim::Rng;
 use std::vec;
@@ -28,7 +28,7 @@ fn registered(source: &[DVec3], target: &[DVec3], initial: Pose) -> Registration
     let (mut source, mut target) = (oriented(source), oriented(target));
     let [source, target] = [&mut source, &mut target].map(|points| OrientedCloud::new(points));
     let mut correspondences = vec![Correspondence::default(); CORRESPONDENCES];
-    register(&source, &target, initial, &IcpOptions::default(), &mut correspondences)
+    register(&source, &target, initial, &IcpOptions::DEFAULT, &mut correspondences)
 }
 
 fn moved(points: &[DVec3], pose: &Pose) -> Vec<DVec3> {

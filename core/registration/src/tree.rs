@@ -3,7 +3,7 @@
 //! The tree is balanced and nothing but an order of the points: the median of a range splits it,
 //! along the axis in which the range is widest.
 
-use crate::cloud::OrientedPoint;
+use crate::point::OrientedPoint;
 use core::ops::Range;
 use glam::DVec3;
 

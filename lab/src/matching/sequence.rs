@@ -118,7 +118,7 @@ impl Matcher {
             let mut source: Vec<OrientedPoint> = source.map(OrientedPoint::from).collect();
             let [source, target] = [&mut source, &mut target].map(|p| OrientedCloud::new(p));
             let pairs = &mut self.correspondences;
-            let registration = register(&source, &target, motion, &IcpOptions::default(), pairs);
+            let registration = register(&source, &target, motion, &IcpOptions::DEFAULT, pairs);
             if !registration.converged {
                 return Matched { motion: initial, registration, rounds };
             }
