@@ -11,7 +11,7 @@ use std::path::Path;
 const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
 
 /// Which packages of the project each one may name. Whatever is not listed may name any.
-const MAY_NAME: [(&str, &[&str]); 9] = [
+const MAY_NAME: [(&str, &[&str]); 10] = [
     ("core", &[]),
     ("core/objects", &["raywake-core"]),
     ("core/registration", &["raywake-core"]),
@@ -20,6 +20,7 @@ const MAY_NAME: [(&str, &[&str]); 9] = [
     ("kernels", &["raywake-core", "raywake-gpu"]),
     ("lab/sim", &["raywake-core"]),
     ("host/io", &["raywake-core", "raywake-sim"]),
+    ("host/render", &[]),
     (
         "host",
         &[
@@ -30,6 +31,7 @@ const MAY_NAME: [(&str, &[&str]); 9] = [
             "raywake-gpu",
             "raywake-alloc-guard",
             "raywake-io",
+            "raywake-render",
             "raywake-sim",
         ],
     ),

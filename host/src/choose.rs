@@ -1,24 +1,29 @@
 //! Which backend a run gets, and `raywake devices`.
 
 use raywake_core::params::Profile;
+use raywake_core::sweep::Rig;
 use raywake_gpu::{DeviceInfo, DeviceKind, GpuError, Options, Validation, devices};
 
 use crate::args::{BackendChoice, BackendKind, Validate};
+use crate::backend::Backend;
 use crate::backend::device::Device;
 use crate::backend::scalar::Scalar;
-use crate::backend::{Backend, Tables};
+use crate::drive::Drive;
 use crate::error::RunError;
+use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 
-/// A backend with everything allocated, and why it is not a device where one might be expected.
+/// The pipeline on a backend, everything allocated.
 pub struct Chosen {
-    /// The backend, not yet sealed.
-    pub backend: Backend,
-    /// For the user.
+    /// The pipeline.
+    pub drive: Drive,
+    /// Where the background filter comes from.
+    pub filter: String,
+    /// Why it is not on a device where one might be expected, for the user.
     pub note: Option<String>,
 }
 
-/// Where the heavy half is to run.
+/// Where the grid and flow stages are to run.
 pub struct Wanted {
     /// How to run on a device; none: on the CPU.
     pub device: Option<Options>,
@@ -26,18 +31,21 @@ pub struct Wanted {
     pub note: Option<String>,
 }
 
-/// Makes the backend asked for.
-pub fn backend(
+/// Makes the pipeline for a rig on the backend asked for.
+pub fn drive(
     choice: &BackendChoice,
+    weights: &WeightFiles,
     profile: &Profile,
-    tables: Tables,
+    rig: &Rig,
 ) -> Result<Chosen, RunError> {
+    let tables = weights.tables(profile)?;
     let wanted = wanted(choice)?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
-        None => Backend::Scalar(Box::new(Scalar::new(profile, tables))),
+        None => Backend::Scalar(Box::new(Scalar::new(profile, tables.clone()))),
     };
-    Ok(Chosen { backend, note: wanted.note })
+    let drive = Drive::new(profile, rig, &tables, backend);
+    Ok(Chosen { drive, filter: tables.provenance, note: wanted.note })
 }
 
 /// Decides between device and CPU.

@@ -1,20 +1,15 @@
-//! Profiles and model weights: built-in ones, or files named on the command line.
+//! Profiles: built-in ones, or files named on the command line.
 
 use std::borrow::Cow;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use raywake_core::background_filter::{self, TABLE_WORDS};
-use raywake_core::digest::Digest;
-use raywake_core::occupancy_constancy::{self, SCORES_MAX, WEIGHT_WORDS};
 use raywake_core::params::{Profile, ProfileError, Value};
-use raywake_core::weights::WeightsError;
 use raywake_objects::params::TrackingParams;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::args::{Learned, ProfileChoice};
-use crate::backend::Tables;
+use crate::args::ProfileChoice;
 use raywake_io::Error;
 
 /// The group of the parameters of tracking, which has groups of its own.
@@ -182,82 +177,13 @@ fn value_of<'a>(value: &'a DeValue) -> Option<Value<'a>> {
     }
 }
 
-fn read(path: &Path) -> Result<String, Error> {
+/// A text file. Errors name the byte that is not text.
+pub(crate) fn read(path: &Path) -> Result<String, Error> {
     let bytes = fs::read(path).map_err(Error::reading(path))?;
     String::from_utf8(bytes).map_err(|e| {
         let place = format!("byte {}", e.utf8_error().valid_up_to());
         Error::input(path, place, "is not UTF-8 text")
     })
-}
-
-/// The texts of both weights files, checked against a profile.
-#[derive(Clone)]
-pub struct Weights {
-    filter: Option<String>,
-    constancy: String,
-}
-
-impl Weights {
-    /// Reads what the command line names, takes what is shipped for the rest. Errors name the file
-    /// and the value in it.
-    pub fn read(learned: &Learned, profile: &Profile) -> Result<Weights, Error> {
-        let filter = match &learned.filter {
-            Some(word) if word.as_os_str() == "none" => None,
-            Some(path) => Some((Some(path), read(path)?)),
-            None => Some((None, background_filter::SHIPPED.to_string())),
-        };
-        let constancy = match &learned.constancy {
-            Some(path) => (Some(path), read(path)?),
-            None => (None, occupancy_constancy::shipped(profile.frame).to_string()),
-        };
-        let levels = profile.levels as usize;
-        if let Some((path, text)) = &filter {
-            let checked = background_filter::load(text, levels, &mut vec![0; TABLE_WORDS]);
-            checked.map_err(|e| mistake(*path, "background filter", "--filter", profile, e))?;
-        }
-        let (mut words, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
-        occupancy_constancy::load(&constancy.1, levels, &mut words, &mut costs)
-            .map_err(|e| mistake(constancy.0, "occupancy constancy", "--constancy", profile, e))?;
-        Ok(Weights { filter: filter.map(|f| f.1), constancy: constancy.1 })
-    }
-
-    /// Whether there is a background filter.
-    pub fn has_filter(&self) -> bool {
-        self.filter.is_some()
-    }
-
-    /// The same without the background filter: every solid column is foreground.
-    pub fn without_filter(self) -> Weights {
-        Weights { filter: None, ..self }
-    }
-
-    /// A digest of both texts, 16 hexadecimal digits.
-    pub fn digest(&self) -> String {
-        let all = format!("{:?}{}", self.filter, self.constancy);
-        format!("{:016x}", Digest::of(all.as_bytes()))
-    }
-
-    /// The tables made of them.
-    pub fn tables(&self, profile: &Profile) -> Result<Tables, Error> {
-        Tables::load(profile, self.filter.as_deref(), &self.constancy).map_err(Error::Usage)
-    }
-}
-
-/// Why the weights of a file, or shipped ones, do not serve a profile.
-fn mistake(
-    path: Option<&PathBuf>,
-    kind: &str,
-    option: &str,
-    profile: &Profile,
-    e: WeightsError,
-) -> Error {
-    match path {
-        Some(path) => Error::input(path, "", format!("{kind}: {e}")),
-        None => Error::Usage(format!(
-            "the shipped {kind} does not fit profile `{}` of {} levels ({e}): give {option}",
-            profile.name, profile.levels
-        )),
-    }
 }
 
 #[cfg(test)]
@@ -344,19 +270,5 @@ mod tests {
             assert_eq!(e.exit_code(), 2);
             assert!(e.to_string().contains(words), "{e}");
         }
-    }
-
-    #[test]
-    fn shipped_weights_fit_the_shipped_profiles_only() {
-        for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
-            let weights = Weights::read(&Learned::default(), &profile).unwrap();
-            assert!(weights.tables(&profile).is_ok());
-        }
-        let low = Profile { levels: 12, ..Profile::hdl64() };
-        let e = Weights::read(&Learned::default(), &low).err().unwrap().to_string();
-        assert!(e.contains("12 levels") && e.contains("--filter"), "{e}");
-        let none = Learned { filter: Some("none".into()), constancy: None };
-        let e = Weights::read(&none, &low).err().unwrap().to_string();
-        assert!(e.contains("12 levels") && e.contains("--constancy"), "{e}");
     }
 }

@@ -8,13 +8,13 @@ use raywake_core::pipeline::Flows;
 use raywake_sim::Truth;
 
 use crate::args::{DemoArgs, Learned, PictureFrame};
-use crate::config::Weights;
 use crate::console::say;
 use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::outputs::Kinds;
 use crate::summary::RunSummary;
+use crate::weight_files::WeightFiles;
 use raywake_io::source::SweepData;
 use raywake_io::source::simulated::Simulated;
 
@@ -29,7 +29,7 @@ const MOVING_MPS: f32 = 1.0;
 pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
     let profile = Profile::hdl64();
     let plan = RunPlan {
-        weights: Weights::read(&Learned::default(), &profile)?,
+        weights: WeightFiles::read(&Learned::default(), &profile)?,
         backend: &args.backend,
         sweeps: 0..SWEEPS,
         out: Some(args.out.clone()),

@@ -12,7 +12,7 @@ use crate::args::BackendChoice;
 use crate::backend::Backend;
 use crate::budget;
 use crate::choose;
-use crate::config::Weights;
+
 use crate::console::{note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
@@ -24,6 +24,7 @@ use crate::session::{Visit, each_sweep};
 use crate::statistics::Statistics;
 use crate::summary::{Facts, RunSummary};
 use crate::team;
+use crate::weight_files::WeightFiles;
 use raywake_io::source::{Source, SweepData};
 
 /// What is to be done with a source.
@@ -31,7 +32,7 @@ pub struct RunPlan<'a> {
     /// Checked.
     pub profile: Profile,
     /// Read and checked.
-    pub weights: Weights,
+    pub weights: WeightFiles,
     /// Where the heavy half runs.
     pub backend: &'a BackendChoice,
     /// Sweeps of the source.
@@ -73,14 +74,12 @@ pub fn execute<S: Source + ?Sized>(
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let figures = FiguresFile::create(plan.summary.as_deref(), plan.out.as_deref())?;
     let outputs = Outputs::create(plan.out.as_deref(), plan.kinds, source.name(), profile)?;
-    let tables = plan.weights.tables(profile)?;
-    let chosen = choose::backend(plan.backend, profile, plan.weights.tables(profile)?)?;
-    let backend = chosen.backend;
+    let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
-    say(&budget::paragraph(profile, &backend, &tables.provenance))?;
+    say(&budget::paragraph(profile, chosen.drive.backend(), &chosen.filter))?;
     let mut run = Running {
-        drive: Drive::new(profile, source.rig(), &tables, backend),
+        drive: chosen.drive,
         outputs,
         statistics: Statistics::default(),
         tracklets: Vec::new(),
@@ -97,7 +96,7 @@ pub fn execute<S: Source + ?Sized>(
         backend: backend.name(),
         device: backend.device().to_string(),
         threads: team::threads(),
-        filter: tables.provenance,
+        filter: chosen.filter,
         interrupted: end.interrupted,
         device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
         host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_))),

@@ -8,7 +8,7 @@
 //! | module | subject |
 //! |---|---|
 //! | [`args`] | the command line |
-//! | [`config`], [`choose`] | profile, learned tables and backend that it asks for |
+//! | [`config`], [`weight_files`], [`choose`] | profile, model weights and backend it asks for |
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
 //! | [`track`], [`map`], `flow`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
@@ -44,6 +44,7 @@ pub mod statistics;
 pub mod summary;
 pub mod team;
 pub mod track;
+pub mod weight_files;
 
 use args::Command;
 use error::RunError;

@@ -1,11 +1,12 @@
 //! `raywake run`.
 
 use crate::args;
-use crate::config::{self, Weights};
+use crate::config;
 use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::outputs::Kinds;
 use crate::summary::RunSummary;
+use crate::weight_files::WeightFiles;
 use raywake_io::source;
 
 /// Estimates the flow of a recorded drive.
@@ -13,7 +14,7 @@ pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
     let mut profile = config::profile(&args.profile)?;
     // Asked for by name, it is wanted under every profile.
     profile.deskew |= args.recording.deskew == Some(true);
-    let weights = Weights::read(&args.learned, &profile)?;
+    let weights = WeightFiles::read(&args.learned, &profile)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
     let plan = RunPlan {
         sweeps: args.part.range(source.len())?,

@@ -9,12 +9,36 @@ use raywake_core::params::Profile;
 use raywake_core::pipeline::Perceived;
 use raywake_core::record::{Ray, Step};
 use raywake_core::team::Team as _;
+use raywake_core::weights::WeightsError;
 use raywake_gpu::{Census, GpuError};
 
 use crate::laps::Laps;
 use crate::team::Team;
 
+/// What is learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LearnedPart {
+    /// The background filter.
+    Filter,
+    /// The occupancy constancy.
+    Constancy,
+}
+
+/// Why a weights file does not serve a profile.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {why}", match .of {
+    LearnedPart::Filter => "background filter",
+    LearnedPart::Constancy => "occupancy constancy",
+})]
+pub struct TablesError {
+    /// Which file.
+    pub of: LearnedPart,
+    /// What is wrong with it.
+    pub why: WeightsError,
+}
+
 /// The learned numbers in the form the kernels and their twins use.
+#[derive(Clone)]
 pub struct Tables {
     /// See [`background_filter::load`]; empty of weight where every solid column passes.
     pub filter: Vec<i32>,
@@ -32,18 +56,17 @@ pub struct Tables {
 
 impl Tables {
     /// Reads both weights files for a profile; without a filter every solid column is foreground.
-    /// The error names the file's kind.
     pub fn load(
         profile: &Profile,
         filter: Option<&str>,
         constancy: &str,
-    ) -> Result<Tables, String> {
+    ) -> Result<Tables, TablesError> {
         let levels = profile.levels as usize;
         let mut table = vec![0; TABLE_WORDS];
         let mut provenance = "none: every solid column is foreground".to_string();
         if let Some(text) = filter {
             background_filter::load(text, levels, &mut table)
-                .map_err(|e| format!("background filter: {e}"))?;
+                .map_err(|why| TablesError { of: LearnedPart::Filter, why })?;
             provenance = text
                 .lines()
                 .find_map(|l| l.strip_prefix("provenance "))
@@ -52,7 +75,7 @@ impl Tables {
         }
         let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
         let scores = occupancy_constancy::load(constancy, levels, &mut weights, &mut costs)
-            .map_err(|e| format!("occupancy constancy: {e}"))?;
+            .map_err(|why| TablesError { of: LearnedPart::Constancy, why })?;
         Ok(Tables {
             filter: table,
             constancy: weights,

@@ -16,13 +16,13 @@ use raywake_core::sweep::{Rig, Timing};
 
 use crate::args::{self, PictureFrame};
 use crate::choose;
-use crate::config::{self, Weights};
+use crate::config;
 use crate::console::{note, say};
-use crate::drive::Drive;
 use crate::error::RunError;
 use crate::laps::Laps;
 use crate::picture::{Pictures, Scene};
 use crate::statistics::{Dropped, in_words};
+use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
@@ -39,7 +39,7 @@ const MOVING_MPS: f64 = 0.5;
 pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
     let profile = config::profile(&args.profile)?;
-    let weights = Weights::read(&args.learned, &profile)?;
+    let weights = WeightFiles::read(&args.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
     let beside = |file: &Option<PathBuf>| file.clone().unwrap_or(args.out.with_extension("png"));
     let mut png =
@@ -144,15 +144,14 @@ fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error>
 fn points(
     args: &args::FlowArgs,
     profile: &Profile,
-    weights: &Weights,
+    weights: &WeightFiles,
     rig: &Rig,
     [first, second]: [&SweepData; 2],
     png: &mut Option<Pictures>,
 ) -> Result<(Vec<PointFlow>, Dropped), RunError> {
-    let tables = weights.tables(profile)?;
-    let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
+    let chosen = choose::drive(&args.backend, weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
-    let mut drive = Drive::new(profile, rig, &tables, chosen.backend);
+    let mut drive = chosen.drive;
     let mut returns = drive.step(&first.sweep(), &[])?.prepared.dropped;
     let stepped = drive.step(&second.sweep(), &first.points)?;
     returns += stepped.prepared.dropped;

@@ -9,13 +9,14 @@ use std::time::Instant;
 
 use crate::args;
 use crate::choose;
-use crate::config::{self, Weights};
+use crate::config;
 use crate::console::{bytes, note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::picture::{Pictures, Scene};
 use crate::session::each_sweep;
+use crate::weight_files::WeightFiles;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_io::source::{self, SweepData};
@@ -87,11 +88,10 @@ fn draw(
 
 /// The flow, for the front end that takes it.
 fn flow(args: &args::TrackArgs, profile: &Profile, rig: &Rig) -> Result<Drive, RunError> {
-    let weights = Weights::read(&args.learned, profile)?;
-    let tables = weights.tables(profile)?;
-    let chosen = choose::backend(&args.backend, profile, weights.tables(profile)?)?;
+    let weights = WeightFiles::read(&args.learned, profile)?;
+    let chosen = choose::drive(&args.backend, &weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
-    Ok(Drive::new(profile, rig, &tables, chosen.backend))
+    Ok(chosen.drive)
 }
 
 /// What the run holds, and what bounds its work.

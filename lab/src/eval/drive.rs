@@ -9,10 +9,10 @@ use super::points::{PointScores, Points};
 use super::rows_file;
 use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
-use raywake::config::Weights;
 use raywake::engine::{self, RunPlan};
 use raywake::error::RunError;
 use raywake::outputs::Kinds;
+use raywake::weight_files::WeightFiles;
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_io::Error;
@@ -35,7 +35,7 @@ pub struct Settings {
     /// Checked.
     pub profile: Profile,
     /// Read and checked.
-    pub weights: Weights,
+    pub weights: WeightFiles,
     /// Digest of the weights' texts.
     pub weights_digest: String,
     /// Where the heavy half runs.
@@ -52,7 +52,7 @@ pub struct Settings {
 
 impl Settings {
     /// A run that writes nothing.
-    fn plan(&self, source: &dyn Source, weights: Weights) -> RunPlan<'_> {
+    fn plan(&self, source: &dyn Source, weights: WeightFiles) -> RunPlan<'_> {
         RunPlan {
             profile: self.profile.clone(),
             weights,

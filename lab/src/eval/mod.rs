@@ -30,9 +30,10 @@ use conclude::conclude;
 use drive::{Files, Settings};
 use facts::Facts;
 use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
-use raywake::config::{self, Weights};
+use raywake::config;
 use raywake::console::interrupted;
 use raywake::error::RunError;
+use raywake::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use row::Row;
@@ -68,7 +69,7 @@ impl Inputs {
             return Err(Error::Usage("--margin must be 0 to 2 m".into()));
         }
         let profile = config::profile(&self.profile)?;
-        let weights = Weights::read(&self.learned, &profile)?;
+        let weights = WeightFiles::read(&self.learned, &profile)?;
         Ok(Settings {
             weights_digest: weights.digest(),
             weights,

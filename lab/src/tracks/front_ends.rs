@@ -7,10 +7,10 @@ use super::recorded::Recorded;
 use glam::DVec3;
 use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
 use raywake::choose;
-use raywake::config::{self, Weights};
-use raywake::drive::Drive;
+use raywake::config;
 use raywake::error::RunError;
 use raywake::track::Tracker;
+use raywake::weight_files::WeightFiles;
 use raywake_io::source::{self, OpenOptions, SweepData};
 use raywake_objects::ObjectReturn;
 use raywake_objects::front_end::Track;
@@ -109,10 +109,8 @@ fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Tr
         let drive = match kind {
             FrontEndKind::Variance => None,
             FrontEndKind::Flow => {
-                let weights = Weights::read(settings.learned, profile)?;
-                let chosen = choose::backend(settings.backend, profile, weights.tables(profile)?)?;
-                let tables = weights.tables(profile)?;
-                Some(Drive::new(profile, source.rig(), &tables, chosen.backend))
+                let weights = WeightFiles::read(settings.learned, profile)?;
+                Some(choose::drive(settings.backend, &weights, profile, source.rig())?.drive)
             }
         };
         let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);

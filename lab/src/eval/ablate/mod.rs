@@ -9,8 +9,8 @@ use super::{Inputs, all, failures, names, read_rows};
 use crate::report::{self, Report};
 use clap::builder::PossibleValuesParser;
 use raywake::args::Learned;
-use raywake::config::Weights;
 use raywake::console::interrupted;
+use raywake::weight_files::WeightFiles;
 use raywake_core::params::Profile;
 use raywake_io::Error;
 use std::collections::BTreeMap;
@@ -75,7 +75,7 @@ fn settings(variant: &Variant, base: &Settings, learned: &Learned) -> Result<Set
         // What is shipped for his profile is his.
         Numbers::Author => {
             let learned = Learned { filter: learned.filter.clone(), constancy: None };
-            Weights::read(&learned, &Profile::dissertation())?
+            WeightFiles::read(&learned, &Profile::dissertation())?
         }
     };
     Ok(Settings { weights_digest: weights.digest(), weights, profile, ..base.clone() })

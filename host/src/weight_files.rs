@@ -1,0 +1,107 @@
+//! Model weights: built-in ones, or files named on the command line.
+
+use std::path::PathBuf;
+
+use raywake_core::background_filter;
+use raywake_core::digest::Digest;
+use raywake_core::occupancy_constancy;
+use raywake_core::params::Profile;
+
+use crate::args::Learned;
+use crate::backend::{LearnedPart, Tables, TablesError};
+use crate::config::read;
+use raywake_io::Error;
+
+/// The texts of both weights files.
+#[derive(Clone)]
+pub struct WeightFiles {
+    /// None: every solid column is foreground.
+    filter: Option<WeightFile>,
+    constancy: WeightFile,
+}
+
+#[derive(Clone)]
+struct WeightFile {
+    /// None: built in.
+    path: Option<PathBuf>,
+    text: String,
+}
+
+impl WeightFiles {
+    /// Reads what the command line names, takes what is built in for the rest.
+    pub fn read(learned: &Learned, profile: &Profile) -> Result<WeightFiles, Error> {
+        let file = |path: &Option<PathBuf>, shipped: &str| match path {
+            Some(path) => Ok(WeightFile { path: Some(path.clone()), text: read(path)? }),
+            None => Ok(WeightFile { path: None, text: shipped.to_string() }),
+        };
+        let unfiltered = learned.filter.as_ref().is_some_and(|f| f.as_os_str() == "none");
+        let shipped = occupancy_constancy::shipped(profile.frame);
+        Ok(WeightFiles {
+            filter: match unfiltered {
+                true => None,
+                false => Some(file(&learned.filter, background_filter::SHIPPED)?),
+            },
+            constancy: file(&learned.constancy, shipped)?,
+        })
+    }
+
+    /// Whether there is a background filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// The same without the background filter: every solid column is foreground.
+    pub fn without_filter(self) -> WeightFiles {
+        WeightFiles { filter: None, ..self }
+    }
+
+    /// A digest of both texts, 16 hexadecimal digits.
+    pub fn digest(&self) -> String {
+        let filter = self.filter.as_ref().map(|f| &f.text);
+        let all = format!("{filter:?}{}", self.constancy.text);
+        format!("{:016x}", Digest::of(all.as_bytes()))
+    }
+
+    /// The tables made of them for a profile. Errors name the file and the value in it, or the
+    /// option for a file where what is built in does not fit.
+    pub fn tables(&self, profile: &Profile) -> Result<Tables, Error> {
+        let filter = self.filter.as_ref().map(|f| f.text.as_str());
+        Tables::load(profile, filter, &self.constancy.text).map_err(|e| self.mistake(profile, e))
+    }
+
+    fn mistake(&self, profile: &Profile, e: TablesError) -> Error {
+        let (file, option) = match e.of {
+            LearnedPart::Filter => (self.filter.as_ref(), "--filter"),
+            LearnedPart::Constancy => (Some(&self.constancy), "--constancy"),
+        };
+        match file.and_then(|f| f.path.as_ref()) {
+            Some(path) => Error::input(path, "", e.to_string()),
+            None => Error::Usage(format!(
+                "the built-in weights do not fit profile `{}` of {} levels ({e}): give {option}",
+                profile.name, profile.levels
+            )),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_weights_fit_the_built_in_profiles_only() {
+        let load = |learned: &Learned, profile: &Profile| {
+            let weights = WeightFiles::read(learned, profile)?;
+            weights.tables(profile).map(|_| ())
+        };
+        for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
+            load(&Learned::default(), &profile).unwrap();
+        }
+        let low = Profile { levels: 12, ..Profile::hdl64() };
+        let e = load(&Learned::default(), &low).unwrap_err().to_string();
+        assert!(e.contains("12 levels") && e.contains("--filter"), "{e}");
+        let none = Learned { filter: Some("none".into()), constancy: None };
+        let e = load(&none, &low).unwrap_err().to_string();
+        assert!(e.contains("12 levels") && e.contains("--constancy"), "{e}");
+    }
+}
