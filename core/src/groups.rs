@@ -1,8 +1,8 @@
-//! Disjoint sets of the first so many whole numbers, and lists of them.
+//! Disjoint sets of the numbers below N (union-find with path halving), and lists of their members.
 
 use crate::record::NONE;
 
-/// Groups of numbers below `N`.
+/// Disjoint sets of numbers below `N`.
 pub struct Groups<const N: usize> {
     parent: [u32; N],
     members: heapless::Vec<u32, N>,
@@ -22,14 +22,14 @@ impl<const N: usize> Groups<N> {
         Groups { parent: [0; N], members: heapless::Vec::new(), ends: heapless::Vec::new() }
     }
 
-    /// Makes a group of each number below `count` that is a `member`.
+    /// Puts each number below `count` that is a `member` into a group of its own.
     pub fn start(&mut self, count: usize, member: impl Fn(usize) -> bool) {
         for (n, parent) in self.parent[..count].iter_mut().enumerate() {
             *parent = if member(n) { n as u32 } else { NONE };
         }
     }
 
-    /// Whether a number is member of a group.
+    /// Whether a number is in a group.
     pub fn contains(&self, n: usize) -> bool {
         self.parent[n] != NONE
     }
@@ -43,14 +43,14 @@ impl<const N: usize> Groups<N> {
         n
     }
 
-    /// Makes one group of those of two members. The lower root stays.
+    /// Merges the groups of two members.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Lists the members of every group, sorted by its root, which is its least member. `count` is
-    /// that of the start.
+    /// Lists the members of every group; groups are ordered by their least member. `count` is that of
+    /// [`Groups::start`].
     pub fn list(&mut self, count: usize) {
         self.members.clear();
         self.ends.clear();

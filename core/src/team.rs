@@ -1,8 +1,8 @@
-//! Work that may be split over threads. Whose these are is not for core to know.
+//! Work that may be split over threads. Core has none; the caller may bring some.
 
-/// Does two things, perhaps at the same time.
+/// Threads that share work by fork and join.
 pub trait Team: Sync {
-    /// Returns when both are done.
+    /// Runs both, perhaps at the same time, and returns when both are done.
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send);
 }
 
@@ -16,8 +16,8 @@ impl Team for Alone {
     }
 }
 
-/// Fills slots with the values of their indices, which begin at `first`. Halves of halves, so that
-/// whoever is done early takes over from the others.
+/// Fills each slot with the value of its index, counted from `first`. By recursive halving, so that
+/// idle threads can steal work.
 pub(crate) fn fill<T: Send>(
     team: &impl Team,
     first: usize,

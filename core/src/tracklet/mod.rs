@@ -1,11 +1,12 @@
-//! Flow tracklets (section 3.6.2): a filter for every column that is seen to move with the flow.
+//! Flow tracklets (section 3.6.2): an EKF for every column that the flow observes.
 //!
-//! A tracklet follows a place on a thing from cell to cell: the middle of the column it was born in,
-//! moved by every displacement since. One step: every tracklet whose cell was observed is predicted,
-//! gated and updated, and moves on; one whose cell was not takes over the nearest observed column
-//! beside it that no other has; an observed column without a tracklet gives birth to one; what is
-//! left waits for [`crate::params::TrackletParams::coast_sweeps`], then ends. Two tracklets that come
-//! to lie in one cell become the older of them.
+//! A tracklet follows a point of an object from cell to cell: the middle of the column it was born in,
+//! moved by every displacement since. Positions are relative to that point, so f32 suffices wherever
+//! one drives. One step: a tracklet whose cell was observed is predicted, gated, updated and moved on;
+//! one whose cell was not takes over the nearest observed column beside it that no other has; an
+//! observed column without a tracklet gives birth to one; the rest coast for
+//! [`crate::params::TrackletParams::coast_sweeps`], then end. Of two tracklets that come to lie in
+//! one cell the older stays.
 
 pub mod ekf;
 #[cfg(test)]
@@ -19,7 +20,7 @@ use nalgebra::Matrix2;
 /// A flow tracklet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracklet {
-    /// Filter; positions from the place it follows, axes of the grid.
+    /// Filter; positions relative to the point it follows, axes of the grid.
     pub ekf: Ekf,
     /// Observations after birth.
     pub age: u32,
@@ -27,7 +28,7 @@ pub struct Tracklet {
     pub missed: u32,
     /// Column of the window.
     pub column: u32,
-    /// The place it follows, from the column's corner, cells: 0 to 1.
+    /// The point it follows, from the column's corner, cells: 0 to 1.
     pub place: [f32; 2],
 }
 
@@ -53,7 +54,7 @@ crate::counters! {
         pub updated,
         /// Ended by the gate.
         pub gated,
-        /// Waiting unobserved.
+        /// Coasting unobserved.
         pub waiting,
         /// Ended for another one in the same cell.
         pub merged,
@@ -76,8 +77,8 @@ pub(crate) fn observe(
     let noise = position_noise(params, covariance);
     let refined = profile.refinement_sweeps > 0;
     if refined {
-        // Things are laid over each other anew every time: what one displacement is off by, the next
-        // one does not make good, as whole cells do.
+        // Registrations err independently of each other: the next displacement does not make good the
+        // error of this one, as it does in whole cells.
         t.ekf.measure_place(noise);
     }
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
@@ -95,8 +96,8 @@ pub(crate) fn observe(
     passed
 }
 
-/// A displacement lies between two positions that err alike: half its covariance is each one's, and
-/// half that of the poses between them.
+/// Covariance of a position. A displacement lies between two that err alike: half of its covariance
+/// belongs to each, and half of that of the poses between them.
 fn position_noise(params: &TrackletParams, [xx, xy, yy]: [f32; 3]) -> Matrix2<f32> {
     let of_poses = params.pose_noise_m * params.pose_noise_m;
     Matrix2::new(xx + of_poses, xy, xy, yy + of_poses) * 0.5
@@ -157,6 +158,29 @@ impl Tracklets {
         observed: &mut [Observation],
     ) -> TrackletTurnover {
         let mut turnover = TrackletTurnover { left: left.into(), ..TrackletTurnover::default() };
+        self.claim(observed);
+        if profile.tracklet.takes_over {
+            self.take_over(step, observed);
+        }
+        self.next.clear();
+        // From here on that of the cells moved to.
+        self.slot_of_column.fill(NONE);
+        for o in observed {
+            let known = self.now.get(core::mem::replace(&mut o.slot, NONE) as usize);
+            let Some(mut t) = continued(known, profile, o, dt, &mut turnover) else { continue };
+            if profile.frame == Frame::Sensor {
+                t.ekf.turn_axes(turned);
+            }
+            let by = o.moved.map(|v| v / profile.voxel_m as f32);
+            o.slot = self.put(step, o.column, by, t, &mut turnover);
+        }
+        self.coast(profile, step, dt, &mut turnover);
+        core::mem::swap(&mut self.now, &mut self.next);
+        turnover
+    }
+
+    /// Gives each observation the tracklet in its column.
+    fn claim(&mut self, observed: &mut [Observation]) {
         self.observation_of_column.fill(NONE);
         self.claimed.fill(false);
         for (n, o) in observed.iter_mut().enumerate() {
@@ -166,43 +190,6 @@ impl Tracklets {
                 *claimed = true;
             }
         }
-        if profile.tracklet.takes_over {
-            self.take_over(step, observed);
-        }
-        self.next.clear();
-        // From here on that of the cells moved to.
-        self.slot_of_column.fill(NONE);
-        for o in observed {
-            let known = core::mem::replace(&mut o.slot, NONE);
-            let mut t = match self.now.get(known as usize) {
-                None => {
-                    turnover.born += 1;
-                    born(profile, o, dt)
-                }
-                Some(known) => {
-                    let mut t = *known;
-                    if observe(&mut t, profile, o.moved, o.covariance, dt) {
-                        turnover.updated += 1;
-                        Tracklet { age: t.age + 1, missed: 0, ..t }
-                    } else {
-                        turnover.gated += 1;
-                        if profile.tracklet.birth == Birth::Source {
-                            continue;
-                        }
-                        turnover.born += 1;
-                        born(profile, o, dt)
-                    }
-                }
-            };
-            if profile.frame == Frame::Sensor {
-                t.ekf.turn_axes(turned);
-            }
-            let by = o.moved.map(|v| v / profile.voxel_m as f32);
-            o.slot = self.put(step, o.column, by, t, &mut turnover);
-        }
-        self.wait(profile, step, dt, &mut turnover);
-        core::mem::swap(&mut self.now, &mut self.next);
-        turnover
     }
 
     /// Tracklets whose cell was not observed take the nearest column beside it that was.
@@ -229,7 +216,7 @@ impl Tracklets {
                 o.slot = slot as u32;
                 self.claimed[slot] = true;
                 let by = [o.column as i32 / side - i, o.column as i32 % side - j];
-                // The nearest place of that column.
+                // The nearest point of that column.
                 t.place = [0, 1].map(|a| (t.place[a] - by[a] as f32).clamp(0.0, INSIDE));
             }
         }
@@ -274,15 +261,15 @@ impl Tracklets {
         slot
     }
 
-    /// Unobserved tracklets go on as predicted for a while, their covariance growing (5.2.2).
-    fn wait(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut TrackletTurnover) {
+    /// Unobserved tracklets move on as predicted for a while, their covariance growing (5.2.2).
+    fn coast(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut TrackletTurnover) {
         for slot in 0..self.now.len() {
             let t = self.now[slot];
-            let waits = t.missed < profile.tracklet.coast_sweeps && t.age > t.missed;
+            let coasts = t.missed < profile.tracklet.coast_sweeps && t.age > t.missed;
             if t.column == NONE || self.claimed[slot] {
                 continue;
             }
-            if !waits {
+            if !coasts {
                 turnover.lost += 1;
                 continue;
             }
@@ -318,8 +305,31 @@ impl Tracklets {
     }
 }
 
-/// Largest place inside a cell: below 1.
+/// Largest coordinate inside a cell: the float before 1.
 const INSIDE: f32 = 1.0 - f32::EPSILON;
+
+/// What a tracklet, or none, becomes with an observation of its column; nothing where it ends.
+fn continued(
+    known: Option<&Tracklet>,
+    profile: &Profile,
+    o: &Observation,
+    dt: f32,
+    turnover: &mut TrackletTurnover,
+) -> Option<Tracklet> {
+    if let Some(known) = known {
+        let mut t = *known;
+        if observe(&mut t, profile, o.moved, o.covariance, dt) {
+            turnover.updated += 1;
+            return Some(Tracklet { age: t.age + 1, missed: 0, ..t });
+        }
+        turnover.gated += 1;
+        if profile.tracklet.birth == Birth::Source {
+            return None;
+        }
+    }
+    turnover.born += 1;
+    Some(born(profile, o, dt))
+}
 
 fn born(profile: &Profile, o: &Observation, dt: f32) -> Tracklet {
     let noise = position_noise(&profile.tracklet, o.covariance);
