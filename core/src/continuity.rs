@@ -6,7 +6,7 @@ crate::params! {
     /// How far two consecutive sweeps may be apart. Any road vehicle at any rate above 2 Hz stays
     /// within the defaults.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Limits {
+    pub struct ContinuityLimits {
         /// Time between sweeps.
         pub gap_s: f64 = 0.5, "s", (above 0 to 10);
         /// Speed between poses.
@@ -31,7 +31,7 @@ pub enum Reset {
     Spin(f64),
 }
 
-impl Limits {
+impl ContinuityLimits {
     /// Why the step from one pose to another in `dt_s` is no motion, if so.
     pub fn broken(&self, from: &Pose, to: &Pose, dt_s: f64) -> Option<Reset> {
         if dt_s <= 0.0 || dt_s.is_nan() {
@@ -55,7 +55,7 @@ mod tests {
 
     #[test]
     fn each_limit() {
-        let (l, at) = (Limits::DEFAULT, |x, yaw| Pose::planar(x, 0.0, 0.0, yaw));
+        let (l, at) = (ContinuityLimits::DEFAULT, |x, yaw| Pose::planar(x, 0.0, 0.0, yaw));
         let broken = |x, yaw, dt| l.broken(&at(0.0, 0.0), &at(x, yaw), dt);
         assert_eq!(broken(5.0, 0.1, 0.1), None);
         assert_eq!(broken(5.0, 0.1, 0.0), Some(Reset::Backwards(0.0)));

@@ -13,7 +13,7 @@ const CELLS_SIDE_MAX: usize = 256usize.div_ceil(CELL_COLUMNS_MIN);
 const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
 /// Height of the ground in cells of several columns.
-pub struct Ground {
+pub struct GroundGrid {
     /// Columns along an axis of the window, and along an edge of a cell, that `cell` is for.
     columns: [usize; 2],
     /// Cells along an axis of the window.
@@ -25,16 +25,16 @@ pub struct Ground {
     extrapolated: [f32; CELLS_MAX],
 }
 
-impl Default for Ground {
+impl Default for GroundGrid {
     fn default() -> Self {
-        Ground::new()
+        GroundGrid::new()
     }
 }
 
-impl Ground {
+impl GroundGrid {
     /// No ground.
-    pub const fn new() -> Ground {
-        Ground {
+    pub const fn new() -> GroundGrid {
+        GroundGrid {
             columns: [0; 2],
             side: 0,
             cell: [0; COLUMNS_MAX],

@@ -49,8 +49,8 @@ impl<const N: usize> Groups<N> {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Lists the members of every group; groups are ordered by their least member. `count` is that of
-    /// [`Groups::start`].
+    /// Lists the members of every group; groups are ordered by their least member. `count` is that
+    /// of [`Groups::start`].
     pub fn list(&mut self, count: usize) {
         self.members.clear();
         self.ends.clear();

@@ -47,7 +47,8 @@ pub const CLOUD_MAX: usize = 65_536;
 pub const BAND_UPDATES: usize = 1 << 20;
 /// Threads of a workgroup of every one-dimensional kernel.
 pub const WORKGROUP: usize = 256;
-/// Threads of a workgroup where each handles a ray or a foreground column, or all of them one column.
+/// Threads of a workgroup where each handles a ray or a foreground column, or all of them one
+/// column.
 pub const ROW_WORKGROUP: usize = 64;
 /// Items a workgroup of the prefix sum and of the radix sort handles.
 pub const TILE: usize = 1024;

@@ -1,8 +1,8 @@
 //! Every number a person chose: what it is called, its unit, its range, its default and the reason
 //! for it, declared once.
 //!
-//! [`params!`](crate::params!) turns a declaration into a struct, its default and a table of what was
-//! declared. The table serves the keys of a configuration file, `--set name=value` and
+//! [`params!`](crate::params!) turns a declaration into a struct, its default and a table of what
+//! was declared. The table serves the keys of a configuration file, `--set name=value` and
 //! `PARAMETERS.md`. [`ceilings`] holds what sizes storage and therefore cannot be set.
 
 mod ceilings;
@@ -187,12 +187,12 @@ pub trait Parameters {
 /// assert_eq!(search.within_bounds().unwrap_err().must, "above 0, at most 100");
 /// ```
 ///
-/// Each line is a documented field: type, default, unit (of a ratio ""), range, and the reason for the
-/// default, without which it was "not measured on its own". Types are those that implement [`Kind`]:
-/// numbers, `bool`, and enums that say so. A range is `(a to b)`, `(above a)`, `(above a to b)`,
-/// `(0 or a to b)`, `(at least a)` or `(any)`. Fields that are no parameters, such as nested groups,
-/// follow in a second block: `} and { pub name: Type = default; }`. `DEFAULT` is constant, so presets
-/// can say `Group { field: value, ..Group::DEFAULT }`.
+/// Each line is a documented field: type, default, unit (of a ratio ""), range, and the reason for
+/// the default, without which it was "not measured on its own". Types are those that implement
+/// [`Kind`]: numbers, `bool`, and enums that say so. A range is `(a to b)`, `(above a)`, `(above a
+/// to b)`, `(0 or a to b)`, `(at least a)` or `(any)`. Fields that are no parameters, such as
+/// nested groups, follow in a second block: `} and { pub name: Type = default; }`. `DEFAULT` is
+/// constant, so presets can say `Group { field: value, ..Group::DEFAULT }`.
 #[macro_export]
 macro_rules! params {
     // The reason for a default.

@@ -4,7 +4,7 @@ use super::{
     COLUMNS_MAX, COST_UNKNOWN, GroundParams, Kind, LEVELS_MAX, Parameters, ProfileError,
     RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
 };
-use crate::continuity::Limits;
+use crate::continuity::ContinuityLimits;
 use heapless::String;
 
 /// The frame the grid lies in (B.2.2 leaves it open).
@@ -83,7 +83,7 @@ crate::params! {
         /// Tracklet filter.
         pub tracklet: TrackletParams = TrackletParams::DEFAULT;
         /// Beyond these two sweeps make no pair, and tracklets are dropped.
-        pub limits: Limits = Limits::DEFAULT;
+        pub limits: ContinuityLimits = ContinuityLimits::DEFAULT;
     }
 }
 

@@ -89,8 +89,8 @@ crate::params! {
         pub evidence_min: f32 = 0.12, "", (0 to 1), SIMULATED;
         /// Difference in evidence that makes motion e times likelier.
         pub evidence_scale: f32 = 0.04, "", (0.0001 to 1), CALIBRATED;
-        /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in the
-        /// last sweep, or beside one that moves.
+        /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in
+        /// the last sweep, or beside one that moves.
         pub evidence_prior_ratio: f32 = 0.4, "", (0 to 1),
             "The least that keeps false motion in a still simulated street within its bound.";
         /// From this length on a cluster that moved needs less, in inverse proportion: its sides
@@ -133,9 +133,9 @@ crate::params! {
         pub static_sigma_m: f64 = 0.0075, "m", (0.0001 to 10), CALIBRATED;
         /// The residual that doubles a variance.
         pub inflation_residual: f32 = 0.008, "", (0.0001 to 1), CALIBRATED;
-        /// Area, range times edge of the footprint, at which the covariance of a perfect fit is kept:
-        /// a near cluster shows another side with every sweep, a small one has returns that err
-        /// alike.
+        /// Area, range times edge of the footprint, at which the covariance of a perfect fit is
+        /// kept: a near cluster shows another side with every sweep, a small one has returns that
+        /// err alike.
         pub confidence_m2: f64 = 0.117, "m²", (0.0001 to 1000), CALIBRATED;
         /// Nearest range of a cluster for that: the vehicle's own sides.
         pub range_min_m: f64 = 2.1, "m", (0.1 to 100), SIMULATED;

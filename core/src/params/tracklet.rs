@@ -54,8 +54,8 @@ crate::params! {
         pub scale_min: f32 = 0.1, "", (0.0001 to 1);
         /// Largest scale of the noise: one outlier must not open the gate ever wider.
         pub scale_max: f32 = 10.0, "", (1 to 10000);
-        /// Time over which the first displacement of a tracklet at rest is taken to have happened, at
-        /// most; whole cells only, as finer displacements show at once.
+        /// Time over which the first displacement of a tracklet at rest is taken to have happened,
+        /// at most; whole cells only, as finer displacements show at once.
         pub departure_s: f32 = 1.0, "s", (0.001 to 100);
         /// Where a tracklet is born.
         pub birth: Birth = Birth::Target, "", (any),

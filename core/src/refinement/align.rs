@@ -1,11 +1,12 @@
-//! Registration of a cluster: Gauss-Newton on point-to-plane residuals under a Geman-McClure kernel.
+//! Registration of a cluster: Gauss-Newton on point-to-plane residuals under a Geman-McClure
+//! kernel.
 //!
-//! As in generalised ICP (Segal, Haehnel and Thrun, RSS 2009) each pair of nearest returns weighs by
-//! the surface it lies on; the robust kernel (Geman and McClure, 1987) is wide at first and then
+//! As in generalised ICP (Segal, Haehnel and Thrun, RSS 2009) each pair of nearest returns weighs
+//! by the surface it lies on; the robust kernel (Geman and McClure, 1987) is wide at first and then
 //! narrow. Correspondences run both ways, from the cluster to the other sweeps and from the second
 //! sweep back, so that neither an end that comes into view nor one that leaves it pulls.
 
-use super::cluster::{Cluster, Samples, VisitedColumns};
+use super::cluster::{CloudPoints, Cluster, VisitedColumns};
 use super::motion::Motion;
 use super::sample::{Mean, SurfaceWeight, minus, squared_distance};
 use super::scaled::Scaled;
@@ -39,7 +40,8 @@ impl<'a> NormalEquations<'a> {
         }
     }
 
-    /// Adds a pair of returns `off` apart, of which the one at `source` moves by `share` of the motion.
+    /// Adds a pair of returns `off` apart, of which the one at `source` moves by `share` of the
+    /// motion.
     fn add(&mut self, weight: &SurfaceWeight, source: [f32; 3], off: [f32; 3], share: f32) {
         let (kernel, noise) = (self.kernel, self.scaled.return_sigma);
         let ratio = self.scaled.params.information_ratio;
@@ -123,7 +125,7 @@ impl Cluster<'_> {
         &self,
         to: &mut NormalEquations,
         motion: &Motion,
-        seen: &Samples,
+        seen: &CloudPoints,
         stride: usize,
     ) {
         let target = &self.scans.targets[0];

@@ -1,10 +1,10 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
 use super::places::Places;
-use super::sample::{Sample, SurfaceWeight};
+use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
 use super::surface::{self, LazyWeight};
-use crate::ground::Ground;
+use crate::ground::GroundGrid;
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
     SUBVOXELS_MAX,
@@ -20,7 +20,7 @@ const MASK_WORDS: usize =
 
 /// The returns of a sweep: their places in the window, voxels, and their columns, or [`NONE`].
 #[derive(Clone, Copy)]
-pub struct Returns<'a> {
+pub struct SweepReturns<'a> {
     pub points: &'a [Point],
     pub placed: &'a [Placed],
     pub columns: &'a [u32],
@@ -46,7 +46,7 @@ pub struct Cloud {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
-    ground: Ground,
+    ground: GroundGrid,
     places: Places,
     /// When each was, s after the sweep's stamp: seldom asked for.
     offset_s: [f32; CLOUD_MAX],
@@ -63,7 +63,7 @@ impl Cloud {
             side: 0,
             corner: [0; 3],
             stamp_s: 0.0,
-            ground: Ground::new(),
+            ground: GroundGrid::new(),
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
@@ -72,13 +72,14 @@ impl Cloud {
         }
     }
 
-    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than clusters
-    /// are. Returns how many returns were left out for want of room: those of the last columns.
+    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than
+    /// clusters are. SweepReturns how many returns were left out for want of room: those of the
+    /// last columns.
     pub(super) fn fill(
         &mut self,
         profile: &Profile,
         scaled: &Scaled,
-        returns: Returns,
+        returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
@@ -91,7 +92,7 @@ impl Cloud {
         dropped
     }
 
-    fn find_ground(&mut self, profile: &Profile, returns: Returns) {
+    fn find_ground(&mut self, profile: &Profile, returns: SweepReturns) {
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
         let found = returns.columns.iter().zip(returns.placed);
@@ -101,16 +102,16 @@ impl Cloud {
         self.ground.estimate(&profile.ground, profile.voxel_m, self.side, under, found);
     }
 
-    /// Lists the returns of clusters and counts them by column, one place farther in `start`. Returns
-    /// how many there are, and the sensors that saw them, a bit each.
+    /// Lists the returns of clusters and counts them by column, one place farther in `start`.
+    /// SweepReturns how many there are, and the sensors that saw them, a bit each.
     fn count_columns(
         &mut self,
         scaled: &Scaled,
-        returns: Returns,
+        returns: SweepReturns,
         apart: &mut [bool],
         listed: &mut [u32],
     ) -> (usize, u32) {
-        let Returns { points, placed, columns } = returns;
+        let SweepReturns { points, placed, columns } = returns;
         self.start[..self.side * self.side + 1].fill(0);
         let (mut count, mut sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
@@ -142,8 +143,14 @@ impl Cloud {
         }
     }
 
-    /// Keeps of each sub-voxel the first return of each sensor. Returns how many had no room.
-    fn thin(&mut self, scaled: &Scaled, returns: Returns, order: &[u32], sensors: u32) -> usize {
+    /// Keeps of each sub-voxel the first return of each sensor. SweepReturns how many had no room.
+    fn thin(
+        &mut self,
+        scaled: &Scaled,
+        returns: SweepReturns,
+        order: &[u32],
+        sensors: u32,
+    ) -> usize {
         // By column they are looked up far apart: only where there are several.
         let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
         let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points[n as usize].sensor);
@@ -230,14 +237,14 @@ impl Cloud {
     }
 
     /// The nearest return of a sensor closer than `reach` to `at`, 1 at most: its squared distance
-    /// (voxels²) and itself; of several as near, always the same. The first one found within `enough`
-    /// will do.
+    /// (voxels²) and itself; of several as near, always the same. The first one found within
+    /// `enough` will do.
     pub fn nearest(
         &self,
         at: [f32; 3],
         sensor: u32,
         [reach, enough]: [f32; 2],
-    ) -> Option<(f32, Sample)> {
+    ) -> Option<(f32, CloudPoint)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
         if !(near(at[0]) && near(at[1])) {
@@ -271,9 +278,9 @@ impl Cloud {
     }
 
     /// A return.
-    pub fn sample(&self, n: usize) -> Sample {
+    pub fn sample(&self, n: usize) -> CloudPoint {
         let (at, sensor) = (self.places.at(n), self.places.sensor(n));
-        Sample { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
+        CloudPoint { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
     }
 
     /// What the returns of its sensor around a return tell about the surface it lies on.

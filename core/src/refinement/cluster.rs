@@ -1,7 +1,7 @@
 //! A cluster and how well a motion explains its returns.
 
 use super::motion::Motion;
-use super::sample::{Mean, Sample};
+use super::sample::{CloudPoint, Mean};
 use super::scans::Scans;
 use crate::params::COLUMNS_MAX;
 
@@ -13,7 +13,7 @@ const TARGET_COLUMNS_MAX: usize = 1024;
 /// Residual from which on a return is rather missed than found.
 const HALF_MISSED: f32 = 0.5;
 
-pub type Samples = heapless::Vec<Sample, SAMPLES_MAX>;
+pub type CloudPoints = heapless::Vec<CloudPoint, SAMPLES_MAX>;
 
 /// Columns that were visited, a bit each: small enough for a stack.
 pub struct VisitedColumns([u64; COLUMNS_MAX.div_ceil(64)]);
@@ -41,7 +41,7 @@ pub struct Cluster<'a> {
     pub scans: Scans<'a>,
     pub columns: &'a [u32],
     /// Every k-th of its returns.
-    pub samples: Samples,
+    pub samples: CloudPoints,
     /// Their mean, voxels from the first sweep's window corner.
     pub centre: [f32; 2],
     /// Largest extent along an axis, voxels.
@@ -54,7 +54,7 @@ impl<'a> Cluster<'a> {
         let first = scans.first;
         let returns = || columns.iter().flat_map(|c| first.column(*c as usize));
         let stride = returns().count().div_ceil(SAMPLES_MAX).max(1);
-        let samples: Samples = returns().step_by(stride).map(|n| first.sample(n)).collect();
+        let samples: CloudPoints = returns().step_by(stride).map(|n| first.sample(n)).collect();
         let count = samples.len() as f32;
         let along = |a: usize| samples.iter().map(move |s| s.at[a]);
         let centre = [0, 1].map(|a| along(a).sum::<f32>() / count);
@@ -65,16 +65,16 @@ impl<'a> Cluster<'a> {
         Cluster { scans, columns, samples, centre, extent }
     }
 
-    /// Distance from the middle of the window, where the vehicle is, voxels, but not below the least
-    /// range there is.
+    /// Distance from the middle of the window, where the vehicle is, voxels, but not below the
+    /// least range there is.
     pub fn range(&self) -> f32 {
         let middle = 0.5 * self.scans.first.side as f32;
         let [x, y] = self.centre.map(|c| c - middle);
         libm::sqrtf(x * x + y * y).max(self.scans.scaled.range_min)
     }
 
-    /// Columns of the second sweep, beside those the cluster would be in, that have returns, and how
-    /// many. Of a cluster too large for the list the first columns tell enough.
+    /// Columns of the second sweep, beside those the cluster would be in, that have returns, and
+    /// how many. Of a cluster too large for the list the first columns tell enough.
     fn target_columns(
         &self,
         motion: &Motion,
@@ -108,7 +108,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// Returns of the second sweep where the cluster would be.
-    pub fn target_samples(&self, motion: &Motion, visited: &mut VisitedColumns) -> Samples {
+    pub fn target_samples(&self, motion: &Motion, visited: &mut VisitedColumns) -> CloudPoints {
         let cloud = self.scans.targets[0].cloud;
         let (columns, total) = self.target_columns(motion, visited);
         let returns = columns.iter().flat_map(|c| cloud.column(*c as usize));
@@ -138,8 +138,8 @@ impl<'a> Cluster<'a> {
         mean.value()
     }
 
-    /// The same at rest, by what can be seen, 0 where nothing can; and the share of its returns that
-    /// can be seen in the second sweep.
+    /// The same at rest, by what can be seen, 0 where nothing can; and the share of its returns
+    /// that can be seen in the second sweep.
     pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
         let scans = &self.scans;
         let mut mean = Mean::default();
@@ -165,7 +165,7 @@ impl<'a> Cluster<'a> {
     }
 
     /// Whether something was where a return of the second sweep is.
-    fn was_there(&self, q: &Sample) -> bool {
+    fn was_there(&self, q: &CloudPoint) -> bool {
         let at = self.scans.targets[0].retrace(q, &Motion::default());
         let truncation = self.scans.scaled.truncation;
         let nearest = self.scans.first.nearest(at, q.sensor, self.scans.reach_inlier());

@@ -210,8 +210,8 @@ fn is_static(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
     found.get(of_column[column] as usize).is_some_and(|f| !f.is_dynamic)
 }
 
-/// Gives columns of the `parent` beside one of its moving part to that if their returns fit its motion
-/// about as well as rest.
+/// Gives columns of the `parent` beside one of its moving part to that if their returns fit its
+/// motion about as well as rest.
 fn grow(
     scans: Scans,
     column: usize,

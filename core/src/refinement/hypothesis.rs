@@ -59,8 +59,8 @@ struct Trials<'a> {
 }
 
 impl Trials<'_> {
-    /// Registers the cluster from a start, with few returns, and with all of them where that leads to
-    /// a better fit than the best so far.
+    /// Registers the cluster from a start, with few returns, and with all of them where that leads
+    /// to a better fit than the best so far.
     fn start(&mut self, by: [f32; 2]) {
         let (cluster, scaled) = (self.cluster, self.cluster.scans.scaled);
         if self.tried.iter().any(|t| is_same(scaled, t, by)) {
@@ -100,8 +100,8 @@ impl Trials<'_> {
     }
 }
 
-/// Tests whether a cluster is dynamic. `predicted` is the displacement, voxels, that the tracklet of
-/// a column predicts, `flow` the match of a column.
+/// Tests whether a cluster is dynamic. `predicted` is the displacement, voxels, that the tracklet
+/// of a column predicts, `flow` the match of a column.
 pub fn test(
     cluster: &Cluster,
     flow: impl Fn(usize) -> Flow,

@@ -1,9 +1,9 @@
 //! Refinement of the flow below the cell's size: clusters of returns, and how each of them moved.
 //!
-//! Cells of 0.3 m bound what whole displacements can tell; this stage goes back to the returns. It has
-//! no counterpart in the dissertation. Per pair of sweeps:
+//! Cells of 0.3 m bound what whole displacements can tell; this stage goes back to the returns. It
+//! has no counterpart in the dissertation. Per pair of sweeps:
 //!
-//! 1. Returns above the ground are thinned to one a sub-voxel ([`cloud`]).
+//! 1. SweepReturns above the ground are thinned to one a sub-voxel ([`cloud`]).
 //! 2. Columns that touch make a cluster ([`segments`]).
 //! 3. Each cluster is registered with the second sweep, and with earlier ones where
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
@@ -11,16 +11,16 @@
 //!    tracklets predict, the displacements most of its columns found by energy minimisation and,
 //!    where none of these fits, a search.
 //! 4. A hypothesis test tells dynamic clusters from static ones ([`hypothesis`]): with r0 and r the
-//!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000), the
-//!    evidence for motion is (1 - r / r0) sqrt(r0 - r). Only what can be seen counts: a voxel no ray
-//!    reached tells nothing. A cluster that moved in the last sweep needs less.
+//!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000),
+//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). Only what can be seen counts: a voxel
+//!    no ray reached tells nothing. A cluster that moved in the last sweep needs less.
 //! 5. A static cluster may have a part that moves; what remains of it, and fragments beside it, may
 //!    go with that ([`clusters`]).
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
 //!    that found no match. Covariances are inflated by the residual ([`refined`]).
 //!
-//! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres; inside,
-//! lengths are in voxels ([`scaled`]).
+//! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres;
+//! inside, lengths are in voxels ([`scaled`]).
 
 mod align;
 mod cloud;
@@ -46,7 +46,7 @@ use crate::prepare::Placed;
 use crate::record::{Flow, Step, VALID, flow_displacement};
 use crate::sweep::Point;
 use crate::team::Team;
-use cloud::{Cloud, Returns, Scratch};
+use cloud::{Cloud, Scratch, SweepReturns};
 use clusters::Clusters;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
@@ -86,8 +86,9 @@ impl Refinement {
         self.held = 0;
     }
 
-    /// Takes over a sweep: its returns, where and when they were, and in which column. `apart` becomes
-    /// whether each is of the ground, or higher than clusters are. Returns how many had no room.
+    /// Takes over a sweep: its returns, where and when they were, and in which column. `apart`
+    /// becomes whether each is of the ground, or higher than clusters are. SweepReturns how many
+    /// had no room.
     pub(crate) fn take(
         &mut self,
         profile: &Profile,
@@ -104,7 +105,7 @@ impl Refinement {
         let cloud = &mut self.clouds[self.newest];
         cloud.corner = corner;
         cloud.stamp_s = stamp_s;
-        let returns = Returns { points, placed, columns };
+        let returns = SweepReturns { points, placed, columns };
         cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 

@@ -1,5 +1,5 @@
-//! Places of returns, an array per axis: a processor compares several of them at once. Compilers see
-//! to that where nothing in a lane can branch: hence no sums with a check for overflow.
+//! Places of returns, an array per axis: a processor compares several of them at once. Compilers
+//! see to that where nothing in a lane can branch: hence no sums with a check for overflow.
 
 use crate::params::CLOUD_MAX;
 use core::array::from_fn;
@@ -12,8 +12,8 @@ const ROOM: usize = CLOUD_MAX + LANES;
 /// No return.
 const NONE: u32 = u32::MAX;
 
-/// Sums over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
-pub type Sums = [f32; 10];
+/// Moments over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
+pub type Moments = [f32; 10];
 
 /// Places of returns, voxels from the window's corner, with the sensor that saw each: every sensor
 /// sees a thing at a time of its own.
@@ -119,7 +119,7 @@ impl Places {
         at: [f32; 3],
         sensor: u32,
         radius: f32,
-        sums: &mut Sums,
+        sums: &mut Moments,
     ) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));

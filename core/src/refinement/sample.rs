@@ -7,7 +7,7 @@ pub type SurfaceWeight = [f32; 6];
 
 /// A return of a cluster.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
+pub struct CloudPoint {
     /// Voxels from the window's corner of its sweep.
     pub at: [f32; 3],
     /// Sensor that saw it.

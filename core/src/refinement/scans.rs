@@ -2,7 +2,7 @@
 
 use super::cloud::Cloud;
 use super::motion::Motion;
-use super::sample::{Mean, Sample, minus, squared_distance};
+use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
 use crate::params::{LEVELS_MAX, REFINEMENT_SWEEPS_MAX};
 use crate::record::Column;
@@ -10,8 +10,8 @@ use crate::record::Column;
 /// Sweeps that a cluster is registered with, at most.
 pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX - 1;
 
-/// A sweep that clusters are registered with: where its window lies seen from the first sweep's, and
-/// how much of the motion over the pair has happened from stamp to stamp.
+/// A sweep that clusters are registered with: where its window lies seen from the first sweep's,
+/// and how much of the motion over the pair has happened from stamp to stamp.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
     pub index: usize,
@@ -27,7 +27,7 @@ impl Target<'_> {
     }
 
     /// Where a return of the first sweep is seen in this one, voxels of this one's window.
-    pub fn predict(&self, s: &Sample, motion: &Motion) -> [f32; 3] {
+    pub fn predict(&self, s: &CloudPoint, motion: &Motion) -> [f32; 3] {
         let d = motion.of([s.at[0], s.at[1]]);
         let share = self.share(motion);
         [
@@ -38,7 +38,7 @@ impl Target<'_> {
     }
 
     /// Where a return of this sweep was, voxels of the first sweep's window.
-    pub fn retrace(&self, q: &Sample, motion: &Motion) -> [f32; 3] {
+    pub fn retrace(&self, q: &CloudPoint, motion: &Motion) -> [f32; 3] {
         let share = self.share(motion);
         let at = minus(q.at, self.offset);
         let d = motion.of([at[0] - share * motion.delta.x, at[1] - share * motion.delta.y]);
@@ -63,8 +63,8 @@ pub struct Scans<'a> {
 }
 
 impl Scans<'_> {
-    /// Whether rays passed through the voxel of a place of the second sweep's window, and none ended
-    /// there: what was there is gone, or has come.
+    /// Whether rays passed through the voxel of a place of the second sweep's window, and none
+    /// ended there: what was there is gone, or has come.
     pub fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {
         let side = self.first.side as f32;
         let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
@@ -80,9 +80,9 @@ impl Scans<'_> {
     pub fn residual(
         &self,
         of: &Cloud,
-        s: &Sample,
+        s: &CloudPoint,
         at: [f32; 3],
-        found: Option<(f32, Sample)>,
+        found: Option<(f32, CloudPoint)>,
     ) -> f32 {
         let Some((d2, q)) = found else { return 1.0 };
         let Scaled { inlier, truncation, .. } = *self.scaled;
@@ -95,14 +95,14 @@ impl Scans<'_> {
     }
 
     /// Residual of a return of the first sweep in a target sweep, if it moved.
-    pub fn dynamic_residual(&self, s: &Sample, motion: &Motion, target: &Target) -> f32 {
+    pub fn dynamic_residual(&self, s: &CloudPoint, motion: &Motion, target: &Target) -> f32 {
         let at = target.predict(s, motion);
         self.residual(self.first, s, at, target.cloud.nearest(at, s.sensor, self.reach_inlier()))
     }
 
     /// Residual of a return of the first sweep in the second, if it was static: nothing where it
     /// cannot be seen.
-    pub fn static_residual(&self, s: &Sample) -> Option<f32> {
+    pub fn static_residual(&self, s: &CloudPoint) -> Option<f32> {
         let target = &self.targets[0];
         let at = target.predict(s, &Motion::default());
         let found = target.cloud.nearest(at, s.sensor, self.reach_inlier());
@@ -111,7 +111,11 @@ impl Scans<'_> {
     }
 
     /// Mean residual of some returns of a column, 0 where it cannot be told.
-    pub fn column_residual(&self, column: usize, residual: impl Fn(&Sample) -> Option<f32>) -> f32 {
+    pub fn column_residual(
+        &self,
+        column: usize,
+        residual: impl Fn(&CloudPoint) -> Option<f32>,
+    ) -> f32 {
         let returns = self.first.column(column);
         let looked_at = self.scaled.params.column_returns as usize;
         let stride = returns.len().div_ceil(looked_at).max(1);

@@ -2,8 +2,8 @@
 
 use super::cluster::Cluster;
 
-/// The displacement that puts most of the cluster's returns on returns of the second sweep; what was
-/// occupied before counts half. The first of those as good.
+/// The displacement that puts most of the cluster's returns on returns of the second sweep; what
+/// was occupied before counts half. The first of those as good.
 pub fn search(cluster: &Cluster) -> [f32; 2] {
     let scans = &cluster.scans;
     let target = &scans.targets[0];

@@ -13,8 +13,8 @@ impl Segments {
         Segments(Groups::new())
     }
 
-    /// Finds the segments of those columns of the first sweep that may be `part` of any. `flow` tells
-    /// the match of a column, if there is one.
+    /// Finds the segments of those columns of the first sweep that may be `part` of any. `flow`
+    /// tells the match of a column, if there is one.
     pub(super) fn find(
         &mut self,
         scans: &Scans,

@@ -1,18 +1,19 @@
 //! Which way the surface faces that a return lies on, from the returns around it.
 //!
 //! Their covariance, and their noise, are that of generalised ICP (Segal, Haehnel and Thrun,
-//! "Generalized-ICP", RSS 2009), of one cloud alone: a return counts across its surface, little along
-//! it, so that rings of returns on a bonnet, which move with the sensor, do not hold a car.
+//! "Generalized-ICP", RSS 2009), of one cloud alone: a return counts across its surface, little
+//! along it, so that rings of returns on a bonnet, which move with the sensor, do not hold a car.
 
-use super::places::Sums;
+use super::places::Moments;
 use super::sample::SurfaceWeight;
 use super::scaled::Scaled;
 use core::sync::atomic::AtomicU32;
 use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use nalgebra::Matrix3;
 
-/// Bits of a weight, all zero until it is asked for: few of them are. Threads that ask at the same
-/// time find the same.
+/// Bits of a weight, all zero until it is asked for. Threads that ask at the same time find the
+/// same. Few are asked for: finding all at once took 9 % more processor time a sweep (KITTI drive
+/// 0005, 60 sweeps, scalar, `user` of `time`: 4.11 s against 3.77 s).
 pub struct LazyWeight([AtomicU32; 6]);
 
 impl LazyWeight {
@@ -38,7 +39,7 @@ impl LazyWeight {
 }
 
 /// The weight of a return from the sums over the returns within a radius around it.
-pub fn weight(scaled: &Scaled, sums_within: impl Fn(f32) -> Sums) -> SurfaceWeight {
+pub fn weight(scaled: &Scaled, sums_within: impl Fn(f32) -> Moments) -> SurfaceWeight {
     let mut spread = covariance(sums_within(scaled.surface_radius));
     // A line, as of one ring, would hold a cluster across the surface and along it.
     if across(&spread) < scaled.surface_line {
@@ -52,7 +53,7 @@ pub fn weight(scaled: &Scaled, sums_within: impl Fn(f32) -> Sums) -> SurfaceWeig
 }
 
 /// Covariance of places, voxels².
-fn covariance([n, x, y, z, square @ ..]: Sums) -> Matrix3<f32> {
+fn covariance([n, x, y, z, square @ ..]: Moments) -> Matrix3<f32> {
     let [x, y, z] = [x, y, z].map(|m| m / n);
     let products = [x * x, x * y, x * z, y * y, y * z, z * z];
     let [xx, xy, xz, yy, yz, zz] = core::array::from_fn(|k| square[k] / n - products[k]);

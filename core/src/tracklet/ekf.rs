@@ -1,11 +1,11 @@
-//! The filter of a flow tracklet (section 3.6.1): an extended Kalman filter with a model of constant
-//! turn rate and velocity (CTRV).
+//! The filter of a flow tracklet (section 3.6.1): an extended Kalman filter with a model of
+//! constant turn rate and velocity (CTRV).
 //!
 //! State (3.15): position, heading, speed, turn rate. Positions are metres from the point the
-//! tracklet follows, so that they keep their precision wherever the vehicle drives. The innovations,
-//! normalised and squared (NIS; Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to
-//! Tracking and Navigation", 2001, section 5.4), scale all noise together, which leaves the gains as
-//! they are.
+//! tracklet follows, so that they keep their precision wherever the vehicle drives. The
+//! innovations, normalised and squared (NIS; Bar-Shalom, Li and Kirubarajan, "Estimation with
+//! Applications to Tracking and Navigation", 2001, section 5.4), scale all noise together, which
+//! leaves the gains as they are.
 
 use crate::ctrv::TwoPointStart;
 use crate::params::{Birth, TrackletParams};
@@ -30,7 +30,8 @@ impl Ekf {
     /// A tracklet born from the displacement `moved` (m) of its first match over `dt` seconds,
     /// relative to where it moved to; `noise` is the covariance of a measured position, m².
     ///
-    /// At the target: as [`TwoPointStart`] has it. At the source: the author's start, one step late.
+    /// At the target: as [`TwoPointStart`] has it. At the source: the author's start, one step
+    /// late.
     pub fn birth(params: &TrackletParams, noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> Ekf {
         let TwoPointStart { heading, speed, covariance } = TwoPointStart::of(noise, moved, dt);
         let mut mean = Vector5::new(0.0, 0.0, heading, speed, 0.0);
@@ -54,9 +55,10 @@ impl Ekf {
         self.mean[3] == 0.0
     }
 
-    /// A tracklet at rest after its first displacement, `elapsed` seconds after the match before its
-    /// birth: born again from that displacement over that time, or nothing if it lies beyond the
-    /// gate, which is isotropic here. The filter alone would learn motion along its x axis only.
+    /// A tracklet at rest after its first displacement, `elapsed` seconds after the match before
+    /// its birth: born again from that displacement over that time, or nothing if it lies beyond
+    /// the gate, which is isotropic here. The filter alone would learn motion along its x axis
+    /// only.
     pub fn depart(
         &self,
         params: &TrackletParams,
@@ -89,8 +91,8 @@ impl Ekf {
         self.covariance[(4, 4)] += of_turn * of_turn;
     }
 
-    /// Resets the position to zero, measured with errors of covariance `noise` that are independent of
-    /// the velocity's.
+    /// Resets the position to zero, measured with errors of covariance `noise` that are independent
+    /// of the velocity's.
     pub fn measure_place(&mut self, noise: Matrix2<f32>) {
         let mut keep = Matrix5::identity();
         keep.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
@@ -150,7 +152,8 @@ impl Ekf {
         self.mean[2] = wrap(self.mean[2]);
     }
 
-    /// Expresses the state in axes turned by `angle`, rad (a vehicle frame that turned, section 3.7).
+    /// Expresses the state in axes turned by `angle`, rad (a vehicle frame that turned, section
+    /// 3.7).
     pub fn turn_axes(&mut self, angle: f32) {
         let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
         let (x, y) = (self.mean[0], self.mean[1]);

@@ -1,10 +1,10 @@
 //! Flow tracklets (section 3.6.2): an EKF for every column that the flow observes.
 //!
-//! A tracklet follows a point of an object from cell to cell: the middle of the column it was born in,
-//! moved by every displacement since. Positions are relative to that point, so f32 suffices wherever
-//! one drives. One step: a tracklet whose cell was observed is predicted, gated, updated and moved on;
-//! one whose cell was not takes over the nearest observed column beside it that no other has; an
-//! observed column without a tracklet gives birth to one; the rest coast for
+//! A tracklet follows a point of an object from cell to cell: the middle of the column it was born
+//! in, moved by every displacement since. Positions are relative to that point, so f32 suffices
+//! wherever one drives. One step: a tracklet whose cell was observed is predicted, gated, updated
+//! and moved on; one whose cell was not takes over the nearest observed column beside it that no
+//! other has; an observed column without a tracklet gives birth to one; the rest coast for
 //! [`crate::params::TrackletParams::coast_sweeps`], then end. Of two tracklets that come to lie in
 //! one cell the older stays.
 
@@ -77,8 +77,8 @@ pub(crate) fn observe(
     let noise = position_noise(params, covariance);
     let refined = profile.refinement_sweeps > 0;
     if refined {
-        // Registrations err independently of each other: the next displacement does not make good the
-        // error of this one, as it does in whole cells.
+        // Registrations err independently of each other: the next displacement does not make good
+        // the error of this one, as it does in whole cells.
         t.ekf.measure_place(noise);
     }
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
@@ -145,9 +145,9 @@ impl Tracklets {
         self.now.clear();
     }
 
-    /// One step over `dt` seconds, after [`Tracklets::place`], with the observed columns, ascending;
-    /// `left` is what that returned, `turned` by how much the grid's axes turned since the sweep
-    /// before, rad.
+    /// One step over `dt` seconds, after [`Tracklets::place`], with the observed columns,
+    /// ascending; `left` is what that returned, `turned` by how much the grid's axes turned since
+    /// the sweep before, rad.
     pub(crate) fn update(
         &mut self,
         profile: &Profile,
@@ -222,8 +222,8 @@ impl Tracklets {
         }
     }
 
-    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Returns its slot,
-    /// or that of the older one there.
+    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Returns its
+    /// slot, or that of the older one there.
     fn put(
         &mut self,
         step: &Step,

@@ -3,7 +3,7 @@
 use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
-use raywake_core::continuity::Limits;
+use raywake_core::continuity::ContinuityLimits;
 use raywake_core::grid::shift::shift;
 use raywake_core::params::REACH;
 use raywake_core::prepare::Window;
@@ -57,7 +57,10 @@ pub fn pair(
     drive.read(index + 1, second)?;
     let (a, b) = (&first.data, &second.data);
     let dt_s = b.stamp_s - a.stamp_s;
-    if Limits::DEFAULT.broken(&a.world_from_vehicle, &b.world_from_vehicle, dt_s).is_some() {
+    if ContinuityLimits::DEFAULT
+        .broken(&a.world_from_vehicle, &b.world_from_vehicle, dt_s)
+        .is_some()
+    {
         return Ok(None);
     }
     let then = grid.sweep(drive.rig(), &a.sweep());

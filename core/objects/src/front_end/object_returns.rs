@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, BatchReturn};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
-use raywake_core::ground::Ground;
+use raywake_core::ground::GroundGrid;
 use raywake_core::params::{COLUMNS_MAX, GroundParams, POINTS_MAX};
 
 /// Ground in cells of five columns.
@@ -55,7 +55,7 @@ impl HeightVariance {
 }
 
 pub(super) struct ObjectReturns {
-    ground: Ground,
+    ground: GroundGrid,
     /// Of the ground above the batch's corner, m; infinite where unknown.
     height: [f32; COLUMNS_MAX],
     variance: [HeightVariance; COLUMNS_MAX],
@@ -65,7 +65,7 @@ pub(super) struct ObjectReturns {
 impl ObjectReturns {
     pub const fn new() -> ObjectReturns {
         ObjectReturns {
-            ground: Ground::new(),
+            ground: GroundGrid::new(),
             height: [0.0; COLUMNS_MAX],
             variance: [HeightVariance::NONE; COLUMNS_MAX],
             is_object: [false; POINTS_MAX],

@@ -63,7 +63,7 @@ impl Returns {
     fn fill(&self, cloud: &mut Cloud) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) = (vec![false; self.points.len()], Box::new(Scratch::new()));
         let Returns { points, placed, columns } = self;
-        let returns = super::cloud::Returns { points, placed, columns };
+        let returns = super::cloud::SweepReturns { points, placed, columns };
         (cloud.fill(&profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
     }
 

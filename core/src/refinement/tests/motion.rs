@@ -3,8 +3,8 @@
 use super::super::hypothesis::Hypothesis;
 use super::*;
 
-/// What is found of a car that moves steadily, over some sweeps: columns of it that move, the median
-/// and the largest error of their motion, voxels.
+/// What is found of a car that moves steadily, over some sweeps: columns of it that move, the
+/// median and the largest error of their motion, voxels.
 fn error_of_steady(sweeps: u32, by: [f32; 2], turn: f32, seed: u64) -> (usize, f32, f32) {
     let mut random = Random(seed);
     let start = [0; 2].map(|_| random.between(27.0, 36.0));

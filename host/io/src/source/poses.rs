@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use raywake_core::continuity::Limits;
+use raywake_core::continuity::ContinuityLimits;
 use raywake_core::pose::{Pose, PoseError, Twist};
 
 use super::text;
@@ -30,7 +30,7 @@ impl PoseTrack {
     pub fn twist(&self, i: usize) -> Twist {
         let steady = |a: usize, b: usize| {
             let dt_s = self.stamps_s[b] - self.stamps_s[a];
-            Limits::DEFAULT.broken(&self.poses[a], &self.poses[b], dt_s).is_none()
+            ContinuityLimits::DEFAULT.broken(&self.poses[a], &self.poses[b], dt_s).is_none()
         };
         let other = match i {
             _ if i > 0 && steady(i - 1, i) => i - 1,
