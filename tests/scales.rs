@@ -135,8 +135,8 @@ fn motion_is_the_same_at_any_scale() {
             let of_object = |e: &Vec<f64>| median(e.iter().copied());
             let errors: Vec<f64> = found.errors.values().map(of_object).collect();
             println!(
-                "{voxel_m:.2} m, {rate:2} Hz: {errors:.3?} m/s off, {recall:.3} of {} columns move, \
-                 {false_motion:.4} of {} that stand",
+                "{voxel_m:.2} m, {rate:2} Hz: {errors:.3?} m/s off, {recall:.3} of {} columns \
+                 move, {false_motion:.4} of {} that stand",
                 found.moving[1], found.standing[1]
             );
             assert!(errors.len() == MOVING && errors.iter().all(|e| *e <= ERROR_MAX_MPS));

@@ -202,7 +202,8 @@ mod tests {
     fn every_key() {
         let text = "base = \"wide\"\nname = \"mine\"\nside = 101\nlevels = 12\nvoxel_m = 0.4\n\
             range_m = 80\nframe = \"sensor\"\ndeskew = false\nem_rounds = 5\nsmoothing = 7\n\
-            displacement_cost = 8\noutside_cost = 9\nrefinement_sweeps = 0\ngap_s = 0.25\njump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
+            displacement_cost = 8\noutside_cost = 9\nrefinement_sweeps = 0\ngap_s = 0.25\n\
+            jump_mps = 33.0\nspin_radps = 2.0\n[tracklet]\n\
             measurement_cells = 0.75\nspeed_noise_mps2 = 2.0\nturn_noise_radps2 = 3.0\n\
             turn_birth_radps = 4.0\ngate_d2 = 5.0\ninnovation_sweeps = 12\nbirth = \"source\"\n\
             takes_over = false\ncoast_sweeps = 6\npose_noise_m = 0.25\n";

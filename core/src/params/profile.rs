@@ -43,8 +43,8 @@ crate::params! {
             "The author's program; the shipped weights are for 14.";
         /// Edge of a voxel.
         pub voxel_m: f64 = 0.30, "m", (0.05 to 2.0),
-            "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: 3.3 \
-             cm mean error of what moves against 4.0 cm (`raywake-lab ablate`).";
+            "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: \
+             3.3 cm mean error of what moves against 4.0 cm (`raywake-lab ablate`).";
         /// Greatest range of a return, counted in voxels along the ray's longest axis as the update
         /// list of B.2.1 does; at most 2,000 voxels.
         pub range_m: f64 = 100.0, "m", (above 0), "Dissertation, table B.1 (m_r).";

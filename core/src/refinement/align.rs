@@ -7,10 +7,10 @@
 //! sweep back, so that neither an end that comes into view nor one that leaves it pulls.
 
 use super::cluster::{CloudPoints, Cluster, VisitedColumns};
-use super::motion::Motion;
+use super::motion::{Motion, TARGETS_MAX};
 use super::sample::{Mean, SurfaceWeight, minus, squared_distance};
 use super::scaled::Scaled;
-use super::scans::{TARGETS_MAX, Target};
+use super::scans::Target;
 use nalgebra::{Matrix3, Vector3};
 
 /// Normal equations of a step: x, y and the turn about the centre.

@@ -48,9 +48,10 @@ use crate::sweep::Point;
 use crate::team::Team;
 use cloud::{Cloud, Scratch, SweepReturns};
 use clusters::Clusters;
+use motion::TARGETS_MAX;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
-use scans::{Scans, TARGETS_MAX, Target};
+use scans::{Scans, Target};
 
 /// State of the refinement between sweeps.
 pub struct Refinement {

@@ -1,7 +1,10 @@
 //! Rigid motion of a cluster.
 
-use super::scans::TARGETS_MAX;
+use crate::params::REFINEMENT_SWEEPS_MAX;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
+
+/// Sweeps that a cluster is registered with, at most.
+pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX - 1;
 
 /// Rigid motion in the plane over one pair of sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -4,11 +4,8 @@ use super::cloud::Cloud;
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
-use crate::params::{LEVELS_MAX, REFINEMENT_SWEEPS_MAX};
+use crate::params::LEVELS_MAX;
 use crate::record::Column;
-
-/// Sweeps that a cluster is registered with, at most.
-pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX - 1;
 
 /// A sweep that clusters are registered with: where its window lies seen from the first sweep's,
 /// and how much of the motion over the pair has happened from stamp to stamp.
