@@ -1,12 +1,16 @@
 //! WGSL to SPIR-V at build time: prelude, naga, checks, and a table of what each kernel binds.
 //! A kernel that breaks a limit of `build/limits.rs` does not build.
 
+#[path = "build/arithmetic.rs"]
+mod arithmetic;
 #[path = "build/limits.rs"]
 mod limits;
 #[path = "build/prelude.rs"]
 mod prelude;
 #[path = "build/reflect.rs"]
 mod reflect;
+#[path = "build/stages.rs"]
+mod stages;
 
 use naga::back::spv;
 use std::fmt::Write;
@@ -22,15 +26,25 @@ fn main() {
     let mode = std::env::var("RAYWAKE_KERNELS").unwrap_or_default();
     let shared = read(&root.join("wgsl/shared.wgsl"));
     let prelude = prelude::prelude() + &shared;
+    let declared = stages::entries();
     let mut files = Vec::new();
     collect(&root.join("wgsl"), &mut files);
     files.sort();
-    let mut table = String::new();
+    let (mut table, mut built) = (String::new(), 0);
     for file in files.iter().filter(|f| !f.ends_with("shared.wgsl")) {
         let source = read(file);
         limits::check_loops(file, &source);
-        compile(&mut table, file, &format!("{prelude}{source}"), &mode);
+        let entries = stages::of_source(&declared, &source);
+        built += entries.len();
+        for index in 0..entries.len() {
+            let arguments = stages::of_file(&entries, index);
+            let text = format!("{prelude}{}{source}", prelude::bindings(&arguments));
+            compile(&mut table, file, &text, &entries[index], &arguments, &mode);
+        }
     }
+    assert_eq!(built, declared.len(), "every stage has its kernels below wgsl/");
+    let names: String = declared.iter().map(|e| format!("&{}, ", e.name.to_uppercase())).collect();
+    let _ = writeln!(table, "/// All kernels.\npub static KERNELS: &[&Kernel] = &[{names}];");
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo"));
     std::fs::write(out.join("kernels.rs"), table).expect("the output folder is writable");
 }
@@ -50,8 +64,15 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// Compiles every entry point of a file and appends a static per entry point to `table`.
-fn compile(table: &mut String, file: &Path, source: &str, mode: &str) {
+/// Compiles an entry point and appends a static for it to `table`.
+fn compile(
+    table: &mut String,
+    file: &Path,
+    source: &str,
+    declared: &stages::Entry,
+    arguments: &[raywake_core::stages::Argument],
+    mode: &str,
+) {
     let fail = |what: String| -> ! { panic!("{}: {what}", file.display()) };
     let module =
         naga::front::wgsl::parse_str(source).unwrap_or_else(|e| fail(e.emit_to_string(source)));
@@ -59,12 +80,26 @@ fn compile(table: &mut String, file: &Path, source: &str, mode: &str) {
     let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
         .validate(&module)
         .unwrap_or_else(|e| fail(e.emit_to_string(source)));
-    for (index, entry) in module.entry_points.iter().enumerate() {
-        let bindings = reflect::bindings(&module, info.get_entry_point(index));
-        limits::check_entry(file, &module, entry, &bindings);
-        let words = spirv(&module, &info, &entry.name, mode).unwrap_or_else(|e| fail(e));
-        write_static(table, entry, &bindings, &words);
+    let index = module.entry_points.iter().position(|e| e.name == declared.name);
+    let index = index.unwrap_or_else(|| fail(format!("no entry point `{}`", declared.name)));
+    let entry = &module.entry_points[index];
+    let mut bindings = reflect::bindings(&module, info.get_entry_point(index));
+    for (n, (bound, argument)) in bindings.iter().zip(arguments).enumerate() {
+        let used = bound.reads || bound.writes;
+        let name = &bound.name;
+        if used && n >= declared.arguments.len() {
+            fail(format!("`{}` uses `{name}`, which its stage does not have", declared.name));
+        }
+        if let (Some(found), Some(wanted)) = (bound.stride, prelude::stride(argument))
+            && found != wanted
+        {
+            fail(format!("elements of `{name}` take {found} bytes, in core {wanted}"));
+        }
     }
+    bindings.truncate(declared.arguments.len());
+    limits::check_entry(file, &module, entry, &bindings);
+    let words = spirv(&module, &info, &entry.name, mode).unwrap_or_else(|e| fail(e));
+    write_static(table, entry, &bindings, &words);
 }
 
 fn spirv(

@@ -5,10 +5,10 @@
 use raywake::backend::Backend;
 use raywake::backend::device::Device;
 use raywake::error::RunError;
-use raywake_core::layout::BUFFERS;
 use raywake_core::params::Profile;
+use raywake_core::stages::FLOW_PROGRAMS;
 use raywake_gpu::{Buffer, DeviceKind, Executor, GpuError, Heap, Options, devices};
-use raywake_kernels::schedule;
+use raywake_kernels::schedule::Schedule;
 use raywake_tests::drives::{Setup, street, sweep};
 use raywake_tests::vulkan;
 use std::time::{Duration, Instant};
@@ -37,7 +37,8 @@ fn buffers_that_do_not_fit() {
     }
     let exabyte = 1 << 60;
     for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
-        let mut table = schedule::buffers(BUFFERS, &Profile::hdl64());
+        let profile = Profile::hdl64();
+        let mut table = Schedule::new(FLOW_PROGRAMS, &profile).buffers(&profile);
         table.push(Buffer { name: "too much", heap, bytes: exabyte });
         let Err(error) = Executor::new(&Options::default(), &table, &[]) else {
             panic!("{heap:?}: an exabyte");

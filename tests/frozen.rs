@@ -11,9 +11,9 @@ use raywake::error::RunError;
 use raywake::team::{self, Team};
 use raywake::track::{Ended, Tracker};
 use raywake_alloc_guard::{Allocation, Guard, Sealed};
-use raywake_core::background_filter;
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
 use raywake_core::team::Team as _;
 use raywake_gpu::{Census, Options};
 use raywake_io::source::SweepData;
@@ -90,7 +90,7 @@ fn check(setup: &Setup, backend: Backend) -> u64 {
     for (now, earlier) in pairs(sweeps) {
         let points = earlier.map_or(&[][..], |e| &e.points);
         let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
-        if let Some(flows) = stepped.flows {
+        if let Some(flows) = stepped.output.flows {
             columns += flows.valid;
             flows.columns.iter().for_each(|c| digest.column(c));
         }

@@ -63,7 +63,7 @@ fn every_kernel_lies_where_its_twin_does() {
     let mut alone = BTreeSet::new();
     for file in files(&folder, ".wgsl") {
         let path = file.strip_prefix(&folder).expect("below").with_extension("rs");
-        if !root().join("core/src").join(&path).is_file() {
+        if !root().join("core/src/stages").join(&path).is_file() {
             alone.insert(path.with_extension("wgsl").display().to_string());
         }
     }

@@ -4,9 +4,9 @@
 
 use glam::{DVec2, DVec3};
 use raywake::order_statistics::median;
-use raywake_core::background_filter;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
 use raywake_sim::{Class, Drive, ObjectState, Options, Path, Scene, State, models};
 use raywake_tests::drives::{Setup, sweep};
 use std::collections::BTreeMap;
@@ -61,7 +61,7 @@ fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
     for index in 0..drive.sweeps() {
         let now = drive.sweep(index);
         let stepped = pipeline.step(&sweep(&now), &before).unwrap_or_else(|e| panic!("{e}"));
-        each(stepped.flows.map_or(&[][..], |flows| flows.columns), &objects);
+        each(stepped.output.flows.map_or(&[][..], |flows| flows.columns), &objects);
         objects = drive.objects(now.stamp_s);
         before = now.points;
     }

@@ -31,7 +31,7 @@ fn run(setup: &Setup, backend: raywake::backend::Backend, source: &mut dyn Sourc
     for index in 0..source.len().min(20) {
         source.read(index, &mut now).unwrap_or_else(|e| panic!("{e}"));
         let stepped = drive.step(&now.sweep(), &before.points).unwrap_or_else(|e| panic!("{e}"));
-        if let Some(flows) = stepped.flows {
+        if let Some(flows) = stepped.output.flows {
             flows.columns.iter().for_each(|c| digest.column(c));
             run.valid.push(flows.valid);
             run.points += flows.points.len();

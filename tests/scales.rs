@@ -5,9 +5,9 @@
 
 use glam::{DVec2, DVec3};
 use raywake::order_statistics::median;
-use raywake_core::background_filter;
 use raywake_core::output::ColumnFlow;
 use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
 use raywake_core::sweep::{Sweep, Timing};
 use raywake_sim::{Drive, ObjectState, Options, Path, Scene, SimSweep, State, models};
 use raywake_tests::drives::Setup;
@@ -111,7 +111,7 @@ fn run(profile: Profile, rate: f64, (drive, sweeps): &(Drive, Vec<SimSweep>)) ->
             twist,
         };
         let stepped = pipeline.step(&sweep, &before).unwrap_or_else(|e| panic!("{e}"));
-        let columns = stepped.flows.map_or(&[][..], |flows| flows.columns);
+        let columns = stepped.output.flows.map_or(&[][..], |flows| flows.columns);
         for c in columns.iter().filter(|_| sweep.stamp_s > SETTLED_S) {
             if let Some(object) = objects.iter().find(|o| inside(c, o)) {
                 found.add(c, object, object.velocity_world.truncate() * faster);

@@ -4,11 +4,10 @@
 
 use raywake::backend::Backend;
 use raywake_core::params::Profile;
-use raywake_gpu::{Kernel, Op, Validation};
-use raywake_kernels::schedule;
+use raywake_gpu::Validation;
+use raywake_kernels::kernel::KERNELS;
 use raywake_tests::drives::{Setup, pairs, street, sweep};
 use raywake_tests::{vulkan, weights};
-use std::collections::BTreeMap;
 use std::process::Command;
 
 /// The pipeline over the street.
@@ -22,7 +21,7 @@ fn check(profile: Profile, validation: Validation) {
     for (now, before) in pairs(street()).chain(pairs(street())) {
         let points = before.map_or(&[][..], |b| &b.points);
         let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
-        valid += stepped.flows.map_or(0, |flows| flows.valid);
+        valid += stepped.output.flows.map_or(0, |flows| flows.valid);
     }
     assert!(valid > 100, "{valid} flows");
     let Backend::Device(device) = drive.backend() else { unreachable!("made above") };
@@ -44,19 +43,6 @@ fn no_access_out_of_bounds_is_found_in_the_largest_window() {
     check(Profile { side: 255, ..Profile::wide() }, Validation::GpuAssisted);
 }
 
-/// Every kernel of every schedule, by name.
-fn kernels() -> BTreeMap<&'static str, &'static Kernel> {
-    let flow = [schedule::load(), schedule::flow(&Profile::hdl64())];
-    let map = [schedule::map_rays(), schedule::map_count(), schedule::map_band()];
-    let programs = flow.into_iter().chain(map);
-    let ops = programs.flat_map(|p| p.ops);
-    ops.filter_map(|op| match op {
-        Op::Dispatch { kernel, .. } => Some((kernel.name, kernel)),
-        _ => None,
-    })
-    .collect()
-}
-
 /// What newer versions say of strides that naga puts on arrays in workgroup memory: harmless.
 const KNOWN: &str = "VUID-StandaloneSpirv-None-10684";
 
@@ -68,7 +54,8 @@ fn kernels_are_valid() {
     }
     let folder = std::env::temp_dir().join(format!("raywake-spirv-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
-    for (name, kernel) in kernels() {
+    for kernel in KERNELS {
+        let name = kernel.name;
         let path = folder.join(name);
         std::fs::write(&path, bytemuck::cast_slice(kernel.spirv)).expect("a temporary file");
         let arguments = ["--target-env", "vulkan1.1"];

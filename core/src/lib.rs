@@ -4,34 +4,30 @@
 //! Temporal scene flow from LIDAR (Ushani 2018, chapter 3 and appendix B) as scalar functions over
 //! caller-owned storage: no allocation, no operating system, no unsafe code.
 
-pub mod background_filter;
-pub mod compact;
 pub mod continuity;
 pub mod counters;
 pub mod ctrv;
 pub mod digest;
 pub mod dropped;
-pub mod flow;
-pub mod grid;
+pub mod frame;
 pub mod ground;
 pub mod groups;
-pub mod layout;
 pub mod map;
 pub mod motion_compensation;
-pub mod occupancy_constancy;
 pub mod output;
 pub mod params;
+pub mod perceive;
 pub mod pipeline;
 pub mod pose;
-pub mod prefix_sum;
 pub mod prepare;
 #[cfg(test)]
 mod random;
 pub mod record;
 pub mod refinement;
 pub mod return_clock;
+pub mod stages;
 pub mod sweep;
 pub mod team;
 pub mod tracklet;
+mod velocities;
 pub mod weights;
-pub mod window;

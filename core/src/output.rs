@@ -4,6 +4,53 @@
 //! tracklets. World frame: the frame of the poses. "World velocity" is over ground; "ego velocity"
 //! is relative to the moving vehicle, along the vehicle's axes (section 3.7).
 
+use crate::continuity::Reset;
+use crate::dropped::DroppedReturns;
+use crate::tracklet::TrackletTurnover;
+
+/// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
+#[derive(Clone, Copy, Debug)]
+pub struct Flows<'a> {
+    /// Solid columns of the first sweep.
+    pub columns: &'a [ColumnFlow],
+    /// Points of the first sweep, in the source's order.
+    pub points: &'a [PointFlow],
+    /// Time between the sweeps, s.
+    pub dt_s: f64,
+    /// What happened to tracklets.
+    pub turnover: TrackletTurnover,
+    /// Matched columns.
+    pub valid: usize,
+    /// Solid columns beyond the capacity for foreground, which count as background, and those beyond
+    /// as many that moved, which count as unmatched.
+    pub foreground_dropped: usize,
+}
+
+/// What one sweep yields. Borrowed from the caller's [`Output`].
+#[derive(Clone, Copy, Debug)]
+pub struct Stepped<'a> {
+    /// Flow of the pair that this sweep completes; none after a reset.
+    pub flows: Option<Flows<'a>>,
+    /// Returns left out.
+    pub dropped: DroppedReturns,
+    /// Set where this sweep has no usable predecessor.
+    pub reset: Option<Reset>,
+    /// Returns beyond the capacity of the refinement: it does not see them.
+    pub unrefined: usize,
+    /// Foreground columns.
+    pub foreground: usize,
+    /// Distinct rays.
+    pub rays: usize,
+}
+
+/// Room for what a step puts out, the caller's.
+pub struct Output<'a> {
+    /// [`crate::params::COLUMNS_MAX`] elements, or as many as the profile has columns.
+    pub columns: &'a mut [ColumnFlow],
+    /// [`crate::params::POINTS_MAX`] elements.
+    pub points: &'a mut [PointFlow],
+}
+
 /// What is known of a column's flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]

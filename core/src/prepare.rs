@@ -1,80 +1,42 @@
 //! Sweep preparation: returns to rays in the grid's frame (B.2.2), time and motion included.
 
 use crate::dropped::DroppedReturns;
-use crate::params::{
-    ANCHOR_ABOVE_GROUND_M, EXTENT_VOXELS, Frame, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS,
-};
+use crate::frame::{Arrival, Window, central};
+use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS};
 use crate::pose::Pose;
-use crate::record::{NONE, Ray, Step, ray};
+use crate::record::{NONE, Ray, SweepUniform, ray};
+use crate::refinement::Refinement;
 use crate::return_clock::{ReturnClock, slot_of};
+use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
 use crate::team::Team;
-use glam::DVec3;
-
-/// Where the window lies in one sweep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
-    /// From vehicle coordinates to metres from the centre of the window's central voxel: what is
-    /// rounded to voxels is the same whatever the window's size.
-    pub grid_from_vehicle: Pose,
-    /// Lattice index of the window's first voxel.
-    pub corner: [i32; 3],
-    /// World position of the centre of lattice cell (0, 0, 0), m (`Frame::Sensor`: the vehicle's).
-    pub lattice_origin: DVec3,
-}
-
-/// The central voxel of a window; its level lies [`ANCHOR_ABOVE_GROUND_M`] above the ground.
-pub fn central(profile: &Profile) -> [i32; 3] {
-    let half = profile.side as i32 / 2;
-    [half, half, profile.levels as i32 / 2]
-}
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// Places the window. `lattice_origin` is that of the drive, or `None` on its first sweep: the
-/// lattice then has a cell centre at the anchor, the point of the vehicle's axis
-/// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
-pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
-    let below = central(profile);
-    let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
-    let r = profile.voxel_m;
-    let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
-    match profile.frame {
-        Frame::Sensor => Window {
-            grid_from_vehicle: Pose { translation: -anchor, ..Pose::IDENTITY },
-            corner: below.map(|b| -b),
-            lattice_origin: pose.translation,
-        },
-        Frame::Lattice => {
-            let at = pose.transform(anchor);
-            let origin = lattice_origin.unwrap_or(at);
-            // A pose a world away saturates; its sweep is no continuation of any other.
-            let cell = ((at - origin) / r)
-                .to_array()
-                .map(|c| libm::floor(c + 0.5).clamp(-1e9, 1e9) as i32);
-            let corner = [cell[0] - below[0], cell[1] - below[1], cell[2] - below[2]];
-            Window {
-                grid_from_vehicle: Pose {
-                    rotation: pose.rotation,
-                    translation: pose.translation - origin - metres(cell),
-                },
-                corner,
-                lattice_origin: origin,
-            }
-        }
-    }
+/// What stays the same from sweep to sweep.
+pub struct Setup {
+    /// Must pass [`Profile::check`].
+    pub profile: Profile,
+    /// Where the sensors sit.
+    pub rig: Rig,
+    /// Range of the constancy classifier's scores.
+    pub scores: Scores,
+    /// Every solid column is foreground.
+    pub unfiltered: bool,
+    /// Turns sweeps into rays.
+    pub preparation: Preparation,
 }
 
 /// What tracing `rays` rays through a profile's window needs to know.
-pub fn step_of(profile: &Profile, rays: usize) -> Step {
-    Step {
+pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
+    SweepUniform {
         side: profile.side as i32,
         levels: profile.levels as i32,
         rays: rays as i32,
         range_steps: profile.range_steps(),
-        ..Step::default()
+        ..SweepUniform::default()
     }
 }
 
@@ -86,6 +48,104 @@ pub struct Placed {
     pub at: [f32; 3],
     /// After the sweep's stamp, s.
     pub offset_s: f32,
+}
+
+/// Where the returns of the last two sweeps are.
+pub(crate) struct Returns {
+    /// Column of every return, of the sweep and of the one before.
+    column: [[u32; POINTS_MAX]; 2],
+    /// Whether a return belongs to none of the clusters that its column is part of.
+    is_apart: [[bool; POINTS_MAX]; 2],
+    placed: [Placed; POINTS_MAX],
+}
+
+/// A sweep as rays.
+pub(crate) struct Sent {
+    pub uniform: SweepUniform,
+    pub dropped: DroppedReturns,
+}
+
+impl Returns {
+    /// Of no sweep.
+    pub const fn new() -> Returns {
+        Returns {
+            column: [[0; POINTS_MAX]; 2],
+            is_apart: [[false; POINTS_MAX]; 2],
+            placed: [const { Placed { at: [0.0; 3], offset_s: 0.0 } }; POINTS_MAX],
+        }
+    }
+
+    /// Turns the sweep that has just come into rays.
+    pub fn send(
+        &mut self,
+        setup: &Setup,
+        team: &impl Team,
+        sweep: &Sweep,
+        arrival: &Arrival,
+        (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
+    ) -> Sent {
+        let Setup { profile, rig, .. } = setup;
+        self.column.swap(0, 1);
+        self.is_apart.swap(0, 1);
+        let (count, dropped) = setup.preparation.prepare(
+            team,
+            profile,
+            rig,
+            &arrival.window,
+            sweep,
+            rays,
+            &mut self.column[0],
+            &mut self.placed,
+            origins,
+        );
+        let [shift_x, shift_y, shift_z] = arrival.shift;
+        let uniform = SweepUniform {
+            shift_x,
+            shift_y,
+            shift_z,
+            unfiltered: setup.unfiltered as i32,
+            smoothing: profile.smoothing as i32,
+            displacement_cost: profile.displacement_cost as i32,
+            outside_cost: profile.outside_cost as i32,
+            score_min: setup.scores.min,
+            ..uniform_of(profile, count)
+        };
+        Sent { uniform, dropped }
+    }
+
+    /// Hands the sweep that was sent to the refinement. Returns how many returns that had no room
+    /// for: it does not see them.
+    pub fn insert(
+        &mut self,
+        refinement: &mut Refinement,
+        profile: &Profile,
+        corner: [i32; 3],
+        sweep: &Sweep,
+    ) -> usize {
+        if profile.refinement_sweeps == 0 {
+            return 0;
+        }
+        let taken = sweep.points.len().min(POINTS_MAX);
+        let side = profile.side as f32;
+        let inside = |v: f32| v >= 0.0 && v < side;
+        let columns = &mut self.column[0][..taken];
+        // Clusters on slopes reach out of the window's levels: their returns belong to its columns
+        // all the same.
+        for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
+            if *column == NONE && inside(*x) && inside(*y) {
+                *column = *x as u32 * profile.side + *y as u32;
+            }
+        }
+        let placed = &self.placed[..taken];
+        let points = &sweep.points[..taken];
+        let apart = &mut self.is_apart[0][..taken];
+        refinement.take(profile, corner, sweep.stamp_s, points, placed, columns, apart)
+    }
+
+    /// Column of the returns of the sweep before from index `from` on, and whether they are apart.
+    pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
+        self.column[1][from..].iter().copied().zip(self.is_apart[1][from..].iter().copied())
+    }
 }
 
 /// Turns sweeps into rays.
@@ -305,9 +365,11 @@ fn place_origins(
 mod tests {
     extern crate std;
     use super::*;
+    use crate::frame::place;
     use crate::pose::Twist;
     use crate::record::{NO_END, ray_end, ray_origin};
     use crate::team::Alone;
+    use glam::DVec3;
     use std::vec;
     use std::vec::Vec;
 

@@ -23,9 +23,38 @@ macro_rules! record {
     };
 }
 
+/// Packed elements, each declared once: the type and the line of `memory-layout.md` about it.
+macro_rules! packed {
+    ($( $(#[doc = $doc:literal])+ $name:ident = $ty:ty; )*) => {
+        $( $(#[doc = $doc])+ pub type $name = $ty; )*
+
+        /// Name, bytes and layout of every packed element.
+        pub const PACKED: &[(&str, usize, &str)] =
+            &[ $( (stringify!($name), size_of::<$ty>(), concat!($($doc),+)) ),* ];
+    };
+}
+
+packed! {
+    /// `[i | j << 16, k | origin << 16 | no_end << 31]`: a ray, with `i, j, k` the signed 16-bit
+    /// voxel of its end counted from the window's corner, `origin` an index of the table of origins,
+    /// and `no_end` set where nothing is hit there.
+    Ray = [u32; 2];
+    /// `[free | occupied << 16, solid]`: a column of voxels, one bit a level (3.4, 3.5, epsilon = 0).
+    Column = [u32; 2];
+    /// `1 << 31 | (du + REACH) << 8 | dv + REACH`: the flow of a column, cells; 0 where there is none.
+    Flow = u32;
+    /// `[flow, energy]`: what a column proposes in a round; flow 0 where no target is feasible.
+    Proposal = [u32; 2];
+    /// `[energy, place]`: the least energy of a column at any displacement, smoothing apart, and its
+    /// place in the column's row of costs.
+    MinCost = [u32; 2];
+    /// `[key, log-odds as i32]`: an update, or a voxel of the sparse map.
+    Update = [u32; 2];
+}
+
 record! {
     /// What the kernels need to know of a sweep besides its rays: sizes, shift and costs.
-    Step {
+    SweepUniform {
         /// Columns of the window along x, and along y.
         side,
         /// Levels of a column.
@@ -57,11 +86,6 @@ record! {
     }
 }
 
-/// A ray: `[i | j << 16, k | origin << 16 | no_end << 31]` with `i, j, k` the signed 16-bit voxel
-/// of its end counted from the window's corner, `origin` an index of the table of origins, and
-/// `no_end` set where nothing is hit there.
-pub type Ray = [u32; 2];
-
 /// Flag of [`Ray`]: free space only.
 pub const NO_END: u32 = 1 << 31;
 
@@ -81,18 +105,11 @@ pub fn ray_origin(r: Ray) -> usize {
     (r[1] >> 16 & 0x7fff) as usize
 }
 
-/// A column of voxels: `[free | occupied << 16, solid]`, one bit a level (3.4, 3.5, epsilon = 0).
-pub type Column = [u32; 2];
-
-/// A column's current flow: [`VALID`] with both components plus [`crate::params::REACH`] in the
-/// low bytes, or 0.
-pub type Flow = u32;
-
 /// Flag of [`Flow`].
 pub const VALID: u32 = 1 << 31;
 
 /// Packs a valid displacement, cells.
-pub fn flow(d: [i32; 2]) -> Flow {
+pub fn pack_flow(d: [i32; 2]) -> Flow {
     let reach = crate::params::REACH;
     VALID | ((d[0] + reach) as u32) << 8 | (d[1] + reach) as u32
 }
@@ -102,13 +119,6 @@ pub fn flow_displacement(f: Flow) -> [i32; 2] {
     let reach = crate::params::REACH;
     [(f >> 8 & 0xff) as i32 - reach, (f & 0xff) as i32 - reach]
 }
-
-/// Proposal of one round of expectation: `[flow, cost]`; flow 0 where no target is feasible.
-pub type Proposal = [u32; 2];
-
-/// The least energy of a column at any displacement, smoothing apart, and its place in the column's
-/// row of costs: `[energy, place]`.
-pub type Least = [u32; 2];
 
 /// No index, no cost yet.
 pub const NONE: u32 = u32::MAX;
@@ -123,7 +133,7 @@ mod tests {
         assert_eq!(ray_end(r), [-5, 4095, -4095]);
         assert_eq!((ray_origin(r), r[1] & NO_END), (511, NO_END));
         for d in [[-15, 15], [0, 0], [7, -3]] {
-            assert_eq!(flow_displacement(flow(d)), d);
+            assert_eq!(flow_displacement(pack_flow(d)), d);
         }
     }
 }

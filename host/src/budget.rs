@@ -4,18 +4,19 @@ mod markdown;
 mod parameters;
 mod traffic;
 
-use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
 use raywake_core::map::Bands;
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::refinement::Refinement;
+use raywake_core::stages::{FLOW_PROGRAMS, MAP_PROGRAMS};
+use raywake_core::stages::{background_filter, occupancy_constancy};
 use raywake_core::sweep::Point;
 use raywake_core::tracklet::Tracklets;
-use raywake_core::{background_filter, occupancy_constancy};
+use raywake_gpu::Heap;
+use raywake_kernels::schedule::Schedule;
 
 use crate::args;
-use crate::backend::Backend;
-use crate::backend::scalar::Scalar;
+use crate::backend::{Backend, Scalar};
 use crate::config;
 use crate::console::{bytes, say};
 use crate::drive::Drive;
@@ -30,7 +31,7 @@ pub use markdown::memory_layout;
 pub use parameters::parameters;
 
 /// Every buffer begins at a multiple of this, bytes; of more where the device asks for it.
-pub const ALIGNMENT: usize = 16;
+pub const ALIGNMENT: u64 = 16;
 
 const HEAPS: [Heap; 3] = [Heap::Upload, Heap::Device, Heap::Readback];
 
@@ -70,15 +71,16 @@ fn is_map(profile: &Profile) -> bool {
     *profile == Profile::map()
 }
 
-/// The buffers of what a profile is for.
-fn table(profile: &Profile) -> &'static [Row] {
-    if is_map(profile) { MAP_BUFFERS } else { BUFFERS }
+/// The buffers and programs of what a profile is for.
+fn schedule(profile: &Profile) -> Schedule {
+    Schedule::new(if is_map(profile) { MAP_PROGRAMS } else { FLOW_PROGRAMS }, profile)
 }
 
 /// Bytes of a heap, padding between buffers included.
 pub fn heap_bytes(heap: Heap, profile: &Profile) -> u64 {
-    let rows = table(profile).iter().filter(|b| b.heap == heap);
-    rows.map(|b| b.bytes(profile).next_multiple_of(ALIGNMENT) as u64).sum()
+    let buffers = schedule(profile).buffers(profile);
+    let of_heap = buffers.iter().filter(|b| b.heap == heap);
+    of_heap.map(|b| b.bytes.next_multiple_of(ALIGNMENT)).sum()
 }
 
 /// Bytes of all heaps.
@@ -127,11 +129,7 @@ fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
         part("learned tables", "Tables", 4 * words),
     ];
     if scalar {
-        parts.push(part(
-            "buffers of the scalar backend",
-            "Scalar",
-            Scalar::bytes(profile) + 4 * words,
-        ));
+        parts.push(part("buffers of the scalar backend", "Scalar", 4 * Scalar::words(profile)));
     }
     parts
 }
@@ -193,12 +191,13 @@ pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raywake_core::stages::{BUFFERS, Row};
 
     #[test]
     fn the_map_alone() {
         let text = memory_layout(&[Profile::map()]);
         assert!(text.contains("\n### Totals\n") && !text.contains("\n## Totals\n"), "{text}");
-        assert!(text.contains("| `updates` |") && !text.contains("| `matching` |"), "{text}");
+        assert!(text.contains("| `updates` |") && !text.contains("| `window_cost` |"), "{text}");
         assert!(device_bytes(&Profile::map()) >= Mapper::bytes(&Profile::map()) as u64);
         let named = |name: &str| {
             let profile = Some(name.to_string());
@@ -217,7 +216,7 @@ mod tests {
         let text = memory_layout(&shipped());
         assert!(text.contains("| hdl64, dissertation | wide |"), "{text}");
         let named = |row: &Row| text.contains(&format!("| `{}` |", row.name));
-        assert!(BUFFERS.iter().chain(MAP_BUFFERS).all(named), "{text}");
+        assert!(BUFFERS.iter().all(named), "{text}");
         assert!(text.contains("\n## Sparse map\n") && text.contains("\n## Records\n"));
     }
 }

@@ -7,7 +7,6 @@ use raywake_gpu::{DeviceInfo, DeviceKind, GpuError, Options, Validation, devices
 use crate::args::{BackendChoice, BackendKind, Validate};
 use crate::backend::Backend;
 use crate::backend::device::Device;
-use crate::backend::scalar::Scalar;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::weight_files::WeightFiles;
@@ -42,7 +41,7 @@ pub fn drive(
     let wanted = wanted(choice)?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
-        None => Backend::Scalar(Box::new(Scalar::new(profile, tables.clone()))),
+        None => Backend::scalar(profile, &tables),
     };
     let drive = Drive::new(profile, rig, &tables, backend);
     Ok(Chosen { drive, filter: tables.provenance, note: wanted.note })

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
+use raywake_core::output::Flows;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
-use raywake_core::pipeline::Flows;
 use raywake_sim::Truth;
 
 use crate::args::{DemoArgs, Learned, PictureFrame};

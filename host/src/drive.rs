@@ -1,10 +1,11 @@
-//! One sweep through figure 3.1: the statements of `raywake_core::pipeline`, the heavy ones on the
-//! chosen backend. Nothing in here allocates.
+//! One sweep through figure 3.1 on the chosen backend. Nothing in here allocates.
 
 use raywake_alloc_guard::Sealed;
-use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
+use raywake_core::output::{self, ColumnFlow, Output, PointFlow, TrackletState};
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::pipeline::{Flows, Output, Pipeline, Prepared};
+use raywake_core::perceive::Machine;
+use raywake_core::pipeline::Pipeline;
+use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Rig, Sweep};
 
 use crate::backend::{Backend, Tables};
@@ -19,39 +20,34 @@ pub struct Drive {
 }
 
 struct Parts {
+    setup: Setup,
     pipeline: Box<Pipeline>,
     backend: Backend,
     columns: Vec<ColumnFlow>,
     points: Vec<PointFlow>,
 }
 
-/// What one sweep yields.
+/// What one sweep yields, and how long it took.
 pub struct Stepped<'a> {
-    /// Sizes, dropped returns, reset.
-    pub prepared: Prepared,
-    /// Flow of the pair that this sweep completes; none after a reset.
-    pub flows: Option<Flows<'a>>,
-    /// Returns beyond the capacity of the refinement: it does not see them.
-    pub unrefined: usize,
-    /// Foreground columns.
-    pub foreground: usize,
-    /// Distinct rays.
-    pub rays: usize,
+    /// What comes out.
+    pub output: output::Stepped<'a>,
     /// Time of every stage.
     pub laps: Laps,
 }
 
 impl Drive {
-    /// Allocates for a checked profile. The pipeline is made on the stack before it moves to the
-    /// heap: call it on a thread with 64 MiB of stack.
+    /// Allocates for a checked profile.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
         let parts = Parts {
-            pipeline: Box::new(Pipeline::new(
-                profile.clone(),
-                rig.clone(),
-                tables.scores,
-                tables.unfiltered,
-            )),
+            setup: Setup {
+                profile: profile.clone(),
+                rig: rig.clone(),
+                scores: tables.scores,
+                unfiltered: tables.unfiltered,
+                preparation: Preparation::new(),
+            },
+            // A constant is written to its place: by way of the stack it would need 30 MiB of it.
+            pipeline: Box::new(const { Pipeline::new() }),
             backend,
             columns: vec![ColumnFlow::default(); profile.columns()],
             points: vec![PointFlow::default(); POINTS_MAX],
@@ -77,26 +73,17 @@ impl Drive {
     /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after which the
     /// next sweep may be given.
     pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, RunError> {
-        self.parts.step(|Parts { pipeline, backend, columns, points }| {
+        self.parts.step(|Parts { setup, pipeline, backend, columns, points }| {
             let mut laps = Laps::start();
-            let (rays, origins) = backend.input();
-            let prepared = pipeline.prepare(&Team, sweep, rays, origins);
-            laps.lap("prepare");
-            let rounds = pipeline.profile().em_rounds;
-            let mut unrefined = 0;
-            let meanwhile = || unrefined = pipeline.take(sweep);
-            let perceived = backend.perceive(&prepared.step, rounds, &mut laps, meanwhile)?;
-            let output = Output { columns, points };
-            let lap = &mut |name| laps.lap(name);
-            let flows = pipeline.follow(&Team, &prepared.step, &perceived, before, output, lap);
-            laps.lap("follow");
-            let (foreground, rays) = (perceived.foreground.len(), perceived.rays);
-            Ok(Stepped { prepared, flows, unrefined, foreground, rays, laps })
+            let machine = Machine { backend, team: &Team, timer: &mut laps };
+            let output =
+                pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
+            Ok(Stepped { output, laps })
         })
     }
 
     /// Tracklets after the last step.
     pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
-        self.parts.pipeline.tracklets()
+        self.parts.pipeline.tracklets(&self.parts.setup.profile)
     }
 }

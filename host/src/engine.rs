@@ -4,9 +4,9 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use raywake_core::output::Flows;
 use raywake_core::output::TrackletState;
 use raywake_core::params::Profile;
-use raywake_core::pipeline::Flows;
 
 use crate::args::BackendChoice;
 use crate::backend::Backend;
@@ -129,8 +129,8 @@ impl Running {
         let stepped = self.drive.step(&now.sweep(), before.map_or(&[], |b| &b.points))?;
         self.statistics.sweep(index, now, &stepped);
         let clock = Instant::now();
-        let dt_s = stepped.flows.map(|f| f.dt_s);
-        if let (Some(flows), Some(before)) = (&stepped.flows, before) {
+        let dt_s = stepped.output.flows.map(|f| f.dt_s);
+        if let (Some(flows), Some(before)) = (&stepped.output.flows, before) {
             self.outputs.pair(before, flows)?;
             let laps = &stepped.laps;
             observe(source, &Pair { index: index - 1, first: before, second: now, flows, laps });

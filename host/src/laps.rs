@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use raywake_core::perceive::Timer;
+
 /// Time since a moment, ms.
 pub fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
@@ -30,15 +32,13 @@ impl Laps {
         }
     }
 
-    /// Books the time since the last lap to `name`.
-    pub fn lap(&mut self, name: &'static str) {
-        let now = Instant::now();
-        self.add(name, (now - self.last).as_secs_f64() * 1e3);
-        self.last = now;
+    /// Names and milliseconds.
+    pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        self.names[..self.count].iter().copied().zip(self.milliseconds)
     }
 
-    /// Books time measured elsewhere; names beyond the capacity share the last entry.
-    pub fn add(&mut self, name: &'static str, milliseconds: f64) {
+    /// Books milliseconds; names beyond the capacity share the last entry.
+    fn add(&mut self, name: &'static str, milliseconds: f64) {
         let known = self.names[..self.count].iter().position(|n| *n == name);
         let at = known.unwrap_or(self.count.min(LAPS_MAX - 1));
         self.names[at] = name;
@@ -46,15 +46,31 @@ impl Laps {
         self.count = self.count.max(at + 1);
     }
 
-    /// Books to `name` what has passed since the last lap beyond `booked` milliseconds.
-    pub fn rest(&mut self, name: &'static str, booked: f64) {
+    /// Milliseconds since this was last asked.
+    fn elapsed(&mut self) -> f64 {
         let now = Instant::now();
-        self.add(name, ((now - self.last).as_secs_f64() * 1e3 - booked).max(0.0));
+        let milliseconds = (now - self.last).as_secs_f64() * 1e3;
         self.last = now;
+        milliseconds
+    }
+}
+
+impl Timer for Laps {
+    fn lap(&mut self, stage: &'static str) {
+        let milliseconds = self.elapsed();
+        self.add(stage, milliseconds);
     }
 
-    /// Names and milliseconds.
-    pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        self.names[..self.count].iter().copied().zip(self.milliseconds)
+    fn measured(
+        &mut self,
+        stages: &mut dyn Iterator<Item = (&'static str, f64)>,
+        rest: &'static str,
+    ) {
+        let mut left = self.elapsed();
+        for (stage, milliseconds) in stages {
+            self.add(stage, milliseconds);
+            left -= milliseconds;
+        }
+        self.add(rest, left.max(0.0));
     }
 }

@@ -13,9 +13,9 @@
 
 use std::path::{Path, PathBuf};
 
+use raywake_core::output::Flows;
 use raywake_core::output::{PointFlow, TrackletState};
 use raywake_core::params::Profile;
-use raywake_core::pipeline::Flows;
 
 use crate::args::{Export, PictureFrame, Results};
 use crate::picture::{Pictures, Scene};

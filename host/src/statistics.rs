@@ -5,8 +5,8 @@ use std::fmt;
 use raywake_core::continuity::Reset;
 use raywake_core::digest::Digest;
 use raywake_core::dropped::DroppedReturns;
+use raywake_core::output::Flows;
 use raywake_core::output::TrackletState;
-use raywake_core::pipeline::Flows;
 use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
 
@@ -144,20 +144,20 @@ pub struct Statistics {
 impl Statistics {
     /// Counts a sweep; its columns go to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
-        self.dropped.returns += stepped.prepared.dropped;
-        self.dropped.unrefined += stepped.unrefined as u64;
+        self.dropped.returns += stepped.output.dropped;
+        self.dropped.unrefined += stepped.output.unrefined as u64;
         self.dropped.null_rows += u64::from(data.dropped.null_rows);
         if self.sweeps > 0 {
             self.dropped.missing_sweeps += data.dropped.sweeps_before;
         }
         self.sweeps += 1;
         self.points += data.points.len() as u64;
-        self.rays += stepped.rays as u64;
-        if let Some(reset) = stepped.prepared.reset {
+        self.rays += stepped.output.rays as u64;
+        if let Some(reset) = stepped.output.reset {
             self.resets.push(ResetAt::new(index, data.frame, reset));
         }
-        if let Some(flows) = &stepped.flows {
-            self.pair(flows, stepped.foreground);
+        if let Some(flows) = &stepped.output.flows {
+            self.pair(flows, stepped.output.foreground);
             self.times(&stepped.laps);
         }
     }

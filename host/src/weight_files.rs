@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use raywake_core::background_filter;
 use raywake_core::digest::Digest;
-use raywake_core::occupancy_constancy;
 use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
+use raywake_core::stages::occupancy_constancy;
 
 use crate::args::Learned;
 use crate::backend::{LearnedPart, Tables, TablesError};

@@ -1,5 +1,6 @@
 //! Limits every kernel keeps, so that it runs on the least of Vulkan devices.
 
+use crate::arithmetic::Constants;
 use crate::reflect::Bound;
 use naga::{AddressSpace, Block, EntryPoint, Module, Statement};
 use std::path::Path;
@@ -18,9 +19,6 @@ pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &
     let fail = |what: String| -> ! { panic!("{}, {}: {what}", file.display(), entry.name) };
     if bindings.len() > BUFFERS_MAX {
         fail(format!("{} storage buffers, {BUFFERS_MAX} allowed", bindings.len()));
-    }
-    if let Some(bare) = bindings.iter().find(|b| !b.is_struct) {
-        fail(format!("`{}` is no struct", bare.name));
     }
     let invocations: u32 = entry.workgroup_size.iter().product();
     if invocations > INVOCATIONS_MAX {
@@ -88,9 +86,11 @@ fn returns(block: &Block) -> bool {
     })
 }
 
-/// Every loop states on its line how often it runs at most, `// <= N`; nested loops multiply, the
-/// loops of a file add up.
+/// Bounds the iterations of all loops of a file: nested loops multiply, the others add up. A loop
+/// whose header counts from constant to constant is computed; any other states on its line,
+/// `// <= N`, an expression of constants that it never exceeds.
 pub fn check_loops(file: &Path, source: &str) {
+    let constants = Constants::of(source);
     let mut open: Vec<u64> = Vec::new();
     let mut total = 0u64;
     for (n, line) in source.lines().enumerate() {
@@ -98,8 +98,9 @@ pub fn check_loops(file: &Path, source: &str) {
         let word = code.trim_start().split([' ', '(', '{']).next().unwrap_or_default();
         let mut factor = 1;
         if ["for", "while", "loop"].contains(&word) {
-            let bound = line.split("// <= ").nth(1).and_then(bound_of);
-            factor = bound.unwrap_or_else(|| {
+            let stated = || line.split("// <= ").nth(1).and_then(|t| constants.value(t));
+            let bound = constants.iterations(code).or_else(stated);
+            factor = bound.and_then(|n| u64::try_from(n).ok()).unwrap_or_else(|| {
                 panic!("{}, line {}: a loop without `// <= N`", file.display(), n + 1)
             });
             total += open.iter().product::<u64>() * factor;
@@ -113,14 +114,4 @@ pub fn check_loops(file: &Path, source: &str) {
         }
     }
     assert!(total <= ITERATIONS_MAX, "{}: {total} loop iterations", file.display());
-}
-
-fn bound_of(text: &str) -> Option<u64> {
-    use raywake_core::params;
-    match text.trim() {
-        "ROW" => Some(params::ROW as u64),
-        "LEVELS_MAX" => Some(params::LEVELS_MAX as u64),
-        "MERGE_PROBES" => Some(params::MERGE_PROBES as u64),
-        number => number.parse().ok(),
-    }
 }

@@ -1,52 +1,60 @@
-//! The constants and records of `raywake-core`, as WGSL.
+//! What stands in front of a kernel: constants, records and bindings as `raywake-core` declares them.
 
-use raywake_core::{background_filter, layout, params, record};
+use raywake_core::record::SweepUniform;
+use raywake_core::stages::{Argument, CONSTANTS, Row, View};
 use std::fmt::Write;
 
-/// Text to put in front of every kernel.
+/// Constants and the uniform record, in front of every kernel.
 pub fn prelude() -> String {
     let mut text = String::new();
-    let unsigned: &[(&str, usize)] = &[
-        ("POINTS_MAX", params::POINTS_MAX),
-        ("LEVELS_MAX", params::LEVELS_MAX),
-        ("FOREGROUND_MAX", params::FOREGROUND_MAX),
-        ("SIDE", params::SIDE),
-        ("LINE", params::LINE),
-        ("ROW", params::ROW),
-        ("ROW_WORDS", params::ROW_WORDS),
-        ("MERGE_SLOTS", params::MERGE_SLOTS),
-        ("MERGE_PROBES", params::MERGE_PROBES as usize),
-        ("WORKGROUP", params::WORKGROUP),
-        ("ROW_WORKGROUP", params::ROW_WORKGROUP),
-        ("TILE", params::TILE),
-        ("RADIX", params::RADIX),
-        ("COST_UNKNOWN", params::COST_UNKNOWN as usize),
-        ("FILTER_TABLE", background_filter::TABLE),
-        ("DISTINCT_COUNT", layout::DISTINCT_COUNT),
-        ("FOREGROUND_COUNT", layout::FOREGROUND_COUNT),
-        ("FOREGROUND_MARKED", layout::FOREGROUND_MARKED),
-        ("GROUPS_DISTINCT", layout::GROUPS_DISTINCT),
-        ("GROUPS_FOREGROUND", layout::GROUPS_FOREGROUND),
-        ("GROUPS_ROWS", layout::GROUPS_ROWS),
-        ("DIGIT_SHIFT", layout::DIGIT_SHIFT),
-        ("NO_END", record::NO_END as usize),
-        ("VALID", record::VALID as usize),
-        ("NONE", record::NONE as usize),
-    ];
-    for (name, value) in unsigned {
-        let _ = writeln!(text, "const {name} = {value}u;");
+    for (name, value, signed) in CONSTANTS {
+        let (kind, suffix) = if *signed { (": i32", "") } else { ("", "u") };
+        let _ = writeln!(text, "const {name}{kind} = {value}{suffix};");
     }
-    let signed: &[(&str, i32)] = &[
-        ("REACH", params::REACH),
-        ("LOG_ODDS_FREE", params::LOG_ODDS_FREE),
-        ("LOG_ODDS_OCCUPIED", params::LOG_ODDS_OCCUPIED),
-        ("LOG_ODDS_SOLID", params::LOG_ODDS_SOLID),
-        ("I32_MAX", i32::MAX),
-    ];
-    for (name, value) in signed {
-        let _ = writeln!(text, "const {name}: i32 = {value};");
-    }
-    let fields: String = record::Step::FIELDS.iter().map(|f| format!("{f}: i32, ")).collect();
-    let _ = writeln!(text, "struct Step {{ {fields}}}");
+    let fields: String = SweepUniform::FIELDS.iter().map(|f| format!("{f}: i32, ")).collect();
+    let _ = writeln!(text, "struct SweepUniform {{ {fields}}}");
     text
+}
+
+/// Bindings of a file: those of one entry point first, numbered, then what others of the file bind.
+/// Arrays are wrapped in structs: a bare array would hide from the validation layer.
+pub fn bindings(arguments: &[Argument]) -> String {
+    let mut text = String::new();
+    for (n, a) in arguments.iter().enumerate() {
+        let (name, access) = (a.name, if a.writes { "read_write" } else { "read" });
+        let row = a.buffer.row();
+        let kind = if is_uniform(row) {
+            row.wgsl.to_string()
+        } else {
+            let _ = writeln!(text, "struct Buffer_{name} {{ d: array<{}> }}", element(a));
+            format!("Buffer_{name}")
+        };
+        let _ = writeln!(text, "@group(0) @binding({n}) var<storage, {access}> {name}: {kind};");
+    }
+    text
+}
+
+fn is_uniform(row: &Row) -> bool {
+    row.wgsl == "SweepUniform"
+}
+
+/// Type of an element as the kernel sees it.
+fn element(a: &Argument) -> String {
+    let own = a.buffer.row().wgsl;
+    let scalar = own.trim_start_matches(|c: char| c != '<').trim_matches(['<', '>']);
+    let scalar = if scalar.is_empty() { own } else { scalar };
+    match a.view {
+        View::Elements => own.to_string(),
+        View::Atomic => format!("atomic<{scalar}>"),
+        View::Words => scalar.to_string(),
+        View::Quads => format!("vec4<{scalar}>"),
+    }
+}
+
+/// Bytes from one element of a buffer to the next that the kernels must come to as well, where they
+/// see its elements: two of 16 bits share a word.
+pub fn stride(a: &Argument) -> Option<u32> {
+    let row = a.buffer.row();
+    let elements = a.view == View::Elements && !is_uniform(row);
+    elements.then_some((row.element_bytes as u32).max(4))
 }

@@ -7,16 +7,15 @@ use naga::{AddressSpace, Module, StorageAccess, TypeInner};
 pub struct Bound {
     /// Name of the variable.
     pub name: String,
-    /// The type is a struct: a bare array would hide from the validation layer.
-    pub is_struct: bool,
+    /// Bytes from one element of its array to the next.
+    pub stride: Option<u32>,
     /// Read.
     pub reads: bool,
     /// Written; atomics are both.
     pub writes: bool,
 }
 
-/// The buffers of the whole module in binding order, with the access of this entry point. An
-/// entry point that leaves some unused still has their bindings, so that one list serves a file.
+/// The buffers of the whole module in binding order, with the access of this entry point.
 pub fn bindings(module: &Module, info: &FunctionInfo) -> Vec<Bound> {
     let mut bound = Vec::new();
     for (handle, global) in module.global_variables.iter() {
@@ -27,17 +26,21 @@ pub fn bindings(module: &Module, info: &FunctionInfo) -> Vec<Bound> {
         let used = info[handle];
         let atomic = access.contains(StorageAccess::STORE) && is_atomic(module, global.ty);
         let writes = used.contains(GlobalUse::WRITE) || atomic && !used.is_empty();
-        let name = global.name.clone().unwrap_or_default();
-        assert_eq!(binding.group, 0, "{name}: only group 0 is bound");
-        let is_struct = matches!(module.types[global.ty].inner, TypeInner::Struct { .. });
         let reads = used.contains(GlobalUse::READ) || atomic && !used.is_empty();
-        bound.push((binding.binding, Bound { name, is_struct, reads, writes }));
+        let name = global.name.clone().unwrap_or_default();
+        let stride = stride(module, global.ty);
+        bound.push((binding.binding, Bound { name, stride, reads, writes }));
     }
     bound.sort_by_key(|(binding, _)| *binding);
-    for (n, (binding, b)) in bound.iter().enumerate() {
-        assert_eq!(*binding as usize, n, "{}: bindings are numbered without gaps", b.name);
-    }
     bound.into_iter().map(|(_, b)| b).collect()
+}
+
+fn stride(module: &Module, ty: naga::Handle<naga::Type>) -> Option<u32> {
+    let TypeInner::Struct { members, .. } = &module.types[ty].inner else { return None };
+    match module.types[members[0].ty].inner {
+        TypeInner::Array { stride, .. } => Some(stride),
+        _ => None,
+    }
 }
 
 fn is_atomic(module: &Module, ty: naga::Handle<naga::Type>) -> bool {

@@ -1,19 +1,12 @@
-// Marks the foreground of the sweep before. Twin: core/src/background_filter.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Table { d: array<i32> }
-@group(0) @binding(1) var<storage, read> filter_table: Table;
-struct Columns { d: array<vec2<u32>> }
-@group(0) @binding(2) var<storage, read> columns_before: Columns;
-struct Words { d: array<u32> }
-@group(0) @binding(3) var<storage, read_write> marks: Words;
+// Marks the foreground of the sweep before. Twin: core/src/stages/background_filter.rs
 
 fn score(column: i32) -> i32 {
-    let side = params.side;
+    let side = sweep.side;
     let i = column / side;
     let j = column % side;
     var sum = filter_table.d[FILTER_TABLE];
-    for (var di = -2; di <= 2; di += 1) { // <= 5
-        for (var dj = -2; dj <= 2; dj += 1) { // <= 5
+    for (var di = -2; di <= 2; di += 1) {
+        for (var dj = -2; dj <= 2; dj += 1) {
             let ni = i + di;
             let nj = j + dj;
             if ni >= 0 && ni < side && nj >= 0 && nj < side {
@@ -44,14 +37,14 @@ fn background_filter(
         atomicStore(&count, 0u);
     }
     workgroupBarrier();
-    for (var n = 0u; n < TILE / ROW_WORKGROUP; n += 1u) { // <= 16
+    for (var n = 0u; n < TILE / ROW_WORKGROUP; n += 1u) {
         let column = (n * groups.x + group.x) * ROW_WORKGROUP + lane;
-        if column < u32(params.side * params.side) {
+        if column < u32(sweep.side * sweep.side) {
             let is_solid = columns_before.d[column].y != 0u;
-            if is_solid && params.unfiltered == 0 {
+            if is_solid && sweep.unfiltered == 0 {
                 solid[atomicAdd(&count, 1u)] = column;
             } else {
-                marks.d[column] = select(0u, 1u, is_solid);
+                foreground_marks.d[column] = select(0u, 1u, is_solid);
             }
         }
     }
@@ -59,10 +52,10 @@ fn background_filter(
     let listed = atomicLoad(&count);
     var n = lane;
     // The exit comes last: software devices go through a loop once more behind one that comes first.
-    loop { // <= 16
+    loop { // <= TILE / ROW_WORKGROUP
         if n < listed {
             let column = solid[n];
-            marks.d[column] = select(0u, 1u, score(i32(column)) > 0);
+            foreground_marks.d[column] = select(0u, 1u, score(i32(column)) > 0);
         }
         n += ROW_WORKGROUP;
         if n >= listed {

@@ -1,15 +1,5 @@
 // Costs of a foreground column at every displacement, one workgroup a column.
-// Twin: core/src/occupancy_constancy.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Numbers { d: array<i32> }
-@group(0) @binding(1) var<storage, read> constancy_weights: Numbers;
-struct Words { d: array<u32> }
-@group(0) @binding(2) var<storage, read> constancy_costs: Words;
-@group(0) @binding(3) var<storage, read> foreground: Words;
-struct Columns { d: array<vec2<u32>> }
-@group(0) @binding(4) var<storage, read> columns_before: Columns;
-@group(0) @binding(5) var<storage, read> columns_now: Columns;
-@group(0) @binding(6) var<storage, read_write> cost: Words;
+// Twin: core/src/stages/occupancy_constancy.rs
 
 var<workgroup> bits: array<i32, 32>;
 
@@ -45,8 +35,8 @@ fn sums_of(masks: u32, weights: vec4<i32>) -> i32 {
 fn target_at(i: i32, j: i32, at: u32) -> u32 {
     let ti = i + i32(at / LINE) - REACH;
     let tj = j + i32(at % LINE) - REACH;
-    if at % LINE < SIDE && ti >= 0 && ti < params.side && tj >= 0 && tj < params.side {
-        return columns_now.d[ti * params.side + tj].x;
+    if at % LINE < SIDE && ti >= 0 && ti < sweep.side && tj >= 0 && tj < sweep.side {
+        return columns_now.d[ti * sweep.side + tj].x;
     }
     return 0u;
 }
@@ -69,10 +59,10 @@ fn occupancy_constancy(
     let w5 = four(20u);
     let w6 = four(24u);
     let w7 = four(28u);
-    let i = column / params.side;
-    let j = column % params.side;
-    let offset = constancy_weights.d[3u * LEVELS_MAX] - params.score_min;
-    for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= 8
+    let i = column / sweep.side;
+    let j = column % sweep.side;
+    let offset = constancy_weights.d[3u * LEVELS_MAX] - sweep.score_min;
+    for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= (ROW_WORDS + ROW_WORKGROUP - 1) / ROW_WORKGROUP
         let low = target_at(i, j, 2u * word);
         let high = target_at(i, j, 2u * word + 1u);
         let free = (low & 0xffffu) | (high << 16u);
@@ -84,7 +74,7 @@ fn occupancy_constancy(
         // Scores fit 16 bits with their sign: the low one is taken out before the high one.
         let first = (both << 16u) >> 16u;
         let second = (both - first) >> 16u;
-        cost.d[group.x * ROW_WORDS + word] = constancy_costs.d[first + offset]
+        pair_cost.d[group.x * ROW_WORDS + word] = constancy_costs.d[first + offset]
             | (constancy_costs.d[second + offset] << 16u);
     }
 }

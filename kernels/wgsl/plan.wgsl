@@ -1,7 +1,5 @@
 // Group counts of the indirect dispatches, from the counts so far. No twin: the scalar backend
 // loops over slices.
-struct Words { d: array<u32> }
-@group(0) @binding(0) var<storage, read_write> counters: Words;
 
 fn set_groups(at: u32, groups: u32) {
     counters.d[at] = groups;

@@ -1,12 +1,8 @@
-// Exclusive prefix sum of a whole buffer: reduce, then scan. Twin: core/src/prefix_sum.rs
+// Exclusive prefix sum of a whole buffer: reduce, then scan. Twin: core/src/stages/prefix_sum.rs
 //
 // `reduce` sums tiles of TILE values, `spine` scans the sums of up to TILE tiles in one workgroup
-// and leaves the sum of all behind them, `scan` scans within each tile and adds the tile's offset. Workgroup memory only: no subgroups, no
-// progress between workgroups assumed.
-struct Words { d: array<u32> }
-@group(0) @binding(0) var<storage, read> values: Words;
-@group(0) @binding(1) var<storage, read_write> tiles: Words;
-@group(0) @binding(2) var<storage, read_write> sums: Words;
+// and leaves the sum of all behind them, `scan` scans within each tile and adds the tile's offset.
+// Workgroup memory only: no subgroups, no progress between workgroups assumed.
 
 const EACH = TILE / WORKGROUP;
 const SPAN = 16u;
@@ -26,14 +22,14 @@ fn scan_workgroup(lane: u32, mine: u32) -> u32 {
     partial[lane] = mine;
     workgroupBarrier();
     var before = 0u;
-    for (var n = lane - lane % SPAN; n < lane; n += 1u) { // <= 15
+    for (var n = lane - lane % SPAN; n < lane; n += 1u) { // <= SPAN - 1
         before += partial[n];
     }
     if lane % SPAN == SPAN - 1u {
         spans[lane / SPAN] = before + mine;
     }
     workgroupBarrier();
-    for (var n = 0u; n < lane / SPAN; n += 1u) { // <= 15
+    for (var n = 0u; n < lane / SPAN; n += 1u) { // <= WORKGROUP / SPAN - 1
         before += spans[n];
     }
     return before;
@@ -42,7 +38,7 @@ fn scan_workgroup(lane: u32, mine: u32) -> u32 {
 @compute @workgroup_size(WORKGROUP)
 fn reduce(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     var sum = 0u;
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         sum += value_at(group.x * TILE + lane * EACH + n);
     }
     let before = scan_workgroup(lane, sum);
@@ -56,7 +52,7 @@ fn spine(@builtin(local_invocation_index) lane: u32) {
     let tiles_used = (arrayLength(&values.d) + TILE - 1u) / TILE;
     var own: array<u32, EACH>;
     var sum = 0u;
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         let tile = lane * EACH + n;
         own[n] = sum;
         if tile < tiles_used {
@@ -67,7 +63,7 @@ fn spine(@builtin(local_invocation_index) lane: u32) {
     if lane == WORKGROUP - 1u {
         tiles.d[TILE] = before + sum;
     }
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         let tile = lane * EACH + n;
         if tile < tiles_used {
             tiles.d[tile] = before + own[n];
@@ -80,12 +76,12 @@ fn scan(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var own: array<u32, EACH>;
     var sum = 0u;
     let first = group.x * TILE + lane * EACH;
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         own[n] = sum;
         sum += value_at(first + n);
     }
     let before = tiles.d[group.x] + scan_workgroup(lane, sum);
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         if first + n < arrayLength(&sums.d) {
             sums.d[first + n] = before + own[n];
         }

@@ -1,4 +1,6 @@
 // Packed records, as in core/src/record.rs. Put in front of every kernel, behind the constants.
+const I32_MAX: i32 = 0x7fffffff;
+
 fn ray_end(ray: vec2<u32>) -> vec3<i32> {
     // Sign extension of 16-bit fields.
     let x = bitcast<i32>(ray.x << 16u) >> 16u;
@@ -19,7 +21,7 @@ fn flow_displacement(flow: u32) -> vec2<i32> {
     return vec2<i32>(i32((flow >> 8u) & 0xffu), i32(flow & 0xffu)) - vec2<i32>(REACH);
 }
 
-// Bresenham's walk in three dimensions, as `Walk` in core/src/grid/mod.rs.
+// Bresenham's walk in three dimensions, as `Walk` in core/src/stages/grid/walk.rs.
 struct Walk {
     voxel: vec3<i32>,
     left: i32,

@@ -1,11 +1,4 @@
-// Sums costs over the 3x3 window, one workgroup a column. Twin: core/src/window.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Words { d: array<u32> }
-@group(0) @binding(1) var<storage, read> foreground: Words;
-@group(0) @binding(2) var<storage, read> rank: Words;
-struct Quads { d: array<vec4<u32>> }
-@group(0) @binding(3) var<storage, read> cost: Quads;
-@group(0) @binding(4) var<storage, read_write> matching: Quads;
+// Sums costs over the 3x3 window, one workgroup a column. Twin: core/src/stages/window.rs
 
 const ROW_QUADS = ROW_WORDS / 4u;
 
@@ -18,27 +11,27 @@ fn window(
 ) {
     let column = i32(foreground.d[group.x]);
     if lane < 9u {
-        let i = column / params.side + i32(lane) / 3 - 1;
-        let j = column % params.side + i32(lane) % 3 - 1;
+        let i = column / sweep.side + i32(lane) / 3 - 1;
+        let j = column % sweep.side + i32(lane) % 3 - 1;
         // A neighbour outside costs nothing here: see `outside_cost`.
         rows[lane] = NONE - 1u;
-        if i >= 0 && i < params.side && j >= 0 && j < params.side {
-            rows[lane] = rank.d[i * params.side + j];
+        if i >= 0 && i < sweep.side && j >= 0 && j < sweep.side {
+            rows[lane] = foreground_index.d[i * sweep.side + j];
         }
     }
     workgroupBarrier();
     var unknown = 0u;
-    for (var n = 0; n < 9; n += 1) { // <= 9
+    for (var n = 0; n < 9; n += 1) {
         unknown += select(0u, COST_UNKNOWN, rows[n] == NONE);
     }
-    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= 2
+    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= (ROW_QUADS + ROW_WORKGROUP - 1) / ROW_WORKGROUP
         // Eight costs at once: nine of at most COST_MAX never carry.
         var sum = vec4<u32>(unknown | (unknown << 16u));
-        for (var n = 0; n < 9; n += 1) { // <= 9
+        for (var n = 0; n < 9; n += 1) {
             if rows[n] < FOREGROUND_MAX {
-                sum += cost.d[rows[n] * ROW_QUADS + quad];
+                sum += pair_cost.d[rows[n] * ROW_QUADS + quad];
             }
         }
-        matching.d[group.x * ROW_QUADS + quad] = sum;
+        window_cost.d[group.x * ROW_QUADS + quad] = sum;
     }
 }

@@ -1,12 +1,11 @@
 //! The columns of one sweep, by the core's own stages.
 
 use glam::DVec3;
-use raywake_core::grid::columns::columns;
-use raywake_core::grid::ray_merge::ray_merge;
-use raywake_core::grid::ray_trace::ray_trace;
-use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, Window, central, place};
-use raywake_core::record::{Column, Ray, Step};
+use raywake_core::frame::{Window, central, place};
+use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::{FLOW_PROGRAMS, GRID, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
 
@@ -16,13 +15,9 @@ pub struct Grid {
     preparation: Preparation,
     lattice_origin: Option<DVec3>,
     offset: DVec3,
-    rays: Vec<Ray>,
-    origins: Vec<[i32; 4]>,
-    slots: Vec<[u32; 2]>,
-    distinct: Vec<u32>,
-    log_odds: Vec<i32>,
+    words: Vec<u32>,
     /// Sizes of the window.
-    pub step: Step,
+    pub step: SweepUniform,
     /// Columns of the window.
     pub columns: Vec<Column>,
     /// Column of every point of the sweep, [`raywake_core::record::NONE`] where it has none.
@@ -36,17 +31,8 @@ impl Grid {
             preparation: Preparation::new(),
             lattice_origin: None,
             offset: DVec3::ZERO,
-            rays: vec![[0; 2]; POINTS_MAX],
-            origins: vec![[0; 4]; ORIGINS_MAX],
-            slots: vec![[0; 2]; MERGE_SLOTS],
-            distinct: vec![0; POINTS_MAX],
-            log_odds: vec![0; profile.voxels()],
-            step: Step {
-                side: profile.side as i32,
-                levels: profile.levels as i32,
-                range_steps: profile.range_steps(),
-                ..Step::default()
-            },
+            words: vec![0; Storage::words(FLOW_PROGRAMS, &profile)],
+            step: uniform_of(&profile, 0),
             columns: vec![[0; 2]; profile.columns()],
             of_point: vec![0; POINTS_MAX],
             profile,
@@ -73,31 +59,22 @@ impl Grid {
             .unwrap_or_else(|| place(&self.profile, rig, pose, None).lattice_origin + self.offset);
         self.lattice_origin = Some(origin);
         let window = place(&self.profile, rig, pose, Some(origin));
+        let mut storage = Storage::over(&mut self.words, FLOW_PROGRAMS, &self.profile);
         let (count, _) = self.preparation.prepare(
             &Alone,
             &self.profile,
             rig,
             &window,
             sweep,
-            &mut self.rays,
+            storage.rays,
             &mut self.of_point,
             &mut [],
-            &mut self.origins,
+            storage.origins,
         );
         self.step.rays = count as i32;
-        let rays = &self.rays[..count];
-        self.slots.fill([0; 2]);
-        let used = ray_merge(rays, &mut self.slots, &mut self.distinct);
-        self.log_odds.fill(0);
-        ray_trace(
-            &self.step,
-            &self.origins,
-            rays,
-            &self.slots,
-            &self.distinct[..used],
-            &mut self.log_odds,
-        );
-        columns(&self.step, &self.log_odds, &mut self.columns);
+        storage.sweep = self.step;
+        run(GRID, &mut storage, 0, &mut |_| ());
+        self.columns.copy_from_slice(storage.columns_now);
         window
     }
 

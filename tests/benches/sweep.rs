@@ -8,18 +8,14 @@
 
 use glam::DVec3;
 use raywake::map::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
-use raywake_core::background_filter;
-use raywake_core::layout::{BUFFERS, Buffer, COUNTERS, DISTINCT_COUNT};
-use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::place;
-use raywake_gpu::{self as gpu, Executor, Heap, Op, Options, Program};
-use raywake_kernels::schedule;
+use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
+use raywake_gpu::Options;
 use raywake_objects::centroid_ekf::{CentroidEkf, CentroidParams};
 use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, MODEL_MAX};
 use raywake_objects::{ObjectReturn, ObjectState};
 use raywake_sim::{Drive, Ego, SimSweep};
 use raywake_tests::drives::{Setup, pairs, sweep};
-use raywake_tests::grid::{Rays, Tracer};
 use raywake_tests::table::{Variant, table};
 use raywake_tests::vulkan;
 use std::collections::BTreeMap;
@@ -48,9 +44,9 @@ fn flow(sweeps: &[SimSweep]) {
                 variant.add(n, if parts.contains(&stage) { "flow" } else { stage }, ms);
                 variant.add(n, "total", ms);
             }
-            variant.add(n, "foreground columns", stepped.foreground as f64);
-            variant.add(n, "rays traced", stepped.rays as f64);
-            let columns = stepped.flows.iter().flat_map(|f| f.columns);
+            variant.add(n, "foreground columns", stepped.output.foreground as f64);
+            variant.add(n, "rays traced", stepped.output.rays as f64);
+            let columns = stepped.output.flows.iter().flat_map(|f| f.columns);
             columns.for_each(|c| variant.digest.column(c));
             drive.tracklets().for_each(|t| variant.digest.tracklet(&t));
         }
@@ -58,80 +54,6 @@ fn flow(sweeps: &[SimSweep]) {
     }
     let title = "flow, profile hdl64, ms a sweep";
     table(title, &variants, &[(0, 2), (1, 3), (0, 1), (2, 3)], &[(0, 2), (1, 3)]);
-}
-
-/// The schedule up to the dense window; `merged` or with a list of single rays from the host, in
-/// two more upload buffers behind the table. A third one takes the window out.
-fn traced(profile: &Profile, merged: bool) -> Option<Executor> {
-    let mut buffers = schedule::buffers(BUFFERS, profile);
-    let more = buffers.len();
-    let row = |name, heap, words| gpu::Buffer { name, heap, bytes: 4 * words as u64 };
-    buffers.push(row("distinct_in", Heap::Upload, POINTS_MAX));
-    buffers.push(row("counters_in", Heap::Upload, COUNTERS));
-    buffers.push(row("log_odds_out", Heap::Readback, profile.voxels()));
-    let mut ops = schedule::flow(profile).ops;
-    let end = ops.iter().position(|op| op.name() == "ray_trace").expect("a stage");
-    ops.truncate(end + 1);
-    ops.retain(|op| op.name() != "shift");
-    if !merged {
-        let at = ops.iter().position(|op| op.name() == "ray_merge").expect("a stage");
-        let list = Op::Copy { from: more, to: Buffer::Distinct as usize };
-        ops.splice(at..=at, [list, Op::Copy { from: more + 1, to: Buffer::Counters as usize }]);
-    }
-    ops.push(Op::Copy { from: Buffer::LogOdds as usize, to: more + 2 });
-    let program = Program { name: "dense window", ops };
-    vulkan::expect(Executor::new(&Options::default(), &buffers, &[program]))
-}
-
-/// Merged rays against single ones in the dense window, on either backend.
-fn dense(sweeps: &[SimSweep]) {
-    let setup = Setup::new(Profile::hdl64(), None);
-    let names = ["CPU, one thread, merged", "CPU, one thread, single rays"];
-    let mut variants: Vec<Variant> = names.map(|n| Variant::new(n.into())).into();
-    let mut executors: Vec<Executor> = Vec::new();
-    for (merged, name) in [(true, "merged"), (false, "single rays")] {
-        let Some(executor) = traced(&setup.profile, merged) else { continue };
-        variants.push(Variant::new(format!("{}, {name}", executor.info().name)));
-        executors.push(executor);
-    }
-    let (mut tracer, mut log_odds) = (Tracer::default(), vec![0; setup.profile.voxels()]);
-    let mut lattice = None;
-    for (n, now) in sweeps.iter().enumerate() {
-        let window = place(&setup.profile, &setup.rig, &now.world_from_vehicle, lattice);
-        lattice.get_or_insert(window.lattice_origin);
-        let rays = Rays::new(&setup.profile, &setup.rig, &window, &sweep(now));
-        for (v, merged) in variants.iter_mut().zip([true, false]) {
-            let clock = Instant::now();
-            let used = if merged { tracer.merge(&rays) } else { tracer.single(&rays).len() };
-            let after_merge = milliseconds(clock);
-            tracer.trace(&rays, &mut log_odds);
-            let total = milliseconds(clock);
-            let rest = total - after_merge;
-            let listed = if merged { "ray_merge" } else { "list of rays" };
-            let rows = [(listed, after_merge), ("ray_trace", rest), ("total", total)];
-            rows.into_iter().for_each(|(row, ms)| v.add(n, row, ms));
-            v.add(n, "rays traced", used as f64);
-            log_odds.iter().for_each(|l| v.digest.word(*l as u32));
-        }
-        let more = BUFFERS.len();
-        for (executor, v) in executors.iter_mut().zip(&mut variants[2..]) {
-            let list = tracer.single(&rays);
-            rays.step.write(executor.upload(Buffer::StepIn as usize));
-            let fill = |to: &mut [u32], words: &[u32]| to[..words.len()].copy_from_slice(words);
-            fill(executor.upload(Buffer::RaysIn as usize), rays.rays.as_flattened());
-            let origins = bytemuck::cast_slice(rays.origins.as_flattened());
-            fill(executor.upload(Buffer::OriginsIn as usize), origins);
-            fill(executor.upload(more), list);
-            executor.upload(more + 1)[DISTINCT_COUNT] = list.len() as u32;
-            let clock = Instant::now();
-            executor.run(0).unwrap_or_else(|e| panic!("{e}"));
-            v.add(n, "total", milliseconds(clock));
-            executor.times(0).for_each(|(stage, ms)| v.add(n, stage, ms));
-            executor.readback(more + 2).iter().for_each(|l| v.digest.word(*l));
-        }
-    }
-    let (ratios, equal) = ([(1, 0), (3, 2), (0, 2)], [(0, 1), (0, 2), (0, 3)]);
-    table("dense window, profile hdl64, ms a sweep", &variants, &ratios, &equal);
 }
 
 /// The sparse map on either backend.
@@ -289,7 +211,6 @@ fn run() {
     let points = sweeps.iter().map(|s| s.points.len()).sum::<usize>() / sweeps.len();
     println!("{count} simulated sweeps of {points} returns; medians; a/b: a divided by b");
     flow(&sweeps);
-    dense(&sweeps);
     map(&sweeps);
     tracks(&sweeps);
 }

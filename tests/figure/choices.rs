@@ -5,9 +5,9 @@
 
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::{Pose, Twist};
-use raywake_core::record::{Column, Step, ray_origin};
+use raywake_core::record::{Column, SweepUniform, ray_origin};
+use raywake_core::stages::window::outside_cost;
 use raywake_core::sweep::{Point, Rig, Timing};
-use raywake_core::window::outside_cost;
 use raywake_sim::SimSweep;
 use raywake_tests::drives::Setup;
 use raywake_tests::pair::{Side, Stages};
@@ -93,7 +93,7 @@ fn what_ends_nowhere_still_frees_space() {
     check_traced("beyond window and range", medium, [90.0, 0.0, 0.0], [84, 0]);
 }
 
-fn step_of(profile: &Profile) -> Step {
+fn step_of(profile: &Profile) -> SweepUniform {
     stages(profile, Pose::IDENTITY, &[[12.0, 0.0, 0.0]])[0].step
 }
 

@@ -1,7 +1,9 @@
 //! The device against the scalar backend, stage by stage.
 
-use raywake_core::background_filter;
+use raywake::backend::device::Device;
+use raywake::backend::{Backend, Tables};
 use raywake_core::params::Profile;
+use raywake_core::stages::background_filter;
 use raywake_gpu::Options;
 use raywake_tests::drives::{Setup, pairs, street};
 use raywake_tests::pair::Side;
@@ -75,17 +77,12 @@ fn a_window_of_other_sizes() {
     let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
     // The shipped classifier has 14 levels: another one for 16.
     let text = weights::constancy(42, 16, 150);
-    let tables = || {
-        raywake::backend::Tables::load(&setup.profile, setup.filter.as_deref(), &text).expect("set")
-    };
-    let device =
-        raywake::backend::device::Device::new(&setup.profile, &tables(), &Options::default());
+    let tables = Tables::load(&setup.profile, setup.filter.as_deref(), &text).expect("set");
+    let device = Device::new(&setup.profile, &tables, &Options::default());
     let Some(device) = raywake_tests::vulkan::expect(device) else { return };
-    let scalar = raywake::backend::scalar::Scalar::new(&setup.profile, tables());
-    let mut sides = [
-        Side::with(&setup, &tables(), raywake::backend::Backend::Scalar(Box::new(scalar))),
-        Side::with(&setup, &tables(), raywake::backend::Backend::Device(Box::new(device))),
-    ];
+    let scalar = Backend::scalar(&setup.profile, &tables);
+    let mut sides =
+        [scalar, Backend::Device(Box::new(device))].map(|b| Side::with(&setup, &tables, b));
     for (now, before) in pairs(&street()[..5]) {
         let [wanted, found] = sides.each_mut().map(|s| s.step(now, before));
         assert_eq!(found.difference(&wanted), None);

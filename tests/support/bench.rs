@@ -1,6 +1,6 @@
 //! Runs single kernels over buffers that the host fills and reads.
 
-use raywake_core::record::Step;
+use raywake_core::record::SweepUniform;
 use raywake_gpu::{Buffer, Executor, Groups, Heap, Kernel, Op, Options, Program};
 
 use crate::{difference, vulkan};
@@ -23,14 +23,14 @@ pub struct Outcome {
 }
 
 impl Bench {
-    /// Without anything, or with the record `params`.
-    pub fn new(step: Option<&Step>) -> Bench {
-        let mut words = vec![0; Step::WORDS];
+    /// Without anything, or with the record `sweep`.
+    pub fn new(step: Option<&SweepUniform>) -> Bench {
+        let mut words = vec![0; SweepUniform::WORDS];
         match step {
             None => Bench::default(),
             Some(step) => {
                 step.write(&mut words);
-                Bench::default().buffer("params", words)
+                Bench::default().buffer("sweep", words)
             }
         }
     }

@@ -1,10 +1,9 @@
 //! Simulated drives, and the pipeline set up for them.
 
 use raywake::backend::device::Device;
-use raywake::backend::scalar::Scalar;
 use raywake::backend::{Backend, Tables};
-use raywake_core::occupancy_constancy;
 use raywake_core::params::Profile;
+use raywake_core::stages::occupancy_constancy;
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_gpu::Options;
 use raywake_sim::{Drive, Ego, Scene, SensorRig, SimSweep};
@@ -40,7 +39,7 @@ impl Setup {
 
     /// The scalar backend.
     pub fn scalar(&self) -> Backend {
-        Backend::Scalar(Box::new(Scalar::new(&self.profile, self.tables())))
+        Backend::scalar(&self.profile, &self.tables())
     }
 
     /// A device. None, with a remark, where there is none.

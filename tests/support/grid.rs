@@ -1,17 +1,19 @@
 //! The dense window of a sweep, apart from the pipeline.
 
-use raywake_core::grid::ray_merge::ray_merge;
-use raywake_core::grid::ray_trace::ray_trace;
+use raywake_core::frame::Window;
 use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, Window};
-use raywake_core::record::{Ray, Step};
+use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::stages::grid::ray_merge::ray_merge;
+use raywake_core::stages::grid::ray_trace::ray_trace;
+use raywake_core::stages::{COUNTERS, DISTINCT_COUNT};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
 
 /// A sweep as rays in a window.
 pub struct Rays {
     /// Sizes.
-    pub step: Step,
+    pub step: SweepUniform,
     /// Rays.
     pub rays: Vec<Ray>,
     /// Where they begin.
@@ -36,14 +38,7 @@ impl Rays {
             &mut origins,
         );
         rays.truncate(count);
-        let step = Step {
-            side: profile.side as i32,
-            levels: profile.levels as i32,
-            rays: count as i32,
-            range_steps: profile.range_steps(),
-            ..Step::default()
-        };
-        Rays { step, rays, origins }
+        Rays { step: uniform_of(profile, count), rays, origins }
     }
 }
 
@@ -64,20 +59,14 @@ impl Tracer {
     /// Merges equal rays; returns how many are left.
     pub fn merge(&mut self, rays: &Rays) -> usize {
         self.slots.fill([0; 2]);
-        self.used = ray_merge(&rays.rays, &mut self.slots, &mut self.distinct);
+        let mut counters = [0; COUNTERS];
+        let (slots, distinct) = (&mut self.slots, &mut self.distinct);
+        ray_merge(&rays.step, &rays.rays, slots, distinct, &mut counters);
+        self.used = counters[DISTINCT_COUNT] as usize;
         self.used
     }
 
-    /// Lists every ray by itself instead; returns the list.
-    pub fn single(&mut self, rays: &Rays) -> &[u32] {
-        self.used = rays.rays.len();
-        let list = &mut self.distinct[..self.used];
-        // An entry from `MERGE_SLOTS` on is a ray without a place in the table: it counts once.
-        list.iter_mut().zip(MERGE_SLOTS as u32..).for_each(|(entry, n)| *entry = n);
-        list
-    }
-
-    /// Traces what was merged or listed.
+    /// Traces what was merged.
     pub fn trace(&self, rays: &Rays, log_odds: &mut [i32]) {
         log_odds.fill(0);
         let distinct = &self.distinct[..self.used];

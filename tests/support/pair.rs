@@ -1,20 +1,55 @@
 //! Two backends side by side.
 
 use raywake::backend::{Backend, Tables};
-use raywake::laps::Laps;
-use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
-use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::pipeline::{Output, Perceived, Pipeline};
-use raywake_core::team::Alone;
+use raywake_core::output::{ColumnFlow, Output, PointFlow, TrackletState};
+use raywake_core::params::POINTS_MAX;
+use raywake_core::perceive::{Machine, Perceive, Perceived, Timer};
+use raywake_core::pipeline::Pipeline;
+use raywake_core::prepare::{Preparation, Setup};
+use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::team::{Alone, Team};
+use raywake_gpu::GpuError;
 use raywake_sim::SimSweep;
 
 use crate::difference;
-use crate::drives::{Setup, sweep};
+use crate::drives::{self, sweep};
 
 /// A backend with its pipeline, looked at stage by stage.
 pub struct Side {
+    setup: Setup,
     pipeline: Box<Pipeline>,
     backend: Backend,
+}
+
+/// A backend that writes down what goes in and what comes out.
+struct Witness<'a> {
+    backend: &'a mut Backend,
+    stages: Stages,
+}
+
+impl Perceive for Witness<'_> {
+    type Error = GpuError;
+
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+        self.backend.input()
+    }
+
+    fn perceive(
+        &mut self,
+        sweep: &SweepUniform,
+        team: &impl Team,
+        timer: &mut (impl Timer + Send),
+        meanwhile: impl FnOnce() + Send,
+    ) -> Result<Perceived<'_>, GpuError> {
+        let (rays, origins) = self.backend.input();
+        let rays = rays[..sweep.rays as usize].as_flattened().to_vec();
+        let origins = bytemuck::cast_slice(origins.as_flattened()).to_vec();
+        self.stages.words.extend([("rays", rays), ("origins", origins)]);
+        self.stages.step = *sweep;
+        let perceived = self.backend.perceive(sweep, team, timer, meanwhile)?;
+        self.stages.perceived(&perceived);
+        Ok(perceived)
+    }
 }
 
 /// What each stage of one sweep left behind, in the order of figure 3.1.
@@ -29,48 +64,42 @@ pub struct Stages {
     /// Tracklets after the sweep.
     pub tracklets: Vec<TrackletState>,
     /// Sizes and shift of the sweep.
-    pub step: raywake_core::record::Step,
+    pub step: SweepUniform,
 }
 
 impl Side {
     /// At rest.
-    pub fn new(setup: &Setup, backend: Backend) -> Side {
+    pub fn new(setup: &drives::Setup, backend: Backend) -> Side {
         Side::with(setup, &setup.tables(), backend)
     }
 
     /// At rest, with tables of one's own.
-    pub fn with(setup: &Setup, tables: &Tables, backend: Backend) -> Side {
-        let profile = setup.profile.clone();
-        let pipeline = Pipeline::new(profile, setup.rig.clone(), tables.scores, tables.unfiltered);
-        Side { pipeline: Box::new(pipeline), backend }
+    pub fn with(setup: &drives::Setup, tables: &Tables, backend: Backend) -> Side {
+        let setup = Setup {
+            profile: setup.profile.clone(),
+            rig: setup.rig.clone(),
+            scores: tables.scores,
+            unfiltered: tables.unfiltered,
+            preparation: Preparation::new(),
+        };
+        Side { setup, pipeline: Box::new(const { Pipeline::new() }), backend }
     }
 
     /// One sweep; `before` is the sweep before it.
     pub fn step(&mut self, now: &SimSweep, before: Option<&SimSweep>) -> Stages {
-        let (rays, origins) = self.backend.input();
-        let prepared = self.pipeline.prepare(&Alone, &sweep(now), rays, origins);
-        let rays = rays[..prepared.step.rays as usize].as_flattened().to_vec();
-        let origins = bytemuck::cast_slice(origins.as_flattened()).to_vec();
-        let mut laps = Laps::start();
-        let profile: &Profile = self.pipeline.profile();
-        let (rounds, columns) = (profile.em_rounds, profile.columns());
-        let (pipeline, sweep) = (&mut self.pipeline, sweep(now));
-        let meanwhile = || _ = pipeline.take(&sweep);
-        let perceived = self.backend.perceive(&prepared.step, rounds, &mut laps, meanwhile);
-        let perceived = perceived.unwrap_or_else(|e| panic!("{e}"));
-        let mut stages = Stages { step: prepared.step, ..Stages::default() };
-        stages.words.extend([("rays", rays), ("origins", origins)]);
-        stages.perceived(&perceived);
-        let mut columns = vec![ColumnFlow::default(); columns];
+        let mut columns = vec![ColumnFlow::default(); self.setup.profile.columns()];
         let mut points = vec![PointFlow::default(); POINTS_MAX];
-        let output = Output { columns: &mut columns, points: &mut points };
+        let out = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
-        if let Some(flows) =
-            self.pipeline.follow(&Alone, &prepared.step, &perceived, seen, output, &mut |_| ())
-        {
+        let mut witness = Witness { backend: &mut self.backend, stages: Stages::default() };
+        let machine = Machine { backend: &mut witness, team: &Alone, timer: &mut () };
+        let stepped = self.pipeline.step(&self.setup, machine, &sweep(now), seen, out);
+        let flows = stepped.unwrap_or_else(|e| panic!("{e}")).flows;
+        let mut stages = witness.stages;
+        if let Some(flows) = flows {
             (stages.columns, stages.points) = (flows.columns.to_vec(), flows.points.to_vec());
         }
-        stages.tracklets = self.pipeline.tracklets().collect();
+        stages.tracklets = self.pipeline.tracklets(&self.setup.profile).collect();
         stages
     }
 }
@@ -79,10 +108,10 @@ impl Stages {
     fn perceived(&mut self, p: &Perceived) {
         self.words.extend([
             ("ray_merge", vec![p.rays as u32]),
-            ("shift", p.before.as_flattened().to_vec()),
+            ("shift", p.columns_before.as_flattened().to_vec()),
             ("background_filter", vec![p.marked as u32]),
             ("compact", p.foreground.to_vec()),
-            ("flow", p.state.to_vec()),
+            ("flow", p.flow.to_vec()),
             ("energy", p.proposal.as_flattened().to_vec()),
         ]);
     }

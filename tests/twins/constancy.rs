@@ -1,8 +1,10 @@
 //! Costs of pairs of columns, and their sums over the 3x3 window.
 
-use raywake_core::occupancy_constancy::{COST_MAX, SCORES_MAX, SHIPPED, WEIGHT_WORDS, load};
 use raywake_core::params::{FOREGROUND_MAX, ROW, ROW_WORDS};
-use raywake_core::record::{Column, NONE, Step};
+use raywake_core::record::{Column, NONE, SweepUniform};
+use raywake_core::stages::occupancy_constancy::{
+    COST_MAX, SCORES_MAX, SHIPPED, WEIGHT_WORDS, load,
+};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{OCCUPANCY_CONSTANCY, WINDOW};
 use raywake_tests::bench::Bench;
@@ -30,12 +32,12 @@ impl Classifier {
 
 fn check_constancy(
     case: &str,
-    step: &Step,
+    step: &SweepUniform,
     with: &Classifier,
     foreground: &[u32],
     [before, now]: [&[Column]; 2],
 ) {
-    let step = Step { score_min: with.score_min, ..*step };
+    let step = SweepUniform { score_min: with.score_min, ..*step };
     let mut cost = vec![POISON; foreground.len().max(1) * ROW_WORDS];
     let bench = Bench::new(Some(&step))
         .buffer("constancy_weights", bytemuck::cast_slice(&with.weights).to_vec())
@@ -43,10 +45,10 @@ fn check_constancy(
         .buffer("foreground", foreground.to_vec())
         .buffer("columns_before", words(before))
         .buffer("columns_now", words(now))
-        .buffer("cost", cost.clone())
+        .buffer("pair_cost", cost.clone())
         .groups(&OCCUPANCY_CONSTANCY, foreground.len());
     let halves = bytemuck::cast_slice_mut(&mut cost);
-    raywake_core::occupancy_constancy::occupancy_constancy(
+    raywake_core::stages::occupancy_constancy::occupancy_constancy(
         &step,
         &with.weights,
         &with.costs,
@@ -56,7 +58,7 @@ fn check_constancy(
         halves,
     );
     if let Some(outcome) = bench.run() {
-        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("cost", &cost)]);
+        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("pair_cost", &cost)]);
     }
 }
 
@@ -109,14 +111,14 @@ fn check_window(case: &str, side: u32, foreground: &[u32], cost: &[u16]) {
     let mut matching = vec![POISON; foreground.len().max(1) * ROW_WORDS];
     let bench = Bench::new(Some(&step))
         .buffer("foreground", foreground.to_vec())
-        .buffer("rank", rank.clone())
-        .buffer("cost", packed(cost))
-        .buffer("matching", matching.clone())
+        .buffer("foreground_index", rank.clone())
+        .buffer("pair_cost", packed(cost))
+        .buffer("window_cost", matching.clone())
         .groups(&WINDOW, foreground.len());
     let halves = bytemuck::cast_slice_mut(&mut matching);
-    raywake_core::window::window(&step, foreground, &rank, cost, halves);
+    raywake_core::stages::window::window(&step, foreground, &rank, cost, halves);
     if let Some(outcome) = bench.run() {
-        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("matching", &matching)]);
+        outcome.check(&format!("{case}, {} rows", foreground.len()), &[("window_cost", &matching)]);
     }
 }
 

@@ -1,11 +1,11 @@
 //! Updates of the sparse map, counted and written band by band.
 
-use raywake_core::layout::{COUNTERS, DISTINCT_COUNT};
 use raywake_core::map::Update;
-use raywake_core::map::emit::{count, emit};
-use raywake_core::params::{EXTENT_VOXELS, MERGE_SLOTS, POINTS_MAX, ROW_WORKGROUP};
-use raywake_core::prefix_sum::prefix_sum;
-use raywake_core::record::{Ray, Step, ray};
+use raywake_core::params::{EXTENT_VOXELS, MERGE_SLOTS, POINTS_MAX, ROW_WORKGROUP, TILE};
+use raywake_core::record::{Ray, SweepUniform, ray};
+use raywake_core::stages::map::emit::{count, emit};
+use raywake_core::stages::prefix_sum::prefix_sum;
+use raywake_core::stages::{COUNTERS, DISTINCT_COUNT};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{COUNT, EMIT};
 use raywake_tests::bench::Bench;
@@ -48,12 +48,14 @@ impl Distinct {
 }
 
 /// Both kernels over a band. Returns the number of updates.
-fn check(case: &str, step: &Step, origins: &[[i32; 4]], d: &Distinct) -> usize {
+fn check(case: &str, step: &SweepUniform, origins: &[[i32; 4]], d: &Distinct) -> usize {
     let used = d.entries.len();
     let room = (used + 70).next_multiple_of(ROW_WORKGROUP);
     let (mut counts, mut offsets) = (vec![0; room], vec![0; room]);
-    count(step, origins, &d.rays, &d.slots, &d.entries, &mut counts[..used]);
-    let total = prefix_sum(&counts, &mut offsets) as usize;
+    count(step, origins, &d.rays, &d.slots, &d.entries, &mut counts);
+    let mut tiles = [0; TILE + 1];
+    prefix_sum(&counts, &mut tiles, &mut offsets);
+    let total = tiles[TILE] as usize;
     let mut updates: Vec<Update> = vec![[POISON; 2]; total];
     emit(step, origins, &d.rays, &d.slots, &d.entries, &offsets[..used], &mut updates);
     let mut counters = vec![POISON; COUNTERS];
@@ -70,7 +72,7 @@ fn check(case: &str, step: &Step, origins: &[[i32; 4]], d: &Distinct) -> usize {
         .buffer("offsets", offsets)
         .buffer("updates", vec![POISON; 2 * total + 9])
         .threads(&COUNT, room)
-        .bound(&EMIT, room / ROW_WORKGROUP, &[("counts", "offsets")]);
+        .threads(&EMIT, room);
     if let Some(outcome) = bench.run() {
         let mut written = roomy(&updates, total + 5);
         written.truncate(2 * total + 9);
@@ -81,7 +83,7 @@ fn check(case: &str, step: &Step, origins: &[[i32; 4]], d: &Distinct) -> usize {
 }
 
 /// All of a window's keys, some of them, none; cut at slabs of equal x and beside these cuts.
-fn bands(step: &Step) -> [[i32; 2]; 10] {
+fn bands(step: &SweepUniform) -> [[i32; 2]; 10] {
     let (slab, keys) = (step.side * step.levels, step.side * step.side * step.levels);
     let middle = step.side / 2;
     let [from, to] = [(middle - 2) * slab, (middle + 3) * slab];
@@ -100,8 +102,8 @@ fn bands(step: &Step) -> [[i32; 2]; 10] {
     ]
 }
 
-fn banded(step: &Step, [band_from, band_to]: [i32; 2]) -> Step {
-    Step { band_from, band_to, ..*step }
+fn banded(step: &SweepUniform, [band_from, band_to]: [i32; 2]) -> SweepUniform {
+    SweepUniform { band_from, band_to, ..*step }
 }
 
 #[test]
@@ -112,7 +114,7 @@ fn bands_of_every_kind() {
     for (case, origins) in [("inside", inside), ("outside", outside)] {
         let mut most = 0;
         for (levels, range_steps) in [(8, 1), (13, 20), (16, 334), (8, 2000)] {
-            let step = Step { range_steps, ..window(31, levels) };
+            let step = SweepUniform { range_steps, ..window(31, levels) };
             let rays = Distinct::any(&mut random, 500, [15, 15, 4], origins.len());
             let bands = bands(&step);
             let of = |band: [i32; 2]| check(case, &banded(&step, band), &origins, &rays);
@@ -129,7 +131,7 @@ fn bands_of_every_kind() {
 #[test]
 fn rays_of_every_number() {
     let mut random = Random::new(61);
-    let step = Step { range_steps: 100, ..window(61, 16) };
+    let step = SweepUniform { range_steps: 100, ..window(61, 16) };
     for count in [&around(ROW_WORKGROUP)[..], &[3000]].concat() {
         let rays = Distinct::any(&mut random, count, [30, 30, 8], 1);
         for band in bands(&step) {
@@ -142,7 +144,7 @@ fn rays_of_every_number() {
 fn the_window_of_the_map() {
     // Keys up to 3e8, rays longer than the range of 334 voxels.
     let mut random = Random::new(62);
-    let step = Step { range_steps: 334, ..window(669, 669) };
+    let step = SweepUniform { range_steps: 334, ..window(669, 669) };
     let rays = Distinct::any(&mut random, 300, [334; 3], 2);
     let origins = [[334, 334, 334, 0], [335, 334, 334, 0]];
     let counts = bands(&step).map(|band| check("map", &banded(&step, band), &origins, &rays));

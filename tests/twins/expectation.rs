@@ -1,9 +1,9 @@
 //! Proposals of the expectation step.
 
-use raywake_core::flow::expectation::expectation;
-use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT};
 use raywake_core::params::{REACH, ROW, ROW_WORKGROUP};
-use raywake_core::record::{Least, NONE, Proposal, Step, flow};
+use raywake_core::record::{MinCost, NONE, Proposal, SweepUniform, pack_flow};
+use raywake_core::stages::flow::expectation::expectation;
+use raywake_core::stages::{COUNTERS, FOREGROUND_COUNT};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::EXPECTATION;
 use raywake_tests::bench::Bench;
@@ -15,17 +15,17 @@ pub const KERNELS: &[&Kernel] = &[&EXPECTATION];
 
 /// What a round of expectation looks at.
 struct Round {
-    step: Step,
+    step: SweepUniform,
     foreground: Vec<u32>,
     matching: Vec<u16>,
     state: Vec<u32>,
     target_energy: Vec<u32>,
-    least: Vec<Least>,
+    least: Vec<MinCost>,
 }
 
 impl Round {
     /// The first round of some columns: no flow yet, nobody at any target, what they can pay unknown.
-    fn first(step: Step, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
+    fn first(step: SweepUniform, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
         let columns = (step.side * step.side) as usize;
         Round {
             matching: (0..foreground.len() * ROW).map(|_| cost()).collect(),
@@ -49,10 +49,10 @@ impl Round {
         let bench = Bench::new(Some(&self.step))
             .buffer("counters", counters)
             .buffer("foreground", foreground)
-            .buffer("matching", packed(&self.matching))
-            .buffer("state", self.state.clone())
+            .buffer("window_cost", packed(&self.matching))
+            .buffer("flow", self.state.clone())
             .buffer("target_energy", self.target_energy.clone())
-            .buffer("least", padded(bytemuck::cast_slice(&self.least)))
+            .buffer("min_cost", padded(bytemuck::cast_slice(&self.least)))
             .buffer("proposal", padded(bytemuck::cast_slice(&proposal)))
             .threads(&EXPECTATION, count + 3);
         expectation(
@@ -70,7 +70,7 @@ impl Round {
                 padded(bytemuck::cast_slice(&proposal)),
             ];
             let case = format!("{case}, {count} columns, {:?}", self.step);
-            outcome.check(&case, &[("least", &wanted[0]), ("proposal", &wanted[1])]);
+            outcome.check(&case, &[("min_cost", &wanted[0]), ("proposal", &wanted[1])]);
         }
         proposal
     }
@@ -82,15 +82,15 @@ fn padded(words: &[u32]) -> Vec<u32> {
 }
 
 fn any_flow(random: &mut Random) -> u32 {
-    flow([random.between(-REACH, REACH), random.between(-REACH, REACH)])
+    pack_flow([random.between(-REACH, REACH), random.between(-REACH, REACH)])
 }
 
 /// Settings from nothing to the ceilings of a profile.
 const SETTINGS: [[i32; 3]; 5] =
     [[1000, 1, 693], [1000, 1, 17_289], [0, 0, 0], [10_000, 1000, 100_000], [100, 0, 693]];
 
-fn with(side: i32, [smoothing, displacement_cost, outside_cost]: [i32; 3]) -> Step {
-    Step { smoothing, displacement_cost, outside_cost, ..window(side, 14) }
+fn with(side: i32, [smoothing, displacement_cost, outside_cost]: [i32; 3]) -> SweepUniform {
+    SweepUniform { smoothing, displacement_cost, outside_cost, ..window(side, 14) }
 }
 
 /// A first round, then later ones over states and targets of every kind.
@@ -146,7 +146,7 @@ fn flows_that_agree() {
         let mut round = Round::first(with(31, settings), all, || random.below(9000) as u16);
         round.check("agreement, first round");
         for d in [[0, 0], [REACH, REACH], [-REACH, REACH], [3, -7]] {
-            round.state.fill(flow(d));
+            round.state.fill(pack_flow(d));
             round.check(&format!("all by {d:?}"));
         }
     }

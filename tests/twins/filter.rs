@@ -1,8 +1,8 @@
 //! The background filter.
 
-use raywake_core::background_filter::{TABLE_WORDS, background_filter, load};
 use raywake_core::params::{ROW_WORKGROUP, TILE};
-use raywake_core::record::{Column, Step};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::background_filter::{TABLE_WORDS, background_filter, load};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::BACKGROUND_FILTER;
 use raywake_tests::bench::Bench;
@@ -22,16 +22,16 @@ fn table(text: &str, levels: i32) -> Vec<i32> {
     table
 }
 
-fn check(case: &str, step: &Step, table: &[i32], before: &[Column]) -> usize {
+fn check(case: &str, step: &SweepUniform, table: &[i32], before: &[Column]) -> usize {
     let mut marks = vec![POISON; before.len()];
     let bench = Bench::new(Some(step))
         .buffer("filter_table", bytemuck::cast_slice(table).to_vec())
         .buffer("columns_before", words(before))
-        .buffer("marks", marks.clone())
+        .buffer("foreground_marks", marks.clone())
         .groups(&BACKGROUND_FILTER, before.len().div_ceil(TILE));
     background_filter(step, table, before, &mut marks);
     if let Some(outcome) = bench.run() {
-        outcome.check(&format!("{case}, {step:?}"), &[("marks", &marks)]);
+        outcome.check(&format!("{case}, {step:?}"), &[("foreground_marks", &marks)]);
     }
     marks.iter().sum::<u32>() as usize
 }
@@ -51,7 +51,7 @@ fn filters_of_every_kind() {
             let kept = check("mild", &step, &mild, &columns);
             assert!(side < 31 || kept > count / 10 && kept < count * 9 / 10, "{kept} of {count}");
             check("strong", &step, &strong, &columns);
-            let all = check("open", &Step { unfiltered: 1, ..step }, &mild, &columns);
+            let all = check("open", &SweepUniform { unfiltered: 1, ..step }, &mild, &columns);
             assert_eq!(all, columns.iter().filter(|c| c[1] != 0).count());
         }
     }

@@ -14,9 +14,9 @@ mod reduce_by_key;
 mod sums;
 mod voxels;
 
-use raywake_core::layout::COUNTERS;
 use raywake_core::params::{EXTENT_VOXELS, TILE};
-use raywake_core::record::{Column, Step};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::COUNTERS;
 use raywake_gpu::Kernel;
 use raywake_tests::bench::Bench;
 use std::collections::BTreeSet;
@@ -47,8 +47,8 @@ fn around(size: usize) -> [usize; 5] {
 /// A window, ray origins, and the ends of rays that strain a walk: what each is, where it ends, and
 /// which origin it has.
 #[allow(clippy::type_complexity)]
-fn extremes() -> (Step, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7]) {
-    let step = Step { range_steps: 2000, ..window(255, 16) };
+fn extremes() -> (SweepUniform, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7]) {
+    let step = SweepUniform { range_steps: 2000, ..window(255, 16) };
     let e = EXTENT_VOXELS;
     let ends = [
         ("onto itself", [127, 127, 8], 0),
@@ -87,8 +87,8 @@ fn total(count: usize) -> Vec<u32> {
 }
 
 /// A square window.
-fn window(side: i32, levels: i32) -> Step {
-    Step { side, levels, ..Step::default() }
+fn window(side: i32, levels: i32) -> SweepUniform {
+    SweepUniform { side, levels, ..SweepUniform::default() }
 }
 
 /// Names of the functions behind `@compute`.

@@ -1,21 +1,21 @@
 //! Claims, ranks, winners.
 
-use raywake_core::flow::maximisation::{claim, rank, settle};
-use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT};
 use raywake_core::params::{REACH, ROW_WORKGROUP};
-use raywake_core::record::{NONE, Proposal, Step, flow};
+use raywake_core::record::{NONE, Proposal, SweepUniform, pack_flow};
+use raywake_core::stages::flow::maximisation::{claim, elect, settle};
+use raywake_core::stages::{COUNTERS, FOREGROUND_COUNT};
 use raywake_gpu::Kernel;
-use raywake_kernels::kernel::{CLAIM, RANK, SETTLE};
+use raywake_kernels::kernel::{CLAIM, ELECT, SETTLE};
 use raywake_tests::bench::Bench;
 use raywake_tests::random::Random;
 
 use super::{POISON, around, window};
 
-pub const KERNELS: &[&Kernel] = &[&CLAIM, &RANK, &SETTLE];
+pub const KERNELS: &[&Kernel] = &[&CLAIM, &ELECT, &SETTLE];
 
 /// Proposals of some columns of a window.
 struct Round {
-    step: Step,
+    step: SweepUniform,
     foreground: Vec<u32>,
     proposal: Vec<Proposal>,
 }
@@ -24,7 +24,7 @@ struct Round {
 #[derive(Clone)]
 struct Changed {
     target_energy: Vec<u32>,
-    target_rank: Vec<u32>,
+    target_index: Vec<u32>,
     state: Vec<u32>,
 }
 
@@ -43,7 +43,7 @@ impl Round {
             let d = [to[0] - from[0], to[1] - from[1]].map(|d| d.clamp(-REACH, REACH));
             match random.below(9) {
                 0 => [0, NONE],
-                _ => [flow(d), random.below(energies)],
+                _ => [pack_flow(d), random.below(energies)],
             }
         };
         Round { step, proposal: foreground.iter().map(&mut propose).collect(), foreground }
@@ -57,14 +57,14 @@ impl Round {
             [self.foreground.clone(), bytemuck::cast_slice(&self.proposal).to_vec()];
         // Left from a round with more columns.
         foreground.extend([0; 2]);
-        proposal.extend([flow([0, 0]), 0, flow([1, 1]), 0]);
+        proposal.extend([pack_flow([0, 0]), 0, pack_flow([1, 1]), 0]);
         Bench::new(Some(&self.step))
             .buffer("counters", counters)
             .buffer("foreground", foreground)
             .buffer("proposal", proposal)
             .buffer("target_energy", start.target_energy.clone())
-            .buffer("target_rank", start.target_rank.clone())
-            .buffer("state", start.state.clone())
+            .buffer("target_index", start.target_index.clone())
+            .buffer("flow", start.state.clone())
     }
 
     /// One kernel for itself, then all of them in a row.
@@ -73,7 +73,7 @@ impl Round {
         let case = format!("{case}, {count} columns");
         let start = Changed {
             target_energy: vec![NONE; 961],
-            target_rank: vec![NONE; 961],
+            target_index: vec![NONE; 961],
             state: vec![POISON; 961],
         };
         let (step, list, proposal) = (&self.step, &self.foreground, &self.proposal);
@@ -82,8 +82,10 @@ impl Round {
             let bench = self.bench(&after).threads(kernel, count + 2);
             match kernel.name {
                 "claim" => claim(step, list, proposal, &mut after.target_energy),
-                "rank" => rank(step, list, proposal, &after.target_energy, &mut after.target_rank),
-                _ => settle(step, list, proposal, &after.target_rank, &mut after.state),
+                "elect" => {
+                    elect(step, list, proposal, &after.target_energy, &mut after.target_index)
+                }
+                _ => settle(step, list, proposal, &after.target_index, &mut after.state),
             }
             after.check(&format!("{case}, {}", kernel.name), bench);
         }
@@ -98,8 +100,8 @@ impl Changed {
         if let Some(outcome) = bench.run() {
             let expected = [
                 ("target_energy", &self.target_energy[..]),
-                ("target_rank", &self.target_rank),
-                ("state", &self.state),
+                ("target_index", &self.target_index),
+                ("flow", &self.state),
             ];
             outcome.check(case, &expected);
         }

@@ -1,9 +1,9 @@
 //! Group counts. No twin: the scalar backend loops over slices.
 
-use raywake_core::layout::{
+use raywake_core::params::{FOREGROUND_MAX, POINTS_MAX, ROW_WORKGROUP};
+use raywake_core::stages::{
     COUNTERS, DISTINCT_COUNT, FOREGROUND_COUNT, GROUPS_DISTINCT, GROUPS_FOREGROUND, GROUPS_ROWS,
 };
-use raywake_core::params::{FOREGROUND_MAX, POINTS_MAX, ROW_WORKGROUP};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::PLAN;
 use raywake_tests::bench::Bench;

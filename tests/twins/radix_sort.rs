@@ -1,9 +1,10 @@
 //! The sparse map's updates, sorted by key: a pass by itself, and all eight.
 
-use raywake_core::layout::{COUNTERS, DIGIT_SHIFT};
-use raywake_core::map::{Update, radix_sort::radix_sort};
+use raywake_core::map::Update;
 use raywake_core::params::{BAND_UPDATES, RADIX, TILE};
-use raywake_core::prefix_sum::prefix_sum;
+use raywake_core::stages::map::radix_sort::radix_sort;
+use raywake_core::stages::prefix_sum::prefix_sum;
+use raywake_core::stages::{COUNTERS, DIGIT_SHIFT};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{FIRST_DIGIT, HISTOGRAM, NEXT_DIGIT, REDUCE, SCAN, SCATTER, SPINE};
 use raywake_tests::bench::Bench;
@@ -50,7 +51,7 @@ fn check_pass(case: &str, list: &[Update], shift: u32) {
     let tiles = list.len().div_ceil(TILE) + 1;
     let histograms = counted(list, shift, tiles);
     let mut offsets = vec![0; histograms.len()];
-    prefix_sum(&histograms, &mut offsets);
+    prefix_sum(&histograms, &mut [0; TILE + 1], &mut offsets);
     let mut passed = list.to_vec();
     passed.sort_by_key(|u| u[0] >> shift & (RADIX as u32 - 1));
     let mut counters = vec![POISON; COUNTERS];
@@ -62,9 +63,9 @@ fn check_pass(case: &str, list: &[Update], shift: u32) {
         .buffer("unsorted", roomy(list, room))
         .buffer("sorted", roomy(&[], room))
         .buffer("histograms", vec![POISON; RADIX * tiles])
-        .buffer("offsets", offsets)
+        .buffer("digit_offsets", offsets)
         .groups(&HISTOGRAM, tiles)
-        .bound(&SCATTER, tiles, &[("histograms", "offsets")])
+        .groups(&SCATTER, tiles)
         .groups(&NEXT_DIGIT, 1);
     counters[DIGIT_SHIFT] += 4;
     if let Some(outcome) = bench.run() {
@@ -98,7 +99,7 @@ fn check_sort(case: &str, list: &[Update], tiles: usize) {
         .buffer("unsorted", roomy(list, room))
         .buffer("sorted", roomy(&[], room))
         .buffer("histograms", vec![POISON; RADIX * tiles])
-        .buffer("offsets", vec![POISON; RADIX * tiles])
+        .buffer("digit_offsets", vec![POISON; RADIX * tiles])
         .buffer("tiles", vec![POISON; TILE + 1])
         .groups(&FIRST_DIGIT, 1);
     for pass in 0..8 {
@@ -108,21 +109,17 @@ fn check_sort(case: &str, list: &[Update], tiles: usize) {
             _ => bench.bound(&HISTOGRAM, tiles, &[("unsorted", "sorted"), ("sorted", "unsorted")]),
         };
         bench = bench
-            .bound(&REDUCE, groups, &[("values", "histograms"), ("sums", "offsets")])
-            .bound(&SPINE, 1, &[("values", "histograms"), ("sums", "offsets")])
-            .bound(&SCAN, groups, &[("values", "histograms"), ("sums", "offsets")]);
+            .bound(&REDUCE, groups, &[("values", "histograms"), ("sums", "digit_offsets")])
+            .bound(&SPINE, 1, &[("values", "histograms"), ("sums", "digit_offsets")])
+            .bound(&SCAN, groups, &[("values", "histograms"), ("sums", "digit_offsets")]);
         bench = match pass % 2 {
-            0 => bench.bound(&SCATTER, tiles, &[("histograms", "offsets")]),
-            _ => bench.bound(
-                &SCATTER,
-                tiles,
-                &[("histograms", "offsets"), ("unsorted", "sorted"), ("sorted", "unsorted")],
-            ),
+            0 => bench.groups(&SCATTER, tiles),
+            _ => bench.bound(&SCATTER, tiles, &[("unsorted", "sorted"), ("sorted", "unsorted")]),
         };
         bench = bench.groups(&NEXT_DIGIT, 1);
     }
     let mut sorted = list.to_vec();
-    radix_sort(&mut sorted, &mut vec![[0; 2]; list.len()]);
+    radix_sort(&total(list.len()), &mut sorted, &mut vec![[0; 2]; list.len()]);
     // Before the last pass the keys were in the order of all digits but the highest.
     let mut but_one = list.to_vec();
     but_one.sort_by_key(|u| u[0] << 4);

@@ -1,10 +1,10 @@
 //! Rays merged and traced.
 
-use raywake_core::grid::ray_merge::{merged, ray_merge};
-use raywake_core::grid::ray_trace::ray_trace;
-use raywake_core::layout::{COUNTERS, DISTINCT_COUNT};
 use raywake_core::params::{EXTENT_VOXELS, MERGE_PROBES, MERGE_SLOTS, POINTS_MAX, WORKGROUP};
-use raywake_core::record::{Ray, Step, ray};
+use raywake_core::record::{Ray, SweepUniform, ray};
+use raywake_core::stages::grid::ray_merge::{merged, ray_merge};
+use raywake_core::stages::grid::ray_trace::ray_trace;
+use raywake_core::stages::{COUNTERS, DISTINCT_COUNT};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{RAY_MERGE, RAY_TRACE};
 use raywake_tests::bench::Bench;
@@ -26,14 +26,16 @@ impl Merged {
     fn by_twin(rays: &[Ray]) -> Merged {
         let mut slots = vec![[0; 2]; MERGE_SLOTS];
         let mut distinct = vec![0; rays.len()];
-        let used = ray_merge(rays, &mut slots, &mut distinct);
-        distinct.truncate(used);
+        let sweep = SweepUniform { rays: rays.len() as i32, ..SweepUniform::default() };
+        let mut counters = [0; COUNTERS];
+        ray_merge(&sweep, rays, &mut slots, &mut distinct, &mut counters);
+        distinct.truncate(counters[DISTINCT_COUNT] as usize);
         Merged { rays: rays.to_vec(), slots, distinct }
     }
 
     /// None where there is no device.
     fn by_kernel(rays: &[Ray]) -> Option<Merged> {
-        let step = Step { rays: rays.len() as i32, ..Step::default() };
+        let step = SweepUniform { rays: rays.len() as i32, ..SweepUniform::default() };
         // Rays behind the last one, as a sweep before might have left them, must not count.
         let mut more = rays.to_vec();
         more.extend([ray([1, 2, 3], 4, false); 3]);
@@ -119,7 +121,7 @@ fn crowd() -> Vec<Ray> {
 fn a_crowd_beyond_the_probes_changes_no_sum() {
     let crowd = crowd();
     let rays: Vec<Ray> = (0..4 * crowd.len()).map(|n| crowd[n * 7 % crowd.len()]).collect();
-    let step = Step { range_steps: 100, ..window(61, 16) };
+    let step = SweepUniform { range_steps: 100, ..window(61, 16) };
     let mut random = Random::new(16);
     let origins: Vec<[i32; 4]> =
         (0..512).map(|_| [random.between(20, 40), random.between(20, 40), 7, 0]).collect();
@@ -138,7 +140,7 @@ fn a_crowd_beyond_the_probes_changes_no_sum() {
     check_trace("crowd, as the kernel merged it", &step, &origins, &kernel);
 }
 
-fn check_trace(case: &str, step: &Step, origins: &[[i32; 4]], merged: &Merged) {
+fn check_trace(case: &str, step: &SweepUniform, origins: &[[i32; 4]], merged: &Merged) {
     let used = merged.distinct.len();
     let mut counters = vec![POISON; COUNTERS];
     counters[DISTINCT_COUNT] = used as u32;
@@ -167,7 +169,7 @@ fn traces_of_every_kind() {
     let outside = vec![[-3, 15, 4, 0], [15, 40, 4, 0], [15, 15, -9, 0], [900, -900, 30, 0]];
     for (case, origins) in [("inside", inside), ("outside", outside)] {
         for (levels, range_steps) in [(8, 1), (14, 20), (16, 334), (8, 2000)] {
-            let step = Step { range_steps, ..window(31, levels) };
+            let step = SweepUniform { range_steps, ..window(31, levels) };
             for count in [0, 1, 63, 64, 65, 3000] {
                 for reach in [2, 40, EXTENT_VOXELS] {
                     let mut one = || {

@@ -1,8 +1,9 @@
 //! The sparse map's updates, summed by key.
 
-use raywake_core::map::{Update, reduce_by_key::reduce_by_key};
+use raywake_core::map::Update;
 use raywake_core::params::{BAND_UPDATES, TILE, WORKGROUP};
-use raywake_core::prefix_sum::prefix_sum;
+use raywake_core::stages::map::reduce_by_key::reduce_by_key;
+use raywake_core::stages::prefix_sum::prefix_sum;
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{FOLD, MARK_HEADS, REDUCE, SCAN, SPINE};
 use raywake_tests::bench::Bench;
@@ -17,13 +18,16 @@ fn check(case: &str, sorted: &[Update], room: usize) {
     let count = sorted.len();
     let case = format!("{case}, {count} updates, room for {room}");
     let mut voxels = vec![[0; 2]; room];
-    let found = reduce_by_key(sorted, &mut voxels);
+    let mut run_tiles = [0; TILE + 1];
+    reduce_by_key(&total(count), sorted, &mut voxels, &mut run_tiles);
+    let found = run_tiles[TILE] as usize;
     let mut heads = vec![0; room];
     for (n, head) in heads[..count].iter_mut().enumerate() {
         *head = (n == 0 || sorted[n - 1][0] != sorted[n][0]) as u32;
     }
     let mut runs = vec![0; room];
-    assert_eq!(prefix_sum(&heads, &mut runs) as usize, found);
+    prefix_sum(&heads, &mut run_tiles, &mut runs);
+    assert_eq!(run_tiles[TILE] as usize, found);
     let voxels = voxels.as_flattened();
     let bench = |heads: &[u32], runs: &[u32]| {
         Bench::new(None)

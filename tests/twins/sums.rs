@@ -1,9 +1,9 @@
 //! Prefix sums and compaction.
 
-use raywake_core::compact::compact;
-use raywake_core::layout::{COUNTERS, FOREGROUND_COUNT, FOREGROUND_MARKED};
 use raywake_core::params::{COLUMNS_MAX, FOREGROUND_MAX, TILE, WORKGROUP};
-use raywake_core::prefix_sum::prefix_sum;
+use raywake_core::stages::compact::compact;
+use raywake_core::stages::prefix_sum::prefix_sum;
+use raywake_core::stages::{COUNTERS, FOREGROUND_COUNT, FOREGROUND_MARKED};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{COMPACT, REDUCE, SCAN, SPINE};
 use raywake_tests::bench::Bench;
@@ -23,9 +23,9 @@ fn check_sum(case: &str, values: &[u32]) {
         *total = tile.iter().sum();
     }
     let mut offsets = totals.clone();
-    offsets[TILE] = prefix_sum(&totals[..groups], &mut offsets[..groups]);
     let mut sums = vec![0; count];
-    prefix_sum(values, &mut sums);
+    prefix_sum(values, &mut offsets, &mut sums);
+    prefix_sum(&totals[..groups], &mut [0; TILE + 1], &mut offsets[..groups]);
 
     let bench = |tiles: &[u32]| {
         Bench::new(None)
@@ -81,20 +81,20 @@ fn sums_of_every_kind() {
 
 fn check_compact(case: &str, marks: &[u32], capacity: usize) {
     let count = marks.len();
-    let mut rank = vec![0; count];
-    prefix_sum(marks, &mut rank);
+    let mut index = vec![0; count];
+    prefix_sum(marks, &mut [0; TILE + 1], &mut index);
     let mut list = vec![POISON; capacity];
     let mut counters = vec![POISON; COUNTERS];
     let bench = Bench::new(None)
-        .buffer("marks", marks.to_vec())
-        .buffer("rank", rank.clone())
+        .buffer("foreground_marks", marks.to_vec())
+        .buffer("foreground_index", index.clone())
         .buffer("foreground", list.clone())
         .buffer("counters", counters.clone())
         .threads(&COMPACT, count);
-    let (listed, marked) = compact(marks, &mut rank, &mut list);
-    (counters[FOREGROUND_COUNT], counters[FOREGROUND_MARKED]) = (listed as u32, marked as u32);
+    compact(marks, &mut index, &mut list, &mut counters);
     if let Some(outcome) = bench.run() {
-        let expected = [("rank", &rank[..]), ("foreground", &list), ("counters", &counters)];
+        let expected =
+            [("foreground_index", &index[..]), ("foreground", &list), ("counters", &counters)];
         outcome.check(&format!("{case}, {count} marks, room for {capacity}"), &expected);
     }
 }
@@ -118,28 +118,30 @@ fn lists_of_every_length() {
 fn the_prefix_sum_feeds_the_list() {
     let mut random = Random::new(4);
     let marks: Vec<u32> = (0..COLUMNS_MAX).map(|_| random.below(2)).collect();
-    let mut rank = vec![POISON; marks.len()];
+    let mut index = vec![POISON; marks.len()];
     let mut list = vec![POISON; FOREGROUND_MAX];
-    // The prefix sum knows the marks as `values` and the ranks as `sums`.
+    // The prefix sum knows the marks as `values` and the indices as `sums`.
     let bench = Bench::new(None)
         .buffer("values", marks.clone())
         .buffer("tiles", vec![POISON; TILE + 1])
-        .buffer("sums", rank.clone())
+        .buffer("sums", index.clone())
         .groups(&REDUCE, COLUMNS_MAX / TILE)
         .groups(&SPINE, 1)
         .groups(&SCAN, COLUMNS_MAX / TILE);
     let Some(outcome) = bench.run() else { return };
     let summed = outcome.words("sums").to_vec();
     let bench = Bench::new(None)
-        .buffer("marks", marks.clone())
-        .buffer("rank", summed)
+        .buffer("foreground_marks", marks.clone())
+        .buffer("foreground_index", summed)
         .buffer("foreground", list.clone())
         .buffer("counters", vec![0; COUNTERS])
         .threads(&COMPACT, COLUMNS_MAX);
-    let (listed, marked) = compact(&marks, &mut rank, &mut list);
-    assert!(marked > listed, "more marks than room");
-    let outcome = bench.run().expect("the same device");
     let mut counters = vec![0; COUNTERS];
-    (counters[FOREGROUND_COUNT], counters[FOREGROUND_MARKED]) = (listed as u32, marked as u32);
-    outcome.check("chain", &[("rank", &rank), ("foreground", &list), ("counters", &counters)]);
+    prefix_sum(&marks, &mut [0; TILE + 1], &mut index);
+    compact(&marks, &mut index, &mut list, &mut counters);
+    assert!(counters[FOREGROUND_MARKED] > counters[FOREGROUND_COUNT], "more marks than room");
+    let outcome = bench.run().expect("the same device");
+    let expected =
+        [("foreground_index", &index[..]), ("foreground", &list), ("counters", &counters)];
+    outcome.check("chain", &expected);
 }

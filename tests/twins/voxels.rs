@@ -1,7 +1,7 @@
 //! Columns from log-odds, and columns moved into the next window.
 
-use raywake_core::grid::{columns::columns, shift::shift};
-use raywake_core::record::Step;
+use raywake_core::record::SweepUniform;
+use raywake_core::stages::grid::{columns::columns, shift::shift};
 use raywake_gpu::Kernel;
 use raywake_kernels::kernel::{COLUMNS, SHIFT};
 use raywake_tests::bench::Bench;
@@ -14,7 +14,7 @@ pub const KERNELS: &[&Kernel] = &[&COLUMNS, &SHIFT];
 /// Sides whose squares lie around a workgroup, and the largest.
 const SIDES: [i32; 5] = [1, 15, 16, 17, 255];
 
-fn check_columns(step: &Step, log_odds: Vec<i32>) {
+fn check_columns(step: &SweepUniform, log_odds: Vec<i32>) {
     let count = (step.side * step.side) as usize;
     let mut now = vec![[POISON; 2]; count];
     let bench = Bench::new(Some(step))
@@ -42,7 +42,7 @@ fn columns_of_every_height() {
     }
 }
 
-fn check_shift(step: &Step, seed: u64) {
+fn check_shift(step: &SweepUniform, seed: u64) {
     let count = (step.side * step.side) as usize;
     let now = Random::new(seed).columns(count, step.levels);
     let mut before = vec![[POISON; 2]; count];
@@ -71,7 +71,7 @@ fn shifts_of_every_size() {
                 (0, -side, levels),
                 (0, 0, -side.max(levels)),
             ] {
-                let step = Step { shift_x: x, shift_y: y, shift_z: z, ..still };
+                let step = SweepUniform { shift_x: x, shift_y: y, shift_z: z, ..still };
                 check_shift(&step, n as u64);
             }
         }

@@ -61,8 +61,6 @@ pub const LOG_ODDS_FREE: i32 = -1;
 pub const LOG_ODDS_OCCUPIED: i32 = 10;
 /// From these tenths on a voxel is solid: p > 0.6, the author's test for a column worth matching.
 pub const LOG_ODDS_SOLID: i32 = 5;
-/// Bounds of log-odds where probabilities are put out, tenths (Table B.1).
-pub const LOG_ODDS_CLIP: [i32; 2] = [-30, 30];
 /// `-log 0.5` in thousandths of a nat: the cost of a window neighbour that says nothing.
 pub const COST_UNKNOWN: u32 = 693;
 /// Height of the HDL-64E above ground on KITTI's car, m: levels are anchored to it, so that the

@@ -4,12 +4,13 @@ use super::places::Places;
 use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
 use super::surface::{self, LazyWeight};
+use crate::frame::central;
 use crate::ground::GroundGrid;
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
     SUBVOXELS_MAX,
 };
-use crate::prepare::{Placed, central};
+use crate::prepare::Placed;
 use crate::record::NONE;
 use crate::sweep::{Point, SENSORS_MAX};
 use core::ops::Range;

@@ -41,9 +41,9 @@ mod surface;
 mod tests;
 
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
-use crate::pipeline::Perceived;
+use crate::perceive::Perceived;
 use crate::prepare::Placed;
-use crate::record::{Flow, Step, VALID, flow_displacement};
+use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::sweep::Point;
 use crate::team::Team;
 use cloud::{Cloud, Scratch, SweepReturns};
@@ -115,7 +115,7 @@ impl Refinement {
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
-        step: &Step,
+        step: &SweepUniform,
         perceived: &Perceived,
         predicted: impl Fn(usize) -> Option<[f32; 2]> + Sync,
     ) {
@@ -123,7 +123,7 @@ impl Refinement {
         let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
             return;
         };
-        let Perceived { state, before, now, .. } = *perceived;
+        let Perceived { flow: state, columns_before: before, columns_now: now, .. } = *perceived;
         let newest = self.newest;
         let first = &self.clouds[index(newest, 1)];
         let side = first.side;
@@ -159,7 +159,7 @@ impl Refinement {
     }
 
     /// How a column of the new window moved, or that it is static.
-    pub(crate) fn of(&self, step: &Step, column: usize, flow: Flow) -> Refined {
+    pub(crate) fn of(&self, step: &SweepUniform, column: usize, flow: Flow) -> Refined {
         let Some(scaled) = &self.scaled else {
             return Refined { by: [0.0; 2], covariance: [0.0; 3], moves: false };
         };

@@ -9,11 +9,13 @@
 //! one cell the older stays.
 
 pub mod ekf;
+pub(crate) mod observe;
+pub(crate) mod state;
 #[cfg(test)]
 mod tests;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile, TrackletParams};
-use crate::record::{NONE, Step};
+use crate::record::{NONE, SweepUniform};
 use ekf::Ekf;
 use nalgebra::Matrix2;
 
@@ -151,7 +153,7 @@ impl Tracklets {
     pub(crate) fn update(
         &mut self,
         profile: &Profile,
-        step: &Step,
+        step: &SweepUniform,
         dt: f32,
         turned: f32,
         left: u32,
@@ -193,7 +195,7 @@ impl Tracklets {
     }
 
     /// Tracklets whose cell was not observed take the nearest column beside it that was.
-    fn take_over(&mut self, step: &Step, observed: &mut [Observation]) {
+    fn take_over(&mut self, step: &SweepUniform, observed: &mut [Observation]) {
         let side = step.side;
         for (slot, t) in self.now.iter_mut().enumerate() {
             if t.column == NONE || self.claimed[slot] {
@@ -226,7 +228,7 @@ impl Tracklets {
     /// slot, or that of the older one there.
     fn put(
         &mut self,
-        step: &Step,
+        step: &SweepUniform,
         column: u32,
         by: [f32; 2],
         t: Tracklet,
@@ -262,7 +264,13 @@ impl Tracklets {
     }
 
     /// Unobserved tracklets move on as predicted for a while, their covariance growing (5.2.2).
-    fn coast(&mut self, profile: &Profile, step: &Step, dt: f32, turnover: &mut TrackletTurnover) {
+    fn coast(
+        &mut self,
+        profile: &Profile,
+        step: &SweepUniform,
+        dt: f32,
+        turnover: &mut TrackletTurnover,
+    ) {
         for slot in 0..self.now.len() {
             let t = self.now[slot];
             let coasts = t.missed < profile.tracklet.coast_sweeps && t.age > t.missed;
@@ -286,7 +294,7 @@ impl Tracklets {
 
     /// Finds the tracklets' columns in the new window. Returns how many are no longer in it; those
     /// have [`NONE`] for a column.
-    pub(crate) fn place(&mut self, step: &Step) -> u32 {
+    pub(crate) fn place(&mut self, step: &SweepUniform) -> u32 {
         let side = step.side;
         self.slot_of_column.fill(NONE);
         let mut left = 0;

@@ -14,8 +14,8 @@ fn profile() -> Profile {
     Profile { side: SIDE as u32, ..Profile::hdl64() }
 }
 
-fn step(side: i32, shift: [i32; 2]) -> Step {
-    Step { side, shift_x: shift[0], shift_y: shift[1], ..Step::default() }
+fn step(side: i32, shift: [i32; 2]) -> SweepUniform {
+    SweepUniform { side, shift_x: shift[0], shift_y: shift[1], ..SweepUniform::default() }
 }
 
 /// A column that moves by cells.

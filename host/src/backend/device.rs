@@ -1,44 +1,40 @@
 //! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
 
-use raywake_core::layout::{BUFFERS, Buffer, DISTINCT_COUNT, FOREGROUND_COUNT, FOREGROUND_MARKED};
-use raywake_core::params::{FOREGROUND_MAX, Profile};
-use raywake_core::pipeline::Perceived;
-use raywake_core::prepare::step_of;
-use raywake_core::record::{Ray, Step};
-use raywake_gpu::{Census, Executor, GpuError, Options};
-use raywake_kernels::schedule;
+use raywake_core::params::Profile;
+use raywake_core::perceive::{Outputs, Perceive, Perceived, Timer};
+use raywake_core::prepare::uniform_of;
+use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
+use raywake_core::team::{Alone, Team};
+use raywake_gpu::{Census, Executor, GpuError, Heap, Options};
+use raywake_kernels::schedule::Schedule;
 
 use super::Tables;
-use crate::laps::Laps;
 
-/// Index of the program run every sweep.
-const FLOW: usize = 0;
-/// Index of the program run once.
-const LOAD: usize = 1;
+/// Index of the program run once, and of the one run every sweep.
+const LOAD: usize = 0;
+const FLOW: usize = 1;
 
 /// A device with everything recorded.
 pub struct Device {
     executor: Executor,
+    schedule: Schedule,
 }
 
 impl Device {
     /// Allocates and records for a profile, uploads the learned tables and runs the pipeline once
     /// without rays: software devices compile kernels in their first run.
     pub fn new(profile: &Profile, tables: &Tables, options: &Options) -> Result<Device, GpuError> {
-        let buffers = schedule::buffers(BUFFERS, profile);
-        let programs = [schedule::flow(profile), schedule::load()];
-        let mut executor = Executor::new(options, &buffers, &programs)?;
-        let mut fill = |buffer: Buffer, words: &[u32]| {
-            executor.upload(buffer as usize).copy_from_slice(words);
-        };
-        fill(Buffer::FilterIn, bytemuck::cast_slice(&tables.filter));
-        fill(Buffer::WeightsIn, bytemuck::cast_slice(&tables.constancy));
-        fill(Buffer::CostsIn, &tables.costs);
-        executor.run(LOAD)?;
-        let mut device = Device { executor };
+        let schedule = Schedule::new(FLOW_PROGRAMS, profile);
+        let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
+        let mut device = Device { executor, schedule };
+        device.upload(Buffer::filter_table, bytemuck::cast_slice(&tables.filter));
+        device.upload(Buffer::constancy_weights, bytemuck::cast_slice(&tables.constancy));
+        device.upload(Buffer::constancy_costs, &tables.costs);
+        device.executor.run(LOAD)?;
         // Nothing of what the device held before comes into view.
-        let empty = Step { shift_x: profile.side as i32, ..step_of(profile, 0) };
-        device.perceive(&empty, &mut Laps::start(), || ())?;
+        let empty = SweepUniform { shift_x: profile.side as i32, ..uniform_of(profile, 0) };
+        device.perceive(&empty, &Alone, &mut (), || ())?;
         Ok(device)
     }
 
@@ -57,40 +53,42 @@ impl Device {
         &self.executor.info().name
     }
 
-    /// Where the next sweep goes: mapped memory.
-    pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
-        let [rays, origins] =
-            self.executor.uploads([Buffer::RaysIn as usize, Buffer::OriginsIn as usize]);
+    fn upload(&mut self, buffer: Buffer, words: &[u32]) {
+        self.executor.upload(self.schedule.index(Heap::Upload, buffer)).copy_from_slice(words);
+    }
+
+    fn readback(&self, buffer: Buffer) -> &[u32] {
+        self.executor.readback(self.schedule.index(Heap::Readback, buffer))
+    }
+}
+
+impl Perceive for Device {
+    type Error = GpuError;
+
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+        let rows = [Buffer::rays, Buffer::origins].map(|b| self.schedule.index(Heap::Upload, b));
+        let [rays, origins] = self.executor.uploads(rows);
         (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
     }
 
-    /// From rays to flow; `meanwhile` is done while the device works.
-    pub fn perceive(
+    fn perceive(
         &mut self,
-        step: &Step,
-        laps: &mut Laps,
-        meanwhile: impl FnOnce(),
+        sweep: &SweepUniform,
+        _: &impl Team,
+        timer: &mut (impl Timer + Send),
+        meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
-        step.write(self.executor.upload(Buffer::StepIn as usize));
+        sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep)));
         self.executor.run_beside(FLOW, meanwhile)?;
-        let mut on_device = 0.0;
-        for (name, milliseconds) in self.executor.times(FLOW) {
-            laps.add(name, milliseconds);
-            on_device += milliseconds;
+        timer.measured(&mut self.executor.times(FLOW), "submit and wait");
+        Ok(Outputs {
+            counters: self.readback(Buffer::counters),
+            columns_before: bytemuck::cast_slice(self.readback(Buffer::columns_before)),
+            columns_now: bytemuck::cast_slice(self.readback(Buffer::columns_now)),
+            foreground: self.readback(Buffer::foreground),
+            flow: self.readback(Buffer::flow),
+            proposal: bytemuck::cast_slice(self.readback(Buffer::proposal)),
         }
-        laps.rest("submit and wait", on_device);
-        let read = |b: Buffer| self.executor.readback(b as usize);
-        let counters = read(Buffer::CountersOut);
-        // A device that answers nonsense yields no flow, not a panic.
-        let count = (counters[FOREGROUND_COUNT] as usize).min(FOREGROUND_MAX);
-        Ok(Perceived {
-            now: bytemuck::cast_slice(read(Buffer::NowOut)),
-            before: bytemuck::cast_slice(read(Buffer::BeforeOut)),
-            foreground: &read(Buffer::ForegroundOut)[..count],
-            marked: counters[FOREGROUND_MARKED] as usize,
-            rays: counters[DISTINCT_COUNT] as usize,
-            state: read(Buffer::StateOut),
-            proposal: &bytemuck::cast_slice(read(Buffer::ProposalOut))[..count],
-        })
+        .into())
     }
 }

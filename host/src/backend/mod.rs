@@ -1,19 +1,15 @@
 //! The heavy half of the pipeline, from rays to flow: on the CPU or on a Vulkan device.
 
 pub mod device;
-pub mod scalar;
 
-use raywake_core::background_filter::{self, TABLE_WORDS};
-use raywake_core::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
 use raywake_core::params::Profile;
-use raywake_core::pipeline::Perceived;
-use raywake_core::record::{Ray, Step};
-use raywake_core::team::Team as _;
+use raywake_core::perceive::{self, Perceive, Perceived, Timer};
+use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::stages::background_filter::{self, TABLE_WORDS};
+use raywake_core::stages::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
+use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
 use raywake_gpu::{Census, GpuError};
-
-use crate::laps::Laps;
-use crate::team::Team;
 
 /// What is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,41 +83,53 @@ impl Tables {
     }
 }
 
+/// The twins over memory of the heap.
+pub type Scalar = perceive::Scalar<Vec<u32>>;
+
 /// Either backend.
 pub enum Backend {
-    /// The core's twins on one thread.
-    Scalar(Box<scalar::Scalar>),
+    /// The core's twins.
+    Scalar(Box<Scalar>),
     /// The kernels on a Vulkan device.
     Device(Box<device::Device>),
 }
 
-impl Backend {
-    /// Where the rays and origins of the next sweep go.
-    pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+impl Perceive for Backend {
+    type Error = GpuError;
+
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
         match self {
             Backend::Scalar(b) => b.input(),
             Backend::Device(b) => b.input(),
         }
     }
 
-    /// From rays to flow; the time of each stage goes to `laps`. `meanwhile` is done while a device
-    /// works, and otherwise by another thread of the team.
-    pub fn perceive(
+    fn perceive(
         &mut self,
-        step: &Step,
-        rounds: u32,
-        laps: &mut Laps,
+        sweep: &SweepUniform,
+        team: &impl Team,
+        timer: &mut (impl Timer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         match self {
             Backend::Scalar(b) => {
-                let mut perceived = None;
-                Team.join(|| perceived = Some(b.perceive(step, rounds, laps)), meanwhile);
-                laps.lap("prepare");
-                Ok(perceived.expect("both were done"))
+                Ok(b.perceive(sweep, team, timer, meanwhile).unwrap_or_else(|e| match e {}))
             }
-            Backend::Device(b) => b.perceive(step, laps, meanwhile),
+            Backend::Device(b) => b.perceive(sweep, team, timer, meanwhile),
         }
+    }
+}
+
+impl Backend {
+    /// The scalar backend for a profile.
+    pub fn scalar(profile: &Profile, tables: &Tables) -> Backend {
+        let words = vec![0; Scalar::words(profile)];
+        let tables = perceive::Tables {
+            filter_table: &tables.filter,
+            constancy_weights: &tables.constancy,
+            constancy_costs: &tables.costs,
+        };
+        Backend::Scalar(Box::new(Scalar::new(words, profile, &tables)))
     }
 
     /// `scalar` or `vulkan`.

@@ -2,14 +2,16 @@
 
 use std::fmt::Write;
 
-use raywake_core::layout::{BUFFERS, Heap, MAP_BUFFERS, Row};
-use raywake_core::params::Profile;
-use raywake_core::record::Step;
-use raywake_kernels::schedule;
+use raywake_core::params::{Profile, REACH};
+use raywake_core::record::{PACKED, SweepUniform};
+use raywake_core::stages::Row;
+use raywake_gpu::{Buffer, Heap};
+use raywake_kernels::schedule::Schedule;
 
 use super::traffic::{self, Traffic};
 use super::{
-    ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts, is_map, track_parts,
+    ALIGNMENT, HEAPS, device_bytes, heap_bytes, host_bytes, host_parts, is_map, schedule,
+    track_parts,
 };
 
 const HEAD: &str = "\
@@ -29,7 +31,7 @@ touch the buffer; `fill` sets every word, `copy` moves a whole buffer.
 
 /// Below the device's table of the flow pipeline; a test of [`traffic`] sees that it is so.
 const LIFETIME: &str = "
-The two largest tables, `cost` and `matching`, are alive at the same time only in `window`, which
+The two largest tables, `pair_cost` and `window_cost`, are alive at the same time only in `window`, which
 reads the one and writes the other.
 ";
 
@@ -69,21 +71,10 @@ The states of tracks that have ended wait for their file, and are not counted.
 const RECORDS_HEAD: &str = "
 ## Records
 
-`params_in` and `params` hold one record `Step`, of the sweep or, in the sparse map, of the band.
+`sweep_in` and `sweep` hold one record `SweepUniform`, of the sweep or, in the sparse map, of the band.
 
 | word | byte | field | type |
 |--:|--:|---|---|
-";
-
-/// The packed elements, from `raywake_core::record` and `raywake_core::map`.
-const PACKED: &str = "
-Other elements are plain words or packed:
-
-- `Ray`, 2 words: `[i | j << 16, k | origin << 16 | no_end << 31]`, `i, j, k` its end's signed 16-bit voxel from the window's corner, `origin` an index of the origins, `no_end` set where nothing is hit there
-- `Column`, 2 words: `[free | occupied << 16, solid]`, one bit a level
-- `Flow`, 1 word: `1 << 31 | (du + 15) << 8 | (dv + 15)`, cells, or 0 where there is none
-- `Proposal`, 2 words: `[flow, cost]`, flow 0 where no target is feasible
-- `Update`, 2 words: `[key, log-odds as i32]`, an update or a voxel of the sparse map
 ";
 
 /// Profiles that take the same bytes share a column.
@@ -96,7 +87,7 @@ struct Sizes<'a> {
 struct Layout<'a> {
     /// What precedes the title of a section.
     level: &'static str,
-    table: &'static [Row],
+    schedule: Schedule,
     sizes: Vec<Sizes<'a>>,
     traffic: Vec<Traffic>,
     /// Below the device's table.
@@ -129,21 +120,20 @@ pub fn memory_layout(profiles: &[Profile]) -> String {
 fn flow<'a>(first: &Profile, profiles: &[&'a Profile]) -> Layout<'a> {
     Layout {
         level: "##",
-        table: BUFFERS,
-        sizes: sizes(BUFFERS, profiles),
-        traffic: traffic::of(BUFFERS, &[schedule::load(), schedule::flow(first)]),
+        sizes: sizes(profiles),
+        traffic: traffic::of(&schedule(first)),
+        schedule: schedule(first),
         device: LIFETIME,
         host: "",
     }
 }
 
 fn map<'a>(profiles: &[&'a Profile]) -> Layout<'a> {
-    let programs = [schedule::map_rays(), schedule::map_count(), schedule::map_band()];
     Layout {
         level: "###",
-        table: MAP_BUFFERS,
-        sizes: sizes(MAP_BUFFERS, profiles),
-        traffic: traffic::of(MAP_BUFFERS, &programs),
+        sizes: sizes(profiles),
+        traffic: traffic::of(&schedule(profiles[0])),
+        schedule: schedule(profiles[0]),
         device: "",
         host: MAP_HOST,
     }
@@ -157,8 +147,10 @@ impl Layout<'_> {
     }
 }
 
-fn sizes<'a>(table: &[Row], profiles: &[&'a Profile]) -> Vec<Sizes<'a>> {
-    let bytes = |p: &Profile| -> Vec<usize> { table.iter().map(|b| b.bytes(p)).collect() };
+fn sizes<'a>(profiles: &[&'a Profile]) -> Vec<Sizes<'a>> {
+    let bytes = |p: &Profile| -> Vec<u64> {
+        schedule(p).buffers(p).iter().map(|b: &Buffer| b.bytes).collect()
+    };
     let mut all: Vec<Sizes> = Vec::new();
     for &profile in profiles {
         match all.iter_mut().find(|s| bytes(s.profile) == bytes(profile)) {
@@ -186,14 +178,16 @@ fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result
     writeln!(out, "| buffer | element | {names} | align | written by | read by | holds |")?;
     let rule = cells(sizes, |_| "--:".into());
     writeln!(out, "|---|---|{}|--:|---|---|---|", rule.replace(' ', ""))?;
-    let rows = layout.table.iter().zip(&layout.traffic).filter(|(row, _)| row.heap == heap);
+    let rows = layout.schedule.rows.iter().zip(&layout.traffic).filter(|(row, _)| row.heap == heap);
     for (row, traffic) in rows {
-        let bytes = cells(sizes, |s| amount(row, s.profile));
+        let bytes = cells(sizes, |s| amount(row.buffer.row(), s.profile));
         let (writers, readers) = (traffic.writers.join(", "), traffic.readers.join(", "));
         writeln!(
             out,
             "| `{}` | `{}` | {bytes} | {ALIGNMENT} | {writers} | {readers} | {} |",
-            row.name, row.element, row.doc
+            row.name(),
+            row.buffer.row().wgsl,
+            row.buffer.row().doc
         )?;
     }
     let sums = cells(sizes, |s| grouped(heap_bytes(heap, s.profile)));
@@ -204,7 +198,7 @@ fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result
 
 /// `27,889 x 8 = 223,112`.
 fn amount(row: &Row, profile: &Profile) -> String {
-    let [count, of] = [(row.count)(profile), 4 * row.words].map(|n| grouped(n as u64));
+    let [count, of] = [(row.count)(profile), row.element_bytes].map(|n| grouped(n as u64));
     format!("{count} x {of} = {}", grouped(row.bytes(profile) as u64))
 }
 
@@ -240,10 +234,13 @@ fn totals(out: &mut String, layout: &Layout) -> std::fmt::Result {
 /// The words of records, and how elements are packed.
 fn records(out: &mut String) -> std::fmt::Result {
     out.push_str(RECORDS_HEAD);
-    for (word, field) in Step::FIELDS.iter().enumerate() {
+    for (word, field) in SweepUniform::FIELDS.iter().enumerate() {
         writeln!(out, "| {word} | {} | `{field}` | `i32` |", 4 * word)?;
     }
-    out.push_str(PACKED);
+    out.push_str("\nOther elements are plain words or packed:\n\n");
+    for (name, bytes, layout) in PACKED {
+        writeln!(out, "- `{name}`, {bytes} bytes:{}", layout.replace("REACH", &REACH.to_string()))?;
+    }
     Ok(())
 }
 
@@ -261,13 +258,7 @@ fn grouped(number: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{PACKED, grouped};
-    use raywake_core::params::REACH;
-
-    #[test]
-    fn flows_are_packed_as_said() {
-        assert!(PACKED.contains(&format!("(du + {REACH}) << 8 | (dv + {REACH})")));
-    }
+    use super::grouped;
 
     #[test]
     fn thousands() {

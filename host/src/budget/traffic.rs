@@ -1,7 +1,7 @@
 //! Who writes and who reads each buffer, as the schedules say.
 
-use raywake_core::layout::{Heap, Row};
-use raywake_gpu::{Groups, Op, Program};
+use raywake_gpu::{Groups, Heap, Op};
+use raywake_kernels::schedule::Schedule;
 
 /// Names of the steps that touch a buffer, each once, from first to last.
 #[derive(Clone, Debug, Default)]
@@ -10,16 +10,16 @@ pub(super) struct Traffic {
     pub readers: Vec<&'static str>,
 }
 
-/// The traffic of every buffer of a table over the programs made for it, in the order they run.
-pub(super) fn of(table: &[Row], programs: &[Program]) -> Vec<Traffic> {
-    let mut all: Vec<Traffic> = vec![Traffic::default(); table.len()];
-    for (buffer, traffic) in table.iter().zip(&mut all) {
+/// The traffic of every buffer over the programs, in the order they run.
+pub(super) fn of(schedule: &Schedule) -> Vec<Traffic> {
+    let mut all: Vec<Traffic> = vec![Traffic::default(); schedule.rows.len()];
+    for (buffer, traffic) in schedule.rows.iter().zip(&mut all) {
         if buffer.heap == Heap::Upload {
             note(&mut traffic.writers, "host");
         }
     }
-    programs.iter().flat_map(|p| &p.ops).for_each(|op| step(op, &mut all));
-    for (buffer, traffic) in table.iter().zip(&mut all) {
+    schedule.programs.iter().flat_map(|p| &p.ops).for_each(|op| step(op, &mut all));
+    for (buffer, traffic) in schedule.rows.iter().zip(&mut all) {
         if buffer.heap == Heap::Readback {
             note(&mut traffic.readers, "host");
         }
@@ -60,21 +60,21 @@ fn note(names: &mut Vec<&'static str>, name: &'static str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raywake_core::layout::{BUFFERS, Buffer};
     use raywake_core::params::Profile;
-    use raywake_kernels::schedule;
+    use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
 
     #[test]
     fn the_large_tables_meet_in_one_step() {
-        let programs = [schedule::load(), schedule::flow(&Profile::hdl64())];
-        let all = of(BUFFERS, &programs);
-        let [cost, matching] = [Buffer::Cost, Buffer::Matching].map(|b| &all[b as usize]);
+        let schedule = Schedule::new(FLOW_PROGRAMS, &Profile::hdl64());
+        let all = of(&schedule);
+        let [pair, window] =
+            [Buffer::pair_cost, Buffer::window_cost].map(|b| &all[schedule.index(Heap::Device, b)]);
         assert_eq!(
-            (&cost.writers[..], &cost.readers[..]),
+            (&pair.writers[..], &pair.readers[..]),
             (&["occupancy_constancy"][..], &["window"][..])
         );
         assert_eq!(
-            (&matching.writers[..], &matching.readers[..]),
+            (&window.writers[..], &window.readers[..]),
             (&["window"][..], &["expectation"][..])
         );
     }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use raywake_core::output::{Origin, PointFlow};
 use raywake_core::params::{ANCHOR_ABOVE_GROUND_M, Profile};
+use raywake_core::perceive::Timer;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 
@@ -152,21 +153,21 @@ fn points(
     let chosen = choose::drive(&args.backend, weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
     let mut drive = chosen.drive;
-    let mut returns = drive.step(&first.sweep(), &[])?.prepared.dropped;
+    let mut returns = drive.step(&first.sweep(), &[])?.output.dropped;
     let stepped = drive.step(&second.sweep(), &first.points)?;
-    returns += stepped.prepared.dropped;
-    if let Some(reset) = stepped.prepared.reset {
+    returns += stepped.output.dropped;
+    if let Some(reset) = stepped.output.reset {
         let [a, b] = [&args.first, &args.second].map(|path| path.display());
         return Err(RunError::Io(Error::Usage(format!(
             "{b} does not follow {a}: {}",
             in_words(reset).1
         ))));
     }
-    if let Some((pictures, flows)) = png.as_mut().zip(stepped.flows.as_ref()) {
+    if let Some((pictures, flows)) = png.as_mut().zip(stepped.output.flows.as_ref()) {
         let (columns, frame) = (flows.columns, PictureFrame::World);
         pictures.write(first, &Scene::Flow { columns, profile, frame })?;
     }
-    let mut flows = stepped.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
+    let mut flows = stepped.output.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
     flows.resize(first.points.len(), PointFlow::default());
     Ok((flows, Dropped { returns, ..Dropped::default() }))
 }

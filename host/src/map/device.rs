@@ -1,13 +1,13 @@
 //! The map's kernels on a Vulkan device: three recorded programs.
 
-use raywake_core::layout::{MAP_BUFFERS, MapBuffer};
 use raywake_core::map::{Bands, Update};
 use raywake_core::params::{BAND_UPDATES, Profile, TILE};
-use raywake_core::record::{Ray, Step};
-use raywake_gpu::{Executor, GpuError, Options};
-use raywake_kernels::schedule;
+use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::stages::{Buffer, MAP_PROGRAMS};
+use raywake_gpu::{Executor, GpuError, Heap, Options};
+use raywake_kernels::schedule::Schedule;
 
-use super::{Mapper, row};
+use super::Mapper;
 
 /// Programs in the order the executor has them.
 const RAYS: usize = 0;
@@ -17,16 +17,16 @@ const BAND: usize = 2;
 /// A device with everything recorded.
 pub struct DeviceMap {
     executor: Executor,
+    schedule: Schedule,
     bands: Bands,
 }
 
 impl DeviceMap {
     /// Allocates and records for a profile.
     pub fn new(profile: &Profile, options: &Options) -> Result<DeviceMap, GpuError> {
-        let buffers = schedule::buffers(MAP_BUFFERS, profile);
-        let programs = [schedule::map_rays(), schedule::map_count(), schedule::map_band()];
-        let executor = Executor::new(options, &buffers, &programs)?;
-        Ok(DeviceMap { executor, bands: Bands::new(Mapper::keys(profile)) })
+        let schedule = Schedule::new(MAP_PROGRAMS, profile);
+        let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
+        Ok(DeviceMap { executor, schedule, bands: Bands::new(Mapper::keys(profile)) })
     }
 
     /// The device's name.
@@ -36,28 +36,34 @@ impl DeviceMap {
 
     /// Where the next sweep goes: mapped memory.
     pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
-        let [rays, origins] =
-            self.executor.uploads([row(MapBuffer::RaysIn), row(MapBuffer::OriginsIn)]);
+        let rows = [Buffer::rays, Buffer::origins].map(|b| self.schedule.index(Heap::Upload, b));
+        let [rays, origins] = self.executor.uploads(rows);
         (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
     }
 
     /// Maps the sweep.
-    pub fn map(&mut self, step: &Step, put: &mut dyn FnMut(&[Update])) -> Result<(), GpuError> {
+    pub fn map(
+        &mut self,
+        sweep: &SweepUniform,
+        put: &mut dyn FnMut(&[Update]),
+    ) -> Result<(), GpuError> {
         let executor = &mut self.executor;
-        step.write(executor.upload(row(MapBuffer::StepIn)));
+        let uniform = self.schedule.index(Heap::Upload, Buffer::sweep);
+        let [count_tiles, run_tiles, voxels] =
+            [Buffer::count_tiles, Buffer::run_tiles, Buffer::scratch]
+                .map(|b| self.schedule.index(Heap::Readback, b));
+        sweep.write(executor.upload(uniform));
         executor.run(RAYS)?;
         self.bands.run(|from, to| {
-            let band = Step { band_from: from as i32, band_to: to as i32, ..*step };
-            band.write(executor.upload(row(MapBuffer::StepIn)));
+            let band = SweepUniform { band_from: from as i32, band_to: to as i32, ..*sweep };
+            band.write(executor.upload(uniform));
             executor.run(COUNT)?;
-            if executor.readback(row(MapBuffer::CountOut))[TILE] as usize > BAND_UPDATES {
+            if executor.readback(count_tiles)[TILE] as usize > BAND_UPDATES {
                 return Ok(false);
             }
             executor.run(BAND)?;
-            let voxels = executor.readback(row(MapBuffer::RunsOut))[TILE] as usize;
-            let voxels = voxels.min(BAND_UPDATES);
-            let words = executor.readback(row(MapBuffer::VoxelsOut));
-            put(&bytemuck::cast_slice(words)[..voxels]);
+            let count = (executor.readback(run_tiles)[TILE] as usize).min(BAND_UPDATES);
+            put(&bytemuck::cast_slice(executor.readback(voxels))[..count]);
             Ok(true)
         })
     }

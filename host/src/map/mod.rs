@@ -5,11 +5,12 @@ pub mod device;
 pub mod scalar;
 
 use raywake_core::dropped::DroppedReturns;
-use raywake_core::layout::{MAP_BUFFERS, MapBuffer};
+use raywake_core::frame::{Window, place};
 use raywake_core::map::Update;
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, Window, place, step_of};
-use raywake_core::record::{NONE, Ray, Step};
+use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::record::{NONE, Ray, SweepUniform};
+use raywake_core::stages::{MAP_PROGRAMS, Storage};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
 use raywake_gpu::GpuError;
@@ -38,13 +39,17 @@ impl MapBackend {
         }
     }
 
-    fn map(&mut self, step: &Step, put: &mut dyn FnMut(&[Update])) -> Result<(), GpuError> {
+    fn map(
+        &mut self,
+        sweep: &SweepUniform,
+        put: &mut dyn FnMut(&[Update]),
+    ) -> Result<(), GpuError> {
         match self {
             MapBackend::Scalar(b) => {
-                b.map(step, put);
+                b.map(sweep, put);
                 Ok(())
             }
-            MapBackend::Device(b) => b.map(step, put),
+            MapBackend::Device(b) => b.map(sweep, put),
         }
     }
 }
@@ -88,9 +93,9 @@ impl Mapper {
         profile.side * profile.side * profile.levels
     }
 
-    /// Bytes of the map's buffers, whichever backend holds them.
+    /// Bytes of the scalar backend's buffers.
     pub fn bytes(profile: &Profile) -> usize {
-        MAP_BUFFERS.iter().map(|b| b.bytes(profile)).sum()
+        4 * Storage::words(MAP_PROGRAMS, profile)
     }
 
     /// Maps a sweep. `put` receives voxels `[key, log-odds in tenths as i32]` in ascending order.
@@ -114,7 +119,7 @@ impl Mapper {
             &mut [],
             origins,
         );
-        self.backend.map(&step_of(&self.profile, count), put)?;
+        self.backend.map(&uniform_of(&self.profile, count), put)?;
         Ok(Mapped { window, dropped, rays: count })
     }
 
@@ -124,9 +129,4 @@ impl Mapper {
         let local = [key / levels / side, key / levels % side, key % levels];
         core::array::from_fn(|a| local[a] as i32 + mapped.window.corner[a])
     }
-}
-
-/// Index of a row of the map's table.
-fn row(buffer: MapBuffer) -> usize {
-    buffer as usize
 }

@@ -154,7 +154,7 @@ impl Tracker {
         };
         let Some(drive) = drive else { return step(now, None).map(Some) };
         let points = before.map_or(&[][..], |b| &b.points);
-        let flows = drive.step(&now.sweep(), points)?.flows;
+        let flows = drive.step(&now.sweep(), points)?.output.flows;
         let flows = flows.map(|f| Flows { of: f.points, reach_m: *reach_m });
         before.map(|before| step(before, flows)).transpose()
     }

@@ -1,24 +1,14 @@
 // The feasible displacement of least energy for every foreground column.
-// Twin: core/src/flow/expectation.rs, which explains the search.
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Words { d: array<u32> }
-@group(0) @binding(1) var<storage, read> counters: Words;
-@group(0) @binding(2) var<storage, read> foreground: Words;
-@group(0) @binding(3) var<storage, read> matching: Words;
-@group(0) @binding(4) var<storage, read> state: Words;
-@group(0) @binding(5) var<storage, read> target_energy: Words;
-struct Pairs { d: array<vec2<u32>> }
-@group(0) @binding(6) var<storage, read_write> least: Pairs;
-@group(0) @binding(7) var<storage, read_write> proposal: Pairs;
+// Twin: core/src/stages/flow/expectation.rs, whose `expectation_by_rings` explains the search.
 
 struct Best { energy: i32, index: i32 }
 
 fn inside(i: i32, j: i32) -> bool {
-    return i >= 0 && i < params.side && j >= 0 && j < params.side;
+    return i >= 0 && i < sweep.side && j >= 0 && j < sweep.side;
 }
 
 fn cost_of(rank: u32, index: i32) -> i32 {
-    let word = matching.d[rank * ROW_WORDS + u32(index) / 2u];
+    let word = window_cost.d[rank * ROW_WORDS + u32(index) / 2u];
     return i32((word >> (16u * (u32(index) & 1u))) & 0xffffu);
 }
 
@@ -31,7 +21,7 @@ fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best 
         return best;
     }
     let d = displacement(index);
-    let at = column + d.x * params.side + d.y;
+    let at = column + d.x * sweep.side + d.y;
     if u32(energy) < target_energy.d[at] || own == pack_flow(d) {
         return Best(energy, index);
     }
@@ -40,22 +30,22 @@ fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best 
 
 // Cost of the window neighbours that lie outside the grid.
 fn outside_cost(i: i32, j: i32) -> i32 {
-    let rows = 3 - select(0, 1, i == 0) - select(0, 1, i == params.side - 1);
-    let lines = 3 - select(0, 1, j == 0) - select(0, 1, j == params.side - 1);
-    return (9 - rows * lines) * params.outside_cost;
+    let rows = 3 - select(0, 1, i == 0) - select(0, 1, i == sweep.side - 1);
+    let lines = 3 - select(0, 1, j == 0) - select(0, 1, j == sweep.side - 1);
+    return (9 - rows * lines) * sweep.outside_cost;
 }
 
 // The least energy without smoothing, feasible or not, and where: a word of two costs at a time.
 fn lowest(rank: u32, i: i32, j: i32, outside: i32) -> vec2<u32> {
     var least = vec2<u32>(NONE);
-    for (var word = 0; word < i32(ROW_WORDS); word += 1) { // <= 496
-        let costs = matching.d[rank * ROW_WORDS + u32(word)];
+    for (var word = 0; word < i32(ROW_WORDS); word += 1) {
+        let costs = window_cost.d[rank * ROW_WORDS + u32(word)];
         let first = displacement(2 * word);
-        for (var half = 0; half < 2; half += 1) { // <= 2
+        for (var half = 0; half < 2; half += 1) {
             let d = first + vec2<i32>(0, half);
             let square = d.x * d.x + d.y * d.y;
             let cost = i32((costs >> (16u * u32(half))) & 0xffffu);
-            let energy = u32(cost + params.displacement_cost * square + outside);
+            let energy = u32(cost + sweep.displacement_cost * square + outside);
             if d.y <= REACH && inside(i + d.x, j + d.y) && energy < least.x {
                 least = vec2<u32>(energy, u32(2 * word + half));
             }
@@ -67,11 +57,11 @@ fn lowest(rank: u32, i: i32, j: i32, outside: i32) -> vec2<u32> {
 // Every displacement, without smoothing.
 fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    for (var index = 0; index < i32(ROW); index += 1) { // <= ROW
+    for (var index = 0; index < i32(ROW); index += 1) {
         let d = displacement(index);
         if d.y <= REACH && inside(i + d.x, j + d.y) {
             let square = d.x * d.x + d.y * d.y;
-            let energy = cost_of(rank, index) + params.displacement_cost * square + outside;
+            let energy = cost_of(rank, index) + sweep.displacement_cost * square + outside;
             if energy < best.energy {
                 best = consider(best, column, index, energy, own);
             }
@@ -90,24 +80,24 @@ fn round_div(a: i32, n: i32) -> i32 {
 // Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
 fn rings(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32, n: i32, s: vec2<i32>, squares: i32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    let floor_energy = i32(least.d[rank].x);
+    let floor_energy = i32(min_cost.d[rank].x);
     let mean = vec2<i32>(round_div(s.x, n), round_div(s.y, n));
     let spread = (n * squares - s.x * s.x - s.y * s.y) / n;
-    for (var ring = 0; ring <= 2 * REACH; ring += 1) { // <= 31
+    for (var ring = 0; ring <= 2 * REACH; ring += 1) {
         let near = max(2 * ring - 1, 0);
-        if floor_energy + params.smoothing * (n * near * near / 4 + spread) > best.energy {
+        if floor_energy + sweep.smoothing * (n * near * near / 4 + spread) > best.energy {
             break;
         }
         // The ring's cells in order, 8 of them per unit of its radius, one in its middle.
         let cells = max(8 * ring, 1);
-        for (var cell = 0; cell < cells; cell += 1) { // <= 120
+        for (var cell = 0; cell < cells; cell += 1) { // <= 8 * 2 * REACH
             let d = mean + on_ring(ring, cell);
             if inside(i + d.x, j + d.y) && max(abs(d.x), abs(d.y)) <= REACH {
                 let square = d.x * d.x + d.y * d.y;
                 let smoothness = squares + n * square - 2 * (d.x * s.x + d.y * s.y);
                 let index = (d.x + REACH) * i32(LINE) + d.y + REACH;
                 let energy = cost_of(rank, index) + outside
-                    + params.displacement_cost * square + params.smoothing * smoothness;
+                    + sweep.displacement_cost * square + sweep.smoothing * smoothness;
                 best = consider(best, column, index, energy, own);
             }
         }
@@ -135,16 +125,16 @@ fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let column = i32(foreground.d[rank]);
-    let i = column / params.side;
-    let j = column % params.side;
+    let i = column / sweep.side;
+    let j = column % sweep.side;
     var count = 0;
     var sum = vec2<i32>(0);
     var squares = 0;
-    for (var n = 0; n < 25; n += 1) { // <= 25
+    for (var n = 0; n < 25; n += 1) {
         let ni = i + n / 5 - 2;
         let nj = j + n % 5 - 2;
         if n != 12 && inside(ni, nj) {
-            let flow = state.d[ni * params.side + nj];
+            let flow = flow.d[ni * sweep.side + nj];
             if (flow & VALID) != 0u {
                 let s = flow_displacement(flow);
                 count += 1;
@@ -153,15 +143,15 @@ fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
-    let own = state.d[column];
+    let own = flow.d[column];
     let outside = outside_cost(i, j);
     var best = Best(I32_MAX, I32_MAX);
     if count == 0 {
         // Where it pays least, if it may: in every round the same.
-        var known = least.d[rank];
+        var known = min_cost.d[rank];
         if known.y == NONE {
             known = lowest(rank, i, j, outside);
-            least.d[rank] = known;
+            min_cost.d[rank] = known;
         }
         best = consider(best, column, i32(known.y), i32(known.x), own);
         if best.index == I32_MAX {

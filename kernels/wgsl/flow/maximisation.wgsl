@@ -1,18 +1,8 @@
-// Every target keeps its best claimant. Twin: core/src/flow/maximisation.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Words { d: array<u32> }
-@group(0) @binding(1) var<storage, read> counters: Words;
-@group(0) @binding(2) var<storage, read> foreground: Words;
-struct Proposals { d: array<vec2<u32>> }
-@group(0) @binding(3) var<storage, read> proposal: Proposals;
-struct Atomics { d: array<atomic<u32>> }
-@group(0) @binding(4) var<storage, read_write> target_energy: Atomics;
-@group(0) @binding(5) var<storage, read_write> target_rank: Atomics;
-@group(0) @binding(6) var<storage, read_write> state: Words;
+// Every target keeps its best claimant. Twin: core/src/stages/flow/maximisation.rs
 
 fn target_of(rank: u32, flow: u32) -> i32 {
     let d = flow_displacement(flow);
-    return i32(foreground.d[rank]) + d.x * params.side + d.y;
+    return i32(foreground.d[rank]) + d.x * sweep.side + d.y;
 }
 
 @compute @workgroup_size(ROW_WORKGROUP)
@@ -27,7 +17,7 @@ fn claim(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 
 @compute @workgroup_size(ROW_WORKGROUP)
-fn rank(@builtin(global_invocation_id) id: vec3<u32>) {
+fn elect(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= counters.d[FOREGROUND_COUNT] {
         return;
     }
@@ -35,7 +25,7 @@ fn rank(@builtin(global_invocation_id) id: vec3<u32>) {
     if proposed.x != 0u {
         let at = target_of(id.x, proposed.x);
         if atomicLoad(&target_energy.d[at]) == proposed.y {
-            atomicMin(&target_rank.d[at], id.x);
+            atomicMin(&target_index.d[at], id.x);
         }
     }
 }
@@ -45,7 +35,7 @@ fn settle(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= counters.d[FOREGROUND_COUNT] {
         return;
     }
-    let flow = proposal.d[id.x].x;
-    let won = flow != 0u && atomicLoad(&target_rank.d[target_of(id.x, flow)]) == id.x;
-    state.d[foreground.d[id.x]] = select(0u, flow, won);
+    let proposed = proposal.d[id.x].x;
+    let won = proposed != 0u && atomicLoad(&target_index.d[target_of(id.x, proposed)]) == id.x;
+    flow.d[foreground.d[id.x]] = select(0u, proposed, won);
 }

@@ -1,12 +1,4 @@
-// Merges equal rays in an open-addressed table. Twin: core/src/grid/ray_merge.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Rays { d: array<vec2<u32>> }
-@group(0) @binding(1) var<storage, read> rays: Rays;
-struct Atomics { d: array<atomic<u32>> }
-@group(0) @binding(2) var<storage, read_write> slots: Atomics;
-struct Words { d: array<u32> }
-@group(0) @binding(3) var<storage, read_write> distinct: Words;
-@group(0) @binding(4) var<storage, read_write> counters: Atomics;
+// Merges equal rays in an open-addressed table. Twin: core/src/stages/grid/ray_merge.rs
 
 fn first_slot(ray: vec2<u32>) -> u32 {
     var mixed = (ray.x * 0x9e3779b1u) ^ (ray.y * 0x85ebca77u);
@@ -17,14 +9,14 @@ fn first_slot(ray: vec2<u32>) -> u32 {
 @compute @workgroup_size(WORKGROUP)
 fn ray_merge(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = id.x;
-    if index >= u32(params.rays) {
+    if index >= u32(sweep.rays) {
         return;
     }
     let ray = rays.d[index];
     var slot = first_slot(ray);
     // Finding no place is no error: the ray is then traced alone.
     var entry = MERGE_SLOTS + index;
-    for (var probe = 0u; probe < MERGE_PROBES; probe += 1u) { // <= MERGE_PROBES
+    for (var probe = 0u; probe < MERGE_PROBES; probe += 1u) {
         // A look before the exchange: most rays find their like already there.
         var holder = atomicLoad(&slots.d[2u * slot]);
         if holder == 0u {

@@ -1,28 +1,24 @@
-// The columns of the sweep before, seen from the new window. Twin: core/src/grid/shift.rs
-@group(0) @binding(0) var<storage, read> params: Step;
-struct Columns { d: array<vec2<u32>> }
-@group(0) @binding(1) var<storage, read> columns_now: Columns;
-@group(0) @binding(2) var<storage, read_write> columns_before: Columns;
+// The columns of the sweep before, seen from the new window. Twin: core/src/stages/grid/shift.rs
 
 fn moved(mask: u32) -> u32 {
-    let all_levels = (1u << u32(params.levels)) - 1u;
-    if params.shift_z >= 0 {
-        return (mask >> u32(params.shift_z)) & all_levels;
+    let all_levels = (1u << u32(sweep.levels)) - 1u;
+    if sweep.shift_z >= 0 {
+        return (mask >> u32(sweep.shift_z)) & all_levels;
     }
-    return (mask << u32(-params.shift_z)) & all_levels;
+    return (mask << u32(-sweep.shift_z)) & all_levels;
 }
 
 @compute @workgroup_size(WORKGROUP)
 fn shift(@builtin(global_invocation_id) id: vec3<u32>) {
-    let side = params.side;
+    let side = sweep.side;
     let column = i32(id.x);
     if column >= side * side {
         return;
     }
-    let i = column / side + params.shift_x;
-    let j = column % side + params.shift_y;
+    let i = column / side + sweep.shift_x;
+    let j = column % side + sweep.shift_y;
     var record = vec2<u32>(0u);
-    if i >= 0 && i < side && j >= 0 && j < side && abs(params.shift_z) < params.levels {
+    if i >= 0 && i < side && j >= 0 && j < side && abs(sweep.shift_z) < sweep.levels {
         let old = columns_now.d[i * side + j];
         record = vec2<u32>(moved(old.x & 0xffffu) | (moved(old.x >> 16u) << 16u), moved(old.y));
     }

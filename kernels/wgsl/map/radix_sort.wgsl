@@ -1,17 +1,9 @@
-// Stable radix sort of updates by key, 4 bits a pass. Twin: core/src/map/radix_sort.rs
+// Stable radix sort of updates by key, 4 bits a pass. Twin: core/src/stages/map/radix_sort.rs
 //
 // A pass: `histogram` counts the digits of every tile, a prefix sum over (digit, tile) says where
 // each tile's share of a digit goes, `scatter` ranks the keys within the tile and writes them,
 // `next_digit` moves on. Ranks come from counts per invocation scanned across the workgroup: no
 // subgroup size assumed. Counts of two digits share a word, so that all fit 8 KiB.
-struct Words { d: array<u32> }
-@group(0) @binding(0) var<storage, read> count_tiles: Words;
-@group(0) @binding(1) var<storage, read_write> counters: Words;
-struct Updates { d: array<vec2<u32>> }
-@group(0) @binding(2) var<storage, read> unsorted: Updates;
-@group(0) @binding(3) var<storage, read_write> sorted: Updates;
-// `histogram` writes the counts here, `scatter` reads their prefix sum.
-@group(0) @binding(4) var<storage, read_write> histograms: Words;
 
 const EACH = TILE / WORKGROUP;
 const HALF = RADIX / 2u;
@@ -33,7 +25,7 @@ fn histogram(
         atomicStore(&totals[lane], 0u);
     }
     workgroupBarrier();
-    for (var n = 0u; n < EACH; n += 1u) { // <= 4
+    for (var n = 0u; n < EACH; n += 1u) {
         let index = group.x * TILE + n * WORKGROUP + lane;
         if index < count_tiles.d[TILE] {
             atomicAdd(&totals[digit_of(unsorted.d[index].x)], 1u);
@@ -52,19 +44,19 @@ fn scatter(
     @builtin(local_invocation_index) lane: u32,
 ) {
     // Digit d of invocation t is counted in word (d % 8) * 256 + t, low or high half.
-    for (var row = 0u; row < HALF; row += 1u) { // <= 8
+    for (var row = 0u; row < HALF; row += 1u) {
         ranks[row * WORKGROUP + lane] = 0u;
     }
     let first = group.x * TILE + lane * EACH;
     let end = min(count_tiles.d[TILE], first + EACH);
-    for (var index = first; index < end; index += 1u) { // <= 4
+    for (var index = first; index < end; index += 1u) { // <= EACH
         let digit = digit_of(unsorted.d[index].x);
         ranks[(digit % HALF) * WORKGROUP + lane] += 1u << (16u * (digit / HALF));
     }
     workgroupBarrier();
     // Each row of 256 words is scanned by 32 invocations, 8 words each.
     var sum = 0u;
-    for (var n = 0u; n < 8u; n += 1u) { // <= 8
+    for (var n = 0u; n < 8u; n += 1u) {
         let count = ranks[lane * 8u + n];
         ranks[lane * 8u + n] = sum;
         sum += count;
@@ -81,18 +73,18 @@ fn scatter(
         workgroupBarrier();
     }
     let before = partial[lane] - sum;
-    for (var n = 0u; n < 8u; n += 1u) { // <= 8
+    for (var n = 0u; n < 8u; n += 1u) {
         ranks[lane * 8u + n] += before;
     }
     workgroupBarrier();
-    for (var index = first; index < end; index += 1u) { // <= 4
+    for (var index = first; index < end; index += 1u) { // <= EACH
         let update = unsorted.d[index];
         let digit = digit_of(update.x);
         let word = (digit % HALF) * WORKGROUP + lane;
         let half = 16u * (digit / HALF);
         let rank = (ranks[word] >> half) & 0xffffu;
         ranks[word] += 1u << half;
-        sorted.d[histograms.d[digit * groups.x + group.x] + rank] = update;
+        sorted.d[digit_offsets.d[digit * groups.x + group.x] + rank] = update;
     }
 }
 

@@ -1,15 +1,7 @@
-// Sums the updates of each key of a sorted list. Twin: core/src/map/reduce_by_key.rs
+// Sums the updates of each key of a sorted list. Twin: core/src/stages/map/reduce_by_key.rs
 //
 // `heads` marks where a key is new; the prefix sum of the marks numbers the keys; `fold` adds every
 // update to its key's voxel. `voxels` must start as zeros.
-struct Words { d: array<u32> }
-@group(0) @binding(0) var<storage, read> count_tiles: Words;
-struct Updates { d: array<vec2<u32>> }
-@group(0) @binding(1) var<storage, read> updates: Updates;
-@group(0) @binding(2) var<storage, read_write> heads: Words;
-@group(0) @binding(3) var<storage, read> runs: Words;
-struct Atomics { d: array<atomic<u32>> }
-@group(0) @binding(4) var<storage, read_write> voxels: Atomics;
 
 fn is_head(index: u32) -> bool {
     if index == 0u {

@@ -8,13 +8,13 @@ use crate::labels::{Motion, View};
 use crate::simulate::truth::PointTruth;
 use glam::DVec3;
 use raywake::engine::Pair;
-use raywake_core::background_filter::score;
-use raywake_core::grid::shift::shift;
+use raywake_core::frame::{Window, place};
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
-use raywake_core::prepare::{Window, place};
-use raywake_core::record::{Column, Step};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::background_filter::score;
+use raywake_core::stages::grid::shift::shift;
 use raywake_core::sweep::Rig;
 use raywake_io::source::SweepData;
 
@@ -103,7 +103,7 @@ impl<'a> Collector<'a> {
         let owners = exact.map(|returns| owners(&self.grid.of_point, returns, columns));
         let next = place(&self.profile, &self.rig, &seen.then, Some(window.lattice_origin));
         let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|a| next.corner[a] - window.corner[a]);
-        let step = Step { shift_x, shift_y, shift_z, ..self.grid.step };
+        let step = SweepUniform { shift_x, shift_y, shift_z, ..self.grid.step };
         shift(&step, &self.grid.columns, &mut self.before);
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
@@ -226,8 +226,8 @@ mod tests {
     use super::*;
     use crate::eval::row::CLASSES;
     use crate::labels::{Kind, Labels, Track};
-    use raywake_core::background_filter::TABLE_WORDS;
     use raywake_core::output::Origin;
+    use raywake_core::stages::background_filter::TABLE_WORDS;
     use raywake_core::sweep::Point;
     use raywake_io::source::Source;
     use raywake_io::source::simulated::Simulated;

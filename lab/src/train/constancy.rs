@@ -153,7 +153,7 @@ fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measur
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raywake_core::occupancy_constancy::SHIPPED;
+    use raywake_core::stages::occupancy_constancy::SHIPPED;
 
     #[test]
     fn the_same_bytes_from_the_same_seed() {

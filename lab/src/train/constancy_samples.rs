@@ -62,7 +62,7 @@ fn target(side: i32, source: usize, [du, dv]: [i32; 2]) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::train::pairs::Match;
-    use raywake_core::record::Step;
+    use raywake_core::record::SweepUniform;
 
     #[test]
     fn features_of_two_columns() {
@@ -85,7 +85,7 @@ mod tests {
             Match { source: 30 * 61 + 30, displacement: [4, -3], moving: true },
             Match { source: 0, displacement: [0, 0], moving: false },
         ];
-        let step = Step { side: 61, levels: 14, ..Default::default() };
+        let step = SweepUniform { side: 61, levels: 14, ..Default::default() };
         let pair = Pair { step, before: columns.clone(), now: columns, matches };
         let mut found = Vec::new();
         samples(&pair, &mut found);

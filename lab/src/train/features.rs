@@ -5,8 +5,8 @@
 //! symmetries its minimum is symmetric. Fitting one weight per orbit of patch columns, to counts
 //! of voxels, therefore finds the minimum that augmenting the samples eightfold would.
 
-use raywake_core::background_filter::PATCH;
-use raywake_core::record::{Column, Step};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::background_filter::PATCH;
 
 /// Levels the filter is trained for.
 pub const LEVELS: usize = 14;
@@ -29,7 +29,7 @@ fn orbit(n: usize) -> usize {
 }
 
 /// Features of a column; what lies outside the window is unknown.
-pub fn features(step: &Step, columns: &[Column], index: usize) -> Features {
+pub fn features(step: &SweepUniform, columns: &[Column], index: usize) -> Features {
     let side = step.side as usize;
     let half = PATCH / 2;
     let mut counts = [0; WIDTH];
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn counts_of_a_corner() {
-        let step = Step { side: 5, levels: 14, ..Default::default() };
+        let step = SweepUniform { side: 5, levels: 14, ..Default::default() };
         let mut columns = [[0; 2]; 25];
         columns[0] = [1 << 3 | 1 << (16 + 13), 1];
         columns[1] = [1, 0];

@@ -9,7 +9,7 @@ use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::{quantise, text};
 use crate::curve::{Curve, Operating};
 use crate::labels::Kind;
-use raywake_core::background_filter::{PATCH, TABLE_WORDS, load};
+use raywake_core::stages::background_filter::{PATCH, TABLE_WORDS, load};
 use raywake_io::Error;
 use serde::Serialize;
 
@@ -180,8 +180,8 @@ fn curve(data: &Data, score: impl Fn(&[u8]) -> f64) -> Curve {
 mod tests {
     use super::*;
     use crate::train::features::features;
-    use raywake_core::background_filter::score;
-    use raywake_core::record::{Column, Step};
+    use raywake_core::record::{Column, SweepUniform};
+    use raywake_core::stages::background_filter::score;
 
     #[test]
     fn the_same_bytes_from_the_same_seed() {
@@ -205,7 +205,7 @@ mod tests {
         let integers = quantise(&weights, SCALE);
         let mut table = vec![0; TABLE_WORDS];
         load(&file(&integers, "test"), LEVELS, &mut table).unwrap();
-        let step = Step { side: 7, levels: 14, ..Default::default() };
+        let step = SweepUniform { side: 7, levels: 14, ..Default::default() };
         let columns: Vec<Column> = (0..49)
             .map(|_| {
                 let free = rng.bits() as u32 & 0x3fff;

@@ -3,7 +3,7 @@
 use super::drives::{Labelled, LabelledSweep};
 use crate::grid::Grid;
 use crate::labels::{Footprint, Kind};
-use raywake_core::prepare::Window;
+use raywake_core::frame::Window;
 use raywake_core::record::NONE;
 
 /// A column without a return of an object, its centre this close outside one, is left out: to

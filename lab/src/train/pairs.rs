@@ -4,10 +4,10 @@ use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
 use raywake_core::continuity::ContinuityLimits;
-use raywake_core::grid::shift::shift;
+use raywake_core::frame::Window;
 use raywake_core::params::REACH;
-use raywake_core::prepare::Window;
-use raywake_core::record::{Column, Step};
+use raywake_core::record::{Column, SweepUniform};
+use raywake_core::stages::grid::shift::shift;
 use raywake_io::Error;
 use std::collections::HashMap;
 
@@ -28,7 +28,7 @@ pub struct Match {
 /// Columns of two consecutive sweeps in the window of the second, with the truth.
 pub struct Pair {
     /// Sizes of the window and its shift.
-    pub step: Step,
+    pub step: SweepUniform,
     /// First sweep.
     pub before: Vec<Column>,
     /// Second sweep.
@@ -68,7 +68,7 @@ pub fn pair(
     let first_columns = grid.columns.clone();
     let now = grid.sweep(drive.rig(), &b.sweep());
     let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|n| now.corner[n] - then.corner[n]);
-    let step = Step { shift_x, shift_y, shift_z, ..grid.step };
+    let step = SweepUniform { shift_x, shift_y, shift_z, ..grid.step };
     let mut before = vec![[0; 2]; first_columns.len()];
     shift(&step, &first_columns, &mut before);
     let side = step.side;

@@ -2,11 +2,13 @@
 
 use super::pairs::{Match, Pair};
 use raywake::backend::Tables;
-use raywake_core::compact::compact;
-use raywake_core::occupancy_constancy::occupancy_constancy;
-use raywake_core::params::{FOREGROUND_MAX, LINE, REACH, ROW};
-use raywake_core::record::Step;
-use raywake_core::window::window;
+use raywake_core::params::{FOREGROUND_MAX, LINE, REACH, ROW, TILE};
+use raywake_core::record::SweepUniform;
+use raywake_core::stages::COUNTERS;
+use raywake_core::stages::compact::compact;
+use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
+use raywake_core::stages::prefix_sum::prefix_sum;
+use raywake_core::stages::window::window;
 use serde::Serialize;
 
 /// Counts over columns.
@@ -56,13 +58,16 @@ impl Ranker {
     /// Adds the matches of a pair to the counts of standing and of moving objects. Every solid
     /// column is foreground, so that no filter takes part.
     pub fn add(&mut self, tables: &Tables, pair: &Pair, counts: &mut [Ranking; 2]) {
-        let step = Step { score_min: tables.scores.min, ..pair.step };
+        let step = SweepUniform { score_min: tables.scores.min, ..pair.step };
         let marks: Vec<u32> = pair.before.iter().map(|c| (c[1] != 0) as u32).collect();
-        let (count, _) = compact(&marks, &mut self.rank, &mut self.list);
+        let mut tiles = [0; TILE + 1];
+        prefix_sum(&marks, &mut tiles, &mut self.rank);
+        compact(&marks, &mut self.rank, &mut self.list, &mut [0; COUNTERS]);
+        let count = (tiles[TILE] as usize).min(FOREGROUND_MAX);
         let solid = &self.list[..count];
         let (weights, costs) = (&tables.constancy, &tables.costs);
         let cost = &mut self.cost[..count * ROW];
-        occupancy_constancy(&step, weights, costs, solid, &pair.before, &pair.now, cost);
+        occupancy_constancy_by_bytes(&step, weights, costs, solid, &pair.before, &pair.now, cost);
         window(&step, solid, &self.rank, cost, &mut self.matching[..count * ROW]);
         for m in &pair.matches {
             let Some(row) = self.matching.chunks_exact(ROW).nth(self.rank[m.source] as usize)
@@ -75,7 +80,7 @@ impl Ranker {
 }
 
 /// Shares of the first place that the true target, and those next to it, have.
-fn standing(step: &Step, m: &Match, row: &[u16]) -> (f64, f64) {
+fn standing(step: &SweepUniform, m: &Match, row: &[u16]) -> (f64, f64) {
     let (i, j) = (m.source as i32 / step.side, m.source as i32 % step.side);
     let inside = |c: i32| (0..step.side).contains(&c);
     let mut least = u16::MAX;

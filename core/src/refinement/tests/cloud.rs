@@ -131,7 +131,7 @@ fn segments_are_what_a_flood_fill_reaches() {
         }
         let cloud = returns.cloud();
         let flows: Vec<Flow> = (0..SIDE * SIDE)
-            .map(|_| if random.below(2) == 0 { 0 } else { flow([random.below(5) as i32, 0]) })
+            .map(|_| if random.below(2) == 0 { 0 } else { pack_flow([random.below(5) as i32, 0]) })
             .collect();
         let excluded = random.below(SIDE * SIDE);
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;

@@ -7,7 +7,7 @@ mod odd;
 
 use super::*;
 use crate::random::Random;
-use crate::record::{Column, NONE, Proposal, flow};
+use crate::record::{Column, NONE, Proposal, pack_flow};
 use crate::team::Alone;
 use std::boxed::Box;
 use std::vec;
@@ -162,15 +162,15 @@ fn run_expecting(
 ) {
     let [before, now] = pair.map(columns);
     let perceived = Perceived {
-        before: &before,
-        now: &now,
+        columns_before: &before,
+        columns_now: &now,
         foreground: &[],
         marked: 0,
         rays: 0,
-        state: flows,
+        flow: flows,
         proposal: &[] as &[Proposal],
     };
-    let step = Step { side: SIDE as i32, ..Step::default() };
+    let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
     refinement.run(&Alone, &step, &perceived, |_| expected);
 }
 

@@ -69,7 +69,7 @@ fn what_is_seen_later_has_moved_for_longer() {
             returns
         };
         let sweeps: Vec<Returns> = (0..3).map(sweep).collect();
-        let found = found_in(&sweeps, &vec![flow(by.map(|v| v.round() as i32)); SIDE * SIDE]);
+        let found = found_in(&sweeps, &vec![pack_flow(by.map(|v| v.round() as i32)); SIDE * SIDE]);
         check_sane(&found);
         let moved: Vec<_> = found.iter().flatten().map(|m| m.0).collect();
         assert!(moved.len() >= 15, "{n}: {}", moved.len());
@@ -89,7 +89,7 @@ fn what_stands_is_exactly_still() {
         let mut refinement = Box::new(Refinement::new());
         all.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
         // Whatever energy minimisation made of it.
-        let wrong = vec![flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
+        let wrong = vec![pack_flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
         run(&mut refinement, &[&all[1], &all[2]], &wrong);
         assert!(motions(&refinement).iter().all(Option::is_none), "{n}");
     }
@@ -107,7 +107,7 @@ fn few_returns_move_nothing_by_themselves() {
             returns
         };
         let sweeps: Vec<Returns> = (0..3).map(cluster).collect();
-        let flows = vec![flow([1, 0]); SIDE * SIDE];
+        let flows = vec![pack_flow([1, 0]); SIDE * SIDE];
         assert!(found_in(&sweeps, &flows).iter().all(Option::is_none), "{count}");
     }
 }
@@ -142,17 +142,17 @@ fn a_wall_that_seems_to_move_stands() {
     let sweeps: Vec<Returns> = (0..3).map(wall).collect();
     sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
     let masks = vec![[0xffff, 0]; 167 * 167];
-    let flows = vec![flow([10, 0]); 167 * 167];
+    let flows = vec![pack_flow([10, 0]); 167 * 167];
     let perceived = Perceived {
-        before: &masks,
-        now: &masks,
+        columns_before: &masks,
+        columns_now: &masks,
         foreground: &[],
         marked: 0,
         rays: 0,
-        state: &flows,
+        flow: &flows,
         proposal: &[] as &[Proposal],
     };
-    let step = Step { side: 167, ..Step::default() };
+    let step = SweepUniform { side: 167, ..SweepUniform::default() };
     refinement.run(&Alone, &step, &perceived, |_| Some([10.0, 0.0]));
     let extent_max = scaled().extent_max;
     let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);

@@ -45,7 +45,7 @@ fn odd_sweeps_yield_no_nonsense() {
             let flows: Vec<Flow> = (0..SIDE * SIDE)
                 .map(|_| match random.below(3) {
                     0 => 0,
-                    _ => flow([0; 2].map(|_| random.below(31) as i32 - 15)),
+                    _ => pack_flow([0; 2].map(|_| random.below(31) as i32 - 15)),
                 })
                 .collect();
             let found = found_in(&[second.clone(), first.clone(), second.clone()], &flows);
@@ -75,7 +75,7 @@ fn the_same_sweeps_yield_the_same_bits() {
     };
     let sweeps: Vec<Returns> = (0..4).map(&mut sweep).collect();
     let others: Vec<Returns> = (5..8).map(sweep).collect();
-    let flows: Vec<Flow> = (0..SIDE * SIDE).map(|c| flow([(c % 3) as i32, 0])).collect();
+    let flows: Vec<Flow> = (0..SIDE * SIDE).map(|c| pack_flow([(c % 3) as i32, 0])).collect();
     let wanted = found_in(&sweeps, &flows);
     assert!(wanted.iter().flatten().count() > 10);
     assert_eq!(found_in(&sweeps, &flows), wanted);

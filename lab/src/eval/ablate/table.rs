@@ -27,15 +27,15 @@ const COLUMNS: [&str; 18] = [
     "Total, ms",
     "Constancy and window, ms",
     "Flow, ms",
-    "Follow, ms",
+    "Refine, track, out, ms",
     "Device, MB",
 ];
 
-/// Stages of a pair that are shown together, by either backend's names.
+/// Stages of a pair that are shown together.
 const PARTS: [&[&str]; 3] = [
     &["occupancy_constancy", "window"],
-    &["flow", "expectation", "maximisation"],
-    &["refinement", "follow"],
+    &["expectation", "maximisation"],
+    &["refine", "track", "out"],
 ];
 
 /// The row of a variant: what its rows and facts tell.
@@ -115,7 +115,7 @@ mod tests {
         let facts = Facts {
             stages: vec![
                 stage("window", [1.0, 2.0, 3.0]),
-                stage("flow", [9.0; 3]),
+                stage("expectation", [9.0; 3]),
                 stage("occupancy_constancy", [30.0, 10.0, 20.0]),
             ],
             totals: vec![40.0, 21.0, 32.0],

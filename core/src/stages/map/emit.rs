@@ -1,30 +1,31 @@
 //! The list of updates (B.2.2), at its exact size.
 
-use super::Update;
-use crate::grid::Walk;
-use crate::grid::ray_merge::merged;
-use crate::grid::ray_trace::inside;
+use crate::map::Update;
 use crate::params::{LOG_ODDS_FREE, LOG_ODDS_OCCUPIED};
-use crate::record::{NO_END, Ray, Step, ray_end, ray_origin};
+use crate::record::{NO_END, Ray, SweepUniform, ray_end, ray_origin};
+use crate::stages::grid::ray_merge::merged;
+use crate::stages::grid::ray_trace::inside;
+use crate::stages::grid::walk::Walk;
 
-/// `counts[n]` becomes the number of updates of `distinct[n]` whose keys lie in the band.
+/// `counts[n]` becomes the number of updates of `distinct[n]` whose keys lie in the band, 0 behind
+/// the last.
 pub fn count(
-    step: &Step,
+    sweep: &SweepUniform,
     origins: &[[i32; 4]],
     rays: &[Ray],
     slots: &[[u32; 2]],
     distinct: &[u32],
     counts: &mut [u32],
 ) {
+    counts.fill(0);
     for (&entry, count) in distinct.iter().zip(counts) {
-        *count = 0;
-        walk(step, origins, rays, slots, entry, |_| *count += 1);
+        walk(sweep, origins, rays, slots, entry, |_| *count += 1);
     }
 }
 
 /// Writes the updates of every distinct ray in the band, from `offsets` on.
 pub fn emit(
-    step: &Step,
+    sweep: &SweepUniform,
     origins: &[[i32; 4]],
     rays: &[Ray],
     slots: &[[u32; 2]],
@@ -34,7 +35,7 @@ pub fn emit(
 ) {
     for (&entry, &offset) in distinct.iter().zip(offsets) {
         let mut at = offset as usize;
-        walk(step, origins, rays, slots, entry, |update| {
+        walk(sweep, origins, rays, slots, entry, |update| {
             updates[at] = update;
             at += 1;
         });
@@ -44,7 +45,7 @@ pub fn emit(
 /// Calls `each` with every update of a distinct ray in the band.
 #[inline]
 fn walk(
-    step: &Step,
+    sweep: &SweepUniform,
     origins: &[[i32; 4]],
     rays: &[Ray],
     slots: &[[u32; 2]],
@@ -55,20 +56,20 @@ fn walk(
     let [x, y, z, _] = origins[ray_origin(ray)];
     let (start, end) = ([x, y, z], ray_end(ray));
     // Keys ascend with x: a ray beside the band's slabs has nothing in it.
-    let slab = step.side * step.levels;
-    if end[0].max(x) < step.band_from / slab || end[0].min(x) > step.band_to / slab {
+    let slab = sweep.side * sweep.levels;
+    if end[0].max(x) < sweep.band_from / slab || end[0].min(x) > sweep.band_to / slab {
         return;
     }
-    let band = step.band_from as usize..step.band_to as usize;
+    let band = sweep.band_from as usize..sweep.band_to as usize;
     let mut put = |voxel, log_odds: i32| {
-        if let Some(key) = inside(step, voxel).filter(|k| band.contains(k)) {
+        if let Some(key) = inside(sweep, voxel).filter(|k| band.contains(k)) {
             each([key as u32, (log_odds * weight) as u32]);
         }
     };
-    for voxel in Walk::new(start, end, step.range_steps) {
+    for voxel in Walk::new(start, end, sweep.range_steps) {
         put(voxel, LOG_ODDS_FREE);
     }
-    if ray[1] & NO_END == 0 && !Walk::beyond(start, end, step.range_steps) {
+    if ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps) {
         put(end, LOG_ODDS_OCCUPIED);
     }
 }

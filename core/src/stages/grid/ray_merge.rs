@@ -2,18 +2,25 @@
 //! rays are traced once with a weight: 5 to 8 times fewer rays on real sweeps, the same sums.
 
 use crate::params::{MERGE_PROBES, MERGE_SLOTS};
-use crate::record::Ray;
+use crate::record::{Ray, SweepUniform};
+use crate::stages::DISTINCT_COUNT;
 
 /// Merges equal rays in an open-addressed table of indices into `rays`.
 ///
 /// `slots` must hold [`MERGE_SLOTS`] zeros and receives `index + 1` of one ray of each kind, and
-/// how many of it there are; `distinct` must hold
-/// `rays.len()` elements and receives the used slots in an order of no meaning. Returns how many
-/// are used. A ray that finds no place within [`MERGE_PROBES`] is appended as
-/// `MERGE_SLOTS + index` and counts once: which rays that meets changes no sum.
-pub fn ray_merge(rays: &[Ray], slots: &mut [[u32; 2]], distinct: &mut [u32]) -> usize {
-    assert!(slots.len() == MERGE_SLOTS);
-    assert!(distinct.len() >= rays.len());
+/// how many of it there are; `distinct` receives the used slots in an order of no meaning, and word
+/// [`DISTINCT_COUNT`] of `counters`, which must be zero, their number. A ray that finds no place
+/// within [`MERGE_PROBES`] is appended as `MERGE_SLOTS + index` and counts once: which rays that
+/// meets changes no sum.
+pub fn ray_merge(
+    sweep: &SweepUniform,
+    rays: &[Ray],
+    slots: &mut [[u32; 2]],
+    distinct: &mut [u32],
+    counters: &mut [u32],
+) {
+    let rays = &rays[..sweep.rays as usize];
+    assert!(slots.len() == MERGE_SLOTS && distinct.len() >= rays.len());
     let mut used = 0;
     for (index, ray) in rays.iter().enumerate() {
         let mut slot = hash(*ray);
@@ -39,7 +46,7 @@ pub fn ray_merge(rays: &[Ray], slots: &mut [[u32; 2]], distinct: &mut [u32]) -> 
             used += 1;
         }
     }
-    used
+    counters[DISTINCT_COUNT] = used as u32;
 }
 
 const NOTHING_NEW: u32 = u32::MAX;

@@ -1,21 +1,4 @@
-//! Occupancy grid (section 3.4.1, appendix B): rays, log-odds, columns.
-//!
-//! Voxel `(i, j, k)` of a window is centred on `(i, j, k) * voxel_m` from the window's corner and
-//! lies at index `(i * side + j) * levels + k`; column `(i, j)` at `i * side + j`. `i` runs along
-//! +x, `j` along +y, `k` upwards.
-
-pub mod columns;
-pub mod ray_merge;
-pub mod ray_trace;
-pub mod shift;
-
-use crate::params::LOG_ODDS_CLIP;
-
-/// Probability of occupancy from log-odds in tenths, clipped as Table B.1 asks (B.2, B.3).
-pub fn probability(log_odds: i32) -> f32 {
-    let l = log_odds.clamp(LOG_ODDS_CLIP[0], LOG_ODDS_CLIP[1]) as f32 * 0.1;
-    1.0 / (1.0 + libm::expf(-l))
-}
+//! The voxels a ray passes.
 
 /// The voxels a ray passes, start included and end excluded: Bresenham's walk in three dimensions,
 /// in integers. The axis of the longest extent steps every time, the others when their error says.
@@ -101,12 +84,5 @@ mod tests {
         assert_eq!(Walk::new([0; 3], [0; 3], 10).count(), 0);
         assert_eq!(Walk::new([0; 3], [20, 0, 0], 10).count(), 10);
         assert!(Walk::beyond([0; 3], [11, 0, 0], 10) && !Walk::beyond([0; 3], [10, 0, 0], 10));
-    }
-
-    #[test]
-    fn probabilities_are_clipped() {
-        assert_eq!(probability(0), 0.5);
-        assert_eq!(probability(1000), probability(30));
-        assert!((probability(-30) - 0.047_425_9).abs() < 1e-6);
     }
 }

@@ -7,35 +7,12 @@
 //! so a band can always be made small enough. The map equals the dense window inside that, bit for
 //! bit.
 
-pub mod emit;
-pub mod radix_sort;
-pub mod reduce_by_key;
-
-use crate::grid::ray_merge::ray_merge;
-use crate::params::{BAND_UPDATES, POINTS_MAX};
-use crate::prefix_sum::prefix_sum;
-use crate::record::{Ray, Step};
+use crate::params::{BAND_UPDATES, POINTS_MAX, TILE};
+use crate::stages::{MAP_BAND, MAP_COUNT, MAP_RAYS, Storage, run};
 
 const _: () = assert!(POINTS_MAX <= BAND_UPDATES);
 
-/// `[key, log-odds as i32]`: an update, or a voxel of the map.
-pub type Update = [u32; 2];
-
-/// Storage of the scalar map, one slice per buffer of the layout.
-pub struct Storage<'a> {
-    /// [`crate::params::MERGE_SLOTS`] elements.
-    pub slots: &'a mut [[u32; 2]],
-    /// [`POINTS_MAX`] elements.
-    pub distinct: &'a mut [u32],
-    /// As many.
-    pub counts: &'a mut [u32],
-    /// As many.
-    pub offsets: &'a mut [u32],
-    /// [`BAND_UPDATES`] elements.
-    pub updates: &'a mut [Update],
-    /// As many.
-    pub scratch: &'a mut [Update],
-}
+pub use crate::record::Update;
 
 /// Bands remembered from sweep to sweep.
 const BANDS_MAX: usize = 256;
@@ -77,29 +54,19 @@ impl Bands {
     }
 }
 
-/// Maps a sweep: `put` receives the voxels of each band, in ascending order of keys.
-pub fn map(
-    s: &mut Storage,
-    step: &Step,
-    bands: &mut Bands,
-    rays: &[Ray],
-    origins: &[[i32; 4]],
-    mut put: impl FnMut(&[Update]),
-) {
-    s.slots.fill([0; 2]);
-    let used = ray_merge(rays, s.slots, s.distinct);
-    let distinct = &s.distinct[..used];
+/// Maps the sweep in `storage` on the CPU: `put` receives the voxels of each band, in ascending order
+/// of keys.
+pub fn map(storage: &mut Storage, bands: &mut Bands, mut put: impl FnMut(&[Update])) {
+    let quiet = &mut |_| ();
+    run(MAP_RAYS, storage, 0, quiet);
     let done: Result<(), core::convert::Infallible> = bands.run(|from, to| {
-        let step = Step { band_from: from as i32, band_to: to as i32, ..*step };
-        emit::count(&step, origins, rays, s.slots, distinct, &mut s.counts[..used]);
-        let total = prefix_sum(&s.counts[..used], &mut s.offsets[..used]) as usize;
-        if total > BAND_UPDATES {
+        (storage.sweep.band_from, storage.sweep.band_to) = (from as i32, to as i32);
+        run(MAP_COUNT, storage, 0, quiet);
+        if storage.count_tiles[TILE] as usize > BAND_UPDATES {
             return Ok(false);
         }
-        emit::emit(&step, origins, rays, s.slots, distinct, &s.offsets[..used], s.updates);
-        radix_sort::radix_sort(&mut s.updates[..total], &mut s.scratch[..total]);
-        let voxels = reduce_by_key::reduce_by_key(&s.updates[..total], s.scratch);
-        put(&s.scratch[..voxels]);
+        run(MAP_BAND, storage, 0, quiet);
+        put(&storage.scratch[..storage.run_tiles[TILE] as usize]);
         Ok(true)
     });
     let Ok(()) = done;
@@ -109,10 +76,10 @@ pub fn map(
 mod tests {
     extern crate std;
     use super::*;
-    use crate::grid::ray_trace::{inside, ray_trace};
-    use crate::params::MERGE_SLOTS;
-    use crate::random::Random;
-    use crate::record::ray;
+    use crate::params::Profile;
+    use crate::record::{Ray, SweepUniform, ray};
+    use crate::stages::grid::ray_trace::{inside, ray_trace};
+    use crate::stages::{DISTINCT_COUNT, MAP_PROGRAMS};
     use std::vec;
     use std::vec::Vec;
 
@@ -149,42 +116,43 @@ mod tests {
 
     #[test]
     fn equals_the_dense_window() {
-        let mut generator = Random(5);
-        let mut random = |n| generator.below(n) as i32;
+        let mut seed = 5u64;
+        let mut random = |n: i32| {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            ((seed >> 33) % n as u64) as i32
+        };
         // Enough updates for several bands.
         let rays: Vec<Ray> = (0..30_000)
             .map(|_| ray([random(201), random(201), random(41)], 0, random(9) == 0))
             .collect();
-        let step = Step { side: 201, levels: 41, range_steps: 90, ..Default::default() };
-        let origins = [[100, 100, 20, 0]];
-        let mut slots = vec![[0; 2]; MERGE_SLOTS];
-        let mut distinct = vec![0; POINTS_MAX];
-        let used = ray_merge(&rays, &mut slots, &mut distinct);
-        let mut dense = vec![0; 201 * 201 * 41];
-        ray_trace(&step, &origins, &rays, &slots, &distinct[..used], &mut dense);
-
-        let (mut counts, mut offsets) = (vec![0; POINTS_MAX], vec![0; POINTS_MAX]);
-        let (mut updates, mut scratch) = (vec![[0; 2]; BAND_UPDATES], vec![[0; 2]; BAND_UPDATES]);
-        let mut storage = Storage {
-            slots: &mut slots,
-            distinct: &mut distinct,
-            counts: &mut counts,
-            offsets: &mut offsets,
-            updates: &mut updates,
-            scratch: &mut scratch,
+        let profile = Profile { side: 201, levels: 41, ..Profile::map() };
+        let mut words = vec![0; Storage::words(MAP_PROGRAMS, &profile)];
+        let mut storage = Storage::over(&mut words, MAP_PROGRAMS, &profile);
+        storage.sweep = SweepUniform {
+            side: 201,
+            levels: 41,
+            range_steps: 90,
+            rays: rays.len() as i32,
+            ..Default::default()
         };
+        storage.origins[0] = [100, 100, 20, 0];
+        storage.rays[..rays.len()].copy_from_slice(&rays);
         let mut bands = Bands::new(201 * 201 * 41);
         let mut voxels = Vec::new();
         let mut parts = 0;
-        map(&mut storage, &step, &mut bands, &rays, &origins, |v| {
+        map(&mut storage, &mut bands, |v| {
             parts += 1;
             voxels.extend_from_slice(v);
         });
         assert!(parts > 1);
         assert!(voxels.windows(2).all(|w| w[0][0] < w[1][0]), "keys ascend and occur once");
+        let s = &storage;
+        let distinct = &s.distinct[..s.counters[DISTINCT_COUNT] as usize];
+        let mut dense = vec![0; 201 * 201 * 41];
+        ray_trace(&s.sweep, s.origins, s.rays, s.slots, distinct, &mut dense);
         let mut sparse = vec![0; dense.len()];
         voxels.iter().for_each(|v| sparse[v[0] as usize] = v[1] as i32);
         assert!(sparse == dense);
-        assert_eq!(inside(&step, [200, 200, 40]), Some(dense.len() - 1));
+        assert_eq!(inside(&s.sweep, [200, 200, 40]), Some(dense.len() - 1));
     }
 }

@@ -1,19 +1,19 @@
 //! Background filter (section 3.4.2): which columns may move.
 //!
 //! A logistic classifier over the free and occupied voxels of 5x5 columns (3.4-3.7). Its decision,
-//! score > 0, needs no sigmoid; the threshold is part of the bias. Weights are integers and sums
-//! are taken over lookups of whole bytes of a column's masks: 100 lookups instead of 700 products.
+//! score > 0, needs no sigmoid; the threshold is part of the bias. Weights are integers, in a table
+//! of sums by whole bytes of a column's masks: 100 lookups take the place of 700 products.
 
 use crate::params::LEVELS_MAX;
-use crate::record::{Column, Step};
+use crate::record::{Column, SweepUniform};
 use crate::weights::{Weights, WeightsError};
 
 /// Columns of the patch along one axis.
 pub const PATCH: usize = 5;
 /// Entries of the lookup table: patch column, byte of its masks, value of the byte.
-pub const TABLE: usize = PATCH * PATCH * 4 * 256;
+pub const FILTER_TABLE: usize = PATCH * PATCH * 4 * 256;
 /// Words of the table with the bias behind it.
-pub const TABLE_WORDS: usize = TABLE + 1;
+pub const TABLE_WORDS: usize = FILTER_TABLE + 1;
 
 /// Fills `table`, which must hold [`TABLE_WORDS`] elements, from a weights file of kind
 /// `background`, shape (25 columns with di outermost, 2 for free then occupied, levels).
@@ -25,7 +25,7 @@ pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsE
         return Err(WeightsError::Range);
     }
     let mut values = weights.values();
-    for patch in table[..TABLE].chunks_exact_mut(4 * 256) {
+    for patch in table[..FILTER_TABLE].chunks_exact_mut(4 * 256) {
         let mut of_bit = [0; 32];
         for state in of_bit.chunks_exact_mut(16) {
             state[..levels].fill_with(|| values.next().unwrap_or(0));
@@ -34,7 +34,7 @@ pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsE
             fill_byte_table(bits, bytes);
         }
     }
-    table[TABLE] = values.next().unwrap_or(0);
+    table[FILTER_TABLE] = values.next().unwrap_or(0);
     Ok(())
 }
 
@@ -46,37 +46,101 @@ pub fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
     }
 }
 
-/// Score of a column (3.6) times the scale of the weights; columns outside the window are unknown.
-pub fn score(step: &Step, table: &[i32], columns: &[Column], index: usize) -> i32 {
-    let side = step.side;
-    let (i, j) = (index as i32 / side, index as i32 % side);
-    let mut sum = table[TABLE];
-    for di in -2..=2 {
-        for dj in -2..=2 {
-            let (ni, nj) = (i + di, j + dj);
-            if (0..side).contains(&ni) && (0..side).contains(&nj) {
-                let state = columns[(ni * side + nj) as usize][0];
-                let patch = &table[((di + 2) * 5 + dj + 2) as usize * 1024..][..1024];
-                for byte in 0..4 {
-                    sum += patch[byte * 256 + (state >> (8 * byte) & 0xff) as usize];
-                }
-            }
+/// Score of a column (3.6) times the scale of the weights: the bias and the weight of every free and
+/// every occupied voxel of the 5x5 columns around it. Columns outside the window are unknown.
+pub fn score(sweep: &SweepUniform, filter_table: &[i32], columns: &[Column], column: usize) -> i32 {
+    let mut sum = filter_table[FILTER_TABLE];
+    each_of_patch(sweep, columns, column, |patch, masks| {
+        for bit in (0..32).filter(|bit| masks >> bit & 1 == 1) {
+            sum += filter_table[table_at(patch, bit / 8, 1 << (bit % 8))];
         }
-    }
+    });
     sum
 }
 
-/// Marks the foreground of the sweep before: `foreground[c]` becomes 1 where a column is solid and
-/// scores above zero (or, unfiltered, is solid), else 0.
-pub fn background_filter(step: &Step, table: &[i32], before: &[Column], foreground: &mut [u32]) {
-    for (index, mark) in foreground.iter_mut().enumerate() {
-        let solid = before[index][1] != 0;
-        *mark = (solid && (step.unfiltered != 0 || score(step, table, before, index) > 0)) as u32;
+/// [`score`] by whole bytes.
+fn score_by_bytes(
+    sweep: &SweepUniform,
+    filter_table: &[i32],
+    columns: &[Column],
+    column: usize,
+) -> i32 {
+    let mut sum = filter_table[FILTER_TABLE];
+    each_of_patch(sweep, columns, column, |patch, masks| {
+        for (byte, value) in masks.to_le_bytes().into_iter().enumerate() {
+            sum += filter_table[table_at(patch, byte, value as usize)];
+        }
+    });
+    sum
+}
+
+/// Where the table has a value of a byte of a patch column's masks.
+#[inline]
+fn table_at(patch: usize, byte: usize, value: usize) -> usize {
+    (patch * 4 + byte) * 256 + value
+}
+
+/// Calls `each` with the place in the patch and the masks of every column of it in the window.
+#[inline]
+fn each_of_patch(
+    sweep: &SweepUniform,
+    columns: &[Column],
+    column: usize,
+    mut each: impl FnMut(usize, u32),
+) {
+    const REACH: i32 = PATCH as i32 / 2;
+    let side = sweep.side;
+    let (i, j) = (column as i32 / side, column as i32 % side);
+    for di in -REACH..=REACH {
+        for dj in -REACH..=REACH {
+            let (ni, nj) = (i + di, j + dj);
+            if (0..side).contains(&ni) && (0..side).contains(&nj) {
+                let patch = (di + REACH) * PATCH as i32 + dj + REACH;
+                each(patch as usize, columns[(ni * side + nj) as usize][0]);
+            }
+        }
+    }
+}
+
+/// Marks the foreground of the sweep before: 1 where a column is solid and scores above zero (or,
+/// unfiltered, is solid), else 0.
+pub fn background_filter(
+    sweep: &SweepUniform,
+    filter_table: &[i32],
+    columns_before: &[Column],
+    foreground_marks: &mut [u32],
+) {
+    mark(sweep, columns_before, foreground_marks, |column| {
+        score(sweep, filter_table, columns_before, column)
+    });
+}
+
+/// [`background_filter`] for the scalar backend.
+pub fn background_filter_by_bytes(
+    sweep: &SweepUniform,
+    filter_table: &[i32],
+    columns_before: &[Column],
+    foreground_marks: &mut [u32],
+) {
+    mark(sweep, columns_before, foreground_marks, |column| {
+        score_by_bytes(sweep, filter_table, columns_before, column)
+    });
+}
+
+fn mark(
+    sweep: &SweepUniform,
+    columns_before: &[Column],
+    foreground_marks: &mut [u32],
+    score: impl Fn(usize) -> i32,
+) {
+    for (column, mark) in foreground_marks.iter_mut().enumerate() {
+        let solid = columns_before[column][1] != 0;
+        *mark = (solid && (sweep.unfiltered != 0 || score(column) > 0)) as u32;
     }
 }
 
 /// The filter shipped with the program: see the file's provenance.
-pub const SHIPPED: &str = include_str!("../weights/background.txt");
+pub const SHIPPED: &str = include_str!("../../weights/background.txt");
 
 #[cfg(test)]
 mod tests {
@@ -102,7 +166,7 @@ mod tests {
         );
         let mut table = vec![0; TABLE_WORDS];
         load(&text, levels, &mut table).unwrap();
-        let step = Step { side: 9, levels: 14, ..Default::default() };
+        let sweep = SweepUniform { side: 9, levels: 14, ..Default::default() };
         let columns: std::vec::Vec<Column> = (0..81u32)
             .map(|n| {
                 let free = n.wrapping_mul(2654435761) >> 18 & 0x3fff;
@@ -129,7 +193,8 @@ mod tests {
                     }
                 }
             }
-            assert_eq!(score(&step, &table, &columns, index), sum);
+            assert_eq!(score(&sweep, &table, &columns, index), sum);
+            assert_eq!(score_by_bytes(&sweep, &table, &columns, index), sum);
         }
         let all: String = (0..701).map(|_| "8000000 ").collect();
         let body =
@@ -140,10 +205,13 @@ mod tests {
         );
         assert_eq!(load(&text, levels, &mut table), Err(WeightsError::Range));
         let mut marks = vec![9; 81];
-        background_filter(&step, &table, &columns, &mut marks);
+        background_filter(&sweep, &table, &columns, &mut marks);
         for (n, m) in marks.iter().enumerate() {
-            let wanted = columns[n][1] != 0 && score(&step, &table, &columns, n) > 0;
+            let wanted = columns[n][1] != 0 && score(&sweep, &table, &columns, n) > 0;
             assert_eq!(*m, wanted as u32);
         }
+        let by_formula = core::mem::replace(&mut marks, vec![9; 81]);
+        background_filter_by_bytes(&sweep, &table, &columns, &mut marks);
+        assert_eq!(marks, by_formula);
     }
 }

@@ -1,21 +1,27 @@
 //! The window that promotes spatial smoothness (3.13).
 
 use crate::params::{COST_UNKNOWN, ROW};
-use crate::record::{NONE, Step};
+use crate::record::{NONE, SweepUniform};
 
 /// Sums costs over the 3x3 window that moves with the source (3.13, as the author programmed it):
-/// row `n` of `matching` becomes the sum of the rows of the foreground neighbours of
+/// row `n` of `window_cost` becomes the sum of the rows of the foreground neighbours of
 /// `foreground[n]`, itself included, plus [`COST_UNKNOWN`] for each neighbour inside the window
 /// that is empty or filtered. Neighbours outside are [`outside_cost`], a constant of the column.
-pub fn window(step: &Step, foreground: &[u32], rank: &[u32], cost: &[u16], matching: &mut [u16]) {
-    for (&source, sum) in foreground.iter().zip(matching.chunks_exact_mut(ROW)) {
+pub fn window(
+    sweep: &SweepUniform,
+    foreground: &[u32],
+    foreground_index: &[u32],
+    pair_cost: &[u16],
+    window_cost: &mut [u16],
+) {
+    for (&source, sum) in foreground.iter().zip(window_cost.chunks_exact_mut(ROW)) {
         sum.fill(0);
         let mut unknown = 0;
-        for neighbour in neighbours(step, source as usize).into_iter().flatten() {
-            match rank[neighbour] {
+        for neighbour in neighbours(sweep, source as usize).into_iter().flatten() {
+            match foreground_index[neighbour] {
                 NONE => unknown += COST_UNKNOWN as u16,
                 n => {
-                    let row = &cost[n as usize * ROW..][..ROW];
+                    let row = &pair_cost[n as usize * ROW..][..ROW];
                     sum.iter_mut().zip(row).for_each(|(sum, cost)| *sum += cost);
                 }
             }
@@ -25,14 +31,14 @@ pub fn window(step: &Step, foreground: &[u32], rank: &[u32], cost: &[u16], match
 }
 
 /// Cost of the window neighbours of a column that lie outside the grid.
-pub fn outside_cost(step: &Step, column: usize) -> i32 {
-    let missing = neighbours(step, column).iter().filter(|n| n.is_none()).count();
-    missing as i32 * step.outside_cost
+pub fn outside_cost(sweep: &SweepUniform, column: usize) -> i32 {
+    let missing = neighbours(sweep, column).iter().filter(|n| n.is_none()).count();
+    missing as i32 * sweep.outside_cost
 }
 
 /// The 3x3 columns around one, [`None`] outside the window.
-fn neighbours(step: &Step, column: usize) -> [Option<usize>; 9] {
-    let side = step.side;
+fn neighbours(sweep: &SweepUniform, column: usize) -> [Option<usize>; 9] {
+    let side = sweep.side;
     let (i, j) = (column as i32 / side, column as i32 % side);
     core::array::from_fn(|n| {
         let (i, j) = (i + n as i32 / 3 - 1, j + n as i32 % 3 - 1);
@@ -50,13 +56,13 @@ mod tests {
 
     #[test]
     fn the_window_adds_what_each_neighbour_says() {
-        let step = Step { side: 33, outside_cost: 693, ..Default::default() };
+        let sweep = SweepUniform { side: 33, outside_cost: 693, ..Default::default() };
         let foreground: Vec<u32> = (0..33 * 33).filter(|n| n % 4 != 0).collect();
         let mut rank = vec![NONE; 33 * 33];
         foreground.iter().enumerate().for_each(|(n, c)| rank[*c as usize] = n as u32);
         let cost: Vec<u16> = (0..foreground.len() * ROW).map(|n| (n * 31 % 5379) as u16).collect();
         let mut matching = vec![0; foreground.len() * ROW];
-        window(&step, &foreground, &rank, &cost, &mut matching);
+        window(&sweep, &foreground, &rank, &cost, &mut matching);
         for (n, source) in foreground.iter().enumerate().step_by(7) {
             let (i, j) = (*source as i32 / 33, *source as i32 % 33);
             for d in [0, 480, 990] {
@@ -67,7 +73,7 @@ mod tests {
                     let r = if inside { rank[(i * 33 + j) as usize] } else { NONE };
                     sum += if r == NONE { 693 } else { cost[r as usize * ROW + d] as u32 };
                 }
-                let outside = outside_cost(&step, *source as usize) as u32;
+                let outside = outside_cost(&sweep, *source as usize) as u32;
                 assert_eq!(matching[n * ROW + d] as u32 + outside, sum);
             }
         }

@@ -2,13 +2,12 @@
 //!
 //! Three binary features per level say whether both columns are free, both occupied, or one of
 //! each (3.8-3.10); a logistic classifier weighs them (3.11, 3.12). Free and occupied exclude each
-//! other, so with the source fixed the score is linear in the target's mask bits: four byte
-//! lookups score a pair. Costs are negative log-probabilities in thousandths of a nat, so that
+//! other, so with the source fixed the score is linear in the target's mask bits. Costs are negative log-probabilities in thousandths of a nat, so that
 //! sums over the window (3.13) and energies are integers on every machine.
 
-use crate::background_filter::fill_byte_table;
-use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW};
-use crate::record::{Column, Step};
+use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW, SIDE};
+use crate::record::{Column, SweepUniform};
+use crate::stages::background_filter::fill_byte_table;
 use crate::weights::{Weights, WeightsError};
 
 /// Entries the table of log-sigmoids may have: sums of weights, bias included.
@@ -81,24 +80,50 @@ pub fn bit_weights(source: Column, weights: &[i32]) -> [i32; 32] {
     bits
 }
 
-/// Costs of every foreground column at every displacement: row `n` of `cost` belongs to
+/// Costs of every foreground column at every displacement: row `n` of `pair_cost` belongs to
 /// `foreground[n]`, its elements are ordered as [`ROW`] says. A target outside the window, and the
-/// padding, is unknown. `cost` must hold [`ROW`] elements per foreground column.
+/// padding, is unknown. `pair_cost` must hold [`ROW`] elements per foreground column.
 pub fn occupancy_constancy(
-    step: &Step,
-    weights: &[i32],
-    costs: &[u32],
+    sweep: &SweepUniform,
+    constancy_weights: &[i32],
+    constancy_costs: &[u32],
     foreground: &[u32],
-    before: &[Column],
-    now: &[Column],
-    cost: &mut [u16],
+    columns_before: &[Column],
+    columns_now: &[Column],
+    pair_cost: &mut [u16],
 ) {
-    let side = step.side;
-    let offset = weights[3 * LEVELS_MAX] - step.score_min;
-    let unknown = costs[offset as usize] as u16;
+    let side = sweep.side;
+    let offset = constancy_weights[3 * LEVELS_MAX] - sweep.score_min;
+    for (&source, row) in foreground.iter().zip(pair_cost.chunks_exact_mut(ROW)) {
+        let bits = bit_weights(columns_before[source as usize], constancy_weights);
+        let (i, j) = (source as i32 / side - REACH, source as i32 % side - REACH);
+        for (n, cost) in row.iter_mut().enumerate() {
+            let (ti, tj) = (i + (n / LINE) as i32, j + (n % LINE) as i32);
+            let inside = n % LINE < SIDE && (0..side).contains(&ti) && (0..side).contains(&tj);
+            let target = if inside { columns_now[(ti * side + tj) as usize][0] } else { 0 };
+            let of_bit = |(k, weight): (usize, &i32)| weight * (target >> k & 1) as i32;
+            let score: i32 = bits.iter().enumerate().map(of_bit).sum();
+            *cost = constancy_costs[(score + offset) as usize] as u16;
+        }
+    }
+}
+
+/// [`occupancy_constancy`] for the scalar backend: four byte lookups score a pair.
+pub fn occupancy_constancy_by_bytes(
+    sweep: &SweepUniform,
+    constancy_weights: &[i32],
+    constancy_costs: &[u32],
+    foreground: &[u32],
+    columns_before: &[Column],
+    columns_now: &[Column],
+    pair_cost: &mut [u16],
+) {
+    let side = sweep.side;
+    let offset = constancy_weights[3 * LEVELS_MAX] - sweep.score_min;
+    let unknown = constancy_costs[offset as usize] as u16;
     let mut bytes = [[0; 256]; 4];
-    for (&source, row) in foreground.iter().zip(cost.chunks_exact_mut(ROW)) {
-        let bits = bit_weights(before[source as usize], weights);
+    for (&source, row) in foreground.iter().zip(pair_cost.chunks_exact_mut(ROW)) {
+        let bits = bit_weights(columns_before[source as usize], constancy_weights);
         for (bits, bytes) in bits.chunks_exact(8).zip(&mut bytes) {
             fill_byte_table(bits, bytes);
         }
@@ -110,18 +135,18 @@ pub fn occupancy_constancy(
             }
             let (from, to) = ((j - REACH).max(0), (j + REACH).min(side - 1));
             let line = (i + du) * side;
-            let targets = &now[(line + from) as usize..=(line + to) as usize];
+            let targets = &columns_now[(line + from) as usize..=(line + to) as usize];
             for (target, cost) in targets.iter().zip(&mut row[(from - j + REACH) as usize..]) {
                 let [a, b, c, d] = target[0].to_le_bytes().map(usize::from);
                 let score = bytes[0][a] + bytes[1][b] + bytes[2][c] + bytes[3][d];
-                *cost = costs[(score + offset) as usize] as u16;
+                *cost = constancy_costs[(score + offset) as usize] as u16;
             }
         }
     }
 }
 
 /// The classifier shipped with the program: see the file's provenance.
-pub const SHIPPED: &str = include_str!("../weights/constancy.txt");
+pub const SHIPPED: &str = include_str!("../../weights/constancy.txt");
 
 /// What is shipped for a frame: ours is trained on a lattice in the world; in the sensor's frame,
 /// where everything moves as the vehicle does, the author's choices include his constants.
@@ -134,7 +159,7 @@ pub fn shipped(frame: Frame) -> &'static str {
 
 /// The author's published constants: made in the sensor's frame, with rays from 1.73 m above the
 /// sensor.
-pub const AUTHOR: &str = include_str!("../weights/author.txt");
+pub const AUTHOR: &str = include_str!("../../weights/author.txt");
 
 #[cfg(test)]
 mod tests {
@@ -143,7 +168,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    fn toy() -> (Step, Vec<Column>, Vec<Column>) {
+    fn toy() -> (SweepUniform, Vec<Column>, Vec<Column>) {
         let random =
             |n: u32, s: u32| (n.wrapping_mul(2654435761) ^ s).wrapping_mul(0x2c1b_3c6d) >> 16;
         let make = |s: u32| -> Vec<Column> {
@@ -155,18 +180,26 @@ mod tests {
                 })
                 .collect()
         };
-        (Step { side: 33, levels: 14, outside_cost: 693, ..Default::default() }, make(1), make(7))
+        (
+            SweepUniform { side: 33, levels: 14, outside_cost: 693, ..Default::default() },
+            make(1),
+            make(7),
+        )
     }
 
     #[test]
     fn costs_equal_the_classifier_in_floating_point() {
-        let (mut step, before, now) = toy();
+        let (mut sweep, before, now) = toy();
         let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
         let scores = load(SHIPPED, 14, &mut weights, &mut costs).unwrap();
-        step.score_min = scores.min;
+        sweep.score_min = scores.min;
         let foreground = [0, 17, 33 * 16 + 16, 33 * 33 - 1];
         let mut cost = vec![0; 4 * ROW];
-        occupancy_constancy(&step, &weights, &costs, &foreground, &before, &now, &mut cost);
+        occupancy_constancy(&sweep, &weights, &costs, &foreground, &before, &now, &mut cost);
+        let mut fast = vec![0; 4 * ROW];
+        let (w, c) = (&weights, &costs);
+        occupancy_constancy_by_bytes(&sweep, w, c, &foreground, &before, &now, &mut fast);
+        assert!(fast == cost);
         for (n, source) in foreground.iter().enumerate() {
             let (i, j) = (*source as i32 / 33, *source as i32 % 33);
             for du in -REACH..=REACH {

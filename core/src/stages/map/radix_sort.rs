@@ -1,10 +1,13 @@
 //! Stable sort of updates by key (B.2.3), least significant digit first.
 
-use super::Update;
+use crate::map::Update;
+use crate::params::TILE;
 
-/// Sorts `updates` by key; equal keys keep their order. `scratch` must hold as many elements.
-pub fn radix_sort(updates: &mut [Update], scratch: &mut [Update]) {
-    assert!(updates.len() == scratch.len());
+/// Sorts the first `count_tiles[TILE]` of `updates` by key; equal keys keep their order. `scratch`
+/// must have room for as many. Digits are bytes here; the kernels take four bits at a time.
+pub fn radix_sort(count_tiles: &[u32], updates: &mut [Update], scratch: &mut [Update]) {
+    let count = count_tiles[TILE] as usize;
+    let (updates, scratch) = (&mut updates[..count], &mut scratch[..count]);
     let mut histograms = [[0u32; 256]; 4];
     for [key, _] in updates.iter() {
         for (digit, histogram) in key.to_le_bytes().into_iter().zip(&mut histograms) {
@@ -43,7 +46,9 @@ mod tests {
                 let mut wanted = updates.clone();
                 wanted.sort_by_key(|u| u[0]);
                 let mut scratch = vec![[0; 2]; updates.len()];
-                radix_sort(&mut updates, &mut scratch);
+                let mut count_tiles = [0; TILE + 1];
+                count_tiles[TILE] = n;
+                radix_sort(&count_tiles, &mut updates, &mut scratch);
                 assert!(updates == wanted, "{n} keys below {spread}");
             }
         }

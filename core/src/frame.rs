@@ -1,0 +1,247 @@
+//! The frame the grid lies in (B.2.2 leaves it open): all that depends on the choice.
+//!
+//! [`Frame::Lattice`]: cell borders are fixed in the world and the window follows the vehicle by
+//! whole cells, so that what stands is displaced by nothing and each sweep is traced once. Points are
+//! quantised relative to the window's central voxel: the window's size changes no voxel, which is why
+//! the sparse map and the dense window agree. [`Frame::Sensor`]: the vehicle frame of each sweep, as
+//! in the dissertation; motion is relative to the vehicle.
+
+use crate::continuity::Reset;
+use crate::motion_compensation::{EgoMotion, turn};
+use crate::output::ColumnFlow;
+use crate::params::{ANCHOR_ABOVE_GROUND_M, Frame, POINTS_MAX, Profile};
+use crate::pose::{Pose, Twist};
+use crate::prepare::Setup;
+use crate::sweep::{Rig, Sweep};
+use crate::tracklet::{Observation, Tracklet};
+use glam::DVec3;
+
+/// Where the window lies in one sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// From vehicle coordinates to metres from the centre of the window's central voxel.
+    pub grid_from_vehicle: Pose,
+    /// Lattice index of the window's first voxel.
+    pub corner: [i32; 3],
+    /// World position of the centre of lattice cell (0, 0, 0), m (`Frame::Sensor`: the vehicle's).
+    pub lattice_origin: DVec3,
+}
+
+/// The central voxel of a window; its level lies [`ANCHOR_ABOVE_GROUND_M`] above the ground.
+pub fn central(profile: &Profile) -> [i32; 3] {
+    let half = profile.side as i32 / 2;
+    [half, half, profile.levels as i32 / 2]
+}
+
+/// Places the window. `lattice_origin` is that of the drive, or `None` on its first sweep: the
+/// lattice then has a cell centre at the anchor, the point of the vehicle's axis
+/// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
+pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
+    let below = central(profile);
+    let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
+    let r = profile.voxel_m;
+    let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
+    match profile.frame {
+        Frame::Sensor => Window {
+            grid_from_vehicle: Pose { translation: -anchor, ..Pose::IDENTITY },
+            corner: below.map(|b| -b),
+            lattice_origin: pose.translation,
+        },
+        Frame::Lattice => {
+            let at = pose.transform(anchor);
+            let origin = lattice_origin.unwrap_or(at);
+            // A pose a world away saturates; its sweep is no continuation of any other.
+            let cell = ((at - origin) / r)
+                .to_array()
+                .map(|c| libm::floor(c + 0.5).clamp(-1e9, 1e9) as i32);
+            let corner = [cell[0] - below[0], cell[1] - below[1], cell[2] - below[2]];
+            Window {
+                grid_from_vehicle: Pose {
+                    rotation: pose.rotation,
+                    translation: pose.translation - origin - metres(cell),
+                },
+                corner,
+                lattice_origin: origin,
+            }
+        }
+    }
+}
+
+/// One sweep's side of a pair.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Side {
+    pub window: Window,
+    pub pose: Pose,
+    pub twist: Twist,
+    pub stamp_s: f64,
+    pub points: usize,
+}
+
+/// Where a sweep lies.
+pub(crate) struct Arrival {
+    pub window: Window,
+    /// Cells from the window before.
+    pub shift: [i32; 3],
+    /// Set where the sweep has no usable predecessor.
+    pub reset: Option<Reset>,
+}
+
+/// Two sweeps that follow each other.
+pub(crate) struct Pair<'a> {
+    pub profile: &'a Profile,
+    pub before: Side,
+    pub current: Side,
+    /// Time between them, s.
+    pub dt_s: f64,
+    /// How much the vehicle turned in between, rad.
+    pub turned_rad: f32,
+    /// The vehicle's motion from the one to the other, at the first: the odometry flow.
+    pub ego: EgoMotion,
+}
+
+/// The last two sweeps, and the lattice of the drive.
+pub(crate) struct Sides {
+    lattice_origin: Option<DVec3>,
+    pub before: Option<Side>,
+    pub current: Option<Side>,
+}
+
+impl Sides {
+    /// Before the first sweep.
+    pub const fn new() -> Sides {
+        Sides { lattice_origin: None, before: None, current: None }
+    }
+
+    /// A sweep arrives. One that does not continue the one before has none before it.
+    pub fn advance(&mut self, setup: &Setup, sweep: &Sweep) -> Arrival {
+        let Setup { profile, rig, .. } = setup;
+        let pose = sweep.world_from_vehicle;
+        self.before = self.current.take();
+        let reset = match &self.before {
+            None => Some(Reset::First),
+            Some(before) => {
+                let dt_s = sweep.stamp_s - before.stamp_s;
+                profile.limits.broken(&before.pose, &pose, dt_s)
+            }
+        };
+        self.before = self.before.filter(|_| reset.is_none());
+        let window = place(profile, rig, &pose, self.lattice_origin);
+        self.lattice_origin.get_or_insert(window.lattice_origin);
+        let points = sweep.points.len().min(POINTS_MAX);
+        let (stamp_s, twist) = (sweep.stamp_s, sweep.twist);
+        self.current = Some(Side { window, pose, twist, stamp_s, points });
+        let before = self.before.as_ref().map(|b| &b.window);
+        let shift = profile.frame.shift(profile.side as i32, before, &window);
+        Arrival { window, shift, reset }
+    }
+
+    /// Both, where the second continues the first.
+    pub fn pair<'a>(&self, profile: &'a Profile) -> Option<Pair<'a>> {
+        Some(Pair::new(profile, self.before?, self.current?))
+    }
+}
+
+impl<'a> Pair<'a> {
+    fn new(profile: &'a Profile, before: Side, current: Side) -> Pair<'a> {
+        let dt_s = current.stamp_s - before.stamp_s;
+        let moved = before.pose.inverse() * current.pose;
+        let ego = EgoMotion::new(&before.pose, &moved.twist(dt_s));
+        Pair { profile, before, current, dt_s, turned_rad: moved.yaw_rad() as f32, ego }
+    }
+
+    /// The first sweep's vehicle frame from the second's window: the corners differ by whole cells.
+    pub fn vehicle_from_grid(&self) -> Pose {
+        let (before, current) = (&self.before.window, &self.current.window);
+        let cells = |a: usize| (before.corner[a] - current.corner[a]) as f64;
+        let moved = core::array::from_fn(|a| cells(a) * self.profile.voxel_m);
+        let mut grid_from_vehicle = before.grid_from_vehicle;
+        grid_from_vehicle.translation += DVec3::from_array(moved);
+        grid_from_vehicle.inverse()
+    }
+
+    /// Displacement over ground and velocities of an observed column at `at` (first sweep's vehicle
+    /// frame): its tracklet's velocity, or, where there was no room for one, that of the
+    /// displacement.
+    pub fn set_motion(
+        &self,
+        at: DVec3,
+        o: &Observation,
+        tracklet: Option<&Tracklet>,
+        flow: &mut ColumnFlow,
+    ) {
+        let (dt, planar) = (self.dt_s as f32, DVec3::new(at.x, at.y, 0.0));
+        let of_pair = (o.moved.map(|v| v / dt), o.covariance.map(|v| v / (dt * dt)));
+        flow.displacement_m = o.moved;
+        flow.displacement_covariance = o.covariance;
+        match self.profile.frame {
+            Frame::Lattice => {
+                (flow.velocity_world_mps, flow.covariance) =
+                    tracklet.map_or(of_pair, |t| t.ekf.velocity());
+                self.set_relative(at, flow);
+            }
+            Frame::Sensor => {
+                let by = DVec3::new(o.moved[0] as f64, o.moved[1] as f64, 0.0);
+                let by = self.current.pose.transform(at + by) - self.before.pose.transform(at);
+                flow.displacement_m = [by.x as f32, by.y as f32];
+                // The tracklet has gone over to the second sweep's axes.
+                let turned_back = |t: &Tracklet| {
+                    let (velocity, covariance) = t.ekf.velocity();
+                    turn(self.turned_rad, velocity, covariance)
+                };
+                let (velocity, covariance) = tracklet.map_or(of_pair, turned_back);
+                flow.velocity_ego_mps = velocity;
+                flow.velocity_world_mps = self.ego.world_from_ego(planar, velocity);
+                flow.covariance = self.ego.turn_covariance(covariance);
+            }
+        }
+    }
+
+    /// The velocity relative to the vehicle that goes with a column's velocity over ground.
+    pub fn set_relative(&self, at: DVec3, flow: &mut ColumnFlow) {
+        let planar = DVec3::new(at.x, at.y, 0.0);
+        let [x, y, _] = self.ego.ego_from_world(planar, flow.velocity_world_mps);
+        flow.velocity_ego_mps = [x, y];
+    }
+}
+
+impl Frame {
+    /// Cells from the window before to the new one. Where there is none before, so many that nothing
+    /// of it comes into view.
+    fn shift(self, side: i32, before: Option<&Window>, now: &Window) -> [i32; 3] {
+        match (before, self) {
+            (Some(before), Frame::Lattice) => core::array::from_fn(|a| {
+                now.corner[a].saturating_sub(before.corner[a]).clamp(-side, side)
+            }),
+            (Some(_), Frame::Sensor) => [0; 3],
+            (None, _) => [side, 0, 0],
+        }
+    }
+
+    /// Heading and speed over ground, velocity over ground and relative to the vehicle, of a tracklet
+    /// at `at` (vehicle frame).
+    pub(crate) fn motion_of(
+        self,
+        t: &Tracklet,
+        ego: &EgoMotion,
+        at: DVec3,
+    ) -> (f32, f32, [f32; 2], [f32; 2]) {
+        let planar = DVec3::new(at.x, at.y, 0.0);
+        let (v, _) = t.ekf.velocity();
+        match self {
+            Frame::Lattice => {
+                let [x, y, _] = ego.ego_from_world(planar, v);
+                (t.ekf.mean[2], t.ekf.mean[3], v, [x, y])
+            }
+            Frame::Sensor => {
+                let w = ego.world_from_ego(planar, v);
+                (libm::atan2f(w[1], w[0]), libm::sqrtf(w[0] * w[0] + w[1] * w[1]), w, v)
+            }
+        }
+    }
+}
+
+/// The centre of a column, at the level of the anchor, from the window's central voxel, m.
+pub(crate) fn centre_of(profile: &Profile, i: i32, j: i32) -> DVec3 {
+    let [ci, cj, _] = central(profile);
+    DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0) * profile.voxel_m
+}

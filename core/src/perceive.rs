@@ -1,0 +1,179 @@
+//! From rays to flow: the part of a sweep that a device may do.
+
+use crate::params::{FOREGROUND_MAX, Profile};
+use crate::record::{Column, Flow, Proposal, Ray, SweepUniform};
+use crate::stages::{
+    DISTINCT_COUNT, FLOW, FLOW_PROGRAMS, FOREGROUND_COUNT, FOREGROUND_MARKED, GRID, Storage, run,
+};
+use crate::team::Team;
+
+/// What perception finds in a pair of sweeps.
+#[derive(Clone, Copy, Debug)]
+pub struct Perceived<'a> {
+    /// Columns of the sweep before, in the new window.
+    pub columns_before: &'a [Column],
+    /// Columns of the new sweep.
+    pub columns_now: &'a [Column],
+    /// Foreground columns, ascending.
+    pub foreground: &'a [u32],
+    /// Foreground columns found, those beyond the capacity included.
+    pub marked: usize,
+    /// Distinct rays traced.
+    pub rays: usize,
+    /// Flow of every column.
+    pub flow: &'a [Flow],
+    /// Last proposal of every foreground column: the energy of its flow.
+    pub proposal: &'a [Proposal],
+}
+
+/// Buffers as perception leaves them, whoever holds them.
+pub struct Outputs<'a> {
+    /// `counters`.
+    pub counters: &'a [u32],
+    /// `columns_before`.
+    pub columns_before: &'a [Column],
+    /// `columns_now`.
+    pub columns_now: &'a [Column],
+    /// `foreground`.
+    pub foreground: &'a [u32],
+    /// `flow`.
+    pub flow: &'a [Flow],
+    /// `proposal`.
+    pub proposal: &'a [Proposal],
+}
+
+impl<'a> From<Outputs<'a>> for Perceived<'a> {
+    fn from(o: Outputs<'a>) -> Perceived<'a> {
+        // A device that answers nonsense yields no flow, not a panic.
+        let count = (o.counters[FOREGROUND_COUNT] as usize).min(FOREGROUND_MAX);
+        Perceived {
+            columns_before: o.columns_before,
+            columns_now: o.columns_now,
+            foreground: &o.foreground[..count],
+            marked: (o.counters[FOREGROUND_MARKED] as usize).max(count),
+            rays: o.counters[DISTINCT_COUNT] as usize,
+            flow: o.flow,
+            proposal: &o.proposal[..count],
+        }
+    }
+}
+
+/// Who keeps the times of the stages.
+pub trait Timer {
+    /// Books the time since the last stage ended to `stage`.
+    fn lap(&mut self, stage: &'static str);
+    /// Books time measured elsewhere, and to `rest` what else has passed since the last stage ended.
+    fn measured(
+        &mut self,
+        stages: &mut dyn Iterator<Item = (&'static str, f64)>,
+        rest: &'static str,
+    );
+}
+
+/// Nobody does.
+impl Timer for () {
+    fn lap(&mut self, _: &'static str) {}
+    fn measured(&mut self, _: &mut dyn Iterator<Item = (&'static str, f64)>, _: &'static str) {}
+}
+
+/// A backend of perception: the twins on the CPU, or the kernels on a device.
+pub trait Perceive {
+    /// Why it may fail.
+    type Error;
+
+    /// Where the rays and the voxels of their origins go: [`crate::params::POINTS_MAX`] and
+    /// [`crate::params::ORIGINS_MAX`] elements, perhaps memory of a device that is slow to read.
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]);
+
+    /// From rays to flow. `meanwhile` is done while a device works, or by another thread of the
+    /// team.
+    fn perceive(
+        &mut self,
+        sweep: &SweepUniform,
+        team: &impl Team,
+        timer: &mut (impl Timer + Send),
+        meanwhile: impl FnOnce() + Send,
+    ) -> Result<Perceived<'_>, Self::Error>;
+}
+
+/// Who does the work of a step, and who keeps its time.
+pub struct Machine<'a, P, T, C> {
+    /// From rays to flow.
+    pub backend: &'a mut P,
+    /// Threads of the CPU; how many makes no difference to what comes out.
+    pub team: &'a T,
+    /// Times of the stages.
+    pub timer: &'a mut C,
+}
+
+/// The learned numbers in the form the kernels and their twins use: slices of the caller's.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables<'a> {
+    /// See [`crate::stages::background_filter::load`]; all zero where there is no filter.
+    pub filter_table: &'a [i32],
+    /// See [`crate::stages::occupancy_constancy::load`].
+    pub constancy_weights: &'a [i32],
+    /// Its costs.
+    pub constancy_costs: &'a [u32],
+}
+
+/// The scalar backend: the stages of [`crate::stages`] over memory that the caller provides.
+pub struct Scalar<M> {
+    memory: M,
+    profile: Profile,
+}
+
+impl<M: AsMut<[u32]> + Send> Scalar<M> {
+    /// Words of memory it needs for a profile.
+    pub fn words(profile: &Profile) -> usize {
+        Storage::words(FLOW_PROGRAMS, profile)
+    }
+
+    /// Over zeroed memory of [`Scalar::words`].
+    pub fn new(memory: M, profile: &Profile, tables: &Tables) -> Scalar<M> {
+        let mut scalar = Scalar { memory, profile: profile.clone() };
+        let storage = scalar.storage();
+        storage.filter_table.copy_from_slice(tables.filter_table);
+        storage.constancy_weights.copy_from_slice(tables.constancy_weights);
+        storage.constancy_costs.copy_from_slice(tables.constancy_costs);
+        scalar
+    }
+
+    /// The buffers as the last sweep left them.
+    pub fn storage(&mut self) -> Storage<'_> {
+        Storage::over(self.memory.as_mut(), FLOW_PROGRAMS, &self.profile)
+    }
+}
+
+impl<M: AsMut<[u32]> + Send> Perceive for Scalar<M> {
+    type Error = core::convert::Infallible;
+
+    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+        let storage = self.storage();
+        (storage.rays, storage.origins)
+    }
+
+    fn perceive(
+        &mut self,
+        sweep: &SweepUniform,
+        team: &impl Team,
+        timer: &mut (impl Timer + Send),
+        meanwhile: impl FnOnce() + Send,
+    ) -> Result<Perceived<'_>, Self::Error> {
+        let rounds = self.profile.em_rounds;
+        let mut s = self.storage();
+        s.sweep = *sweep;
+        let lap = &mut |stage| timer.lap(stage);
+        let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, lap));
+        team.join(stages, meanwhile);
+        Ok(Outputs {
+            counters: s.counters,
+            columns_before: s.columns_before,
+            columns_now: s.columns_now,
+            foreground: s.foreground,
+            flow: s.flow,
+            proposal: s.proposal,
+        }
+        .into())
+    }
+}

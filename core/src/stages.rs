@@ -1,0 +1,335 @@
+//! Every stage from rays to flow and from rays to the sparse map: the table of buffers, the stages
+//! and the order they run in, declared here and nowhere else.
+//!
+//! A stage is a function of this module's tree, its *twin*, and the kernel of the same name at the
+//! same path below `kernels/wgsl`. The twin is the formula; where the scalar backend needs a faster
+//! one, that stands beside it and is tested equal. The order below drives the scalar backend, the
+//! device's schedule, the sparse map and the lab.
+
+mod declare;
+
+pub mod background_filter;
+pub mod compact;
+pub mod flow {
+    //! Energy minimisation (section 3.5.2) as expectation-maximisation.
+    //!
+    //! Every foreground column seeks the displacement of least energy (3.14), in whole cells and
+    //! thousandths of a nat; then every target keeps its best claimant. Both steps are strict: all
+    //! columns of a round see the flow that the round before left (Jacobi), ties go to the first
+    //! candidate in scan order and to the first column, and the energies of the targets are rebuilt
+    //! each round from their winners.
+    pub mod expectation;
+    pub mod maximisation;
+    #[cfg(test)]
+    mod tests;
+}
+pub mod grid {
+    //! Occupancy grid (section 3.4.1, appendix B): rays, log-odds, columns.
+    //!
+    //! Voxel `(i, j, k)` of a window is centred on `(i, j, k) * voxel_m` from the window's corner
+    //! and lies at index `(i * side + j) * levels + k`; column `(i, j)` at `i * side + j`. `i` runs
+    //! along +x, `j` along +y, `k` upwards.
+    pub mod columns;
+    pub mod ray_merge;
+    pub mod ray_trace;
+    pub mod shift;
+    pub mod walk;
+}
+pub mod map {
+    //! Update list, radix sort and reduce-by-key of the sparse map (B.2).
+    pub mod emit;
+    pub mod radix_sort;
+    pub mod reduce_by_key;
+}
+pub mod occupancy_constancy;
+pub mod prefix_sum;
+pub mod window;
+
+pub use declare::{
+    Argument, Element, Groups, List, Op, Program, Row, Runner, Stage, View, needed, run, walk,
+};
+
+use crate::params::*;
+use crate::record::{Column, Flow, MinCost, NO_END, NONE, Proposal, Ray, SweepUniform, VALID};
+use background_filter::{FILTER_TABLE, TABLE_WORDS};
+use declare::{argument, buffers, constants, passed, stage, words_of};
+use occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
+
+use crate::map::Update;
+
+buffers! {
+    uniform sweep: SweepUniform, "sizes, shift and costs of the sweep";
+    origins: [i32; 4] [|_| ORIGINS_MAX] "voxels of the ray origins";
+    rays: Ray [|_| POINTS_MAX] "rays of the sweep";
+    filter_table: i32 [|_| TABLE_WORDS] "background filter by mask byte";
+    constancy_weights: i32 [|_| WEIGHT_WORDS] "constancy weights by level";
+    constancy_costs: u32 [|_| SCORES_MAX] "cost of each score, 1/1000 nat";
+    slots: [u32; 2] [|_| MERGE_SLOTS] "distinct rays: 1 + index of one, and how many";
+    distinct: u32 [|_| POINTS_MAX] "used slots";
+    counters: u32 [|_| COUNTERS] "counts and indirect group counts";
+    log_odds: i32 [Profile::voxels] "log-odds of every voxel, tenths";
+    columns_now: Column [Profile::columns] "columns of this sweep";
+    columns_before: Column [Profile::columns] "columns of the sweep before, in this window";
+    foreground_marks: u32 [Profile::columns] "1 where a column is foreground";
+    tiles: u32 [|_| TILE + 1] "sums of the tiles of the prefix sum, then of all";
+    foreground_index: u32 [Profile::columns] "position of a column in the foreground";
+    foreground: u32 [|_| FOREGROUND_MAX] "foreground columns, ascending";
+    pair_cost: u16 [|_| FOREGROUND_MAX * ROW] "costs of pairs of columns";
+    window_cost: u16 [|_| FOREGROUND_MAX * ROW] "costs summed over 3x3 columns (T, 3.13)";
+    flow: Flow [Profile::columns] "flow of every column";
+    target_energy: u32 [Profile::columns] "energy of the winner at every target";
+    target_index: u32 [Profile::columns] "foreground index of the winner at every target";
+    proposal: Proposal [|_| FOREGROUND_MAX] "flow and energy each foreground column proposes";
+    min_cost: MinCost [|_| FOREGROUND_MAX] "least energy of a foreground column, and where";
+    counts: u32 [|_| POINTS_MAX] "updates of each distinct ray in the band";
+    offsets: u32 [|_| POINTS_MAX] "where its updates start";
+    count_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum, updates of the band";
+    updates: Update [|_| BAND_UPDATES] "updates (key, log-odds), then sorted";
+    scratch: Update [|_| BAND_UPDATES] "the other side of a radix pass, then voxels";
+    histograms: u32 [|_| HISTOGRAMS] "digits of each tile";
+    digit_offsets: u32 [|_| HISTOGRAMS] "where they go";
+    digit_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum";
+    heads: u32 [|_| BAND_UPDATES] "1 where a key is new";
+    runs: u32 [|_| BAND_UPDATES] "voxels before";
+    run_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum, voxels of the band";
+}
+
+/// Words of the counters: distinct rays, foreground listed, foreground marked, shift of the radix
+/// digit; then three group counts and a spare for each indirect dispatch.
+pub const COUNTERS: usize = 16;
+/// Word of the number of distinct rays.
+pub const DISTINCT_COUNT: usize = 0;
+/// Word of the number of foreground columns listed.
+pub const FOREGROUND_COUNT: usize = 1;
+/// Word of the number of foreground columns marked.
+pub const FOREGROUND_MARKED: usize = 2;
+/// Word of the shift of the radix pass.
+pub const DIGIT_SHIFT: usize = 3;
+/// First word of the group counts, one thread per distinct ray.
+pub const GROUPS_DISTINCT: usize = 4;
+/// First word of the group counts, one thread per foreground column.
+pub const GROUPS_FOREGROUND: usize = 8;
+/// First word of the group counts, one group per foreground column.
+pub const GROUPS_ROWS: usize = 12;
+/// Counts of all digits in all tiles of a band.
+const HISTOGRAMS: usize = RADIX * BAND_UPDATES / TILE;
+
+constants! {
+    POINTS_MAX, LEVELS_MAX, FOREGROUND_MAX, SIDE, LINE, ROW, ROW_WORDS, MERGE_SLOTS, MERGE_PROBES,
+    WORKGROUP, ROW_WORKGROUP, TILE, RADIX, COST_UNKNOWN, FILTER_TABLE, DISTINCT_COUNT,
+    FOREGROUND_COUNT, FOREGROUND_MARKED, GROUPS_DISTINCT, GROUPS_FOREGROUND, GROUPS_ROWS,
+    DIGIT_SHIFT, NO_END, VALID, NONE;
+    REACH, RANGE_STEPS_MAX, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, LOG_ODDS_SOLID
+}
+
+use Groups::{GroupPer, One, ThreadPer, Threads, Tiles};
+use List::{Distinct, Foreground};
+use Op::{Fill, Fused, Part, ReadBack, Repeat, Rounds, Run, Upload};
+
+/// The programs of the flow pipeline: at start, and every sweep.
+pub const FLOW_PROGRAMS: &[Program] = &[
+    Program { name: "load", ops: LOAD },
+    Program { name: "flow", ops: &[Part(GRID), Part(FLOW)] },
+];
+
+/// The programs of the sparse map: every sweep, then two for every band.
+pub const MAP_PROGRAMS: &[Program] = &[
+    Program { name: "map rays", ops: MAP_RAYS },
+    Program { name: "map count", ops: MAP_COUNT },
+    Program { name: "map band", ops: MAP_BAND },
+];
+
+/// Copies of the learned tables, once at start.
+pub const LOAD: &[Op] = &[
+    Upload(Buffer::filter_table),
+    Upload(Buffer::constancy_weights),
+    Upload(Buffer::constancy_costs),
+];
+
+const RAY_MERGE: &Stage = stage!(
+    ray_merge in grid::ray_merge,
+    (sweep, rays, mut atomic slots, mut distinct, mut atomic counters),
+    Threads(|_| POINTS_MAX)
+);
+
+/// Group counts of the indirect dispatches.
+const PLAN: &Stage = stage!(device plan, (mut counters), One);
+
+/// Exclusive prefix sum of a whole buffer.
+macro_rules! prefix_sum {
+    ($values:ident, $tiles:ident, $sums:ident, $count:expr) => {
+        stage!(
+            prefix_sum in prefix_sum,
+            (values is $values, mut tiles is $tiles, mut sums is $sums),
+            [reduce: Tiles($count), spine: One, scan: Tiles($count)]
+        )
+    };
+}
+
+/// From rays to the columns of a sweep: the occupancy grid.
+pub const GRID: &[Op] = &[
+    Upload(Buffer::sweep),
+    Upload(Buffer::origins),
+    Upload(Buffer::rays),
+    Fill(Buffer::slots, 0),
+    Fill(Buffer::counters, 0),
+    Fill(Buffer::log_odds, 0),
+    Run(
+        stage!(shift in grid::shift, (sweep, columns_now, mut columns_before), Threads(Profile::columns)),
+    ),
+    Run(RAY_MERGE),
+    Run(PLAN),
+    Run(stage!(
+        ray_trace in grid::ray_trace,
+        (sweep, origins, rays, slots, list distinct, mut atomic log_odds),
+        ThreadPer(Distinct)
+    )),
+    Run(
+        stage!(columns in grid::columns, (sweep, log_odds, mut columns_now), Threads(Profile::columns)),
+    ),
+];
+
+/// From the columns of two sweeps to flow.
+pub const FLOW: &[Op] = &[
+    Run(stage!(
+        background_filter in background_filter,
+        (sweep, filter_table, columns_before, mut foreground_marks),
+        scalar: background_filter::background_filter_by_bytes,
+        Tiles(Profile::columns)
+    )),
+    Run(prefix_sum!(foreground_marks, tiles, foreground_index, Profile::columns)),
+    Run(stage!(
+        compact in compact,
+        (foreground_marks, mut foreground_index, mut foreground, mut counters),
+        Threads(Profile::columns)
+    )),
+    Run(PLAN),
+    Run(stage!(
+        occupancy_constancy in occupancy_constancy,
+        (sweep, constancy_weights, constancy_costs, list foreground, columns_before, columns_now,
+            mut pair_cost),
+        scalar: occupancy_constancy::occupancy_constancy_by_bytes,
+        GroupPer(Foreground)
+    )),
+    Run(stage!(
+        window in window,
+        (sweep, list foreground, foreground_index, quads pair_cost, mut quads window_cost),
+        GroupPer(Foreground)
+    )),
+    Fill(Buffer::flow, 0),
+    Fill(Buffer::target_energy, NONE),
+    Fill(Buffer::min_cost, NONE),
+    Rounds(&[
+        Run(stage!(
+            expectation in flow::expectation,
+            (sweep, list foreground, window_cost, flow, target_energy, mut min_cost, mut proposal),
+            scalar: flow::expectation::expectation_by_rings,
+            ThreadPer(Foreground)
+        )),
+        Fill(Buffer::target_energy, NONE),
+        Fill(Buffer::target_index, NONE),
+        Run(stage!(
+            maximisation in flow::maximisation,
+            (sweep, list foreground, proposal, mut atomic target_energy, mut atomic target_index,
+                mut flow),
+            [claim: ThreadPer(Foreground), elect: ThreadPer(Foreground), settle: ThreadPer(Foreground)]
+        )),
+    ]),
+    ReadBack(Buffer::counters),
+    ReadBack(Buffer::columns_now),
+    ReadBack(Buffer::columns_before),
+    ReadBack(Buffer::foreground),
+    ReadBack(Buffer::flow),
+    ReadBack(Buffer::proposal),
+];
+
+/// Half a pass of the radix sort over 4-bit digits.
+macro_rules! radix_pass {
+    (histogram, $from:ident) => {
+        stage!(
+            device histogram,
+            (count_tiles, counters, unsorted is $from, mut histograms),
+            Tiles(|_| BAND_UPDATES)
+        )
+    };
+    (scatter, $from:ident, $to:ident) => {
+        stage!(
+            device scatter,
+            (count_tiles, counters, unsorted is $from, mut sorted is $to, digit_offsets),
+            Tiles(|_| BAND_UPDATES)
+        )
+    };
+}
+
+const DIGIT_SUM: &Stage = prefix_sum!(histograms, digit_tiles, digit_offsets, |_| HISTOGRAMS);
+const NEXT_DIGIT: &Stage = stage!(device next_digit, (mut counters), One);
+
+/// Sparse map: distinct rays of a sweep. Then, band after band, [`MAP_COUNT`] and [`MAP_BAND`].
+pub const MAP_RAYS: &[Op] = &[
+    Upload(Buffer::sweep),
+    Upload(Buffer::origins),
+    Upload(Buffer::rays),
+    Fill(Buffer::slots, 0),
+    Fill(Buffer::counters, 0),
+    Run(RAY_MERGE),
+];
+
+/// Sparse map: counts the updates of a band; `count_tiles` ends with their number.
+pub const MAP_COUNT: &[Op] = &[
+    Upload(Buffer::sweep),
+    Run(stage!(
+        count in map::emit,
+        (sweep, origins, rays, slots, list distinct, mut counts),
+        Threads(|_| POINTS_MAX)
+    )),
+    Run(prefix_sum!(counts, count_tiles, offsets, |_| POINTS_MAX)),
+    ReadBack(Buffer::count_tiles),
+];
+
+/// Sparse map: emits, sorts and reduces the updates of the band just counted, which must not be
+/// more than [`BAND_UPDATES`]. `run_tiles` ends with the number of voxels, `scratch` holds them.
+pub const MAP_BAND: &[Op] = &[
+    Run(stage!(
+        emit in map::emit,
+        (sweep, origins, rays, slots, list distinct, offsets, mut updates),
+        Threads(|_| POINTS_MAX)
+    )),
+    Fused(
+        stage!(radix_sort in map::radix_sort, (count_tiles, mut updates, mut scratch), []),
+        &[
+            // The counters hold the shift of the digit too; a full sort leaves it at 32, where no
+            // shift is defined, so it starts anew.
+            Run(stage!(device first_digit, (mut counters), One)),
+            Repeat(
+                4,
+                &[
+                    Run(radix_pass!(histogram, updates)),
+                    Run(DIGIT_SUM),
+                    Run(radix_pass!(scatter, updates, scratch)),
+                    Run(NEXT_DIGIT),
+                    Run(radix_pass!(histogram, scratch)),
+                    Run(DIGIT_SUM),
+                    Run(radix_pass!(scatter, scratch, updates)),
+                    Run(NEXT_DIGIT),
+                ],
+            ),
+        ],
+    ),
+    Fused(
+        stage!(reduce_by_key in map::reduce_by_key, (count_tiles, updates, mut voxels is scratch, mut run_tiles), []),
+        &[
+            Run(
+                stage!(device mark_heads, (count_tiles, updates, mut heads), Threads(|_| BAND_UPDATES)),
+            ),
+            Run(prefix_sum!(heads, run_tiles, runs, |_| BAND_UPDATES)),
+            Fill(Buffer::scratch, 0),
+            Run(stage!(
+                device fold,
+                (count_tiles, updates, heads, runs, mut atomic voxels is scratch),
+                Threads(|_| BAND_UPDATES)
+            )),
+        ],
+    ),
+    ReadBack(Buffer::scratch),
+    ReadBack(Buffer::run_tiles),
+];

@@ -1,0 +1,417 @@
+//! What a buffer and a stage are, and the macros that declare them in [`super`].
+//!
+//! A declaration there is the only one: the slices the scalar backend works on, the bytes of
+//! `memory-layout.md`, the bindings and struct wrappers of the kernels, the device's schedule and
+//! the names in every table of times come from it.
+
+use super::{Buffer, Storage};
+use crate::params::Profile;
+
+/// An argument of a stage as the kernel binds it.
+macro_rules! argument {
+    (mut $($rest:ident)+) => { Argument { writes: true, ..argument!($($rest)+) } };
+    (atomic $($rest:ident)+) => { Argument { view: View::Atomic, ..argument!($($rest)+) } };
+    (words $($rest:ident)+) => { Argument { view: View::Words, ..argument!($($rest)+) } };
+    (quads $($rest:ident)+) => { Argument { view: View::Quads, ..argument!($($rest)+) } };
+    (list $($rest:ident)+) => { Argument { is_list: true, ..argument!($($rest)+) } };
+    ($name:ident is $buffer:ident) => {
+        Argument { name: stringify!($name), ..argument!($buffer) }
+    };
+    ($buffer:ident) => {
+        Argument {
+            name: stringify!($buffer),
+            buffer: Buffer::$buffer,
+            view: View::Elements,
+            writes: false,
+            is_list: false,
+        }
+    };
+}
+
+/// An element of a buffer: as the twins see it, and as the kernels do.
+pub trait Element: Copy {
+    /// Type of an array element in a kernel. Two 16-bit elements share a `u32`.
+    const WGSL: &'static str;
+    /// The element whose words are all `word`.
+    fn splat(word: u32) -> Self;
+}
+
+macro_rules! elements {
+    ($($rust:ty, $wgsl:literal, |$word:ident| $splat:expr;)*) => { $(
+        impl Element for $rust {
+            const WGSL: &'static str = $wgsl;
+            fn splat($word: u32) -> $rust {
+                $splat
+            }
+        }
+    )* };
+}
+
+elements! {
+    u16, "u32", |word| word as u16;
+    u32, "u32", |word| word;
+    i32, "i32", |word| word as i32;
+    [u32; 2], "vec2<u32>", |word| [word; 2];
+    [i32; 4], "vec4<i32>", |word| [word as i32; 4];
+}
+
+/// One row of the table of buffers.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Name, the same in the kernels and of the twins' arguments.
+    pub name: &'static str,
+    /// Type of an element in the kernels.
+    pub wgsl: &'static str,
+    /// Bytes of an element of the twins.
+    pub element_bytes: usize,
+    /// Elements for a profile.
+    pub count: fn(&Profile) -> usize,
+    /// Name of the mapped buffer it is uploaded through, where it is.
+    pub upload: &'static str,
+    /// Name of the mapped buffer it is read back through, where it is.
+    pub readback: &'static str,
+    /// What it holds.
+    pub doc: &'static str,
+}
+
+impl Row {
+    /// Bytes for a profile.
+    pub fn bytes(&self, profile: &Profile) -> usize {
+        self.element_bytes * (self.count)(profile)
+    }
+}
+
+/// How a kernel sees a buffer where that is not as its elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// An array of the buffer's elements.
+    Elements,
+    /// Atomic words.
+    Atomic,
+    /// Plain words.
+    Words,
+    /// Words by four.
+    Quads,
+}
+
+/// A buffer as an argument of a stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Argument {
+    /// Name in the kernel and in the twin.
+    pub name: &'static str,
+    /// The buffer.
+    pub buffer: Buffer,
+    /// How the kernel sees it.
+    pub view: View,
+    /// The stage writes it.
+    pub writes: bool,
+    /// It is a list, whose length `counters` holds.
+    pub is_list: bool,
+}
+
+/// A list whose length only the device knows: `counters` holds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum List {
+    /// Distinct rays.
+    Distinct,
+    /// Foreground columns.
+    Foreground,
+}
+
+/// Workgroups of a kernel.
+#[derive(Clone, Copy, Debug)]
+pub enum Groups {
+    /// One.
+    One,
+    /// A thread per item.
+    Threads(fn(&Profile) -> usize),
+    /// [`crate::params::TILE`] items a workgroup.
+    Tiles(fn(&Profile) -> usize),
+    /// A thread per entry of a list.
+    ThreadPer(List),
+    /// A workgroup per entry of a list.
+    GroupPer(List),
+}
+
+/// A stage: a twin, and the kernels that together do the same on a device.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// Name, in every table of times too.
+    pub name: &'static str,
+    /// Entry points in order, all with the stage's arguments.
+    pub kernels: &'static [(&'static str, Groups)],
+    /// Arguments of the twin.
+    pub arguments: &'static [Argument],
+    /// What the scalar backend runs.
+    pub scalar: fn(&mut Storage),
+}
+
+impl Stage {
+    /// What the kernels bind, in order: the arguments, and `counters` behind a list where threads
+    /// have to know its length.
+    pub fn bindings(&self) -> impl Iterator<Item = Argument> {
+        let by_group = |(_, groups): &(_, Groups)| matches!(groups, Groups::GroupPer(_));
+        let counted = !self.kernels.iter().all(by_group);
+        let of =
+            move |a: &Argument| [Some(*a), (a.is_list && counted).then_some(argument!(counters))];
+        self.arguments.iter().flat_map(of).flatten()
+    }
+}
+
+/// A step of a program.
+#[derive(Clone, Copy, Debug)]
+pub enum Op {
+    /// The host's words go to the device.
+    Upload(Buffer),
+    /// Every word of a buffer is set.
+    Fill(Buffer, u32),
+    /// A stage.
+    Run(&'static Stage),
+    /// One stage of the scalar backend that is several steps on a device.
+    Fused(&'static Stage, &'static [Op]),
+    /// Steps that are a list of their own.
+    Part(&'static [Op]),
+    /// As often as there are rounds of the energy minimisation.
+    Rounds(&'static [Op]),
+    /// A fixed number of times.
+    Repeat(u32, &'static [Op]),
+    /// The device's words go to the host.
+    ReadBack(Buffer),
+}
+
+/// Steps that run as a whole.
+#[derive(Clone, Copy, Debug)]
+pub struct Program {
+    /// For messages and documents.
+    pub name: &'static str,
+    /// The steps, in order.
+    pub ops: &'static [Op],
+}
+
+/// Who runs a program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Runner {
+    /// The twins.
+    Scalar,
+    /// The kernels.
+    Device,
+}
+
+/// Calls `each` with every upload, fill, stage and readback in the order they run.
+pub fn walk(ops: &[Op], runner: Runner, rounds: u32, each: &mut dyn FnMut(Op)) {
+    for op in ops {
+        let (times, inner) = match *op {
+            Op::Fused(stage, _) if runner == Runner::Scalar => {
+                each(Op::Run(stage));
+                continue;
+            }
+            Op::Fused(_, inner) | Op::Part(inner) => (1, inner),
+            Op::Rounds(inner) => (rounds, inner),
+            Op::Repeat(times, inner) => (times, inner),
+            leaf => {
+                each(leaf);
+                continue;
+            }
+        };
+        (0..times).for_each(|_| walk(inner, runner, rounds, each));
+    }
+}
+
+/// Runs steps on the CPU. `lap` is called with the name of each stage when it is done.
+pub fn run(ops: &[Op], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&'static str)) {
+    walk(ops, Runner::Scalar, rounds, &mut |op| match op {
+        Op::Fill(buffer, word) => storage.fill(buffer, word),
+        Op::Run(stage) => {
+            (stage.scalar)(storage);
+            lap(stage.name);
+        }
+        // The storage is the host's own memory.
+        _ => {}
+    });
+}
+
+impl Op {
+    /// Whether this step, which [`walk`] has come to, touches a buffer.
+    pub fn touches(&self, buffer: Buffer) -> bool {
+        match *self {
+            Op::Upload(b) | Op::ReadBack(b) | Op::Fill(b, _) => b == buffer,
+            Op::Run(stage) => stage.bindings().any(|a| a.buffer == buffer),
+            _ => false,
+        }
+    }
+}
+
+/// Whether some of the programs need a buffer.
+pub fn needed(programs: &[Program], runner: Runner, buffer: Buffer) -> bool {
+    let mut found = false;
+    for program in programs {
+        walk(program.ops, runner, 1, &mut |op| found |= op.touches(buffer));
+    }
+    found
+}
+
+/// Declares the table of buffers: [`Buffer`], [`BUFFERS`](super::BUFFERS) and [`Storage`].
+macro_rules! buffers {
+    (
+        uniform $uniform:ident: $record:ty, $uniform_doc:literal;
+        $( $name:ident: $element:ty [$count:expr] $doc:literal; )*
+    ) => {
+        /// Buffers by their names in the kernels.
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Buffer {
+            #[doc = $uniform_doc]
+            $uniform,
+            $( #[doc = $doc] $name ),*
+        }
+
+        impl Buffer {
+            /// All of them, in order.
+            pub const ALL: &[Buffer] = &[Buffer::$uniform, $( Buffer::$name ),*];
+
+            /// The row of this buffer.
+            pub fn row(self) -> &'static Row {
+                &BUFFERS[self as usize]
+            }
+        }
+
+        /// The table of buffers, in the order of [`Buffer`].
+        pub const BUFFERS: &[Row] = &[
+            Row {
+                name: stringify!($uniform),
+                wgsl: stringify!($record),
+                element_bytes: 4 * <$record>::WORDS,
+                count: |_| 1,
+                upload: concat!(stringify!($uniform), "_in"),
+                readback: concat!(stringify!($uniform), "_out"),
+                doc: $uniform_doc,
+            },
+            $( Row {
+                name: stringify!($name),
+                wgsl: <$element as Element>::WGSL,
+                element_bytes: size_of::<$element>(),
+                count: $count,
+                upload: concat!(stringify!($name), "_in"),
+                readback: concat!(stringify!($name), "_out"),
+                doc: $doc,
+            } ),*
+        ];
+
+        /// The buffers as the twins see them: slices of memory that the caller owns.
+        pub struct Storage<'a> {
+            #[doc = $uniform_doc]
+            pub $uniform: $record,
+            $( #[doc = $doc] pub $name: &'a mut [$element] ),*
+        }
+
+        impl<'a> Storage<'a> {
+            /// Cuts up `words`, of which there must be [`Storage::words`]. Buffers that the
+            /// programs do not need are empty.
+            pub fn over(
+                words: &'a mut [u32],
+                programs: &[Program],
+                profile: &Profile,
+            ) -> Storage<'a> {
+                assert!(words.len() == Storage::words(programs, profile));
+                let mut rest = words;
+                let mut cut = |buffer: Buffer| {
+                    let words = words_of(buffer, programs, profile);
+                    let (first, others) = core::mem::take(&mut rest).split_at_mut(words);
+                    rest = others;
+                    first
+                };
+                Storage {
+                    $uniform: <$record>::default(),
+                    $( $name: bytemuck::cast_slice_mut(cut(Buffer::$name)) ),*
+                }
+            }
+
+            /// Sets every word of a buffer.
+            pub fn fill(&mut self, buffer: Buffer, word: u32) {
+                match buffer {
+                    Buffer::$uniform => {}
+                    $( Buffer::$name => self.$name.fill(<$element as Element>::splat(word)) ),*
+                }
+            }
+        }
+    };
+}
+
+impl Storage<'_> {
+    /// 32-bit words that the buffers of some programs take.
+    pub fn words(programs: &[Program], profile: &Profile) -> usize {
+        Buffer::ALL.iter().map(|b| words_of(*b, programs, profile)).sum()
+    }
+}
+
+/// Words of a buffer in the scalar backend's storage; the uniform is a field of its own.
+pub(super) fn words_of(buffer: Buffer, programs: &[Program], profile: &Profile) -> usize {
+    let stored = buffer != Buffer::sweep && needed(programs, Runner::Scalar, buffer);
+    if stored { buffer.row().bytes(profile).div_ceil(4) } else { 0 }
+}
+
+/// A stage: `stage!(NAME in MODULE, (ARGUMENTS), GROUPS)`. Its twin is the function of that name in
+/// the module, its kernel the entry point of that name. An argument is
+/// `[mut] [atomic|words|quads] BUFFER`, `[mut] NAME is BUFFER` where the stage serves several
+/// buffers, or `list BUFFER` where `counters` says how many elements of it there are.
+/// `scalar: FUNCTION` names what the scalar backend runs in the twin's place, `[ENTRY: GROUPS, ..]`
+/// the entry points where there are several.
+macro_rules! stage {
+    ($name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, [$($kernel:ident: $groups:expr),*]) => {
+        stage!(@ $name, $args, [$(($kernel, $groups)),*], $fast)
+    };
+    ($name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr) => {
+        stage!(@ $name, $args, [($name, $groups)], $fast)
+    };
+    ($name:ident in $($seg:ident)::+, $args:tt, [$($kernel:ident: $groups:expr),*]) => {
+        stage!(@ $name, $args, [$(($kernel, $groups)),*], $($seg)::+::$name)
+    };
+    ($name:ident in $($seg:ident)::+, $args:tt, $groups:expr) => {
+        stage!(@ $name, $args, [($name, $groups)], $($seg)::+::$name)
+    };
+    (device $name:ident, ($($($a:ident)+),*), $groups:expr) => {
+        &Stage {
+            name: stringify!($name),
+            kernels: &[(stringify!($name), $groups)],
+            arguments: &[$(argument!($($a)+)),*],
+            scalar: |_| (),
+        }
+    };
+    (@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*], $twin:path) => {
+        &Stage {
+            name: stringify!($name),
+            kernels: &[$((stringify!($kernel), $groups)),*],
+            arguments: &[$(argument!($($a)+)),*],
+            scalar: |storage| $twin($(passed!(storage, $($a)+)),*),
+        }
+    };
+}
+
+/// An argument of a stage as the twin takes it.
+macro_rules! passed {
+    ($s:ident, mut atomic $($rest:ident)+) => { passed!($s, mut $($rest)+) };
+    ($s:ident, mut words $($rest:ident)+) => { passed!($s, mut $($rest)+) };
+    ($s:ident, mut quads $($rest:ident)+) => { passed!($s, mut $($rest)+) };
+    ($s:ident, atomic $($rest:ident)+) => { passed!($s, $($rest)+) };
+    ($s:ident, words $($rest:ident)+) => { passed!($s, $($rest)+) };
+    ($s:ident, quads $($rest:ident)+) => { passed!($s, $($rest)+) };
+    ($s:ident, list distinct) => { &$s.distinct[..$s.counters[DISTINCT_COUNT] as usize] };
+    ($s:ident, list foreground) => { &$s.foreground[..$s.counters[FOREGROUND_COUNT] as usize] };
+    ($s:ident, mut $name:ident is $buffer:ident) => { &mut $s.$buffer };
+    ($s:ident, $name:ident is $buffer:ident) => { &$s.$buffer };
+    ($s:ident, mut $buffer:ident) => { &mut $s.$buffer };
+    ($s:ident, $buffer:ident) => { &$s.$buffer };
+}
+
+/// Constants that the kernels see under the same names.
+macro_rules! constants {
+    ($($name:ident),* ; $($signed:ident),*) => {
+        /// Name, value and whether it is an `i32` in the kernels.
+        pub const CONSTANTS: &[(&str, i64, bool)] = &[
+            $( (stringify!($name), $name as i64, false), )*
+            $( (stringify!($signed), $signed as i64, true), )*
+        ];
+    };
+}
+
+pub(super) use {argument, buffers, constants, passed, stage};

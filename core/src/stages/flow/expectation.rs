@@ -1,0 +1,261 @@
+//! Expectation (section 3.5.2.1): the feasible displacement of least energy for every column.
+
+use crate::params::{LINE, REACH, ROW, SIDE};
+use crate::record::{
+    Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement, pack_flow,
+};
+use crate::stages::window::outside_cost;
+
+/// Proposes a flow for every column of `foreground`: the displacement of least energy (3.14) among
+/// those that are feasible, the first in scan order among equals.
+///
+/// `window_cost` holds a row of [`ROW`] costs for each of them, `min_cost` and `proposal` an
+/// element. A displacement is feasible where it would win its target, or keeps the column's own.
+/// `min_cost` becomes the least energy of any displacement, feasible or not, and its place in the
+/// row, for columns none of whose neighbours has a valid flow; it must start as [`NONE`].
+pub fn expectation(
+    sweep: &SweepUniform,
+    foreground: &[u32],
+    window_cost: &[u16],
+    flow: &[Flow],
+    target_energy: &[u32],
+    min_cost: &mut [MinCost],
+    proposal: &mut [Proposal],
+) {
+    for (n, &column) in foreground.iter().enumerate() {
+        let row = &window_cost[n * ROW..][..ROW];
+        let outside = outside_cost(sweep, column as usize);
+        let around: heapless::Vec<[i32; 2], 24> = neighbours(sweep, flow, column).collect();
+        let (mut best, mut least) = ([0, NONE], [NONE; 2]);
+        for index in (0..ROW).filter(|index| index % LINE < SIDE) {
+            let d = displacement(index as i32);
+            let Some(target) = inside(sweep, column, d) else { continue };
+            let square = |d: [i32; 2]| d[0] * d[0] + d[1] * d[1];
+            let smoothing = around.iter().map(|s| square([d[0] - s[0], d[1] - s[1]]));
+            let energy = row[index] as i32
+                + outside
+                + sweep.displacement_cost * square(d)
+                + sweep.smoothing * smoothing.sum::<i32>();
+            // Energies are never negative: unsigned order is theirs, and NONE is above all.
+            let energy = energy as u32;
+            if energy < least[0] {
+                least = [energy, index as u32];
+            }
+            let feasible = energy < target_energy[target] || flow[column as usize] == pack_flow(d);
+            if feasible && energy < best[1] {
+                best = [pack_flow(d), energy];
+            }
+        }
+        if around.is_empty() {
+            min_cost[n] = least;
+        }
+        proposal[n] = best;
+    }
+}
+
+/// Where a displacement leads, if that is in the window.
+fn inside(sweep: &SweepUniform, column: u32, d: [i32; 2]) -> Option<usize> {
+    let (side, column) = (sweep.side, column as i32);
+    let (i, j) = (column / side + d[0], column % side + d[1]);
+    ((0..side).contains(&i) && (0..side).contains(&j)).then(|| (i * side + j) as usize)
+}
+
+/// Valid flows of the 24 columns around one.
+fn neighbours<'a>(
+    sweep: &SweepUniform,
+    flow: &'a [Flow],
+    column: u32,
+) -> impl Iterator<Item = [i32; 2]> + use<'a> {
+    let (side, column) = (sweep.side, column as i32);
+    let (i, j) = (column / side, column % side);
+    let columns = move |ni: i32| ni * side + (j - 2).max(0)..=ni * side + (j + 2).min(side - 1);
+    ((i - 2).max(0)..=(i + 2).min(side - 1))
+        .flat_map(columns)
+        .filter(move |c| *c != column)
+        .map(|c| flow[c as usize])
+        .filter(|f| f & VALID != 0)
+        .map(flow_displacement)
+}
+
+/// Best found so far; ties go to the lower index in scan order.
+struct Best {
+    energy: i32,
+    index: i32,
+}
+
+/// [`expectation`] for the scalar backend: one to nine candidates in the place of 961.
+///
+/// Smoothing over `n` valid neighbours with displacements `s` collapses to
+/// `w_p (S2 + n |d|² - 2 d.S1)` with `S1`, `S2` the sums of `s` and `|s|²`. A column without valid
+/// neighbours looks at every displacement once: should it be without neighbours again, the least of
+/// them wins if it is feasible. With neighbours, that least plus the smoothing term, a paraboloid
+/// around their mean, excludes all but a few: rings around the rounded mean are visited until no
+/// farther ring can win or tie.
+pub fn expectation_by_rings(
+    sweep: &SweepUniform,
+    foreground: &[u32],
+    window_cost: &[u16],
+    flow: &[Flow],
+    target_energy: &[u32],
+    min_cost: &mut [MinCost],
+    proposal: &mut [Proposal],
+) {
+    for (n, &column) in foreground.iter().enumerate() {
+        let around = Sums::of(sweep, flow, column);
+        let search = Search {
+            sweep,
+            row: &window_cost[n * ROW..][..ROW],
+            target_energy,
+            own: flow[column as usize],
+            column,
+            i: column as i32 / sweep.side,
+            j: column as i32 % sweep.side,
+        };
+        let outside = outside_cost(sweep, column as usize);
+        let mut best = Best { energy: i32::MAX, index: i32::MAX };
+        if around.count == 0 {
+            let [energy, index] = min_cost[n];
+            if index != NONE {
+                search.consider(index as i32, energy as i32, &mut best);
+            }
+            if best.index == i32::MAX {
+                min_cost[n] = search.everywhere(outside, &mut best);
+            }
+        } else {
+            search.rings(outside, min_cost[n][0] as i32, &around, &mut best);
+        }
+        proposal[n] = match best.index {
+            i32::MAX => [0, NONE],
+            index => [pack_flow(displacement(index)), best.energy as u32],
+        };
+    }
+}
+
+/// Displacement at an index of a row.
+#[inline]
+fn displacement(index: i32) -> [i32; 2] {
+    [index / LINE as i32 - REACH, index % LINE as i32 - REACH]
+}
+
+/// Sums over the valid flows of the 24 columns around one.
+struct Sums {
+    count: i32,
+    sum: [i32; 2],
+    squares: i32,
+}
+
+impl Sums {
+    fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
+        let side = sweep.side;
+        let (i, j) = (column as i32 / side, column as i32 % side);
+        let mut n = Sums { count: 0, sum: [0; 2], squares: 0 };
+        let (from, to) = ((j - 2).max(0), (j + 2).min(side - 1));
+        for ni in (i - 2).max(0)..=(i + 2).min(side - 1) {
+            for c in ni * side + from..=ni * side + to {
+                let flow = flow[c as usize];
+                if flow & VALID != 0 && c != column as i32 {
+                    let s = flow_displacement(flow);
+                    n.count += 1;
+                    n.sum = [n.sum[0] + s[0], n.sum[1] + s[1]];
+                    n.squares += s[0] * s[0] + s[1] * s[1];
+                }
+            }
+        }
+        n
+    }
+}
+
+/// One column's view of its candidates.
+struct Search<'a> {
+    sweep: &'a SweepUniform,
+    row: &'a [u16],
+    target_energy: &'a [u32],
+    own: Flow,
+    column: u32,
+    i: i32,
+    j: i32,
+}
+
+impl Search<'_> {
+    /// Takes the candidate at `index` if it is feasible and better, or as good and earlier.
+    #[inline]
+    fn consider(&self, index: i32, energy: i32, best: &mut Best) {
+        if energy > best.energy || energy == best.energy && index > best.index {
+            return;
+        }
+        let d = displacement(index);
+        let target = super::maximisation::target(self.sweep, self.column, d);
+        // Energies are never negative: unsigned order is theirs, and NONE is above all.
+        if (energy as u32) < self.target_energy[target] || self.own == pack_flow(d) {
+            *best = Best { energy, index };
+        }
+    }
+
+    /// Rows and columns of the search that lie inside the window.
+    fn reach(&self, at: i32) -> core::ops::RangeInclusive<i32> {
+        (-REACH).max(-at)..=REACH.min(self.sweep.side - 1 - at)
+    }
+
+    /// Every displacement, without smoothing. Returns the least energy, feasible or not, and where.
+    fn everywhere(&self, outside: i32, best: &mut Best) -> MinCost {
+        let cost = self.sweep.displacement_cost;
+        let mut least = [NONE; 2];
+        for du in self.reach(self.i) {
+            let line = (du + REACH) * LINE as i32 + REACH;
+            let energy = |dv: i32| {
+                self.row[(line + dv) as usize] as i32 + cost * (du * du + dv * dv) + outside
+            };
+            let least_of_line = self.reach(self.j).map(energy).min().unwrap_or(i32::MAX);
+            if (least_of_line as u32) < least[0] {
+                let first = self.reach(self.j).find(|dv| energy(*dv) == least_of_line);
+                least = [least_of_line as u32, (line + first.unwrap_or(0)) as u32];
+            }
+            // A whole line above the best cannot win; candidates come in scan order, so neither
+            // can one that only ties.
+            if least_of_line < best.energy {
+                self.reach(self.j).for_each(|dv| self.consider(line + dv, energy(dv), best));
+            }
+        }
+        least
+    }
+
+    /// Rings of growing distance around the mean of the neighbours' flows.
+    fn rings(&self, outside: i32, least: i32, around: &Sums, best: &mut Best) {
+        let (n, [su, sv], smoothing) = (around.count, around.sum, self.sweep.smoothing);
+        let mean = [round_div(su, n), round_div(sv, n)];
+        // |s - mean|² summed: what the smoothing costs at the mean itself, rounded down.
+        let spread = (n * around.squares - su * su - sv * sv) / n;
+        for ring in 0..=2 * REACH {
+            // On a ring some component lies at least ring - 1/2 from the mean.
+            let near = (2 * ring - 1).max(0);
+            if least.saturating_add(smoothing * (n * near * near / 4 + spread)) > best.energy {
+                break;
+            }
+            for du in -ring..=ring {
+                let u = mean[0] + du;
+                let stride = if du.abs() == ring { 1 } else { 2 * ring.max(1) };
+                let mut dv = -ring;
+                while dv <= ring {
+                    let v = mean[1] + dv;
+                    if self.reach(self.i).contains(&u) && self.reach(self.j).contains(&v) {
+                        let square = u * u + v * v;
+                        let smooth = around.squares + n * square - 2 * (u * su + v * sv);
+                        let index = (u + REACH) * LINE as i32 + v + REACH;
+                        let energy = self.row[index as usize] as i32
+                            + outside
+                            + self.sweep.displacement_cost * square
+                            + smoothing * smooth;
+                        self.consider(index, energy, best);
+                    }
+                    dv += stride;
+                }
+            }
+        }
+    }
+}
+
+/// `a / n` to the nearest integer, halves upwards; `n` is positive.
+#[inline]
+fn round_div(a: i32, n: i32) -> i32 {
+    (2 * a + n).div_euclid(2 * n)
+}

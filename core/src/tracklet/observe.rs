@@ -1,0 +1,70 @@
+//! The door in: what a pair of sweeps says of the motion of columns.
+
+use super::Observation;
+use crate::params::{FOREGROUND_MAX, Profile};
+use crate::perceive::Perceived;
+use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
+use crate::refinement::Refinement;
+
+/// How solid columns moved: those with a match, and those that a moving cluster took along.
+pub(crate) struct Observations {
+    /// Ascending by column.
+    pub all: heapless::Vec<Observation, FOREGROUND_MAX>,
+    /// Observed columns beyond the capacity, the last in column order: they put out no motion.
+    pub beyond_capacity: usize,
+}
+
+impl Observations {
+    pub const fn new() -> Observations {
+        Observations { all: heapless::Vec::new(), beyond_capacity: 0 }
+    }
+
+    /// Lists those of a pair.
+    pub fn collect(
+        &mut self,
+        profile: &Profile,
+        sweep: &SweepUniform,
+        perceived: &Perceived,
+        refinement: &Refinement,
+    ) {
+        self.all.clear();
+        self.beyond_capacity = 0;
+        for (column, record) in perceived.columns_before.iter().enumerate() {
+            if record[1] == 0 {
+                continue;
+            }
+            let flow = perceived.flow[column];
+            let moved = if profile.refinement_sweeps > 0 {
+                refined(profile, sweep, refinement, column, flow)
+            } else {
+                whole_cells(profile, flow)
+            };
+            let Some((moved, covariance)) = moved else { continue };
+            let o = Observation { column: column as u32, moved, covariance, slot: NONE };
+            self.beyond_capacity += self.all.push(o).is_err() as usize;
+        }
+    }
+}
+
+/// Displacement, m, and covariance, m^2, that the refinement found.
+fn refined(
+    profile: &Profile,
+    sweep: &SweepUniform,
+    refinement: &Refinement,
+    column: usize,
+    flow: u32,
+) -> Option<([f32; 2], [f32; 3])> {
+    let r = profile.voxel_m as f32;
+    let found = refinement.of(sweep, column, flow);
+    let observed = found.moves || flow & VALID != 0;
+    observed.then(|| (found.by.map(|v| v * r), found.covariance.map(|v| v * r * r)))
+}
+
+/// The match itself: whole cells.
+fn whole_cells(profile: &Profile, flow: u32) -> Option<([f32; 2], [f32; 3])> {
+    let r = profile.voxel_m as f32;
+    let sigma_m = profile.tracklet.measurement_cells * r;
+    let variance = 2.0 * sigma_m * sigma_m;
+    let moved = flow_displacement(flow).map(|c| c as f32 * r);
+    (flow & VALID != 0).then_some((moved, [variance, 0.0, variance]))
+}

@@ -1,0 +1,158 @@
+//! Out: a velocity for every column and every return (section 3.7).
+
+use crate::frame::{Pair, centre_of};
+use crate::output::{ColumnFlow, Origin, PointFlow};
+use crate::params::COLUMNS_MAX;
+use crate::perceive::Perceived;
+use crate::prepare::Returns;
+use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
+use crate::refinement::Refinement;
+use crate::sweep::Point;
+use crate::team::Team;
+use crate::tracklet::Tracklets;
+use crate::tracklet::observe::Observations;
+use glam::DVec3;
+
+/// Index of the record of every column of the window, [`NONE`] where it has none.
+pub(crate) struct FlowOfColumn([u32; COLUMNS_MAX]);
+
+impl FlowOfColumn {
+    /// For [`Found::columns`] to fill.
+    pub const fn new() -> FlowOfColumn {
+        FlowOfColumn([0; COLUMNS_MAX])
+    }
+}
+
+/// All that is known of a pair of sweeps.
+pub(crate) struct Found<'a> {
+    pub pair: &'a Pair<'a>,
+    pub sweep: &'a SweepUniform,
+    pub perceived: &'a Perceived<'a>,
+    pub observations: &'a Observations,
+    pub tracklets: &'a Tracklets,
+    pub refinement: &'a Refinement,
+    pub returns: &'a Returns,
+}
+
+impl Found<'_> {
+    /// Writes one record per solid column of the first sweep; returns how many, and how many of
+    /// them are matched.
+    pub fn columns(&self, index: &mut FlowOfColumn, out: &mut [ColumnFlow]) -> (usize, usize) {
+        let vehicle_from_grid = self.pair.vehicle_from_grid();
+        let mut foreground = self.perceived.foreground.iter().enumerate().peekable();
+        let mut observed = self.observations.all.iter().peekable();
+        let (mut count, mut valid) = (0, 0);
+        for (column, record) in self.perceived.columns_before.iter().enumerate() {
+            let rank = foreground.next_if(|(_, c)| **c as usize == column).map(|(n, _)| n);
+            index.0[column] = NONE;
+            if record[1] == 0 {
+                continue;
+            }
+            let side = self.sweep.side;
+            let (i, j) = (column as i32 / side, column as i32 % side);
+            let at = vehicle_from_grid.transform(centre_of(self.pair.profile, i, j));
+            let mut flow = self.column_at(i, j, at);
+            let matched = self.set_match(&mut flow, column, rank);
+            valid += matched as usize;
+            if let Some(o) = observed.next_if(|o| o.column as usize == column) {
+                flow.origin = if matched { Origin::Matched } else { Origin::Joined };
+                let tracklet = self.tracklets.all().get(o.slot as usize);
+                flow.age = tracklet.map_or(0, |t| t.age);
+                self.pair.set_motion(at, o, tracklet, &mut flow);
+            } else {
+                self.pair.set_relative(at, &mut flow);
+            }
+            index.0[column] = count as u32;
+            out[count] = flow;
+            count += 1;
+        }
+        (count, valid)
+    }
+
+    /// The record of a column whose centre is at `at` in the first sweep's vehicle frame.
+    fn column_at(&self, i: i32, j: i32, at: DVec3) -> ColumnFlow {
+        let corner = self.pair.current.window.corner;
+        let world = self.pair.before.pose.transform(at);
+        ColumnFlow {
+            cell: [corner[0] + i, corner[1] + j],
+            position_world_m: [world.x, world.y],
+            position_vehicle_m: [at.x as f32, at.y as f32],
+            ..Default::default()
+        }
+    }
+
+    /// The match of a column that is `rank`-th of the foreground; whether it has one.
+    fn set_match(&self, flow: &mut ColumnFlow, column: usize, rank: Option<usize>) -> bool {
+        let Some(rank) = rank else { return false };
+        flow.origin = Origin::Unmatched;
+        let found = self.perceived.flow[column];
+        if found & VALID == 0 {
+            return false;
+        }
+        flow.displacement_cells = flow_displacement(found);
+        flow.energy = self.perceived.proposal[rank][1] as i32;
+        true
+    }
+
+    /// Writes one record per return of the first sweep, in its order.
+    pub fn points(
+        &self,
+        team: &impl Team,
+        points: &[Point],
+        columns: &[ColumnFlow],
+        index: &FlowOfColumn,
+        out: &mut [PointFlow],
+    ) {
+        let half = points.len().min(out.len()) / 2;
+        let (first, second) = out.split_at_mut(half);
+        let part = |from: usize, points: &[Point], out: &mut [PointFlow]| {
+            let places = self.returns.before(from);
+            for (((column, is_apart), point), out) in places.zip(points).zip(out) {
+                *out = self.point(column, is_apart, point, columns, index);
+            }
+        };
+        team.join(|| part(0, &points[..half], first), || part(half, &points[half..], second));
+    }
+
+    /// A return moves with its column; outside the window, and where nothing is solid, with the
+    /// ground.
+    #[inline]
+    fn point(
+        &self,
+        column: u32,
+        is_apart: bool,
+        point: &Point,
+        columns: &[ColumnFlow],
+        index: &FlowOfColumn,
+    ) -> PointFlow {
+        let mut out = PointFlow::default();
+        if let Some(flow) = columns.get(self.flow_at(column, index)).filter(|_| !is_apart) {
+            out.velocity_world_mps = flow.velocity_world_mps;
+            out.covariance = flow.covariance;
+            out.age = flow.age;
+            out.origin = flow.origin;
+        } else if self.pair.profile.refinement_sweeps > 0 && !is_apart && column != NONE {
+            // Its column is not solid, but part of a cluster.
+            if let Some(found) = self.refinement.at(column) {
+                let (r, dt) = (self.pair.profile.voxel_m as f32, self.pair.dt_s as f32);
+                out.velocity_world_mps = found.by.map(|v| v * r / dt);
+                out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
+                out.origin = Origin::Joined;
+            }
+        }
+        let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });
+        out.velocity_ego_mps =
+            self.pair.ego.ego_from_world(DVec3::new(x, y, z), out.velocity_world_mps);
+        out
+    }
+
+    /// Where the record is of a column of the window before; beyond all records where there is none.
+    #[inline]
+    fn flow_at(&self, column: u32, index: &FlowOfColumn) -> usize {
+        let side = self.sweep.side;
+        let i = (column / side as u32) as i32 - self.sweep.shift_x;
+        let j = (column % side as u32) as i32 - self.sweep.shift_y;
+        let seen = column != NONE && (0..side).contains(&i) && (0..side).contains(&j);
+        if seen { index.0[(i * side + j) as usize] as usize } else { NONE as usize }
+    }
+}
