@@ -30,6 +30,7 @@ const MAY_NAME: [(&str, &[&str]); 10] = [
             "raywake-kernels",
             "raywake-gpu",
             "raywake-alloc-guard",
+            "raywake-render",
             "raywake-io",
             "raywake-render",
             "raywake-sim",

@@ -60,6 +60,8 @@ elements! {
 pub struct Row {
     /// Name, the same in the kernels and of the twins' arguments.
     pub name: &'static str,
+    /// Type of an element of the twins.
+    pub element: &'static str,
     /// Type of an element in the kernels.
     pub wgsl: &'static str,
     /// Bytes of an element of the twins.
@@ -279,6 +281,7 @@ macro_rules! buffers {
         pub const BUFFERS: &[Row] = &[
             Row {
                 name: stringify!($uniform),
+                element: stringify!($record),
                 wgsl: stringify!($record),
                 element_bytes: 4 * <$record>::WORDS,
                 count: |_| 1,
@@ -288,6 +291,7 @@ macro_rules! buffers {
             },
             $( Row {
                 name: stringify!($name),
+                element: stringify!($element),
                 wgsl: <$element as Element>::WGSL,
                 element_bytes: size_of::<$element>(),
                 count: $count,

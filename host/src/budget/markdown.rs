@@ -186,7 +186,7 @@ fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result
             out,
             "| `{}` | `{}` | {bytes} | {ALIGNMENT} | {writers} | {readers} | {} |",
             row.name(),
-            row.buffer.row().wgsl,
+            row.buffer.row().element,
             row.buffer.row().doc
         )?;
     }
