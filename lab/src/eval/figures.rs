@@ -67,10 +67,9 @@ fn histogram(errors: &Sorted, cell_m: f64) -> Plot {
         width: BIN_M,
         counts,
         overflow,
-        skipped: 0,
-        line: None,
+        line: Some((cell_m, "cell".into())),
     };
-    Plot::Histogram(histogram.line(cell_m, "cell"))
+    Plot::Histogram(histogram)
 }
 
 /// Figures 3.7 and 3.8: errors of the raw flow by class, and of all that moves and is parked.

@@ -19,47 +19,8 @@ const fn paint(class: &'static str, light: &'static str) -> Paint {
 pub(super) const INK: Paint = paint("ink", "#1f2430");
 /// Text that steps back, and reference values.
 pub(super) const MUTED: Paint = paint("muted", "#667085");
-/// Grid lines.
-pub(super) const GRID: Paint = paint("grid", "#e4e7ec");
-/// Lines at zero.
-pub(super) const AXIS: Paint = paint("axis", "#98a2b3");
 /// The page.
 pub(super) const PAPER: Paint = paint("paper", "#ffffff");
-/// Bars of reference values.
-pub(super) const REFERENCE: Paint = paint("reference", "#c3cad5");
-/// Marks upon curves.
-pub(super) const MARK: Paint = paint("mark", "#c0182b");
-
-const SERIES: [Paint; 7] = [
-    paint("s0", "#0072b2"),
-    paint("s1", "#d55e00"),
-    paint("s2", "#009e73"),
-    paint("s3", "#b5609a"),
-    paint("s4", "#e69f00"),
-    paint("s5", "#56b4e9"),
-    paint("s6", "#7a6a53"),
-];
-
-const ORDERED: [Paint; 7] = [
-    paint("o0", "#a9d4ea"),
-    paint("o1", "#7cbbdf"),
-    paint("o2", "#4f9fd0"),
-    paint("o3", "#2f81bb"),
-    paint("o4", "#1b639f"),
-    paint("o5", "#12467b"),
-    paint("o6", "#0a2a54"),
-];
-
-/// Of the `i`-th of several things; repeats after seven.
-pub(super) fn series(i: usize) -> Paint {
-    SERIES[i % SERIES.len()]
-}
-
-/// Of the `i`-th of `n` things that have an order, pale to dark.
-pub(super) fn ordered(i: usize, n: usize) -> Paint {
-    let last = ORDERED.len() - 1;
-    ORDERED[if n > 1 { (i * last / (n - 1)).min(last) } else { last }]
-}
 
 /// Of a kind of object, with its name.
 pub(super) fn kind(kind: Kind) -> (&'static str, &'static str) {

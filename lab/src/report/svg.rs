@@ -14,7 +14,6 @@ const FONTS: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', 
 pub(super) enum Anchor {
     Start,
     Middle,
-    End,
 }
 
 /// A stroke of this colour, width (units) and, where not empty, dashes.
@@ -23,16 +22,6 @@ pub(super) struct Stroke {
     pub paint: Paint,
     pub width: f64,
     pub dashes: &'static str,
-}
-
-impl Stroke {
-    pub fn thin(paint: Paint) -> Stroke {
-        Stroke { paint, width: 1.0, dashes: "" }
-    }
-
-    pub fn dashed(paint: Paint) -> Stroke {
-        Stroke { paint, width: 1.3, dashes: "5 4" }
-    }
 }
 
 /// A drawing under way: x to the right, y down, about a pixel per unit.
@@ -58,16 +47,6 @@ impl Area {
 
     pub fn bottom(&self) -> f64 {
         self.top + self.height
-    }
-
-    /// The same without so much at the left, top, right and bottom; never negative in size.
-    pub fn inset(&self, left: f64, top: f64, right: f64, bottom: f64) -> Area {
-        Area {
-            left: self.left + left,
-            top: self.top + top,
-            width: (self.width - left - right).max(1.0),
-            height: (self.height - top - bottom).max(1.0),
-        }
     }
 }
 
@@ -138,20 +117,11 @@ impl Svg {
         ));
     }
 
-    pub fn disc(&mut self, [x, y]: [f64; 2], radius: f64, fill: Paint, opacity: f64) {
-        self.push(format_args!(
-            "<circle class=\"f-{}\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" fill=\"{}\" \
-             fill-opacity=\"{opacity}\"/>",
-            fill.class, fill.light
-        ));
-    }
-
     /// Text on the baseline `y`, `size` units high.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, size: f64, anchor: Anchor, paint: Paint) {
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
-            Anchor::End => "end",
         };
         self.push(format_args!(
             "<text class=\"f-{}\" x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size}\" \

@@ -19,7 +19,8 @@ const DRAWN: usize = 40_000;
 /// the simulated sets.
 pub fn convergence(sets: &[Set]) -> Chart {
     let part = |title: &str, y: &str, of: std::ops::Range<usize>, value: fn(&Cost) -> f64| {
-        let mut lines = Lines::new(Axis::new("iteration"), Axis::new(y).log());
+        let mut lines = Lines::new(Axis::new("iteration"), Axis::new(y));
+        lines.log_y = true;
         for set in sets.iter().filter(|s| s.id == "stationary" || s.id == "moving") {
             for n in of.clone() {
                 let scores: Vec<&Score> = set.outcomes.iter().map(|o| &o.scores[n]).collect();

@@ -1,20 +1,25 @@
 //! Bars from left to right: times of stages, figures beside reference figures.
 
+use super::axis::{Axis, linear_label};
+use super::colours::{INK, REFERENCE, series};
 use super::legend::{Entry, Sign};
-use super::scale::{Axis, Scale};
+use super::{LETTER, Outcome, Sheet, font, px, styled, width};
 use crate::report::encode::short;
-use crate::report::palette::{AXIS, GRID, INK, MUTED, Paint, REFERENCE, series};
-use crate::report::svg::{Anchor, Area, Stroke, Svg, width};
+use plotters::chart::ChartBuilder;
+use plotters::element::{EmptyElement, PathElement, Rectangle, Text};
+use plotters::style::text_anchor::HPos;
+use plotters::style::{Color, RGBColor};
 
-const SIZE: f64 = 12.5;
+/// Height of a bar and of the space between two categories, units.
 const BAR: f64 = 17.0;
 const BETWEEN: f64 = 13.0;
-const FOOT: f64 = 44.0;
+/// Height of the axis below, units.
+const FOOT: f64 = 42.0;
 
 /// One bar of every series for every category.
 #[derive(Clone, Debug)]
 pub struct Bars {
-    /// Quantity and unit; bars begin at zero, so it cannot be logarithmic.
+    /// Quantity and unit; bars begin at zero.
     pub x: Axis,
     /// From the top down.
     pub categories: Vec<String>,
@@ -48,8 +53,15 @@ impl From<f64> for Bar {
     }
 }
 
+impl Bar {
+    /// How far it and its spread reach.
+    fn reach(&self) -> f64 {
+        self.spread.map_or(self.value, |[_, to]| to.max(self.value))
+    }
+}
+
 impl Bars {
-    fn paint(&self, i: usize) -> Paint {
+    fn colour(&self, i: usize) -> RGBColor {
         if self.series[i].reference { REFERENCE } else { series(i) }
     }
 
@@ -59,7 +71,7 @@ impl Bars {
         }
         let named = self.series.iter().enumerate();
         named
-            .map(|(i, s)| Entry { name: s.name.clone(), sign: Sign::Block(self.paint(i), 1.0) })
+            .map(|(i, s)| Entry { name: s.name.clone(), sign: Sign::Block(self.colour(i)) })
             .collect()
     }
 
@@ -71,36 +83,59 @@ impl Bars {
         self.group_height() * self.categories.len().max(2) as f64 + FOOT + 8.0
     }
 
-    pub(super) fn draw(&self, svg: &mut Svg, area: Area) {
-        let bars = self.series.iter().flat_map(|s| s.bars.iter().flatten());
-        let values: Vec<f64> = bars
-            .flat_map(|b| [Some(b.value), b.spread.map(|s| s[0]), b.spread.map(|s| s[1])])
-            .flatten()
-            .filter(|v| v.is_finite())
-            .collect();
-        let linear = Axis { log: false, ..self.x.clone() };
-        let zero = (!values.is_empty()).then_some(0.0);
-        let Some(scale) = Scale::new(&linear, values.into_iter().chain(zero)) else {
-            return super::no_data(svg, area);
-        };
-        let names = self.categories.iter().map(|c| width(c, SIZE));
-        let gutter = names.fold(0.0, f64::max).min(0.45 * area.width);
-        let inner = area.inset(gutter + 12.0, 4.0, 52.0, FOOT);
-        let x = |v: f64| Some(inner.left + inner.width * scale.place(v)?);
-        let start = x(0.0).unwrap_or(inner.left).clamp(inner.left, inner.right());
-        draw_axis(svg, inner, &scale, &self.x.label);
-        for (i, category) in self.categories.iter().enumerate() {
-            let top = inner.top + self.group_height() * i as f64 + 0.5 * BETWEEN;
-            let middle = top + 0.5 * BAR * self.series.len() as f64;
-            let at = [inner.left - 12.0, middle + 4.4];
-            svg.text(at, category, SIZE, Anchor::End, INK);
-            for (j, s) in self.series.iter().enumerate() {
-                let area = Area { top: top + BAR * j as f64, height: BAR - 3.0, ..inner };
-                let Some(bar) = s.bars.get(i).copied().flatten() else { continue };
-                draw_bar(svg, bar, area, start, &x, self.paint(j));
-            }
+    /// Category, series and bar of all that can be drawn.
+    fn drawable(&self) -> impl Iterator<Item = (usize, usize, Bar)> {
+        let mut all = Vec::new();
+        for (j, s) in self.series.iter().enumerate() {
+            let bars = s.bars.iter().enumerate().take(self.categories.len());
+            all.extend(bars.filter_map(|(i, bar)| Some((i, j, (*bar)?))));
         }
-        svg.line([start, inner.top], [start, inner.bottom()], Stroke::thin(AXIS));
+        all.into_iter().filter(|(.., bar)| bar.value >= 0.0 && bar.reach().is_finite())
+    }
+
+    pub(super) fn draw(&self, sheet: &Sheet) -> Outcome {
+        let reaches: Vec<f64> = self.drawable().map(|(.., bar)| bar.reach()).collect();
+        let (Some(x), false) =
+            (self.x.ends(reaches.iter().copied().chain([0.0])), reaches.is_empty())
+        else {
+            return Ok(false);
+        };
+        let names = self.categories.iter().map(|c| width(c, LETTER)).fold(0.0, f64::max);
+        let down = self.group_height() * self.categories.len() as f64;
+        let mut plane = ChartBuilder::on(sheet)
+            .margin_right(px(56.0))
+            .x_label_area_size(px(FOOT))
+            .y_label_area_size(px(names.min(0.4 * super::WIDTH) + 12.0))
+            .build_cartesian_2d(x.clone(), down..0.0)?;
+        let x_label = linear_label(x);
+        let mut mesh = plane.configure_mesh();
+        styled(&mut mesh);
+        mesh.disable_y_mesh().y_labels(0).x_label_formatter(&x_label).x_desc(&self.x.label);
+        mesh.draw()?;
+        let middle = |i: usize, j: usize| {
+            self.group_height() * i as f64 + 0.5 * BETWEEN + BAR * (j as f64 + 0.5)
+        };
+        for (i, category) in self.categories.iter().enumerate() {
+            let at = (0.0, 0.5 * (middle(i, 0) + middle(i, self.series.len() - 1)));
+            let style = font(LETTER, INK, HPos::Right);
+            let name = Text::new(category.clone(), (px(-8.0), 0), style);
+            plane.draw_series([EmptyElement::at(at) + name])?;
+        }
+        for (i, j, bar) in self.drawable() {
+            let (y, half) = (middle(i, j), 0.5 * BAR - 1.5);
+            let block = [(0.0, y - half), (bar.value, y + half)];
+            plane.draw_series([Rectangle::new(block, self.colour(j).filled())])?;
+            if let Some([from, to]) = bar.spread {
+                let style = INK.stroke_width(px(1.0) as u32);
+                plane.draw_series([PathElement::new([(from, y), (to, y)], style)])?;
+                let ends =
+                    [from, to].map(|v| PathElement::new([(v, y - 3.5), (v, y + 3.5)], style));
+                plane.draw_series(ends)?;
+            }
+            let value = Text::new(short(bar.value), (px(6.0), 0), font(LETTER, INK, HPos::Left));
+            plane.draw_series([EmptyElement::at((bar.reach(), y)) + value])?;
+        }
+        Ok(true)
     }
 
     pub(super) fn table(&self) -> Vec<Vec<String>> {
@@ -119,42 +154,4 @@ impl Bars {
         }
         rows
     }
-}
-
-fn draw_axis(svg: &mut Svg, a: Area, scale: &Scale, label: &str) {
-    for (value, text) in &scale.ticks {
-        let Some(place) = scale.place(*value) else { continue };
-        let x = a.left + a.width * place;
-        svg.line([x, a.top], [x, a.bottom()], Stroke::thin(GRID));
-        svg.text([x, a.bottom() + 16.0], text, 12.0, Anchor::Middle, MUTED);
-    }
-    svg.text([a.left + 0.5 * a.width, a.bottom() + 36.0], label, 12.0, Anchor::Middle, MUTED);
-}
-
-/// A bar from `start`, its spread and its number.
-fn draw_bar(
-    svg: &mut Svg,
-    bar: Bar,
-    a: Area,
-    start: f64,
-    x: &impl Fn(f64) -> Option<f64>,
-    paint: Paint,
-) {
-    let middle = a.top + 0.5 * a.height;
-    let Some(end) = x(bar.value) else {
-        return svg.text([start + 6.0, middle + 4.2], "no data", 12.0, Anchor::Start, MUTED);
-    };
-    let end = end.clamp(a.left, a.right());
-    let (left, width) = (start.min(end), (end - start).abs());
-    svg.rect(Area { left, width, ..a }, 1.5, paint, 1.0);
-    let mut reach = start.max(end);
-    if let Some([from, to]) = bar.spread.and_then(|[a, b]| Some([x(a)?, x(b)?])) {
-        let [from, to] = [from, to].map(|v| v.clamp(a.left, a.right()));
-        svg.line([from, middle], [to, middle], Stroke::thin(INK));
-        for at in [from, to] {
-            svg.line([at, middle - 3.5], [at, middle + 3.5], Stroke::thin(INK));
-        }
-        reach = reach.max(from).max(to);
-    }
-    svg.text([reach + 6.0, middle + 4.2], &short(bar.value), 12.0, Anchor::Start, INK);
 }

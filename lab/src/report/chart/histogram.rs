@@ -1,14 +1,18 @@
 //! Counts in bins of equal width.
 
-use super::frame::Frame;
+use super::axis::{Axis, linear_label};
+use super::colours::{INK, MUTED, REFERENCE, series};
 use super::legend::{Entry, Sign};
-use super::scale::{Axis, Scale};
+use super::{LETTER, Outcome, Sheet, font, px, styled};
 use crate::report::encode::fixed;
-use crate::report::palette::{AXIS, INK, MUTED, REFERENCE, series};
-use crate::report::svg::{Anchor, Area, Stroke, Svg};
+use plotters::chart::ChartBuilder;
+use plotters::element::{Rectangle, Text};
+use plotters::series::DashedLineSeries;
+use plotters::style::Color;
+use plotters::style::text_anchor::HPos;
 
-/// Between the last bin and the one of all that lies beyond, in bins.
-const BREAK: f64 = 1.0;
+/// The bin of all that lies beyond the others, as parts of their length.
+const BEYOND: [f64; 2] = [1.04, 1.12];
 
 /// Counts in bins of equal width from zero, and of all beyond them.
 #[derive(Clone, Debug)]
@@ -23,37 +27,11 @@ pub struct Histogram {
     pub counts: Vec<u64>,
     /// Values beyond the bins.
     pub overflow: u64,
-    /// Values that are negative or no numbers; they are not drawn, but told.
-    pub skipped: u64,
     /// A dashed line at this value, with its name: the cell size.
     pub line: Option<(f64, String)>,
 }
 
 impl Histogram {
-    /// Counts values in `bins` bins.
-    pub fn of(x: &str, y: &str, width: f64, bins: usize, values: &[f64]) -> Histogram {
-        let mut counts = vec![0; bins];
-        let (mut overflow, mut skipped) = (0, 0);
-        for &v in values {
-            if v >= 0.0 {
-                // A cast saturates, so that infinity and a width of zero end beyond the bins.
-                *counts.get_mut((v / width) as usize).unwrap_or(&mut overflow) += 1;
-            } else {
-                skipped += 1;
-            }
-        }
-        Histogram { x: x.into(), y: y.into(), width, counts, overflow, skipped, line: None }
-    }
-
-    /// The same with a dashed line.
-    pub fn line(self, at: f64, name: &str) -> Histogram {
-        Histogram { line: Some((at, name.into())), ..self }
-    }
-
-    fn total(&self) -> u64 {
-        self.counts.iter().sum::<u64>() + self.overflow
-    }
-
     /// Upper edge of the last bin.
     fn end(&self) -> f64 {
         self.width * self.counts.len() as f64
@@ -62,64 +40,51 @@ impl Histogram {
     pub(super) fn legend(&self) -> Vec<Entry> {
         let line = self.line.iter();
         let line = line.map(|(_, name)| Entry { name: name.clone(), sign: Sign::Dashed(INK) });
-        let beyond = format!("all beyond {}", self.end_text());
-        line.chain([Entry { name: beyond, sign: Sign::Block(REFERENCE, 1.0) }]).collect()
+        let name = format!("all beyond {}", self.end() as f32);
+        line.chain([Entry { name, sign: Sign::Block(REFERENCE) }]).collect()
     }
 
-    fn end_text(&self) -> String {
-        let text = format!("{:.3}", self.end());
-        text.trim_end_matches('0').trim_end_matches('.').into()
-    }
-
-    pub(super) fn draw(&self, svg: &mut Svg, area: Area) {
-        let bins = self.counts.len();
-        let drawable = self.total() > 0 && bins > 0 && self.width > 0.0 && self.end().is_finite();
-        let x = Axis::new(&self.x).range(0.0, self.end());
-        let y = Axis::new(&self.y);
+    pub(super) fn draw(&self, sheet: &Sheet) -> Outcome {
+        let total = self.counts.iter().sum::<u64>() + self.overflow;
         let most = self.counts.iter().chain([&self.overflow]).max().copied().unwrap_or(0);
-        let scales = Scale::new(&x, [0.0]).zip(Scale::new(&y, [0.0, most as f64]));
-        let Some((x_scale, y_scale)) = scales.filter(|_| drawable) else {
-            return super::no_data(svg, area);
-        };
-        // Room at the right for the bin beyond.
-        let room = (area.width * 0.1).max(58.0);
-        let frame = Frame::new(area.inset(0.0, 0.0, room, 0.0), x_scale, y_scale);
-        frame.draw(svg, &x, &y);
-        let a = frame.area;
-        let bin = a.width / bins as f64;
-        let gap = if bin > 5.0 { 1.0 } else { 0.0 };
-        let height = |count: u64| a.bottom() - frame.y_at(count as f64).unwrap_or(a.bottom());
-        let mut bar = |left: f64, width: f64, count: u64, paint| {
-            if count > 0 {
-                // What is there shall be seen, be it one in a million.
-                let height = height(count).max(0.8);
-                let top = a.bottom() - height;
-                svg.rect(Area { left, top, width, height }, 0.0, paint, 0.88);
-            }
-        };
-        for (i, &count) in self.counts.iter().enumerate() {
-            bar(a.left + bin * i as f64 + 0.5 * gap, bin - gap, count, series(0));
+        let x = Axis::new("").range(0.0, BEYOND[1] * self.end()).ends([0.0]);
+        let (Some(x), true) = (x, total > 0) else { return Ok(false) };
+        let y = 0.0..1.05 * most as f64;
+        let mut plane = ChartBuilder::on(sheet)
+            .margin_top(px(22.0))
+            .margin_right(px(22.0))
+            .x_label_area_size(px(42.0))
+            .y_label_area_size(px(64.0))
+            .build_cartesian_2d(x, y.clone())?;
+        let label = linear_label(0.0..self.end());
+        let x_label = |v: &f64| if *v > self.end() { String::new() } else { label(v) };
+        let y_label = linear_label(y.clone());
+        let mut mesh = plane.configure_mesh();
+        styled(&mut mesh);
+        mesh.disable_x_mesh().x_label_formatter(&x_label).y_label_formatter(&y_label);
+        mesh.x_desc(&self.x).y_desc(&self.y).draw()?;
+        let bins = (0..).zip(&self.counts).map(|(i, count)| {
+            let [from, to] = [i, i + 1].map(|i| self.width * f64::from(i));
+            Rectangle::new([(from, 0.0), (to, *count as f64)], series(0).mix(0.88).filled())
+        });
+        plane.draw_series(bins)?;
+        let [from, to] = BEYOND.map(|part| part * self.end());
+        let beyond = [(from, 0.0), (to, self.overflow as f64)];
+        plane.draw_series([Rectangle::new(beyond, REFERENCE.filled())])?;
+        if let Some((at, _)) = self.line.as_ref().filter(|l| (0.0..self.end()).contains(&l.0)) {
+            let style = INK.stroke_width(px(1.3) as u32);
+            let ends = [(*at, 0.0), (*at, y.end)];
+            plane.draw_series(DashedLineSeries::new(
+                ends,
+                px(5.0) as u32,
+                px(4.0) as u32,
+                style,
+            ))?;
         }
-        let beyond = [a.right() + (BREAK * bin).max(22.0), a.right() + room];
-        bar(beyond[0], beyond[1] - beyond[0], self.overflow, REFERENCE);
-        svg.line([beyond[0], a.bottom()], [beyond[1], a.bottom()], Stroke::thin(AXIS));
-        let middle = 0.5 * (beyond[0] + beyond[1]) + 2.0;
-        let label = format!("> {}", self.end_text());
-        svg.text([middle, a.bottom() + 18.0], &label, 12.0, Anchor::Middle, MUTED);
-        if let Some(at) = self.line.as_ref().and_then(|l| frame.x_at(l.0))
-            && at <= a.right()
-        {
-            svg.line([at, a.top], [at, a.bottom()], Stroke::dashed(INK));
-        }
-        self.draw_count(svg, [beyond[1], a.top - 10.0]);
-    }
-
-    fn draw_count(&self, svg: &mut Svg, at: [f64; 2]) {
-        let mut text = format!("n = {}", fixed(self.total() as f64, 0));
-        if self.skipped > 0 {
-            text += &format!(", {} no numbers", fixed(self.skipped as f64, 0));
-        }
-        svg.text(at, &text, 12.0, Anchor::End, MUTED);
+        let corner = (sheet.dim_in_pixel().0 as i32 - px(22.0), px(10.0));
+        let count = format!("n = {}", fixed(total as f64, 0));
+        sheet.draw(&Text::new(count, corner, font(LETTER, MUTED, HPos::Right)))?;
+        Ok(true)
     }
 
     pub(super) fn table(&self) -> Vec<Vec<String>> {
@@ -130,19 +95,5 @@ impl Histogram {
         rows.extend(self.counts.iter().enumerate().map(row));
         rows.push(vec![edge(self.counts.len()), "inf".into(), self.overflow.to_string()]);
         rows
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_value_is_in_one_bin_or_told() {
-        let values = [0.0, 0.05, 0.1, 0.29, 0.31, 7.0, f64::INFINITY, f64::NAN, -1.0];
-        let h = Histogram::of("error, m", "columns", 0.1, 3, &values);
-        assert_eq!((h.counts.as_slice(), h.overflow, h.skipped), (&[2, 1, 1][..], 3, 2));
-        let none = Histogram::of("", "", 0.0, 3, &[1.0]);
-        assert_eq!((none.total(), none.overflow), (1, 1));
     }
 }

@@ -1,14 +1,19 @@
 //! Curves and dots over two axes.
 
-use super::frame::Frame;
+use super::axis::{Axis, linear_label, log_label};
+use super::colours::{INK, MARK, MUTED, ordered, series};
 use super::legend::{Entry, Sign};
-use super::marks;
-use super::scale::{Axis, Scale};
-use crate::report::palette::{MUTED, Paint, ordered, series};
-use crate::report::svg::{Area, Stroke, Svg};
-
-/// A cumulative distribution is drawn through so many of its values at most.
-const CDF_POINTS: usize = 400;
+use super::{LETTER, Outcome, Sheet, font, px, styled};
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::combinators::IntoLogRange;
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::element::{Circle, EmptyElement, Text};
+use plotters::prelude::SVGBackend;
+use plotters::series::{DashedLineSeries, LineSeries};
+use plotters::style::text_anchor::HPos;
+use plotters::style::{Color, RGBColor};
 
 /// Curves or dots over two axes.
 #[derive(Clone, Debug)]
@@ -23,6 +28,8 @@ pub struct Lines {
     pub guides: Vec<Guide>,
     /// Whether the series have an order, such as ages: they are then coloured pale to dark.
     pub ordered: bool,
+    /// Whether y is logarithmic: only values above zero are drawn.
+    pub log_y: bool,
 }
 
 /// One curve.
@@ -30,7 +37,7 @@ pub struct Lines {
 pub struct Series {
     /// In the legend; give n here.
     pub name: String,
-    /// x and y; a point that is not finite interrupts the curve.
+    /// x and y; a point that cannot be drawn interrupts the curve.
     pub points: Vec<[f64; 2]>,
     /// How it is drawn.
     pub style: Style,
@@ -45,10 +52,6 @@ pub enum Style {
     Line,
     /// A dot each.
     Dots,
-    /// Dots joined by lines: few points, each of which counts.
-    DotsAndLine,
-    /// Dashed and grey: somebody else's curve.
-    Reference,
 }
 
 /// A place with a word.
@@ -63,75 +66,123 @@ pub struct Mark {
 /// A dashed line across the plot, named in the legend.
 #[derive(Clone, Debug)]
 pub enum Guide {
-    /// Upright at x.
-    X(f64, String),
     /// Level at y.
     Y(f64, String),
     /// Where y equals x.
     Diagonal(String),
 }
 
+type Plane<'a, 'b, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, Y>>;
+
 impl Lines {
     /// Nothing yet over two axes.
     pub fn new(x: Axis, y: Axis) -> Lines {
-        Lines { x, y, series: Vec::new(), guides: Vec::new(), ordered: false }
+        let (series, guides) = (Vec::new(), Vec::new());
+        Lines { x, y, series, guides, ordered: false, log_y: false }
     }
 
-    fn paint(&self, i: usize) -> Paint {
-        match self.series[i].style {
-            Style::Reference => MUTED,
-            _ if self.ordered => ordered(i, self.series.len()),
-            _ => series(i),
-        }
+    fn colour(&self, i: usize) -> RGBColor {
+        if self.ordered { ordered(i, self.series.len()) } else { series(i) }
     }
 
     pub(super) fn legend(&self) -> Vec<Entry> {
         let sign = |i: usize, s: &Series| match s.style {
-            Style::Reference => Sign::Dashed(MUTED),
-            Style::Dots => Sign::Dot(self.paint(i)),
-            _ => Sign::Line(self.paint(i)),
+            Style::Dots => Sign::Dot(self.colour(i)),
+            Style::Line => Sign::Line(self.colour(i)),
         };
         let curves = self.series.iter().enumerate();
         let curves = curves.map(|(i, s)| Entry { name: s.name.clone(), sign: sign(i, s) });
         let guides = self.guides.iter().map(|guide| match guide {
-            Guide::X(_, name) | Guide::Y(_, name) | Guide::Diagonal(name) => {
+            Guide::Y(_, name) | Guide::Diagonal(name) => {
                 Entry { name: name.clone(), sign: Sign::Dashed(MUTED) }
             }
         });
         curves.chain(guides).collect()
     }
 
-    pub(super) fn draw(&self, svg: &mut Svg, area: Area) {
-        let Some(frame) = self.frame(area) else { return super::no_data(svg, area) };
-        frame.draw(svg, &self.x, &self.y);
-        svg.clip(frame.area.inset(-1.0, -2.0, -2.0, -1.0));
-        for guide in &self.guides {
-            draw_guide(svg, &frame, guide);
-        }
-        for (i, s) in self.series.iter().enumerate() {
-            draw_series(svg, &frame, s, self.paint(i));
-        }
-        svg.end_clip();
-        marks::draw(svg, &frame, &self.series);
+    fn is_drawable(&self, [x, y]: [f64; 2]) -> bool {
+        x.is_finite() && y.is_finite() && !(self.log_y && y <= 0.0)
     }
 
-    /// Axes for all points that have both coordinates.
-    fn frame(&self, area: Area) -> Option<Frame> {
-        let whole = |p: &&[f64; 2]| {
-            let shown = |v: f64, axis: &Axis| v.is_finite() && !(axis.log && v <= 0.0);
-            shown(p[0], &self.x) && shown(p[1], &self.y)
+    pub(super) fn draw(&self, sheet: &Sheet) -> Outcome {
+        let points = self.series.iter().flat_map(|s| s.points.iter().copied());
+        let points: Vec<_> = points.filter(|p| self.is_drawable(*p)).collect();
+        let levels = self.guides.iter().filter_map(|guide| match guide {
+            Guide::Y(y, _) => Some(*y).filter(|y| self.is_drawable([0.0, *y])),
+            Guide::Diagonal(_) => None,
+        });
+        let x = self.x.ends(points.iter().map(|p| p[0]));
+        let y = self.y.ends(points.iter().map(|p| p[1]).chain(levels));
+        let (Some(x), Some(y), false) = (x, y, points.is_empty()) else { return Ok(false) };
+        let mut builder = ChartBuilder::on(sheet);
+        builder.margin_top(px(10.0)).margin_right(px(22.0));
+        builder.x_label_area_size(px(42.0)).y_label_area_size(px(64.0));
+        if self.log_y {
+            let least = points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+            let y = y.start.max(0.8 * least)..y.end;
+            self.draw_on(builder.build_cartesian_2d(x, y.log_scale())?, &log_label)
+        } else {
+            let label = linear_label(y.clone());
+            self.draw_on(builder.build_cartesian_2d(x, y)?, &label)
+        }
+    }
+
+    fn draw_on<Y>(&self, mut plane: Plane<Y>, y_label: &dyn Fn(&f64) -> String) -> Outcome
+    where
+        Y: Ranged<ValueType = f64> + ValueFormatter<f64> + AsRangedCoord,
+    {
+        let (x, y) = (plane.x_range(), plane.y_range());
+        let x_label = linear_label(x.clone());
+        let mut mesh = plane.configure_mesh();
+        styled(&mut mesh);
+        mesh.disable_x_mesh().x_label_formatter(&x_label).y_label_formatter(y_label);
+        mesh.x_desc(&self.x.label).y_desc(&self.y.label).draw()?;
+        let inside = |[a, b]: [f64; 2]| {
+            self.is_drawable([a, b])
+                && (x.start..=x.end).contains(&a)
+                && (y.start..=y.end).contains(&b)
         };
-        let points = || self.series.iter().flat_map(|s| &s.points).filter(whole);
-        points().next()?;
-        let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = points().map(|p| (p[0], p[1])).unzip();
         for guide in &self.guides {
-            match guide {
-                Guide::X(x, _) => xs.push(*x),
-                Guide::Y(y, _) => ys.push(*y),
-                Guide::Diagonal(_) => {}
+            let points = match guide {
+                Guide::Y(level, _) => vec![[x.start, *level], [x.end, *level]],
+                // By parts: on a logarithmic axis it is no straight line.
+                Guide::Diagonal(_) => (0..=64)
+                    .map(|i| x.start + (x.end - x.start) * f64::from(i) / 64.0)
+                    .map(|v| [v, v])
+                    .collect(),
+            };
+            let points = points.into_iter().filter(|p| inside(*p)).map(|[a, b]| (a, b));
+            let style = MUTED.stroke_width(px(1.3) as u32);
+            plane.draw_series(DashedLineSeries::new(
+                points,
+                px(5.0) as u32,
+                px(4.0) as u32,
+                style,
+            ))?;
+        }
+        for (i, s) in self.series.iter().enumerate() {
+            let colour = self.colour(i);
+            for run in s.points.split(|p| !inside(*p)) {
+                let run = run.iter().map(|&[a, b]| (a, b));
+                if s.style == Style::Line && run.len() > 1 {
+                    plane.draw_series(LineSeries::new(run, colour.stroke_width(px(2.2) as u32)))?;
+                } else {
+                    let opacity = if s.points.len() > 200 { 0.35 } else { 0.9 };
+                    let dot = |at| Circle::new(at, px(2.5), colour.mix(opacity).filled());
+                    plane.draw_series(run.map(dot))?;
+                }
             }
         }
-        Some(Frame::new(area, Scale::new(&self.x, xs)?, Scale::new(&self.y, ys)?))
+        let marks = self.series.iter().flat_map(|s| &s.marks).filter(|m| inside(m.at));
+        plane.draw_series(marks.enumerate().map(|(n, mark)| {
+            // In turn on either side of a curve that falls.
+            let sides = [(px(-9.0), px(5.0), HPos::Right), (px(9.0), px(-5.0), HPos::Left)];
+            let (x, y, side) = sides[n % 2];
+            EmptyElement::at((mark.at[0], mark.at[1]))
+                + Circle::new((0, 0), px(4.6), MARK.filled())
+                + Text::new(mark.label.clone(), (x, y), font(LETTER, INK, side))
+        }))?;
+        Ok(true)
     }
 
     pub(super) fn table(&self) -> Vec<Vec<String>> {
@@ -152,77 +203,5 @@ impl Series {
     /// A curve.
     pub fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
         Series { name: name.into(), points, style: Style::Line, marks: Vec::new() }
-    }
-
-    /// The share of values (percent, of those that are numbers) up to each of them, in 400 steps of
-    /// equal share at most; the name gets the number of values.
-    pub fn cdf(name: &str, values: &[f64]) -> Series {
-        let mut sorted: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-        sorted.sort_by(f64::total_cmp);
-        let n = sorted.len();
-        let steps = n.min(CDF_POINTS);
-        let point = |i: usize| {
-            let rank = i * n / steps;
-            [sorted[rank - 1], 100.0 * rank as f64 / n as f64]
-        };
-        let start = sorted.first().map(|&v| [v, 0.0]);
-        let points = start.into_iter().chain((1..=steps).map(point)).collect();
-        Series::line(&format!("{name} (n = {})", crate::report::encode::fixed(n as f64, 0)), points)
-    }
-
-    /// The same in another style.
-    pub fn style(self, style: Style) -> Series {
-        Series { style, ..self }
-    }
-
-    /// The same with a mark.
-    pub fn mark(mut self, at: [f64; 2], label: &str) -> Series {
-        self.marks.push(Mark { at, label: label.into() });
-        self
-    }
-}
-
-fn draw_guide(svg: &mut Svg, frame: &Frame, guide: &Guide) {
-    let a = frame.area;
-    let ends = match guide {
-        Guide::X(x, _) => frame.x_at(*x).map(|x| [[x, a.top], [x, a.bottom()]]),
-        Guide::Y(y, _) => frame.y_at(*y).map(|y| [[a.left, y], [a.right(), y]]),
-        Guide::Diagonal(_) => None,
-    };
-    if let Some([from, to]) = ends {
-        svg.line(from, to, Stroke::dashed(MUTED));
-    }
-    if let Guide::Diagonal(_) = guide {
-        // By parts: on a logarithmic axis it is no straight line.
-        let along = |i: i32| frame.diagonal(f64::from(i) / 64.0);
-        let points: Vec<_> = (0..=64).filter_map(along).collect();
-        svg.polyline(&points, Stroke::dashed(MUTED));
-    }
-}
-
-fn draw_series(svg: &mut Svg, frame: &Frame, s: &Series, paint: Paint) {
-    let places: Vec<Option<[f64; 2]>> = s.points.iter().map(|&p| frame.at(p)).collect();
-    if s.style != Style::Dots {
-        let stroke = match s.style {
-            Style::Reference => Stroke { paint, width: 1.8, dashes: "6 4" },
-            _ => Stroke { paint, width: 2.2, dashes: "" },
-        };
-        for run in places.split(Option::is_none) {
-            let run: Vec<[f64; 2]> = run.iter().flatten().copied().collect();
-            match run[..] {
-                [] => {}
-                [alone] => svg.disc(alone, 3.0, paint, 1.0),
-                _ => svg.polyline(&run, stroke),
-            }
-        }
-    }
-    let many = s.points.len() > 200;
-    let (radius, opacity) = match s.style {
-        Style::Dots if many => (2.0, 0.35),
-        Style::Dots | Style::DotsAndLine => (3.6, 0.9),
-        _ => return,
-    };
-    for at in places.into_iter().flatten() {
-        svg.disc(at, radius, paint, opacity);
     }
 }

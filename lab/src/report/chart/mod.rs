@@ -1,34 +1,77 @@
-//! Charts: one description, drawn once as SVG (and from that as PNG) and listed as CSV.
+//! Charts: one description, drawn as SVG by plotters (and from that as PNG) and listed as CSV.
 
+mod axis;
 mod bars;
-mod frame;
+mod colours;
 mod histogram;
 mod legend;
 mod lines;
-mod marks;
-mod scale;
 
+pub use axis::Axis;
 pub use bars::{Bar, BarSeries, Bars};
 pub use histogram::Histogram;
 pub use lines::{Guide, Lines, Mark, Series, Style};
-pub use scale::Axis;
 
-use super::encode;
-use super::palette::{GRID, INK, MUTED};
-use super::svg::{Anchor, Area, Stroke, Svg};
+use super::encode::{csv, xml};
+use colours::{AXIS, GRID, INK, MUTED};
 use legend::Entry;
+use plotters::backend::SVGBackend;
+use plotters::chart::MeshStyle;
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
+use plotters::element::Text;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, IntoFont, RGBColor, TRANSPARENT, TextStyle};
 
-/// Width of every chart within its margin, units.
-const WIDTH: f64 = 720.0;
-
-/// Around every chart, units.
-const MARGIN: f64 = 8.0;
-
-/// Between parts that stand side by side, units.
-const GAP: f64 = 34.0;
-
-/// Space for the title of a part, units.
+/// Width of every chart, units.
+const WIDTH: f64 = 736.0;
+/// Height of a plot beside another and of one alone, units.
+const HEIGHTS: [f64; 2] = [240.0, 372.0];
+/// Height of the title of a part, units.
 const TITLE: f64 = 24.0;
+/// Height of letters, units.
+const LETTER: f64 = 12.5;
+/// plotters draws in whole pixels: so many of them make a unit, for curves to be smooth.
+const FINE: f64 = 16.0;
+
+type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+/// Whether there was anything to draw.
+type Outcome = Result<bool, DrawingAreaErrorKind<std::io::Error>>;
+
+/// Units as plotters' pixels.
+fn px(units: f64) -> i32 {
+    (units * FINE).round() as i32
+}
+
+/// Letters of a colour that lie on this side of their place, their middle at its height.
+fn font(size: f64, colour: RGBColor, side: HPos) -> TextStyle<'static> {
+    // plotters takes 1.24 of the size that it writes.
+    let font = ("sans-serif", size * FINE * 1.24).into_font();
+    font.color(&colour).pos(Pos::new(side, VPos::Center))
+}
+
+/// Grid, axes and labels of every plot look the same.
+fn styled<X, Y>(mesh: &mut MeshStyle<X, Y, SVGBackend>)
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let thin = px(1.0) as u32;
+    mesh.light_line_style(TRANSPARENT)
+        .bold_line_style(GRID.stroke_width(thin))
+        .axis_style(AXIS.stroke_width(thin))
+        .set_all_tick_mark_size(px(4.0))
+        .label_style(font(LETTER, MUTED, HPos::Center))
+        .x_labels(6)
+        .y_labels(6);
+}
+
+/// About how wide a text is, units; rather more than less.
+fn width(text: &str, size: f64) -> f64 {
+    0.56 * size * text.chars().count() as f64
+}
 
 /// A figure of one plot, or of several small ones that are to be compared.
 #[derive(Clone, Debug)]
@@ -65,35 +108,39 @@ impl Chart {
     /// The drawing and its width and height, units.
     pub(super) fn svg(&self) -> (String, [f64; 2]) {
         let columns = if self.parts.len() > 1 { 2 } else { 1 };
-        let width = (WIDTH - GAP * (columns - 1) as f64) / columns as f64;
+        let wide = WIDTH / columns as f64;
         let shared = self.shared_legend();
-        let shared_height = legend::height(shared.as_deref().unwrap_or(&[]), WIDTH);
+        let top = legend::height(shared.as_deref().unwrap_or_default(), WIDTH);
         let height_of = |(title, plot): &(String, Plot)| {
-            let own = if shared.is_some() { 0.0 } else { legend::height(&plot.legend(), width) };
+            let own = if shared.is_some() { 0.0 } else { legend::height(&plot.legend(), wide) };
             plot.height(columns) + own + if title.is_empty() { 0.0 } else { TITLE }
         };
-        let rows: Vec<f64> = self
-            .parts
-            .chunks(columns)
-            .map(|row| row.iter().map(height_of).fold(0.0, f64::max))
-            .collect();
-        let gaps = GAP * 0.6 * rows.len().saturating_sub(1) as f64;
-        let height = (shared_height + rows.iter().sum::<f64>() + gaps).max(40.0);
-        let mut svg = Svg::new(WIDTH, height, MARGIN);
-        if let Some(entries) = &shared {
-            legend::draw(&mut svg, entries, [0.0, 0.0], WIDTH);
-        }
-        let mut top = shared_height;
-        for (row, height) in self.parts.chunks(columns).zip(rows) {
-            for (i, (title, plot)) in row.iter().enumerate() {
-                let left = i as f64 * (width + GAP);
-                let area = Area { left, top, width, height };
-                draw_part(&mut svg, title, plot, area, shared.is_none());
+        let rows = self.parts.chunks(columns);
+        let heights: Vec<f64> =
+            rows.map(|row| row.iter().map(height_of).fold(0.0, f64::max)).collect();
+        let size = [WIDTH, (top + heights.iter().sum::<f64>()).max(40.0)];
+        let mut svg = String::new();
+        let sheet = SVGBackend::with_string(&mut svg, (px(size[0]) as u32, px(size[1]) as u32))
+            .into_drawing_area();
+        let draw = || -> Drawn {
+            let (head, body) = sheet.split_vertically(px(top));
+            legend::draw(&head, shared.as_deref().unwrap_or_default(), WIDTH)?;
+            let ends = heights.iter().scan(0.0, |sum, h| {
+                *sum += h;
+                Some(px(*sum))
+            });
+            let below: Vec<i32> = ends.take(heights.len().saturating_sub(1)).collect();
+            let beside: Vec<i32> = (1..columns).map(|_| px(wide)).collect();
+            for ((title, plot), cell) in
+                self.parts.iter().zip(body.split_by_breakpoints(beside, below))
+            {
+                draw_part(&cell, title, plot, shared.is_none(), wide)?;
             }
-            top += height + 0.6 * GAP;
-        }
-        let size = svg.size();
-        (svg.finish(&self.caption), size)
+            sheet.present()
+        };
+        draw().expect("drawing into memory");
+        drop(sheet);
+        (labelled(&svg, size, &self.caption), size)
     }
 
     /// The legend of all parts where they have the same.
@@ -121,8 +168,19 @@ impl Chart {
             }
             rows.extend(table.drain(1..));
         }
-        encode::csv(&rows)
+        csv(&rows)
     }
+}
+
+/// The drawing in units, with words for those who cannot see it.
+fn labelled(svg: &str, [w, h]: [f64; 2], label: &str) -> String {
+    let body = svg.split_once('>').map_or("", |(_, body)| body);
+    let [fine_w, fine_h] = [w, h].map(px);
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{}\" width=\"{w}\" \
+         height=\"{h}\" viewBox=\"0 0 {fine_w} {fine_h}\">{body}",
+        xml(label)
+    )
 }
 
 impl Plot {
@@ -137,16 +195,15 @@ impl Plot {
     fn height(&self, columns: usize) -> f64 {
         match self {
             Plot::Bars(bars) => bars.height(),
-            _ if columns > 1 => 236.0,
-            _ => 372.0,
+            _ => HEIGHTS[usize::from(columns == 1)],
         }
     }
 
-    fn draw(&self, svg: &mut Svg, area: Area) {
+    fn draw(&self, sheet: &Sheet) -> Outcome {
         match self {
-            Plot::Lines(lines) => lines.draw(svg, area),
-            Plot::Histogram(histogram) => histogram.draw(svg, area),
-            Plot::Bars(bars) => bars.draw(svg, area),
+            Plot::Lines(lines) => lines.draw(sheet),
+            Plot::Histogram(histogram) => histogram.draw(sheet),
+            Plot::Bars(bars) => bars.draw(sheet),
         }
     }
 
@@ -160,24 +217,24 @@ impl Plot {
     }
 }
 
-fn draw_part(svg: &mut Svg, title: &str, plot: &Plot, area: Area, with_legend: bool) {
-    let mut area = area;
+fn draw_part(cell: &Sheet, title: &str, plot: &Plot, with_legend: bool, wide: f64) -> Drawn {
+    let mut sheet = cell.clone();
     if !title.is_empty() {
-        svg.text([area.left, area.top + 14.0], title, 14.5, Anchor::Start, INK);
-        area = area.inset(0.0, TITLE, 0.0, 0.0);
+        let (head, body) = sheet.split_vertically(px(TITLE));
+        let style = font(14.5, INK, HPos::Left);
+        head.draw(&Text::new(title.to_string(), (0, px(0.5 * TITLE)), style))?;
+        sheet = body;
     }
     if with_legend {
-        let height = legend::draw(svg, &plot.legend(), [area.left, area.top], area.width);
-        area = area.inset(0.0, height, 0.0, 0.0);
+        let entries = plot.legend();
+        let (head, body) = sheet.split_vertically(px(legend::height(&entries, wide)));
+        legend::draw(&head, &entries, wide)?;
+        sheet = body;
     }
-    plot.draw(svg, area);
-}
-
-/// An empty plot that says so.
-fn no_data(svg: &mut Svg, area: Area) {
-    let middle = area.top + 0.5 * area.height;
-    for y in [area.top + 8.0, area.bottom() - 8.0] {
-        svg.line([area.left, y], [area.right(), y], Stroke::thin(GRID));
+    if !plot.draw(&sheet)? {
+        let (w, h) = sheet.dim_in_pixel();
+        let style = font(14.0, MUTED, HPos::Center);
+        sheet.draw(&Text::new("no data", (w as i32 / 2, h as i32 / 2), style))?;
     }
-    svg.text([area.left + 0.5 * area.width, middle], "no data", 14.0, Anchor::Middle, MUTED);
+    Ok(())
 }

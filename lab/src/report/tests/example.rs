@@ -22,13 +22,16 @@ pub fn precision_recall() -> Chart {
     };
     let mut lines =
         Lines::new(Axis::new("recall").range(0.0, 1.0), Axis::new("precision").range(0.0, 1.0));
-    lines.series.push(
-        Series::line("trained filter", curve(7.0))
-            .mark([0.95, 1.0 - 0.7 * 0.95f64.powf(7.0)], "95 % of the foreground")
-            .mark([0.80, 1.0 - 0.7 * 0.8f64.powf(7.0)], "80 %"),
-    );
+    let mark = |recall: f64, label: &str| Mark {
+        at: [recall, 1.0 - 0.7 * recall.powf(7.0)],
+        label: label.into(),
+    };
+    lines.series.push(Series {
+        marks: vec![mark(0.95, "95 % of the foreground"), mark(0.80, "80 %")],
+        ..Series::line("trained filter", curve(7.0))
+    });
     lines.series.push(Series::line("height alone", curve(2.0)));
-    lines.series.push(Series::line("dissertation, read off", curve(5.0)).style(Style::Reference));
+    lines.series.push(Series::line("dissertation, read off", curve(5.0)));
     let caption = "Precision and recall of the background filter, foreground being the positive \
                    class; the dots are decision thresholds. n = 12,345 solid columns of 2 drives.";
     Chart::new("precision-recall", caption, Plot::Lines(lines))
@@ -38,8 +41,13 @@ pub fn histograms() -> Chart {
     let classes =
         [("Car", 9000, 0.10), ("Cyclist", 900, 0.14), ("Pedestrian", 400, 0.2), ("Tram", 0, 1.0)];
     let part = |(name, n, typical): (&str, usize, f64)| {
-        let h = Histogram::of("error, m", "columns", 0.05, 30, &errors(7, n, typical));
-        (name.to_string(), Plot::Histogram(h.line(0.3, "cell, 0.30 m")))
+        let (mut counts, mut overflow) = (vec![0; 30], 0);
+        for error in errors(7, n, typical) {
+            *counts.get_mut((error / 0.05) as usize).unwrap_or(&mut overflow) += 1;
+        }
+        let line = Some((0.3, "cell, 0.30 m".into()));
+        let (x, y) = ("error, m".into(), "columns".into());
+        (name.to_string(), Plot::Histogram(Histogram { x, y, width: 0.05, counts, overflow, line }))
     };
     let parts = classes.into_iter().map(part).collect();
     let caption = "Error of the raw scene flow by class: distance between estimated and labelled \
@@ -54,10 +62,10 @@ pub fn cdfs() -> Chart {
             Axis::new("share, %").range(0.0, 100.0),
         );
         for age in [1, 2, 4, 8, 10] {
-            let values = errors(age, 3000, typical * 3.0 / (age as f64).sqrt());
-            let mut curve = Series::cdf("", &values);
-            curve.name = format!("age {age}");
-            lines.series.push(curve);
+            let mut values = errors(age, 3000, typical * 3.0 / (age as f64).sqrt());
+            values.sort_by(f64::total_cmp);
+            let points = (0..).zip(&values).map(|(n, v)| [*v, f64::from(n) / 30.0]).collect();
+            lines.series.push(Series::line(&format!("age {age}"), points));
         }
         lines.ordered = true;
         (name.to_string(), Plot::Lines(lines))
@@ -126,7 +134,7 @@ fn scatter() -> Chart {
         [returns, 5.0 + returns * 1e-4 + noise[i as usize]]
     });
     let mut lines = Lines::new(Axis::new("returns in the sweep"), Axis::new("time, ms"));
-    lines.series.push(Series::line("sweeps", points.collect()).style(Style::Dots));
+    lines.series.push(Series { style: Style::Dots, ..Series::line("sweeps", points.collect()) });
     lines.series.push(Series::line("least squares", vec![[60e3, 12.0], [135e3, 19.4]]));
     lines.guides.push(Guide::Y(25.0, "budget".into()));
     Chart::new("time-by-returns", "Time against returns, n = 300.", Plot::Lines(lines))
@@ -138,14 +146,15 @@ fn reliability() -> Chart {
         Axis::new("predicted probability").range(0.0, 1.0),
         Axis::new("observed share").range(0.0, 1.0),
     );
-    lines.series.push(Series::line("filter", points).style(Style::DotsAndLine));
+    lines.series.push(Series::line("filter", points));
     lines.guides.push(Guide::Diagonal("calibrated".into()));
     Chart::new("reliability", "Reliability of the filter's probabilities.", Plot::Lines(lines))
 }
 
 pub fn nothing() -> Chart {
     let lines = Lines::new(Axis::new("x"), Axis::new("y"));
-    let h = Histogram::of("x", "y", 0.1, 10, &[f64::NAN]);
+    let (x, y, counts) = ("x".into(), "y".into(), vec![0; 10]);
+    let h = Histogram { x, y, width: 0.1, counts, overflow: 0, line: None };
     let bars = Bars { x: Axis::new("x"), categories: vec![], series: vec![] };
     let mut nan = lines.clone();
     nan.series.push(Series::line("n", vec![[f64::NAN, 1.0], [1.0, f64::INFINITY]]));

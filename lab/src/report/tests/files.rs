@@ -157,17 +157,16 @@ fn odd_values_are_drawn_or_left_out() {
     ];
     for &a in &odd {
         for &b in &odd {
-            for axis in [
-                Axis::new("x"),
-                Axis::new("x").log(),
-                Axis::new("x").range(a, b),
-                Axis::new("x").range(a, b).log(),
-            ] {
-                let mut lines = Lines::new(axis.clone(), axis.clone());
-                lines
-                    .series
-                    .push(Series::line("odd", vec![[a, b], [b, a], [1.0, 1.0]]).mark([a, b], "m"));
-                lines.guides = vec![Guide::X(a, "g".into()), Guide::Diagonal("d".into())];
+            let axes = [Axis::new("x"), Axis::new("x").range(a, b)];
+            for (axis, log_y) in
+                axes.into_iter().flat_map(|axis| [(axis.clone(), false), (axis, true)])
+            {
+                let mut lines = Lines { log_y, ..Lines::new(axis.clone(), axis.clone()) };
+                lines.series.push(Series {
+                    marks: vec![Mark { at: [a, b], label: "m".into() }],
+                    ..Series::line("odd", vec![[a, b], [b, a], [1.0, 1.0]])
+                });
+                lines.guides = vec![Guide::Y(a, "g".into()), Guide::Diagonal("d".into())];
                 let mut bars =
                     Bars { x: axis, categories: vec!["a".into(), "b".into()], series: vec![] };
                 let bar = Bar { value: a, spread: Some([b, a]) };
@@ -176,7 +175,9 @@ fn odd_values_are_drawn_or_left_out() {
                     reference: false,
                     bars: vec![Some(bar)],
                 });
-                let h = Histogram::of("x", "y", a, 4, &[a, b]).line(b, "l");
+                let line = Some((b, "l".into()));
+                let (x, y, counts) = ("x".into(), "y".into(), vec![1, 0, 2]);
+                let h = Histogram { x, y, width: a, counts, overflow: 1, line };
                 let parts = [Plot::Lines(lines), Plot::Bars(bars), Plot::Histogram(h)];
                 let parts = parts.into_iter().map(|p| (String::new(), p)).collect();
                 let (svg, _) = Chart::small_multiples("odd", "", parts).svg();
