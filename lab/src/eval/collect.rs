@@ -20,7 +20,7 @@ use raywake_io::source::SweepData;
 
 /// A copy of a pair, for another thread.
 #[derive(Clone)]
-pub struct Seen {
+pub struct PairData {
     /// Index of the first sweep in the drive.
     pub index: usize,
     /// The first sweep.
@@ -35,10 +35,10 @@ pub struct Seen {
     pub points: Vec<PointFlow>,
 }
 
-impl Seen {
+impl PairData {
     /// Copies.
-    pub fn of(pair: &Pair) -> Seen {
-        Seen {
+    pub fn of(pair: &Pair) -> PairData {
+        PairData {
             index: pair.index,
             first: pair.first.clone(),
             then: pair.second.world_from_vehicle,
@@ -91,13 +91,13 @@ impl<'a> Collector<'a> {
     }
 
     /// The labelled objects of the first sweep.
-    pub fn present(&self, seen: &Seen) -> &'a [Present] {
+    pub fn present(&self, seen: &PairData) -> &'a [Present] {
         self.objects.at(seen.first.frame)
     }
 
     /// Rows of the first sweep's solid columns. They belong to what their returns hit where there is
     /// exact truth of these, else to the box that their centre lies in.
-    pub fn rows(&mut self, seen: &Seen, exact: Option<&[PointTruth]>) -> Vec<Row> {
+    pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
         let columns = self.grid.columns.len();
         let owners = exact.map(|returns| owners(&self.grid.of_point, returns, columns));
@@ -129,7 +129,7 @@ impl<'a> Collector<'a> {
 
     fn row(
         &self,
-        seen: &Seen,
+        seen: &PairData,
         flow: &ColumnFlow,
         object: Option<&Present>,
         voxels: u8,
@@ -190,7 +190,7 @@ impl<'a> Collector<'a> {
     }
 
     /// A displacement in the frame of the grid as a displacement over ground.
-    fn over_ground(&self, seen: &Seen, at: DVec3, by: DVec3) -> DVec3 {
+    fn over_ground(&self, seen: &PairData, at: DVec3, by: DVec3) -> DVec3 {
         match self.profile.frame {
             Frame::Lattice => by,
             Frame::Sensor => seen.then.transform(at + by) - seen.now().transform(at),
@@ -198,7 +198,7 @@ impl<'a> Collector<'a> {
     }
 
     /// A displacement over ground in the frame of the grid.
-    fn in_grid(&self, seen: &Seen, at: DVec3, by: DVec3) -> DVec3 {
+    fn in_grid(&self, seen: &PairData, at: DVec3, by: DVec3) -> DVec3 {
         match self.profile.frame {
             Frame::Lattice => by,
             Frame::Sensor => seen.then.inverse().transform(seen.now().transform(at) + by) - at,
@@ -285,7 +285,7 @@ mod tests {
             }
         };
         let columns = (0..4).map(column).collect();
-        let seen = Seen { index: 0, first, then, dt_s: 0.1, columns, points: Vec::new() };
+        let seen = PairData { index: 0, first, then, dt_s: 0.1, columns, points: Vec::new() };
         let classes =
             |rows: &[Row]| rows.iter().map(|r| CLASSES[r.class as usize]).collect::<Vec<_>>();
         let rows = collector.rows(&seen, Some(&truth));

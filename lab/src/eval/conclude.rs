@@ -5,7 +5,7 @@ use super::drive::Settings;
 use super::facts::Facts;
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
-use super::tally::{Estimate, Group, Motion, Tally, Truth};
+use super::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
 use super::verdicts::Verdicts;
 use super::{figures, read_rows, tables};
 use crate::labels::CAMERA_DEG;
@@ -123,13 +123,14 @@ fn subtitle(drives: &[Facts]) -> String {
 }
 
 fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
-    let flow =
-        |motion| tally.flow(Estimate::Ours, Truth::Raw, Group::Labelled, motion, Weight::Column);
+    let flow = |motion| {
+        tally.flow(Estimate::Ours, Truth::Raw, ClassGroup::Labelled, motion, Weight::Column)
+    };
     let number = |v: f64, unit: &str, digits: usize| {
         if v.is_finite() { format!("{v:.digits$} {unit}") } else { "–".into() }
     };
-    let (moving, parked) = (flow(Motion::Moving), flow(Motion::Parked));
-    let settled = tally.settled(Group::Labelled, Motion::Moving, Weight::Column);
+    let (moving, parked) = (flow(MotionGroup::Moving), flow(MotionGroup::Parked));
+    let settled = tally.settled(ClassGroup::Labelled, MotionGroup::Moving, Weight::Column);
     report.headline(
         &number(100.0 * moving.quantile(0.5), "cm", 1),
         "median error of raw flow, moving",

@@ -1,6 +1,6 @@
 //! One drive: the pipeline on one thread, rows and pictures on another.
 
-use super::collect::{Collector, Seen};
+use super::collect::{Collector, PairData};
 use super::exact::Exact;
 use super::facts::{Facts, Panel};
 use super::objects::Objects;
@@ -212,7 +212,7 @@ fn run(
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
-            let _ = send.send(Some(Seen::of(pair)));
+            let _ = send.send(Some(PairData::of(pair)));
         });
         if summary.as_ref().is_ok_and(|s| !s.facts.interrupted) {
             let _ = send.send(None);
@@ -245,7 +245,7 @@ fn collect(
     mut collector: Collector,
     mut points: Points,
     exact: Option<Exact>,
-    pairs: &Receiver<Option<Seen>>,
+    pairs: &Receiver<Option<PairData>>,
     files: &Files,
 ) -> Result<Collected, Error> {
     let mut panels = Panels::default();

@@ -3,7 +3,7 @@
 use super::facts::Facts;
 use super::statistics::{Sorted, Weight};
 use super::tables::{RECALL, stages};
-use super::tally::{Estimate, Group, Motion, SETTLED, Tally, Truth};
+use super::tally::{ClassGroup, Estimate, MotionGroup, SETTLED, Tally, Truth};
 use crate::curve::{Curve, Operating};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
@@ -21,15 +21,15 @@ const CDF_MPS: f64 = 3.0;
 const POINTS: usize = 200;
 
 /// Classes with a figure of their own in the dissertation, and all that are there.
-fn groups(tally: &Tally) -> Vec<Group> {
-    let some = |g: &Group| tally.coverage(*g, Motion::Any)[0] > 0;
-    Group::labelled().chain([Group::Class(0)]).filter(some).collect()
+fn groups(tally: &Tally) -> Vec<ClassGroup> {
+    let some = |g: &ClassGroup| tally.coverage(*g, MotionGroup::Any)[0] > 0;
+    ClassGroup::labelled().chain([ClassGroup::Class(0)]).filter(some).collect()
 }
 
 /// Name of a part of a figure.
-fn title(group: Group, motion: Motion) -> String {
+fn title(group: ClassGroup, motion: MotionGroup) -> String {
     match motion {
-        Motion::Any => group.label().to_string(),
+        MotionGroup::Any => group.label().to_string(),
         _ => format!("{}, {}", group.label(), motion.label()),
     }
 }
@@ -79,12 +79,12 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     };
     let by_class = groups(tally)
         .into_iter()
-        .filter(|g| *g != Group::Labelled)
-        .flat_map(|g| Motion::of(g).iter().map(move |m| (g, *m)))
+        .filter(|g| *g != ClassGroup::Labelled)
+        .flat_map(|g| MotionGroup::of(g).iter().map(move |m| (g, *m)))
         .filter(|(g, m)| tally.coverage(*g, *m)[0] > 0)
         .map(|(g, m)| (title(g, m), of(g, m)));
-    let motions = [Motion::Moving, Motion::Parked];
-    let by_motion = motions.map(|m| (title(Group::Labelled, m), of(Group::Labelled, m)));
+    let motions = [MotionGroup::Moving, MotionGroup::Parked];
+    let by_motion = motions.map(|m| (title(ClassGroup::Labelled, m), of(ClassGroup::Labelled, m)));
     [
         Chart::small_multiples(
             "figure-3-7",
@@ -107,7 +107,7 @@ fn cdf(name: &str, errors: &Sorted, limit: f64, style: Style) -> Series {
 
 /// Raw flow of what moves and what is parked beside the estimates that need no LIDAR.
 pub fn references(tally: &Tally) -> Chart {
-    let part = |motion: Motion| {
+    let part = |motion: MotionGroup| {
         let mut lines = Lines::new(
             Axis::new("error, m").range(0.0, CDF_M),
             Axis::new("share of columns").range(0.0, 1.0),
@@ -115,20 +115,21 @@ pub fn references(tally: &Tally) -> Chart {
         lines.series = Estimate::ALL
             .iter()
             .map(|e| {
-                let errors = tally.flow(*e, Truth::Raw, Group::Labelled, motion, Weight::Column);
+                let errors =
+                    tally.flow(*e, Truth::Raw, ClassGroup::Labelled, motion, Weight::Column);
                 Series { name: e.label().into(), ..cdf("", &errors, CDF_M, Style::Line) }
             })
             .collect();
         (motion.label().to_string(), Plot::Lines(lines))
     };
     let caption = "Raw flow of all labelled columns beside estimates that need no LIDAR.";
-    let parts = [Motion::Moving, Motion::Parked].map(part);
+    let parts = [MotionGroup::Moving, MotionGroup::Parked].map(part);
     Chart::small_multiples("figure-references", caption, parts.into())
 }
 
 /// Figure 3.9: errors of tracklets by age, by class: what moves, and all that is parked.
 pub fn tracklets(tally: &Tally) -> Chart {
-    let part = |(group, motion): (Group, Motion)| {
+    let part = |(group, motion): (ClassGroup, MotionGroup)| {
         let mut lines = Lines::new(
             Axis::new("error, m/s").range(0.0, CDF_MPS),
             Axis::new("share of columns").range(0.0, 1.0),
@@ -146,9 +147,9 @@ pub fn tracklets(tally: &Tally) -> Chart {
         lines.series.push(series(format!("{SETTLED} and more"), &settled));
         (title(group, motion), Plot::Lines(lines))
     };
-    let moving = groups(tally).into_iter().map(|g| (g, Motion::Moving));
-    let parts = moving.chain([(Group::Labelled, Motion::Parked)]);
-    let parts = parts.filter(|(g, m)| *g != Group::Class(0) && tally.coverage(*g, *m)[0] > 0);
+    let moving = groups(tally).into_iter().map(|g| (g, MotionGroup::Moving));
+    let parts = moving.chain([(ClassGroup::Labelled, MotionGroup::Parked)]);
+    let parts = parts.filter(|(g, m)| *g != ClassGroup::Class(0) && tally.coverage(*g, *m)[0] > 0);
     let caption = "As figure 3.9 of the dissertation: errors of the velocity of tracklets after \
         exactly so many observations, or so many and more. Age 0 has flow whose tracklet the gate \
         ended too.";
@@ -161,8 +162,8 @@ pub fn settled(tally: &Tally) -> Chart {
         Axis::new("error, m/s").range(0.0, CDF_MPS),
         Axis::new("share of columns").range(0.0, 1.0),
     );
-    for motion in [Motion::Moving, Motion::Parked] {
-        let errors = tally.settled(Group::Labelled, motion, Weight::Column);
+    for motion in [MotionGroup::Moving, MotionGroup::Parked] {
+        let errors = tally.settled(ClassGroup::Labelled, motion, Weight::Column);
         lines.series.push(cdf(motion.label(), &errors, CDF_MPS, Style::Line));
     }
     lines.guides.push(Guide::Y(0.5, "median".into()));

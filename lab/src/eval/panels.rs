@@ -1,7 +1,7 @@
 //! Pictures of a drive: its best and worst sweeps, and motion over ground beside motion as the
 //! vehicle sees it (figures 3.10 to 3.12).
 
-use super::collect::Seen;
+use super::collect::PairData;
 use super::facts;
 use super::objects::Present;
 use super::row::Row;
@@ -32,7 +32,7 @@ struct Candidate {
     merit: f32,
     /// Mean error of the raw flow of labelled columns, m.
     mean_m: f32,
-    seen: Seen,
+    seen: PairData,
     rows: Vec<Row>,
     outlines: Vec<Outline>,
 }
@@ -46,7 +46,7 @@ pub struct Panels([Option<Candidate>; PICTURES.len()]);
 
 impl Panels {
     /// Considers a sweep.
-    pub fn consider(&mut self, seen: &Seen, rows: &[Row], present: &[Present]) {
+    pub fn consider(&mut self, seen: &PairData, rows: &[Row], present: &[Present]) {
         let labelled = || rows.iter().filter(|r| r.in_view && r.class > 0);
         let count = labelled().count();
         if count < LABELLED {

@@ -1,6 +1,6 @@
 //! Today's metrics on the flow of every return, for drives with labelled boxes or exact truth.
 
-use super::collect::Seen;
+use super::collect::PairData;
 use super::objects::Present;
 use crate::labels::{View, kind};
 use crate::metrics::{
@@ -69,7 +69,7 @@ impl Points {
     /// Fails where the graders would.
     pub fn pair(
         &mut self,
-        seen: &Seen,
+        seen: &PairData,
         present: &[Present],
         exact: Option<&[PointTruth]>,
     ) -> Result<(), Error> {
@@ -98,7 +98,7 @@ impl Points {
     }
 
     /// By the box around it: what is in none stands.
-    fn boxed(&self, position_m: [f32; 3], seen: &Seen, present: &[Present]) -> TruePoint {
+    fn boxed(&self, position_m: [f32; 3], seen: &PairData, present: &[Present]) -> TruePoint {
         let at = DVec3::from_array(position_m.map(f64::from));
         let mut point = TruePoint {
             position_m,
@@ -129,7 +129,7 @@ impl Points {
 }
 
 /// By the simulator.
-fn simulated(seen: &Seen, returns: &[PointTruth]) -> Vec<TruePoint> {
+fn simulated(seen: &PairData, returns: &[PointTruth]) -> Vec<TruePoint> {
     // Flow over one period; pairs may lie a little closer or farther apart.
     let span = (seen.dt_s / PERIOD_S) as f32;
     let point = |(p, t): (&Point, &PointTruth)| TruePoint {

@@ -3,10 +3,10 @@
 use super::facts::Facts;
 use super::points::{ESTIMATES, PointScores};
 use super::statistics::{Sorted, Weight};
-use super::tally::{Estimate, Group, Motion, Tally, Truth};
+use super::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
 use crate::curve::{Curve, Operating};
-use crate::metrics::{Class, Motion as PointMotion, Range};
-use crate::report::{Cell, Row, Table};
+use crate::metrics::{Class, PointMotion, Range};
+use crate::report::{Cell, Table, TableRow};
 use raywake::order_statistics::Spread;
 use raywake::statistics::BUDGET_MS;
 
@@ -18,13 +18,19 @@ pub const RECALL: f64 = 0.95;
 /// Columns of tables of displacements.
 const FLOW: [&str; 4] = ["Count", "Median, cm", "Mean, cm", "Within 30 cm, %"];
 
-fn table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>) -> Table {
+fn table(id: &str, caption: &str, columns: &[&str], rows: Vec<TableRow>) -> Table {
     let columns = columns.iter().map(|c| (*c).to_string()).collect();
     Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
 }
 
 /// A table with a note below it.
-pub fn noted_table(id: &str, caption: &str, columns: &[&str], rows: Vec<Row>, note: &str) -> Table {
+pub fn noted_table(
+    id: &str,
+    caption: &str,
+    columns: &[&str],
+    rows: Vec<TableRow>,
+    note: &str,
+) -> Table {
     Table { notes: vec![note.into()], ..table(id, caption, columns, rows) }
 }
 
@@ -38,20 +44,20 @@ fn flow_cells(errors: &Sorted) -> [Cell; 4] {
     ]
 }
 
-fn row(head: [&str; 2], cells: impl IntoIterator<Item = Cell>) -> Row {
-    Row::new(head.map(Cell::from).into_iter().chain(cells))
+fn row(head: [&str; 2], cells: impl IntoIterator<Item = Cell>) -> TableRow {
+    TableRow::new(head.map(Cell::from).into_iter().chain(cells))
 }
 
 /// Figures of the dissertation: a count, then numbers with as many decimals as it has.
-fn published(group: Group, count: u64, numbers: &[(f64, usize)], empty: usize) -> Row {
+fn published(group: ClassGroup, count: u64, numbers: &[(f64, usize)], empty: usize) -> TableRow {
     let head = [group.label(), "dissertation"].map(Cell::from).into_iter();
     let numbers = numbers.iter().map(|&(v, digits)| Cell::Number(v, digits));
     let rest = std::iter::repeat_n(Cell::Empty, empty);
-    Row::reference(head.chain([Cell::Count(count)]).chain(numbers).chain(rest))
+    TableRow::reference(head.chain([Cell::Count(count)]).chain(numbers).chain(rest))
 }
 
 /// The dissertation's row of table 3.1: voxels counted, moving and parked together.
-fn published_flow(group: Group) -> Option<Row> {
+fn published_flow(group: ClassGroup) -> Option<TableRow> {
     let (count, numbers) = match group.label() {
         "Car" => (873_947, [10.2, 19.3, 83.8]),
         "Cyclist" => (9_890, [13.2, 24.5, 78.8]),
@@ -66,9 +72,9 @@ fn published_flow(group: Group) -> Option<Row> {
 /// Table 3.1: raw flow by class, moving and parked apart.
 pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
     let mut rows = Vec::new();
-    for group in Group::labelled().chain([Group::Class(0)]) {
-        let all = [Motion::Any].iter().filter(|_| group != Group::Class(0));
-        for motion in all.chain(Motion::of(group)) {
+    for group in ClassGroup::labelled().chain([ClassGroup::Class(0)]) {
+        let all = [MotionGroup::Any].iter().filter(|_| group != ClassGroup::Class(0));
+        for motion in all.chain(MotionGroup::of(group)) {
             let errors = tally.flow(Estimate::Ours, Truth::Raw, group, *motion, weight);
             if errors.count() > 0 {
                 rows.push(row([group.label(), motion.label()], flow_cells(&errors)));
@@ -85,24 +91,24 @@ pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
     let caption = format!(
         "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps, by {of}."
     );
-    table(id, &caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
+    table(id, &caption, &[&["Class", "MotionGroup"], &FLOW[..]].concat(), rows)
 }
 
 /// Every estimate beside every other, all labelled columns.
 pub fn references(tally: &Tally, truth: Truth) -> Table {
     let mut rows = Vec::new();
-    for motion in Motion::ALL {
+    for motion in MotionGroup::ALL {
         for estimate in Estimate::ALL {
-            let errors = tally.flow(estimate, truth, Group::Labelled, motion, Weight::Column);
+            let errors = tally.flow(estimate, truth, ClassGroup::Labelled, motion, Weight::Column);
             if errors.count() == 0 {
                 continue;
             }
             let head = [motion.label(), estimate.label()].map(Cell::from);
             let cells = head.into_iter().chain(flow_cells(&errors));
             rows.push(if estimate.is_reference() {
-                Row::reference(cells)
+                TableRow::reference(cells)
             } else {
-                Row::new(cells)
+                TableRow::new(cells)
             });
         }
     }
@@ -113,14 +119,14 @@ pub fn references(tally: &Tally, truth: Truth) -> Table {
     let caption = format!(
         "Raw flow of all labelled columns beside estimates that need no LIDAR; truth: {what}."
     );
-    table(id, &caption, &[&["Motion", "Estimate"], &FLOW[..]].concat(), rows)
+    table(id, &caption, &[&["MotionGroup", "Estimate"], &FLOW[..]].concat(), rows)
 }
 
 /// Table 3.2: settled tracklets.
 pub fn tracklets(tally: &Tally) -> Table {
     let mut rows = Vec::new();
-    for group in Group::labelled() {
-        for motion in Motion::ALL {
+    for group in ClassGroup::labelled() {
+        for motion in MotionGroup::ALL {
             let [all, covered] = tally.coverage(group, motion);
             if all == 0 {
                 continue;
@@ -141,7 +147,7 @@ pub fn tracklets(tally: &Tally) -> Table {
     }
     let columns = [
         "Class",
-        "Motion",
+        "MotionGroup",
         "Count",
         "Median, m/s",
         "Mean, m/s",
@@ -155,7 +161,7 @@ pub fn tracklets(tally: &Tally) -> Table {
     table("table-3-2", caption, &columns, rows)
 }
 
-fn published_tracklets(group: Group) -> Option<Row> {
+fn published_tracklets(group: ClassGroup) -> Option<TableRow> {
     let (count, median, mean) = match group.label() {
         "Car" => (216_026, 0.49, 0.65),
         "Cyclist" => (1_507, 1.01, 1.09),
@@ -173,13 +179,15 @@ fn published_tracklets(group: Group) -> Option<Row> {
 pub fn filter(curve: Option<&Curve>) -> Table {
     let row = |name: &str, p: Option<Operating>| {
         let values = p.map_or([f64::NAN; 3], |p| [p.recall, p.background_accuracy, p.precision]);
-        Row::new([Cell::from(name)].into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))))
+        TableRow::new(
+            [Cell::from(name)].into_iter().chain(values.map(|v| Cell::Number(100.0 * v, 1))),
+        )
     };
     let dissertation = ["dissertation".into(), Cell::Number(95.0, 1), Cell::Number(74.5, 1)];
     let rows = vec![
         row("threshold of the weights", curve.map(|c| c.above(0.0))),
         row("at 95 % recall", curve.map(|c| c.at_recall(RECALL))),
-        Row::reference(dissertation.into_iter().chain([Cell::Empty])),
+        TableRow::reference(dissertation.into_iter().chain([Cell::Empty])),
     ];
     let columns = ["Operating point", "Recall, %", "Background accuracy, %", "Precision, %"];
     let caption = "Background filter over solid columns in view. Foreground is what lies in a \
@@ -211,17 +219,17 @@ pub fn stages(drives: &[Facts]) -> Vec<(String, Vec<f64>)> {
 /// Table 3.3: time per stage.
 pub fn times(drives: &[Facts]) -> Table {
     let stages = stages(drives);
-    let mut rows: Vec<Row> = stages
+    let mut rows: Vec<TableRow> = stages
         .iter()
         .filter_map(|(name, ms)| {
             let s = Spread::of(ms)?;
             let cells = [s.mean, s.sd, s.median, s.p99].map(|v| Cell::Number(v, 2));
-            Some(Row::new([Cell::from(name.as_str())].into_iter().chain(cells)))
+            Some(TableRow::new([Cell::from(name.as_str())].into_iter().chain(cells)))
         })
         .collect();
     let published = ["dissertation, GTX 1080, total".into(), Cell::Number(85.7, 1)];
     let published = published.into_iter().chain([Cell::Number(6.38, 2), Cell::Empty, Cell::Empty]);
-    rows.push(Row::reference(published));
+    rows.push(TableRow::reference(published));
     let totals: Vec<f64> = drives.iter().flat_map(|d| &d.totals).copied().collect();
     let within = totals.iter().filter(|t| **t < BUDGET_MS).count();
     let share = 100.0 * within as f64 / totals.len().max(1) as f64;
@@ -243,9 +251,9 @@ pub fn scores(drives: &[Facts]) -> [PointScores; 3] {
     sums
 }
 
-fn estimate_row(n: usize, cells: impl IntoIterator<Item = Cell>) -> Row {
+fn estimate_row(n: usize, cells: impl IntoIterator<Item = Cell>) -> TableRow {
     let cells = [Cell::from(ESTIMATES[n])].into_iter().chain(cells);
-    if n == 0 { Row::new(cells) } else { Row::reference(cells) }
+    if n == 0 { TableRow::new(cells) } else { TableRow::reference(cells) }
 }
 
 /// Bucket-normalised and three-way error of single returns (Argoverse 2).

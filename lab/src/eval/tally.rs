@@ -66,7 +66,7 @@ pub enum Truth {
 
 /// What labelled objects do over ground; see [`crate::labels::Motion`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Motion {
+pub enum MotionGroup {
     /// Whatever.
     Any,
     /// Moving.
@@ -77,62 +77,63 @@ pub enum Motion {
     Parked,
 }
 
-impl Motion {
+impl MotionGroup {
     /// All of them.
-    pub const ALL: [Motion; 4] = [Motion::Any, Motion::Moving, Motion::Slow, Motion::Parked];
+    pub const ALL: [MotionGroup; 4] =
+        [MotionGroup::Any, MotionGroup::Moving, MotionGroup::Slow, MotionGroup::Parked];
 
     /// Those told apart for a group: only what is labelled has any.
-    pub fn of(group: Group) -> &'static [Motion] {
-        if group == Group::Class(0) { &[Motion::Any] } else { &Motion::ALL[1..] }
+    pub fn of(group: ClassGroup) -> &'static [MotionGroup] {
+        if group == ClassGroup::Class(0) { &[MotionGroup::Any] } else { &MotionGroup::ALL[1..] }
     }
 
     /// For people.
     pub fn label(self) -> &'static str {
         match self {
-            Motion::Any => "all",
-            Motion::Moving => "moving",
-            Motion::Slow => "slow",
-            Motion::Parked => "parked",
+            MotionGroup::Any => "all",
+            MotionGroup::Moving => "moving",
+            MotionGroup::Slow => "slow",
+            MotionGroup::Parked => "parked",
         }
     }
 
     fn holds(self, motion: usize) -> bool {
         match self {
-            Motion::Any => true,
-            Motion::Moving => motion == 2,
-            Motion::Slow => motion == 1,
-            Motion::Parked => motion == 0,
+            MotionGroup::Any => true,
+            MotionGroup::Moving => motion == 2,
+            MotionGroup::Slow => motion == 1,
+            MotionGroup::Parked => motion == 0,
         }
     }
 }
 
 /// A set of classes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Group {
+pub enum ClassGroup {
     /// One of [`CLASSES`].
     Class(u8),
     /// Everything in a labelled box.
     Labelled,
 }
 
-impl Group {
+impl ClassGroup {
     /// For people.
     pub fn label(self) -> &'static str {
         match self {
-            Group::Class(class) => CLASSES[class as usize],
-            Group::Labelled => "All labelled",
+            ClassGroup::Class(class) => CLASSES[class as usize],
+            ClassGroup::Labelled => "All labelled",
         }
     }
 
     /// Classes of labelled objects and all of them together.
-    pub fn labelled() -> impl Iterator<Item = Group> {
-        (1..CLASSES.len() as u8).map(Group::Class).chain([Group::Labelled])
+    pub fn labelled() -> impl Iterator<Item = ClassGroup> {
+        (1..CLASSES.len() as u8).map(ClassGroup::Class).chain([ClassGroup::Labelled])
     }
 
     fn holds(self, class: usize) -> bool {
         match self {
-            Group::Class(c) => usize::from(c) == class,
-            Group::Labelled => class > 0,
+            ClassGroup::Class(c) => usize::from(c) == class,
+            ClassGroup::Labelled => class > 0,
         }
     }
 }
@@ -236,8 +237,8 @@ impl Tally {
         &self,
         estimate: Estimate,
         truth: Truth,
-        group: Group,
-        motion: Motion,
+        group: ClassGroup,
+        motion: MotionGroup,
         weight: Weight,
     ) -> Sorted {
         let by = if truth == Truth::Raw { &self.raw } else { &self.smooth };
@@ -246,23 +247,23 @@ impl Tally {
     }
 
     /// Errors of the velocity of settled tracklets against smoothed labels, m/s.
-    pub fn settled(&self, group: Group, motion: Motion, weight: Weight) -> Sorted {
+    pub fn settled(&self, group: ClassGroup, motion: MotionGroup, weight: Weight) -> Sorted {
         gather(&self.settled.smooth, group, motion).sorted(weight)
     }
 
     /// The same against labels as they are, and their own distance from the smoothed ones.
-    pub fn settled_raw(&self, group: Group, motion: Motion) -> [Sorted; 2] {
+    pub fn settled_raw(&self, group: ClassGroup, motion: MotionGroup) -> [Sorted; 2] {
         [&self.settled.raw, &self.settled.floor]
             .map(|cells| gather(cells, group, motion).sorted(Weight::Column))
     }
 
     /// Errors of the velocity of tracklets of one age of [`Self::AGES`], m/s.
-    pub fn at_age(&self, age: usize, group: Group, motion: Motion) -> Sorted {
+    pub fn at_age(&self, age: usize, group: ClassGroup, motion: MotionGroup) -> Sorted {
         gather(&self.by_age[age].1, group, motion).sorted(Weight::Column)
     }
 
     /// Solid columns in view, and how many of them have a settled tracklet.
-    pub fn coverage(&self, group: Group, motion: Motion) -> [u64; 2] {
+    pub fn coverage(&self, group: ClassGroup, motion: MotionGroup) -> [u64; 2] {
         [&self.columns, &self.covered].map(|counts| {
             let chosen = cells(group, motion);
             chosen.map(|(class, motion)| counts[class][motion]).sum()
@@ -271,12 +272,12 @@ impl Tally {
 }
 
 /// Indices of the cells that a group and a motion name.
-pub fn cells(group: Group, motion: Motion) -> impl Iterator<Item = (usize, usize)> {
+pub fn cells(group: ClassGroup, motion: MotionGroup) -> impl Iterator<Item = (usize, usize)> {
     let classes = (0..COUNT).filter(move |c| group.holds(*c));
     classes.flat_map(move |c| (0..3).filter(move |m| motion.holds(*m)).map(move |m| (c, m)))
 }
 
-fn gather(of: &Cells, group: Group, motion: Motion) -> Errors {
+fn gather(of: &Cells, group: ClassGroup, motion: MotionGroup) -> Errors {
     let mut all = Errors::default();
     cells(group, motion).for_each(|(class, motion)| all.extend(&of[class][motion]));
     all
@@ -314,18 +315,29 @@ mod tests {
         tally.row(&Row { in_view: false, ..row(1, 2, 9.0, 0.0) });
         let flow = |e, g, m| tally.flow(e, Truth::Raw, g, m, Weight::Column);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
-        assert!(near(flow(Estimate::Ours, Group::Class(1), Motion::Moving).mean(), 0.1));
-        assert!(near(flow(Estimate::Ours, Group::Labelled, Motion::Any).mean(), 0.52 / 3.0));
-        assert!(near(flow(Estimate::Zero, Group::Labelled, Motion::Moving).mean(), 1.45));
-        assert!(near(flow(Estimate::Ours, Group::Class(0), Motion::Any).mean(), 0.3));
-        assert_eq!(flow(Estimate::Matched, Group::Labelled, Motion::Any).count(), 2);
-        let voxels =
-            tally.flow(Estimate::Ours, Truth::Raw, Group::Labelled, Motion::Any, Weight::Voxel);
+        assert!(near(flow(Estimate::Ours, ClassGroup::Class(1), MotionGroup::Moving).mean(), 0.1));
+        assert!(near(
+            flow(Estimate::Ours, ClassGroup::Labelled, MotionGroup::Any).mean(),
+            0.52 / 3.0
+        ));
+        assert!(near(flow(Estimate::Zero, ClassGroup::Labelled, MotionGroup::Moving).mean(), 1.45));
+        assert!(near(flow(Estimate::Ours, ClassGroup::Class(0), MotionGroup::Any).mean(), 0.3));
+        assert_eq!(flow(Estimate::Matched, ClassGroup::Labelled, MotionGroup::Any).count(), 2);
+        let voxels = tally.flow(
+            Estimate::Ours,
+            Truth::Raw,
+            ClassGroup::Labelled,
+            MotionGroup::Any,
+            Weight::Voxel,
+        );
         assert_eq!(voxels.count(), 9);
-        assert_eq!(tally.coverage(Group::Labelled, Motion::Moving), [2, 1]);
-        assert!(near(tally.settled(Group::Labelled, Motion::Moving, Weight::Column).mean(), 1.0));
-        assert!(near(tally.settled_raw(Group::Labelled, Motion::Any)[1].mean(), 0.0));
-        assert_eq!(tally.at_age(3, Group::Labelled, Motion::Any).count(), 2);
+        assert_eq!(tally.coverage(ClassGroup::Labelled, MotionGroup::Moving), [2, 1]);
+        assert!(near(
+            tally.settled(ClassGroup::Labelled, MotionGroup::Moving, Weight::Column).mean(),
+            1.0
+        ));
+        assert!(near(tally.settled_raw(ClassGroup::Labelled, MotionGroup::Any)[1].mean(), 0.0));
+        assert_eq!(tally.at_age(3, ClassGroup::Labelled, MotionGroup::Any).count(), 2);
         assert_eq!(tally.out_of_view, 1);
         assert_eq!(tally.filter().unwrap().auc(), 0.5);
     }

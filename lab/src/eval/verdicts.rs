@@ -4,7 +4,7 @@ use super::calibration::truth;
 use super::row::Row;
 use super::statistics::{Errors, Weight};
 use super::tables::noted_table;
-use super::tally::{COUNT, Group, Motion, cells};
+use super::tally::{COUNT, ClassGroup, MotionGroup, cells};
 use crate::labels::trajectory::MOVING_MPS;
 use crate::report::{self, Cell, Table};
 
@@ -43,7 +43,7 @@ impl Verdicts {
         speeds.moving += u64::from(moving);
     }
 
-    fn of(&self, exact: bool, group: Group, motion: Motion) -> Speeds {
+    fn of(&self, exact: bool, group: ClassGroup, motion: MotionGroup) -> Speeds {
         let mut all = Speeds::default();
         for (class, motion) in cells(group, motion) {
             let speeds = &self.0[usize::from(exact)][class][motion];
@@ -57,8 +57,9 @@ impl Verdicts {
 
     /// What was put out, by what is true.
     pub fn table(&self) -> Table {
-        let sets = [Motion::Moving, Motion::Slow, Motion::Parked].map(|m| (Group::Labelled, m));
-        let sets = sets.into_iter().chain([(Group::Class(0), Motion::Any)]);
+        let sets = [MotionGroup::Moving, MotionGroup::Slow, MotionGroup::Parked]
+            .map(|m| (ClassGroup::Labelled, m));
+        let sets = sets.into_iter().chain([(ClassGroup::Class(0), MotionGroup::Any)]);
         let mut rows = Vec::new();
         for exact in [true, false] {
             for (group, motion) in sets.clone() {
@@ -70,7 +71,7 @@ impl Verdicts {
                     continue;
                 }
                 let fast = 1.0 - flow.share_below(MOVING_MPS);
-                rows.push(report::Row::new([
+                rows.push(report::TableRow::new([
                     truth(exact).into(),
                     group.label().into(),
                     motion.label().into(),
@@ -86,7 +87,7 @@ impl Verdicts {
         let columns = [
             "Truth",
             "Columns",
-            "Motion",
+            "MotionGroup",
             "Count",
             "Put out as moving, %",
             "By flow alone, %",
@@ -137,9 +138,9 @@ mod tests {
             let flow = speeds.flow.sorted(Weight::Column);
             (speeds.moving, flow.count(), flow.share_below(MOVING_MPS))
         };
-        assert_eq!(of(Group::Labelled, Motion::Moving), (1, 2, 0.5));
-        assert_eq!(of(Group::Labelled, Motion::Parked), (0, 2, 0.5));
-        assert_eq!(of(Group::Class(0), Motion::Any), (1, 1, 0.0));
+        assert_eq!(of(ClassGroup::Labelled, MotionGroup::Moving), (1, 2, 0.5));
+        assert_eq!(of(ClassGroup::Labelled, MotionGroup::Parked), (0, 2, 0.5));
+        assert_eq!(of(ClassGroup::Class(0), MotionGroup::Any), (1, 1, 0.0));
         // Moving, parked and background: nothing is slow, nothing of smoothed labels.
         assert_eq!(verdicts.table().rows.len(), 3);
     }

@@ -1,7 +1,7 @@
 //! `boxes.csv`: `frame,track_id,class,x,y,z,l,w,h,yaw,...`, a header and a box a line; the centre in
 //! the vehicle frame, metres, yaw about +z in radians.
 
-use super::gather::{Gather, Row, heading};
+use super::gather::{Gather, LabelRow, heading};
 use super::{Error, Labels, View};
 use glam::DVec3;
 use raywake_io::source::text;
@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path) -> Result<Labels, Error> {
     Ok(labels)
 }
 
-fn row<'a>(fields: &[&'a str]) -> Result<Row<'a>, String> {
+fn row<'a>(fields: &[&'a str]) -> Result<LabelRow<'a>, String> {
     if fields.len() < COLUMNS.len() {
         return Err(format!("{} fields, {} expected", fields.len(), COLUMNS.len()));
     }
@@ -48,7 +48,7 @@ fn row<'a>(fields: &[&'a str]) -> Result<Row<'a>, String> {
         let bad = |_| format!("`{}` is no {}", fields[n], COLUMNS[n]);
         fields[n].parse::<f64>().map_err(bad)
     };
-    Ok(Row {
+    Ok(LabelRow {
         id: fields[1],
         class: fields[2],
         frame: fields[0].parse().map_err(|_| format!("`{}` is no frame", fields[0]))?,

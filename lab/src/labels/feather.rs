@@ -1,7 +1,7 @@
 //! Labels in feather files: Argoverse 2's `annotations.feather`, and `truth/objects.feather` of
 //! simulated drives.
 
-use super::gather::{Gather, Row};
+use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::DQuat;
 use raywake_io::source::feather::FeatherTable;
@@ -71,7 +71,7 @@ fn read(
             continue;
         };
         let three = |columns: &[Vec<f64>]| [0, 1, 2].map(|i| columns[i][row]);
-        gather.add(&Row {
+        gather.add(&LabelRow {
             id: &ids[row],
             class: &classes[row],
             frame,

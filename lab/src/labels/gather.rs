@@ -7,7 +7,7 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
 /// One box as a file has it, not yet looked at.
-pub(super) struct Row<'a> {
+pub(super) struct LabelRow<'a> {
     pub id: &'a str,
     pub class: &'a str,
     pub frame: u64,
@@ -39,7 +39,7 @@ const SIZE_TOLERANCE: f64 = 0.01;
 
 impl Gather {
     /// Takes a box, or counts why it cannot be one.
-    pub fn add(&mut self, row: &Row) {
+    pub fn add(&mut self, row: &LabelRow) {
         match usable(row) {
             Ok(pose) => self.place(row, pose),
             Err(why) => self.leave_out(why),
@@ -51,7 +51,7 @@ impl Gather {
         *self.left_out.entry(why).or_default() += 1;
     }
 
-    fn place(&mut self, row: &Row, pose: Pose) {
+    fn place(&mut self, row: &LabelRow, pose: Pose) {
         let index = match self.by_id.get(row.id) {
             Some(&index) => index,
             None => self.start(row),
@@ -76,7 +76,7 @@ impl Gather {
     }
 
     /// A new track; returns its index.
-    fn start(&mut self, row: &Row) -> usize {
+    fn start(&mut self, row: &LabelRow) -> usize {
         let kind = kind(row.class).unwrap_or_else(|| {
             *self.unknown.entry(row.class.into()).or_default() += 1;
             Kind::Other
@@ -100,7 +100,7 @@ impl Gather {
 }
 
 /// The pose of a row that makes sense.
-fn usable(row: &Row) -> Result<Pose, &'static str> {
+fn usable(row: &LabelRow) -> Result<Pose, &'static str> {
     let whole = |v: &[f64]| v.iter().all(|v| v.is_finite());
     if !whole(&row.centre) || !whole(&row.size) || !row.rotation.is_finite() {
         return Err("boxes left out: a NaN or infinite number");
@@ -118,9 +118,9 @@ fn usable(row: &Row) -> Result<Pose, &'static str> {
 mod tests {
     use super::*;
 
-    fn row(id: &str, frame: u64) -> Row<'_> {
+    fn row(id: &str, frame: u64) -> LabelRow<'_> {
         let (size, centre) = ([4.0, 2.0, 1.5], [1.0, 2.0, 3.0]);
-        Row { id, class: "Car", frame, size, centre, rotation: heading(0.3) }
+        LabelRow { id, class: "Car", frame, size, centre, rotation: heading(0.3) }
     }
 
     #[test]
@@ -140,14 +140,14 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_counted() {
         let mut g = Gather::default();
-        g.add(&Row { centre: [f64::NAN, 0.0, 0.0], ..row("a", 1) });
-        g.add(&Row { rotation: heading(f64::INFINITY), ..row("a", 1) });
-        g.add(&Row { size: [4.0, 0.0, 1.0], ..row("a", 1) });
-        g.add(&Row { rotation: heading(0.0) * 2.0, ..row("a", 1) });
-        g.add(&Row { class: "Zeppelin", ..row("z", 1) });
+        g.add(&LabelRow { centre: [f64::NAN, 0.0, 0.0], ..row("a", 1) });
+        g.add(&LabelRow { rotation: heading(f64::INFINITY), ..row("a", 1) });
+        g.add(&LabelRow { size: [4.0, 0.0, 1.0], ..row("a", 1) });
+        g.add(&LabelRow { rotation: heading(0.0) * 2.0, ..row("a", 1) });
+        g.add(&LabelRow { class: "Zeppelin", ..row("z", 1) });
         g.add(&row("z", 1));
         g.add(&row("z", 2));
-        g.add(&Row { class: "Zeppelin", size: [5.0, 2.0, 1.5], ..row("z", 3) });
+        g.add(&LabelRow { class: "Zeppelin", size: [5.0, 2.0, 1.5], ..row("z", 3) });
         let labels = g.finish(View::All);
         assert_eq!((labels.tracks.len(), labels.tracks[0].boxes.len()), (1, 3));
         assert_eq!(labels.tracks[0].kind, Kind::Other);

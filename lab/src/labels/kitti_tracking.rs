@@ -4,7 +4,7 @@
 //! image, height, width, length, x, y, z of the middle of its bottom and `rotation_y`, both in the
 //! rectified camera (x right, y down, z forward).
 
-use super::gather::{Gather, Row};
+use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, calib: &Path) -> Result<Labels, Error> {
         }
         let [height, width, length, ..] = numbers;
         let pose = velodyne_from_camera * camera_from_box(&numbers);
-        gather.add(&Row {
+        gather.add(&LabelRow {
             id: fields[1],
             class: fields[2],
             frame,

@@ -4,7 +4,7 @@
 //! item for every frame from that one on. A pose is that of the middle of the box's bottom in the
 //! Velodyne's frame (Geiger et al. 2013).
 
-use super::gather::{Gather, Row};
+use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::{DQuat, DVec3};
 use raywake_io::source::text;
@@ -56,7 +56,7 @@ impl<'a> File<'a> {
             let bottom = DVec3::new(number("tx")?, number("ty")?, number("tz")?);
             let centre = (bottom + rotation * DVec3::new(0.0, 0.0, 0.5 * size[2])).to_array();
             let frame = u64::from(first) + n as u64;
-            gather.add(&Row { id, class, frame, size, centre, rotation });
+            gather.add(&LabelRow { id, class, frame, size, centre, rotation });
         }
         Ok(())
     }

@@ -29,7 +29,7 @@ const PAIR_S: f64 = 0.1;
 
 /// Whether things truly move over ground ([`Scored::moving`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum PointMotion {
     /// At least [`super::MOVING_M`].
     Moving,
     /// Less: parked where they are objects.
@@ -111,14 +111,14 @@ impl AccuracyTable {
     }
 
     /// Over the categories that `of` names.
-    pub fn accuracy(&self, of: impl Fn(Category) -> bool, motion: Motion) -> Accuracy {
+    pub fn accuracy(&self, of: impl Fn(Category) -> bool, motion: PointMotion) -> Accuracy {
         let mut sums = Sums::default();
         for category in Category::all().filter(|&c| of(c)) {
             let [standing, moving] = self.cells[category.index()];
-            if motion != Motion::Moving {
+            if motion != PointMotion::Moving {
                 sums += standing;
             }
-            if motion != Motion::Standing {
+            if motion != PointMotion::Standing {
                 sums += moving;
             }
         }

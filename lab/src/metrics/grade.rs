@@ -1,9 +1,8 @@
 //! `raywake-lab grade`: the official figures of estimates on an Argoverse 2 log.
 
 use super::argoverse::{Log, read_estimate};
-use super::{
-    AccuracyTable, BucketedEpe, Pair, Range, Rules, ScoreError, ThreeWayEpe, print, reference,
-};
+use super::grades::Grades;
+use super::{Pair, Range, Rules, ScoreError, print, reference};
 use raywake_io::Error;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -33,49 +32,8 @@ pub struct Args {
     every: NonZeroUsize,
 }
 
-/// The metrics of one estimate.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Grades {
-    /// Bucket-normalised error.
-    pub bucketed: BucketedEpe,
-    /// Three-way error.
-    pub three_way: ThreeWayEpe,
-    /// Accuracies and outliers, without the vehicle's motion.
-    pub over_ground: AccuracyTable,
-    /// The same with it.
-    pub with_ego_motion: AccuracyTable,
-}
-
-impl Grades {
-    /// Counts a pair.
-    pub fn add(
-        &mut self,
-        pair: &Pair,
-        estimate_m: &[[f32; 3]],
-        rules: &Rules,
-    ) -> Result<(), ScoreError> {
-        let mut points = pair.score(estimate_m, rules)?;
-        self.bucketed.add(&points);
-        self.three_way.add(&points);
-        self.over_ground.add(&points);
-        for point in &mut points {
-            *point = point.with_ego_motion(&pair.second_from_first);
-        }
-        self.with_ego_motion.add(&points);
-        Ok(())
-    }
-
-    /// Adds what was counted elsewhere.
-    pub fn merge(&mut self, other: &Grades) {
-        self.bucketed.merge(&other.bucketed);
-        self.three_way.merge(&other.three_way);
-        self.over_ground.merge(&other.over_ground);
-        self.with_ego_motion.merge(&other.with_ego_motion);
-    }
-}
-
 /// An estimate under way, or what there is to compare it with.
-struct Row {
+struct Graded {
     name: String,
     from: From,
     grades: Grades,
@@ -101,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let mut rows = references();
     for folder in &args.estimate {
         let files = From::Files(log.estimates(folder)?);
-        rows.push(Row::new(&folder.display().to_string(), files));
+        rows.push(Graded::new(&folder.display().to_string(), files));
     }
     let pairs: Vec<(usize, PathBuf)> = log
         .pairs()
@@ -132,18 +90,18 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn references() -> Vec<Row> {
+fn references() -> Vec<Graded> {
     let rows: [(&str, Reference); 3] = [
         ("reference: zero flow, the vehicle's motion known", reference::standing),
         ("reference: zero flow, the vehicle's motion unknown", reference::carried),
         ("reference: truth rounded to 0.30 m", |pair| reference::rounded(pair, CELL_M)),
     ];
-    rows.map(|(name, estimate)| Row::new(name, From::Reference(estimate))).into()
+    rows.map(|(name, estimate)| Graded::new(name, From::Reference(estimate))).into()
 }
 
-impl Row {
-    fn new(name: &str, from: From) -> Row {
-        Row { name: name.into(), from, grades: Grades::default(), unvouched: 0 }
+impl Graded {
+    fn new(name: &str, from: From) -> Graded {
+        Graded { name: name.into(), from, grades: Grades::default(), unvouched: 0 }
     }
 
     /// Counts a pair, whose truth is from the file `truth`.

@@ -18,6 +18,7 @@ pub mod argoverse;
 mod bucketed;
 mod category;
 pub mod grade;
+mod grades;
 mod ground;
 mod npy;
 mod pair;
@@ -29,7 +30,7 @@ mod three_way;
 #[cfg(test)]
 mod tests;
 
-pub use accuracy::{Accuracy, AccuracyTable, Motion};
+pub use accuracy::{Accuracy, AccuracyTable, PointMotion};
 pub use bucketed::{BucketedEpe, BucketedErrors, ClassError};
 pub use category::{Category, Class};
 pub use pair::{MOVING_M, NEAR_M, Pair, Rules, ScoreError, Scored, TruePoint};

@@ -1,7 +1,7 @@
 //! The figures as text.
 
-use super::grade::Grades;
-use super::{Accuracy, AccuracyTable, Bucket, BucketedErrors, Category, Class, Motion, Range};
+use super::grades::Grades;
+use super::{Accuracy, AccuracyTable, Bucket, BucketedErrors, Category, Class, PointMotion, Range};
 
 /// Writes the figures of an estimate to standard output.
 pub(super) fn figures(grades: &Grades) {
@@ -50,12 +50,12 @@ fn accuracy(what: &str, table: &AccuracyTable) {
         let shares = [a.strict, a.relaxed, a.outliers].map(|v| number(100.0 * v)).concat();
         println!("    {name:<24}{:>10}{}{shares}{}", a.count, number(a.epe_m), number(a.angle_rad));
     };
-    line("all", table.accuracy(|_| true, Motion::Any));
-    line("moving", table.accuracy(|_| true, Motion::Moving));
+    line("all", table.accuracy(|_| true, PointMotion::Any));
+    line("moving", table.accuracy(|_| true, PointMotion::Moving));
     let parked = |c: Category| c.class().is_some_and(|class| class != Class::Background);
-    line("parked", table.accuracy(parked, Motion::Standing));
+    line("parked", table.accuracy(parked, PointMotion::Standing));
     for class in Class::ALL {
-        line(class.name(), table.accuracy(|c| c.class() == Some(class), Motion::Any));
+        line(class.name(), table.accuracy(|c| c.class() == Some(class), PointMotion::Any));
     }
 }
 

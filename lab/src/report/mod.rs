@@ -22,7 +22,7 @@ pub use chart::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
 pub use clouds::{Cloud, clouds};
-pub use table::{Cell, Line, Row, Shown, Table};
+pub use table::{Cell, Line, Shown, Table, TableRow};
 
 use crate::results;
 use raywake_io::Error;

@@ -17,27 +17,27 @@ pub struct Table {
     /// Names of the columns with their units.
     pub columns: Vec<String>,
     /// As many cells each as there are columns.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// Below the table.
     pub notes: Vec<String>,
 }
 
 /// A row.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct TableRow {
     cells: Vec<Cell>,
     reference: bool,
 }
 
-impl Row {
+impl TableRow {
     /// Figures of ours.
-    pub fn new(cells: impl IntoIterator<Item = Cell>) -> Row {
-        Row { cells: cells.into_iter().collect(), reference: false }
+    pub fn new(cells: impl IntoIterator<Item = Cell>) -> TableRow {
+        TableRow { cells: cells.into_iter().collect(), reference: false }
     }
 
     /// Figures of somebody else's, to compare with; they step back.
-    pub fn reference(cells: impl IntoIterator<Item = Cell>) -> Row {
-        Row { reference: true, ..Row::new(cells) }
+    pub fn reference(cells: impl IntoIterator<Item = Cell>) -> TableRow {
+        TableRow { reference: true, ..TableRow::new(cells) }
     }
 }
 
@@ -111,7 +111,7 @@ impl Table {
     }
 
     pub(super) fn csv(&self) -> String {
-        let exact = |r: &Row| r.cells.iter().map(Cell::exact).collect();
+        let exact = |r: &TableRow| r.cells.iter().map(Cell::exact).collect();
         let rows: Vec<_> =
             [self.columns.clone()].into_iter().chain(self.rows.iter().map(exact)).collect();
         encode::csv(&rows)
@@ -124,7 +124,7 @@ impl Table {
 
     /// With every cell as the text that is shown of it.
     pub fn shown(&self) -> Shown {
-        let row = |r: &Row| Line {
+        let row = |r: &TableRow| Line {
             cells: r.cells.iter().map(Cell::shown).collect(),
             reference: r.reference,
         };

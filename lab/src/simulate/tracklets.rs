@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Box of one frame.
-struct Row {
+struct ObjectRow {
     /// Bottom centre (m) and heading (rad) in the vehicle frame.
     at: DVec3,
     yaw: f64,
@@ -29,7 +29,7 @@ struct Tracklet {
     class: Class,
     size: [f64; 3],
     first_frame: usize,
-    rows: Vec<Row>,
+    rows: Vec<ObjectRow>,
 }
 
 /// The labels of a drive, frame by frame.
@@ -66,13 +66,13 @@ impl Tracklets {
         }
     }
 
-    fn row(&self, centre: Pose, size: [f64; 3], seen: bool) -> Row {
+    fn row(&self, centre: Pose, size: [f64; 3], seen: bool) -> ObjectRow {
         let half = DVec3::from_array(size) * 0.5;
         let corner = |n: usize| {
             let sign = |bit: usize| if n & bit == 0 { -1.0 } else { 1.0 };
             centre.transform(half * DVec3::new(sign(1), sign(2), sign(4)))
         };
-        Row {
+        ObjectRow {
             at: centre.translation - DVec3::new(0.0, 0.0, half.z),
             yaw: centre.yaw_rad(),
             seen,
@@ -137,7 +137,7 @@ impl Tracklet {
     }
 }
 
-impl Row {
+impl ObjectRow {
     /// Elements of a pose. State 0: unset, 2: labelled; occlusion 0: visible (or partly, which is
     /// not told apart), 2: fully; truncation 0: in the image, 1: truncated, 2: outside.
     fn fields(&self) -> [(&'static str, f64); 15] {

@@ -4,7 +4,7 @@ use super::errors::{Errors, Rmse};
 use super::evaluate::{MAIN, OURS, Outcome, Score, methods};
 use super::front_ends::Found;
 use crate::labels::Kind;
-use crate::report::{Cell, Row, Table};
+use crate::report::{Cell, Table, TableRow};
 use raywake::order_statistics::median;
 
 /// Tracks listed as the worst.
@@ -85,7 +85,7 @@ impl Set {
     }
 }
 
-fn table(id: String, caption: String, columns: &[&str], rows: Vec<Row>) -> Table {
+fn table(id: String, caption: String, columns: &[&str], rows: Vec<TableRow>) -> Table {
     let columns = columns.iter().map(|c| c.to_string()).collect();
     Table { id, caption, columns, rows, notes: Vec::new() }
 }
@@ -99,7 +99,7 @@ pub fn errors(set: &Set) -> Table {
             let [a, b] =
                 [[position, f64::NAN, f64::NAN, velocity], [heading, rate, f64::NAN, f64::NAN]];
             let cells = a.into_iter().chain(b).map(|v| Cell::Number(v, 3));
-            Row::reference([Cell::from(name)].into_iter().chain(cells))
+            TableRow::reference([Cell::from(name)].into_iter().chain(cells))
         }));
     }
     for (n, (name, _)) in methods().iter().enumerate() {
@@ -140,24 +140,24 @@ pub fn errors(set: &Set) -> Table {
 }
 
 /// A row of [`errors`]: a tracker over some objects.
-fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool) -> Row {
+fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool) -> TableRow {
     let errors = set.errors(method, &of);
     let r = errors.rmse();
     let all = [r.position, r.ground, r.height, r.velocity, r.heading, r.turn_rate];
     let some = set.outcomes.iter().filter(|o| of(o));
     let median = median(some.map(|o| o.scores[method].errors.rmse().position));
     let cells = all.into_iter().chain([median]).map(|v| Cell::Number(v, 3));
-    Row::new([Cell::from(name)].into_iter().chain(cells).chain([Cell::from(errors.flips)]))
+    TableRow::new([Cell::from(name)].into_iter().chain(cells).chain([Cell::from(errors.flips)]))
 }
 
 /// A row of [`errors`]: how far labels of what stands wander in the world, with the drift of the
 /// poses and the labels' own errors.
-pub fn wandering(labels: &Errors) -> Row {
+pub fn wandering(labels: &Errors) -> TableRow {
     let r = labels.rmse();
     let numbers = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
     let cells = numbers.map(|v| Cell::Number(v, 3));
     let name = Cell::from("the labels, with the poses' drift");
-    Row::reference([name].into_iter().chain(cells).chain([Cell::Empty]))
+    TableRow::reference([name].into_iter().chain(cells).chain([Cell::Empty]))
 }
 
 /// Share of tracks better than the baseline's, and times.
@@ -175,7 +175,7 @@ pub fn better(set: &Set) -> Table {
         let shares = shares.into_iter().chain([set.mean(crisper)]);
         let cells = shares.map(|v| Cell::Number(100.0 * v, 1));
         let times = [Cell::Number(set.mean(|o| iterations(&o.scores[n])), 1), Cell::Number(ms, 1)];
-        Row::new([Cell::from(methods()[n].0)].into_iter().chain(cells).chain(times))
+        TableRow::new([Cell::from(methods()[n].0)].into_iter().chain(cells).chain(times))
     };
     let caption = format!("Tracks of which the error is less than the baseline's, {}.", set.name);
     let columns = [
@@ -202,21 +202,21 @@ pub fn better(set: &Set) -> Table {
 pub fn entropies(sets: &[Set]) -> Table {
     let number = |v: f64| Cell::Number(v, 3);
     let share = |v: f64| Cell::Number(100.0 * v, 0);
-    let mut rows: Vec<Row> = PRINTED_ENTROPY
+    let mut rows: Vec<TableRow> = PRINTED_ENTROPY
         .iter()
         .map(|&(name, [truth, baseline, proposed])| {
             let gap = (baseline - proposed) / (baseline - truth);
             let none = vec![Cell::Empty; MAIN - 2];
             let cells = [truth, baseline, proposed].map(number).into_iter().chain(none);
             let gaps = [share(gap), Cell::Empty];
-            Row::reference([Cell::from(name)].into_iter().chain(cells).chain(gaps))
+            TableRow::reference([Cell::from(name)].into_iter().chain(cells).chain(gaps))
         })
         .collect();
     rows.extend(sets.iter().filter(|s| !s.outcomes.is_empty()).map(|set| {
         let all = (0..MAIN).map(|n| set.entropy(n));
         let cells = [set.mean(|o| o.entropy)].into_iter().chain(all).map(number);
         let gaps = [1, OURS].map(|n| share(set.gap_closed(n)));
-        Row::new([Cell::from(set.name.as_str())].into_iter().chain(cells).chain(gaps))
+        TableRow::new([Cell::from(set.name.as_str())].into_iter().chain(cells).chain(gaps))
     }));
     let names = methods().into_iter().take(MAIN).map(|m| m.0);
     let gaps = ["Gap closed as printed, %", "Gap closed by ours, %"];
@@ -250,7 +250,7 @@ pub fn kinds(set: &Set) -> Table {
         }
         let flips = set.errors(OURS, |o| o.kind == kind).flips;
         cells.extend([Cell::Number(better, 0), Cell::from(flips)]);
-        rows.push(Row::new(cells));
+        rows.push(TableRow::new(cells));
     }
     let caption = format!(
         "Errors by kind, {}: position, m / velocity, m/s / heading, rad / heading rate, rad/s.",
@@ -275,7 +275,7 @@ pub fn extents(sets: &[Set]) -> Table {
             let numbers = [0, 1, 2].map(|axis| Cell::Number(off_by(extent, axis), 2));
             let head =
                 [Cell::from(set.name.as_str()), Cell::from(vehicles.len()), Cell::from(name)];
-            rows.push(Row::new(head.into_iter().chain(numbers)));
+            rows.push(TableRow::new(head.into_iter().chain(numbers)));
         };
         if vehicles.is_empty() {
             continue;
@@ -312,7 +312,7 @@ pub fn worst(set: &Set) -> Table {
         let entropy = [Cell::Number(ours.entropy - o.entropy, 2)];
         let stop = [Cell::from(format!("{:?}", ours.stop).to_lowercase())];
         let errors = errors.into_iter().map(|v| Cell::Number(v, 2));
-        Row::new(head.into_iter().chain(errors).chain(entropy).chain(stop))
+        TableRow::new(head.into_iter().chain(errors).chain(entropy).chain(stop))
     };
     let rows = all.iter().take(WORST).map(row).collect();
     let caption = format!("The tracks on which ours is worst, {}.", set.name);
@@ -346,7 +346,7 @@ pub fn front_ends(found: &[(&'static str, Found)]) -> Table {
             found.fragments,
             found.swaps,
         ];
-        Row::new([Cell::from(*name)].into_iter().chain(counts.map(Cell::from)))
+        TableRow::new([Cell::from(*name)].into_iter().chain(counts.map(Cell::from)))
     };
     let caption = "What the front ends find of labelled objects. A track is an object's where more \
         than half of its returns lie in the object's box; fragments are the tracks of an object \

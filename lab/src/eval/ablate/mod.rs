@@ -87,7 +87,7 @@ fn row(
     settings: &Settings,
     names: &BTreeMap<String, &Path>,
     out: &Path,
-) -> Result<report::Row, Error> {
+) -> Result<report::TableRow, Error> {
     let (done, failed) = all(names, settings, out, 1)?;
     failures("drives", &failed)?;
     let mut tally = Tally::new();

@@ -4,8 +4,8 @@ use super::variants::{VARIANTS, Variant};
 use crate::eval::facts::Facts;
 use crate::eval::statistics::Weight;
 use crate::eval::tables::{WITHIN_M, noted_table};
-use crate::eval::tally::{Estimate, Group, Motion, Tally, Truth};
-use crate::report::{Cell, Row, Table};
+use crate::eval::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
+use crate::report::{Cell, Table, TableRow};
 use raywake::budget::device_bytes;
 use raywake::order_statistics::median;
 use raywake_core::params::Profile;
@@ -39,14 +39,14 @@ const PARTS: [&[&str]; 3] = [
 ];
 
 /// The row of a variant: what its rows and facts tell.
-pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]) -> Row {
+pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]) -> TableRow {
     let mut cells = vec![Cell::from(variant.name), variant.what.into()];
     let flow =
         |group, motion| tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column);
     let percent = |share: f64| Cell::Number(100.0 * share, 1);
-    for motion in [Motion::Moving, Motion::Parked] {
-        let errors = flow(Group::Labelled, motion);
-        if motion == Motion::Moving {
+    for motion in [MotionGroup::Moving, MotionGroup::Parked] {
+        let errors = flow(ClassGroup::Labelled, motion);
+        if motion == MotionGroup::Moving {
             cells.push(Cell::Count(errors.count()));
         }
         cells.extend([
@@ -55,24 +55,24 @@ pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]
             percent(errors.share_below(WITHIN_M)),
         ]);
     }
-    cells.push(percent(flow(Group::Class(0), Motion::Any).share_below(WITHIN_M)));
-    for motion in [Motion::Moving, Motion::Parked] {
-        let errors = tally.settled(Group::Labelled, motion, Weight::Column);
+    cells.push(percent(flow(ClassGroup::Class(0), MotionGroup::Any).share_below(WITHIN_M)));
+    for motion in [MotionGroup::Moving, MotionGroup::Parked] {
+        let errors = tally.settled(ClassGroup::Labelled, motion, Weight::Column);
         cells.push(Cell::Number(errors.quantile(0.5), 2));
     }
-    let [all, covered] = tally.coverage(Group::Labelled, Motion::Any);
+    let [all, covered] = tally.coverage(ClassGroup::Labelled, MotionGroup::Any);
     cells.push(percent(covered as f64 / all as f64));
     let time = |ms| Cell::Number(ms, 1);
     cells.push(time(median(drives.iter().flat_map(|d| &d.totals).copied())));
     cells.extend(PARTS.map(|names| time(median(drives.iter().flat_map(|d| part(d, names))))));
     cells.push(Cell::Number(device_bytes(profile) as f64 / 1e6, 1));
-    Row::new(cells)
+    TableRow::new(cells)
 }
 
 /// The row of a variant that has no figures.
-pub fn failed(variant: &Variant) -> Row {
+pub fn failed(variant: &Variant) -> TableRow {
     let head = [variant.name, variant.what].map(Cell::from).into_iter();
-    Row::new(head.chain(std::iter::repeat_n(Cell::Empty, COLUMNS.len() - 2)))
+    TableRow::new(head.chain(std::iter::repeat_n(Cell::Empty, COLUMNS.len() - 2)))
 }
 
 /// Time of some stages together, by pair, ms.
@@ -82,7 +82,7 @@ fn part<'a>(facts: &'a Facts, names: &'a [&str]) -> impl Iterator<Item = f64> + 
 }
 
 /// The table of all rows; `failures`: why variants have no figures.
-pub fn table(rows: Vec<Row>, failures: &[String]) -> Table {
+pub fn table(rows: Vec<TableRow>, failures: &[String]) -> Table {
     let caption = "Variants of the base, one thing changed in each: error of the raw flow of \
         labelled columns (labels as they are) and of the background, median error of the velocity \
         of tracklets of age 10 and more (smoothed labels), columns with such a tracklet, median \

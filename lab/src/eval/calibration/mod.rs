@@ -7,7 +7,7 @@ pub use show::{reliability, table, truth};
 
 use super::row::Row;
 use super::statistics::{Errors, Sorted, Weight};
-use super::tally::{COUNT, Group, Motion, SETTLED, cells};
+use super::tally::{COUNT, ClassGroup, MotionGroup, SETTLED, cells};
 use ellipse::{content, deviation};
 
 /// What is claimed.
@@ -48,7 +48,7 @@ pub enum Columns {
     /// Those put out with a displacement over ground, whatever they are.
     PutOutMoving,
     /// Those of a group with a motion.
-    Of(Group, Motion),
+    Of(ClassGroup, MotionGroup),
 }
 
 /// Claims and errors of some columns.
@@ -185,7 +185,7 @@ mod tests {
     fn shares_of_normal_errors_are_those_claimed() {
         let mut calibration = Calibration::default();
         (0..COUNT).for_each(|n| calibration.row(&row(n), true));
-        let moving = Columns::Of(Group::Labelled, Motion::Moving);
+        let moving = Columns::Of(ClassGroup::Labelled, MotionGroup::Moving);
         let flow = calibration.sample(Quantity::Flow, true, moving);
         assert_eq!((flow.content.count(), flow.without), (COUNT, 0));
         for p in [0.1, 0.5, 0.68, 0.95, 0.99] {
@@ -222,9 +222,9 @@ mod tests {
             [s.content.count(), s.without]
         };
         assert_eq!(counts(Columns::PutOutMoving), [2, 1]);
-        assert_eq!(counts(Columns::Of(Group::Labelled, Motion::Any)), [2, 1]);
-        assert_eq!(counts(Columns::Of(Group::Class(1), Motion::Moving)), [0, 1]);
-        assert_eq!(counts(Columns::Of(Group::Class(0), Motion::Any)), [1, 0]);
+        assert_eq!(counts(Columns::Of(ClassGroup::Labelled, MotionGroup::Any)), [2, 1]);
+        assert_eq!(counts(Columns::Of(ClassGroup::Class(1), MotionGroup::Moving)), [0, 1]);
+        assert_eq!(counts(Columns::Of(ClassGroup::Class(0), MotionGroup::Any)), [1, 0]);
         let exact = calibration.sample(Quantity::Flow, true, Columns::PutOutMoving);
         assert!(exact.content.share_below(0.95).is_nan() && exact.without == 0);
     }

@@ -2,8 +2,8 @@
 
 use super::{Calibration, Columns, Quantity};
 use crate::eval::tables::noted_table;
-use crate::eval::tally::{Group, Motion};
-use crate::report::{Axis, Cell, Chart, Guide, Lines, Plot, Row, Series, Table};
+use crate::eval::tally::{ClassGroup, MotionGroup};
+use crate::report::{Axis, Cell, Chart, Guide, Lines, Plot, Series, Table, TableRow};
 
 /// Contents of the ellipses of the table.
 const CONTENTS: [f64; 2] = [0.68, 0.95];
@@ -30,17 +30,17 @@ impl Columns {
     fn label(self) -> String {
         match self {
             Columns::PutOutMoving => "put out as moving".into(),
-            Columns::Of(group, Motion::Any) => group.label().into(),
+            Columns::Of(group, MotionGroup::Any) => group.label().into(),
             Columns::Of(group, motion) => format!("{}, {}", group.label(), motion.label()),
         }
     }
 
     /// As they are listed.
     fn all() -> impl Iterator<Item = Columns> {
-        let movers = Group::labelled().map(|g| Columns::Of(g, Motion::Moving));
-        let rest = [Motion::Slow, Motion::Parked, Motion::Any];
-        let rest = rest.map(|m| Columns::Of(Group::Labelled, m));
-        let background = [Columns::Of(Group::Class(0), Motion::Any)];
+        let movers = ClassGroup::labelled().map(|g| Columns::Of(g, MotionGroup::Moving));
+        let rest = [MotionGroup::Slow, MotionGroup::Parked, MotionGroup::Any];
+        let rest = rest.map(|m| Columns::Of(ClassGroup::Labelled, m));
+        let background = [Columns::Of(ClassGroup::Class(0), MotionGroup::Any)];
         [Columns::PutOutMoving].into_iter().chain(movers).chain(rest).chain(background)
     }
 }
@@ -61,7 +61,7 @@ pub fn table(calibration: &Calibration) -> Table {
                     continue;
                 }
                 let [p, q] = CONTENTS.map(|p| Cell::Number(100.0 * s.content.share_below(p), 1));
-                rows.push(Row::new([
+                rows.push(TableRow::new([
                     format!("{}, {}", quantity.label(), quantity.unit()).into(),
                     truth(exact).into(),
                     columns.label().into(),
@@ -96,8 +96,8 @@ pub fn table(calibration: &Calibration) -> Table {
 
 /// Share of true values in ellipses of every content; on the diagonal covariances are right.
 pub fn reliability(calibration: &Calibration) -> Chart {
-    let series = |quantity, exact, motion: Motion| {
-        let columns = Columns::Of(Group::Labelled, motion);
+    let series = |quantity, exact, motion: MotionGroup| {
+        let columns = Columns::Of(ClassGroup::Labelled, motion);
         let content = calibration.sample(quantity, exact, columns).content;
         let points = if content.count() > 0 { content.cdf(END, POINTS) } else { Vec::new() };
         Series::line(motion.label(), points)
@@ -109,8 +109,9 @@ pub fn reliability(calibration: &Calibration) -> Chart {
                 Axis::new("probability claimed of an ellipse").range(0.0, 1.0),
                 Axis::new("share of true values in it").range(0.0, 1.0),
             );
-            lines.series =
-                [Motion::Moving, Motion::Parked].map(|m| series(quantity, exact, m)).into();
+            lines.series = [MotionGroup::Moving, MotionGroup::Parked]
+                .map(|m| series(quantity, exact, m))
+                .into();
             if lines.series.iter().all(|s| s.points.is_empty()) {
                 continue;
             }

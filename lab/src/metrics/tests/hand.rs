@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::labels::Kind;
-use grade::Grades;
+use grades::Grades;
 use std::f64::consts::FRAC_PI_4;
 
 fn near(a: f64, b: f64) {
@@ -81,7 +81,7 @@ fn nothing_and_nothing_that_moves() {
     let empty = BucketedEpe::default().errors(Range::Near);
     assert!(empty.mean_static_epe_m.is_nan() && empty.mean_dynamic.is_nan());
     assert!(ThreeWayEpe::default().errors(Range::Near).mean_epe_m().is_nan());
-    let nothing = AccuracyTable::default().accuracy(|_| true, Motion::Any);
+    let nothing = AccuracyTable::default().accuracy(|_| true, PointMotion::Any);
     assert!(nothing.count == 0 && nothing.epe_m.is_nan() && nothing.strict.is_nan());
     let pair = still(vec![point("BUS", [0.0; 3]), point("BACKGROUND", [0.0; 3])]);
     let mut grades = Grades::default();
@@ -184,7 +184,7 @@ fn merging_is_adding() {
     let epe = |g: &Grades| g.three_way.errors(Range::Near).foreground_dynamic;
     near(epe(&first).epe_m, epe(&both).epe_m);
     assert_eq!(epe(&first).count, 6);
-    let all = |t: &AccuracyTable| t.accuracy(|_| true, Motion::Any);
+    let all = |t: &AccuracyTable| t.accuracy(|_| true, PointMotion::Any);
     assert_eq!(all(&first.over_ground).count, 12);
     near(all(&first.over_ground).angle_rad, all(&both.over_ground).angle_rad);
     near(all(&first.with_ego_motion).strict, all(&both.with_ego_motion).strict);
@@ -196,7 +196,7 @@ fn accuracies() {
         let pair = still(vec![point("BUS", [truth, 0.0, 0.0])]);
         let mut table = AccuracyTable::default();
         table.add(&score(&pair, &[[estimate, 0.0, 0.0]]));
-        let a = table.accuracy(|_| true, Motion::Any);
+        let a = table.accuracy(|_| true, PointMotion::Any);
         [a.strict, a.relaxed, a.outliers]
     };
     // By length, by share, by neither.
@@ -221,13 +221,13 @@ fn accuracies_by_class_and_motion() {
     let mut table = AccuracyTable::default();
     table.add(&score(&pair, &[[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0; 3]]));
     let bus = |c: Category| c.name() == "BUS";
-    let parked = table.accuracy(bus, Motion::Standing);
+    let parked = table.accuracy(bus, PointMotion::Standing);
     assert_eq!(parked.count, 1);
     near(parked.epe_m, 0.1);
     // (0, 0, 0, 0.1 s) against (0.1 m, 0, 0, 0.1 s).
     near(parked.angle_rad, FRAC_PI_4);
-    assert_eq!(table.accuracy(bus, Motion::Any).count, 2);
-    let moving = table.accuracy(|_| true, Motion::Moving);
+    assert_eq!(table.accuracy(bus, PointMotion::Any).count, 2);
+    let moving = table.accuracy(|_| true, PointMotion::Moving);
     assert_eq!((moving.count, moving.strict), (2, 0.5));
     near(moving.angle_rad, FRAC_PI_4 / 2.0);
 }

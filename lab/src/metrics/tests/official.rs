@@ -26,7 +26,7 @@
 
 use super::*;
 use argoverse::Log;
-use grade::Grades;
+use grades::Grades;
 use std::path::PathBuf;
 
 /// The estimates of `official.txt`.
@@ -97,9 +97,9 @@ fn accuracy(grades: &Grades, group: &str, ego: &str) -> Vec<f64> {
         _ => &grades.with_ego_motion,
     };
     let a = match group {
-        "all" => table.accuracy(|_| true, Motion::Any),
-        "moving" => table.accuracy(|_| true, Motion::Moving),
-        class => table.accuracy(|c| c.class().is_some_and(|c| c.name() == class), Motion::Any),
+        "all" => table.accuracy(|_| true, PointMotion::Any),
+        "moving" => table.accuracy(|_| true, PointMotion::Moving),
+        class => table.accuracy(|c| c.class().is_some_and(|c| c.name() == class), PointMotion::Any),
     };
     vec![a.count as f64, a.epe_m, a.strict, a.relaxed, a.outliers, a.angle_rad]
 }

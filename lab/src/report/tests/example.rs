@@ -171,21 +171,21 @@ pub fn table() -> Table {
         caption: "Error of the raw scene flow.".into(),
         columns: columns.map(String::from).to_vec(),
         rows: vec![
-            Row::new([
+            TableRow::new([
                 "Car".into(),
                 12_345u64.into(),
                 number(10.1234),
                 number(19.5),
                 number(84.25),
             ]),
-            Row::reference([
+            TableRow::reference([
                 "Car, dissertation".into(),
                 873_947u64.into(),
                 number(10.2),
                 number(19.3),
                 number(83.8),
             ]),
-            Row::new([
+            TableRow::new([
                 "<b>\"Tram\" & co</b>".into(),
                 0u64.into(),
                 number(f64::NAN),

@@ -210,7 +210,7 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(path.contains("\"../x\" is no plain name"), "{path}");
     let ragged = refused(&|s| {
         let mut table = example::table();
-        table.rows.push(Row::new([Cell::Empty]));
+        table.rows.push(TableRow::new([Cell::Empty]));
         s.table(table);
     });
     assert!(ragged.contains("row 4 has 1 cells for 5 columns"), "{ragged}");
