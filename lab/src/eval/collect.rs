@@ -54,6 +54,20 @@ impl PairData {
     }
 }
 
+/// Displacements over ground of a column between the sweeps, m, world axes.
+struct Displacements {
+    /// By the labels as they are.
+    truth: DVec3,
+    /// By the smoothed labels.
+    smooth: DVec3,
+    /// At rest relative to the vehicle.
+    carried: DVec3,
+    /// The truth in whole cells of the grid.
+    rounded: DVec3,
+    /// Whether labels are complete at both ends.
+    in_view: bool,
+}
+
 /// Makes rows of the pairs of one drive.
 pub struct Collector<'a> {
     profile: Profile,
@@ -135,23 +149,9 @@ impl<'a> Collector<'a> {
         voxels: u8,
         score: i32,
     ) -> Row {
-        let ([x, y], flat) = (flow.position_vehicle_m, flat(flow));
-        // Flow is planar; the height matters where the vehicle nods, a little.
-        let at = DVec3::new(
-            flat.x,
-            flat.y,
-            object.map_or(self.rig.ground_m, |p| p.vehicle_from_box.translation.z),
-        );
-        let world = seen.now().transform(at);
-        let step = object.and_then(|p| p.step);
-        let vanishes = object.is_some() && step.is_none();
-        let moved = |by: Option<Pose>| by.map_or(world, |m| m.transform(world)) - world;
-        let (truth, smooth) = (moved(step.map(|s| s.raw)), moved(step.map(|s| s.smooth)));
-        let ends = [at, seen.then.inverse().transform(world + truth)];
-        let cell = self.profile.voxel_m;
-        let carried = seen.then.transform(at) - world;
-        let rounded = (self.in_grid(seen, at, truth) / cell).round() * cell;
-        let rounded = self.over_ground(seen, at, DVec3::new(rounded.x, rounded.y, 0.0));
+        let [x, y] = flow.position_vehicle_m;
+        let Displacements { truth, smooth, carried, rounded, in_view } =
+            self.displacements(seen, flat(flow), object);
         Row {
             sweep: seen.index as u32,
             frame: seen.first.frame,
@@ -161,7 +161,7 @@ impl<'a> Collector<'a> {
             y,
             class: object.map_or(0, |p| class_of(p.kind)),
             track: object.map_or(0, |p| p.track + 1),
-            in_view: !vanishes && ends.iter().all(|end| self.view.holds(*end)),
+            in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
             voxels,
             score,
@@ -186,6 +186,28 @@ impl<'a> Collector<'a> {
             covariance_yy: flow.covariance[2],
             age: flow.age,
             dt: seen.dt_s as f32,
+        }
+    }
+
+    /// What is true of a column with its centre `at`, and the references.
+    fn displacements(&self, seen: &PairData, at: DVec3, object: Option<&Present>) -> Displacements {
+        // Flow is planar; the height matters where the vehicle nods, a little.
+        let height = object.map_or(self.rig.ground_m, |p| p.vehicle_from_box.translation.z);
+        let at = DVec3::new(at.x, at.y, height);
+        let world = seen.now().transform(at);
+        let step = object.and_then(|p| p.step);
+        let vanishes = object.is_some() && step.is_none();
+        let moved = |by: Option<Pose>| by.map_or(world, |m| m.transform(world)) - world;
+        let (truth, smooth) = (moved(step.map(|s| s.raw)), moved(step.map(|s| s.smooth)));
+        let ends = [at, seen.then.inverse().transform(world + truth)];
+        let cell = self.profile.voxel_m;
+        let rounded = (self.in_grid(seen, at, truth) / cell).round() * cell;
+        Displacements {
+            truth,
+            smooth,
+            carried: seen.then.transform(at) - world,
+            rounded: self.over_ground(seen, at, DVec3::new(rounded.x, rounded.y, 0.0)),
+            in_view: !vanishes && ends.iter().all(|end| self.view.holds(*end)),
         }
     }
 

@@ -9,12 +9,12 @@ use super::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
 use super::verdicts::Verdicts;
 use super::{figures, read_rows, tables};
 use crate::labels::CAMERA_DEG;
-use crate::report::{Picture, Report, Table};
+use crate::report::{Picture, Report, Results};
 use raywake_io::Error;
 use std::path::Path;
 
-/// Reads the rows of all drives, writes the report and returns the tables for the screen.
-pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec<Table>, Error> {
+/// Reads the rows of all drives, writes the report and returns its tables.
+pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Results, Error> {
     let mut tally = Tally::new();
     let (mut calibration, mut verdicts) = (Calibration::default(), Verdicts::default());
     read_rows(drives, out, |facts, row| {
@@ -26,65 +26,58 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Vec
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
     headlines(&mut report, &tally, drives);
     facts(&mut report, drives, settings);
-    let [by_class, by_motion] = figures::histograms(&tally, settings.profile.voxel_m);
-    let scores = tables::scores(drives);
-    let [bucketed, three_way] = tables::argoverse(&scores);
-    let shown = [
-        tables::raw_flow(&tally, Weight::Column),
-        tables::references(&tally, Truth::Raw),
-        tables::tracklets(&tally),
-        verdicts.table(),
-        calibration::table(&calibration),
-        bucketed,
-        three_way,
-        tables::accuracy(&scores),
-        tables::filter(curve.as_ref()),
-        tables::times(drives),
-    ];
-    let [raw, beside, settled, moving, claims, bucketed, three_way, accuracy, filter, times] =
-        shown.clone();
-    report
-        .section("Raw scene flow")
-        .text(RAW)
-        .table(raw)
-        .chart(by_class)
-        .chart(by_motion)
-        .table(beside)
-        .chart(figures::references(&tally))
-        .table(tables::references(&tally, Truth::Smooth))
-        .table(tables::raw_flow(&tally, Weight::Voxel));
+    raw_flow(&mut report, &tally, settings.profile.voxel_m);
     report
         .section("Temporal scene flow")
         .text(TRACKLETS)
-        .table(settled)
+        .table(tables::tracklets(&tally))
         .chart(figures::settled(&tally))
         .chart(figures::tracklets(&tally));
-    report.section("Moving or not").table(moving);
+    report.section("Moving or not").table(verdicts.table());
     report
         .section("Uncertainty")
         .text(UNCERTAINTY)
-        .table(claims)
+        .table(calibration::table(&calibration))
         .chart(calibration::reliability(&calibration));
+    returns(&mut report, drives);
+    report
+        .section("Background filter")
+        .table(tables::filter(curve.as_ref()))
+        .chart(figures::precision_recall(curve.as_ref()));
+    report
+        .section("Time")
+        .text(TIME)
+        .table(tables::times(drives))
+        .chart(figures::times(drives))
+        .chart(figures::time_by_points(drives));
+    pictures(&mut report, drives, out)?;
+    choices(&mut report, drives, settings, &tally);
+    report.write(out)
+}
+
+fn raw_flow(report: &mut Report, tally: &Tally, cell_m: f64) {
+    let [by_class, by_motion] = figures::histograms(tally, cell_m);
+    report
+        .section("Raw scene flow")
+        .text(RAW)
+        .table(tables::raw_flow(tally, Weight::Column))
+        .chart(by_class)
+        .chart(by_motion)
+        .table(tables::references(tally, Truth::Raw))
+        .chart(figures::references(tally))
+        .table(tables::references(tally, Truth::Smooth))
+        .table(tables::raw_flow(tally, Weight::Voxel));
+}
+
+fn returns(report: &mut Report, drives: &[Facts]) {
+    let scores = tables::scores(drives);
+    let [bucketed, three_way] = tables::argoverse(&scores);
     report
         .section("Flow of single returns")
         .text(&about_returns())
         .table(bucketed)
         .table(three_way)
-        .table(accuracy);
-    report
-        .section("Background filter")
-        .table(filter)
-        .chart(figures::precision_recall(curve.as_ref()));
-    report
-        .section("Time")
-        .text(TIME)
-        .table(times)
-        .chart(figures::times(drives))
-        .chart(figures::time_by_points(drives));
-    pictures(&mut report, drives, out)?;
-    choices(&mut report, drives, settings, &tally);
-    report.write(out)?;
-    Ok(shown.into())
+        .table(tables::accuracy(&scores));
 }
 
 const RAW: &str = "The error is the distance between the displacement found for a solid column from \

@@ -112,10 +112,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let names = names(&args.drives)?;
     let (done, failed) = all(&names, &settings, out, args.jobs.max(1))?;
     if !done.is_empty() && !args.rows_only {
-        for table in conclude(&done, &settings, out)? {
-            println!("{}", table.text());
-        }
-        println!("report: {}", out.join("report.html").display());
+        conclude(&done, &settings, out)?.print(out);
     }
     failures("drives", &failed)
 }

@@ -60,6 +60,14 @@ pub struct Results {
     pub tables: Vec<Shown>,
 }
 
+impl Results {
+    /// Prints the tables, and where the report is.
+    pub fn print(&self, folder: &Path) {
+        self.tables.iter().for_each(|table| println!("{}", table.text()));
+        println!("report: {}", folder.join("report.html").display());
+    }
+}
+
 /// A section of a report under way.
 #[derive(Clone, Debug)]
 pub struct Section {
@@ -138,15 +146,17 @@ impl Report {
     /// Fails before anything is written with [`Error::Usage`] on an id that is not a file name or
     /// that is given twice, a table whose rows do not fit its columns, or a picture that is no PNG;
     /// later where a file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<(), Error> {
+    pub fn write(&self, folder: &Path) -> Result<Results, Error> {
         self.check()?;
         atomic::create_folder(folder)?;
         for element in self.sections.iter().flat_map(|s| &s.elements) {
             write_files(element, folder)?;
         }
-        let results = serde_json::to_string_pretty(&self.results()).expect("plain text");
-        put(folder, "results.json", (results + "\n").as_bytes())?;
-        put(folder, "report.html", html::page(self).as_bytes())
+        let results = self.results();
+        let text = serde_json::to_string_pretty(&results).expect("plain text") + "\n";
+        put(folder, "results.json", text.as_bytes())?;
+        put(folder, "report.html", html::page(self).as_bytes())?;
+        Ok(results)
     }
 
     /// Its facts and tables.

@@ -21,7 +21,7 @@ mod tests;
 mod tracker;
 
 use crate::labels::Kind;
-use crate::report::{Report, Table};
+use crate::report::{Report, Results, Table};
 use errors::Errors;
 use evaluate::{OURS, evaluate, histories};
 use front_ends::{Found, Settings};
@@ -116,10 +116,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
             Set { id: set.id.into(), name: set.name.into(), outcomes }
         })
         .collect();
-    for table in conclude(args, &all, &sets, &labels, &found)? {
-        println!("{}", table.text());
-    }
-    println!("report: {}", args.out.join("report.html").display());
+    conclude(args, &all, &sets, &labels, &found)?.print(&args.out);
     Ok(())
 }
 
@@ -154,22 +151,20 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Writes the report and returns the tables for the screen.
+/// Writes the report and returns its tables.
 fn conclude(
     args: &Args,
     objects: &[Objects],
     sets: &[Set],
     labels: &Errors,
     found: &[(&'static str, Found)],
-) -> Result<Vec<Table>, Error> {
+) -> Result<Results, Error> {
     let mut report = Report::new("Tracks with shape", "chapter 2, perfect segmentation");
     headlines(&mut report, sets);
     report.fact("Seed", &args.seed.to_string());
     for set in sets {
         report.fact("Set", &set.about());
     }
-    let mut shown = vec![tables::entropies(sets), tables::extents(sets)];
-    let [entropies, extents] = [shown[0].clone(), shown[1].clone()];
     for set in sets {
         let mut all = vec![tables::errors(set), tables::better(set), tables::worst(set)];
         if set.outcomes.iter().any(|o| o.kind != Kind::Car) {
@@ -179,24 +174,18 @@ fn conclude(
             all[0].rows.push(tables::wandering(labels));
         }
         let section = report.section(&set.name);
-        for table in &all {
-            section.table(table.clone());
-        }
-        shown.extend(all);
+        all.into_iter().for_each(|table| _ = section.table(table));
     }
     if !found.is_empty() {
-        let tables = front_ends(found);
         let section = report.section("Front ends");
         section.text(FRONT_ENDS);
-        tables.iter().for_each(|table| _ = section.table(table.clone()));
-        shown.extend(tables);
+        front_ends(found).into_iter().for_each(|table| _ = section.table(table));
     }
-    report.section("Crispness").table(entropies).table(extents);
+    report.section("Crispness").table(tables::entropies(sets)).table(tables::extents(sets));
     report.section("Convergence").chart(figures::convergence(sets));
     pictures(&mut report, objects)?;
     report.section("What is counted").text(&choices());
-    report.write(&args.out)?;
-    Ok(shown)
+    report.write(&args.out)
 }
 
 const FRONT_ENDS: &str = "Above, segmentation and association are perfect. Here the labelled objects \

@@ -6,7 +6,7 @@ mod variants;
 use super::drive::Settings;
 use super::tally::Tally;
 use super::{Inputs, all, failures, names, read_rows};
-use crate::report::{self, Report};
+use crate::report::{self, Report, Results};
 use clap::builder::PossibleValuesParser;
 use raywake::args::Learned;
 use raywake::console::interrupted;
@@ -59,9 +59,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     let why: Vec<String> = failed.iter().map(|(name, e)| format!("`{name}`: {e}")).collect();
     let table = table::table(rows, &why);
-    println!("{}", table.text());
-    write(&base, &names, table, &args.out)?;
-    println!("report: {}", args.out.join("report.html").display());
+    write(&base, &names, table, &args.out)?.print(&args.out);
     failures("variants", &failed)
 }
 
@@ -100,7 +98,7 @@ fn write(
     names: &BTreeMap<String, &Path>,
     table: report::Table,
     out: &Path,
-) -> Result<(), Error> {
+) -> Result<Results, Error> {
     let mut report = Report::new("Ablations", "What every choice is worth");
     report.fact("Base", &base.profile.name);
     report.fact("Weights", &base.weights_digest);
