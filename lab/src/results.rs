@@ -71,7 +71,8 @@ fn section(results: &Results) -> String {
 /// Name of the fact that tells the command.
 pub(crate) const COMMAND: &str = "Command";
 
-/// The command line of this process; of many arguments in a row, drives that is, the first and last.
+/// The command line of this process; of many arguments in a row, drives that is, the first and
+/// last.
 pub(crate) fn command() -> String {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut out = String::from("raywake-lab");

@@ -26,7 +26,8 @@ fn main() {
         }
         let (drives, sweeps) = (seeds as f64, (seeds as usize * SWEEPS) as f64);
         println!(
-            "{name:8} {:5.1} sweeps/s, {:6.0} returns a sweep, {:4.0} objects and {:5.0} fixtures, laid out in {:3.0} ms",
+            "{name:8} {:5.1} sweeps/s, {:6.0} returns a sweep, {:4.0} objects and {:5.0} \
+            fixtures, laid out in {:3.0} ms",
             sweeps / casting,
             returns as f64 / sweeps,
             objects as f64 / drives,

@@ -1,8 +1,8 @@
-//! Planar motion, leg by leg: acceleration and curvature are constant or change evenly, the one with
-//! time, the other along the way (clothoids, by which real vehicles enter a bend).
+//! Planar motion, leg by leg: acceleration and curvature are constant or change evenly, the one
+//! with time, the other along the way (clothoids, by which real vehicles enter a bend).
 
-/// Time in which a vehicle's turn or braking begins and ends, s: its yaw rate and acceleration do not
-/// jump, and within a sweep the twist at its stamp stands for all of it.
+/// Time in which a vehicle's turn or braking begins and ends, s: its yaw rate and acceleration do
+/// not jump, and within a sweep the twist at its stamp stands for all of it.
 pub(crate) const EASE_S: f64 = 1.0;
 
 /// Steps in which the angle of a change of lane is found.
@@ -41,8 +41,8 @@ struct Leg {
     course: Course,
 }
 
-/// Places and weights of Gauss and Legendre's quadrature over 0 to 1: better than a micrometre where
-/// a clothoid turns by less than a right angle.
+/// Places and weights of Gauss and Legendre's quadrature over 0 to 1: better than a micrometre
+/// where a clothoid turns by less than a right angle.
 const QUADRATURE: [[f64; 2]; 5] = [
     [0.046_910_077_030_668, 0.118_463_442_528_095],
     [0.230_765_344_947_158, 0.239_314_335_249_683],
@@ -119,7 +119,8 @@ impl Path {
     }
 
     /// Appends legs along which the speed changes to `speed` (m/s), which must be another than
-    /// before: the acceleration grows to `rate` (m/s^2 > 0) and fades again over `ease_s` each, > 0.
+    /// before: the acceleration grows to `rate` (m/s^2 > 0) and fades again over `ease_s` each
+    /// (> 0).
     pub fn then_to_speed(self, speed: f64, rate: f64, ease_s: f64) -> Path {
         let change = speed - self.end().speed;
         let (time, rate) = (change.abs() / rate, rate.copysign(change));
@@ -139,8 +140,8 @@ impl Path {
         self
     }
 
-    /// Appends a turn by `angle` (rad, left positive) at constant speed, which must not be zero: the
-    /// curvature grows to that of the radius (m) and fades again over `ease_s` each, > 0.
+    /// Appends a turn by `angle` (rad, left positive) at constant speed, which must not be zero:
+    /// the curvature grows to that of the radius (m) and fades again over `ease_s` each, > 0.
     pub fn then_turn(self, angle: f64, radius: f64, ease_s: f64) -> Path {
         let speed = self.end().speed;
         let whole_m = angle.abs() * radius;
@@ -155,9 +156,9 @@ impl Path {
             )
     }
 
-    /// Appends a change of lane by `aside` (m, left positive, not zero) in this time (s) at constant
-    /// speed, which must not be zero: two turns whose curvature grows and fades all the way, after
-    /// which the heading is as before.
+    /// Appends a change of lane by `aside` (m, left positive, not zero) in this time (s) at
+    /// constant speed, which must not be zero: two turns whose curvature grows and fades all the
+    /// way, after which the heading is as before.
     pub fn then_shift(self, aside: f64, duration: f64) -> Path {
         let start = self.end();
         let length = start.speed * duration;

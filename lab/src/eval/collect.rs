@@ -109,8 +109,8 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
-    /// Rows of the first sweep's solid columns. They belong to what their returns hit where there is
-    /// exact truth of these, else to the box that their centre lies in.
+    /// Rows of the first sweep's solid columns. They belong to what their returns hit where there
+    /// is exact truth of these, else to the box that their centre lies in.
     pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
         let columns = self.grid.columns.len();

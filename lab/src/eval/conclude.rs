@@ -80,10 +80,10 @@ fn returns(report: &mut Report, drives: &[Facts]) {
         .table(tables::accuracy(&scores));
 }
 
-const RAW: &str = "The error is the distance between the displacement found for a solid column from \
-    one sweep to the next and that of the labelled object it belongs to. Columns that the filter \
-    takes for background, and columns without a match, put out no motion over ground and are \
-    scored as such.";
+const RAW: &str = "The error is the distance between the displacement found for a solid column \
+    from one sweep to the next and that of the labelled object it belongs to. Columns that the \
+    filter takes for background, and columns without a match, put out no motion over ground and \
+    are scored as such.";
 
 const TRACKLETS: &str = "The error is the distance between the velocity over ground of a column's \
     tracklet and that of its object at the column's centre.";
@@ -98,15 +98,15 @@ fn about_returns() -> String {
     format!(
         "Every return has the velocity of its column over the time between the sweeps. \
     Truth is the simulator's, or the motion of the labelled box a return lies in; what is in none \
-    stands, but for what lies so close outside one ({DOUBT_M} m) that it may belong to it, which is not \
-    scored. Without a map, returns without a label up to {GROUND_M} m above the plane the vehicle stands \
-    on count as ground, which is left out. For the graders' own truth and ground of an Argoverse \
-    2 log see `raywake-lab grade`."
+    stands, but for what lies so close outside one ({DOUBT_M} m) that it may belong to it, which \
+    is not scored. Without a map, returns without a label up to {GROUND_M} m above the plane the \
+    vehicle stands on count as ground, which is left out. For the graders' own truth and ground \
+    of an Argoverse 2 log see `raywake-lab grade`."
     )
 }
 
-const TIME: &str = "From the sweep in memory to flow in memory, while another thread makes rows, and \
-    other drives run where `--jobs` says so; `raywake run` has the machine to itself.";
+const TIME: &str = "From the sweep in memory to flow in memory, while another thread makes rows, \
+    and other drives run where `--jobs` says so; `raywake run` has the machine to itself.";
 
 fn subtitle(drives: &[Facts]) -> String {
     let pairs: u64 = drives.iter().map(|d| d.pairs).sum();
@@ -190,8 +190,8 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
          labelled box, in the order of the labels, that its centre lies in, seen from above, with \
          a margin of {} m. {tracks} labelled objects have {boxes} boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
-         labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the others, all \
-         around. {} columns do not.\n\n\
+         labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the \
+         others, all around. {} columns do not.\n\n\
          An object moves from {} m/s over ground on.\n\n\
          Columns without a valid match and columns that the filter rejects are scored with what \
          the program puts out for them: no motion over ground.",

@@ -53,8 +53,8 @@ pub fn precision_recall(curve: Option<&Curve>) -> Chart {
         Axis::new("precision").range(0.0, 1.0),
     );
     lines.series.extend(series);
-    let caption = "As figure 3.6 of the dissertation: precision and recall of the background filter over solid columns in \
-        view, for every threshold; foreground is the positive class.";
+    let caption = "As figure 3.6 of the dissertation: precision and recall of the background \
+        filter over solid columns in view, for every threshold; foreground is the positive class.";
     Chart::new("figure-3-6", caption, Plot::Lines(lines))
 }
 
@@ -94,7 +94,8 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
         ),
         Chart::small_multiples(
             "figure-3-8",
-            "As figure 3.8 of the dissertation: errors of the raw flow of all labelled columns, moving and parked apart.",
+            "As figure 3.8 of the dissertation: errors of the raw flow of all labelled columns, \
+            moving and parked apart.",
             by_motion.into(),
         ),
     ]
@@ -204,6 +205,7 @@ pub fn time_by_points(drives: &[Facts]) -> Chart {
     if slowest > 0.5 * BUDGET_MS {
         lines.guides.push(Guide::Y(BUDGET_MS, "time between sweeps".into()));
     }
-    let caption = "As section B.4 of the dissertation: time of a pair of sweeps against its number of returns.";
+    let caption = "As section B.4 of the dissertation: time of a pair of sweeps against its \
+        number of returns.";
     Chart::new("figure-b-4", caption, Plot::Lines(lines))
 }

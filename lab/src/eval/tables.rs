@@ -91,7 +91,7 @@ pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
     let caption = format!(
         "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps, by {of}."
     );
-    table(id, &caption, &[&["Class", "MotionGroup"], &FLOW[..]].concat(), rows)
+    table(id, &caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
 }
 
 /// Every estimate beside every other, all labelled columns.
@@ -119,7 +119,7 @@ pub fn references(tally: &Tally, truth: Truth) -> Table {
     let caption = format!(
         "Raw flow of all labelled columns beside estimates that need no LIDAR; truth: {what}."
     );
-    table(id, &caption, &[&["MotionGroup", "Estimate"], &FLOW[..]].concat(), rows)
+    table(id, &caption, &[&["Motion", "Estimate"], &FLOW[..]].concat(), rows)
 }
 
 /// Table 3.2: settled tracklets.
@@ -147,7 +147,7 @@ pub fn tracklets(tally: &Tally) -> Table {
     }
     let columns = [
         "Class",
-        "MotionGroup",
+        "Motion",
         "Count",
         "Median, m/s",
         "Mean, m/s",
@@ -234,8 +234,8 @@ pub fn times(drives: &[Facts]) -> Table {
     let within = totals.iter().filter(|t| **t < BUDGET_MS).count();
     let share = 100.0 * within as f64 / totals.len().max(1) as f64;
     let caption = format!(
-        "As table 3.3 of the dissertation: time per pair of sweeps, {} pairs; {share:.1} % of them within 100 ms (the \
-         dissertation: over 99 %).",
+        "As table 3.3 of the dissertation: time per pair of sweeps, {} pairs; {share:.1} % of \
+        them within 100 ms (the dissertation: over 99 %).",
         totals.len(),
     );
     let columns = ["Step", "Mean, ms", "Standard deviation, ms", "Median, ms", "99 %, ms"];

@@ -87,7 +87,7 @@ impl Verdicts {
         let columns = [
             "Truth",
             "Columns",
-            "MotionGroup",
+            "Motion",
             "Count",
             "Put out as moving, %",
             "By flow alone, %",
@@ -97,10 +97,11 @@ impl Verdicts {
         ];
         let caption = format!(
             "Moving or not: columns put out with a displacement and a velocity of {MOVING_MPS} m/s \
-             or more; by flow alone, with a displacement of as much over the time between the sweeps."
+             or more; by flow alone, with a displacement of as much over the time between the \
+             sweeps."
         );
-        let note = "What moves and is not put out so is missed; what is parked or background and is \
-            put out so is false. What no label holds counts as background at rest.";
+        let note = "What moves and is not put out so is missed; what is parked or background and \
+            is put out so is false. What no label holds counts as background at rest.";
         noted_table("moving-or-not", &caption, &columns, rows, note)
     }
 }

@@ -1,5 +1,5 @@
-//! `boxes.csv`: `frame,track_id,class,x,y,z,l,w,h,yaw,...`, a header and a box a line; the centre in
-//! the vehicle frame, metres, yaw about +z in radians.
+//! `boxes.csv`: `frame,track_id,class,x,y,z,l,w,h,yaw,...`, a header, then one box per line; the
+//! centre in the vehicle frame, metres, yaw about +z in radians.
 
 use super::gather::{Gather, LabelRow, heading};
 use super::{Error, Labels, View};

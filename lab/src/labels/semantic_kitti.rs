@@ -64,7 +64,8 @@ impl PointLabel {
         (252..=259).contains(&self.class)
     }
 
-    /// Kind of the object; `None` for what is no object that could move, and for what is unlabelled.
+    /// Kind of the object; `None` for what is no object that could move, and for what is
+    /// unlabelled.
     pub fn kind(self) -> Option<Kind> {
         let object = self.moving() || (10..=32).contains(&self.class);
         self.name().filter(|_| object).and_then(kind)

@@ -73,8 +73,8 @@ impl Matcher {
         matched
     }
 
-    /// Moves the sweep before to the earlier ones, and all of them into the frame of this one. Where
-    /// the motion is unknown they are of no use.
+    /// Moves the sweep before to the earlier ones, and all of them into the frame of this one.
+    /// Where the motion is unknown they are of no use.
     fn remember(&mut self, before: &[TimedPoint], dt_s: f64, matched: &Matched) {
         if !matched.registration.converged {
             self.earlier.clear();

@@ -31,7 +31,7 @@ pub struct Log {
 /// An estimate's flow, one row per return.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// PointMotion over the pair, m, in the terms of [`TruePoint::flow_m`].
+    /// Motion over the pair, m, in the terms of [`TruePoint::flow_m`].
     pub flow_m: Vec<[f32; 3]>,
     /// Whether the estimator vouches for it; the grader takes the flow either way.
     pub valid: Vec<bool>,

@@ -3,7 +3,7 @@
 //!
 //! | metric | as in |
 //! |---|---|
-//! | [`BucketedEpe`], [`ThreeWayEpe`] | `bucketed-scene-flow-eval` 2.0.25, the Argoverse 2 challenge |
+//! | [`BucketedEpe`], [`ThreeWayEpe`] | `bucketed-scene-flow-eval` 2.0.25 (Argoverse 2) |
 //! | [`AccuracyTable`] | av2-api (EPE, strict and relaxed accuracy, angle), FlowNet3D (outliers) |
 //!
 //! A [`Pair`] holds the truth of two sweeps and says which returns count ([`Rules`]); an estimate

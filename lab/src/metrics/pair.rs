@@ -8,7 +8,7 @@ use std::fmt;
 /// Chebyshev distance (larger of |x| and |y|) below which a return is near, m.
 pub const NEAR_M: f64 = 35.0;
 
-/// PointMotion over a pair from which something moves, m: 0.5 m/s at 10 Hz.
+/// Motion over a pair from which something moves, m: 0.5 m/s at 10 Hz.
 pub const MOVING_M: f64 = 0.05;
 
 /// A return of a pair's first sweep and its true motion to the second.
@@ -16,8 +16,8 @@ pub const MOVING_M: f64 = 0.05;
 pub struct TruePoint {
     /// Position in the first sweep's vehicle frame, m.
     pub position_m: [f32; 3],
-    /// PointMotion to the second sweep along the axes of the same frame, m, the vehicle's own removed:
-    /// what stands has none.
+    /// Motion to the second sweep along the axes of the same frame, m, the vehicle's own
+    /// removed: what stands has none.
     pub flow_m: [f32; 3],
     /// What it belongs to.
     pub category: Category,

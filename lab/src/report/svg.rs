@@ -66,7 +66,8 @@ impl Svg {
         let ([w, h], from) = (self.size(), -self.margin);
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{}\" \
-             width=\"{w}\" height=\"{h}\" viewBox=\"{from} {from} {w} {h}\" font-family=\"{FONTS}\">\
+             width=\"{w}\" height=\"{h}\" viewBox=\"{from} {from} {w} {h}\" \
+             font-family=\"{FONTS}\">\
              {}</svg>\n",
             xml(label),
             self.body

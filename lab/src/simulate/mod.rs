@@ -42,13 +42,15 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     drives: usize,
     /// Sweeps of each drive, 10 a second.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=SWEEPS_MAX))]
+    #[arg(long, default_value_t = 100)]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..=SWEEPS_MAX))]
     sweeps: u64,
     /// Drive k of a seed is the same whatever the number of drives.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Sensors on the vehicle.
-    #[arg(long, default_value = "hdl64", value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
+    #[arg(long, default_value = "hdl64")]
+    #[arg(value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
     sensor: String,
     /// What the vehicle does.
     #[arg(long, value_enum, default_value = "any")]

@@ -47,8 +47,8 @@ pub struct PointTruth {
     pub object: u32,
     /// What it is.
     pub class: Class,
-    /// How far over ground the point of the material moves within [`raywake_sim::PERIOD_S`] after the return, along
-    /// the axes the vehicle has at the sweep's stamp, m.
+    /// How far over ground the point of the material moves within [`raywake_sim::PERIOD_S`] after
+    /// the return, along the axes the vehicle has at the sweep's stamp, m.
     pub flow: [f32; 3],
 }
 

@@ -31,10 +31,10 @@ pub struct Sample {
 ///
 /// The text draws them from the whole search neighbourhood about the source, the author's program
 /// from one as wide about the true column. Either way nearly all of them are somewhere else
-/// entirely, free or unknown, and easily told apart; what spoils flow is the column beside the right
-/// one. The nearer they are taken, the more often the true column comes first among the 31x31 on
-/// drives held out. At one cell the evidence left is so weak against the smoothing that velocities
-/// of moving objects suffer; two serves both.
+/// entirely, free or unknown, and easily told apart; what spoils flow is the column beside the
+/// right one. The nearer they are taken, the more often the true column comes first among the 31x31
+/// on drives held out. At one cell the evidence left is so weak against the smoothing that
+/// velocities of moving objects suffer; two serves both.
 const NEAR: i32 = 2;
 
 /// For every match of a pair the true column, and those around it as far as they lie in the window.

@@ -86,11 +86,12 @@ pub fn table(calibration: &Calibration) -> Table {
         "Median deviation claimed",
         "Median error",
     ];
-    let caption = "Covariances beside errors: share of true values in the 68 % and the 95 % ellipse \
-        of the covariance put out (squared Mahalanobis distance up to 2.279 and 5.991).";
+    let caption = "Covariances beside errors: share of true values in the 68 % and the 95 % \
+        ellipse of the covariance put out (squared Mahalanobis distance up to 2.279 and 5.991).";
     let note = "Columns with a covariance of zero, background and what has no match, have no \
-        ellipse; they are counted apart and not among the shares. The deviation is the root of half \
-        the trace, in the unit of the value; of an ellipse that is right and round the median error is 1.18 of it.";
+        ellipse; they are counted apart and not among the shares. The deviation is the root of \
+        half the trace, in the unit of the value; of an ellipse that is right and round the median \
+        error is 1.18 of it.";
     noted_table("calibration", caption, &columns, rows, note)
 }
 

@@ -255,7 +255,10 @@ pub fn report() -> Report {
         .fact("Digest", "`3f9c0a4be71d22aa`");
     report
         .section("Background filter")
-        .text("How well the filter tells foreground from background.\n\nThe threshold is the shipped one.")
+        .text(
+            "How well the filter tells foreground from background.\n\nThe threshold is the \
+            shipped one.",
+        )
         .chart(precision_recall())
         .chart(reliability());
     report.section("Raw scene flow").table(table()).chart(histograms()).chart(bars());
