@@ -3,6 +3,9 @@
 use crate::report::encode::{fixed, short};
 use std::ops::Range;
 
+/// Shortest axis and largest value: plotters looks for labels without end beyond these.
+const SPAN: [f64; 2] = [1e-9, 1e12];
+
 /// One axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -29,8 +32,8 @@ impl Axis {
             Some(ends.map_or([v, v], |[low, high]| [low.min(v), high.max(v)]))
         })?;
         let [low, high] = self.range.unwrap_or_else(|| grown(data));
-        let span = high - low;
-        let sound = span.is_normal() && span > 1e-9 * low.abs().max(high.abs());
+        let (span, most) = (high - low, low.abs().max(high.abs()));
+        let sound = span > SPAN[0].max(1e-9 * most) && most < SPAN[1];
         sound.then_some(low..high)
     }
 }

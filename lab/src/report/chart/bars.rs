@@ -107,7 +107,9 @@ impl Bars {
             .x_label_area_size(px(FOOT))
             .y_label_area_size(px(names.min(0.4 * super::WIDTH) + 12.0))
             .build_cartesian_2d(x.clone(), down..0.0)?;
-        let x_label = linear_label(x);
+        // What lies beyond a given end stops there.
+        let within = |v: f64| v.clamp(x.start, x.end);
+        let x_label = linear_label(x.clone());
         let mut mesh = plane.configure_mesh();
         styled(&mut mesh);
         mesh.disable_y_mesh().y_labels(0).x_label_formatter(&x_label).x_desc(&self.x.label);
@@ -116,16 +118,16 @@ impl Bars {
             self.group_height() * i as f64 + 0.5 * BETWEEN + BAR * (j as f64 + 0.5)
         };
         for (i, category) in self.categories.iter().enumerate() {
-            let at = (0.0, 0.5 * (middle(i, 0) + middle(i, self.series.len() - 1)));
+            let at = (x.start, 0.5 * (middle(i, 0) + middle(i, self.series.len() - 1)));
             let style = font(LETTER, INK, HPos::Right);
             let name = Text::new(category.clone(), (px(-8.0), 0), style);
             plane.draw_series([EmptyElement::at(at) + name])?;
         }
         for (i, j, bar) in self.drawable() {
             let (y, half) = (middle(i, j), 0.5 * BAR - 1.5);
-            let block = [(0.0, y - half), (bar.value, y + half)];
+            let block = [(within(0.0), y - half), (within(bar.value), y + half)];
             plane.draw_series([Rectangle::new(block, self.colour(j).filled())])?;
-            if let Some([from, to]) = bar.spread {
+            if let Some([from, to]) = bar.spread.map(|ends| ends.map(within)) {
                 let style = INK.stroke_width(px(1.0) as u32);
                 plane.draw_series([PathElement::new([(from, y), (to, y)], style)])?;
                 let ends =
@@ -133,7 +135,7 @@ impl Bars {
                 plane.draw_series(ends)?;
             }
             let value = Text::new(short(bar.value), (px(6.0), 0), font(LETTER, INK, HPos::Left));
-            plane.draw_series([EmptyElement::at((bar.reach(), y)) + value])?;
+            plane.draw_series([EmptyElement::at((within(bar.reach()), y)) + value])?;
         }
         Ok(true)
     }

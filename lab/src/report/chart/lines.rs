@@ -119,7 +119,7 @@ impl Lines {
         builder.x_label_area_size(px(42.0)).y_label_area_size(px(64.0));
         if self.log_y {
             let least = points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
-            let y = y.start.max(0.8 * least)..y.end;
+            let y = y.start.max(0.8 * least).max(1e-9 * y.end)..y.end;
             self.draw_on(builder.build_cartesian_2d(x, y.log_scale())?, &log_label)
         } else {
             let label = linear_label(y.clone());
