@@ -1,5 +1,5 @@
-//! Constant turn rate and velocity (CTRV): what the filters of flow tracklets (section 3.6.1) and of
-//! object tracks (section 2.4) share.
+//! Constant turn rate and velocity (CTRV): what the filters of flow tracklets (section 3.6.1) and
+//! of object tracks (section 2.4) share.
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 

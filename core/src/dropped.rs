@@ -32,8 +32,8 @@ impl core::ops::AddAssign for DroppedReturns {
 }
 
 impl DroppedReturns {
-    /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and counted,
-    /// where the return is not valid.
+    /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and
+    /// counted, where the return is not valid.
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
         let p = point.position;
         if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {

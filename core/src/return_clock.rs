@@ -89,8 +89,8 @@ impl Sweep<'_> {
     }
 }
 
-/// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at the
-/// rear, 1 to the left, 2 in front, 3 to the right.
+/// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at
+/// the rear, 1 to the left, 2 in front, 3 to the right.
 #[inline]
 fn pseudo_angle(x: f32, y: f32) -> f32 {
     let sum = x.abs() + y.abs();

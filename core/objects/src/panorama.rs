@@ -1,8 +1,8 @@
 //! Free space beside what a sensor sees: rays that pass an object and end farther away.
 //!
 //! Where an object ends and where it is only hidden by another look alike in its own returns; the
-//! rays next to it know. Directions from a sensor are binned by azimuth and rise, and each bin holds
-//! the nearest and the farthest return.
+//! rays next to it know. Directions from a sensor are binned by azimuth and rise, and each bin
+//! holds the nearest and the farthest return.
 
 /// Bins of a turn; they are as wide as 0.22 to 0.45 degrees.
 const AZIMUTHS: usize = 1024;
@@ -18,9 +18,11 @@ raywake_core::params! {
     pub struct PassingParams {
         /// What is farther than a return by more than this is another object,
         pub passing_margin_m: f32 = 1.0, "m", (0 to 10);
-        /// and by this for each metre of its distance: a side that is seen at a slant goes on that far.
+        /// and by this for each metre of its distance: a side that is seen at a slant goes on that
+        /// far.
         pub passing_margin_ratio: f32 = 0.05, "", (0 to 1);
-        /// Directions that rays must pass in, for each in which they end at the object or before it.
+        /// Directions that rays must pass in, for each in which they end at the object or before
+        /// it.
         pub passing_ratio: u32 = 3, "", (1 to 100);
     }
 }
@@ -46,9 +48,9 @@ impl Panorama {
         Panorama { reach: [[NOTHING; RISES]; AZIMUTHS] }
     }
 
-    /// Finds which rays pass the returns that are `wanted` by their index, among all returns of some
-    /// 100 ms. `ray` tells of a return its sensor, and where its ray began and ended, m; `found` is told
-    /// whether the next rays pass on its left and on its right.
+    /// Finds which rays pass the returns that are `wanted` by their index, among all returns of
+    /// some 100 ms. `ray` tells of a return its sensor, and where its ray began and ended, m;
+    /// `found` is told whether the next rays pass on its left and on its right.
     pub fn look<T>(
         &mut self,
         params: &PassingParams,
@@ -85,8 +87,8 @@ impl Panorama {
     }
 
     /// Whether the next rays to the left and to the right of a return, as the sensor sees it, pass
-    /// what it is of: over the whole height of that, nearly all that end, end farther away. Through a
-    /// window or between wheels only some do.
+    /// what it is of: over the whole height of that, nearly all that end, end farther away. Through
+    /// a window or between wheels only some do.
     fn passed(&self, params: &PassingParams, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
         let Some(Direction { azimuth, rise: own, range }) = direction(from, to) else {
             return [false; 2];

@@ -1,8 +1,8 @@
 //! B-splines of degree 4 on uniform knots (2.5.2.1).
 //!
-//! The knots run on evenly for four spacings beyond either end of the splines' domain, so that every
-//! basis function has the same shape and every time of the domain has five of them. One over `n` basis
-//! functions has `n - 4` pieces.
+//! The knots run on evenly for four spacings beyond either end of the splines' domain, so that
+//! every basis function has the same shape and every time of the domain has five of them. One over
+//! `n` basis functions has `n - 4` pieces.
 
 /// Degree of the polynomials.
 pub const DEGREE: usize = 4;
@@ -57,8 +57,8 @@ impl Knots {
     /// No knots: no spline is over these.
     pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
-    /// One basis function for every `every` seconds from `start` to `end`, at least five and at most
-    /// [`BASES_MAX`].
+    /// One basis function for every `every` seconds from `start` to `end`, at least five and at
+    /// most [`BASES_MAX`].
     pub fn over(start: f64, end: f64, every: f64) -> (Knots, KnotFit) {
         let domain = (end - start).max(DOMAIN_MIN_S);
         let wanted = libm::ceil(domain / every - 1e-9);
@@ -106,8 +106,8 @@ impl Knots {
         self.start + (i as f64 - DEGREE as f64) * self.spacing
     }
 
-    /// Mean of the knots inside basis function `i`, s (Greville abscissa): the spline with these for
-    /// control points is the time.
+    /// Mean of the knots inside basis function `i`, s (Greville abscissa): the spline with these
+    /// for control points is the time.
     pub fn centre(&self, i: usize) -> f64 {
         self.knot(i) + 0.5 * SUPPORT as f64 * self.spacing
     }
@@ -156,7 +156,8 @@ impl Knots {
     }
 }
 
-/// Basis functions of degree `P` that are not zero at `u`, 0 to 1, of a piece, in order; then zeros.
+/// Basis functions of degree `P` that are not zero at `u`, 0 to 1, of a piece, in order; then
+/// zeros.
 fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
     let mut values = [0.0; SUPPORT];
     values[0] = 1.0;

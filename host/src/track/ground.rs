@@ -1,8 +1,8 @@
 //! A map of the ground from a file: an ESRI ASCII grid in the frame of the poses.
 //!
-//! Lines of a key and a number (`ncols`, `nrows`, `xllcorner`, `yllcorner`, `cellsize` and, if there
-//! is such, `NODATA_value`; m), then `nrows` lines of `ncols` heights (m), that of the largest y
-//! first.
+//! Lines of a key and a number (`ncols`, `nrows`, `xllcorner`, `yllcorner`, `cellsize` and, if
+//! there is such, `NODATA_value`; m), then `nrows` lines of `ncols` heights (m), that of the
+//! largest y first.
 
 use std::path::Path;
 

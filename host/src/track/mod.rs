@@ -27,8 +27,8 @@ pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 pub(crate) use write::local;
 
-/// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after the
-/// sweep in hand, and all tracks with it.
+/// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
+/// the sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut settings = config::settings(&args.profile)?;
     settings.profile.deskew |= args.recording.deskew == Some(true);

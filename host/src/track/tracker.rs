@@ -94,9 +94,9 @@ impl Lag {
 }
 
 impl Tracker {
-    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, with a
-    /// map of the ground where there is one, and with the estimate of every sweep where `fixed_lag`
-    /// says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
+    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, with
+    /// a map of the ground where there is one, and with the estimate of every sweep where
+    /// `fixed_lag` says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
     pub fn new(
         rig: &Rig,
         settings: &Settings,
@@ -132,8 +132,8 @@ impl Tracker {
         ]
     }
 
-    /// A sweep, and the one before it if there is one. With the flow it is that one whose tracks come
-    /// next, as its flow is then known; nothing comes back where there is none.
+    /// A sweep, and the one before it if there is one. With the flow it is that one whose tracks
+    /// come next, as its flow is then known; nothing comes back where there is none.
     pub fn sweep(
         &mut self,
         now: &SweepData,

@@ -16,8 +16,8 @@ pub struct Files {
     rows: Vec<TrackRow>,
 }
 
-/// A track at the time of one of its updates: times of the recording, s, and positions in the world,
-/// m.
+/// A track at the time of one of its updates: times of the recording, s, and positions in the
+/// world, m.
 struct TrackRow {
     track: u32,
     filter: ObjectState,

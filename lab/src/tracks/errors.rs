@@ -1,5 +1,5 @@
-//! Errors of a track: of what stands about its own mean, of what moves against the truth at the same
-//! point of the body.
+//! Errors of a track: of what stands about its own mean, of what moves against the truth at the
+//! same point of the body.
 
 use super::object::{Moment, moment_at};
 use crate::labels::turn;

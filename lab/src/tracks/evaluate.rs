@@ -29,7 +29,8 @@ pub enum Method {
     FixedLag(EstimateParams),
 }
 
-/// The trackers of the tables and their names: those of the dissertation, then each option by itself.
+/// The trackers of the tables and their names: those of the dissertation, then each option by
+/// itself.
 pub fn methods() -> [(&'static str, Method); 16] {
     let (printed, ours) = (EstimateParams::DISSERTATION, EstimateParams::DEFAULT);
     let of = Method::Proposed;

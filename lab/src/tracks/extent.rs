@@ -12,8 +12,8 @@ const STEPS: usize = 90;
 const POINTS: usize = 2000;
 
 /// Length, width and height of a cloud, m: of the narrowest upright box seen from above that leaves
-/// out 1 % of the points on each side, the longer side first. Where the cloud's frame looks does not
-/// matter. NaN where the cloud is empty.
+/// out 1 % of the points on each side, the longer side first. Where the cloud's frame looks does
+/// not matter. NaN where the cloud is empty.
 pub fn extent(cloud: &[[f32; 3]]) -> [f64; 3] {
     let step = cloud.len().div_ceil(POINTS).max(1);
     let sample: Vec<[f64; 3]> = cloud.iter().step_by(step).map(|p| p.map(f64::from)).collect();

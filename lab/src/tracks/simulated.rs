@@ -26,7 +26,8 @@ const RETURNS: usize = 2000;
 /// What moves goes so far at least, m.
 const MOVED_M: f64 = 2.0;
 
-/// Parked objects of one drive at most, and moving ones of a kind, so that they are of many streets.
+/// Parked objects of one drive at most, and moving ones of a kind, so that they are of many
+/// streets.
 const PER_DRIVE: [usize; 2] = [6, 2];
 
 /// Between two samples of the truth, s.

@@ -29,9 +29,9 @@ impl Track {
     }
 }
 
-/// The baseline of section 2.4: states after every batch, the centroid of which the filter takes for
-/// the object's position. Where it finds out later which way the object looks, its earlier states
-/// are revised, as they are for the proposed tracker's start.
+/// The baseline of section 2.4: states after every batch, the centroid of which the filter takes
+/// for the object's position. Where it finds out later which way the object looks, its earlier
+/// states are revised, as they are for the proposed tracker's start.
 pub fn baseline(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
     let mut history = Vec::new();
     follow(object, params, |state, revision, _| {

@@ -1,4 +1,5 @@
-//! A dense symmetric system of equations of fixed capacity: small once the model points are eliminated.
+//! A dense symmetric system of equations of fixed capacity: small once the model points are
+//! eliminated.
 
 /// `A x = b` of a size set at run time, at most `N`; `L` is `N * N`.
 pub(super) struct CholeskySystem<const N: usize, const L: usize> {
@@ -51,9 +52,9 @@ impl<const N: usize, const L: usize> CholeskySystem<N, L> {
         }
     }
 
-    /// Solves by Cholesky factorisation after scaling the diagonal to ones. A pivot below `least`, of a
-    /// direction that nothing determines, is raised to it: the solution then hardly goes there. False
-    /// where the system is not finite.
+    /// Solves by Cholesky factorisation after scaling the diagonal to ones. A pivot below `least`,
+    /// of a direction that nothing determines, is raised to it: the solution then hardly goes
+    /// there. False where the system is not finite.
     pub fn solve(&mut self, least: f64) -> bool {
         let n = self.size;
         for i in 0..n {

@@ -1,13 +1,15 @@
 //! Where an object ends, and what that says of its motion.
 //!
-//! Along a smooth side all motions explain the returns alike: a long vehicle that passes by then seems
-//! to stand while its side grows (the failure of figure 2.9). But rays pass beyond its ends: in every
-//! part of the track the foremost and the hindmost return lie at the same two places of the object,
-//! unless something hides them. Both places are unknowns, eliminated as model points are. A return that
-//! falls short of its end weighs less than one beyond it, as the end may be hidden, unless rays pass
-//! there; and hardly anything where the sensor looks along the object from its other end.
+//! Along a smooth side all motions explain the returns alike: a long vehicle that passes by then
+//! seems to stand while its side grows (the failure of figure 2.9). But rays pass beyond its ends:
+//! in every part of the track the foremost and the hindmost return lie at the same two places of
+//! the object, unless something hides them. Both places are unknowns, eliminated as model points
+//! are. A return that falls short of its end weighs less than one beyond it, as the end may be
+//! hidden, unless rays pass there; and hardly anything where the sensor looks along the object from
+//! its other end.
 
-use super::equations::{Equations, PointReturns};
+use super::equations::Equations;
+use super::model_point::ModelPoint;
 use super::observation::Observation;
 use super::params::EndpointParams;
 use super::samples::Sample;
@@ -116,8 +118,8 @@ impl Endpoints {
         self.count += 1;
     }
 
-    /// States of the object in every part by its front, by its rear (`share` 1 and 0), or by what lies
-    /// between.
+    /// States of the object in every part by its front, by its rear (`share` 1 and 0), or by what
+    /// lies between.
     pub fn states(
         &self,
         knots: &Knots,
@@ -200,10 +202,10 @@ impl Endpoints {
         (&end.samples[..self.count], &end.observations[..self.count])
     }
 
-    fn point<'a>(&self, end: &'a End, at: f32, surface: &'a Surface) -> PointReturns<'a> {
+    fn point<'a>(&self, end: &'a End, at: f32, surface: &'a Surface) -> ModelPoint<'a> {
         let (samples, observations) = self.found(end);
         let members = &INDICES[..self.count];
-        PointReturns { members, samples, observations, model: [at, 0.0, 0.0], surface }
+        ModelPoint { members, samples, observations, model: [at, 0.0, 0.0], surface }
     }
 }
 
@@ -211,16 +213,16 @@ fn surface(at: f32) -> Surface {
     Surface { prior_precision: PRIOR_PRECISION, prior_mean: [at, 0.0, 0.0], ..Surface::NONE }
 }
 
-/// Weight of an end seen from a sensor `ahead` of it and `aside`, m: in full from its own side, or from
-/// the side.
+/// Weight of an end seen from a sensor `ahead` of it and `aside`, m: in full from its own side, or
+/// from the side.
 fn view_weight(ahead: f64, aside: f64, full_slope: f64) -> f64 {
     let slope = if ahead < 0.0 { libm::fabs(aside) / -ahead } else { full_slope };
     let view = (slope / full_slope).min(1.0);
     view * view
 }
 
-/// Share of the precision, and squared residual: Huber's loss beyond the end, that of Geman and McClure
-/// before it where it may be hidden.
+/// Share of the precision, and squared residual: Huber's loss beyond the end, that of Geman and
+/// McClure before it where it may be hidden.
 fn loss(residual: f64, hidden: bool, params: &EndpointParams) -> (f64, f64) {
     let (bound, scale) = (params.endpoint_bound_m, params.endpoint_hidden_m);
     if hidden {

@@ -1,15 +1,15 @@
-//! The normal equations of a Gauss-Newton step (2.5.3), the model points eliminated (Schur complement,
-//! as in bundle adjustment: Triggs et al., 2000).
+//! The normal equations of a Gauss-Newton step (2.5.3), the model points eliminated (Schur
+//! complement, as in bundle adjustment: Triggs et al., 2000).
 //!
-//! The height is apart from the plane: no derivative couples them, so there are two systems. A model
-//! point's own block is diagonal in the axes of its surface, so each axis is eliminated as a row: the
-//! Schur complement is one rank-one update for each axis of each point.
+//! The height is apart from the plane: no derivative couples them, so there are two systems. A
+//! model point's own block is diagonal in the axes of its surface, so each axis is eliminated as a
+//! row: the Schur complement is one rank-one update for each axis of each point.
 
 use super::cholesky::CholeskySystem;
+use super::model_point::{Block, ModelPoint};
 use super::observation::Observation;
 use super::samples::Sample;
 use super::state::{ControlPoint, is_vertical, planar, vertical};
-use super::surface::Surface;
 use crate::spline::{BASES_MAX, Basis, SUPPORT};
 
 const PLANAR: usize = 5 * BASES_MAX;
@@ -186,11 +186,11 @@ impl Equations {
     }
 
     /// Eliminates a model point.
-    pub fn eliminate(&mut self, point: &PointReturns) {
+    pub fn eliminate(&mut self, point: &ModelPoint) {
         let Some((low, high)) = point.bases() else { return };
         let mut rows = [[0.0; 3 * BASES_MAX]; 2];
         let mut row_up = [0.0; BASES_MAX];
-        let block = point.block();
+        let Block { precision: own, rhs } = point.block();
         for (sample, observation) in point.returns() {
             let from = sample.basis.first - low;
             for (a, row) in rows.iter_mut().enumerate() {
@@ -212,10 +212,10 @@ impl Equations {
         }
         for (axis, row) in rows.iter().enumerate() {
             let row = &row[..3 * (high - low)];
-            self.planar.eliminate(3 * low, row, block.precision[axis], block.rhs[axis]);
+            self.planar.eliminate(3 * low, row, own[axis], rhs[axis]);
         }
         let row = &row_up[..high - low];
-        self.vertical.eliminate(low, row, block.precision[2], block.rhs[2]);
+        self.vertical.eliminate(low, row, own[2], rhs[2]);
     }
 
     /// The solution as a step of the control points. None where there is none.
@@ -241,73 +241,11 @@ impl Equations {
     }
 }
 
-/// A model point and its returns.
-pub(super) struct PointReturns<'a> {
-    /// Indices of the returns.
-    pub members: &'a [u16],
-    pub samples: &'a [Sample],
-    pub observations: &'a [Observation],
-    /// m.
-    pub model: [f32; 3],
-    pub surface: &'a Surface,
-}
-
-/// A model point's own block, which is diagonal, and right-hand side, in the axes of its surface.
-struct Block {
-    precision: [f64; 3],
-    rhs: [f64; 3],
-}
-
-impl<'a> PointReturns<'a> {
-    fn returns(&self) -> impl Iterator<Item = (&'a Sample, &'a Observation)> {
-        let (samples, observations) = (self.samples, self.observations);
-        self.members.iter().map(|&i| (&samples[usize::from(i)], &observations[usize::from(i)]))
-    }
-
-    fn block(&self) -> Block {
-        let Surface { normal: [nx, ny], prior_mean, prior_precision, .. } = *self.surface;
-        let back: [f64; 3] = core::array::from_fn(|d| {
-            prior_precision * (f64::from(prior_mean[d]) - f64::from(self.model[d]))
-        });
-        let rhs = [nx * back[0] + ny * back[1], nx * back[1] - ny * back[0], back[2]];
-        let mut block = Block { precision: [prior_precision; 3], rhs };
-        for (_, observation) in self.returns() {
-            for a in 0..3 {
-                block.precision[a] += observation.precision[a];
-                block.rhs[a] += observation.precision[a] * observation.residual[a];
-            }
-        }
-        block
-    }
-
-    /// Basis functions that some returns touch.
-    fn bases(&self) -> Option<(usize, usize)> {
-        let firsts = || self.returns().map(|(sample, _)| sample.basis.first);
-        Some((firsts().min()?, firsts().max()? + SUPPORT))
-    }
-
-    /// The point's step, m, that goes with a step of the control points.
-    pub fn back_substitute(&self, step: &[ControlPoint]) -> [f64; 3] {
-        let mut block = self.block();
-        for (sample, observation) in self.returns() {
-            let [x, y, z, heading] = sample.basis.pose(step);
-            for a in 0..2 {
-                let axis = observation.axes[a];
-                let moved = axis[0] * x + axis[1] * y - observation.by_heading[a] * heading;
-                block.rhs[a] -= observation.precision[a] * moved;
-            }
-            block.rhs[2] -= observation.precision[2] * z;
-        }
-        let [across, along, up] = core::array::from_fn(|a| block.rhs[a] / block.precision[a]);
-        let [nx, ny] = self.surface.normal;
-        [nx * across - ny * along, ny * across + nx * along, up]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
     use super::super::cholesky::tests::gauss;
+    use super::super::surface::Surface;
     use super::*;
     use crate::random::Random;
     use crate::spline::Knots;
@@ -458,7 +396,7 @@ mod tests {
                 (0..scene.samples.len() as u16).filter(of).collect()
             })
             .collect();
-        let point = |n: usize| PointReturns {
+        let point = |n: usize| ModelPoint {
             members: &members[n],
             samples: &scene.samples,
             observations: &observations,

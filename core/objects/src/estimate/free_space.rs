@@ -1,5 +1,5 @@
-//! Free-space carving (Kutulakos and Seitz, 2000, on points): a ray that goes on beyond a model point
-//! shows that nothing is there.
+//! Free-space carving (Kutulakos and Seitz, 2000, on points): a ray that goes on beyond a model
+//! point shows that nothing is there.
 
 use super::MODEL_MAX;
 use super::params::FreeSpaceParams;
@@ -47,7 +47,8 @@ impl CarvingRay {
 }
 
 impl Problem {
-    /// Removes model points with fewer returns than rays through them, unless that were all. How many.
+    /// Removes model points with fewer returns than rays through them, unless that were all. How
+    /// many.
     pub(super) fn carve(&mut self, return_sigma_m: f64, params: &FreeSpaceParams) -> usize {
         let samples = &self.samples.all()[self.active.clone()];
         let every = samples.len().div_ceil(params.carving_rays).max(1);

@@ -1,5 +1,5 @@
-//! The first trajectory (2.5.3): splines fitted to the history of another tracker, smoothed with the
-//! process model, or at rest; then grown from the middle of the track.
+//! The first trajectory (2.5.3): splines fitted to the history of another tracker, smoothed with
+//! the process model, or at rest; then grown from the middle of the track.
 
 use super::params::{EstimateParams, SmoothingParams};
 use super::problem::Problem;
@@ -12,8 +12,8 @@ use crate::ObjectState;
 const GROWTHS_MAX: f64 = 64.0;
 
 impl Problem {
-    /// The first trajectory of a solve, from a history. False where there is none: everything is then
-    /// at rest where the returns are on average.
+    /// The first trajectory of a solve, from a history. False where there is none: everything is
+    /// then at rest where the returns are on average.
     pub fn start(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
         if !self.fit(history) {
             self.stand_at_mean();
@@ -43,8 +43,8 @@ impl Problem {
         self.equations.step(control_points, &mut self.step)
     }
 
-    /// The trajectory that a history of positions and the process model make together (a smoother by
-    /// Gauss-Newton). What moves slowly has no heading in it but noise.
+    /// The trajectory that a history of positions and the process model make together (a smoother
+    /// by Gauss-Newton). What moves slowly has no heading in it but noise.
     pub fn smooth(&mut self, params: &EstimateParams, history: &[ObjectState]) {
         let n = self.knots.bases();
         let control_points = &mut self.solution.control_points[..n];
@@ -100,8 +100,8 @@ impl Problem {
         self.solution.control_points[..self.knots.bases()].fill(mean.map(|sum| sum / count));
     }
 
-    /// Grows the trajectory from the middle of the returns outwards: what is seen next is registered
-    /// with the model of what was seen so far, starting where the process model puts it.
+    /// Grows the trajectory from the middle of the returns outwards: what is seen next is
+    /// registered with the model of what was seen so far, starting where the process model puts it.
     pub fn grow(&mut self, params: &EstimateParams) {
         let growth = &params.growth;
         let sparse = &EstimateParams {

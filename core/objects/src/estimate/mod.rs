@@ -14,23 +14,24 @@
 //! (2.24) and (2.25) without the half, (2.25) with `R_z` for its inverse and `R_z = σ_z I` for
 //! `σ_z² I`; the above follows from Bayes' rule and from what a Gaussian is.
 //!
-//! Everything is in double precision but the places of returns and model points: `Q_u^-1` reaches 1e6
-//! beside `R_z^-1` of 4.
+//! Everything is in double precision but the places of returns and model points: `Q_u^-1` reaches
+//! 1e6 beside `R_z^-1` of 4.
 //!
 //! The plain method stays where its start puts it: the visible face of an object changes as one
 //! passes it, a history of centroids slides along, and the model takes up two shifted copies of one
 //! face (figure 2.9). What cures that, each an option of [`EstimateParams`] that `raywake-lab eval
 //! tracks` measures by itself:
 //!
-//! - [`endpoints`]: where the object ends, and that rays pass there ([`crate::panorama`]);
-//! - [`velocity_search`]: more starts than one, found by a search over velocities;
-//! - [`initial`]: a start that grows from the middle of the track over a sparse model;
-//! - [`surface`]: returns that weigh across surfaces;
-//! - [`free_space`]: removal of model points that rays went through;
-//! - [`process`]: a Student-t turn rate: steady motion with a few hard turns.
+//! - `endpoints`: where the object ends, and that rays pass there ([`crate::panorama`]);
+//! - `velocity_search`: more starts than one, found by a search over velocities;
+//! - `initial`: a start that grows from the middle of the track over a sparse model;
+//! - `surface`: returns that weigh across surfaces;
+//! - `free_space`: removal of model points that rays went through;
+//! - `process`: a Student-t turn rate: steady motion with a few hard turns.
 //!
-//! A round object hides where on it the origin lies: with one behind it, as a trailer's axle, it turns
-//! later and more gently. So its points are near the origin ([`EstimateParams::reference_length_m`]).
+//! A round object hides where on it the origin lies: with one behind it, as a trailer's axle, it
+//! turns later and more gently. So its points are near the origin
+//! ([`EstimateParams::reference_length_m`]).
 
 mod cholesky;
 mod endpoints;
@@ -39,6 +40,7 @@ mod fixed_lag;
 mod free_space;
 mod initial;
 mod members;
+mod model_point;
 mod nearest;
 mod observation;
 mod params;
@@ -188,8 +190,8 @@ impl Estimator {
         }
     }
 
-    /// Backwards at one heading is forwards at the opposite one: of the two, the way it goes for most
-    /// of its track.
+    /// Backwards at one heading is forwards at the opposite one: of the two, the way it goes for
+    /// most of its track.
     fn face_forward(&mut self) {
         let control_points = &mut self.best.control_points[..self.problem.knots.bases()];
         let speed: f64 = control_points.iter().map(|point| point[SPEED]).sum();
@@ -211,8 +213,8 @@ impl Estimator {
         control_points.iter_mut().for_each(|point| point[HEADING] -= turns);
     }
 
-    /// State of the object at `time_s`, extrapolated outside the time of its returns; all zeros where
-    /// there is no estimate.
+    /// State of the object at `time_s`, extrapolated outside the time of its returns; all zeros
+    /// where there is no estimate.
     pub fn state(&self, time_s: f64) -> ObjectState {
         let knots = &self.problem.knots;
         if *knots == Knots::NONE {

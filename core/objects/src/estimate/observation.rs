@@ -1,15 +1,15 @@
 //! A return as an iteration sees it: its place on the object, its residual and its derivatives.
 //!
-//! A return `z` at the time `t`, of the model point `m`, has the residual `e = R(φ)'(z - p) - m`. Turned
-//! into the world's axes, which leaves its length, its derivatives hold no sine: with `d = z - p`, `-1`
-//! for the position, `(d_y, -d_x)` for the heading, `-R` for `m`.
+//! A return `z` at the time `t`, of the model point `m`, has the residual `e = R(φ)'(z - p) - m`.
+//! Turned into the world's axes, which leaves its length, its derivatives hold no sine: with `d = z
+//! - p`, `-1` for the position, `(d_y, -d_x)` for the heading, `-R` for `m`.
 
 use super::samples::Sample;
 use super::state::ControlPoint;
 use super::surface::Surface;
 
-/// A return at a trajectory. The axes of residual and precision are those of its model point's surface:
-/// across, along and up.
+/// A return at a trajectory. The axes of residual and precision are those of its model point's
+/// surface: across, along and up.
 #[derive(Clone, Copy)]
 pub(super) struct Observation {
     /// From the object's origin to the return, m, in the world's axes.

@@ -38,9 +38,9 @@ raywake_core::params! {
         /// Whether rays that pass an object tell where it ends (see [`crate::panorama`]).
         pub passing: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
         /// Length of an object for which the noise, `basis_s` and `tangential_sigma_m` hold; 0: for
-        /// objects of any length. Turn rate noise is inversely proportional to the length, as is the
-        /// speed noise of longer objects; knots of shorter ones are closer, and their returns less
-        /// free along surfaces; `shape_sigma_m` is no more than the length.
+        /// objects of any length. Turn rate noise is inversely proportional to the length, as is
+        /// the speed noise of longer objects; knots of shorter ones are closer, and their returns
+        /// less free along surfaces; `shape_sigma_m` is no more than the length.
         pub reference_length_m: f64 = 4.5, "m", (0 to 100), "A car's.";
         /// Objects that look shorter count as of this length.
         pub length_min_m: f64 = 0.6, "m", (above 0);
@@ -82,8 +82,8 @@ raywake_core::params! {
     /// Endpoints: where an object begins and ends along itself.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct EndpointParams {
-        /// Standard deviation of a return at an end of the object; 0: ends are not used. They lead the
-        /// first descent, after which the returns alone decide.
+        /// Standard deviation of a return at an end of the object; 0: ends are not used. They lead
+        /// the first descent, after which the returns alone decide.
         pub endpoint_sigma_m: f64 = 0.2, "m", (0 to 10),
             "`raywake-lab eval tracks` has a row without.";
         /// Time over which one foremost and one hindmost return are taken.
@@ -126,8 +126,8 @@ raywake_core::params! {
 }
 
 raywake_core::params! {
-    /// Growth of the first trajectory from the middle of the track, over a sparse model: a dense one
-    /// would hold it where it starts.
+    /// Growth of the first trajectory from the middle of the track, over a sparse model: a dense
+    /// one would hold it where it starts.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GrowthParams {
         /// Whether it grows.
@@ -241,7 +241,8 @@ raywake_core::params! {
         pub young_points_max: usize = 75, "points", (1 to 3000);
         /// Net displacement backwards from which an object is turned round.
         pub reversed_m: f64 = 0.3, "m", (0 to 10);
-        /// Length of the object, at most, by which the tracker's centroid may differ from the estimate.
+        /// Length of the object, at most, by which the tracker's centroid may differ from the
+        /// estimate.
         pub strayed_length_m: f64 = 15.0, "m", (0 to 100);
     }
 }

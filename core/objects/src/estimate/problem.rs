@@ -1,11 +1,12 @@
-//! One trajectory and model being estimated: iterations of Gauss and Newton, damped as Levenberg and
-//! Marquardt do, each with new nearest model points (as iterated closest points have).
+//! One trajectory and model being estimated: iterations of Gauss and Newton, damped as Levenberg
+//! and Marquardt do, each with new nearest model points (as iterated closest points have).
 
 use core::ops::Range;
 
 use super::endpoints::{Endpoints, PARTS};
-use super::equations::{Equations, PointReturns};
+use super::equations::Equations;
 use super::members::Members;
+use super::model_point::ModelPoint;
 use super::nearest::{NearestGrid, square_distance};
 use super::observation::Observation;
 use super::params::EstimateParams;
@@ -271,13 +272,13 @@ impl Problem {
         cost
     }
 
-    /// One step of trajectory, model and ends; the equations hold process and prior. None where there
-    /// is no finite solution.
+    /// One step of trajectory, model and ends; the equations hold process and prior. None where
+    /// there is no finite solution.
     fn step(&mut self, damping: f64) -> Option<()> {
         let samples = &self.samples.all()[self.active.clone()];
         let (observations, members) = (&self.observations[..], &self.members);
         let Solution { control_points, model, surfaces, points, ends } = &mut self.solution;
-        let point = |number: usize, model: &[f32; 3]| PointReturns {
+        let point = |number: usize, model: &[f32; 3]| ModelPoint {
             members: members.of(number),
             samples,
             observations,

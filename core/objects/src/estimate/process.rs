@@ -1,21 +1,22 @@
-//! Process model (2.5.1.1): `J_u = 1/2 ∫ e_u' Q_u^-1 e_u`, with `e_u` the derivative of the splines minus
-//! that of the unicycle.
+//! Process model (2.5.1.1): `J_u = 1/2 ∫ e_u' Q_u^-1 e_u`, with `e_u` the derivative of the splines
+//! minus that of the unicycle.
 //!
-//! The integral is taken over every piece of the splines by Gauss and Legendre's rule with six nodes,
-//! which is exact for polynomials of degree 11. All but the unicycle's `v cos` and `v sin` of the
-//! heading are polynomials of degree 8 at most; those two are as smooth, and over a piece, in which a
-//! heading turns by a fraction of a radian, six nodes leave less than a millionth of the integral
-//! (`the_integral_is_exact_enough`).
+//! The integral is taken over every piece of the splines by Gauss and Legendre's rule with six
+//! nodes, which is exact for polynomials of degree 11. All but the unicycle's `v cos` and `v sin`
+//! of the heading are polynomials of degree 8 at most; those two are as smooth, and over a piece,
+//! in which a heading turns by a fraction of a radian, six nodes leave less than a millionth of the
+//! integral (`the_integral_is_exact_enough`).
 //!
-//! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_decay_s`. And motion is steady but
-//! for a few hard turns, which no Gaussian says: it lets the steady parts jitter and smooths the turns.
-//! The noise is Student-t instead (as in Roth, Özkan and Gustafsson, ICASSP 2013): the variance of each
-//! manoeuvre of `m` pieces is unknown, its reciprocal Gamma distributed with `ν` degrees of freedom.
-//! Integrated out, with `S = ∫ e² / q²` over the manoeuvre, its cost is `(ν + m) / 2 ln(1 + S / ν)` where
-//! a Gaussian's is `S / 2`. As nobody knows when manoeuvres begin, the cost is the mean over all `m` ways
-//! to cut the track into them. Gauss-Newton takes it as a Gaussian of precision `(ν + m) / (ν + S)` times
-//! `1 / q²` (iteratively reweighted least squares), which has the same gradient. It has further minima,
-//! so trajectories are found with Gaussian noise first.
+//! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_decay_s`. And motion is steady
+//! but for a few hard turns, which no Gaussian says: it lets the steady parts jitter and smooths
+//! the turns. The noise is Student-t instead (as in Roth, Özkan and Gustafsson, ICASSP 2013): the
+//! variance of each manoeuvre of `m` pieces is unknown, its reciprocal Gamma distributed with `ν`
+//! degrees of freedom. Integrated out, with `S = ∫ e² / q²` over the manoeuvre, its cost is `(ν +
+//! m) / 2 ln(1 + S / ν)` where a Gaussian's is `S / 2`. As nobody knows when manoeuvres begin, the
+//! cost is the mean over all `m` ways to cut the track into them. Gauss-Newton takes it as a
+//! Gaussian of precision `(ν + m) / (ν + S)` times `1 / q²` (iteratively reweighted least squares),
+//! which has the same gradient. It has further minima, so trajectories are found with Gaussian
+//! noise first.
 
 use super::cholesky::CholeskySystem;
 use super::equations::Equations;
@@ -134,8 +135,8 @@ pub(super) fn add(
     cost
 }
 
-/// Calls `visit` with the basis functions' values and slopes at every node of a piece, and the node's
-/// share of its length, s.
+/// Calls `visit` with the basis functions' values and slopes at every node of a piece, and the
+/// node's share of its length, s.
 fn nodes(knots: &Knots, mut visit: impl FnMut(&[f64; SUPPORT], &[f64; SUPPORT], f64)) {
     for (place, share) in GAUSS {
         for u in [0.5 - 0.5 * place, 0.5 + 0.5 * place] {

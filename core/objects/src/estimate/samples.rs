@@ -1,4 +1,5 @@
-//! The returns that take part in an estimate: a bounded number, as evenly spaced in time as they allow.
+//! The returns that take part in an estimate: a bounded number, as evenly spaced in time as they
+//! allow.
 
 use crate::spline::{Basis, Knots};
 use crate::{ObjectReturn, RETURNS_MAX};
@@ -7,6 +8,8 @@ use crate::{ObjectReturn, RETURNS_MAX};
 const TICKS: usize = 4096;
 /// No track gets so far from its anchor and its start, m and s.
 const FAR: f32 = 1e5;
+/// Least time that ticks divide, s: all returns may be of one instant.
+const SPAN_MIN_S: f32 = 1e-3;
 /// Parts of a track that may give equally many returns.
 const PARTS: usize = 128;
 const TICKS_PER_PART: usize = TICKS / PARTS;
@@ -66,7 +69,8 @@ pub(super) struct Taken {
     pub unsound: usize,
 }
 
-/// Returns that a part gives at most, so that all together give no more than `at_most` (or one each).
+/// Returns that a part gives at most, so that all together give no more than `at_most` (or one
+/// each).
 fn quota(counts: &[u32; PARTS], at_most: usize) -> u32 {
     let (mut low, mut high) = (1, at_most as u32 + 1);
     while high - low > 1 {
@@ -88,9 +92,9 @@ impl Samples {
         Samples { all: [Sample::NONE; RETURNS_MAX], count: 0, ticks: [0; TICKS], length_m: 0.0 }
     }
 
-    /// Takes at most `at_most` of the returns: parts of the track that have more than their quota give
-    /// every k-th, in time order (within a tick, in the order given), with or without what rays pass.
-    /// None where no return is sound.
+    /// Takes at most `at_most` of the returns: parts of the track that have more than their quota
+    /// give every k-th, in time order (within a tick, in the order given), with or without what
+    /// rays pass. None where no return is sound.
     pub fn take(
         &mut self,
         returns: &[ObjectReturn],
@@ -102,7 +106,7 @@ impl Samples {
         let sound = || returns.iter().filter(|one| is_sound_return(one));
         let times = || sound().map(|one| one.time_s);
         let (first_s, last_s) = (times().reduce(f32::min)?, times().reduce(f32::max)?);
-        let per_s = TICKS as f32 / (last_s - first_s).max(1e-3);
+        let per_s = TICKS as f32 / (last_s - first_s).max(SPAN_MIN_S);
         let tick = |one: &ObjectReturn| (((one.time_s - first_s) * per_s) as usize).min(TICKS - 1);
         let counts = self.count_ticks(sound().map(tick));
         let most = quota(&counts, at_most);
@@ -156,7 +160,8 @@ impl Samples {
         });
     }
 
-    /// Takes the first [`RETURNS_MAX`] of these positions and times, which are in the order of time.
+    /// Takes the first [`RETURNS_MAX`] of these positions and times, which are in the order of
+    /// time.
     pub fn set(&mut self, returns: impl Iterator<Item = ([f32; 3], f32)>) {
         self.count = 0;
         for (sample, (position, time_s)) in self.all.iter_mut().zip(returns) {
@@ -173,8 +178,8 @@ impl Samples {
         }
     }
 
-    /// Visible length of the object, m: the diagonal of what is seen of it in a glance, which four of
-    /// five glances do not exceed; 0 where no glance tells.
+    /// Visible length of the object, m: the diagonal of what is seen of it in a glance, which four
+    /// of five glances do not exceed; 0 where no glance tells.
     pub fn length_m(&self) -> f32 {
         self.length_m
     }

@@ -60,7 +60,8 @@ pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectS
     })
 }
 
-/// State at `time_s`, extrapolated at constant velocity from `inside`, a time of the splines' domain.
+/// State at `time_s`, extrapolated at constant velocity from `inside`, a time of the splines'
+/// domain.
 pub(super) fn state_at(
     knots: &Knots,
     control_points: &[ControlPoint],

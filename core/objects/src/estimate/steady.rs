@@ -5,6 +5,8 @@ use super::problem::Problem;
 use super::velocity_search::{SteadyMotion, VelocitySearch, within};
 use crate::wrap_angle;
 
+/// Least time between motions for an interpolation, s.
+const STEP_MIN_S: f64 = 1e-3;
 /// Parts of a track at most that are steady.
 const PARTS_MAX: usize = 16;
 
@@ -86,6 +88,6 @@ fn steady_parts(
 fn velocity_at(motions: &[SteadyMotion], time: f64) -> [f64; 2] {
     let next = motions.partition_point(|motion| motion.time_s <= time);
     let (a, b) = (&motions[next.max(1) - 1], &motions[next.min(motions.len() - 1)]);
-    let share = (time - a.time_s) / (b.time_s - a.time_s).max(1e-3);
+    let share = (time - a.time_s) / (b.time_s - a.time_s).max(STEP_MIN_S);
     [0, 1].map(|d| a.velocity[d] + share * (b.velocity[d] - a.velocity[d]))
 }

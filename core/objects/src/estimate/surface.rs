@@ -37,8 +37,8 @@ impl Surface {
         }
     }
 
-    /// Normal and precision from the scatter of all returns: along the eigenvectors of its covariance
-    /// in the plane.
+    /// Normal and precision from the scatter of all returns: along the eigenvectors of its
+    /// covariance in the plane.
     pub fn fit(&mut self, scatter: &Scatter, params: &EstimateParams) {
         let count = f64::from(scatter.count);
         let [xx, xy, yy, zz] = scatter.sums.map(|sum| f64::from(sum) / count);

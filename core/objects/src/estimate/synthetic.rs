@@ -319,3 +319,18 @@ pub fn history_errors(drive: &Drive) -> Errors {
             .unwrap()
     })
 }
+
+/// It comes towards the vehicle and passes it.
+pub fn tram(seed: u64, speed: f64) -> Plan {
+    Plan {
+        seconds: 6.0,
+        speed,
+        heading: core::f64::consts::PI,
+        position: [3.0 * (speed + 6.0), 4.5],
+        vehicle_mps: 6.0,
+        length: 30.0,
+        width: 2.6,
+        height: 3.4,
+        ..parked(seed)
+    }
+}

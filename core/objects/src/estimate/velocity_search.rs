@@ -1,9 +1,10 @@
 //! Steady motion that lays the returns of a time over each other.
 //!
-//! Of all velocities that a centroid allows, the search takes the one that makes the cloud crispest: of
-//! least entropy over cells (compare 2.6.4; Sheehan, Harrison and Newman, 2012). It goes over a lattice of
-//! velocities, as Gauss-Newton does not find far minima. Along a smooth side all velocities are as crisp,
-//! but for where the object ends: returns that rays pass count once more, by themselves.
+//! Of all velocities that a centroid allows, the search takes the one that makes the cloud
+//! crispest: of least entropy over cells (compare 2.6.4; Sheehan, Harrison and Newman, 2012). It
+//! goes over a lattice of velocities, as Gauss-Newton does not find far minima. Along a smooth side
+//! all velocities are as crisp, but for where the object ends: returns that rays pass count once
+//! more, by themselves.
 
 use super::params::SearchParams;
 use super::samples::Sample;
@@ -217,8 +218,8 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    /// The side and the front of something so long that passes at `velocity`, its front hidden until
-    /// the sixth part of ten.
+    /// The side and the front of something so long that passes at `velocity`, its front hidden
+    /// until the sixth part of ten.
     fn passing(length_m: f32, velocity: [f32; 2]) -> Vec<Sample> {
         let mut random = Random(3);
         let speed = libm::hypotf(velocity[0], velocity[1]);
@@ -263,7 +264,8 @@ mod tests {
         }
     }
 
-    /// A smooth side behind a gap: its front shows until it leaves the gap, its rear when it enters.
+    /// A smooth side behind a gap: its front shows until it leaves the gap, its rear when it
+    /// enters.
     #[test]
     fn where_it_ends_tells_how_a_side_moves() {
         let mut search = Box::new(VelocitySearch::new());

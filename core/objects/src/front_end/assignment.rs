@@ -6,8 +6,8 @@ use raywake_core::record::NONE;
 /// Segments, and one column for each track that none continues.
 const COLUMNS: usize = SEGMENTS_MAX + TRACKS_MAX;
 
-/// Tracks are rows, segments columns; a track without a segment costs the gate. Rows are added one at a
-/// time along shortest augmenting paths (Jonker and Volgenant, 1987).
+/// Tracks are rows, segments columns; a track without a segment costs the gate. Rows are added one
+/// at a time along shortest augmenting paths (Jonker and Volgenant, 1987).
 pub(super) struct Assignment {
     /// Cost of a segment for a track; infinite beyond the gate.
     cost: [[f32; SEGMENTS_MAX]; TRACKS_MAX],
@@ -68,8 +68,8 @@ impl Assignment {
         (row != NONE).then_some(row as usize)
     }
 
-    /// The column without a row that is nearest to a row without a column. There always is one: that
-    /// of the row itself.
+    /// The column without a row that is nearest to a row without a column. There always is one:
+    /// that of the row itself.
     fn nearest_free(&mut self, track: usize, segments: usize, columns: usize, gate: f32) -> usize {
         self.length[..columns].fill(f64::INFINITY);
         self.visited[..columns].fill(false);

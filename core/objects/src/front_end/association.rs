@@ -74,8 +74,8 @@ impl Association {
     }
 }
 
-/// Squared Mahalanobis distance of a segment from a track's prediction, as a fraction of the gate; none
-/// beyond it.
+/// Squared Mahalanobis distance of a segment from a track's prediction, as a fraction of the gate;
+/// none beyond it.
 fn gate_share(
     params: &FrontEndParams,
     batch: &Batch,

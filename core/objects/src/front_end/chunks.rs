@@ -88,8 +88,8 @@ impl Chunks {
         &self.all
     }
 
-    /// Adds a return to the nearest chunk that it may join, or to one of its own. The chunk, or [`NONE`]
-    /// where there is no room.
+    /// Adds a return to the nearest chunk that it may join, or to one of its own. The chunk, or
+    /// [`NONE`] where there is no room.
     pub fn add(&mut self, params: &FrontEndParams, one: &BatchReturn) -> u32 {
         let index = self.nearest(params, one).unwrap_or_else(|| self.open(one));
         if let Some(chunk) = self.all.get_mut(index as usize) {

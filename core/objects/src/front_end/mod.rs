@@ -6,14 +6,14 @@
 //!                                                 chunks
 //! ```
 //! Returns of some 100 ms, of any number of sensors, each at its own time, are put into the world
-//! ([`batch`]); those of objects are found by the variance of z in 2-D cells and by the ground
-//! ([`object_returns`]); they are gathered in small containers in space and time ([`chunks`]), whose
-//! connected components are segments ([`segments`]). Each segment continues at most one track
-//! ([`association`]), or begins one; a track that is not observed for a while ends.
+//! (`batch`); those of objects are found by the variance of z in 2-D cells and by the ground
+//! (`object_returns`); they are gathered in small containers in space and time (`chunks`),
+//! whose connected components are segments (`segments`). Each segment continues at most one track
+//! (`association`), or begins one; a track that is not observed for a while ends.
 //!
 //! With the flow of the returns ([`FrontEnd::take`]) what moves is an object's wherever it is,
-//! neighbours that move differently are two objects, and the velocity of a segment joins its position
-//! in the gate.
+//! neighbours that move differently are two objects, and the velocity of a segment joins its
+//! position in the gate.
 
 mod assignment;
 mod association;
@@ -22,6 +22,8 @@ mod chunks;
 mod counts;
 mod object_returns;
 mod params;
+#[cfg(test)]
+mod scene;
 mod segments;
 #[cfg(test)]
 mod tests;
@@ -102,8 +104,8 @@ impl FrontEnd {
     }
 
     /// Continues the tracks with what has been taken since the last step. `tracks` are the same as
-    /// then, the first [`TRACKS_MAX`] of them are used; those that have ended can be looked at until
-    /// the next step.
+    /// then, the first [`TRACKS_MAX`] of them are used; those that have ended can be looked at
+    /// until the next step.
     pub fn step(
         &mut self,
         params: &FrontEndParams,

@@ -2,113 +2,15 @@
 
 extern crate std;
 use super::association::velocity_distance2;
+use super::scene::{PARAMS, Run, Thing, ground, rig, seen};
 use super::*;
 use crate::centroid_ekf::CentroidEkf;
 use glam::DVec3;
 use raywake_core::output::PointFlow;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
-use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
-
-const PARAMS: FrontEndParams = FrontEndParams::DEFAULT;
-
-fn rig(sensors: usize, timing: Timing) -> Rig {
-    let up = |n: usize| Pose::planar(0.0, n as f64, 1.7, 0.0);
-    Rig {
-        sensors: (0..sensors).map(up).collect(),
-        timing,
-        distorted: false,
-        ground_m: 0.0,
-        own_vehicle: None,
-    }
-}
-
-const OFFSETS: Timing = Timing::Offset { from_s: 0.0, span_s: 0.1 };
-
-/// A box on the ground, seen all around.
-#[derive(Clone, Copy)]
-struct Thing {
-    at: [f64; 2],
-    size: [f64; 3],
-    velocity: [f64; 2],
-}
-
-impl Thing {
-    fn car(x: f64, y: f64, velocity: [f64; 2]) -> Thing {
-        Thing { at: [x, y], size: [4.0, 1.8, 1.5], velocity }
-    }
-
-    /// Points of its sides `time_s` after the beginning.
-    fn points(&self, time_s: f64) -> Vec<[f64; 3]> {
-        let [l, w, h] = self.size;
-        let centre = [0, 1].map(|a| self.at[a] + time_s * self.velocity[a]);
-        let mut points = Vec::new();
-        let steps = |length: f64| (length / 0.2) as i32;
-        for k in 1..=steps(h) {
-            for i in 0..=steps(l) {
-                for j in 0..=steps(w) {
-                    if i == 0 || j == 0 || i == steps(l) || j == steps(w) {
-                        let [x, y] = [i as f64 * 0.2 - 0.5 * l, j as f64 * 0.2 - 0.5 * w];
-                        points.push([centre[0] + x, centre[1] + y, k as f64 * 0.2]);
-                    }
-                }
-            }
-        }
-        points
-    }
-}
-
-/// Points of flat ground up to 45 m away.
-fn ground() -> Vec<[f64; 3]> {
-    let at = |n: i32| n as f64 * 0.6 - 44.9;
-    (0..150).flat_map(|i| (0..150).map(move |j| [at(i), at(j), 0.0])).collect()
-}
-
-/// What a sensor sees `offset_s` after the stamp.
-fn seen(things: &[Thing], stamp_s: f64, offset_s: f32, sensor: u32) -> Vec<Point> {
-    let places = things.iter().flat_map(|t| t.points(stamp_s + offset_s as f64));
-    let point =
-        |p: [f64; 3]| Point { position: p.map(|v| v as f32), intensity: 0.0, offset_s, sensor };
-    ground().into_iter().chain(places).map(point).collect()
-}
-
-struct Run {
-    front_end: Box<FrontEnd>,
-    tracks: Vec<Track>,
-    rig: Rig,
-    place: Pose,
-}
-
-impl Run {
-    fn new(sensors: usize, capacity: usize) -> Run {
-        Run {
-            front_end: Box::new(FrontEnd::new()),
-            tracks: vec![Track::new(); capacity],
-            rig: rig(sensors, OFFSETS),
-            place: Pose::IDENTITY,
-        }
-    }
-
-    fn take(&mut self, stamp_s: f64, points: &[Point], flows: Option<Flows>) {
-        let sweep = Sweep { stamp_s, points, world_from_vehicle: self.place, twist: Twist::ZERO };
-        self.front_end.take(&PARAMS, &self.rig, &sweep, flows);
-    }
-
-    fn step(&mut self) -> TrackingCounts {
-        self.front_end.step(&PARAMS, None, &mut self.tracks)
-    }
-
-    fn see(&mut self, things: &[Thing], stamp_s: f64) -> TrackingCounts {
-        self.take(stamp_s, &seen(things, stamp_s, 0.0, 0), None);
-        self.step()
-    }
-
-    fn live(&self) -> Vec<&Track> {
-        self.tracks.iter().filter(|t| t.life == Life::Live).collect()
-    }
-}
 
 #[test]
 fn cars_are_followed_far_from_the_origin() {

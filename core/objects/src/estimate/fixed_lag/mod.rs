@@ -1,17 +1,19 @@
 //! Fixed-lag smoothing: the same estimate over the last seconds, with every sweep.
 //!
-//! What leaves the window stays as a prior: the state at the window's first time where the estimate had
-//! it when the window last moved on, and for each model point the mean of the returns that left, as
-//! precise as they were many. An object needs its [`FixedLag`] (some 30 KB); the workspace is one for
-//! all.
+//! What leaves the window stays as a prior: the state at the window's first time where the estimate
+//! had it when the window last moved on, and for each model point the mean of the returns that
+//! left, as precise as they were many. An object needs its [`FixedLag`] (some 30 KB); the workspace
+//! is one for all.
 //!
-//! A young track is solved twice with every sweep, over a sparse model made anew: from where it is, and
-//! from one other start, which take turns; the cheaper remains.
+//! A young track is solved twice with every sweep, over a sparse model made anew: from where it is,
+//! and from one other start, which take turns; the cheaper remains.
 //!
 //! So the work of a push is bounded, however young its track and however many appear at once:
 //! [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
 
 mod model;
+#[cfg(test)]
+mod tests;
 mod young;
 
 use super::Estimator;
@@ -28,8 +30,8 @@ use model::WindowModel;
 
 /// The window, s. It sizes what is kept, as do the following.
 const WINDOW_S: f64 = 2.5;
-/// Pieces of the splines at most, and their length, s: a piece more than the window, into which time
-/// runs on.
+/// Pieces of the splines at most, and their length, s: a piece more than the window, into which
+/// time runs on.
 const PIECES: usize = 6;
 const PIECE_S: f64 = 0.5;
 const BASES: usize = PIECES + DEGREE;
@@ -120,12 +122,12 @@ impl FixedLag {
         self.restarts = 0;
     }
 
-    /// Takes in the returns of a sweep and the state of the tracker that found the object, and returns
-    /// the object's state at the time of the newest return; without a sound return, the state
-    /// extrapolated to the tracker's time. A young track that has hardly moved is stationary.
+    /// Takes in the returns of a sweep and the state of the tracker that found the object, and
+    /// returns the object's state at the time of the newest return; without a sound return, the
+    /// state extrapolated to the tracker's time. A young track that has hardly moved is stationary.
     ///
-    /// Returns before the window are ignored. After a gap as long as the window, or when the estimate
-    /// leaves the tracker's by more than `shape_sigma_m`, the estimate starts again.
+    /// Returns before the window are ignored. After a gap as long as the window, or when the
+    /// estimate leaves the tracker's by more than `shape_sigma_m`, the estimate starts again.
     pub fn push(
         &mut self,
         estimator: &mut Estimator,
@@ -199,8 +201,8 @@ impl FixedLag {
         push_last(&mut self.history, state);
     }
 
-    /// Takes evenly spaced returns of a sweep, its foremost and its hindmost; those older than the window
-    /// leave. How many are new.
+    /// Takes evenly spaced returns of a sweep, its foremost and its hindmost; those older than the
+    /// window leave. How many are new.
     fn take(
         &mut self,
         returns: &[ObjectReturn],
@@ -288,7 +290,8 @@ impl FixedLag {
         self.returns.truncate(self.returns.len() - left);
     }
 
-    /// Moves the splines on until they hold the newest time: first by more pieces, then by later ones.
+    /// Moves the splines on until they hold the newest time: first by more pieces, then by later
+    /// ones.
     fn advance(&mut self, params: &FixedLagParams) {
         while self.newest_s > self.knots.end() {
             let pieces = self.knots.spans();

@@ -8,6 +8,8 @@ use crate::estimate::params::FixedLagParams;
 use crate::estimate::surface::{Scatter, Surface};
 use heapless::Vec;
 
+/// Prior of a new model point, returns: makes its elimination regular.
+const PRIOR_RETURNS_MIN: f32 = 0.1;
 /// Model points at most.
 const MODEL: usize = 128;
 
@@ -26,7 +28,7 @@ impl WindowPoint {
     pub fn surface(&self, precision: f64) -> Surface {
         Surface {
             prior_mean: self.prior_mean,
-            prior_precision: precision * f64::from(self.prior_returns.max(0.1)),
+            prior_precision: precision * f64::from(self.prior_returns.max(PRIOR_RETURNS_MIN)),
             scatter: self.scatter,
             ..Surface::isotropic(precision)
         }
@@ -60,8 +62,8 @@ impl WindowModel {
         point.scatter.add(local, point.at);
     }
 
-    /// Makes model points of the last `fresh` returns where there are none near, and notes the model
-    /// point of each return.
+    /// Makes model points of the last `fresh` returns where there are none near, and notes the
+    /// model point of each return.
     pub fn extend(
         &mut self,
         returns: &mut Vec<WindowReturn, RETURNS>,

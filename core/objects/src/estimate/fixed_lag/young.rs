@@ -80,7 +80,8 @@ impl FixedLag {
         }
     }
 
-    /// Solves from the trajectory of the problem, with sparse models of what is seen by then; its cost.
+    /// Solves from the trajectory of the problem, with sparse models of what is seen by then; its
+    /// cost.
     fn solve(&mut self, problem: &mut Problem, params: &EstimateParams) -> f64 {
         let lag = &params.fixed_lag;
         let points = self.returns.len() / lag.young_returns_per_point;
@@ -117,8 +118,8 @@ impl FixedLag {
         self.ends = [-rear, -front];
     }
 
-    /// Moves the state to the point of the object that published states are of, with its heading within
-    /// half a turn of theirs: each start has an origin of its own.
+    /// Moves the state to the point of the object that published states are of, with its heading
+    /// within half a turn of theirs: each start has an origin of its own.
     fn anchor(&mut self) {
         let mut by = [0.0; 3];
         for state in &self.published {
