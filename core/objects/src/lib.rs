@@ -55,6 +55,15 @@ pub struct ObjectState {
     pub turn_rate: f64,
 }
 
+impl ObjectState {
+    /// A place, m from the track's anchor, in the frame of the object.
+    pub fn local(&self, at: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - self.position[a]);
+        let (sin, cos) = libm::sincos(self.heading);
+        [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
+    }
+}
+
 /// An angle within half a turn of zero.
 pub(crate) fn wrap_angle(angle: f64) -> f64 {
     angle - core::f64::consts::TAU * libm::round(angle / core::f64::consts::TAU)

@@ -44,31 +44,18 @@ impl Basis {
     }
 }
 
-/// How the spacing of knots differs from what was asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct KnotFit {
-    /// Closer: the domain is too short for five basis functions.
-    pub compressed: bool,
-    /// Wider: it is too long for [`BASES_MAX`].
-    pub stretched: bool,
-}
-
 impl Knots {
     /// No knots: no spline is over these.
     pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
     /// One basis function for every `every` seconds from `start` to `end`, at least five and at
     /// most [`BASES_MAX`].
-    pub fn over(start: f64, end: f64, every: f64) -> (Knots, KnotFit) {
+    pub fn over(start: f64, end: f64, every: f64) -> Knots {
         let domain = (end - start).max(DOMAIN_MIN_S);
         let wanted = libm::ceil(domain / every - 1e-9);
         let bases = wanted.clamp(SUPPORT as f64, BASES_MAX as f64);
         let pieces = bases as usize - DEGREE;
-        let fit = KnotFit {
-            compressed: domain / every < SUPPORT as f64 - 1e-9,
-            stretched: wanted > BASES_MAX as f64,
-        };
-        (Knots { start, spacing: domain / pieces as f64, pieces }, fit)
+        Knots { start, spacing: domain / pieces as f64, pieces }
     }
 
     /// A number of pieces of a given length.
@@ -192,7 +179,7 @@ mod tests {
     fn basis_is_that_of_the_recursion() {
         let mut random = Random(3);
         for (start, end) in [(0.0, 6.05), (-3.0, 1.0), (100.0, 100.4)] {
-            let (knots, _) = Knots::over(start, end, 0.5);
+            let knots = Knots::over(start, end, 0.5);
             for _ in 0..200 {
                 let time = start + (end - start) * random.uniform();
                 let basis = knots.basis(time);
@@ -209,7 +196,7 @@ mod tests {
 
     #[test]
     fn basis_sums_to_one_and_holds_ends() {
-        let (knots, _) = Knots::over(2.0, 8.0, 0.5);
+        let knots = Knots::over(2.0, 8.0, 0.5);
         assert_eq!((knots.bases(), knots.start(), knots.end()), (12, 2.0, 8.0));
         for i in -20..=120 {
             let basis = knots.basis(2.0 + 0.06 * f64::from(i));
@@ -222,7 +209,7 @@ mod tests {
 
     #[test]
     fn slopes_are_differences() {
-        let (knots, _) = Knots::over(0.0, 3.0, 0.25);
+        let knots = Knots::over(0.0, 3.0, 0.25);
         let step = 1e-6;
         for i in 1..50 {
             let u = f64::from(i) / 50.0;
@@ -241,7 +228,7 @@ mod tests {
     #[test]
     fn de_boor_is_the_weighted_sum() {
         let mut random = Random(4);
-        let (knots, _) = Knots::over(-1.0, 9.3, 0.5);
+        let knots = Knots::over(-1.0, 9.3, 0.5);
         let mut weights = [[0.0; 2]; BASES_MAX];
         weights.as_flattened_mut().fill_with(|| random.normal());
         for _ in 0..200 {
@@ -258,17 +245,14 @@ mod tests {
 
     #[test]
     fn short_tracks_compress_and_long_ones_stretch() {
-        let fit = |domain: f64| {
-            let (knots, fit) = Knots::over(0.0, domain, 0.5);
-            (knots.bases(), fit.compressed, fit.stretched)
-        };
-        assert_eq!(fit(0.0), (5, true, false));
-        assert_eq!(fit(2.4), (5, true, false));
-        assert_eq!(fit(2.5), (5, false, false));
-        assert_eq!(fit(2.6), (6, false, false));
-        assert_eq!(fit(32.0), (BASES_MAX, false, false));
-        assert_eq!(fit(1e6), (BASES_MAX, false, true));
-        let (knots, _) = Knots::over(5.0, 5.0, 0.5);
+        let bases = |domain: f64| Knots::over(0.0, domain, 0.5).bases();
+        assert_eq!(bases(0.0), 5);
+        assert_eq!(bases(2.4), 5);
+        assert_eq!(bases(2.5), 5);
+        assert_eq!(bases(2.6), 6);
+        assert_eq!(bases(32.0), BASES_MAX);
+        assert_eq!(bases(1e6), BASES_MAX);
+        let knots = Knots::over(5.0, 5.0, 0.5);
         assert_eq!(knots.end(), 5.0 + DOMAIN_MIN_S);
     }
 }

@@ -8,7 +8,6 @@ use raywake_objects::front_end::{Life, Track};
 use raywake_render::{Look, Outline, Panel, Sign, Trail, colours};
 
 use super::pictures::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
-use crate::track::local;
 
 /// How far a picture reaches, m.
 const REACH_M: f64 = 50.0;
@@ -69,7 +68,7 @@ fn outline(track: &Track, state: &ObjectState, pose: &Pose) -> Outline {
 
 /// Corners of the box around the returns of the last update, in the frame of the object, m.
 fn extent(track: &Track, state: &ObjectState) -> ([f32; 2], [f32; 2]) {
-    let returns = track.latest().iter().map(|seen| local(state, seen.position));
+    let returns = track.latest().iter().map(|seen| state.local(seen.position));
     returns.fold(([0.0; 2], [0.0; 2]), |(low, high), [x, y, _]| {
         ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)])
     })

@@ -25,7 +25,6 @@ use raywake_objects::estimate::FixedLag;
 pub use ground::Ground;
 pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
-pub(crate) use write::local;
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
 /// the sweep in hand, and all tracks with it.

@@ -65,7 +65,7 @@ impl Files {
             lag: placed(lag(n)),
         }));
         let in_frame = |seen: &ObjectReturn| {
-            let place = local(&estimator.state(f64::from(seen.time_s)), seen.position);
+            let place = estimator.state(f64::from(seen.time_s)).local(seen.position);
             [place[0], place[1], place[2], seen.time_s]
         };
         let rows: Vec<[f32; 4]> = track.returns().iter().map(in_frame).collect();
@@ -93,13 +93,6 @@ impl Files {
         t.f64s("lag_time_s", &self.rows, |r| r.lag.time_s);
         t.write(&folder.join("tracks.feather"), &[])
     }
-}
-
-/// A place (m from the track's anchor) in the frame of an object.
-pub(crate) fn local(state: &ObjectState, at: [f32; 3]) -> [f32; 3] {
-    let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - state.position[a]);
-    let (sin, cos) = libm::sincos(state.heading);
-    [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
 }
 
 /// Writes a cloud of x, y, z and time.

@@ -38,8 +38,8 @@ pub fn convergence(sets: &[Set]) -> Chart {
         part("cost, ours", "mean J", OURS..MAIN, Cost::total),
         part("distance, ours", "mean distance, m", OURS..MAIN, |c| c.residual_m),
     ];
-    let caption = "As figure 2.5: cost J, and mean distance of a return from its model point, after \
-        each iteration; mean over tracks, of which those that have ended stay as they are.";
+    let caption = "As figure 2.5: cost J, and mean distance of a return from its model point, \
+        after each iteration; mean over tracks, of which those that have ended stay as they are.";
     Chart::small_multiples("figure-2-5", caption, parts)
 }
 

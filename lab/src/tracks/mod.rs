@@ -188,8 +188,8 @@ fn conclude(
     report.write(&args.out)
 }
 
-const FRONT_ENDS: &str = "Above, segmentation and association are perfect. Here the labelled objects \
-    are followed as the front ends find them; each object counts by its longest track.";
+const FRONT_ENDS: &str = "Above, segmentation and association are perfect. Here the labelled \
+    objects are followed as the front ends find them; each object counts by its longest track.";
 
 /// What the front ends find, and the errors of that.
 fn front_ends(found: &[(&'static str, Found)]) -> Vec<Table> {

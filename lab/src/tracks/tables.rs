@@ -85,9 +85,16 @@ impl Set {
     }
 }
 
-fn table(id: String, caption: String, columns: &[&str], rows: Vec<TableRow>) -> Table {
-    let columns = columns.iter().map(|c| c.to_string()).collect();
+/// A table whose columns' titles are separated by bars.
+fn table(id: String, caption: String, columns: &str, rows: Vec<TableRow>) -> Table {
+    let columns = columns.split('|').map(|c| c.trim().to_string()).collect();
     Table { id, caption, columns, rows, notes: Vec::new() }
+}
+
+/// A row with a name and numbers of so many digits after the point.
+fn numbers(name: &str, numbers: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Cell> {
+    let cells = numbers.into_iter().map(|v| Cell::Number(v, digits));
+    [Cell::from(name)].into_iter().chain(cells).collect()
 }
 
 /// Errors as in table 2.1, of one set.
@@ -96,10 +103,9 @@ pub fn errors(set: &Set) -> Table {
     let mut rows = Vec::new();
     if stationary {
         rows.extend(PRINTED.map(|(name, [position, velocity, heading, rate])| {
-            let [a, b] =
-                [[position, f64::NAN, f64::NAN, velocity], [heading, rate, f64::NAN, f64::NAN]];
-            let cells = a.into_iter().chain(b).map(|v| Cell::Number(v, 3));
-            TableRow::reference([Cell::from(name)].into_iter().chain(cells))
+            let none = f64::NAN;
+            let all = [position, none, none, velocity, heading, rate, none, none];
+            TableRow::reference(numbers(name, all, 3))
         }));
     }
     for (n, (name, _)) in methods().iter().enumerate() {
@@ -114,29 +120,16 @@ pub fn errors(set: &Set) -> Table {
         }
     }
     let against = match stationary {
-        true => {
-            "position and heading about their means over a track, velocity and heading rate from zero"
-        }
-        false => {
-            "against the truth at the same point of the body, each track brought there by one constant transform"
-        }
+        true => "position and heading about their means, velocity and heading rate from zero",
+        false => "against the truth at the same point of the body, by one transform for a track",
     };
     let caption = format!(
         "As table 2.1, {}. Root mean squares over the batches of all tracks: {against}.",
         set.about()
     );
-    let columns = [
-        "Tracker",
-        "Position, m",
-        "x and y, m",
-        "z, m",
-        "Velocity, m/s",
-        "Heading, rad",
-        "Heading rate, rad/s",
-        "Median track's position, m",
-        "Flips",
-    ];
-    table(format!("errors-{}", set.id), caption, &columns, rows)
+    let columns = "Tracker | Position, m | x and y, m | z, m | Velocity, m/s | Heading, rad \
+        | Heading rate, rad/s | Median track's position, m | Flips";
+    table(format!("errors-{}", set.id), caption, columns, rows)
 }
 
 /// A row of [`errors`]: a tracker over some objects.
@@ -146,18 +139,17 @@ fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool
     let all = [r.position, r.ground, r.height, r.velocity, r.heading, r.turn_rate];
     let some = set.outcomes.iter().filter(|o| of(o));
     let median = median(some.map(|o| o.scores[method].errors.rmse().position));
-    let cells = all.into_iter().chain([median]).map(|v| Cell::Number(v, 3));
-    TableRow::new([Cell::from(name)].into_iter().chain(cells).chain([Cell::from(errors.flips)]))
+    let cells = numbers(name, all.into_iter().chain([median]), 3);
+    TableRow::new(cells.into_iter().chain([Cell::from(errors.flips)]))
 }
 
 /// A row of [`errors`]: how far labels of what stands wander in the world, with the drift of the
 /// poses and the labels' own errors.
 pub fn wandering(labels: &Errors) -> TableRow {
     let r = labels.rmse();
-    let numbers = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
-    let cells = numbers.map(|v| Cell::Number(v, 3));
-    let name = Cell::from("the labels, with the poses' drift");
-    TableRow::reference([name].into_iter().chain(cells).chain([Cell::Empty]))
+    let all = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
+    let cells = numbers("the labels, with the poses' drift", all, 3);
+    TableRow::reference(cells.into_iter().chain([Cell::Empty]))
 }
 
 /// Share of tracks better than the baseline's, and times.
@@ -172,24 +164,15 @@ pub fn better(set: &Set) -> Table {
         let crisper = |o: &Outcome| f64::from(u8::from(o.scores[n].entropy < o.scores[0].entropy));
         let iterations = |s: &Score| s.costs.len().saturating_sub(1) as f64;
         let ms = 1e3 * set.mean(|o| o.scores[n].seconds);
-        let shares = shares.into_iter().chain([set.mean(crisper)]);
-        let cells = shares.map(|v| Cell::Number(100.0 * v, 1));
-        let times = [Cell::Number(set.mean(|o| iterations(&o.scores[n])), 1), Cell::Number(ms, 1)];
-        TableRow::new([Cell::from(methods()[n].0)].into_iter().chain(cells).chain(times))
+        let shares = shares.into_iter().chain([set.mean(crisper)]).map(|v| 100.0 * v);
+        let work = [set.mean(|o| iterations(&o.scores[n])), ms];
+        TableRow::new(numbers(methods()[n].0, shares.chain(work), 1))
     };
     let caption = format!("Tracks of which the error is less than the baseline's, {}.", set.name);
-    let columns = [
-        "Tracker",
-        "Position, %",
-        "Velocity, %",
-        "Heading, %",
-        "Heading rate, %",
-        "Entropy, %",
-        "Iterations",
-        "Time, ms",
-    ];
+    let columns = "Tracker | Position, % | Velocity, % | Heading, % | Heading rate, % \
+        | Entropy, % | Iterations | Time, ms";
     let rows = (1..methods().len()).map(row).collect();
-    let mut table = table(format!("better-{}", set.id), caption, &columns, rows);
+    let mut table = table(format!("better-{}", set.id), caption, columns, rows);
     table.notes.push(
         "Iterations are those that led to the estimate; the time is that of all there were, of the \
          fixed lag for all batches of a track."
@@ -218,9 +201,9 @@ pub fn entropies(sets: &[Set]) -> Table {
         let gaps = [1, OURS].map(|n| share(set.gap_closed(n)));
         TableRow::new([Cell::from(set.name.as_str())].into_iter().chain(cells).chain(gaps))
     }));
-    let names = methods().into_iter().take(MAIN).map(|m| m.0);
-    let gaps = ["Gap closed as printed, %", "Gap closed by ours, %"];
-    let columns: Vec<&str> = ["Set", "Truth"].into_iter().chain(names).chain(gaps).collect();
+    let names = methods().map(|m| m.0)[..MAIN].join(" | ");
+    let columns =
+        format!("Set | Truth | {names} | Gap closed as printed, % | Gap closed by ours, %");
     let caption = "As table 2.2: entropy of the clouds of all returns in the object's frame, sigma \
         5 cm, nats, mean over tracks; the gap is that of the baseline to the truth.";
     table("entropy".into(), caption.into(), &columns, rows)
@@ -257,8 +240,9 @@ pub fn kinds(set: &Set) -> Table {
         set.name
     );
     let [baseline, printed, ours] = [0, 1, OURS].map(|n| methods()[n].0);
-    let columns =
-        ["Kind", "Tracks", baseline, printed, ours, "Better position, %", "Flips of ours"];
+    let columns = format!(
+        "Kind | Tracks | {baseline} | {printed} | {ours} | Better position, % | Flips of ours"
+    );
     table(format!("kinds-{}", set.id), caption, &columns, rows)
 }
 
@@ -285,10 +269,10 @@ pub fn extents(sets: &[Set]) -> Table {
             row(name, &|o| o.scores[n].extent);
         }
     }
-    let caption = "Extent of vehicles: median difference between the narrowest box around the cloud \
-        and the vehicle's own. That of the truth is what is never seen.";
-    let columns = ["Set", "Vehicles", "Cloud by", "Length, m", "Width, m", "Height, m"];
-    table("extents".into(), caption.into(), &columns, rows)
+    let caption = "Extent of vehicles: median difference between the narrowest box around the \
+        cloud and the vehicle's own. That of the truth is what is never seen.";
+    let columns = "Set | Vehicles | Cloud by | Length, m | Width, m | Height, m";
+    table("extents".into(), caption.into(), columns, rows)
 }
 
 /// The tracks on which ours is worst.
@@ -316,23 +300,10 @@ pub fn worst(set: &Set) -> Table {
     };
     let rows = all.iter().take(WORST).map(row).collect();
     let caption = format!("The tracks on which ours is worst, {}.", set.name);
-    let columns = [
-        "Object",
-        "Kind",
-        "Returns",
-        "Seen, s",
-        "Mean range, m",
-        "Turns, rad",
-        "Baseline's position, m",
-        "As printed, m",
-        "Ours, m",
-        "Velocity, m/s",
-        "Heading, rad",
-        "Heading rate, rad/s",
-        "Entropy above the truth's",
-        "Stopped",
-    ];
-    table(format!("worst-{}", set.id), caption, &columns, rows)
+    let columns = "Object | Kind | Returns | Seen, s | Mean range, m | Turns, rad \
+        | Baseline's position, m | As printed, m | Ours, m | Velocity, m/s \
+        | Heading, rad | Heading rate, rad/s | Entropy above the truth's | Stopped";
+    table(format!("worst-{}", set.id), caption, columns, rows)
 }
 
 /// What the front ends find of the labelled objects of some drives.
@@ -351,14 +322,7 @@ pub fn front_ends(found: &[(&'static str, Found)]) -> Table {
     let caption = "What the front ends find of labelled objects. A track is an object's where more \
         than half of its returns lie in the object's box; fragments are the tracks of an object \
         beyond its first, and a swap is a track that goes over from an object to another.";
-    let columns = [
-        "Front end",
-        "Labelled objects",
-        "Found",
-        "Tracks",
-        "Of labelled objects",
-        "Fragments",
-        "Swaps",
-    ];
-    table("front-ends".into(), caption.into(), &columns, found.iter().map(row).collect())
+    let columns = "Front end | Labelled objects | Found | Tracks | Of labelled objects \
+        | Fragments | Swaps";
+    table("front-ends".into(), caption.into(), columns, found.iter().map(row).collect())
 }

@@ -265,7 +265,7 @@ mod tests {
 
     fn scene() -> Scene {
         let mut random = Random(17);
-        let (knots, _) = Knots::over(0.0, 3.5, 0.5);
+        let knots = Knots::over(0.0, 3.5, 0.5);
         assert_eq!(knots.bases(), BASES);
         let control_points = core::array::from_fn(|k| {
             let mut point: ControlPoint = core::array::from_fn(|_| 0.2 * random.normal());

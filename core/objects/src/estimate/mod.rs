@@ -64,9 +64,8 @@ pub use params::{
 };
 pub use report::{Cost, EstimateReport, InitialGuess, Termination};
 
-use crate::spline::{KnotFit, Knots};
+use crate::spline::Knots;
 use crate::{ObjectReturn, ObjectState, wrap_angle};
-use observation::Observation;
 use problem::{Problem, Solution};
 use state::{HEADING, SPEED, reverse, state_at};
 use velocity_search::VelocitySearch;
@@ -113,18 +112,14 @@ impl Estimator {
             report.unsound = returns.len();
             return report;
         };
-        let shape_sigma_m = params.shape_sigma_m;
         let params = &params.for_length(problem.samples.length_m());
         let [first_s, last_s] = [taken.first_s, taken.last_s].map(f64::from);
-        let (knots, KnotFit { compressed, stretched }) =
-            Knots::over(first_s, last_s, params.basis_s);
-        problem.set_knots(knots);
+        problem.set_knots(Knots::over(first_s, last_s, params.basis_s));
         report.returns = problem.samples.all().len();
         report.unsound = taken.unsound;
         report.thinned = returns.len() - taken.unsound - report.returns;
-        (report.compressed, report.stretched) = (compressed, stretched);
 
-        report.no_history = !problem.start(params, history);
+        problem.start(params, history);
         if params.growth.growth {
             problem.grow(&params.gaussian().without_endpoints());
         }
@@ -135,7 +130,6 @@ impl Estimator {
             self.face_forward();
         }
         self.unwind();
-        report.outside = self.outside(shape_sigma_m);
         report
     }
 
@@ -227,12 +221,5 @@ impl Estimator {
     /// Model points, m, in the object's frame.
     pub fn model(&self) -> &[[f32; 3]] {
         &self.best.model[..self.best.points]
-    }
-
-    /// Samples farther than `radius_m` from the object's origin.
-    fn outside(&self, radius_m: f64) -> usize {
-        let samples = self.problem.samples.all().iter();
-        let observations = samples.map(|s| Observation::of(&self.best.control_points, s));
-        observations.filter(|one| one.square_range() > radius_m * radius_m).count()
     }
 }

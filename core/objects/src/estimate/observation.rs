@@ -64,11 +64,6 @@ impl Observation {
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
     }
 
-    /// Squared distance from the object's origin, m².
-    pub fn square_range(&self) -> f64 {
-        self.offset.iter().map(|v| v * v).sum()
-    }
-
     /// Residual and derivatives at a model point; the cost.
     pub fn evaluate(&mut self, model: &[f32; 3], surface: &Surface) -> f64 {
         let [nx, ny] = surface.normal;

@@ -231,7 +231,7 @@ mod tests {
 
     #[test]
     fn derivatives_are_differences() {
-        let (knots, _) = Knots::over(0.0, 1.0, 0.5);
+        let knots = Knots::over(0.0, 1.0, 0.5);
         let (values, slopes) = knots.shape(0.3);
         let control_points = control_points::<SUPPORT>();
         let rows = residuals(&control_points, &values, &slopes, 0.8);
@@ -262,7 +262,7 @@ mod tests {
                 manoeuvre_s: 1.0,
                 ..params
             });
-            let (knots, _) = Knots::over(0.0, 4.0, 0.5);
+            let knots = Knots::over(0.0, 4.0, 0.5);
             let mut equations = Box::new(Equations::new());
             let mut control_points = control_points::<8>();
             let mut cost = |control_points: &[ControlPoint]| {
@@ -327,7 +327,7 @@ mod tests {
 
     #[test]
     fn the_integral_is_exact_enough() {
-        let (knots, _) = Knots::over(0.0, 6.0, 0.5);
+        let knots = Knots::over(0.0, 6.0, 0.5);
         let control_points = control_points::<12>();
         let process = ProcessModel::of(&EstimateParams::DISSERTATION);
         let mut equations = Box::new(Equations::new());

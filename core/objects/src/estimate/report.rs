@@ -63,16 +63,8 @@ pub struct EstimateReport {
     pub thinned: usize,
     /// Returns left out because they or their times are not finite, or beyond 100 km and a day.
     pub unsound: usize,
-    /// Returns that took part, and lie farther from the object's origin than `shape_sigma_m`.
-    pub outside: usize,
     /// Model points removed because rays went through them.
     pub carved: usize,
-    /// The knots are closer than asked for: the track is short.
-    pub compressed: bool,
-    /// They are farther apart: the track is long.
-    pub stretched: bool,
-    /// There was no history: the first trajectory rests at the mean of the returns.
-    pub no_history: bool,
     /// The start that led to the estimate.
     pub from: InitialGuess,
 }

@@ -182,11 +182,6 @@ impl FixedLag {
         self.iterations
     }
 
-    /// Model points; none while the track is young.
-    pub fn points(&self) -> usize {
-        self.model.points.len()
-    }
-
     /// Adds a state of the tracker to the history.
     fn remember(&mut self, baseline: &ObjectState) {
         if !is_sound(baseline) {
