@@ -5,10 +5,10 @@ use crate::frame::{Arrival, Window, central};
 use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
-use crate::refinement::Refinement;
+use crate::refinement::{Refinement, SweepReturns};
 use crate::return_clock::{ReturnClock, slot_of};
 use crate::stages::occupancy_constancy::Scores;
-use crate::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
+use crate::sweep::{Placed, Point, Rig, SENSORS_MAX, Sweep, Timing};
 use crate::team::Team;
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
@@ -38,16 +38,6 @@ pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
         range_steps: profile.range_steps(),
         ..SweepUniform::default()
     }
-}
-
-/// Where and when a return was, NaN where it was left out.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Placed {
-    /// Voxels from the window's corner, at its own time and not only its slot's: in half a slot a
-    /// fast vehicle goes a centimetre.
-    pub at: [f32; 3],
-    /// After the sweep's stamp, s.
-    pub offset_s: f32,
 }
 
 /// Where the returns of the last two sweeps are.
@@ -136,10 +126,14 @@ impl Returns {
                 *column = *x as u32 * profile.side + *y as u32;
             }
         }
-        let placed = &self.placed[..taken];
-        let points = &sweep.points[..taken];
-        let apart = &mut self.is_apart[0][..taken];
-        refinement.take(profile, corner, sweep.stamp_s, points, placed, columns, apart)
+        let returns = SweepReturns {
+            corner,
+            stamp_s: sweep.stamp_s,
+            points: &sweep.points[..taken],
+            placed: &self.placed[..taken],
+            columns,
+        };
+        refinement.insert_cloud(profile, returns, &mut self.is_apart[0][..taken])
     }
 
     /// Column of the returns of the sweep before from index `from` on, and whether they are apart.

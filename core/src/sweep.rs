@@ -15,6 +15,16 @@ pub struct Point {
     pub sensor: u32,
 }
 
+/// A return placed in the window of its sweep; NaN where it was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placed {
+    /// Voxels from the window's corner, at its own time and not only its slot's: in half a slot a
+    /// fast vehicle goes a centimetre.
+    pub at: [f32; 3],
+    /// After the sweep's stamp, s.
+    pub offset_s: f32,
+}
+
 /// One sweep as received.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep<'a> {

@@ -10,20 +10,25 @@ use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
     SUBVOXELS_MAX,
 };
-use crate::prepare::Placed;
 use crate::record::NONE;
-use crate::sweep::{Point, SENSORS_MAX};
+use crate::sweep::{Placed, Point, SENSORS_MAX};
 use core::ops::Range;
 
 /// Words of a mask of the sub-voxels of a column.
 const MASK_WORDS: usize =
     (SUBVOXELS_MAX * SUBVOXELS_MAX * SUBVOXELS_MAX * CLUSTER_LEVELS_MAX).div_ceil(32);
 
-/// The returns of a sweep: their places in the window, voxels, and their columns, or [`NONE`].
+/// The returns of a sweep.
 #[derive(Clone, Copy)]
 pub struct SweepReturns<'a> {
+    /// Lattice index of the window's first voxel.
+    pub corner: [i32; 3],
+    /// Time of the sweep, s.
+    pub stamp_s: f64,
     pub points: &'a [Point],
+    /// Their places in the window, voxels.
     pub placed: &'a [Placed],
+    /// Their columns, or [`NONE`].
     pub columns: &'a [u32],
 }
 
@@ -85,6 +90,7 @@ impl Cloud {
         scratch: &mut Scratch,
     ) -> usize {
         self.side = profile.side as usize;
+        (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
         self.find_ground(profile, returns);
         let (count, sensors) = self.count_columns(scaled, returns, apart, &mut scratch.listed);
         self.sort(returns.columns, &scratch.listed[..count], &mut scratch.order);
@@ -112,7 +118,7 @@ impl Cloud {
         apart: &mut [bool],
         listed: &mut [u32],
     ) -> (usize, u32) {
-        let SweepReturns { points, placed, columns } = returns;
+        let SweepReturns { points, placed, columns, .. } = returns;
         self.start[..self.side * self.side + 1].fill(0);
         let (mut count, mut sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {

@@ -42,11 +42,10 @@ mod tests;
 
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
 use crate::perceive::Perceived;
-use crate::prepare::Placed;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
-use crate::sweep::Point;
 use crate::team::Team;
-use cloud::{Cloud, Scratch, SweepReturns};
+pub(crate) use cloud::SweepReturns;
+use cloud::{Cloud, Scratch};
 use clusters::Clusters;
 use motion::TARGETS_MAX;
 pub(crate) use refined::Refined;
@@ -87,27 +86,18 @@ impl Refinement {
         self.held = 0;
     }
 
-    /// Takes over a sweep: its returns, where and when they were, and in which column. `apart`
-    /// becomes whether each is of the ground, or higher than clusters are. SweepReturns how many
-    /// had no room.
-    pub(crate) fn take(
+    /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or higher
+    /// than clusters are. Returns how many returns had no room.
+    pub(crate) fn insert_cloud(
         &mut self,
         profile: &Profile,
-        corner: [i32; 3],
-        stamp_s: f64,
-        points: &[Point],
-        placed: &[Placed],
-        columns: &[u32],
+        returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
         let scaled = self.scaled.insert(Scaled::new(profile));
         self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
-        let cloud = &mut self.clouds[self.newest];
-        cloud.corner = corner;
-        cloud.stamp_s = stamp_s;
-        let returns = SweepReturns { points, placed, columns };
-        cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
+        self.clouds[self.newest].fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `predicted` is the displacement that the
@@ -161,7 +151,7 @@ impl Refinement {
     /// How a column of the new window moved, or that it is static.
     pub(crate) fn of(&self, step: &SweepUniform, column: usize, flow: Flow) -> Refined {
         let Some(scaled) = &self.scaled else {
-            return Refined { by: [0.0; 2], covariance: [0.0; 3], moves: false };
+            return Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false };
         };
         let side = step.side;
         let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);

@@ -11,7 +11,7 @@ pub(crate) struct Refined {
     /// Its covariance (xx, xy, yy).
     pub covariance: [f32; 3],
     /// Whether it is part of a cluster that moves.
-    pub moves: bool,
+    pub is_dynamic: bool,
 }
 
 impl Refined {
@@ -21,7 +21,7 @@ impl Refined {
         let ratio = scaled.params.motion_sigma_ratio;
         let variance = cluster.variance + if cluster.is_dynamic { ratio * ratio } else { 0.0 };
         let own = match cluster.is_dynamic {
-            true => Refined { by, covariance: cluster.motion.covariance_of(at), moves: true },
+            true => Refined { by, covariance: cluster.motion.covariance_of(at), is_dynamic: true },
             false => Refined::at_rest(scaled, cluster.static_residual),
         };
         own.with_alternative(by, variance)
@@ -42,6 +42,6 @@ impl Refined {
     pub fn at_rest(scaled: &Scaled, residual: f32) -> Refined {
         let sigma = scaled.static_sigma;
         let variance = sigma * sigma * variance_inflation(scaled, residual);
-        Refined { by: [0.0; 2], covariance: [variance, 0.0, variance], moves: false }
+        Refined { by: [0.0; 2], covariance: [variance, 0.0, variance], is_dynamic: false }
     }
 }

@@ -56,7 +56,7 @@ fn refined(
 ) -> Option<([f32; 2], [f32; 3])> {
     let r = profile.voxel_m as f32;
     let found = refinement.of(sweep, column, flow);
-    let observed = found.moves || flow & VALID != 0;
+    let observed = found.is_dynamic || flow & VALID != 0;
     observed.then(|| (found.by.map(|v| v * r), found.covariance.map(|v| v * r * r)))
 }
 

@@ -8,6 +8,7 @@ mod odd;
 use super::*;
 use crate::random::Random;
 use crate::record::{Column, NONE, Proposal, pack_flow};
+use crate::sweep::{Placed, Point};
 use crate::team::Alone;
 use std::boxed::Box;
 use std::vec;
@@ -63,7 +64,8 @@ impl Returns {
     fn fill(&self, cloud: &mut Cloud) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) = (vec![false; self.points.len()], Box::new(Scratch::new()));
         let Returns { points, placed, columns } = self;
-        let returns = super::cloud::SweepReturns { points, placed, columns };
+        let (corner, stamp_s) = ([0; 3], 0.0);
+        let returns = SweepReturns { corner, stamp_s, points, placed, columns };
         (cloud.fill(&profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
     }
 
@@ -127,8 +129,10 @@ fn give(refinement: &mut Refinement, returns: &Returns, n: usize) {
 
 fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, n: usize) {
     let Returns { points, placed, columns } = returns;
+    let (corner, stamp_s) = ([0; 3], n as f64 * 0.1);
     let mut apart = vec![false; points.len()];
-    refinement.take(profile, [0; 3], n as f64 * 0.1, points, placed, columns, &mut apart);
+    let returns = SweepReturns { corner, stamp_s, points, placed, columns };
+    refinement.insert_cloud(profile, returns, &mut apart);
 }
 
 fn no_flow() -> Vec<Flow> {
