@@ -54,12 +54,12 @@ impl DroppedReturns {
     /// Every count with the name of its field and a name for people.
     pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
         [
-            ("over_capacity", "over the capacity", self.over_capacity),
+            ("over_capacity", "over capacity", self.over_capacity),
             ("not_finite", "not finite", self.not_finite),
             ("no_return", "without an echo", self.no_return),
             ("too_far", "too far", self.too_far),
             ("unknown_sensor", "of an unknown sensor", self.unknown_sensor),
-            ("own_vehicle", "on the own vehicle", self.own_vehicle),
+            ("own_vehicle", "on the ego vehicle", self.own_vehicle),
         ]
     }
 }
