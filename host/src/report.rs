@@ -78,8 +78,8 @@ fn tracklets(out: &mut String, s: &RunSummary) -> std::fmt::Result {
     let t = &s.tracklet_turnover;
     writeln!(
         out,
-        "           {} born, {} updated, {} coasting; {} lost, {} gated out, {} merged, {} left the \
-         window",
+        "           {} born, {} updated, {} coasting; {} lost, {} gated out, {} merged, \
+         {} left the window",
         t.born, t.updated, t.waiting, t.lost, t.gated, t.merged, t.left
     )
 }

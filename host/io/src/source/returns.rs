@@ -3,7 +3,7 @@
 //! | field | names | as |
 //! |---|---|---|
 //! | position | `x`, `y`, `z` | m, in the frame of the vehicle |
-//! | intensity | `intensity`, `i`, `reflectivity` | 0..1, or 0..255 in a cloud with values above 1 |
+//! | intensity | `intensity`, `i`, `reflectivity` | 0..1, or 0..255 if any is above 1 |
 //! | time | `offset_time`, `t`, `time`, `timestamp`, `time_stamp` | unit by type, as in drivers |
 //!
 //! Times in integers are ns (Ouster `t`, Livox `offset_time`), those in floats s (Velodyne `time`,

@@ -1,5 +1,5 @@
-//! Files beside the clouds of a drive in KITTI's raw layout whose azimuths do not tell what a
-//! return's time and sensor are: several scanners, or one whose lasers do not fire column by column.
+//! Files beside the clouds of a drive in KITTI's raw layout whose azimuths do not give the time and
+//! sensor of a return: several scanners, or one whose lasers do not fire column by column.
 //!
 //! | in `velodyne_points` | content |
 //! |---|---|
