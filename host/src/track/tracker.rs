@@ -28,12 +28,12 @@ pub struct Tracker {
     drive: Option<Drive>,
     reach_m: f64,
     ground: Option<Ground>,
-    parts: Sealed<Parts>,
+    parts: Sealed<TrackerParts>,
     /// Rooms of the tracks that ended.
     ended: Vec<usize>,
 }
 
-struct Parts {
+struct TrackerParts {
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
     /// One for each thread; fixed lags use the first.
@@ -104,7 +104,7 @@ impl Tracker {
         ground: Option<Ground>,
         fixed_lag: bool,
     ) -> Tracker {
-        let parts = Parts {
+        let parts = TrackerParts {
             front_end: Box::new(FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
             solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
@@ -142,7 +142,7 @@ impl Tracker {
         let Tracker { rig, params, drive, reach_m, ground, parts, .. } = self;
         let map = ground.as_ref().map(Ground::map);
         let mut step = |sweep: &SweepData, flows: Option<Flows>| {
-            parts.step(|Parts { front_end, tracks, solvers, lags }| {
+            parts.step(|TrackerParts { front_end, tracks, solvers, lags }| {
                 front_end.take(&params.front_end, rig, &sweep.sweep(), flows);
                 let counts = front_end.step(&params.front_end, map.as_ref(), tracks);
                 let estimator = &mut solvers[0].estimator;
@@ -201,11 +201,11 @@ impl Tracker {
         ended.clear();
         ended.extend(slots.map(|(slot, _)| slot));
         for group in ended.chunks(parts.solvers.len()) {
-            parts.step(|Parts { solvers, tracks, .. }| {
+            parts.step(|TrackerParts { solvers, tracks, .. }| {
                 solve(&params.estimate, solvers, tracks, group);
                 Ok::<_, RunError>(())
             })?;
-            let Parts { tracks, solvers, lags, .. } = &**parts;
+            let TrackerParts { tracks, solvers, lags, .. } = &**parts;
             for (&slot, Solver { estimator, report, milliseconds }) in group.iter().zip(solvers) {
                 let lag = lags.get(slot).map(|lag| lag.states.kept());
                 let (track, milliseconds) = (&tracks[slot], *milliseconds);
