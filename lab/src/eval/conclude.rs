@@ -3,11 +3,12 @@
 use super::calibration::{self, Calibration};
 use super::drive::Settings;
 use super::facts::Facts;
+use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
-use super::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
+use super::tally::Tally;
 use super::verdicts::Verdicts;
-use super::{figures, read_rows, tables};
+use super::{figures, read_rows, return_tables, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Results};
 use raywake_io::Error;
@@ -70,14 +71,14 @@ fn raw_flow(report: &mut Report, tally: &Tally, cell_m: f64) {
 }
 
 fn returns(report: &mut Report, drives: &[Facts]) {
-    let scores = tables::scores(drives);
-    let [bucketed, three_way] = tables::argoverse(&scores);
+    let scores = return_tables::scores(drives);
+    let [bucketed, three_way] = return_tables::argoverse(&scores);
     report
         .section("Flow of single returns")
         .text(&about_returns())
         .table(bucketed)
         .table(three_way)
-        .table(tables::accuracy(&scores));
+        .table(return_tables::accuracy(&scores));
 }
 
 const RAW: &str = "The error is the distance between the displacement found for a solid column \

@@ -1,9 +1,10 @@
 //! Figures 3.6 to 3.9 and B.4 of an evaluation.
 
 use super::facts::Facts;
+use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
 use super::tables::{RECALL, stages};
-use super::tally::{ClassGroup, Estimate, MotionGroup, SETTLED, Tally, Truth};
+use super::tally::{SETTLED, Tally};
 use crate::curve::{Curve, Operating};
 use crate::report::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,

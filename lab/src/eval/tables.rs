@@ -1,11 +1,10 @@
 //! Tables 3.1 to 3.3 and what belongs beside them.
 
 use super::facts::Facts;
-use super::points::{ESTIMATES, PointScores};
+use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
-use super::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
+use super::tally::Tally;
 use crate::curve::{Curve, Operating};
-use crate::metrics::{Class, PointMotion, Range};
 use crate::report::{Cell, Table, TableRow};
 use raywake::order_statistics::Spread;
 use raywake::statistics::BUDGET_MS;
@@ -17,22 +16,6 @@ pub const RECALL: f64 = 0.95;
 
 /// Columns of tables of displacements.
 const FLOW: [&str; 4] = ["Count", "Median, cm", "Mean, cm", "Within 30 cm, %"];
-
-fn table(id: &str, caption: &str, columns: &[&str], rows: Vec<TableRow>) -> Table {
-    let columns = columns.iter().map(|c| (*c).to_string()).collect();
-    Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
-}
-
-/// A table with a note below it.
-pub fn noted_table(
-    id: &str,
-    caption: &str,
-    columns: &[&str],
-    rows: Vec<TableRow>,
-    note: &str,
-) -> Table {
-    Table { notes: vec![note.into()], ..table(id, caption, columns, rows) }
-}
 
 /// Count, median, mean and share within 30 cm of displacements.
 fn flow_cells(errors: &Sorted) -> [Cell; 4] {
@@ -91,7 +74,7 @@ pub fn raw_flow(tally: &Tally, weight: Weight) -> Table {
     let caption = format!(
         "As table 3.1 of the dissertation: error of the raw flow of a pair of sweeps, by {of}."
     );
-    table(id, &caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
+    Table::new(id, caption, &[&["Class", "Motion"], &FLOW[..]].concat(), rows)
 }
 
 /// Every estimate beside every other, all labelled columns.
@@ -119,7 +102,7 @@ pub fn references(tally: &Tally, truth: Truth) -> Table {
     let caption = format!(
         "Raw flow of all labelled columns beside estimates that need no LIDAR; truth: {what}."
     );
-    table(id, &caption, &[&["Motion", "Estimate"], &FLOW[..]].concat(), rows)
+    Table::new(id, caption, &[&["Motion", "Estimate"], &FLOW[..]].concat(), rows)
 }
 
 /// Table 3.2: settled tracklets.
@@ -158,7 +141,7 @@ pub fn tracklets(tally: &Tally) -> Table {
     let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 \
         and more. Truth: smoothed labels, parked objects at rest; a simulator's labels are exact. \
         Coverage: columns with such a tracklet, of all.";
-    table("table-3-2", caption, &columns, rows)
+    Table::new("table-3-2", caption, &columns, rows)
 }
 
 fn published_tracklets(group: ClassGroup) -> Option<TableRow> {
@@ -192,7 +175,7 @@ pub fn filter(curve: Option<&Curve>) -> Table {
     let columns = ["Operating point", "Recall, %", "Background accuracy, %", "Precision, %"];
     let caption = "Background filter over solid columns in view. Foreground is what lies in a \
         labelled box; background accuracy is the share of the other columns that are rejected.";
-    table("filter", caption, &columns, rows)
+    Table::new("filter", caption, &columns, rows)
 }
 
 /// Name of the time without the filter among the stages.
@@ -239,81 +222,5 @@ pub fn times(drives: &[Facts]) -> Table {
         totals.len(),
     );
     let columns = ["Step", "Mean, ms", "Standard deviation, ms", "Median, ms", "99 %, ms"];
-    table("table-3-3", &caption, &columns, rows)
-}
-
-/// Sums of the scores of all drives, in the order of [`ESTIMATES`].
-pub fn scores(drives: &[Facts]) -> [PointScores; 3] {
-    let mut sums: [PointScores; 3] = Default::default();
-    for (sum, n) in sums.iter_mut().zip(0..) {
-        drives.iter().for_each(|d| sum.merge(&d.scores[n]));
-    }
-    sums
-}
-
-fn estimate_row(n: usize, cells: impl IntoIterator<Item = Cell>) -> TableRow {
-    let cells = [Cell::from(ESTIMATES[n])].into_iter().chain(cells);
-    if n == 0 { TableRow::new(cells) } else { TableRow::reference(cells) }
-}
-
-/// Bucket-normalised and three-way error of single returns (Argoverse 2).
-pub fn argoverse(scores: &[PointScores; 3]) -> [Table; 2] {
-    let normalised = |s: &PointScores| {
-        let errors = s.bucketed.errors(Range::Near);
-        let classes = errors.classes.iter().skip(1).map(|c| c.dynamic);
-        let all: Vec<f64> = [errors.mean_dynamic].into_iter().chain(classes).collect();
-        all.into_iter().map(|v| Cell::Number(v, 3))
-    };
-    let names = Class::ALL.iter().skip(1).map(|c| c.name());
-    let columns: Vec<&str> = ["Estimate", "Mean"].into_iter().chain(names).collect();
-    let rows = scores.iter().enumerate().map(|(n, s)| estimate_row(n, normalised(s))).collect();
-    let caption = "Bucket-normalised error of moving returns within 35 m, as Argoverse 2 ranks: \
-        1 is what an estimate of no motion scores.";
-    let bucketed = table("bucketed", caption, &columns, rows);
-    let three = |s: &PointScores| {
-        let e = s.three_way.errors(Range::Near);
-        let parts = [e.foreground_dynamic, e.foreground_static, e.background_static];
-        let mean = parts.iter().map(|p| p.epe_m).sum::<f64>() / 3.0;
-        let count = Cell::Count(e.foreground_dynamic.count);
-        let all = [mean, parts[0].epe_m, parts[1].epe_m, parts[2].epe_m];
-        [count].into_iter().chain(all.map(|v| Cell::Number(v, 4)))
-    };
-    let columns = [
-        "Estimate",
-        "Moving returns",
-        "Mean, m",
-        "Foreground moving, m",
-        "Foreground static, m",
-        "Background static, m",
-    ];
-    let rows = scores.iter().enumerate().map(|(n, s)| estimate_row(n, three(s))).collect();
-    let caption = "Three-way error of returns within 35 m (Argoverse 2, 2023).";
-    [bucketed, table("three-way", caption, &columns, rows)]
-}
-
-/// EPE3D, accuracies and outliers of single returns (KITTI).
-pub fn accuracy(scores: &[PointScores; 3]) -> Table {
-    let mut rows = Vec::new();
-    for (name, motion) in [("moving", PointMotion::Moving), ("standing", PointMotion::Standing)] {
-        for (n, s) in scores.iter().enumerate() {
-            let foreground = |c: crate::metrics::Category| {
-                c.class().is_some_and(|class| class != Class::Background)
-            };
-            let a = s.accuracy.accuracy(foreground, motion);
-            let cells = [
-                Cell::from(name),
-                Cell::Count(a.count),
-                Cell::Number(a.epe_m, 4),
-                Cell::Number(100.0 * a.strict, 1),
-                Cell::Number(100.0 * a.relaxed, 1),
-                Cell::Number(100.0 * a.outliers, 1),
-            ];
-            rows.push(estimate_row(n, cells));
-        }
-    }
-    let columns =
-        ["Estimate", "Objects", "Returns", "EPE3D, m", "AccS, %", "AccR, %", "Outliers, %"];
-    let caption = "Metrics of scene flow on KITTI, for the returns of labelled objects, motion of \
-        the vehicle removed. Of standing ones every error counts as an outlier.";
-    table("accuracy", caption, &columns, rows)
+    Table::new("table-3-3", caption, &columns, rows)
 }

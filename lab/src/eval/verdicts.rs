@@ -1,10 +1,9 @@
 //! Moving or not: motion put out where there is none, and none where there is.
 
 use super::calibration::truth;
+use super::groups::{COUNT, ClassGroup, MotionGroup, cells};
 use super::row::Row;
 use super::statistics::{Errors, Weight};
-use super::tables::noted_table;
-use super::tally::{COUNT, ClassGroup, MotionGroup, cells};
 use crate::labels::trajectory::MOVING_MPS;
 use crate::report::{self, Cell, Table};
 
@@ -102,7 +101,7 @@ impl Verdicts {
         );
         let note = "What moves and is not put out so is missed; what is parked or background and \
             is put out so is false. What no label holds counts as background at rest.";
-        noted_table("moving-or-not", &caption, &columns, rows, note)
+        Table::new("moving-or-not", caption, &columns, rows).note(note)
     }
 }
 

@@ -101,6 +101,23 @@ impl Cell {
 }
 
 impl Table {
+    /// A table without notes.
+    pub fn new(
+        id: impl Into<String>,
+        caption: impl Into<String>,
+        columns: &[&str],
+        rows: Vec<TableRow>,
+    ) -> Table {
+        let columns = columns.iter().map(|c| (*c).to_string()).collect();
+        Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
+    }
+
+    /// The same with a note below.
+    pub fn note(mut self, note: &str) -> Table {
+        self.notes.push(note.into());
+        self
+    }
+
     /// Fails where a row has another number of cells than there are columns.
     pub(super) fn check(&self) -> Result<(), Error> {
         let wrong = self.rows.iter().position(|r| r.cells.len() != self.columns.len());

@@ -2,9 +2,10 @@
 
 use super::variants::{VARIANTS, Variant};
 use crate::eval::facts::Facts;
+use crate::eval::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use crate::eval::statistics::Weight;
-use crate::eval::tables::{WITHIN_M, noted_table};
-use crate::eval::tally::{ClassGroup, Estimate, MotionGroup, Tally, Truth};
+use crate::eval::tables::WITHIN_M;
+use crate::eval::tally::Tally;
 use crate::report::{Cell, Table, TableRow};
 use raywake::budget::device_bytes;
 use raywake::order_statistics::median;
@@ -94,7 +95,7 @@ pub fn table(rows: Vec<TableRow>, failures: &[String]) -> Table {
         search has 15 cells either way, which is fixed at compile time: its metres are the cell's \
         doing. So is the window of 3 x 3 columns that costs are summed over. In the sensor's frame \
         nothing is refined below a cell: its row stands beside `refine-0`.";
-    let mut table = noted_table("ablations", caption, &COLUMNS, rows, note);
+    let mut table = Table::new("ablations", caption, &COLUMNS, rows).note(note);
     table.notes.extend_from_slice(failures);
     table
 }

@@ -5,9 +5,10 @@ mod show;
 
 pub use show::{reliability, table, truth};
 
+use super::groups::{COUNT, ClassGroup, MotionGroup, cells};
 use super::row::Row;
 use super::statistics::{Errors, Sorted, Weight};
-use super::tally::{COUNT, ClassGroup, MotionGroup, SETTLED, cells};
+use super::tally::SETTLED;
 use ellipse::{content, deviation};
 
 /// What is claimed.

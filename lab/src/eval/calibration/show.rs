@@ -1,8 +1,7 @@
 //! Table and figure of calibration.
 
 use super::{Calibration, Columns, Quantity};
-use crate::eval::tables::noted_table;
-use crate::eval::tally::{ClassGroup, MotionGroup};
+use crate::eval::groups::{ClassGroup, MotionGroup};
 use crate::report::{Axis, Cell, Chart, Guide, Lines, Plot, Series, Table, TableRow};
 
 /// Contents of the ellipses of the table.
@@ -92,7 +91,7 @@ pub fn table(calibration: &Calibration) -> Table {
         ellipse; they are counted apart and not among the shares. The deviation is the root of \
         half the trace, in the unit of the value; of an ellipse that is right and round the median \
         error is 1.18 of it.";
-    noted_table("calibration", caption, &columns, rows, note)
+    Table::new("calibration", caption, &columns, rows).note(note)
 }
 
 /// Share of true values in ellipses of every content; on the diagonal covariances are right.
