@@ -18,7 +18,7 @@ use raywake_core::output::{PointFlow, TrackletState};
 use raywake_core::params::Profile;
 
 use crate::args::{Export, PictureFrame, Results};
-use crate::picture::{Pictures, Scene};
+use crate::picture::{Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::SweepData;
@@ -103,7 +103,7 @@ impl Outputs {
         }
         if let Some((pictures, frame)) = &mut self.pictures {
             let (columns, profile, frame) = (flows.columns, &self.profile, *frame);
-            pictures.write(first, &Scene::Flow { columns, profile, frame })?;
+            pictures.write(first, &Subject::Flow { columns, profile, frame })?;
         }
         if let Some(folder) = &folders.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);

@@ -9,7 +9,7 @@ use tiny_skia::{
 
 /// Why there is no picture.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Error {
+pub enum PictureError {
     /// This many pixels are none, or too many.
     #[error("a picture cannot have {} x {} pixels", .0[0], .0[1])]
     Size([f32; 2]),
@@ -65,9 +65,9 @@ impl Canvas {
     /// A picture of this width and height (units) in one colour, `scale` pixels to a unit.
     ///
     /// Fails where it would have no pixels, or more than 16,384 in a row or column.
-    pub fn new(size: [f32; 2], scale: f32, background: Colour) -> Result<Canvas, Error> {
+    pub fn new(size: [f32; 2], scale: f32, background: Colour) -> Result<Canvas, PictureError> {
         let pixels = size.map(|v| (v * scale).ceil());
-        let error = Error::Size(pixels);
+        let error = PictureError::Size(pixels);
         if !pixels.iter().all(|v| (1.0..=PIXELS_MAX).contains(v)) {
             return Err(error);
         }

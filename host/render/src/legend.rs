@@ -3,7 +3,7 @@
 use crate::canvas::{Align, Canvas, Pen};
 use crate::colours::{Colour, INK, MUTED, ramp};
 use crate::panel::{draw_arrow, draw_box};
-use crate::scene::{Entry, Look, Sign};
+use crate::scene::{LegendEntry, Look, Sign};
 use crate::text;
 
 /// Height of a row and of its text, units.
@@ -18,8 +18,8 @@ const SIGN: f32 = 20.0;
 const CELL: f32 = 10.0;
 
 /// Entries row by row, as many in each as its width allows.
-pub(crate) fn rows(look: &Look, wide: f32) -> Vec<Vec<&Entry>> {
-    let mut rows: Vec<Vec<&Entry>> = Vec::new();
+pub(crate) fn rows(look: &Look, wide: f32) -> Vec<Vec<&LegendEntry>> {
+    let mut rows: Vec<Vec<&LegendEntry>> = Vec::new();
     let mut x = wide;
     for entry in &look.legend {
         let width = entry_width(entry, look);
@@ -36,12 +36,12 @@ pub(crate) fn rows(look: &Look, wide: f32) -> Vec<Vec<&Entry>> {
 }
 
 /// Of all rows, units.
-pub(crate) fn height(rows: &[Vec<&Entry>]) -> f32 {
+pub(crate) fn height(rows: &[Vec<&LegendEntry>]) -> f32 {
     if rows.is_empty() { 0.0 } else { 12.0 + ROW * rows.len() as f32 }
 }
 
 /// Draws rows from the upper left corner `at`.
-pub(crate) fn draw(canvas: &mut Canvas, rows: &[Vec<&Entry>], look: &Look, at: [f32; 2]) {
+pub(crate) fn draw(canvas: &mut Canvas, rows: &[Vec<&LegendEntry>], look: &Look, at: [f32; 2]) {
     let mut y = at[1] + 12.0 + 0.5 * ROW;
     for row in rows {
         let mut x = at[0];
@@ -55,7 +55,7 @@ pub(crate) fn draw(canvas: &mut Canvas, rows: &[Vec<&Entry>], look: &Look, at: [
     }
 }
 
-fn entry_width(entry: &Entry, look: &Look) -> f32 {
+fn entry_width(entry: &LegendEntry, look: &Look) -> f32 {
     sign_width(&entry.sign, look) + SPACE + text::width(&entry.text, SIZE)
 }
 

@@ -14,6 +14,7 @@
 pub mod canvas;
 pub mod colours;
 mod legend;
+mod page;
 mod panel;
 pub mod scene;
 mod text;
@@ -21,7 +22,8 @@ mod text;
 #[cfg(test)]
 mod tests;
 
-pub use canvas::{Canvas, Error, Pen};
+pub use canvas::{Canvas, Pen, PictureError};
 pub use colours::Colour;
+pub use page::birds_eye;
 pub use panel::WINDOW;
-pub use scene::{Arrow, Cell, Entry, Look, Outline, Panel, Sign, Trail, birds_eye};
+pub use scene::{Arrow, Cell, LegendEntry, Look, Outline, Panel, Sign, Trail};

@@ -1,6 +1,6 @@
 //! One panel.
 
-use crate::canvas::{Align, Canvas, Error, Pen};
+use crate::canvas::{Align, Canvas, Pen, PictureError};
 use crate::colours::{BORDER, Colour, GROUND, INK, MUTED, PAPER, RING, VEHICLE, ramp};
 use crate::scene::{Arrow, Cell, Look, Outline, Panel};
 use crate::text;
@@ -29,17 +29,17 @@ impl Look {
 }
 
 /// Where metres lie on a panel.
-pub(crate) struct View<'a> {
+pub(crate) struct PanelView<'a> {
     look: &'a Look,
 }
 
-impl View<'_> {
-    pub fn new(look: &Look) -> View<'_> {
-        View { look }
+impl PanelView<'_> {
+    pub fn new(look: &Look) -> PanelView<'_> {
+        PanelView { look }
     }
 
     /// Everything, from the ground up.
-    pub fn draw(&self, panel: &Panel) -> Result<Canvas, Error> {
+    pub fn draw(&self, panel: &Panel) -> Result<Canvas, PictureError> {
         let side = self.look.side;
         let mut canvas = Canvas::new([side; 2], self.look.scale, GROUND)?;
         let c = &mut canvas;

@@ -1,19 +1,7 @@
-//! What a bird's-eye picture shows, as plain data, and how its parts lie on the page.
+//! What a bird's-eye picture shows, as plain data.
 
-use crate::canvas::{Align, Canvas, Error, Pen};
-use crate::colours::{Colour, INK, MUTED, PAPER};
-use crate::panel::View;
-use crate::{legend, text};
-
-/// Around the page, units.
-const MARGIN: f32 = 14.0;
-/// Between panels, units.
-const GAP: f32 = 28.0;
-/// Height of a panel's title, units.
-const TITLE: f32 = 30.0;
-/// Height of a title's and of a note's font, units.
-const TITLE_SIZE: f32 = 16.0;
-const NOTE_SIZE: f32 = 13.0;
+use crate::canvas::Pen;
+use crate::colours::Colour;
 
 /// One view from above. Places are in metres, x up and y to the left on the picture; the origin is
 /// in the middle. What is not finite, or lies outside, is left out.
@@ -107,12 +95,12 @@ pub struct Look {
     /// Pixels per unit; text is 13 units high.
     pub scale: f32,
     /// What colours and arrows mean, in rows below the panels.
-    pub legend: Vec<Entry>,
+    pub legend: Vec<LegendEntry>,
 }
 
 /// A sign of the legend and its meaning.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct LegendEntry {
     /// The sign.
     pub sign: Sign,
     /// What it means.
@@ -132,41 +120,4 @@ pub enum Sign {
     Outline(Colour),
     /// A line.
     Line(Pen),
-}
-
-/// Draws panels side by side above one legend.
-///
-/// Fails where `half_extent_m` or `cell_m` is not positive and finite, or the picture has no pixels or more than 16,384
-/// in a row.
-pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Canvas, Error> {
-    for metres in [look.half_extent_m, look.cell_m] {
-        if !(metres > 0.0 && metres.is_finite()) {
-            return Err(Error::Extent(metres));
-        }
-    }
-    let n = panels.len().max(1) as f32;
-    let width = look.side * n + GAP * (n - 1.0);
-    let rows = legend::rows(look, width);
-    let height = TITLE + look.side + legend::height(&rows);
-    let page = [width, height].map(|v| v + 2.0 * MARGIN);
-    let mut canvas = Canvas::new(page, look.scale, PAPER)?;
-    for (i, panel) in panels.iter().enumerate() {
-        let left = MARGIN + i as f32 * (look.side + GAP);
-        draw_title(&mut canvas, panel, [left, MARGIN + TITLE - 11.0], look.side);
-        canvas.place(&View::new(look).draw(panel)?, [left, MARGIN + TITLE]);
-    }
-    legend::draw(&mut canvas, &rows, look, [MARGIN, MARGIN + TITLE + look.side]);
-    Ok(canvas)
-}
-
-/// Title and note on one baseline; the title ends before the note.
-fn draw_title(canvas: &mut Canvas, panel: &Panel, [left, y]: [f32; 2], wide: f32) {
-    let room = wide - text::width(&panel.note, NOTE_SIZE) - GAP;
-    let fits = |title: &String| text::width(title, TITLE_SIZE) <= room;
-    let cut = |end| format!("{}…", panel.title[..end].trim_end());
-    let ends = panel.title.char_indices().rev().map(|(end, _)| end);
-    let title = Some(panel.title.clone()).into_iter().chain(ends.map(cut)).find(fits);
-    let title = title.unwrap_or_default();
-    canvas.text([left, y], &title, TITLE_SIZE, Align::Start, INK);
-    canvas.text([left + wide, y], &panel.note, NOTE_SIZE, Align::End, MUTED);
 }

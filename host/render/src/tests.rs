@@ -2,7 +2,8 @@
 
 use crate::canvas::Canvas;
 use crate::{
-    Arrow, Cell, Colour, Entry, Error, Look, Outline, Panel, Sign, Trail, birds_eye, colours,
+    Arrow, Cell, Colour, LegendEntry, Look, Outline, Panel, PictureError, Sign, Trail, birds_eye,
+    colours,
 };
 
 const RED: Colour = [200, 0, 0];
@@ -138,7 +139,7 @@ fn boxes_trails_and_the_vehicle_are_there() {
 
 #[test]
 fn the_legend_has_a_row_for_what_fits() {
-    let entry = Entry { sign: Sign::Cell(RED), text: "moving, of some length".into() };
+    let entry = LegendEntry { sign: Sign::Cell(RED), text: "moving, of some length".into() };
     let height = |n: usize| {
         let look = Look { legend: vec![entry.clone(); n], ..look() };
         let picture = birds_eye(&[Panel::default()], &look).unwrap();
@@ -192,7 +193,7 @@ fn full() -> Canvas {
         window: Some([[14.0, 11.0], [13.0, -14.0], [-12.0, -13.0], [-13.0, 12.0]]),
         vehicle: true,
     };
-    let entry = |sign, text: &str| Entry { sign, text: text.into() };
+    let entry = |sign, text: &str| LegendEntry { sign, text: text.into() };
     let legend = vec![
         entry(Sign::Ramp(colours::SPEEDS, ["0".into(), "≥ 15".into()]), "m/s"),
         entry(Sign::Arrow(Arrow { way: [5.0, 0.0], colour: RED, width: 1.7 }), "10 m/s"),
@@ -249,9 +250,9 @@ fn nonsense_is_left_out() {
 #[test]
 fn what_cannot_be_drawn_is_an_error() {
     let fails = |look: Look| birds_eye(&[Panel::default()], &look).err().unwrap();
-    assert!(matches!(fails(Look { half_extent_m: f32::NAN, ..look() }), Error::Extent(_)));
-    assert_eq!(fails(Look { half_extent_m: 0.0, ..look() }), Error::Extent(0.0));
-    assert_eq!(fails(Look { cell_m: -1.0, ..look() }), Error::Extent(-1.0));
-    assert!(matches!(fails(Look { side: 1e6, ..look() }), Error::Size(_)));
-    assert!(matches!(fails(Look { scale: 0.0, ..look() }), Error::Size(_)));
+    assert!(matches!(fails(Look { half_extent_m: f32::NAN, ..look() }), PictureError::Extent(_)));
+    assert_eq!(fails(Look { half_extent_m: 0.0, ..look() }), PictureError::Extent(0.0));
+    assert_eq!(fails(Look { cell_m: -1.0, ..look() }), PictureError::Extent(-1.0));
+    assert!(matches!(fails(Look { side: 1e6, ..look() }), PictureError::Size(_)));
+    assert!(matches!(fails(Look { scale: 0.0, ..look() }), PictureError::Size(_)));
 }

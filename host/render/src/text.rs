@@ -12,7 +12,7 @@ pub fn width(text: &str, size: f32) -> f32 {
 
 /// Outlines of a line of text that starts at `at` on the baseline; nothing where it has no marks.
 pub(crate) fn outlines(text: &str, [x, y]: [f32; 2], size: f32) -> Option<Path> {
-    let mut pen = Pen { path: PathBuilder::new(), x, y, unit: unit(size) };
+    let mut pen = GlyphPath { path: PathBuilder::new(), x, y, unit: unit(size) };
     for glyph in glyphs(text) {
         face().outline_glyph(glyph, &mut pen);
         pen.x += advance(glyph) * pen.unit;
@@ -39,20 +39,20 @@ fn advance(glyph: GlyphId) -> f32 {
 }
 
 /// Places glyphs, given in font units with y up, on a picture with y down.
-struct Pen {
+struct GlyphPath {
     path: PathBuilder,
     x: f32,
     y: f32,
     unit: f32,
 }
 
-impl Pen {
+impl GlyphPath {
     fn at(&self, x: f32, y: f32) -> [f32; 2] {
         [self.x + x * self.unit, self.y - y * self.unit]
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlineBuilder for GlyphPath {
     fn move_to(&mut self, x: f32, y: f32) {
         let [x, y] = self.at(x, y);
         self.path.move_to(x, y);

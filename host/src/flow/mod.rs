@@ -21,7 +21,7 @@ use crate::config;
 use crate::console::{note, say};
 use crate::error::RunError;
 use crate::laps::Laps;
-use crate::picture::{Pictures, Scene};
+use crate::picture::{Pictures, Subject};
 use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
@@ -165,7 +165,7 @@ fn points(
     }
     if let Some((pictures, flows)) = png.as_mut().zip(stepped.output.flows.as_ref()) {
         let (columns, frame) = (flows.columns, PictureFrame::World);
-        pictures.write(first, &Scene::Flow { columns, profile, frame })?;
+        pictures.write(first, &Subject::Flow { columns, profile, frame })?;
     }
     let mut flows = stepped.output.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
     flows.resize(first.points.len(), PointFlow::default());

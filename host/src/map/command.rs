@@ -12,7 +12,7 @@ use crate::console::{bytes, note, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
-use crate::picture::{Pictures, Scene};
+use crate::picture::{Pictures, Subject};
 use crate::session::each_sweep;
 use crate::statistics::Dropped;
 use raywake_io::sink::atomic;
@@ -44,7 +44,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
         let path = args.out.join(format!("{:010}.feather", visit.now.frame));
         if let Some(pictures) = &mut pictures {
             let (voxels, voxel_m) = (&voxels, profile.voxel_m);
-            pictures.write(visit.now, &Scene::Map { voxels, origin_m, voxel_m })?;
+            pictures.write(visit.now, &Subject::Map { voxels, origin_m, voxel_m })?;
         }
         let meta =
             [("frame", visit.now.frame.to_string()), ("stamp_s", visit.now.stamp_s.to_string())];

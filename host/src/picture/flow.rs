@@ -4,9 +4,9 @@ use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
 use raywake_io::source::SweepData;
-use raywake_render::{Cell, Entry, Look, Panel, Sign, WINDOW, colours};
+use raywake_render::{Cell, LegendEntry, Look, Panel, Sign, WINDOW, colours};
 
-use super::pictures::{
+use super::drawing::{
     WIDE, along_vehicle, arrow, entry, look, places, return_heights, speed, speeds,
 };
 use crate::args::PictureFrame;
@@ -67,7 +67,7 @@ fn window(half_m: f64, frame: Frame, pose: &Pose) -> [[f32; 2]; 4] {
     })
 }
 
-fn legend(of: &str) -> Vec<Entry> {
+fn legend(of: &str) -> Vec<LegendEntry> {
     let young =
         entry(Sign::Arrow(arrow([4.0, 0.0], THIN)), &format!("observed less than {AGE} times"));
     let still = entry(Sign::Cell(colours::STATIC), "static foreground");

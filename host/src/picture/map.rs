@@ -5,7 +5,7 @@ use raywake_core::pose::Pose;
 use raywake_io::sink::feather::Voxel;
 use raywake_render::{Cell, Look, Panel, Sign, colours};
 
-use super::pictures::{entry, heights, look};
+use super::drawing::{entry, heights, look};
 
 /// How far a picture reaches, m: as far as a map does.
 const REACH_M: f64 = 100.0;

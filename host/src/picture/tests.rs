@@ -8,9 +8,8 @@ use raywake_io::sink::feather::Voxel;
 use raywake_io::source::SweepData;
 use raywake_render::{Canvas, colours};
 
-use super::Scene;
+use super::Subject;
 use super::flow::BEYOND;
-use super::pictures;
 use crate::args::PictureFrame;
 
 fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
@@ -20,8 +19,8 @@ fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
         world_from_vehicle: Pose::planar(5.0, -3.0, 0.0, yaw_rad),
         ..SweepData::default()
     };
-    let scene = Scene::Flow { columns, profile: &Profile::hdl64(), frame };
-    pictures::draw(&sweep, &scene, "drive", String::new()).unwrap()
+    let subject = Subject::Flow { columns, profile: &Profile::hdl64(), frame };
+    super::draw(&sweep, &subject, "drive", String::new()).unwrap()
 }
 
 /// Middle of the strong colours of the panel, m forward and left, and how many pixels have such.
@@ -88,19 +87,19 @@ fn what_is_static_or_unknown_has_no_arrow() {
 
 #[test]
 fn a_map_shows_what_stands_and_what_is_free() {
-    // A wall 3 m high and 20 m ahead, and a free lane up to it, in a lattice of 0.4 m voxels whose
-    // corner is not the vehicle.
+    // A wall 3 m high and 20 m ahead, a free lane up to it, ground to its right; voxels of 0.4 m.
     let voxel = |i, j, k, log_odds_tenths| Voxel { index: [i, j, k], log_odds_tenths };
+    let ground = (0..100).map(|i| voxel(i, -60, 0, 20));
     let lane = (0..50).map(|i| voxel(i, 0, 0, -20));
     let wall =
         (-10..10).flat_map(|j| [voxel(50, j, 0, 20), voxel(50, j, 7, 20), voxel(50, j, 8, -5)]);
-    let voxels: Vec<Voxel> = lane.chain(wall).collect();
-    let scene = Scene::Map { voxels: &voxels, origin_m: [100.0, 50.0, -1.7], voxel_m: 0.4 };
+    let voxels: Vec<Voxel> = lane.chain(wall).chain(ground).collect();
+    let subject = Subject::Map { voxels: &voxels, origin_m: [100.0, 50.0, -1.7], voxel_m: 0.4 };
     let sweep = SweepData {
         world_from_vehicle: Pose::planar(100.0, 50.0, 0.0, 0.0),
         ..SweepData::default()
     };
-    let picture = pictures::draw(&sweep, &scene, "drive", String::new()).unwrap();
+    let picture = super::draw(&sweep, &subject, "drive", String::new()).unwrap();
     let width = picture.size()[0] as usize;
     // 4.5 pixels per metre, the vehicle in the middle of the panel.
     let at = |x_m: f64, y_m: f64| {

@@ -7,7 +7,7 @@ use raywake_objects::ObjectState;
 use raywake_objects::front_end::{Life, Track};
 use raywake_render::{Look, Outline, Panel, Sign, Trail, colours};
 
-use super::pictures::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
+use super::drawing::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
 
 /// How far a picture reaches, m.
 const REACH_M: f64 = 50.0;

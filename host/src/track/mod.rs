@@ -14,7 +14,7 @@ use crate::console::{bytes, note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
-use crate::picture::{Pictures, Scene};
+use crate::picture::{Pictures, Subject};
 use crate::session::each_sweep;
 use crate::weight_files::WeightFiles;
 use raywake_core::params::Profile;
@@ -80,7 +80,7 @@ fn draw(
     tracker: &Tracker,
 ) -> Result<(), raywake_io::Error> {
     match pictures {
-        Some(pictures) => pictures.write(sweep, &Scene::Tracks(tracker.tracks())),
+        Some(pictures) => pictures.write(sweep, &Subject::Tracks(tracker.tracks())),
         None => Ok(()),
     }
 }

@@ -1,10 +1,8 @@
 //! Clouds from above and from the side, coloured by time, side by side.
 
-use super::palette::{self, INK, MUTED};
-use super::raster;
-use super::svg::{Anchor, Area, Svg};
 use raywake_io::Error;
-use resvg::tiny_skia::{Paint, Pixmap, Rect, Transform};
+use raywake_render::canvas::{Align, Canvas};
+use raywake_render::{Colour, colours};
 
 /// Width of a panel, units.
 const WIDE: f64 = 340.0;
@@ -15,10 +13,12 @@ const TITLE: f64 = 26.0;
 const FOOT: f64 = 30.0;
 /// Pixels per unit.
 const SCALE: f32 = 2.0;
-/// Side of a point, pixels.
-const POINT: f32 = 2.0;
+/// Side of a point, units.
+const POINT: f32 = 1.0;
 /// Free space around the object, m.
 const MARGIN_M: f64 = 0.3;
+/// From first to last: blue over green to yellow, ever lighter.
+const TIMES: &[Colour] = &[[53, 42, 135], [15, 118, 200], [55, 184, 157], [250, 220, 30]];
 
 /// A cloud with a title.
 #[derive(Clone, Debug)]
@@ -31,60 +31,57 @@ pub struct Cloud {
     pub times: Vec<f32>,
 }
 
-/// Draws clouds side by side at one scale, seen from above and beneath it from the right, from blue
-/// (first) to yellow (last). The scale is chosen to show `reach` m (length, width, height) about the
-/// origin; what lies beyond is left out.
+/// Draws clouds side by side at one scale, from above and beneath it from the right, from blue
+/// (first) to yellow (last). The scale is chosen to show `reach` m (length, width, height) about
+/// the origin; what lies beyond is left out.
 ///
-/// Returns a PNG file. Fails where the picture is larger than memory.
+/// Returns a PNG file. Fails where the picture has no pixels or too many.
 pub fn clouds(clouds: &[Cloud], reach: [f64; 3]) -> Result<Vec<u8>, Error> {
     let [length, width, height] = reach.map(|v| v + 2.0 * MARGIN_M);
     let per_m = WIDE / length;
-    let (above, beside) = (width * per_m, height * per_m);
+    let [above, beside] = [width, height].map(|v| v * per_m);
     let n = clouds.len().max(1) as f64;
-    let size = [WIDE * n + GAP * (n - 1.0), TITLE + above + GAP + beside + FOOT];
-    let mut svg = Svg::new(size[0], size[1], GAP);
-    let mut panels = Vec::new();
+    let page = [GAP + n * (WIDE + GAP), 3.0 * GAP + TITLE + above + beside + FOOT];
+    let canvas = Canvas::new(page.map(|v| v as f32), SCALE, colours::PAPER);
+    let mut canvas = canvas.map_err(|e| Error::Usage(format!("clouds: {e}")))?;
     for (i, cloud) in clouds.iter().enumerate() {
-        let left = i as f64 * (WIDE + GAP);
-        svg.text([left, 16.0], &cloud.title, 15.0, Anchor::Start, INK);
-        let top = Area { left, top: TITLE, width: WIDE, height: above };
-        let side = Area { top: TITLE + above + GAP, height: beside, ..top };
-        for area in [top, side] {
-            svg.raw(&super::birds_eye::rect(area, "#f8f9fb"));
+        let left = GAP + i as f64 * (WIDE + GAP);
+        let title = [left, GAP + 16.0].map(|v| v as f32);
+        canvas.text(title, &cloud.title, 15.0, Align::Start, colours::INK);
+        let top = Area { corner: [left, GAP + TITLE], size: [WIDE, above] };
+        let side = Area { corner: [left, 2.0 * GAP + TITLE + above], size: [WIDE, beside] };
+        for area in [&top, &side] {
+            let [corner, size] = [area.corner, area.size].map(|v| v.map(|v| v as f32));
+            canvas.rect(corner, size, colours::GROUND, 1.0);
         }
-        panels.push([top, side]);
-    }
-    let foot = size[1] - 8.0;
-    svg.raw(&super::birds_eye::rect(
-        Area { left: 0.0, top: foot - 4.0, width: per_m, height: 2.0 },
-        "#667085",
-    ));
-    let legend = "1 m; from above, and from the right; blue first, yellow last";
-    svg.text([per_m + 8.0, foot], legend, 13.0, Anchor::Start, MUTED);
-    let mut sheet = raster::sheet(svg.size(), SCALE)?;
-    raster::draw(&svg.finish("clouds"), SCALE, &mut sheet)?;
-    for (cloud, [top, side]) in clouds.iter().zip(panels) {
         for (p, time) in cloud.points.iter().zip(&cloud.times) {
-            let [x, y, z] = p.map(f64::from);
-            let colour = palette::time(f64::from(*time));
-            dot(&mut sheet, top, [x, y].map(|v| v * per_m), colour);
-            dot(&mut sheet, side, [x, z].map(|v| v * per_m), colour);
+            let [x, y, z] = p.map(|v| f64::from(v) * per_m);
+            let colour = colours::ramp(TIMES, *time);
+            top.dot(&mut canvas, [x, y], colour);
+            side.dot(&mut canvas, [x, z], colour);
         }
     }
-    raster::encode(&sheet)
+    let [left, foot, metre] = [GAP, page[1] - GAP - 8.0, per_m].map(|v| v as f32);
+    canvas.rect([left, foot - 4.0], [metre, 2.0], colours::MUTED, 1.0);
+    let legend = "1 m; from above, and from the right; blue first, yellow last";
+    canvas.text([left + metre + 8.0, foot], legend, 13.0, Align::Start, colours::MUTED);
+    Ok(canvas.png())
 }
 
-/// A point so far right of and above the middle of an area, units, if it lies within it.
-fn dot(sheet: &mut Pixmap, area: Area, [x, y]: [f64; 2], [r, g, b]: [u8; 3]) {
-    if !(x.abs() < 0.5 * area.width && y.abs() < 0.5 * area.height) {
-        return;
-    }
-    let at = [area.left + 0.5 * area.width + x, area.top + 0.5 * area.height - y];
-    let [left, top] = at.map(|v| ((v + GAP) as f32 * SCALE - 0.5 * POINT).round());
-    let mut paint = Paint { anti_alias: false, ..Paint::default() };
-    paint.set_color_rgba8(r, g, b, 200);
-    if let Some(square) = Rect::from_xywh(left, top, POINT, POINT) {
-        sheet.fill_rect(square, &paint, Transform::identity(), None);
+/// A panel, units.
+struct Area {
+    corner: [f64; 2],
+    size: [f64; 2],
+}
+
+impl Area {
+    /// A point so far right of and above the middle, units, if it lies within.
+    fn dot(&self, canvas: &mut Canvas, [x, y]: [f64; 2], colour: Colour) {
+        let ([left, top], [width, height]) = (self.corner, self.size);
+        if x.abs() < 0.5 * width && y.abs() < 0.5 * height {
+            let at = [left + 0.5 * width + x, top + 0.5 * height - y].map(|v| v as f32);
+            canvas.square(at, POINT, colour, 0.8);
+        }
     }
 }
 
@@ -101,12 +98,14 @@ mod tests {
         };
         let two =
             [cloud(&[[0.5, 0.2, 0.1]], &[0.0]), cloud(&[[0.0; 3], [9.0, 0.0, 0.0]], &[1.0, 0.0])];
-        let sheet = Pixmap::decode_png(&clouds(&two, [4.0, 2.0, 1.5]).unwrap()).unwrap();
-        let half = sheet.width() as usize / 2;
+        let png = clouds(&two, [4.0, 2.0, 1.5]).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
+        let half = reader.next_frame(&mut rgb).unwrap().width as usize / 2;
         let count = |right: bool, like: fn([u8; 3]) -> bool| {
-            let pixels = sheet.pixels().iter().enumerate();
+            let pixels = rgb.chunks_exact(3).enumerate();
             let side = pixels.filter(|(n, _)| (n % (2 * half) >= half) == right);
-            side.filter(|(_, p)| like([p.red(), p.green(), p.blue()])).count()
+            side.filter(|(_, p)| like([p[0], p[1], p[2]])).count()
         };
         // A square of four pixels from above, another from the right.
         let blue = |[r, g, b]: [u8; 3]| b > 140 && r < 120 && g < 120;

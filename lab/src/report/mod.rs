@@ -9,9 +9,7 @@ mod chart;
 mod clouds;
 mod encode;
 mod html;
-mod palette;
 mod raster;
-mod svg;
 mod table;
 
 #[cfg(test)]

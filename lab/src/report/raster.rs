@@ -6,37 +6,18 @@ use resvg::usvg::fontdb::Database;
 use resvg::usvg::{Options, Tree};
 use std::sync::{Arc, OnceLock};
 
-/// Draws an SVG onto a picture, `scale` pixels per unit, over what is there.
-///
-/// Fails where the document is no SVG.
-pub(super) fn draw(svg: &str, scale: f32, onto: &mut Pixmap) -> Result<(), Error> {
-    let options =
-        Options { fontdb: fonts(), font_family: "sans-serif".into(), ..Options::default() };
-    let tree = Tree::from_str(svg, &options).map_err(|e| failed(&e))?;
-    resvg::render(&tree, Transform::from_scale(scale, scale), &mut onto.as_mut());
-    Ok(())
-}
-
 /// An SVG of this size (units) on white as a PNG file, `scale` pixels per unit.
 ///
 /// Fails where the document is no SVG or the picture is empty or larger than memory.
 pub(super) fn png(svg: &str, size: [f64; 2], scale: f32) -> Result<Vec<u8>, Error> {
-    let mut pixmap = sheet(size, scale)?;
-    draw(svg, scale, &mut pixmap)?;
-    encode(&pixmap)
-}
-
-/// A white picture.
-pub(super) fn sheet(size: [f64; 2], scale: f32) -> Result<Pixmap, Error> {
+    let options =
+        Options { fontdb: fonts(), font_family: "sans-serif".into(), ..Options::default() };
+    let tree = Tree::from_str(svg, &options).map_err(|e| failed(&e))?;
     let [width, height] = size.map(|v| (v * f64::from(scale)).ceil() as u32);
     let mut pixmap =
         Pixmap::new(width, height).ok_or_else(|| failed(&format!("{width} x {height} pixels")))?;
     pixmap.fill(resvg::tiny_skia::Color::WHITE);
-    Ok(pixmap)
-}
-
-/// A picture as a PNG file.
-pub(super) fn encode(pixmap: &Pixmap) -> Result<Vec<u8>, Error> {
+    resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
     pixmap.encode_png().map_err(|e| failed(&e))
 }
 
