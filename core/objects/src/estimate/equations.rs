@@ -8,12 +8,10 @@
 use super::cholesky::CholeskySystem;
 use super::model_point::{Block, ModelPoint};
 use super::observation::Observation;
+use super::piece::{Piece, Planar, Vertical};
 use super::samples::Sample;
 use super::state::{ControlPoint, is_vertical, planar, vertical};
 use crate::spline::{BASES_MAX, Basis, SUPPORT};
-
-const PLANAR: usize = 5 * BASES_MAX;
-const VERTICAL: usize = 2 * BASES_MAX;
 
 /// See [`CholeskySystem::solve`].
 const PIVOT_MIN: f64 = 1e-10;
@@ -26,67 +24,8 @@ const RIDGE: f64 = 1e-9;
 /// Both systems of a step.
 pub(super) struct Equations {
     pub bases: usize,
-    pub planar: CholeskySystem<PLANAR, { PLANAR * PLANAR }>,
-    pub vertical: CholeskySystem<VERTICAL, { VERTICAL * VERTICAL }>,
-}
-
-/// What a return adds for a pair of basis functions, before their values.
-const TERMS: usize = 7;
-const PAIRS: usize = SUPPORT * (SUPPORT + 1) / 2;
-
-/// Sums over the returns of one piece of the splines.
-struct Piece {
-    matrix: [[f64; PAIRS]; TERMS],
-    vector: [[f64; SUPPORT]; 4],
-}
-
-impl Piece {
-    const EMPTY: Piece = Piece { matrix: [[0.0; PAIRS]; TERMS], vector: [[0.0; SUPPORT]; 4] };
-
-    fn add(&mut self, values: &[f64; SUPPORT], terms: &[f64; TERMS], rhs: &[f64; 4]) {
-        let mut products = [0.0; PAIRS];
-        let mut at = 0;
-        for i in 0..SUPPORT {
-            for j in 0..=i {
-                products[at] = values[i] * values[j];
-                at += 1;
-            }
-        }
-        for (sums, term) in self.matrix.iter_mut().zip(terms) {
-            for (sum, product) in sums.iter_mut().zip(&products) {
-                *sum += term * product;
-            }
-        }
-        for (sums, rhs) in self.vector.iter_mut().zip(rhs) {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += rhs * value;
-            }
-        }
-    }
-
-    fn flush(&mut self, first: usize, equations: &mut Equations) {
-        let mut at = 0;
-        for i in 0..SUPPORT {
-            for j in 0..=i {
-                let [xx, xy, yy, xh, yh, hh, zz] = core::array::from_fn(|t| self.matrix[t][at]);
-                let block = [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]];
-                for (a, row) in block.iter().enumerate() {
-                    for (b, &value) in row.iter().enumerate() {
-                        if i > j || a >= b {
-                            equations.planar.add(3 * (first + i) + a, 3 * (first + j) + b, value);
-                        }
-                    }
-                }
-                equations.vertical.add(first + i, first + j, zz);
-                at += 1;
-            }
-            for d in 0..3 {
-                equations.planar.vector[3 * (first + i) + d] += self.vector[d][i];
-            }
-            equations.vertical.vector[first + i] += self.vector[3][i];
-        }
-        *self = Piece::EMPTY;
-    }
+    pub planar: Planar,
+    pub vertical: Vertical,
 }
 
 impl Equations {
@@ -158,7 +97,7 @@ impl Equations {
         let mut first = 0;
         for (sample, observation) in samples.iter().zip(observations) {
             if sample.basis.first != first {
-                piece.flush(first, self);
+                piece.flush(first, &mut self.planar, &mut self.vertical);
                 first = sample.basis.first;
             }
             let Observation { axes: [n, t], by_heading: [hn, ht], residual, .. } = *observation;
@@ -182,7 +121,7 @@ impl Equations {
             ];
             piece.add(&sample.basis.values, &terms, &rhs);
         }
-        piece.flush(first, self);
+        piece.flush(first, &mut self.planar, &mut self.vertical);
     }
 
     /// Eliminates a model point.

@@ -44,6 +44,7 @@ mod model_point;
 mod nearest;
 mod observation;
 mod params;
+mod piece;
 mod problem;
 mod process;
 mod report;

@@ -211,3 +211,30 @@ impl Samples {
         &self.all[..self.count]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::boxed::Box;
+
+    #[test]
+    fn a_glance_tells_how_long_an_object_is() {
+        let mut returns = Box::new(Samples::new());
+        // 8 m along the diagonal of the plane at 5 m/s; half of it hidden for half a second.
+        let mut look = |count: usize| {
+            let seen = (0..count).map(|i| {
+                let time_s = 4.0 * i as f32 / count as f32;
+                let hidden = (1.0..1.5).contains(&time_s);
+                let along = 5.0 * time_s + (i % 5) as f32 * if hidden { 1.0 } else { 2.0 };
+                ([0.6 * along, 0.8 * along, 0.0], time_s)
+            });
+            returns.set(seen);
+            returns.length_m()
+        };
+        let length = look(2000);
+        assert!((8.0..8.6).contains(&length), "{length}");
+        // Too few in every glance.
+        assert_eq!(look(80), 0.0);
+    }
+}
