@@ -25,17 +25,13 @@ static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 /// What a device may hold for a window of 50 m.
 const DEVICE_BYTES: u64 = 64 << 20;
 
-/// Stack of the thread that works, bytes: as the program's, it holds the core's state for a moment.
-const STACK: usize = 64 << 20;
-
 /// Numbers of threads, whatever the machine has.
 const THREADS: [usize; 2] = [3, 1];
 
 fn main() {
     let [several, one] = THREADS.map(|threads| {
-        let worker = std::thread::Builder::new().stack_size(STACK);
-        let worker = worker.spawn(move || team::lead(threads, run));
-        worker.expect("a thread").join().expect("all pass")
+        let worker = std::thread::spawn(move || team::lead(threads, run));
+        worker.join().expect("all pass")
     });
     assert!(several == one, "{several:x?}, alone {one:x?}");
 }

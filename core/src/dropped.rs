@@ -32,6 +32,16 @@ impl core::ops::AddAssign for DroppedReturns {
 }
 
 impl DroppedReturns {
+    /// Nothing left out yet.
+    pub const ZERO: DroppedReturns = DroppedReturns {
+        over_capacity: 0,
+        not_finite: 0,
+        no_return: 0,
+        too_far: 0,
+        unknown_sensor: 0,
+        own_vehicle: 0,
+    };
+
     /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and
     /// counted, where the return is not valid.
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {

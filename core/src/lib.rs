@@ -25,6 +25,7 @@ mod random;
 pub mod record;
 pub mod refinement;
 pub mod return_clock;
+pub mod returns;
 pub mod stages;
 pub mod sweep;
 pub mod team;

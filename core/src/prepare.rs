@@ -1,11 +1,13 @@
-//! Sweep preparation: returns to rays in the grid's frame (B.2.2), time and motion included.
+//! Rays: returns in the grid's frame (B.2.2), time and motion included.
+//!
+//! A return is moved by the vehicle's pose at its own time slot (motion compensation, "deskewing")
+//! and quantised relative to the window's central voxel.
 
 use crate::dropped::DroppedReturns;
-use crate::frame::{Arrival, Window, central};
+use crate::frame::{Window, central};
 use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
-use crate::refinement::{Refinement, SweepReturns};
 use crate::return_clock::{ReturnClock, slot_of};
 use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, SENSORS_MAX, Sweep, Timing};
@@ -40,108 +42,6 @@ pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
     }
 }
 
-/// Where the returns of the last two sweeps are.
-pub(crate) struct Returns {
-    /// Column of every return, of the sweep and of the one before.
-    column: [[u32; POINTS_MAX]; 2],
-    /// Whether a return belongs to none of the clusters that its column is part of.
-    is_apart: [[bool; POINTS_MAX]; 2],
-    placed: [Placed; POINTS_MAX],
-}
-
-/// A sweep as rays.
-pub(crate) struct Sent {
-    pub uniform: SweepUniform,
-    pub dropped: DroppedReturns,
-}
-
-impl Returns {
-    /// Of no sweep.
-    pub const fn new() -> Returns {
-        Returns {
-            column: [[0; POINTS_MAX]; 2],
-            is_apart: [[false; POINTS_MAX]; 2],
-            placed: [const { Placed { at: [0.0; 3], offset_s: 0.0 } }; POINTS_MAX],
-        }
-    }
-
-    /// Turns the sweep that has just come into rays.
-    pub fn send(
-        &mut self,
-        setup: &Setup,
-        team: &impl Team,
-        sweep: &Sweep,
-        arrival: &Arrival,
-        (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
-    ) -> Sent {
-        let Setup { profile, rig, .. } = setup;
-        self.column.swap(0, 1);
-        self.is_apart.swap(0, 1);
-        let (count, dropped) = setup.preparation.prepare(
-            team,
-            profile,
-            rig,
-            &arrival.window,
-            sweep,
-            rays,
-            &mut self.column[0],
-            &mut self.placed,
-            origins,
-        );
-        let [shift_x, shift_y, shift_z] = arrival.shift;
-        let uniform = SweepUniform {
-            shift_x,
-            shift_y,
-            shift_z,
-            unfiltered: setup.unfiltered as i32,
-            smoothing: profile.smoothing as i32,
-            displacement_cost: profile.displacement_cost as i32,
-            outside_cost: profile.outside_cost as i32,
-            score_min: setup.scores.min,
-            ..uniform_of(profile, count)
-        };
-        Sent { uniform, dropped }
-    }
-
-    /// Hands the sweep that was sent to the refinement. Returns how many returns that had no room
-    /// for: it does not see them.
-    pub fn insert(
-        &mut self,
-        refinement: &mut Refinement,
-        profile: &Profile,
-        corner: [i32; 3],
-        sweep: &Sweep,
-    ) -> usize {
-        if profile.refinement_sweeps == 0 {
-            return 0;
-        }
-        let taken = sweep.points.len().min(POINTS_MAX);
-        let side = profile.side as f32;
-        let inside = |v: f32| v >= 0.0 && v < side;
-        let columns = &mut self.column[0][..taken];
-        // Clusters on slopes reach out of the window's levels: their returns belong to its columns
-        // all the same.
-        for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
-            if *column == NONE && inside(*x) && inside(*y) {
-                *column = *x as u32 * profile.side + *y as u32;
-            }
-        }
-        let returns = SweepReturns {
-            corner,
-            stamp_s: sweep.stamp_s,
-            points: &sweep.points[..taken],
-            placed: &self.placed[..taken],
-            columns,
-        };
-        refinement.insert_cloud(profile, returns, &mut self.is_apart[0][..taken])
-    }
-
-    /// Column of the returns of the sweep before from index `from` on, and whether they are apart.
-    pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
-        self.column[1][from..].iter().copied().zip(self.is_apart[1][from..].iter().copied())
-    }
-}
-
 /// Turns sweeps into rays.
 pub struct Preparation {
     clock: ReturnClock,
@@ -162,75 +62,17 @@ impl Preparation {
         Preparation { clock: ReturnClock::new() }
     }
 
-    /// Rays of a sweep, the same however many are in the team.
-    ///
-    /// `rays` and `columns` must hold [`POINTS_MAX`] elements, `origins` [`ORIGINS_MAX`]. Returns
-    /// the number of rays and what was left out. `columns[p]` becomes the column in which point
-    /// `p` of the sweep lies, or [`NONE`]; `placed[p]`, as far as there is room, where and when
-    /// it was; `origins` the voxel of every ray origin.
+    /// Rays of a sweep, the same however many are in the team; and what was left out.
     pub fn prepare(
         &self,
         team: &impl Team,
-        profile: &Profile,
-        rig: &Rig,
-        window: &Window,
-        sweep: &Sweep,
-        rays: &mut [Ray],
-        columns: &mut [u32],
-        placed: &mut [Placed],
-        origins: &mut [[i32; 4]],
+        placement: &Placement,
+        out: RayBuffers,
     ) -> (usize, DroppedReturns) {
+        let RayBuffers { rays, origins, columns, placed } = out;
         assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
-        let deskew = profile.deskew && rig.distorted;
-        let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
-        let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
-        let mut origin_ids = [[0u32; SLOTS]; SENSORS_MAX];
-        place_origins(profile, rig, window, sweep, moving, origins, &mut origin_ids);
-        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
-            let moved = if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
-            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
-        }
-        let [from, to] = [0.0, SLOTS as f64].map(|when| rig.timing.offset_s(when) as f32);
-        let slot_s = (to - from) / SLOTS as f32;
-        let drift = Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 });
-
-        let (side, levels) = (profile.side, profile.levels);
-        let centre = central(profile);
-        let centre_f = centre.map(|c| c as f32);
-        let part =
-            |points: &[Point], rays: &mut [Ray], columns: &mut [u32], placed: &mut [Placed]| {
-                let mut dropped = DroppedReturns::default();
-                let mut count = 0;
-                for (n, (point, column)) in points.iter().zip(columns).enumerate() {
-                    *column = NONE;
-                    if let Some(placed) = placed.get_mut(n) {
-                        *placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
-                    }
-                    let Some(own) = dropped.admit(rig, point) else { continue };
-                    let (p, sensor) = (point.position, point.sensor as usize);
-                    let when = self.clock.slots(rig, point);
-                    let slot = if moving { slot_of(when) } else { 0 };
-                    let at = in_voxels(&to_voxel[slot], p);
-                    let end = add(voxel(at), centre);
-                    if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
-                        dropped.too_far += 1;
-                        continue;
-                    }
-                    dropped.own_vehicle += own as u64;
-                    let [i, j, k] = end.map(|v| v as u32);
-                    if i < side && j < side && k < levels && !own {
-                        *column = i * side + j;
-                    }
-                    if let Some(placed) = placed.get_mut(n).filter(|_| !own) {
-                        let after = when - (slot as f32 + 0.5);
-                        let at = drift.place([0, 1, 2].map(|a| at[a] + centre_f[a]), after);
-                        *placed = Placed { at, offset_s: from + when * slot_s };
-                    }
-                    rays[count] = ray(end, origin_ids[sensor][slot], own);
-                    count += 1;
-                }
-                (count, dropped)
-            };
+        let Placement { rig, sweep, .. } = *placement;
+        let caster = Caster::new(&self.clock, placement, origins);
         // Two parts, the rays of the second behind those that the first may have.
         let taken = sweep.points.len().min(POINTS_MAX);
         let (first, second) = sweep.points[..taken].split_at(taken / 2);
@@ -240,10 +82,10 @@ impl Preparation {
         let (columns, more_columns) = columns.split_at_mut(first.len());
         let (placed, more_placed) = placed.split_at_mut(first.len().min(placed.len()));
         let mut found = [(0, DroppedReturns::default()); 2];
-        let [(count, dropped), (more, more_dropped)] = &mut found;
+        let [one, other] = &mut found;
         team.join(
-            || (*count, *dropped) = part(first, of_first, columns, placed),
-            || (*more, *more_dropped) = part(second, of_second, more_columns, more_placed),
+            || *one = caster.cast_all(first, of_first, columns, placed),
+            || *other = caster.cast_all(second, of_second, more_columns, more_placed),
         );
         let [(count, mut dropped), (more, more_dropped)] = found;
         dropped += more_dropped;
@@ -254,6 +96,137 @@ impl Preparation {
         }
         (count + more, dropped)
     }
+}
+
+/// A sweep, where it was taken and where the window lies.
+#[derive(Clone, Copy)]
+pub struct Placement<'a> {
+    /// Sizes, deskewing.
+    pub profile: &'a Profile,
+    /// Where the sensors sit, and when a return was.
+    pub rig: &'a Rig,
+    /// Where the window lies.
+    pub window: &'a Window,
+    /// The sweep.
+    pub sweep: &'a Sweep<'a>,
+}
+
+/// Room for the rays of a sweep, the caller's.
+pub struct RayBuffers<'a> {
+    /// [`POINTS_MAX`] elements, perhaps memory of a device that is slow to read.
+    pub rays: &'a mut [Ray],
+    /// [`ORIGINS_MAX`] elements; the voxels of the ray origins.
+    pub origins: &'a mut [[i32; 4]],
+    /// [`POINTS_MAX`] elements; the column each return lies in, or [`NONE`].
+    pub columns: &'a mut [u32],
+    /// Where and when each return was, as far as there is room.
+    pub placed: &'a mut [Placed],
+}
+
+/// Casts the rays of one sweep.
+struct Caster<'a> {
+    clock: &'a ReturnClock,
+    rig: &'a Rig,
+    side: u32,
+    levels: u32,
+    centre: [i32; 3],
+    /// The vehicle's motion within the sweep counts.
+    moving: bool,
+    to_voxel: [ToVoxel; SLOTS],
+    origin_ids: OriginIds,
+    drift: Drift,
+    /// Begin of the sweep after the stamp, and length of a slot, s.
+    from_s: f32,
+    slot_s: f32,
+}
+
+impl<'a> Caster<'a> {
+    fn new(
+        clock: &'a ReturnClock,
+        placement: &Placement<'a>,
+        origins: &mut [[i32; 4]],
+    ) -> Caster<'a> {
+        let Placement { profile, rig, window, sweep } = *placement;
+        let deskew = profile.deskew && rig.distorted;
+        let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
+        let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
+        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
+            let moved = if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
+            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
+        }
+        let [from_s, to_s] = [0.0, SLOTS as f64].map(|when| rig.timing.offset_s(when) as f32);
+        let slot_s = (to_s - from_s) / SLOTS as f32;
+        Caster {
+            clock,
+            rig,
+            side: profile.side,
+            levels: profile.levels,
+            centre: central(profile),
+            moving,
+            to_voxel,
+            origin_ids: place_origins(placement, moving, origins),
+            drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
+            from_s,
+            slot_s,
+        }
+    }
+
+    /// Rays of some returns, their columns and places; returns how many rays there are.
+    fn cast_all(
+        &self,
+        points: &[Point],
+        rays: &mut [Ray],
+        columns: &mut [u32],
+        placed: &mut [Placed],
+    ) -> (usize, DroppedReturns) {
+        let mut dropped = DroppedReturns::default();
+        let mut count = 0;
+        for (n, (point, column)) in points.iter().zip(columns).enumerate() {
+            let cast = self.cast(point, &mut dropped);
+            *column = cast.map_or(NONE, |c| c.column);
+            if let Some(placed) = placed.get_mut(n) {
+                *placed = cast.map_or(Placed::NOWHERE, |c| c.placed);
+            }
+            if let Some(cast) = cast {
+                rays[count] = cast.ray;
+                count += 1;
+            }
+        }
+        (count, dropped)
+    }
+
+    /// One return; nothing where it is left out.
+    #[inline]
+    fn cast(&self, point: &Point, dropped: &mut DroppedReturns) -> Option<Cast> {
+        let own = dropped.admit(self.rig, point)?;
+        let when = self.clock.slots(self.rig, point);
+        let slot = if self.moving { slot_of(when) } else { 0 };
+        let at = in_voxels(&self.to_voxel[slot], point.position);
+        let end = add(voxel(at), self.centre);
+        if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
+            dropped.too_far += 1;
+            return None;
+        }
+        dropped.own_vehicle += own as u64;
+        let ray = ray(end, self.origin_ids[point.sensor as usize][slot], own);
+        if own {
+            return Some(Cast { ray, column: NONE, placed: Placed::NOWHERE });
+        }
+        let [i, j, k] = end.map(|v| v as u32);
+        let inside = i < self.side && j < self.side && k < self.levels;
+        let at = [0, 1, 2].map(|a| at[a] + self.centre[a] as f32);
+        let at = self.drift.place(at, when - (slot as f32 + 0.5));
+        let placed = Placed { at, offset_s: self.from_s + when * self.slot_s };
+        Some(Cast { ray, column: if inside { i * self.side + j } else { NONE }, placed })
+    }
+}
+
+/// What becomes of a return.
+#[derive(Clone, Copy)]
+struct Cast {
+    ray: Ray,
+    column: u32,
+    placed: Placed,
 }
 
 /// What the vehicle's motion within a slot does to its returns: translation and yaw.
@@ -278,7 +251,7 @@ impl Drift {
         }
     }
 
-    /// A place, so many slots after the time it was reckoned for.
+    /// The position `after` slots later.
     #[inline]
     fn place(&self, [x, y, z]: [f32; 3], after: f32) -> [f32; 3] {
         let ([dx, dy, dz], [cx, cy]) = (self.by, self.centre);
@@ -319,18 +292,15 @@ fn voxel(at: [f32; 3]) -> [i32; 3] {
     })
 }
 
+/// Index of the origin of every sensor in every slot.
+type OriginIds = [[u32; SLOTS]; SENSORS_MAX];
+
 /// Voxels of the ray origins, and which of them each sensor and slot has. Slots whose origins
 /// share a voxel share an entry, so that equal rays can be recognised.
-fn place_origins(
-    profile: &Profile,
-    rig: &Rig,
-    window: &Window,
-    sweep: &Sweep,
-    moving: bool,
-    origins: &mut [[i32; 4]],
-    ids: &mut [[u32; SLOTS]; SENSORS_MAX],
-) {
+fn place_origins(placement: &Placement, moving: bool, origins: &mut [[i32; 4]]) -> OriginIds {
     assert!(origins.len() == ORIGINS_MAX);
+    let Placement { profile, rig, window, sweep } = *placement;
+    let mut ids = [[0; SLOTS]; SENSORS_MAX];
     // Looked up here, not in `origins`: that may be memory of a device, slow to read.
     let mut table = [[0; 4]; ORIGINS_MAX];
     let mut count = 0;
@@ -353,6 +323,7 @@ fn place_origins(
         }
     }
     origins[..count].copy_from_slice(&table[..count]);
+    ids
 }
 
 #[cfg(test)]
@@ -400,14 +371,13 @@ mod tests {
         let mut placed = vec![Placed::default(); points.len()];
         let (count, dropped) = Preparation::new().prepare(
             &Alone,
-            profile,
-            rig,
-            &window,
-            &sweep,
-            &mut rays,
-            &mut columns,
-            &mut placed,
-            &mut origins,
+            &Placement { profile, rig, window: &window, sweep: &sweep },
+            RayBuffers {
+                rays: &mut rays,
+                origins: &mut origins,
+                columns: &mut columns,
+                placed: &mut placed,
+            },
         );
         rays.truncate(count);
         columns.truncate(points.len());

@@ -25,6 +25,11 @@ pub struct Placed {
     pub offset_s: f32,
 }
 
+impl Placed {
+    /// Of a return that was left out.
+    pub(crate) const NOWHERE: Placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
+}
+
 /// One sweep as received.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep<'a> {

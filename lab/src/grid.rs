@@ -3,7 +3,7 @@
 use glam::DVec3;
 use raywake_core::frame::{Window, central, place};
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{Column, SweepUniform};
 use raywake_core::stages::{FLOW_PROGRAMS, GRID, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
@@ -62,14 +62,13 @@ impl Grid {
         let mut storage = Storage::over(&mut self.words, FLOW_PROGRAMS, &self.profile);
         let (count, _) = self.preparation.prepare(
             &Alone,
-            &self.profile,
-            rig,
-            &window,
-            sweep,
-            storage.rays,
-            &mut self.of_point,
-            &mut [],
-            storage.origins,
+            &Placement { profile: &self.profile, rig, window: &window, sweep },
+            RayBuffers {
+                rays: storage.rays,
+                origins: storage.origins,
+                columns: &mut self.of_point,
+                placed: &mut [],
+            },
         );
         self.step.rays = count as i32;
         storage.sweep = self.step;

@@ -150,7 +150,7 @@ fn tracks(sweeps: &[SimSweep]) {
         history.push(ekf.state());
     }
     let returns = batches.concat();
-    let mut estimator = Box::new(Estimator::new());
+    let mut estimator = Box::new(const { Estimator::new() });
     let mut variants = Vec::new();
     for (name, model) in [("batch, n_m = 300", 300), ("batch, n_m = 3000", MODEL_MAX)] {
         let mut variant = Variant::new(format!(
@@ -193,15 +193,7 @@ fn tracks(sweeps: &[SimSweep]) {
     );
 }
 
-/// The pipeline is made on the stack before it moves to the heap.
-const STACK: usize = 64 << 20;
-
 fn main() {
-    let worker = std::thread::Builder::new().stack_size(STACK).spawn(run);
-    worker.expect("the system has threads").join().expect("the thread that measures panicked");
-}
-
-fn run() {
     let given = |argument: &str| std::env::args().any(|a| a == argument);
     let count = if given("--bench") && !given("--test") { 20 } else { 2 };
     let ego = Ego::Turn { left: true, speed: 6.0 };

@@ -2,7 +2,7 @@
 
 use raywake_core::frame::Window;
 use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::grid::ray_merge::ray_merge;
 use raywake_core::stages::grid::ray_trace::ray_trace;
@@ -28,14 +28,13 @@ impl Rays {
         let preparation = Preparation::new();
         let (count, _) = preparation.prepare(
             &Alone,
-            profile,
-            rig,
-            window,
-            sweep,
-            &mut rays,
-            &mut columns,
-            &mut [],
-            &mut origins,
+            &Placement { profile, rig, window, sweep },
+            RayBuffers {
+                rays: &mut rays,
+                origins: &mut origins,
+                columns: &mut columns,
+                placed: &mut [],
+            },
         );
         rays.truncate(count);
         Rays { step: uniform_of(profile, count), rays, origins }

@@ -42,7 +42,7 @@ fn advance(
 }
 
 fn new() -> Box<Tracklets> {
-    Box::new(Tracklets::new())
+    Box::new(const { Tracklets::new() })
 }
 
 fn cell(i: i32, j: i32) -> i32 {

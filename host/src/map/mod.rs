@@ -8,7 +8,7 @@ use raywake_core::dropped::DroppedReturns;
 use raywake_core::frame::{Window, place};
 use raywake_core::map::Update;
 use raywake_core::params::{POINTS_MAX, Profile};
-use raywake_core::prepare::{Preparation, uniform_of};
+use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{NONE, Ray, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 use raywake_core::sweep::{Rig, Sweep};
@@ -110,14 +110,8 @@ impl Mapper {
         let (rays, origins) = self.backend.input();
         let (count, dropped) = self.preparation.prepare(
             &Alone,
-            &self.profile,
-            &self.rig,
-            &window,
-            sweep,
-            rays,
-            &mut self.columns,
-            &mut [],
-            origins,
+            &Placement { profile: &self.profile, rig: &self.rig, window: &window, sweep },
+            RayBuffers { rays, origins, columns: &mut self.columns, placed: &mut [] },
         );
         self.backend.map(&uniform_of(&self.profile, count), put)?;
         Ok(Mapped { window, dropped, rays: count })

@@ -156,10 +156,6 @@ fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
     Ok(names)
 }
 
-/// Stack of a thread that runs a drive: unoptimised builds make the pipeline there before it moves
-/// to the heap.
-const STACK: usize = 64 << 20;
-
 /// Drives that were evaluated, and those that failed.
 type Outcome = (Vec<Facts>, Vec<(String, RunError)>);
 
@@ -190,8 +186,7 @@ fn all(
     };
     std::thread::scope(|scope| {
         for _ in 0..jobs.min(list.len()) {
-            let thread = std::thread::Builder::new().stack_size(STACK);
-            thread.spawn_scoped(scope, work).expect("the system has threads");
+            scope.spawn(work);
         }
     });
     if interrupted() {

@@ -188,10 +188,6 @@ fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) 
     }
 }
 
-/// Stack of a thread that estimates: unoptimised builds make the estimator there before it moves to
-/// the heap.
-const STACK: usize = 64 << 20;
-
 /// The baseline's history of every object.
 pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
     objects.iter().map(|o| baseline(o, &CentroidParams::DEFAULT)).collect()
@@ -202,7 +198,7 @@ pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
 pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize) -> Vec<Outcome> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {
-        let mut estimator = Box::new(Estimator::new());
+        let mut estimator = Box::new(const { Estimator::new() });
         loop {
             let n = next.fetch_add(1, Ordering::Relaxed);
             let (Some(object), Some(history)) = (objects.get(n), histories.get(n)) else {
@@ -214,8 +210,7 @@ pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize)
     };
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, objects.len().max(1)) {
-            let thread = std::thread::Builder::new().stack_size(STACK);
-            thread.spawn_scoped(scope, work).expect("the system has threads");
+            scope.spawn(work);
         }
     });
     let mut done = done.into_inner().expect("no thread panicked with it");

@@ -97,45 +97,35 @@ impl Found {
     }
 }
 
-/// Stack of the thread of the flow: see [`Tracker::new`].
-const STACK: usize = 64 << 20;
-
 /// All tracks of a drive.
 fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, RunError> {
-    let work = || -> Result<Vec<Track>, RunError> {
-        let mut source = source::open(path, &OpenOptions::default())?;
-        let tracking = config::settings(settings.profile)?;
-        let profile = &tracking.profile;
-        let drive = match kind {
-            FrontEndKind::Variance => None,
-            FrontEndKind::Flow => {
-                let weights = WeightFiles::read(settings.learned, profile)?;
-                Some(choose::drive(settings.backend, &weights, profile, source.rig())?.drive)
-            }
-        };
-        let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);
-        let mut tracks = Vec::new();
-        let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
-        let (mut now, mut before) = (SweepData::default(), SweepData::default());
-        for index in 0..source.len() {
-            source.read(index, &mut now)?;
-            if tracker.sweep(&now, (index > 0).then_some(&before))?.is_some() {
-                keep(&tracker);
-            }
-            std::mem::swap(&mut now, &mut before);
+    let mut source = source::open(path, &OpenOptions::default())?;
+    let tracking = config::settings(settings.profile)?;
+    let profile = &tracking.profile;
+    let drive = match kind {
+        FrontEndKind::Variance => None,
+        FrontEndKind::Flow => {
+            let weights = WeightFiles::read(settings.learned, profile)?;
+            Some(choose::drive(settings.backend, &weights, profile, source.rig())?.drive)
         }
-        if tracker.last(&before)?.is_some() {
+    };
+    let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);
+    let mut tracks = Vec::new();
+    let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
+    let (mut now, mut before) = (SweepData::default(), SweepData::default());
+    for index in 0..source.len() {
+        source.read(index, &mut now)?;
+        if tracker.sweep(&now, (index > 0).then_some(&before))?.is_some() {
             keep(&tracker);
         }
-        tracker.finish()?;
+        std::mem::swap(&mut now, &mut before);
+    }
+    if tracker.last(&before)?.is_some() {
         keep(&tracker);
-        Ok(tracks)
-    };
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(STACK);
-        let thread = thread.spawn_scoped(scope, work).expect("the system has threads");
-        thread.join().expect("the front end panicked")
-    })
+    }
+    tracker.finish()?;
+    keep(&tracker);
+    Ok(tracks)
 }
 
 /// Times of some returns of a track, s after its start, and the object each lies on.

@@ -321,7 +321,7 @@ mod tests {
         let dense = gauss(rows);
 
         let observations = scene.observations();
-        let mut equations = Box::new(Equations::new());
+        let mut equations = Box::new(const { Equations::new() });
         equations.clear(BASES);
         for k in 0..BASES {
             for d in 0..7 {

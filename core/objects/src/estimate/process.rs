@@ -263,7 +263,7 @@ mod tests {
                 ..params
             });
             let knots = Knots::over(0.0, 4.0, 0.5);
-            let mut equations = Box::new(Equations::new());
+            let mut equations = Box::new(const { Equations::new() });
             let mut control_points = control_points::<8>();
             let mut cost = |control_points: &[ControlPoint]| {
                 equations.clear(8);
@@ -330,7 +330,7 @@ mod tests {
         let knots = Knots::over(0.0, 6.0, 0.5);
         let control_points = control_points::<12>();
         let process = ProcessModel::of(&EstimateParams::DISSERTATION);
-        let mut equations = Box::new(Equations::new());
+        let mut equations = Box::new(const { Equations::new() });
         equations.clear(12);
         let ours = add(&knots, &control_points, &process, &mut equations);
         let mut fine = 0.0;

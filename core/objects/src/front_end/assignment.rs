@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn equals_brute_force() {
         let mut random = Random(12);
-        let mut solver = Box::new(Assignment::new());
+        let mut solver = Box::new(const { Assignment::new() });
         let (mut contested, mut alone) = (0, 0);
         for _ in 0..2000 {
             let (tracks, segments) = (1 + random.below(5), random.below(6));
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn at_capacity() {
-        let mut solver = Box::new(Assignment::new());
+        let mut solver = Box::new(const { Assignment::new() });
         // All want the first segment most.
         for track in 0..TRACKS_MAX {
             for (segment, cost) in solver.costs(track).iter_mut().enumerate() {

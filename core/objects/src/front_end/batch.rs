@@ -61,7 +61,8 @@ pub(super) fn cell(at: [f32; 3]) -> [usize; 2] {
 
 /// What has been taken since the last step.
 pub(super) struct Batch {
-    clock: ReturnClock,
+    /// Made with the first sweep.
+    clock: Option<ReturnClock>,
     /// Stamp of the first sweep taken, s.
     pub stamp_s: Option<f64>,
     /// World position of the corner of the window: a corner of the lattice along x and y, the
@@ -73,13 +74,13 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    pub fn new() -> Batch {
+    pub const fn new() -> Batch {
         Batch {
-            clock: ReturnClock::new(),
+            clock: None,
             stamp_s: None,
             corner: DVec3::ZERO,
             returns: heapless::Vec::new(),
-            dropped: DroppedReturns::default(),
+            dropped: DroppedReturns::ZERO,
         }
     }
 
@@ -118,6 +119,7 @@ impl Batch {
         let motion = SweepMotion::new(rig, sweep, self.corner);
         let edge = SIDE as f32 * CELL_M;
         let vehicle = under - self.corner;
+        let clock = self.clock.get_or_insert_with(ReturnClock::new);
         for (n, point) in sweep.points.iter().enumerate() {
             match self.dropped.admit(rig, point) {
                 Some(false) => {}
@@ -127,7 +129,7 @@ impl Batch {
                 }
                 None => continue,
             }
-            let (placed, offset_s) = motion.place(rig, point, self.clock.slots(rig, point));
+            let (placed, offset_s) = motion.place(rig, point, clock.slots(rig, point));
             let at = placed.position;
             let inside = at[..2].iter().all(|v| *v >= 0.0 && *v < edge) && at[2].abs() < edge;
             if !inside {

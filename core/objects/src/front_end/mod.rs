@@ -78,7 +78,7 @@ impl Default for FrontEnd {
 
 impl FrontEnd {
     /// A front end at rest.
-    pub fn new() -> FrontEnd {
+    pub const fn new() -> FrontEnd {
         FrontEnd {
             batch: Batch::new(),
             objects: ObjectReturns::new(),

@@ -1,0 +1,105 @@
+//! The returns of the last two sweeps: where each of them is.
+
+use crate::dropped::DroppedReturns;
+use crate::frame::Arrival;
+use crate::params::{POINTS_MAX, Profile};
+use crate::prepare::{Placement, RayBuffers, Setup, uniform_of};
+use crate::record::{NONE, Ray, SweepUniform};
+use crate::refinement::{Refinement, SweepReturns};
+use crate::sweep::{Placed, Sweep};
+use crate::team::Team;
+
+/// Where the returns of the last two sweeps are.
+pub(crate) struct Returns {
+    /// Column of every return, of the sweep and of the one before.
+    column: [[u32; POINTS_MAX]; 2],
+    /// Whether a return belongs to none of the clusters that its column is part of.
+    is_apart: [[bool; POINTS_MAX]; 2],
+    placed: [Placed; POINTS_MAX],
+}
+
+/// A sweep as rays.
+pub(crate) struct Sent {
+    pub uniform: SweepUniform,
+    pub dropped: DroppedReturns,
+}
+
+impl Returns {
+    /// Of no sweep.
+    pub const fn new() -> Returns {
+        Returns {
+            column: [[0; POINTS_MAX]; 2],
+            is_apart: [[false; POINTS_MAX]; 2],
+            placed: [const { Placed { at: [0.0; 3], offset_s: 0.0 } }; POINTS_MAX],
+        }
+    }
+
+    /// Turns the sweep that has just come into rays.
+    pub fn send(
+        &mut self,
+        setup: &Setup,
+        team: &impl Team,
+        sweep: &Sweep,
+        arrival: &Arrival,
+        (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
+    ) -> Sent {
+        let Setup { profile, rig, .. } = setup;
+        self.column.swap(0, 1);
+        self.is_apart.swap(0, 1);
+        let placement = Placement { profile, rig, window: &arrival.window, sweep };
+        let (columns, placed) = (&mut self.column[0], &mut self.placed);
+        let buffers = RayBuffers { rays, origins, columns, placed };
+        let (count, dropped) = setup.preparation.prepare(team, &placement, buffers);
+        let [shift_x, shift_y, shift_z] = arrival.shift;
+        let uniform = SweepUniform {
+            shift_x,
+            shift_y,
+            shift_z,
+            unfiltered: setup.unfiltered as i32,
+            smoothing: profile.smoothing as i32,
+            displacement_cost: profile.displacement_cost as i32,
+            outside_cost: profile.outside_cost as i32,
+            score_min: setup.scores.min,
+            ..uniform_of(profile, count)
+        };
+        Sent { uniform, dropped }
+    }
+
+    /// Hands the sweep that was sent to the refinement. Returns how many returns that had no room
+    /// for: it does not see them.
+    pub fn insert(
+        &mut self,
+        refinement: &mut Refinement,
+        profile: &Profile,
+        corner: [i32; 3],
+        sweep: &Sweep,
+    ) -> usize {
+        if profile.refinement_sweeps == 0 {
+            return 0;
+        }
+        let taken = sweep.points.len().min(POINTS_MAX);
+        let side = profile.side as f32;
+        let inside = |v: f32| v >= 0.0 && v < side;
+        let columns = &mut self.column[0][..taken];
+        // Clusters on slopes reach out of the window's levels: their returns belong to its columns
+        // all the same.
+        for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
+            if *column == NONE && inside(*x) && inside(*y) {
+                *column = *x as u32 * profile.side + *y as u32;
+            }
+        }
+        let returns = SweepReturns {
+            corner,
+            stamp_s: sweep.stamp_s,
+            points: &sweep.points[..taken],
+            placed: &self.placed[..taken],
+            columns,
+        };
+        refinement.insert_cloud(profile, returns, &mut self.is_apart[0][..taken])
+    }
+
+    /// Column of the returns of the sweep before from index `from` on, and whether they are apart.
+    pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
+        self.column[1][from..].iter().copied().zip(self.is_apart[1][from..].iter().copied())
+    }
+}
