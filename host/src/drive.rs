@@ -47,7 +47,7 @@ impl Drive {
                 preparation: Preparation::new(),
             },
             // A constant is written to its place: by way of the stack it would need 30 MiB of it.
-            pipeline: Box::new(const { Pipeline::new() }),
+            pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()),
             backend,
             columns: vec![ColumnFlow::default(); profile.columns()],
             points: vec![PointFlow::default(); POINTS_MAX],

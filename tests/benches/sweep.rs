@@ -150,7 +150,7 @@ fn tracks(sweeps: &[SimSweep]) {
         history.push(ekf.state());
     }
     let returns = batches.concat();
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut variants = Vec::new();
     for (name, model) in [("batch, n_m = 300", 300), ("batch, n_m = 3000", MODEL_MAX)] {
         let mut variant = Variant::new(format!(

@@ -82,7 +82,7 @@ impl Side {
             unfiltered: tables.unfiltered,
             preparation: Preparation::new(),
         };
-        Side { setup, pipeline: Box::new(const { Pipeline::new() }), backend }
+        Side { setup, pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()), backend }
     }
 
     /// One sweep; `before` is the sweep before it.

@@ -42,7 +42,7 @@ fn advance(
 }
 
 fn new() -> Box<Tracklets> {
-    Box::new(const { Tracklets::new() })
+    raywake_alloc_guard::boxed!(Tracklets, Tracklets::new())
 }
 
 fn cell(i: i32, j: i32) -> i32 {

@@ -35,6 +35,10 @@
 //! the first allocation and serves it; the step that ends next returns the note.
 #![deny(missing_docs)]
 
+mod boxed;
+
+pub use boxed::{Constant, boxed};
+
 use std::alloc::{GlobalAlloc, Layout};
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::cell::Cell;

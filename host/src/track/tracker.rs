@@ -105,7 +105,7 @@ impl Tracker {
         fixed_lag: bool,
     ) -> Tracker {
         let parts = TrackerParts {
-            front_end: Box::new(const { FrontEnd::new() }),
+            front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
             solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
             lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),

@@ -198,7 +198,7 @@ pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
 pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize) -> Vec<Outcome> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {
-        let mut estimator = Box::new(const { Estimator::new() });
+        let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
         loop {
             let n = next.fetch_add(1, Ordering::Relaxed);
             let (Some(object), Some(history)) = (objects.get(n), histories.get(n)) else {

@@ -224,7 +224,7 @@ fn pictures(report: &mut Report, all: &[Objects]) -> Result<(), Error> {
         let set = all.iter().find(|set| set.id == id)?;
         set.objects.iter().filter(|o| o.kind == kind).max_by_key(|o| o.returns.len())
     };
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let section = report.section("Clouds");
     section.text("Returns in the object's frame, coloured by time from blue to yellow.");
     let shown = [

@@ -48,7 +48,7 @@ pub struct Seen {
 /// Finds where rays pass the returns of a sweep that are asked for.
 pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
     let ray = |s: &Seen| (s.sensor, [0.0; 3], (s.at - s.from).as_vec3().to_array());
-    let mut panorama = Box::new(const { Panorama::new() });
+    let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
     panorama.look(&PassingParams::DEFAULT, seen, ray, wanted, |s, passed| s.passed = passed);
 }
 

@@ -54,7 +54,8 @@ pub fn fixed_lag(
     params: &EstimateParams,
     estimator: &mut Estimator,
 ) -> Vec<ObjectState> {
-    let (mut filter, mut history) = (Box::new(const { FixedLag::new() }), Vec::new());
+    let (mut filter, mut history) =
+        (raywake_alloc_guard::boxed!(FixedLag, FixedLag::new()), Vec::new());
     follow(object, &CentroidParams::DEFAULT, |state, _, batch| {
         history.push(filter.push(estimator, params, batch, &state));
     });

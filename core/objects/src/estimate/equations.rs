@@ -188,7 +188,6 @@ mod tests {
     use super::*;
     use crate::random::Random;
     use crate::spline::Knots;
-    use std::boxed::Box;
     use std::vec;
     use std::vec::Vec;
 
@@ -321,7 +320,7 @@ mod tests {
         let dense = gauss(rows);
 
         let observations = scene.observations();
-        let mut equations = Box::new(const { Equations::new() });
+        let mut equations = raywake_alloc_guard::boxed!(Equations, Equations::new());
         equations.clear(BASES);
         for k in 0..BASES {
             for d in 0..7 {

@@ -216,7 +216,6 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::random::Random;
-    use std::boxed::Box;
 
     fn control_points<const N: usize>() -> [ControlPoint; N] {
         let mut random = Random(7);
@@ -263,7 +262,7 @@ mod tests {
                 ..params
             });
             let knots = Knots::over(0.0, 4.0, 0.5);
-            let mut equations = Box::new(const { Equations::new() });
+            let mut equations = raywake_alloc_guard::boxed!(Equations, Equations::new());
             let mut control_points = control_points::<8>();
             let mut cost = |control_points: &[ControlPoint]| {
                 equations.clear(8);
@@ -330,7 +329,7 @@ mod tests {
         let knots = Knots::over(0.0, 6.0, 0.5);
         let control_points = control_points::<12>();
         let process = ProcessModel::of(&EstimateParams::DISSERTATION);
-        let mut equations = Box::new(const { Equations::new() });
+        let mut equations = raywake_alloc_guard::boxed!(Equations, Equations::new());
         equations.clear(12);
         let ours = add(&knots, &control_points, &process, &mut equations);
         let mut fine = 0.0;

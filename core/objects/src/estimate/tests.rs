@@ -6,7 +6,6 @@ use super::*;
 use crate::RETURNS_MAX;
 use crate::noise::ProcessNoise;
 use crate::random::Random;
-use std::boxed::Box;
 use std::vec::Vec;
 
 fn root_mean(all: &[Errors]) -> Errors {
@@ -46,7 +45,7 @@ fn point() -> (Vec<ObjectReturn>, Vec<ObjectState>) {
 fn finds_the_optimum_of_a_point_in_uniform_motion() {
     let (returns, history) = point();
     let params = EstimateParams { model_points: 1, ..EstimateParams::DISSERTATION };
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let report = estimator.solve(&params, &returns, &history);
     assert!(report.costs.last().unwrap().total() < 1e-4 * report.costs[0].total(), "{report:?}");
     for time_s in [0.0, 0.7, 1.5, 2.9] {
@@ -66,7 +65,7 @@ fn finds_the_optimum_of_a_point_in_uniform_motion() {
 #[test]
 fn goes_on_as_at_the_end() {
     let (returns, history) = point();
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     estimator.solve(&EstimateParams::DISSERTATION, &returns, &history);
     let (last, later) = (estimator.state(2.99), estimator.state(4.99));
     assert_eq!(later.time_s, 4.99);
@@ -75,7 +74,7 @@ fn goes_on_as_at_the_end() {
 
 #[test]
 fn parked_cars_stand() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let drives: Vec<Drive> = (0..4).map(|seed| drive(synthetic::parked(seed))).collect();
     let all: Vec<_> =
         drives.iter().map(|d| estimated(&mut estimator, &EstimateParams::DEFAULT, d)).collect();
@@ -91,7 +90,7 @@ fn parked_cars_stand() {
 
 #[test]
 fn moving_cars_are_followed() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for seed in 0..5 {
         let drive = drive(synthetic::moving(seed));
         let ours = estimated(&mut estimator, &EstimateParams::DEFAULT, &drive);
@@ -105,7 +104,7 @@ fn moving_cars_are_followed() {
 /// is told by the rays that pass.
 #[test]
 fn long_sides_move_with_their_ends() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let params = EstimateParams::DEFAULT;
     let without = EstimateParams { passing: false, ..params };
     let mut worst: f64 = 0.0;
@@ -121,7 +120,7 @@ fn long_sides_move_with_their_ends() {
 /// Steady for a second at a time, a motion is found that brakes and bends.
 #[test]
 fn unsteady_motion_has_a_start() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let plan = Plan { acceleration: -1.2, turn_rate: 0.1, speed: 9.0, ..synthetic::moving(2) };
     let drive = drive(plan);
     let params = EstimateParams::DEFAULT;
@@ -145,7 +144,7 @@ fn unsteady_motion_has_a_start() {
 #[test]
 fn perturbed_starts_converge() {
     let drive = drive(synthetic::moving(3));
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut random = Random(11);
     for _ in 0..3 {
         let [x, y, turned] = [0.4, 0.3, 0.1].map(|scale| scale * random.normal());
@@ -167,7 +166,7 @@ fn perturbed_starts_converge() {
 #[test]
 fn conditioning_leaves_the_step_exact() {
     let (returns, history) = point();
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let params = EstimateParams { iterations: 1, model_points: 40, ..EstimateParams::DISSERTATION };
     let one = estimator.solve(&params, &returns, &history).costs[1].total();
     let state = estimator.state(1.3);
@@ -190,7 +189,7 @@ fn conditioning_leaves_the_step_exact() {
 #[test]
 fn is_the_same_again() {
     let drive = drive(Plan { seconds: 2.0, ..synthetic::moving(2) });
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut bits = || {
         estimator.solve(&EstimateParams::DEFAULT, &drive.returns, &drive.history);
         let state = estimator.state(1.0);
@@ -208,7 +207,7 @@ fn sane(estimator: &Estimator) {
 
 #[test]
 fn bad_input_is_bounded_and_reported() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let whole = drive(Plan { seconds: 4.0, ..synthetic::moving(3) });
     let between = |from: f32, to: f32| -> Vec<ObjectReturn> {
         whole.returns.iter().filter(|seen| (from..to).contains(&seen.time_s)).copied().collect()
@@ -268,7 +267,7 @@ fn bad_input_is_bounded_and_reported() {
 
 #[test]
 fn takes_as_many_as_it_may_evenly_in_time() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     // A tenth of the returns in nine tenths of the time, and in no order.
     let mut random = Random(5);
     let returns: Vec<ObjectReturn> = (0..40_000)
@@ -301,7 +300,7 @@ fn takes_as_many_as_it_may_evenly_in_time() {
 /// What is counted is of the start that led to the estimate, not of all that were tried.
 #[test]
 fn carved_points_are_those_that_lack() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let params = EstimateParams::DEFAULT;
     let mut carved = 0;
     for seed in 0..4 {
@@ -320,7 +319,7 @@ fn carved_points_are_those_that_lack() {
 /// A crumb has no heading that returns could tell, but neither does it spin.
 #[test]
 fn whole_turns_are_taken_back() {
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let mut random = Random(2);
     for _ in 0..20 {
         let returns: Vec<ObjectReturn> = (0..40)
@@ -358,7 +357,7 @@ fn a_wrong_association_does_not_break_a_track() {
         })
         .collect();
     drive.returns.extend(wrong);
-    let mut estimator = Box::new(const { Estimator::new() });
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let ours = estimated(&mut estimator, &EstimateParams::DEFAULT, &drive);
     assert!(ours[0] < 0.2 && ours[2] < 0.05, "{ours:?}");
 }

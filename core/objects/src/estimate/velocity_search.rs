@@ -215,7 +215,6 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::random::Random;
-    use std::boxed::Box;
     use std::vec::Vec;
 
     /// The side and the front of something so long that passes at `velocity`, its front hidden
@@ -248,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_velocity_is_found_where_the_centroid_errs() {
-        let mut search = Box::new(const { VelocitySearch::new() });
+        let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         for (length_m, velocity) in [(4.5, [7.0, 2.0]), (12.0, [-6.0, 3.0]), (4.5, [0.3, 0.0])] {
             let samples = passing(length_m, velocity);
             let found = search.find(&samples, length_m, &SearchParams::DEFAULT).unwrap();
@@ -268,7 +267,7 @@ mod tests {
     /// enters.
     #[test]
     fn where_it_ends_tells_how_a_side_moves() {
-        let mut search = Box::new(const { VelocitySearch::new() });
+        let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         let mut random = Random(9);
         let [gap, length_m, speed] = [20.0, 22.0, 6.0];
         let mut samples = Vec::new();
@@ -293,7 +292,7 @@ mod tests {
 
     #[test]
     fn too_few_or_at_one_time_have_no_velocity() {
-        let mut search = Box::new(const { VelocitySearch::new() });
+        let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         let samples = passing(4.5, [7.0, 2.0]);
         assert_eq!(search.find(&[], 4.5, &SearchParams::DEFAULT), None);
         assert_eq!(
@@ -311,7 +310,7 @@ mod tests {
 
     #[test]
     fn what_is_wild_takes_no_longer() {
-        let mut search = Box::new(const { VelocitySearch::new() });
+        let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
         let mut random = Random(5);
         let mut wild: Vec<Sample> = (0..3000)
             .map(|n| {

@@ -117,7 +117,6 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::random::Random;
-    use std::boxed::Box;
     use std::vec;
     use std::vec::Vec;
 
@@ -133,7 +132,7 @@ mod tests {
     #[test]
     fn equals_brute_force() {
         let mut random = Random(12);
-        let mut solver = Box::new(const { Assignment::new() });
+        let mut solver = raywake_alloc_guard::boxed!(Assignment, Assignment::new());
         let (mut contested, mut alone) = (0, 0);
         for _ in 0..2000 {
             let (tracks, segments) = (1 + random.below(5), random.below(6));
@@ -175,7 +174,7 @@ mod tests {
 
     #[test]
     fn at_capacity() {
-        let mut solver = Box::new(const { Assignment::new() });
+        let mut solver = raywake_alloc_guard::boxed!(Assignment, Assignment::new());
         // All want the first segment most.
         for track in 0..TRACKS_MAX {
             for (segment, cost) in solver.costs(track).iter_mut().enumerate() {

@@ -155,7 +155,7 @@ mod tests {
     /// Clusters of returns, some of which touch, with and without velocities.
     fn batch(seed: u64) -> Box<Batch> {
         let mut random = Random(seed);
-        let mut batch = Box::new(const { Batch::new() });
+        let mut batch = raywake_alloc_guard::boxed!(Batch, Batch::new());
         for _ in 0..60 {
             let middle = [0; 2].map(|_| random.between(1.0, 25.0));
             let speed = random.below(4) as f32 * 2.0;
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn components_equal_a_flood_fill() {
-        let mut segments = Box::new(const { Segments::new() });
+        let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
         let params = FrontEndParams { returns_min: 1, ..PARAMS };
         let mut several = 0;
         for seed in 0..20 {
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn returns_join_the_nearest_chunk_and_segments_sum_them() {
-        let mut segments = Box::new(const { Segments::new() });
+        let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
         for seed in 0..10 {
             let batch = batch(seed);
             segments.find(&PARAMS, &batch, |n| n % 7 != 0, &mut TrackingCounts::default());

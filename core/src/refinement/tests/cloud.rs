@@ -112,7 +112,7 @@ fn returns_beyond_the_capacity_are_counted() {
     assert_eq!(returns.fill(&mut cloud).0, dropped);
     assert!(all == all_kept(&cloud));
     // And it can be worked with.
-    let mut refinement = Box::new(const { Refinement::new() });
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     for n in 0..3 {
         give(&mut refinement, &returns, n);
     }
@@ -135,7 +135,7 @@ fn segments_are_what_a_flood_fill_reaches() {
             .collect();
         let excluded = random.below(SIDE * SIDE);
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;
-        let mut segments = Box::new(const { Segments::new() });
+        let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
         let scans = Scans {
             scaled: &scaled(),
             first: &cloud,

@@ -197,7 +197,7 @@ fn check_sane(found: &[Moved]) {
 
 /// What is found after some sweeps, the pair's two the last.
 fn found_in(sweeps: &[Returns], flows: &[Flow]) -> Vec<Moved> {
-    let mut refinement = Box::new(const { Refinement::new() });
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
     let [.., before, now] = sweeps else { panic!("two sweeps make a pair") };
     run(&mut refinement, &[before, now], flows);

@@ -12,7 +12,7 @@ fn error_of_steady(sweeps: u32, by: [f32; 2], turn: f32, seed: u64) -> (usize, f
     let at = |n: f32| Car { centre: [0, 1].map(|a| start[a] + n * by[a]), yaw: yaw + n * turn };
     let profile = Profile { refinement_sweeps: sweeps, ..profile() };
     let all: Vec<Returns> = (0..3).map(|n| sweep_of(&at(n as f32 - 1.0), &mut random)).collect();
-    let mut refinement = Box::new(const { Refinement::new() });
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     all.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &profile, r, n));
     run(&mut refinement, &[&all[1], &all[2]], &no_flow());
     let found = motions(&refinement);
@@ -86,7 +86,7 @@ fn what_stands_is_exactly_still() {
     for n in 0..30 {
         let car = Car { centre: [30.0 + 0.1 * n as f32, 31.0], yaw: 0.2 * n as f32 };
         let all: Vec<Returns> = (0..3).map(|_| sweep_of(&car, &mut random)).collect();
-        let mut refinement = Box::new(const { Refinement::new() });
+        let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         all.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
         // Whatever energy minimisation made of it.
         let wrong = vec![pack_flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
@@ -138,7 +138,7 @@ fn a_wall_that_seems_to_move_stands() {
         }
         returns
     };
-    let mut refinement = Box::new(const { Refinement::new() });
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     let sweeps: Vec<Returns> = (0..3).map(wall).collect();
     sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
     let masks = vec![[0xffff, 0]; 167 * 167];
@@ -180,7 +180,7 @@ fn what_moved_goes_on_by_less() {
         returns
     };
     let moving = |sweeps: &[Returns; 3], expected| {
-        let mut refinement = Box::new(const { Refinement::new() });
+        let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
         run_expecting(&mut refinement, &[&sweeps[1], &sweeps[2]], &no_flow(), expected);
         motions(&refinement).iter().flatten().count()

@@ -58,7 +58,7 @@ fn odd_sweeps_yield_no_nonsense() {
     assert!(
         found_in(&[odd[0].clone(), Returns::default()], &no_flow()).iter().all(Option::is_none)
     );
-    let mut alone = Box::new(const { Refinement::new() });
+    let mut alone = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     give(&mut alone, &odd[0], 0);
     run(&mut alone, &[&odd[0], &odd[0]], &no_flow());
     assert!(motions(&alone).iter().all(Option::is_none));
@@ -80,7 +80,7 @@ fn the_same_sweeps_yield_the_same_bits() {
     assert!(wanted.iter().flatten().count() > 10);
     assert_eq!(found_in(&sweeps, &flows), wanted);
     // Whatever was before.
-    let mut used = Box::new(const { Refinement::new() });
+    let mut used = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     others.iter().enumerate().for_each(|(n, r)| give(&mut used, r, n));
     run(&mut used, &[&others[1], &others[2]], &flows);
     used.clear();
