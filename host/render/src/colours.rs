@@ -31,10 +31,15 @@ pub const SPEEDS: &[Colour] = &[[240, 158, 30], [222, 84, 32], [176, 22, 74], [8
 pub const ELEVATIONS: &[Colour] =
     &[[154, 176, 196], [62, 148, 168], [38, 96, 142], [64, 26, 98], [30, 4, 36]];
 
+/// Within 0 to 1; NaN counts as 0.
+pub fn clamped(t: f32) -> f32 {
+    if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
+}
+
 /// The colour at `t` (0 to 1, clamped; NaN counts as 0) of a ramp with evenly spaced stops.
 pub fn ramp(stops: &[Colour], t: f32) -> Colour {
     let Some(last) = stops.len().checked_sub(1) else { return INK };
-    let place = t.max(0.0).min(1.0) * last as f32;
+    let place = clamped(t) * last as f32;
     let i = (place as usize).min(last.saturating_sub(1));
     let (from, to, part) = (stops[i], stops[(i + 1).min(last)], place - i as f32);
     [0, 1, 2].map(|c| {

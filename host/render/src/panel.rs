@@ -1,7 +1,7 @@
 //! One panel.
 
 use crate::canvas::{Align, Canvas, Pen, PictureError};
-use crate::colours::{BORDER, Colour, GROUND, INK, MUTED, PAPER, RING, VEHICLE, ramp};
+use crate::colours::{BORDER, Colour, GROUND, INK, MUTED, PAPER, RING, VEHICLE, clamped, ramp};
 use crate::scene::{Arrow, Cell, Look, Outline, Panel};
 use crate::text;
 use std::collections::BTreeSet;
@@ -94,7 +94,7 @@ impl PanelView<'_> {
         // A tenth of the returns lie lower than the ground: reflections.
         let Some(&(ground, _)) = seen.get(seen.len() / 10) else { return };
         for (z, at) in seen {
-            let height = ((z - ground) / self.look.height_m).max(0.0).min(1.0);
+            let height = clamped((z - ground) / self.look.height_m);
             let colour = ramp(self.look.heights, height);
             canvas.square(at, POINT, colour, 0.6 + 0.35 * height);
         }
@@ -224,7 +224,7 @@ pub(crate) fn draw_arrow(
     let way = [b[0] - a[0], b[1] - a[1]];
     // Not `hypot`: that is another function on every platform.
     let long = (way[0] * way[0] + way[1] * way[1]).sqrt();
-    if !(long >= 1.5) {
+    if long.is_nan() || long < 1.5 {
         return;
     }
     let along = way.map(|v| v / long);

@@ -7,7 +7,7 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
 /// Width of a line of text, in the unit of `size`, the height of the font.
 pub fn width(text: &str, size: f32) -> f32 {
-    glyphs(text).map(|glyph| advance(glyph)).sum::<f32>() * unit(size)
+    glyphs(text).map(advance).sum::<f32>() * unit(size)
 }
 
 /// Outlines of a line of text that starts at `at` on the baseline; nothing where it has no marks.

@@ -253,7 +253,7 @@ fn collect(
         let seen = match pairs.recv() {
             Ok(Some(seen)) => seen,
             Ok(None) => return Ok(None),
-            Err(_) => return Err(Error::Usage("interrupted".into()).into()),
+            Err(_) => return Err(Error::Usage("interrupted".into())),
         };
         let present = collector.present(&seen);
         let returns = exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;
