@@ -1,10 +1,11 @@
 //! The frame the grid lies in (B.2.2 leaves it open): all that depends on the choice.
 //!
 //! [`Frame::Lattice`]: cell borders are fixed in the world and the window follows the vehicle by
-//! whole cells, so that what stands is displaced by nothing and each sweep is traced once. Points are
-//! quantised relative to the window's central voxel: the window's size changes no voxel, which is why
-//! the sparse map and the dense window agree. [`Frame::Sensor`]: the vehicle frame of each sweep, as
-//! in the dissertation; motion is relative to the vehicle.
+//! whole cells. The displacement of static objects is then exactly zero, each sweep is traced only
+//! once, and the search covers speed over ground. Points are quantised relative to the window's
+//! central voxel, so the size of the window changes no voxel: that is why the sparse map and the
+//! dense window agree. [`Frame::Sensor`]: the vehicle frame of each sweep, as in the dissertation;
+//! motion is relative to the vehicle.
 
 use crate::continuity::Reset;
 use crate::motion_compensation::{EgoMotion, turn};
@@ -205,8 +206,8 @@ impl<'a> Pair<'a> {
 }
 
 impl Frame {
-    /// Cells from the window before to the new one. Where there is none before, so many that nothing
-    /// of it comes into view.
+    /// Cells from the window before to the new one. Where there is none before, so many that
+    /// nothing of it comes into view.
     fn shift(self, side: i32, before: Option<&Window>, now: &Window) -> [i32; 3] {
         match (before, self) {
             (Some(before), Frame::Lattice) => core::array::from_fn(|a| {
@@ -217,8 +218,8 @@ impl Frame {
         }
     }
 
-    /// Heading and speed over ground, velocity over ground and relative to the vehicle, of a tracklet
-    /// at `at` (vehicle frame).
+    /// Heading and speed over ground, velocity over ground and relative to the vehicle, of a
+    /// tracklet at `at` (vehicle frame).
     pub(crate) fn motion_of(
         self,
         t: &Tracklet,

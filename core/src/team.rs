@@ -1,4 +1,8 @@
 //! Work that may be split over threads. Core has none; the caller may bring some.
+//!
+//! Clusters are registered independently of each other, each into a slot of its own; the rays of a
+//! sweep and the velocities of its points are computed in two halves. The number of threads
+//! therefore changes no bit of the results.
 
 /// Threads that share work by fork and join.
 pub trait Team: Sync {

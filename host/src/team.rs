@@ -1,4 +1,7 @@
 //! The threads that share the work within a sweep.
+//!
+//! The program's working thread leads a team of one thread per core, at most [`THREADS_MAX`]. Every
+//! other thread works alone.
 
 use std::num::NonZero;
 use std::thread;
@@ -34,7 +37,8 @@ pub fn available() -> usize {
 }
 
 /// Does `work` on this thread, with so many less one others that share it: they are watched for
-/// allocations all their life, and sleep where there is nothing to do. Once a thread: there is no other team for it.
+/// allocations all their life, and sleep where there is nothing to do. Once a thread: there is no
+/// other team for it.
 pub fn lead<R>(threads: usize, work: impl FnOnce() -> R) -> R {
     if threads < 2 {
         return work();

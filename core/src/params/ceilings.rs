@@ -3,7 +3,9 @@
 /// Returns of one sweep; further ones, in the source's order, are dropped and counted.
 /// (The dissertation's n_max is 150,000; no labelled KITTI sweep has more than 124,123.)
 pub const POINTS_MAX: usize = 131_072;
-/// Levels of a column: free and occupied masks share one 32-bit word.
+/// Levels of a column: free and occupied masks share one 32-bit word. No profile needs more.
+/// Compared with 32 levels this halves the memory traffic, and a pair of columns is scored with
+/// four byte lookups (scalar) or 32 masked additions (kernel).
 pub const LEVELS_MAX: usize = 16;
 /// Columns of the flow window: 256 x 256 cells, 76.8 m at 0.30 m.
 pub const COLUMNS_MAX: usize = 65_536;
@@ -18,8 +20,9 @@ pub const ORIGINS_MAX: usize = crate::sweep::SENSORS_MAX * SLOTS;
 pub const REACH: i32 = 15;
 /// Width of the search, cells.
 pub const SIDE: usize = 2 * REACH as usize + 1;
-/// Elements from one line of the search to the next: [`SIDE`] and one of padding, so that an index
-/// is two shifts away from its displacement.
+/// Elements from one line of the search to the next: [`SIDE`] and one of padding. Shifts and masks
+/// turn an index into its displacement, without a division, and a row is a whole number of `vec4`s.
+/// The padding costs at most 1.5 MB over both buffers of costs.
 pub const LINE: usize = 32;
 /// Elements of a row of costs, one row per foreground column: displacement `(du, dv)` is element
 /// `(du + REACH) * LINE + dv + REACH`, the order in which ties are broken.

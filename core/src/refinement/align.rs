@@ -5,6 +5,9 @@
 //! by the surface it lies on; the robust kernel (Geman and McClure, 1987) is wide at first and then
 //! narrow. Correspondences run both ways, from the cluster to the other sweeps and from the second
 //! sweep back, so that neither an end that comes into view nor one that leaves it pulls.
+//!
+//! Returns are only paired with returns of the same sensor. Two scanners see a dynamic object at
+//! different times; between two sweeps of one scanner it has moved for about one period.
 
 use super::cluster::{CloudPoints, Cluster, VisitedColumns};
 use super::motion::{Motion, TARGETS_MAX};

@@ -79,7 +79,7 @@ impl Cloud {
     }
 
     /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than
-    /// clusters are. SweepReturns how many returns were left out for want of room: those of the
+    /// clusters are. Returns how many returns were left out for want of room: those of the
     /// last columns.
     pub(super) fn fill(
         &mut self,
@@ -110,7 +110,7 @@ impl Cloud {
     }
 
     /// Lists the returns of clusters and counts them by column, one place farther in `start`.
-    /// SweepReturns how many there are, and the sensors that saw them, a bit each.
+    /// Returns how many there are, and the sensors that saw them, a bit each.
     fn count_columns(
         &mut self,
         scaled: &Scaled,
@@ -150,7 +150,7 @@ impl Cloud {
         }
     }
 
-    /// Keeps of each sub-voxel the first return of each sensor. SweepReturns how many had no room.
+    /// Keeps of each sub-voxel the first return of each sensor. Returns how many had no room.
     fn thin(
         &mut self,
         scaled: &Scaled,

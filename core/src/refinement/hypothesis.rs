@@ -1,4 +1,10 @@
 //! Static or dynamic: the motion that explains a cluster best, against rest.
+//!
+//! Two or three sweeps are thin evidence for the motion of a truck that drives alongside, because
+//! its side slides along itself. The prediction of its tracklets therefore acts as a prior: a
+//! cluster that keeps moving as predicted needs only a share of the evidence that one needs to
+//! start moving (`evidence_prior_ratio` of [`RefinementParams`](crate::params::RefinementParams)),
+//! and less still if it is long.
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::motion::Motion;

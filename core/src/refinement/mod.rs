@@ -1,9 +1,10 @@
 //! Refinement of the flow below the cell's size: clusters of returns, and how each of them moved.
 //!
 //! Cells of 0.3 m bound what whole displacements can tell; this stage goes back to the returns. It
-//! has no counterpart in the dissertation. Per pair of sweeps:
+//! works on clusters rather than columns: all columns of a cluster share one rigid motion. It has
+//! no counterpart in the dissertation. Per pair of sweeps:
 //!
-//! 1. SweepReturns above the ground are thinned to one a sub-voxel ([`cloud`]).
+//! 1. Returns above the ground are thinned to one a sub-voxel ([`cloud`]).
 //! 2. Columns that touch make a cluster ([`segments`]).
 //! 3. Each cluster is registered with the second sweep, and with earlier ones where
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
@@ -86,8 +87,8 @@ impl Refinement {
         self.held = 0;
     }
 
-    /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or higher
-    /// than clusters are. Returns how many returns had no room.
+    /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or
+    /// higher than clusters are. Returns how many returns had no room.
     pub(crate) fn insert_cloud(
         &mut self,
         profile: &Profile,

@@ -1,4 +1,8 @@
 //! How a column moved, and how certain that is.
+//!
+//! A static column gets a displacement of exactly zero rather than a small residual motion. What is
+//! uncertain about that goes into its covariance, which grows with the residual at rest and where
+//! the column's match disagrees.
 
 use super::hypothesis::{Hypothesis, variance_inflation};
 use super::scaled::Scaled;

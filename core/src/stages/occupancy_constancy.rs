@@ -2,8 +2,12 @@
 //!
 //! Three binary features per level say whether both columns are free, both occupied, or one of
 //! each (3.8-3.10); a logistic classifier weighs them (3.11, 3.12). Free and occupied exclude each
-//! other, so with the source fixed the score is linear in the target's mask bits. Costs are negative log-probabilities in thousandths of a nat, so that
-//! sums over the window (3.13) and energies are integers on every machine.
+//! other, so with the source fixed the score is linear in the target's mask bits.
+//!
+//! Costs are negative log-probabilities in thousandths of a nat, so that sums over the window
+//! (3.13) and energies are integers on every machine. They are unsigned costs rather than scores:
+//! nine of them fit in 16 bits, `atomicMin` finds the winners, and the largest number can stand for
+//! "none yet" ([`NONE`](crate::record::NONE)).
 
 use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW, SIDE};
 use crate::record::{Column, SweepUniform};

@@ -5,7 +5,11 @@
 //! tracklet follows, so that they keep their precision wherever the vehicle drives. The
 //! innovations, normalised and squared (NIS; Bar-Shalom, Li and Kirubarajan, "Estimation with
 //! Applications to Tracking and Navigation", 2001, section 5.4), scale all noise together, which
-//! leaves the gains as they are.
+//! leaves the gains as they are. The noise has to be measured because poses, stamps and drivers
+//! differ from one recording to the next.
+//!
+//! The poses themselves are not corrected. Static clusters do show a common displacement, some 6 mm
+//! a sweep on KITTI's drive 0005, but the errors of dynamic ones do not follow it.
 
 use crate::ctrv::TwoPointStart;
 use crate::params::{Birth, TrackletParams};

@@ -26,7 +26,8 @@ use std::time::Instant;
 /// Pairs that may wait for their rows: the pipeline waits where rows take longer.
 const WAITING: usize = 2;
 
-/// Counts changes of what rows and facts mean: those of another number are made anew.
+/// Counts changes of what rows and facts mean: those of another number are made anew. Raise it with
+/// every such change.
 const ROWS: u32 = 3;
 
 /// What all drives of an evaluation have in common.

@@ -2,9 +2,9 @@
 //!
 //! Two steps. Every drive goes through the pipeline once and leaves its rows (Parquet, one per
 //! solid column of every pair) and facts (JSON) in the folder of results: on several drives at a
-//! time, and only on those not there yet. Then all rows are read again for tables, figures and
-//! the report; any engine that reads Parquet can do the same over more drives than one machine
-//! holds.
+//! time, and only on those not there yet, so that an interrupted evaluation resumes. Then all rows
+//! are read again for tables, figures and the report; any engine that reads Parquet can do the same
+//! over more drives than one machine holds.
 
 pub mod ablate;
 mod calibration;

@@ -1,4 +1,5 @@
 //! `raywake-lab sim`: simulated drives in the layout of KITTI's raw recordings, with exact truth.
+//! Evaluation, training and the program read them as they read any other recording.
 //!
 //! A drive is `OUT/DATE/DATE_drive_NNNN_sync/`, its calibration `OUT/DATE/calib_*.txt`. Beside what
 //! a recording has, it has `truth/`: see [`truth`]. Its vehicle frame ("Velodyne" in KITTI's files)

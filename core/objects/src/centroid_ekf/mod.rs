@@ -5,7 +5,9 @@
 //! of (2.6). Positions are metres from the track's anchor, times seconds after its start. The first
 //! centroid tells no velocity, and a polar state without speed could only ever learn motion along
 //! its own heading: the filter rests until a centroid lies farther from the first than noise
-//! explains, or for [`CentroidParams::rest_max_s`], and is then born of both.
+//! explains, or for [`CentroidParams::rest_max_s`], and is then born of both. If it turns out to
+//! have its object backwards, it reverses its heading, once. Either way [`Revision`] corrects the
+//! earlier states too, so that no history jumps by half a turn.
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,8 @@
 //! The normal equations of a Gauss-Newton step (2.5.3), the model points eliminated (Schur
 //! complement, as in bundle adjustment: Triggs et al., 2000).
 //!
+//! A return couples one model point with five coefficients of each of four splines (position and
+//! heading), so with the model points eliminated only small systems of spline coefficients remain.
 //! The height is apart from the plane: no derivative couples them, so there are two systems. A
 //! model point's own block is diagonal in the axes of its surface, so each axis is eliminated as a
 //! row: the Schur complement is one rank-one update for each axis of each point.

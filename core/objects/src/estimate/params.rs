@@ -269,7 +269,8 @@ impl EstimateParams {
         ..EstimateParams::DEFAULT
     };
 
-    /// Those for an object of a length, m; unchanged where it is not known.
+    /// Those for an object of a length, m; unchanged where it is not known. Length tells agility: a
+    /// tram neither brakes nor turns as a car does, nor a car as a pedestrian.
     pub(super) fn for_length(&self, length_m: f32) -> EstimateParams {
         let mut params = *self;
         if self.reference_length_m > 0.0 && length_m > 0.0 {

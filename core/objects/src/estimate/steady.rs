@@ -1,4 +1,10 @@
 //! First trajectories of steady motion, and of motion that is steady for a time.
+//!
+//! Gauss-Newton only descends to a near minimum, so an estimate has three starts: the tracker's
+//! history, grown from the middle of the track; one steady motion for the whole track; and motions
+//! that are steady for [`SearchParams::unsteady_s`](super::params::SearchParams) each. Each is
+//! solved, and the solution of least cost, endpoints included, is kept. In practice that
+//! is where a descent from the true trajectory ends too.
 
 use super::params::EstimateParams;
 use super::problem::Problem;

@@ -1,5 +1,9 @@
 //! Segments: connected components of chunks (Euclidean clustering: Rusu, 2009; here in velocity and
 //! time too).
+//!
+//! Objects that touch but move differently become two segments where the flow is known. A return
+//! whose velocity is unknown, because it lies outside the flow's window or is unmatched, may join
+//! either.
 
 use super::batch::{Batch, BatchReturn};
 use super::chunks::{CHUNKS_MAX, Chunks, ReturnSums};

@@ -1,4 +1,8 @@
 //! A track: an object from its birth to its end.
+//!
+//! Tracks live in a slice of the caller's, who thus chooses their number where their memory is. A
+//! track of any length fits: of its returns and states it keeps every k-th, and k doubles when
+//! there is no more room ([`Thinned`]).
 
 use super::batch::BatchReturn;
 use super::thinned::Thinned;

@@ -8,6 +8,9 @@
 //! A young track is solved twice with every sweep, over a sparse model made anew: from where it is,
 //! and from one other start, which take turns; the cheaper remains.
 //!
+//! The turn rate keeps its Gaussian noise and does not decay here: a sweep's two iterations would
+//! not find the minima that Student-t noise adds.
+//!
 //! So the work of a push is bounded, however young its track and however many appear at once:
 //! [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
 
