@@ -8,7 +8,7 @@ use std::hint::black_box;
 use raywake::backend::Backend;
 use raywake::config::Settings;
 use raywake::error::RunError;
-use raywake::team::{self, Team};
+use raywake::team::{self, ThreadTeam};
 use raywake::track::{Ended, Tracker};
 use raywake_alloc_guard::{Allocation, Guard, Sealed};
 use raywake_core::digest::Digest;
@@ -71,7 +71,7 @@ fn the_team_is_watched() {
         assert!([section, "helper thread"].contains(&e.section) && e.bytes == 100, "{e}");
     };
     told("alone", &allocate);
-    told("shared", &|| Team.join(|| (), allocate));
+    told("shared", &|| ThreadTeam.join(|| (), allocate));
     println!("an allocation in a step is an error ... ok");
 }
 

@@ -12,7 +12,6 @@ use crate::motion_compensation::{EgoMotion, turn};
 use crate::output::ColumnFlow;
 use crate::params::{ANCHOR_ABOVE_GROUND_M, Frame, POINTS_MAX, Profile};
 use crate::pose::{Pose, Twist};
-use crate::prepare::Setup;
 use crate::sweep::{Rig, Sweep};
 use crate::tracklet::{Observation, Tracklet};
 use glam::DVec3;
@@ -88,7 +87,7 @@ pub(crate) struct Arrival {
 }
 
 /// Two sweeps that follow each other.
-pub(crate) struct Pair<'a> {
+pub(crate) struct SweepPair<'a> {
     pub profile: &'a Profile,
     pub before: Side,
     pub current: Side,
@@ -114,8 +113,7 @@ impl Sides {
     }
 
     /// A sweep arrives. One that does not continue the one before has none before it.
-    pub fn advance(&mut self, setup: &Setup, sweep: &Sweep) -> Arrival {
-        let Setup { profile, rig, .. } = setup;
+    pub fn advance(&mut self, profile: &Profile, rig: &Rig, sweep: &Sweep) -> Arrival {
         let pose = sweep.world_from_vehicle;
         self.before = self.current.take();
         let reset = match &self.before {
@@ -137,17 +135,17 @@ impl Sides {
     }
 
     /// Both, where the second continues the first.
-    pub fn pair<'a>(&self, profile: &'a Profile) -> Option<Pair<'a>> {
-        Some(Pair::new(profile, self.before?, self.current?))
+    pub fn pair<'a>(&self, profile: &'a Profile) -> Option<SweepPair<'a>> {
+        Some(SweepPair::new(profile, self.before?, self.current?))
     }
 }
 
-impl<'a> Pair<'a> {
-    fn new(profile: &'a Profile, before: Side, current: Side) -> Pair<'a> {
+impl<'a> SweepPair<'a> {
+    fn new(profile: &'a Profile, before: Side, current: Side) -> SweepPair<'a> {
         let dt_s = current.stamp_s - before.stamp_s;
         let moved = before.pose.inverse() * current.pose;
         let ego = EgoMotion::new(&before.pose, &moved.twist(dt_s));
-        Pair { profile, before, current, dt_s, turned_rad: moved.yaw_rad() as f32, ego }
+        SweepPair { profile, before, current, dt_s, turned_rad: moved.yaw_rad() as f32, ego }
     }
 
     /// The first sweep's vehicle frame from the second's window: the corners differ by whole cells.

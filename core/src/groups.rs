@@ -3,23 +3,23 @@
 use crate::record::NONE;
 
 /// Disjoint sets of numbers below `N`.
-pub struct Groups<const N: usize> {
+pub struct DisjointSets<const N: usize> {
     parent: [u32; N],
     members: heapless::Vec<u32, N>,
     /// Where each group ends in `members`.
     ends: heapless::Vec<u32, N>,
 }
 
-impl<const N: usize> Default for Groups<N> {
-    fn default() -> Groups<N> {
-        Groups::new()
+impl<const N: usize> Default for DisjointSets<N> {
+    fn default() -> DisjointSets<N> {
+        DisjointSets::new()
     }
 }
 
-impl<const N: usize> Groups<N> {
+impl<const N: usize> DisjointSets<N> {
     /// No numbers, no groups.
-    pub const fn new() -> Groups<N> {
-        Groups { parent: [0; N], members: heapless::Vec::new(), ends: heapless::Vec::new() }
+    pub const fn new() -> DisjointSets<N> {
+        DisjointSets { parent: [0; N], members: heapless::Vec::new(), ends: heapless::Vec::new() }
     }
 
     /// Puts each number below `count` that is a `member` into a group of its own.
@@ -50,7 +50,7 @@ impl<const N: usize> Groups<N> {
     }
 
     /// Lists the members of every group; groups are ordered by their least member. `count` is that
-    /// of [`Groups::start`].
+    /// of [`DisjointSets::start`].
     pub fn list(&mut self, count: usize) {
         self.members.clear();
         self.ends.clear();

@@ -10,7 +10,7 @@ use crate::tracklet::TrackletTurnover;
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
 #[derive(Clone, Copy, Debug)]
-pub struct Flows<'a> {
+pub struct PairFlows<'a> {
     /// Solid columns of the first sweep.
     pub columns: &'a [ColumnFlow],
     /// Points of the first sweep, in the source's order.
@@ -28,9 +28,9 @@ pub struct Flows<'a> {
 
 /// What one sweep yields. Borrowed from the caller's [`Output`].
 #[derive(Clone, Copy, Debug)]
-pub struct Stepped<'a> {
+pub struct SweepOutput<'a> {
     /// Flow of the pair that this sweep completes; none after a reset.
-    pub flows: Option<Flows<'a>>,
+    pub flows: Option<PairFlows<'a>>,
     /// Returns left out.
     pub dropped: DroppedReturns,
     /// Set where this sweep has no usable predecessor.

@@ -27,7 +27,7 @@ pub struct Perceived<'a> {
 }
 
 /// Buffers as perception leaves them, whoever holds them.
-pub struct Outputs<'a> {
+pub struct PerceptionBuffers<'a> {
     /// `counters`.
     pub counters: &'a [u32],
     /// `columns_before`.
@@ -42,8 +42,8 @@ pub struct Outputs<'a> {
     pub proposal: &'a [Proposal],
 }
 
-impl<'a> From<Outputs<'a>> for Perceived<'a> {
-    fn from(o: Outputs<'a>) -> Perceived<'a> {
+impl<'a> From<PerceptionBuffers<'a>> for Perceived<'a> {
+    fn from(o: PerceptionBuffers<'a>) -> Perceived<'a> {
         // A device that answers nonsense yields no flow, not a panic.
         let count = (o.counters[FOREGROUND_COUNT] as usize).min(FOREGROUND_MAX);
         Perceived {
@@ -59,7 +59,7 @@ impl<'a> From<Outputs<'a>> for Perceived<'a> {
 }
 
 /// Who keeps the times of the stages.
-pub trait Timer {
+pub trait StageTimer {
     /// Books the time since the last stage ended to `stage`.
     fn lap(&mut self, stage: &'static str);
     /// Books time measured elsewhere, and to `rest` what else has passed since the last stage ended.
@@ -71,7 +71,7 @@ pub trait Timer {
 }
 
 /// Nobody does.
-impl Timer for () {
+impl StageTimer for () {
     fn lap(&mut self, _: &'static str) {}
     fn measured(&mut self, _: &mut dyn Iterator<Item = (&'static str, f64)>, _: &'static str) {}
 }
@@ -91,7 +91,7 @@ pub trait Perceive {
         &mut self,
         sweep: &SweepUniform,
         team: &impl Team,
-        timer: &mut (impl Timer + Send),
+        timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, Self::Error>;
 }
@@ -108,7 +108,7 @@ pub struct Machine<'a, P, T, C> {
 
 /// The learned numbers in the form the kernels and their twins use: slices of the caller's.
 #[derive(Clone, Copy, Debug)]
-pub struct Tables<'a> {
+pub struct LearnedTables<'a> {
     /// See [`crate::stages::background_filter::load`]; all zero where there is no filter.
     pub filter_table: &'a [i32],
     /// See [`crate::stages::occupancy_constancy::load`].
@@ -118,20 +118,20 @@ pub struct Tables<'a> {
 }
 
 /// The scalar backend: the stages of [`crate::stages`] over memory that the caller provides.
-pub struct Scalar<M> {
+pub struct ScalarBackend<M> {
     memory: M,
     profile: Profile,
 }
 
-impl<M: AsMut<[u32]> + Send> Scalar<M> {
+impl<M: AsMut<[u32]> + Send> ScalarBackend<M> {
     /// Words of memory it needs for a profile.
     pub fn words(profile: &Profile) -> usize {
         Storage::words(FLOW_PROGRAMS, profile)
     }
 
-    /// Over zeroed memory of [`Scalar::words`].
-    pub fn new(memory: M, profile: &Profile, tables: &Tables) -> Scalar<M> {
-        let mut scalar = Scalar { memory, profile: profile.clone() };
+    /// Over zeroed memory of [`ScalarBackend::words`].
+    pub fn new(memory: M, profile: &Profile, tables: &LearnedTables) -> ScalarBackend<M> {
+        let mut scalar = ScalarBackend { memory, profile: profile.clone() };
         let storage = scalar.storage();
         storage.filter_table.copy_from_slice(tables.filter_table);
         storage.constancy_weights.copy_from_slice(tables.constancy_weights);
@@ -145,7 +145,7 @@ impl<M: AsMut<[u32]> + Send> Scalar<M> {
     }
 }
 
-impl<M: AsMut<[u32]> + Send> Perceive for Scalar<M> {
+impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
     type Error = core::convert::Infallible;
 
     fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
@@ -157,7 +157,7 @@ impl<M: AsMut<[u32]> + Send> Perceive for Scalar<M> {
         &mut self,
         sweep: &SweepUniform,
         team: &impl Team,
-        timer: &mut (impl Timer + Send),
+        timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, Self::Error> {
         let rounds = self.profile.em_rounds;
@@ -166,7 +166,7 @@ impl<M: AsMut<[u32]> + Send> Perceive for Scalar<M> {
         let lap = &mut |stage| timer.lap(stage);
         let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, lap));
         team.join(stages, meanwhile);
-        Ok(Outputs {
+        Ok(PerceptionBuffers {
             counters: s.counters,
             columns_before: s.columns_before,
             columns_now: s.columns_now,

@@ -6,18 +6,19 @@
 //! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on the
 //! CPU or on a device, with the same result.
 
-use crate::frame::Sides;
-use crate::output::{Flows, Output, Stepped, TrackletState};
+use crate::frame::{Sides, SweepPair};
+use crate::output::{Output, SweepOutput, TrackletState};
 use crate::params::Profile;
-use crate::perceive::{Machine, Perceive, Timer};
+use crate::perceive::{Machine, Perceive, Perceived, StageTimer};
 use crate::prepare::Setup;
+use crate::record::SweepUniform;
 use crate::refinement::Refinement;
 use crate::returns::Returns;
 use crate::sweep::{Point, Sweep};
 use crate::team::Team;
-use crate::tracklet::Tracklets;
 use crate::tracklet::observe::Observations;
 use crate::tracklet::state::state_of;
+use crate::tracklet::{TrackletTurnover, Tracklets};
 use crate::velocities::{FlowOfColumn, Found};
 
 /// The state between sweeps. Plain and large (see `memory-layout.md`): keep it in a static or a box.
@@ -54,15 +55,14 @@ impl Pipeline {
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,
-        machine: Machine<P, impl Team, impl Timer + Send>,
+        machine: Machine<P, impl Team, impl StageTimer + Send>,
         sweep: &Sweep,
         before: &[Point],
         out: Output<'o>,
-    ) -> Result<Stepped<'o>, P::Error> {
+    ) -> Result<SweepOutput<'o>, P::Error> {
         let Machine { backend, team, timer } = machine;
         let profile = &setup.profile;
-
-        let arrival = self.sides.advance(setup, sweep);
+        let arrival = self.sides.advance(profile, &setup.rig, sweep);
         if arrival.reset.is_some() {
             self.tracklets.clear();
             self.refinement.clear();
@@ -71,65 +71,71 @@ impl Pipeline {
         timer.lap("rays");
 
         let (returns, refinement) = (&mut self.returns, &mut self.refinement);
-        let mut unrefined = 0;
-        let corner = arrival.window.corner;
+        let (mut unrefined, corner) = (0, arrival.window.corner);
         let insert_cloud = || unrefined = returns.insert(refinement, profile, corner, sweep);
         let perceived = backend.perceive(&sent.uniform, team, timer, insert_cloud)?;
-        let stepped = Stepped {
-            flows: None,
+
+        let mut flows = None;
+        if let Some(pair) = self.sides.pair(profile) {
+            let left = self.refine(team, &pair, &sent.uniform, &perceived);
+            timer.lap("refine");
+            let turnover = self.track(&pair, &sent.uniform, &perceived, left);
+            timer.lap("track");
+            let found = Found {
+                pair: &pair,
+                sweep: &sent.uniform,
+                perceived: &perceived,
+                observations: &self.observations,
+                tracklets: &self.tracklets,
+                refinement: &self.refinement,
+                returns: &self.returns,
+            };
+            flows = Some(found.put_out(team, before, turnover, &mut self.flow_of_column, out));
+            timer.lap("out");
+        }
+        Ok(SweepOutput {
+            flows,
             dropped: sent.dropped,
             reset: arrival.reset,
             unrefined,
             foreground: perceived.foreground.len(),
             rays: perceived.rays,
-        };
-        let Some(pair) = self.sides.pair(profile) else { return Ok(stepped) };
+        })
+    }
 
-        let left = self.tracklets.place(&sent.uniform);
-        if profile.refinement_sweeps > 0 {
-            let cells_per_mps = |v: f32| v * pair.dt_s as f32 / profile.voxel_m as f32;
+    /// Moves the tracklets into the new window; then refines displacements below the cell's size,
+    /// with the tracklets' velocities as priors. Returns how many tracklets left the window.
+    fn refine(
+        &mut self,
+        team: &impl Team,
+        pair: &SweepPair,
+        sweep: &SweepUniform,
+        perceived: &Perceived,
+    ) -> u32 {
+        let left = self.tracklets.place(sweep);
+        if pair.profile.refinement_sweeps > 0 {
             let tracklets = &self.tracklets;
-            self.refinement.run(team, &sent.uniform, &perceived, |column| {
+            let cells = |v: f32| v * pair.dt_s as f32 / pair.profile.voxel_m as f32;
+            self.refinement.run(team, sweep, perceived, |column| {
                 let t = tracklets.at(column).filter(|t| t.age > 0)?;
-                Some(t.ekf.velocity().0.map(cells_per_mps))
+                Some(t.ekf.velocity().0.map(cells))
             });
         }
-        timer.lap("refine");
+        left
+    }
 
-        self.observations.collect(profile, &sent.uniform, &perceived, &self.refinement);
-        let turnover = self.tracklets.update(
-            profile,
-            &sent.uniform,
-            pair.dt_s as f32,
-            pair.turned_rad,
-            left,
-            &mut self.observations.all,
-        );
-        timer.lap("track");
-
-        let found = Found {
-            pair: &pair,
-            sweep: &sent.uniform,
-            perceived: &perceived,
-            observations: &self.observations,
-            tracklets: &self.tracklets,
-            refinement: &self.refinement,
-            returns: &self.returns,
-        };
-        let (count, valid) = found.columns(&mut self.flow_of_column, out.columns);
-        let columns = &out.columns[..count];
-        found.points(team, before, columns, &self.flow_of_column, out.points);
-        timer.lap("out");
-        let beyond = perceived.marked - perceived.foreground.len();
-        let flows = Flows {
-            columns,
-            points: &out.points[..pair.before.points],
-            dt_s: pair.dt_s,
-            turnover,
-            valid,
-            foreground_dropped: beyond + self.observations.beyond_capacity,
-        };
-        Ok(Stepped { flows: Some(flows), ..stepped })
+    /// Updates the tracklets with the displacements of columns.
+    fn track(
+        &mut self,
+        pair: &SweepPair,
+        sweep: &SweepUniform,
+        perceived: &Perceived,
+        left: u32,
+    ) -> TrackletTurnover {
+        let (profile, observed) = (pair.profile, &mut self.observations);
+        observed.collect(profile, sweep, perceived, &self.refinement);
+        let (dt, turned) = (pair.dt_s as f32, pair.turned_rad);
+        self.tracklets.update(profile, sweep, dt, turned, left, &mut observed.all)
     }
 
     /// The tracklets after the last step, at the time of its sweep.

@@ -46,7 +46,8 @@ pub mod prefix_sum;
 pub mod window;
 
 pub use declare::{
-    Argument, Element, Groups, List, Op, Program, Row, Runner, Stage, View, needed, run, walk,
+    Argument, BufferElement, BufferRow, GroupCount, List, Runner, Stage, StageOp, StageProgram,
+    View, needed, run, walk,
 };
 
 use crate::params::*;
@@ -122,25 +123,25 @@ constants! {
     REACH, RANGE_STEPS_MAX, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, LOG_ODDS_SOLID
 }
 
-use Groups::{GroupPer, One, ThreadPer, Threads, Tiles};
+use GroupCount::{GroupPer, One, ThreadPer, Threads, Tiles};
 use List::{Distinct, Foreground};
-use Op::{Fill, Fused, Part, ReadBack, Repeat, Rounds, Run, Upload};
+use StageOp::{Fill, Fused, Part, ReadBack, Repeat, Rounds, Run, Upload};
 
 /// The programs of the flow pipeline: at start, and every sweep.
-pub const FLOW_PROGRAMS: &[Program] = &[
-    Program { name: "load", ops: LOAD },
-    Program { name: "flow", ops: &[Part(GRID), Part(FLOW)] },
+pub const FLOW_PROGRAMS: &[StageProgram] = &[
+    StageProgram { name: "load", ops: LOAD },
+    StageProgram { name: "flow", ops: &[Part(GRID), Part(FLOW)] },
 ];
 
 /// The programs of the sparse map: every sweep, then two for every band.
-pub const MAP_PROGRAMS: &[Program] = &[
-    Program { name: "map rays", ops: MAP_RAYS },
-    Program { name: "map count", ops: MAP_COUNT },
-    Program { name: "map band", ops: MAP_BAND },
+pub const MAP_PROGRAMS: &[StageProgram] = &[
+    StageProgram { name: "map rays", ops: MAP_RAYS },
+    StageProgram { name: "map count", ops: MAP_COUNT },
+    StageProgram { name: "map band", ops: MAP_BAND },
 ];
 
 /// Copies of the learned tables, once at start.
-pub const LOAD: &[Op] = &[
+pub const LOAD: &[StageOp] = &[
     Upload(Buffer::filter_table),
     Upload(Buffer::constancy_weights),
     Upload(Buffer::constancy_costs),
@@ -167,7 +168,7 @@ macro_rules! prefix_sum {
 }
 
 /// From rays to the columns of a sweep: the occupancy grid.
-pub const GRID: &[Op] = &[
+pub const GRID: &[StageOp] = &[
     Upload(Buffer::sweep),
     Upload(Buffer::origins),
     Upload(Buffer::rays),
@@ -190,7 +191,7 @@ pub const GRID: &[Op] = &[
 ];
 
 /// From the columns of two sweeps to flow.
-pub const FLOW: &[Op] = &[
+pub const FLOW: &[StageOp] = &[
     Run(stage!(
         background_filter in background_filter,
         (sweep, filter_table, columns_before, mut foreground_marks),
@@ -265,7 +266,7 @@ const DIGIT_SUM: &Stage = prefix_sum!(histograms, digit_tiles, digit_offsets, |_
 const NEXT_DIGIT: &Stage = stage!(device next_digit, (mut counters), One);
 
 /// Sparse map: distinct rays of a sweep. Then, band after band, [`MAP_COUNT`] and [`MAP_BAND`].
-pub const MAP_RAYS: &[Op] = &[
+pub const MAP_RAYS: &[StageOp] = &[
     Upload(Buffer::sweep),
     Upload(Buffer::origins),
     Upload(Buffer::rays),
@@ -275,7 +276,7 @@ pub const MAP_RAYS: &[Op] = &[
 ];
 
 /// Sparse map: counts the updates of a band; `count_tiles` ends with their number.
-pub const MAP_COUNT: &[Op] = &[
+pub const MAP_COUNT: &[StageOp] = &[
     Upload(Buffer::sweep),
     Run(stage!(
         count in map::emit,
@@ -288,7 +289,7 @@ pub const MAP_COUNT: &[Op] = &[
 
 /// Sparse map: emits, sorts and reduces the updates of the band just counted, which must not be
 /// more than [`BAND_UPDATES`]. `run_tiles` ends with the number of voxels, `scratch` holds them.
-pub const MAP_BAND: &[Op] = &[
+pub const MAP_BAND: &[StageOp] = &[
     Run(stage!(
         emit in map::emit,
         (sweep, origins, rays, slots, list distinct, offsets, mut updates),

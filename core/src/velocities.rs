@@ -1,7 +1,7 @@
 //! Out: a velocity for every column and every return (section 3.7).
 
-use crate::frame::{Pair, centre_of};
-use crate::output::{ColumnFlow, Origin, PointFlow};
+use crate::frame::{SweepPair, centre_of};
+use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow};
 use crate::params::COLUMNS_MAX;
 use crate::perceive::Perceived;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
@@ -9,8 +9,8 @@ use crate::refinement::Refinement;
 use crate::returns::Returns;
 use crate::sweep::Point;
 use crate::team::Team;
-use crate::tracklet::Tracklets;
 use crate::tracklet::observe::Observations;
+use crate::tracklet::{TrackletTurnover, Tracklets};
 use glam::DVec3;
 
 /// Index of the record of every column of the window, [`NONE`] where it has none.
@@ -25,7 +25,7 @@ impl FlowOfColumn {
 
 /// All that is known of a pair of sweeps.
 pub(crate) struct Found<'a> {
-    pub pair: &'a Pair<'a>,
+    pub pair: &'a SweepPair<'a>,
     pub sweep: &'a SweepUniform,
     pub perceived: &'a Perceived<'a>,
     pub observations: &'a Observations,
@@ -35,9 +35,32 @@ pub(crate) struct Found<'a> {
 }
 
 impl Found<'_> {
+    /// Writes a velocity for every solid column and every return of the first sweep.
+    pub fn put_out<'o>(
+        &self,
+        team: &impl Team,
+        points: &[Point],
+        turnover: TrackletTurnover,
+        index: &mut FlowOfColumn,
+        out: Output<'o>,
+    ) -> PairFlows<'o> {
+        let (count, valid) = self.columns(index, out.columns);
+        let columns = &out.columns[..count];
+        self.points(team, points, columns, index, out.points);
+        let beyond = self.perceived.marked - self.perceived.foreground.len();
+        PairFlows {
+            columns,
+            points: &out.points[..self.pair.before.points],
+            dt_s: self.pair.dt_s,
+            turnover,
+            valid,
+            foreground_dropped: beyond + self.observations.beyond_capacity,
+        }
+    }
+
     /// Writes one record per solid column of the first sweep; returns how many, and how many of
     /// them are matched.
-    pub fn columns(&self, index: &mut FlowOfColumn, out: &mut [ColumnFlow]) -> (usize, usize) {
+    fn columns(&self, index: &mut FlowOfColumn, out: &mut [ColumnFlow]) -> (usize, usize) {
         let vehicle_from_grid = self.pair.vehicle_from_grid();
         let mut foreground = self.perceived.foreground.iter().enumerate().peekable();
         let mut observed = self.observations.all.iter().peekable();
@@ -95,7 +118,7 @@ impl Found<'_> {
     }
 
     /// Writes one record per return of the first sweep, in its order.
-    pub fn points(
+    fn points(
         &self,
         team: &impl Team,
         points: &[Point],

@@ -191,7 +191,7 @@ pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raywake_core::stages::{BUFFERS, Row};
+    use raywake_core::stages::{BUFFERS, BufferRow};
 
     #[test]
     fn the_map_alone() {
@@ -215,7 +215,7 @@ mod tests {
         assert!(scalar < device && scalar > heap_bytes(Heap::Upload, &p), "{scalar}");
         let text = memory_layout(&shipped());
         assert!(text.contains("| hdl64, dissertation | wide |"), "{text}");
-        let named = |row: &Row| text.contains(&format!("| `{}` |", row.name));
+        let named = |row: &BufferRow| text.contains(&format!("| `{}` |", row.name));
         assert!(BUFFERS.iter().all(named), "{text}");
         assert!(text.contains("\n## Sparse map\n") && text.contains("\n## Records\n"));
     }

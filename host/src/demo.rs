@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use raywake_core::output::Flows;
+use raywake_core::output::PairFlows;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
 use raywake_sim::Truth;
@@ -100,7 +100,7 @@ struct SpeedErrors {
 
 impl SpeedErrors {
     /// Matched columns of moving objects whose tracklet is old enough.
-    fn add(&mut self, truth: &VelocityField, flows: &Flows) {
+    fn add(&mut self, truth: &VelocityField, flows: &PairFlows) {
         let old = |c: &&ColumnFlow| c.origin == Origin::Matched && c.age >= AGE;
         for column in flows.columns.iter().filter(old) {
             let Some([x, y]) = truth.at(column) else { continue };

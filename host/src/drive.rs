@@ -11,7 +11,7 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 use crate::backend::{Backend, Tables};
 use crate::error::RunError;
 use crate::laps::Laps;
-use crate::team::Team;
+use crate::team::ThreadTeam;
 
 /// The pipeline with its backend and the storage of its results. Nothing is allocated once it is
 /// made.
@@ -30,7 +30,7 @@ struct Parts {
 /// What one sweep yields, and how long it took.
 pub struct Stepped<'a> {
     /// What comes out.
-    pub output: output::Stepped<'a>,
+    pub output: output::SweepOutput<'a>,
     /// Time of every stage.
     pub laps: Laps,
 }
@@ -75,7 +75,7 @@ impl Drive {
     pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, RunError> {
         self.parts.step(|Parts { setup, pipeline, backend, columns, points }| {
             let mut laps = Laps::start();
-            let machine = Machine { backend, team: &Team, timer: &mut laps };
+            let machine = Machine { backend, team: &ThreadTeam, timer: &mut laps };
             let output =
                 pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
             Ok(Stepped { output, laps })

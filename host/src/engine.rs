@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use raywake_core::output::Flows;
+use raywake_core::output::PairFlows;
 use raywake_core::output::TrackletState;
 use raywake_core::params::Profile;
 
@@ -56,7 +56,7 @@ pub struct Pair<'a> {
     /// The second sweep.
     pub second: &'a SweepData,
     /// Flow of the first sweep.
-    pub flows: &'a Flows<'a>,
+    pub flows: &'a PairFlows<'a>,
     /// Time of every stage.
     pub laps: &'a Laps,
 }

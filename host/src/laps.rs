@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use raywake_core::perceive::Timer;
+use raywake_core::perceive::StageTimer;
 
 /// Time since a moment, ms.
 pub fn milliseconds(since: Instant) -> f64 {
@@ -55,7 +55,7 @@ impl Laps {
     }
 }
 
-impl Timer for Laps {
+impl StageTimer for Laps {
     fn lap(&mut self, stage: &'static str) {
         let milliseconds = self.elapsed();
         self.add(stage, milliseconds);

@@ -13,7 +13,7 @@
 
 use std::path::{Path, PathBuf};
 
-use raywake_core::output::Flows;
+use raywake_core::output::PairFlows;
 use raywake_core::output::{PointFlow, TrackletState};
 use raywake_core::params::Profile;
 
@@ -90,7 +90,7 @@ impl Outputs {
     }
 
     /// Writes what a pair of sweeps yields for its first sweep.
-    pub fn pair(&mut self, first: &SweepData, flows: &Flows) -> Result<(), Error> {
+    pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
         let Some(folders) = &self.folders else { return Ok(()) };
         let meta = meta(first, flows.dt_s);
         if let Some(folder) = &folders.columns {

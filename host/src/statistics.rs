@@ -5,7 +5,7 @@ use std::fmt;
 use raywake_core::continuity::Reset;
 use raywake_core::digest::Digest;
 use raywake_core::dropped::DroppedReturns;
-use raywake_core::output::Flows;
+use raywake_core::output::PairFlows;
 use raywake_core::output::TrackletState;
 use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
@@ -162,7 +162,7 @@ impl Statistics {
         }
     }
 
-    fn pair(&mut self, flows: &Flows, foreground: usize) {
+    fn pair(&mut self, flows: &PairFlows, foreground: usize) {
         self.pairs += 1;
         self.solid += flows.columns.len() as u64;
         self.foreground += foreground as u64;

@@ -13,9 +13,9 @@ use raywake_alloc_guard::watch;
 pub const THREADS_MAX: usize = 4;
 
 /// Whoever belongs to the thread that asks.
-pub struct Team;
+pub struct ThreadTeam;
 
-impl raywake_core::team::Team for Team {
+impl raywake_core::team::Team for ThreadTeam {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         if threads() > 1 {
             rayon_core::join(a, b);

@@ -1,7 +1,7 @@
 //! What stands in front of a kernel: constants, records and bindings as `raywake-core` declares them.
 
 use raywake_core::record::SweepUniform;
-use raywake_core::stages::{Argument, CONSTANTS, Row, View};
+use raywake_core::stages::{Argument, BufferRow, CONSTANTS, View};
 use std::fmt::Write;
 
 /// Constants and the uniform record, in front of every kernel.
@@ -34,7 +34,7 @@ pub fn bindings(arguments: &[Argument]) -> String {
     text
 }
 
-fn is_uniform(row: &Row) -> bool {
+fn is_uniform(row: &BufferRow) -> bool {
     row.wgsl == "SweepUniform"
 }
 

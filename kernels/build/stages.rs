@@ -1,6 +1,6 @@
 //! What the table of stages says of a file of kernels.
 
-use raywake_core::stages::{Argument, FLOW_PROGRAMS, MAP_PROGRAMS, Op, Runner, walk};
+use raywake_core::stages::{Argument, FLOW_PROGRAMS, MAP_PROGRAMS, Runner, StageOp, walk};
 
 /// An entry point and its arguments, in the order of their bindings.
 #[derive(Clone)]
@@ -15,7 +15,7 @@ pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     for program in FLOW_PROGRAMS.iter().chain(MAP_PROGRAMS) {
         walk(program.ops, Runner::Device, 1, &mut |op| {
-            let Op::Run(stage) = op else { return };
+            let StageOp::Run(stage) = op else { return };
             let arguments: Vec<Argument> = stage.bindings().collect();
             for (name, _) in stage.kernels {
                 match all.iter().find(|e| e.name == *name) {

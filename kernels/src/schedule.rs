@@ -3,7 +3,7 @@
 
 use raywake_core::params::{Profile, TILE};
 use raywake_core::stages::{
-    self, Buffer, GROUPS_DISTINCT, GROUPS_FOREGROUND, GROUPS_ROWS, Groups, List, Runner, Stage,
+    self, Buffer, GROUPS_DISTINCT, GROUPS_FOREGROUND, GROUPS_ROWS, GroupCount, List, Runner, Stage,
     needed, walk,
 };
 use raywake_gpu::{self as gpu, Heap, Kernel};
@@ -13,21 +13,21 @@ use crate::kernel::KERNELS;
 /// Some programs and the memory that they share on a device.
 pub struct Schedule {
     /// Everything that is allocated.
-    pub rows: Vec<Row>,
+    pub rows: Vec<MemoryRow>,
     /// The programs, in the order given, by rows.
     pub programs: Vec<gpu::Program>,
 }
 
 /// A buffer on the device, or the mapped one through which it crosses.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct MemoryRow {
     /// What it holds.
     pub buffer: Buffer,
     /// Who touches it.
     pub heap: Heap,
 }
 
-impl Row {
+impl MemoryRow {
     /// Its name.
     pub fn name(&self) -> &'static str {
         let row = self.buffer.row();
@@ -41,14 +41,14 @@ impl Row {
 
 impl Schedule {
     /// For a profile's sizes.
-    pub fn new(programs: &[stages::Program], profile: &Profile) -> Schedule {
+    pub fn new(programs: &[stages::StageProgram], profile: &Profile) -> Schedule {
         let mut rows = Vec::new();
         for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
             let wanted = Buffer::ALL.iter().filter(|b| match heap {
                 Heap::Device => needed(programs, Runner::Device, **b),
                 _ => crosses(programs, **b, heap),
             });
-            rows.extend(wanted.map(|&buffer| Row { buffer, heap }));
+            rows.extend(wanted.map(|&buffer| MemoryRow { buffer, heap }));
         }
         let mut schedule = Schedule { rows, programs: Vec::new() };
         schedule.programs = programs.iter().map(|p| schedule.program(p, profile)).collect();
@@ -57,7 +57,7 @@ impl Schedule {
 
     /// The table as the executor takes it.
     pub fn buffers(&self, profile: &Profile) -> Vec<gpu::Buffer> {
-        let of = |row: &Row| gpu::Buffer {
+        let of = |row: &MemoryRow| gpu::Buffer {
             name: row.name(),
             heap: row.heap,
             bytes: row.buffer.row().bytes(profile) as u64,
@@ -71,20 +71,20 @@ impl Schedule {
         found.unwrap_or_else(|| panic!("`{}` is in no {heap:?} row", buffer.row().name))
     }
 
-    fn program(&self, program: &stages::Program, profile: &Profile) -> gpu::Program {
+    fn program(&self, program: &stages::StageProgram, profile: &Profile) -> gpu::Program {
         let mut ops = Vec::new();
         let row = |heap, buffer| self.index(heap, buffer);
         walk(program.ops, Runner::Device, profile.em_rounds, &mut |op| match op {
-            stages::Op::Upload(b) => {
+            stages::StageOp::Upload(b) => {
                 ops.push(gpu::Op::Copy { from: row(Heap::Upload, b), to: row(Heap::Device, b) })
             }
-            stages::Op::ReadBack(b) => {
+            stages::StageOp::ReadBack(b) => {
                 ops.push(gpu::Op::Copy { from: row(Heap::Device, b), to: row(Heap::Readback, b) })
             }
-            stages::Op::Fill(b, value) => {
+            stages::StageOp::Fill(b, value) => {
                 ops.push(gpu::Op::Fill { buffer: row(Heap::Device, b), value });
             }
-            stages::Op::Run(stage) => ops.extend(self.dispatches(stage, profile)),
+            stages::StageOp::Run(stage) => ops.extend(self.dispatches(stage, profile)),
             other => unreachable!("{other:?} is a list of others"),
         });
         gpu::Program { name: program.name, ops }
@@ -93,7 +93,7 @@ impl Schedule {
     fn dispatches(&self, stage: &'static Stage, profile: &Profile) -> Vec<gpu::Op> {
         let buffers: Vec<usize> =
             stage.bindings().map(|a| self.index(Heap::Device, a.buffer)).collect();
-        let dispatch = |(entry, groups): &(&'static str, Groups)| {
+        let dispatch = |(entry, groups): &(&'static str, GroupCount)| {
             let kernel = kernel(entry);
             gpu::Op::Dispatch {
                 name: stage.name,
@@ -105,19 +105,21 @@ impl Schedule {
         stage.kernels.iter().map(dispatch).collect()
     }
 
-    fn groups(&self, groups: Groups, kernel: &Kernel, profile: &Profile) -> gpu::Groups {
+    fn groups(&self, groups: GroupCount, kernel: &Kernel, profile: &Profile) -> gpu::Groups {
         let fixed = |count: usize| gpu::Groups::Fixed([count as u32, 1, 1]);
         let indirect = |word: usize| gpu::Groups::Indirect {
             buffer: self.index(Heap::Device, Buffer::counters),
             offset_bytes: 4 * word as u64,
         };
         match groups {
-            Groups::One => fixed(1),
-            Groups::Threads(count) => fixed(count(profile).div_ceil(kernel.workgroup[0] as usize)),
-            Groups::Tiles(count) => fixed(count(profile).div_ceil(TILE)),
-            Groups::ThreadPer(List::Distinct) => indirect(GROUPS_DISTINCT),
-            Groups::ThreadPer(List::Foreground) => indirect(GROUPS_FOREGROUND),
-            Groups::GroupPer(_) => indirect(GROUPS_ROWS),
+            GroupCount::One => fixed(1),
+            GroupCount::Threads(count) => {
+                fixed(count(profile).div_ceil(kernel.workgroup[0] as usize))
+            }
+            GroupCount::Tiles(count) => fixed(count(profile).div_ceil(TILE)),
+            GroupCount::ThreadPer(List::Distinct) => indirect(GROUPS_DISTINCT),
+            GroupCount::ThreadPer(List::Foreground) => indirect(GROUPS_FOREGROUND),
+            GroupCount::GroupPer(_) => indirect(GROUPS_ROWS),
         }
     }
 }
@@ -128,13 +130,13 @@ pub fn kernel(entry: &str) -> &'static Kernel {
     found.unwrap_or_else(|| panic!("no kernel `{entry}`"))
 }
 
-fn crosses(programs: &[stages::Program], buffer: Buffer, heap: Heap) -> bool {
+fn crosses(programs: &[stages::StageProgram], buffer: Buffer, heap: Heap) -> bool {
     let mut found = false;
     for program in programs {
         walk(program.ops, Runner::Device, 1, &mut |op| {
             found |= match op {
-                stages::Op::Upload(b) => heap == Heap::Upload && b == buffer,
-                stages::Op::ReadBack(b) => heap == Heap::Readback && b == buffer,
+                stages::StageOp::Upload(b) => heap == Heap::Upload && b == buffer,
+                stages::StageOp::ReadBack(b) => heap == Heap::Readback && b == buffer,
                 _ => false,
             }
         });

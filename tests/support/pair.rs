@@ -3,7 +3,7 @@
 use raywake::backend::{Backend, Tables};
 use raywake_core::output::{ColumnFlow, Output, PointFlow, TrackletState};
 use raywake_core::params::POINTS_MAX;
-use raywake_core::perceive::{Machine, Perceive, Perceived, Timer};
+use raywake_core::perceive::{Machine, Perceive, Perceived, StageTimer};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::record::{Ray, SweepUniform};
@@ -38,7 +38,7 @@ impl Perceive for Witness<'_> {
         &mut self,
         sweep: &SweepUniform,
         team: &impl Team,
-        timer: &mut (impl Timer + Send),
+        timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         let (rays, origins) = self.backend.input();

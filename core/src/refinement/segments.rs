@@ -1,16 +1,16 @@
 //! Segmentation: columns of the first sweep that touch and may move together are one cluster.
 
 use super::scans::Scans;
-use crate::groups::Groups;
+use crate::groups::DisjointSets;
 use crate::params::COLUMNS_MAX;
 use crate::record::{Flow, VALID, flow_displacement};
 
 /// Connected components of columns.
-pub struct Segments(Groups<COLUMNS_MAX>);
+pub struct Segments(DisjointSets<COLUMNS_MAX>);
 
 impl Segments {
     pub(super) const fn new() -> Segments {
-        Segments(Groups::new())
+        Segments(DisjointSets::new())
     }
 
     /// Finds the segments of those columns of the first sweep that may be `part` of any. `flow`

@@ -29,7 +29,7 @@ macro_rules! argument {
 }
 
 /// An element of a buffer: as the twins see it, and as the kernels do.
-pub trait Element: Copy {
+pub trait BufferElement: Copy {
     /// Type of an array element in a kernel. Two 16-bit elements share a `u32`.
     const WGSL: &'static str;
     /// The element whose words are all `word`.
@@ -38,7 +38,7 @@ pub trait Element: Copy {
 
 macro_rules! elements {
     ($($rust:ty, $wgsl:literal, |$word:ident| $splat:expr;)*) => { $(
-        impl Element for $rust {
+        impl BufferElement for $rust {
             const WGSL: &'static str = $wgsl;
             fn splat($word: u32) -> $rust {
                 $splat
@@ -57,7 +57,7 @@ elements! {
 
 /// One row of the table of buffers.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct BufferRow {
     /// Name, the same in the kernels and of the twins' arguments.
     pub name: &'static str,
     /// Type of an element of the twins.
@@ -76,7 +76,7 @@ pub struct Row {
     pub doc: &'static str,
 }
 
-impl Row {
+impl BufferRow {
     /// Bytes for a profile.
     pub fn bytes(&self, profile: &Profile) -> usize {
         self.element_bytes * (self.count)(profile)
@@ -122,7 +122,7 @@ pub enum List {
 
 /// Workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
-pub enum Groups {
+pub enum GroupCount {
     /// One.
     One,
     /// A thread per item.
@@ -141,7 +141,7 @@ pub struct Stage {
     /// Name, in every table of times too.
     pub name: &'static str,
     /// Entry points in order, all with the stage's arguments.
-    pub kernels: &'static [(&'static str, Groups)],
+    pub kernels: &'static [(&'static str, GroupCount)],
     /// Arguments of the twin.
     pub arguments: &'static [Argument],
     /// What the scalar backend runs.
@@ -152,7 +152,7 @@ impl Stage {
     /// What the kernels bind, in order: the arguments, and `counters` behind a list where threads
     /// have to know its length.
     pub fn bindings(&self) -> impl Iterator<Item = Argument> {
-        let by_group = |(_, groups): &(_, Groups)| matches!(groups, Groups::GroupPer(_));
+        let by_group = |(_, groups): &(_, GroupCount)| matches!(groups, GroupCount::GroupPer(_));
         let counted = !self.kernels.iter().all(by_group);
         let of =
             move |a: &Argument| [Some(*a), (a.is_list && counted).then_some(argument!(counters))];
@@ -162,7 +162,7 @@ impl Stage {
 
 /// A step of a program.
 #[derive(Clone, Copy, Debug)]
-pub enum Op {
+pub enum StageOp {
     /// The host's words go to the device.
     Upload(Buffer),
     /// Every word of a buffer is set.
@@ -170,24 +170,24 @@ pub enum Op {
     /// A stage.
     Run(&'static Stage),
     /// One stage of the scalar backend that is several steps on a device.
-    Fused(&'static Stage, &'static [Op]),
+    Fused(&'static Stage, &'static [StageOp]),
     /// Steps that are a list of their own.
-    Part(&'static [Op]),
+    Part(&'static [StageOp]),
     /// As often as there are rounds of the energy minimisation.
-    Rounds(&'static [Op]),
+    Rounds(&'static [StageOp]),
     /// A fixed number of times.
-    Repeat(u32, &'static [Op]),
+    Repeat(u32, &'static [StageOp]),
     /// The device's words go to the host.
     ReadBack(Buffer),
 }
 
 /// Steps that run as a whole.
 #[derive(Clone, Copy, Debug)]
-pub struct Program {
+pub struct StageProgram {
     /// For messages and documents.
     pub name: &'static str,
     /// The steps, in order.
-    pub ops: &'static [Op],
+    pub ops: &'static [StageOp],
 }
 
 /// Who runs a program.
@@ -200,16 +200,16 @@ pub enum Runner {
 }
 
 /// Calls `each` with every upload, fill, stage and readback in the order they run.
-pub fn walk(ops: &[Op], runner: Runner, rounds: u32, each: &mut dyn FnMut(Op)) {
+pub fn walk(ops: &[StageOp], runner: Runner, rounds: u32, each: &mut dyn FnMut(StageOp)) {
     for op in ops {
         let (times, inner) = match *op {
-            Op::Fused(stage, _) if runner == Runner::Scalar => {
-                each(Op::Run(stage));
+            StageOp::Fused(stage, _) if runner == Runner::Scalar => {
+                each(StageOp::Run(stage));
                 continue;
             }
-            Op::Fused(_, inner) | Op::Part(inner) => (1, inner),
-            Op::Rounds(inner) => (rounds, inner),
-            Op::Repeat(times, inner) => (times, inner),
+            StageOp::Fused(_, inner) | StageOp::Part(inner) => (1, inner),
+            StageOp::Rounds(inner) => (rounds, inner),
+            StageOp::Repeat(times, inner) => (times, inner),
             leaf => {
                 each(leaf);
                 continue;
@@ -220,10 +220,10 @@ pub fn walk(ops: &[Op], runner: Runner, rounds: u32, each: &mut dyn FnMut(Op)) {
 }
 
 /// Runs steps on the CPU. `lap` is called with the name of each stage when it is done.
-pub fn run(ops: &[Op], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&'static str)) {
+pub fn run(ops: &[StageOp], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&'static str)) {
     walk(ops, Runner::Scalar, rounds, &mut |op| match op {
-        Op::Fill(buffer, word) => storage.fill(buffer, word),
-        Op::Run(stage) => {
+        StageOp::Fill(buffer, word) => storage.fill(buffer, word),
+        StageOp::Run(stage) => {
             (stage.scalar)(storage);
             lap(stage.name);
         }
@@ -232,19 +232,19 @@ pub fn run(ops: &[Op], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&
     });
 }
 
-impl Op {
+impl StageOp {
     /// Whether this step, which [`walk`] has come to, touches a buffer.
     pub fn touches(&self, buffer: Buffer) -> bool {
         match *self {
-            Op::Upload(b) | Op::ReadBack(b) | Op::Fill(b, _) => b == buffer,
-            Op::Run(stage) => stage.bindings().any(|a| a.buffer == buffer),
+            StageOp::Upload(b) | StageOp::ReadBack(b) | StageOp::Fill(b, _) => b == buffer,
+            StageOp::Run(stage) => stage.bindings().any(|a| a.buffer == buffer),
             _ => false,
         }
     }
 }
 
 /// Whether some of the programs need a buffer.
-pub fn needed(programs: &[Program], runner: Runner, buffer: Buffer) -> bool {
+pub fn needed(programs: &[StageProgram], runner: Runner, buffer: Buffer) -> bool {
     let mut found = false;
     for program in programs {
         walk(program.ops, runner, 1, &mut |op| found |= op.touches(buffer));
@@ -272,14 +272,14 @@ macro_rules! buffers {
             pub const ALL: &[Buffer] = &[Buffer::$uniform, $( Buffer::$name ),*];
 
             /// The row of this buffer.
-            pub fn row(self) -> &'static Row {
+            pub fn row(self) -> &'static BufferRow {
                 &BUFFERS[self as usize]
             }
         }
 
         /// The table of buffers, in the order of [`Buffer`].
-        pub const BUFFERS: &[Row] = &[
-            Row {
+        pub const BUFFERS: &[BufferRow] = &[
+            BufferRow {
                 name: stringify!($uniform),
                 element: stringify!($record),
                 wgsl: stringify!($record),
@@ -289,10 +289,10 @@ macro_rules! buffers {
                 readback: concat!(stringify!($uniform), "_out"),
                 doc: $uniform_doc,
             },
-            $( Row {
+            $( BufferRow {
                 name: stringify!($name),
                 element: stringify!($element),
-                wgsl: <$element as Element>::WGSL,
+                wgsl: <$element as BufferElement>::WGSL,
                 element_bytes: size_of::<$element>(),
                 count: $count,
                 upload: concat!(stringify!($name), "_in"),
@@ -313,7 +313,7 @@ macro_rules! buffers {
             /// programs do not need are empty.
             pub fn over(
                 words: &'a mut [u32],
-                programs: &[Program],
+                programs: &[StageProgram],
                 profile: &Profile,
             ) -> Storage<'a> {
                 assert!(words.len() == Storage::words(programs, profile));
@@ -334,7 +334,7 @@ macro_rules! buffers {
             pub fn fill(&mut self, buffer: Buffer, word: u32) {
                 match buffer {
                     Buffer::$uniform => {}
-                    $( Buffer::$name => self.$name.fill(<$element as Element>::splat(word)) ),*
+                    $( Buffer::$name => self.$name.fill(<$element as BufferElement>::splat(word)) ),*
                 }
             }
         }
@@ -343,13 +343,13 @@ macro_rules! buffers {
 
 impl Storage<'_> {
     /// 32-bit words that the buffers of some programs take.
-    pub fn words(programs: &[Program], profile: &Profile) -> usize {
+    pub fn words(programs: &[StageProgram], profile: &Profile) -> usize {
         Buffer::ALL.iter().map(|b| words_of(*b, programs, profile)).sum()
     }
 }
 
 /// Words of a buffer in the scalar backend's storage; the uniform is a field of its own.
-pub(super) fn words_of(buffer: Buffer, programs: &[Program], profile: &Profile) -> usize {
+pub(super) fn words_of(buffer: Buffer, programs: &[StageProgram], profile: &Profile) -> usize {
     let stored = buffer != Buffer::sweep && needed(programs, Runner::Scalar, buffer);
     if stored { buffer.row().bytes(profile).div_ceil(4) } else { 0 }
 }

@@ -1,7 +1,7 @@
 //! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
 
 use raywake_core::params::Profile;
-use raywake_core::perceive::{Outputs, Perceive, Perceived, Timer};
+use raywake_core::perceive::{Perceive, Perceived, PerceptionBuffers, StageTimer};
 use raywake_core::prepare::uniform_of;
 use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
@@ -75,13 +75,13 @@ impl Perceive for Device {
         &mut self,
         sweep: &SweepUniform,
         _: &impl Team,
-        timer: &mut (impl Timer + Send),
+        timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep)));
         self.executor.run_beside(FLOW, meanwhile)?;
         timer.measured(&mut self.executor.times(FLOW), "submit and wait");
-        Ok(Outputs {
+        Ok(PerceptionBuffers {
             counters: self.readback(Buffer::counters),
             columns_before: bytemuck::cast_slice(self.readback(Buffer::columns_before)),
             columns_now: bytemuck::cast_slice(self.readback(Buffer::columns_now)),

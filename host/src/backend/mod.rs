@@ -3,7 +3,7 @@
 pub mod device;
 
 use raywake_core::params::Profile;
-use raywake_core::perceive::{self, Perceive, Perceived, Timer};
+use raywake_core::perceive::{self, Perceive, Perceived, StageTimer};
 use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::background_filter::{self, TABLE_WORDS};
 use raywake_core::stages::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
@@ -84,7 +84,7 @@ impl Tables {
 }
 
 /// The twins over memory of the heap.
-pub type Scalar = perceive::Scalar<Vec<u32>>;
+pub type Scalar = perceive::ScalarBackend<Vec<u32>>;
 
 /// Either backend.
 pub enum Backend {
@@ -108,7 +108,7 @@ impl Perceive for Backend {
         &mut self,
         sweep: &SweepUniform,
         team: &impl Team,
-        timer: &mut (impl Timer + Send),
+        timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
         match self {
@@ -124,7 +124,7 @@ impl Backend {
     /// The scalar backend for a profile.
     pub fn scalar(profile: &Profile, tables: &Tables) -> Backend {
         let words = vec![0; Scalar::words(profile)];
-        let tables = perceive::Tables {
+        let tables = perceive::LearnedTables {
             filter_table: &tables.filter,
             constancy_weights: &tables.constancy,
             constancy_costs: &tables.costs,

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use raywake_core::params::{Profile, REACH};
 use raywake_core::record::{PACKED, SweepUniform};
-use raywake_core::stages::Row;
+use raywake_core::stages::BufferRow;
 use raywake_gpu::{Buffer, Heap};
 use raywake_kernels::schedule::Schedule;
 
@@ -197,7 +197,7 @@ fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result
 }
 
 /// `27,889 x 8 = 223,112`.
-fn amount(row: &Row, profile: &Profile) -> String {
+fn amount(row: &BufferRow, profile: &Profile) -> String {
     let [count, of] = [(row.count)(profile), row.element_bytes].map(|n| grouped(n as u64));
     format!("{count} x {of} = {}", grouped(row.bytes(profile) as u64))
 }

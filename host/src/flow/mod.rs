@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use raywake_core::output::{Origin, PointFlow};
 use raywake_core::params::{ANCHOR_ABOVE_GROUND_M, Profile};
-use raywake_core::perceive::Timer;
+use raywake_core::perceive::StageTimer;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 

@@ -18,7 +18,7 @@ use super::Ground;
 use crate::config::Settings;
 use crate::drive::Drive;
 use crate::error::RunError;
-use crate::team::{THREADS_MAX, Team};
+use crate::team::{THREADS_MAX, ThreadTeam};
 use raywake_io::source::SweepData;
 
 /// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
@@ -66,7 +66,7 @@ fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slot
         (solvers, slots) => {
             let half = slots.len() / 2;
             let ((a, b), (c, d)) = (solvers.split_at_mut(half), slots.split_at(half));
-            Team.join(|| solve(params, a, tracks, c), || solve(params, b, tracks, d));
+            ThreadTeam.join(|| solve(params, a, tracks, c), || solve(params, b, tracks, d));
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::batch::{Batch, BatchReturn};
 use super::chunks::{CHUNKS_MAX, Chunks, ReturnSums};
 use super::{FrontEndParams, SEGMENTS_MAX, TrackingCounts};
-use raywake_core::groups::Groups;
+use raywake_core::groups::DisjointSets;
 use raywake_core::params::POINTS_MAX;
 use raywake_core::record::NONE;
 
@@ -48,7 +48,7 @@ pub(super) struct Segments {
     chunks: Chunks,
     /// Chunk of every return, or [`NONE`].
     of_return: [u32; POINTS_MAX],
-    groups: Groups<CHUNKS_MAX>,
+    groups: DisjointSets<CHUNKS_MAX>,
     all: heapless::Vec<Segment, SEGMENTS_MAX>,
     /// Segment of every chunk, or [`NONE`].
     of_chunk: [u32; CHUNKS_MAX],
@@ -59,7 +59,7 @@ impl Segments {
         Segments {
             chunks: Chunks::new(),
             of_return: [0; POINTS_MAX],
-            groups: Groups::new(),
+            groups: DisjointSets::new(),
             all: heapless::Vec::new(),
             of_chunk: [0; CHUNKS_MAX],
         }
