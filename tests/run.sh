@@ -13,7 +13,8 @@ as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 missing_packages() {
     local package
     for package in "$@"; do
-        dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q ' installed' || echo "$package"
+        dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q ' installed' ||
+            echo "$package"
     done
 }
 
@@ -49,7 +50,8 @@ RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
 
 say "core without an operating system"
 if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
-    cargo check --quiet -p raywake-core -p raywake-objects -p raywake-registration --target thumbv7em-none-eabihf
+    cargo check --quiet --target thumbv7em-none-eabihf \
+        -p raywake-core -p raywake-objects -p raywake-registration
     echo "checks for thumbv7em-none-eabihf"
 else
     echo "skipped: the target thumbv7em-none-eabihf cannot be installed"
@@ -82,7 +84,10 @@ export RAYWAKE_DIGEST_OF=${RAYWAKE_DIGEST_OF%:}
 
 say "tests"
 unable=()
-browser >/dev/null || { echo "skipped: reports in a browser, there is none"; unable=(--skip a_browser); }
+browser >/dev/null || {
+    echo "skipped: reports in a browser, there is none"
+    unable=(--skip a_browser)
+}
 if [ -n "${RAYWAKE_DATA:-}" ]; then
     cargo test --workspace --quiet -- --include-ignored "${unable[@]}"
 else

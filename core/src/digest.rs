@@ -47,8 +47,8 @@ impl Digest {
         (v + 0.0).to_bits().to_le_bytes().into_iter().for_each(|b| self.byte(b));
     }
 
-    /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over ground, velocity
-    /// relative to the vehicle, covariance, age.
+    /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over
+    /// ground, velocity relative to the vehicle, covariance, age.
     pub fn column(&mut self, c: &ColumnFlow) {
         c.cell.iter().for_each(|v| self.word(*v as u32));
         self.word(c.origin as u32);

@@ -54,8 +54,8 @@ impl Bands {
     }
 }
 
-/// Maps the sweep in `storage` on the CPU: `put` receives the voxels of each band, in ascending order
-/// of keys.
+/// Maps the sweep in `storage` on the CPU: `put` receives the voxels of each band, in ascending
+/// order of keys.
 pub fn map(storage: &mut Storage, bands: &mut Bands, mut put: impl FnMut(&[Update])) {
     let quiet = &mut |_| ();
     run(MAP_RAYS, storage, 0, quiet);

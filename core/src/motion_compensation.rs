@@ -80,7 +80,8 @@ mod tests {
         assert!((seen[0] + 7.5).abs() < 1e-6 && (seen[1] + 10.0).abs() < 1e-6);
         let back = ego.world_from_ego(at, [seen[0], seen[1]]);
         assert!(back[0].abs() < 1e-5 && back[1].abs() < 1e-5);
-        // Driving north at 10 m/s beside us: along +y of the world, still in our frame but for the turn.
+        // Driving north at 10 m/s beside us: along +y of the world, still in our frame but for the
+        // turn.
         let seen = ego.ego_from_world(DVec3::ZERO, [0.0, 10.0]);
         assert!(seen.iter().all(|v| v.abs() < 1e-5));
         let turned = ego.turn_covariance([4.0, 0.0, 1.0]);

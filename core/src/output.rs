@@ -21,8 +21,8 @@ pub struct PairFlows<'a> {
     pub turnover: TrackletTurnover,
     /// Matched columns.
     pub valid: usize,
-    /// Solid columns beyond the capacity for foreground, which count as background, and those beyond
-    /// as many that moved, which count as unmatched.
+    /// Solid columns beyond the capacity for foreground, which count as background, and those
+    /// beyond as many that moved, which count as unmatched.
     pub foreground_dropped: usize,
 }
 
@@ -90,7 +90,8 @@ pub struct ColumnFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 2],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor joined.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor
+    /// joined.
     pub covariance: [f32; 3],
     /// Observations of the tracklet after its birth (section 3.6.2).
     pub age: u32,
@@ -105,7 +106,8 @@ pub struct PointFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 3],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor joined.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor
+    /// joined.
     pub covariance: [f32; 3],
     /// Age of the column's tracklet.
     pub age: u32,

@@ -62,7 +62,8 @@ impl<'a> From<PerceptionBuffers<'a>> for Perceived<'a> {
 pub trait StageTimer {
     /// Books the time since the last stage ended to `stage`.
     fn lap(&mut self, stage: &'static str);
-    /// Books time measured elsewhere, and to `rest` what else has passed since the last stage ended.
+    /// Books time measured elsewhere, and to `rest` what else has passed since the last stage
+    /// ended.
     fn measured(
         &mut self,
         stages: &mut dyn Iterator<Item = (&'static str, f64)>,

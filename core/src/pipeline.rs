@@ -3,8 +3,8 @@
 //! ```text
 //! sweep -> rays -> perceive -> refine -> track -> out -> velocities of columns and returns
 //! ```
-//! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on the
-//! CPU or on a device, with the same result.
+//! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on
+//! the CPU or on a device, with the same result.
 
 use crate::frame::{Sides, SweepPair};
 use crate::output::{Output, SweepOutput, TrackletState};
@@ -21,7 +21,8 @@ use crate::tracklet::state::state_of;
 use crate::tracklet::{TrackletTurnover, Tracklets};
 use crate::velocities::{FlowOfColumn, Found};
 
-/// The state between sweeps. Plain and large (see `memory-layout.md`): keep it in a static or a box.
+/// The state between sweeps. Plain and large (see `memory-layout.md`): keep it in a static or a
+/// box.
 pub struct Pipeline {
     sides: Sides,
     returns: Returns,

@@ -36,17 +36,19 @@ macro_rules! packed {
 
 packed! {
     /// `[i | j << 16, k | origin << 16 | no_end << 31]`: a ray, with `i, j, k` the signed 16-bit
-    /// voxel of its end counted from the window's corner, `origin` an index of the table of origins,
-    /// and `no_end` set where nothing is hit there.
+    /// voxel of its end counted from the window's corner, `origin` an index of the table of
+    /// origins, and `no_end` set where nothing is hit there.
     Ray = [u32; 2];
-    /// `[free | occupied << 16, solid]`: a column of voxels, one bit a level (3.4, 3.5, epsilon = 0).
+    /// `[free | occupied << 16, solid]`: a column of voxels, one bit a level (3.4, 3.5, epsilon =
+    /// 0).
     Column = [u32; 2];
-    /// `1 << 31 | (du + REACH) << 8 | dv + REACH`: the flow of a column, cells; 0 where there is none.
+    /// `1 << 31 | (du + REACH) << 8 | dv + REACH`: the flow of a column, cells; 0 where there is
+    /// none.
     Flow = u32;
     /// `[flow, energy]`: what a column proposes in a round; flow 0 where no target is feasible.
     Proposal = [u32; 2];
-    /// `[energy, place]`: the least energy of a column at any displacement, smoothing apart, and its
-    /// place in the column's row of costs.
+    /// `[energy, place]`: the least energy of a column at any displacement, smoothing apart, and
+    /// its place in the column's row of costs.
     MinCost = [u32; 2];
     /// `[key, log-odds as i32]`: an update, or a voxel of the sparse map.
     Update = [u32; 2];

@@ -175,9 +175,11 @@ pub const GRID: &[StageOp] = &[
     Fill(Buffer::slots, 0),
     Fill(Buffer::counters, 0),
     Fill(Buffer::log_odds, 0),
-    Run(
-        stage!(shift in grid::shift, (sweep, columns_now, mut columns_before), Threads(Profile::columns)),
-    ),
+    Run(stage!(
+        shift in grid::shift,
+        (sweep, columns_now, mut columns_before),
+        Threads(Profile::columns)
+    )),
     Run(RAY_MERGE),
     Run(PLAN),
     Run(stage!(
@@ -185,10 +187,15 @@ pub const GRID: &[StageOp] = &[
         (sweep, origins, rays, slots, list distinct, mut atomic log_odds),
         ThreadPer(Distinct)
     )),
-    Run(
-        stage!(columns in grid::columns, (sweep, log_odds, mut columns_now), Threads(Profile::columns)),
-    ),
+    Run(stage!(
+        columns in grid::columns,
+        (sweep, log_odds, mut columns_now),
+        Threads(Profile::columns)
+    )),
 ];
+
+/// A thread per foreground column.
+const PER_COLUMN: GroupCount = ThreadPer(Foreground);
 
 /// From the columns of two sweeps to flow.
 pub const FLOW: &[StageOp] = &[
@@ -233,7 +240,7 @@ pub const FLOW: &[StageOp] = &[
             maximisation in flow::maximisation,
             (sweep, list foreground, proposal, mut atomic target_energy, mut atomic target_index,
                 mut flow),
-            [claim: ThreadPer(Foreground), elect: ThreadPer(Foreground), settle: ThreadPer(Foreground)]
+            [claim: PER_COLUMN, elect: PER_COLUMN, settle: PER_COLUMN]
         )),
     ]),
     ReadBack(Buffer::counters),
@@ -317,11 +324,17 @@ pub const MAP_BAND: &[StageOp] = &[
         ],
     ),
     Fused(
-        stage!(reduce_by_key in map::reduce_by_key, (count_tiles, updates, mut voxels is scratch, mut run_tiles), []),
+        stage!(
+            reduce_by_key in map::reduce_by_key,
+            (count_tiles, updates, mut voxels is scratch, mut run_tiles),
+            []
+        ),
         &[
-            Run(
-                stage!(device mark_heads, (count_tiles, updates, mut heads), Threads(|_| BAND_UPDATES)),
-            ),
+            Run(stage!(
+                device mark_heads,
+                (count_tiles, updates, mut heads),
+                Threads(|_| BAND_UPDATES)
+            )),
             Run(prefix_sum!(heads, run_tiles, runs, |_| BAND_UPDATES)),
             Fill(Buffer::scratch, 0),
             Run(stage!(

@@ -169,7 +169,8 @@ impl Found<'_> {
         out
     }
 
-    /// Where the record is of a column of the window before; beyond all records where there is none.
+    /// Where the record is of a column of the window before; beyond all records where there is
+    /// none.
     #[inline]
     fn flow_at(&self, column: u32, index: &FlowOfColumn) -> usize {
         let side = self.sweep.side;

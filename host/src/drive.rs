@@ -70,8 +70,8 @@ impl Drive {
     /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
     ///
     /// # Errors
-    /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after which the
-    /// next sweep may be given.
+    /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after
+    /// which the next sweep may be given.
     pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, RunError> {
         self.parts.step(|Parts { setup, pipeline, backend, columns, points }| {
             let mut laps = Laps::start();

@@ -24,7 +24,8 @@ impl Constants {
         all
     }
 
-    /// The value of an expression of numbers, constants, `+ - * / %`, brackets, `i32()` and `u32()`.
+    /// The value of an expression of numbers, constants, `+ - * / %`, brackets, `i32()` and
+    /// `u32()`.
     pub fn value(&self, text: &str) -> Option<i64> {
         let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
         let text = text.replace("i32(", "(").replace("u32(", "(");

@@ -36,7 +36,8 @@ pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &
         fail(format!("{shared} bytes of workgroup memory, {SHARED_BYTES_MAX} allowed"));
     }
     // A barrier some invocations do not reach is undefined, and the compiler does not look. A break
-    // out of a loop that holds one is not seen here either: the bounds of those loops are constants.
+    // out of a loop that holds one is not seen here either: the bounds of those loops are
+    // constants.
     if has_conditional_barrier(&entry.function.body, false) {
         fail("a barrier under a condition, or behind an early return".into());
     }

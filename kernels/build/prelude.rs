@@ -1,4 +1,5 @@
-//! What stands in front of a kernel: constants, records and bindings as `raywake-core` declares them.
+//! What stands in front of a kernel: constants, records and bindings as `raywake-core` declares
+//! them.
 
 use raywake_core::record::SweepUniform;
 use raywake_core::stages::{Argument, BufferRow, CONSTANTS, View};

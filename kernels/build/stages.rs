@@ -9,8 +9,8 @@ pub struct Entry {
     pub arguments: Vec<Argument>,
 }
 
-/// Every entry point of every stage, once. Where a stage serves several buffers, the kernels see the
-/// same names and types of each.
+/// Every entry point of every stage, once. Where a stage serves several buffers, the kernels see
+/// the same names and types of each.
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     for program in FLOW_PROGRAMS.iter().chain(MAP_PROGRAMS) {

@@ -25,8 +25,8 @@ fn score(column: i32) -> i32 {
 var<workgroup> count: atomic<u32>;
 var<workgroup> solid: array<u32, TILE>;
 
-// Lists the solid ones of TILE columns, then scores them. The columns are from all over the window, so
-// that every workgroup has as many.
+// Lists the solid ones of TILE columns, then scores them. The columns are from all over the window,
+// so that every workgroup has as many.
 @compute @workgroup_size(ROW_WORKGROUP)
 fn background_filter(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -51,7 +51,8 @@ fn background_filter(
     workgroupBarrier();
     let listed = atomicLoad(&count);
     var n = lane;
-    // The exit comes last: software devices go through a loop once more behind one that comes first.
+    // The exit comes last: software devices go through a loop once more behind one that comes
+    // first.
     loop { // <= TILE / ROW_WORKGROUP
         if n < listed {
             let column = solid[n];

@@ -1,4 +1,5 @@
-// Lists the marked columns in order, from the prefix sum of the marks. Twin: core/src/stages/compact.rs
+// Lists the marked columns in order, from the prefix sum of the marks. Twin:
+// core/src/stages/compact.rs
 
 @compute @workgroup_size(WORKGROUP)
 fn compact(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -62,7 +62,7 @@ fn occupancy_constancy(
     let i = column / sweep.side;
     let j = column % sweep.side;
     let offset = constancy_weights.d[3u * LEVELS_MAX] - sweep.score_min;
-    for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= (ROW_WORDS + ROW_WORKGROUP - 1) / ROW_WORKGROUP
+    for (var word = lane; word < ROW_WORDS; word += ROW_WORKGROUP) { // <= ROW_WORDS / ROW_WORKGROUP + 1
         let low = target_at(i, j, 2u * word);
         let high = target_at(i, j, 2u * word + 1u);
         let free = (low & 0xffffu) | (high << 16u);

@@ -16,8 +16,8 @@ fn value_at(index: u32) -> u32 {
     return 0u;
 }
 
-// Exclusive prefix over the workgroup of one number per invocation: within spans, then of their sums.
-// Few barriers: software devices pay for each of them by the invocation.
+// Exclusive prefix over the workgroup of one number per invocation: within spans, then of their
+// sums. Few barriers: software devices pay for each of them by the invocation.
 fn scan_workgroup(lane: u32, mine: u32) -> u32 {
     partial[lane] = mine;
     workgroupBarrier();

@@ -36,7 +36,8 @@ fn walk(start: vec3<i32>, end: vec3<i32>, limit: i32) -> Walk {
     let extent = abs(end - start);
     let length = max(extent.x, max(extent.y, extent.z));
     let error = 2 * extent - length;
-    return Walk(start, min(length, limit), sign(end - start), 2 * length, 2 * extent, length, error);
+    let left = min(length, limit);
+    return Walk(start, left, sign(end - start), 2 * length, 2 * extent, length, error);
 }
 
 fn advance(w: Walk) -> Walk {

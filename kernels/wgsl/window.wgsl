@@ -24,7 +24,7 @@ fn window(
     for (var n = 0; n < 9; n += 1) {
         unknown += select(0u, COST_UNKNOWN, rows[n] == NONE);
     }
-    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= (ROW_QUADS + ROW_WORKGROUP - 1) / ROW_WORKGROUP
+    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= ROW_QUADS / ROW_WORKGROUP + 1
         // Eight costs at once: nine of at most COST_MAX never carry.
         var sum = vec4<u32>(unknown | (unknown << 16u));
         for (var n = 0; n < 9; n += 1) {

@@ -82,8 +82,8 @@ fn map(sweeps: &[SimSweep]) {
     table("sparse map, profile map, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
 }
 
-/// Objects that appear in one sweep, each as the given one; and how often it is tried: a sweep takes as
-/// long as its fastest try, as what else the machine does is none of ours.
+/// Objects that appear in one sweep, each as the given one; and how often it is tried: a sweep
+/// takes as long as its fastest try, as what else the machine does is none of ours.
 const OBJECTS: usize = 20;
 const TRIES: usize = 5;
 

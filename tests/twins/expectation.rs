@@ -24,7 +24,8 @@ struct Round {
 }
 
 impl Round {
-    /// The first round of some columns: no flow yet, nobody at any target, what they can pay unknown.
+    /// The first round of some columns: no flow yet, nobody at any target, what they can pay
+    /// unknown.
     fn first(step: SweepUniform, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
         let columns = (step.side * step.side) as usize;
         Round {
@@ -37,7 +38,8 @@ impl Round {
         }
     }
 
-    /// Both, compared. Keeps what they can pay at least, as later rounds need them, and returns the proposals.
+    /// Both, compared. Keeps what they can pay at least, as later rounds need them, and returns the
+    /// proposals.
     fn check(&mut self, case: &str) -> Vec<Proposal> {
         let count = self.foreground.len();
         let mut proposal = vec![[POISON; 2]; count];

@@ -46,8 +46,8 @@ pub fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
     }
 }
 
-/// Score of a column (3.6) times the scale of the weights: the bias and the weight of every free and
-/// every occupied voxel of the 5x5 columns around it. Columns outside the window are unknown.
+/// Score of a column (3.6) times the scale of the weights: the bias and the weight of every free
+/// and every occupied voxel of the 5x5 columns around it. Columns outside the window are unknown.
 pub fn score(sweep: &SweepUniform, filter_table: &[i32], columns: &[Column], column: usize) -> i32 {
     let mut sum = filter_table[FILTER_TABLE];
     each_of_patch(sweep, columns, column, |patch, masks| {

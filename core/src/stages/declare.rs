@@ -334,7 +334,7 @@ macro_rules! buffers {
             pub fn fill(&mut self, buffer: Buffer, word: u32) {
                 match buffer {
                     Buffer::$uniform => {}
-                    $( Buffer::$name => self.$name.fill(<$element as BufferElement>::splat(word)) ),*
+                    $( Buffer::$name => self.$name.fill(BufferElement::splat(word)) ),*
                 }
             }
         }
@@ -361,9 +361,6 @@ pub(super) fn words_of(buffer: Buffer, programs: &[StageProgram], profile: &Prof
 /// `scalar: FUNCTION` names what the scalar backend runs in the twin's place, `[ENTRY: GROUPS, ..]`
 /// the entry points where there are several.
 macro_rules! stage {
-    ($name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, [$($kernel:ident: $groups:expr),*]) => {
-        stage!(@ $name, $args, [$(($kernel, $groups)),*], $fast)
-    };
     ($name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr) => {
         stage!(@ $name, $args, [($name, $groups)], $fast)
     };

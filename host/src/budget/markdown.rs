@@ -19,8 +19,8 @@ const HEAD: &str = "\
 
 What `raywake run` holds from its first sweep to its last, in bytes; nothing is allocated between.
 What `raywake map` and `raywake track` hold is as fixed; it is under `Sparse map` and `Tracks`.
-`raywake budget` prints this file from the declarations the program allocates by, and a test compares
-the two.
+`raywake budget` prints this file from the declarations the program allocates by, and a test
+compares the two.
 
 A buffer is so many elements of so many bytes. Words are 32-bit, little-endian; an element is
 aligned to its own size. Each heap is one allocation of device memory; in it every buffer begins at
@@ -31,8 +31,8 @@ touch the buffer; `fill` sets every word, `copy` moves a whole buffer.
 
 /// Below the device's table of the flow pipeline; a test of [`traffic`] sees that it is so.
 const LIFETIME: &str = "
-The two largest tables, `pair_cost` and `window_cost`, are alive at the same time only in `window`, which
-reads the one and writes the other.
+The two largest tables, `pair_cost` and `window_cost`, are alive at the same time only in
+`window`, which reads the one and writes the other.
 ";
 
 const MAP_HEAD: &str = "
@@ -71,7 +71,8 @@ The states of tracks that have ended wait for their file, and are not counted.
 const RECORDS_HEAD: &str = "
 ## Records
 
-`sweep_in` and `sweep` hold one record `SweepUniform`, of the sweep or, in the sparse map, of the band.
+`sweep_in` and `sweep` hold one record `SweepUniform`, of the sweep or, in the sparse map, of the
+band.
 
 | word | byte | field | type |
 |--:|--:|---|---|

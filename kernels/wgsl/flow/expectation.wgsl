@@ -78,7 +78,17 @@ fn round_div(a: i32, n: i32) -> i32 {
 }
 
 // Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
-fn rings(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32, n: i32, s: vec2<i32>, squares: i32) -> Best {
+fn rings(
+    rank: u32,
+    column: i32,
+    i: i32,
+    j: i32,
+    outside: i32,
+    own: u32,
+    n: i32,
+    s: vec2<i32>,
+    squares: i32,
+) -> Best {
     var best = Best(I32_MAX, I32_MAX);
     let floor_energy = i32(min_cost.d[rank].x);
     let mean = vec2<i32>(round_div(s.x, n), round_div(s.y, n));

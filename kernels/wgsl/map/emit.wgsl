@@ -1,4 +1,5 @@
-// Counts, then writes, the updates of every distinct ray in a band. Twin: core/src/stages/map/emit.rs
+// Counts, then writes, the updates of every distinct ray in a band. Twin:
+// core/src/stages/map/emit.rs
 
 struct Merged { ray: vec2<u32>, weight: i32 }
 

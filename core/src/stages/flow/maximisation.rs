@@ -7,8 +7,8 @@
 use crate::record::{Flow, Proposal, SweepUniform, flow_displacement};
 
 /// Every target keeps its best claimant: `flow` of the winners becomes what they proposed, that of
-/// all other foreground columns 0. `target_energy` and `target_index`, one element per column of the
-/// window, must start as [`crate::record::NONE`] and become the winners' energies and indices.
+/// all other foreground columns 0. `target_energy` and `target_index`, one element per column of
+/// the window, must start as [`crate::record::NONE`] and become the winners' energies and indices.
 pub fn maximisation(
     sweep: &SweepUniform,
     foreground: &[u32],
