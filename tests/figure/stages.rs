@@ -3,11 +3,13 @@
 use raywake::backend::device::Device;
 use raywake::backend::{Backend, Tables};
 use raywake_core::params::Profile;
+use raywake_core::pipeline::Pipeline;
 use raywake_core::stages::background_filter;
 use raywake_gpu::Options;
 use raywake_tests::drives::{Setup, pairs, street};
 use raywake_tests::pair::Side;
 use raywake_tests::weights;
+use std::sync::Mutex;
 
 /// Both backends over the first sweeps of the street.
 fn check(profile: Profile, filter: Option<String>, sweeps: usize) {
@@ -86,5 +88,18 @@ fn a_window_of_other_sizes() {
     for (now, before) in pairs(&street()[..5]) {
         let [wanted, found] = sides.each_mut().map(|s| s.step(now, before));
         assert_eq!(found.difference(&wanted), None);
+    }
+}
+
+#[test]
+fn a_pipeline_may_be_a_static() {
+    static PIPELINE: Mutex<Pipeline> = Mutex::new(Pipeline::new());
+    let setup = Setup::new(Profile::hdl64(), some_filter());
+    let kept = PIPELINE.lock().expect("nobody else has it");
+    let mut fixed = Side::on(kept, &setup, &setup.tables(), setup.scalar());
+    let mut boxed = Side::new(&setup, setup.scalar());
+    for (now, before) in pairs(&street()[..3]) {
+        let wanted = boxed.step(now, before);
+        assert_eq!(fixed.step(now, before).difference(&wanted), None);
     }
 }

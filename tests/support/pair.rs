@@ -10,14 +10,15 @@ use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::team::{Alone, Team};
 use raywake_gpu::GpuError;
 use raywake_sim::SimSweep;
+use std::ops::DerefMut;
 
 use crate::difference;
 use crate::drives::{self, sweep};
 
 /// A backend with its pipeline, looked at stage by stage.
-pub struct Side {
+pub struct Side<P = Box<Pipeline>> {
     setup: Setup,
-    pipeline: Box<Pipeline>,
+    pipeline: P,
     backend: Backend,
 }
 
@@ -75,6 +76,14 @@ impl Side {
 
     /// At rest, with tables of one's own.
     pub fn with(setup: &drives::Setup, tables: &Tables, backend: Backend) -> Side {
+        let pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
+        Side::on(pipeline, setup, tables, backend)
+    }
+}
+
+impl<P: DerefMut<Target = Pipeline>> Side<P> {
+    /// On a pipeline at rest, wherever that is kept.
+    pub fn on(pipeline: P, setup: &drives::Setup, tables: &Tables, backend: Backend) -> Side<P> {
         let setup = Setup {
             profile: setup.profile.clone(),
             rig: setup.rig.clone(),
@@ -82,7 +91,7 @@ impl Side {
             unfiltered: tables.unfiltered,
             preparation: Preparation::new(),
         };
-        Side { setup, pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()), backend }
+        Side { setup, pipeline, backend }
     }
 
     /// One sweep; `before` is the sweep before it.
