@@ -46,7 +46,7 @@ impl Default for Panorama {
 impl Panorama {
     /// Nothing seen. 512 KB: keep it in a box.
     pub const fn new() -> Panorama {
-        Panorama { reach: [[NOTHING; RISES]; AZIMUTHS] }
+        Panorama { reach: [[[0.0; 2]; RISES]; AZIMUTHS] }
     }
 
     /// Finds which rays pass the returns that are `wanted` by their index, among all returns of

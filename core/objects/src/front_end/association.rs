@@ -23,7 +23,7 @@ impl Association {
         Association {
             assignment: Assignment::new(),
             live: heapless::Vec::new(),
-            slot_of_segment: [NONE; SEGMENTS_MAX],
+            slot_of_segment: [0; SEGMENTS_MAX],
             segments: 0,
         }
     }

@@ -66,7 +66,7 @@ pub struct FrontEnd {
     panorama: Panorama,
     /// Segments without a track.
     unassigned: heapless::Vec<u32, SEGMENTS_MAX>,
-    last_s: f64,
+    last_s: Option<f64>,
     next_id: u32,
 }
 
@@ -86,7 +86,7 @@ impl FrontEnd {
             association: Association::new(),
             panorama: Panorama::new(),
             unassigned: heapless::Vec::new(),
-            last_s: f64::NEG_INFINITY,
+            last_s: None,
             next_id: 0,
         }
     }
@@ -118,10 +118,10 @@ impl FrontEnd {
         let mut counts =
             TrackingCounts { dropped: self.batch.dropped, ..TrackingCounts::default() };
         if let Some(stamp_s) = self.batch.stamp_s {
-            if stamp_s <= self.last_s {
+            if self.last_s.is_some_and(|last_s| stamp_s <= last_s) {
                 counts.reset = end(tracks, |_| true);
             }
-            self.last_s = stamp_s;
+            self.last_s = Some(stamp_s);
             counts.ended = counts.reset + end(tracks, |t| stamp_s - t.last_s() > params.patience_s);
             let FrontEnd { batch, objects, segments, association, .. } = self;
             objects.find(params, batch, map);
@@ -205,10 +205,11 @@ impl FrontEnd {
 
     /// Hands the returns of every segment to its track.
     fn distribute(&self, tracks: &mut [Track]) {
+        let Some(stamp_s) = self.last_s else { return };
         for (n, one) in self.batch.returns.iter().enumerate() {
             let Some(segment) = self.segments.of_return(n) else { continue };
             if let Some(track) = tracks.get_mut(self.association.slot(segment) as usize) {
-                let time_s = self.last_s + one.time_s as f64;
+                let time_s = stamp_s + one.time_s as f64;
                 let world = |v: [f32; 3]| self.batch.in_world(v.map(f64::from));
                 track.keep(time_s, world(one.position), world(one.origin), one);
             }
