@@ -3,6 +3,27 @@
 #![deny(missing_docs)]
 //! Temporal scene flow from LIDAR (Ushani 2018, chapter 3 and appendix B) as scalar functions over
 //! caller-owned storage: no allocation, no operating system, no unsafe code.
+//!
+//! ```text
+//!  returns, pose       rays            grid             columns           foreground
+//! ┌───────────┐  ┌──────────────┐  ┌──────────┐  ┌─────────────────┐  ┌─────────────────┐
+//! │  prepare  ├─►│ merge, trace ├─►│ log-odds ├─►│ free / occupied ├─►│ learned filter  │
+//! └───────────┘  └──────────────┘  └──────────┘  └─────────────────┘  └────────┬────────┘
+//!                                                                              ▼
+//! ┌───────────┐  ┌──────────────┐  ┌──────────┐  ┌─────────────────┐  ┌─────────────────┐
+//! │ velocities│◄─┤ EKF tracklets│◄─┤  refine  │◄─┤ expectation-max.│◄─┤  constancy cost │
+//! └───────────┘  └──────────────┘  └──────────┘  └─────────────────┘  └─────────────────┘
+//! ```
+//! That is figure 3.1 of the dissertation; [`pipeline::Pipeline::step`] is it in code.
+//!
+//! - A sweep: [`sweep`] (returns, rig), [`return_clock`] (the time of a return), [`continuity`] (what
+//!   makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (where the window lies).
+//! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (who runs them),
+//!   [`record`] (what crosses to a device).
+//! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
+//! - The sparse map of appendix B: [`map`].
+//! - Around them: [`params`], [`weights`], [`team`] (threads), [`digest`], [`counters`], [`dropped`],
+//!   [`ground`], [`groups`], [`pose`], [`ctrv`].
 
 pub mod continuity;
 pub mod counters;

@@ -13,7 +13,7 @@ const HEAD: &str = "\
 Printed by `raywake budget --parameters`; a test compares it with this file. A parameter is set by
 `--set NAME=VALUE` or, in a file given with `--config`, by a key of this name, at the top or in a
 table called as its group. Defaults are those of profile `hdl64`, followed by the profiles that
-differ. Figures are described in the README.
+differ. Figures are described in RESULTS.md.
 ";
 
 const OBJECTS: &str = "
