@@ -30,7 +30,6 @@ pub mod grid {
     //! and lies at index `(i * side + j) * levels + k`; column `(i, j)` at `i * side + j`. `i` runs
     //! along +x, `j` along +y, `k` upwards.
     pub mod columns;
-    pub mod dilate;
     pub mod ray_merge;
     pub mod ray_trace;
     pub mod shift;
@@ -73,7 +72,6 @@ buffers! {
     columns_now: Column [Profile::columns] "columns of this sweep";
     columns_before: Column [Profile::columns] "columns of the sweep before, in this window";
     foreground_marks: u32 [Profile::columns] "1 where a column is foreground";
-    dilated_marks: u32 [Profile::columns] "1 where a column or one beside it is foreground";
     tiles: u32 [|_| TILE + 1] "sums of the tiles of the prefix sum, then of all";
     foreground_index: u32 [Profile::columns] "position of a column in the foreground";
     foreground: u32 [|_| FOREGROUND_MAX] "foreground columns, ascending";
@@ -206,11 +204,6 @@ pub const FLOW: &[StageOp] = &[
         (sweep, filter_table, columns_before, mut foreground_marks),
         scalar: background_filter::background_filter_by_bytes,
         Tiles(Profile::columns)
-    )),
-    Run(stage!(
-        dilate in grid::dilate,
-        (sweep, foreground_marks, mut dilated_marks),
-        Threads(Profile::columns)
     )),
     Run(prefix_sum!(foreground_marks, tiles, foreground_index, Profile::columns)),
     Run(stage!(

@@ -3,7 +3,6 @@
 #![forbid(unsafe_code)]
 
 mod constancy;
-mod dilate;
 mod emit;
 mod expectation;
 mod filter;
@@ -26,9 +25,8 @@ use std::collections::BTreeSet;
 const POISON: u32 = 0xdead_beef;
 
 /// The kernels these tests run.
-const COVERED: [&[&Kernel]; 12] = [
+const COVERED: [&[&Kernel]; 11] = [
     constancy::KERNELS,
-    dilate::KERNELS,
     emit::KERNELS,
     expectation::KERNELS,
     filter::KERNELS,
