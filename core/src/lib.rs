@@ -16,14 +16,15 @@
 //! ```
 //! That is figure 3.1 of the dissertation; [`pipeline::Pipeline::step`] is it in code.
 //!
-//! - A sweep: [`sweep`] (returns, rig), [`return_clock`] (the time of a return), [`continuity`] (what
-//!   makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (where the window lies).
+//! - A sweep: [`sweep`] (returns, rig), [`return_clock`] (the time of a return), [`continuity`]
+//!   (what makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (where the window
+//!   lies).
 //! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (who runs them),
 //!   [`record`] (what crosses to a device).
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
 //! - The sparse map of appendix B: [`map`].
-//! - Around them: [`params`], [`weights`], [`team`] (threads), [`digest`], [`counters`], [`dropped`],
-//!   [`ground`], [`groups`], [`pose`], [`ctrv`].
+//! - Around them: [`mod@params`], [`weights`], [`team`] (threads), [`digest`], [`mod@counters`],
+//!   [`dropped`], [`ground`], [`groups`], [`pose`], [`ctrv`].
 
 pub mod continuity;
 pub mod counters;

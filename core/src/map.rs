@@ -2,7 +2,7 @@
 //!
 //! Section B.2 to the letter, but for exact sizes and bounded memory: count the updates, make room
 //! by a prefix sum, emit them, sort by key, sum equal keys. The window spans the sensor's range;
-//! its voxels are keyed in the order of [`crate::grid`], and the key space is worked through in
+//! its voxels are keyed in the order of [`crate::stages::grid`], and the key space is worked through in
 //! bands of at most [`BAND_UPDATES`] updates. A voxel gets one update per distinct ray at most,
 //! so a band can always be made small enough. The map equals the dense window inside that, bit for
 //! bit.
