@@ -17,8 +17,7 @@
 //! That is figure 3.1 of the dissertation; [`pipeline::Pipeline::step`] is it in code.
 //!
 //! - A sweep: [`sweep`] (returns, rig), [`return_clock`] (the time of a return), [`continuity`]
-//!   (what makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (where the window
-//!   lies).
+//!   (what makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (the window).
 //! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (who runs them),
 //!   [`record`] (what crosses to a device).
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].

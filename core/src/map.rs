@@ -2,10 +2,10 @@
 //!
 //! Section B.2 to the letter, but for exact sizes and bounded memory: count the updates, make room
 //! by a prefix sum, emit them, sort by key, sum equal keys. The window spans the sensor's range;
-//! its voxels are keyed in the order of [`crate::stages::grid`], and the key space is worked through in
-//! bands of at most [`BAND_UPDATES`] updates. A voxel gets one update per distinct ray at most,
-//! so a band can always be made small enough. The map equals the dense window inside that, bit for
-//! bit.
+//! its voxels are keyed in the order of [`crate::stages::grid`], and the key space is worked
+//! through in bands of at most [`BAND_UPDATES`] updates. A voxel gets one update per distinct ray
+//! at most, so a band can always be made small enough. The map equals the dense window inside that,
+//! bit for bit.
 
 use crate::params::{BAND_UPDATES, POINTS_MAX, TILE};
 use crate::stages::{MAP_BAND, MAP_COUNT, MAP_RAYS, Storage, run};

@@ -1,7 +1,8 @@
 //! Limits on the code's sizes and shapes, and what still exceeds them.
 //!
 //! `limits.txt` lists every excess with its size. It only shrinks: a new or larger one fails, and
-//! so does one that has become smaller until the list says so. `UPDATE=1` writes the list.
+//! so does one that has become smaller until the list says so. `UPDATE=1` writes what has
+//! become smaller, and nothing else.
 
 #![forbid(unsafe_code)]
 
@@ -72,18 +73,25 @@ fn list() -> PathBuf {
 #[test]
 fn nothing_exceeds_its_limit_by_more_than_the_list_says() {
     let found = measure(&sources(&root()));
+    let mut listed = listed();
     if std::env::var_os("UPDATE").is_some() {
-        let lines = found.iter().map(|(excess, size)| format!("{excess} {size}\n"));
+        // What is new or larger stays an error: the list never grows.
+        listed.retain(|excess, _| found.contains_key(excess));
+        listed.iter_mut().for_each(|(excess, size)| *size = found[excess].min(*size));
+        let lines = listed.iter().map(|(excess, size)| format!("{excess} {size}\n"));
         std::fs::write(list(), lines.collect::<String>()).expect("the list can be written");
     }
-    let text = read(&list());
+    let differences = differences(&found, &listed);
+    assert!(differences.is_empty(), "\n{}\n", differences.join("\n"));
+}
+
+/// The list as it is.
+fn listed() -> Excesses {
     let split = |line: &str| {
         let (excess, size) = line.rsplit_once(' ').expect("an excess and its size");
         (excess.to_string(), size.parse().expect("a size"))
     };
-    let listed: Excesses = text.lines().map(split).collect();
-    let differences = differences(&found, &listed);
-    assert!(differences.is_empty(), "\n{}\n", differences.join("\n"));
+    read(&list()).lines().map(split).collect()
 }
 
 fn differences(found: &Excesses, listed: &Excesses) -> Vec<String> {
