@@ -166,6 +166,7 @@ mod tests {
     /// for what is seen of other things by a beam and so many degrees off.
     fn scene(middle: f32, other: impl Fn(usize, f32) -> Option<f32>) -> Box<Panorama> {
         let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
+        panorama.clear();
         for n in 0..1800 {
             let degrees = 0.2 * n as f32;
             let off = (degrees - middle + 540.0) % 360.0 - 180.0;
@@ -212,6 +213,7 @@ mod tests {
     #[test]
     fn every_sensor_looks_for_itself() {
         let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
+        panorama.clear();
         // An edge at 60 degrees, its wall seen by the other sensor or by the same one.
         for (of_wall, expected) in [(1, [false; 2]), (0, [true, false])] {
             let returns = (0..100).map(|n| 50.0 + 0.2 * n as f32);

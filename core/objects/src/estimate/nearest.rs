@@ -143,7 +143,6 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::random::Random;
-    use std::boxed::Box;
     use std::vec::Vec;
 
     fn brute(points: &[[f32; 3]], at: [f32; 3]) -> (u16, f32) {
@@ -160,7 +159,7 @@ mod tests {
     #[test]
     fn is_that_of_brute_force() {
         let mut random = Random(1);
-        let mut grid = Box::new(NearestGrid::<300>::new());
+        let mut grid = raywake_alloc_guard::boxed!(NearestGrid<300>, NearestGrid::new());
         for (count, size) in [(1, 1.0), (2, 0.0), (40, 3.0), (300, 5.0), (300, 0.01), (300, 900.0)]
         {
             // On a lattice, so that there are ties.

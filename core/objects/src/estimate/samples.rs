@@ -216,11 +216,10 @@ impl Samples {
 mod tests {
     extern crate std;
     use super::*;
-    use std::boxed::Box;
 
     #[test]
     fn a_glance_tells_how_long_an_object_is() {
-        let mut returns = Box::new(Samples::new());
+        let mut returns = raywake_alloc_guard::boxed!(Samples, Samples::new());
         // 8 m along the diagonal of the plane at 5 m/s; half of it hidden for half a second.
         let mut look = |count: usize| {
             let seen = (0..count).map(|i| {

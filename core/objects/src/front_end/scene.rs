@@ -80,7 +80,7 @@ pub struct Run {
 impl Run {
     pub fn new(sensors: usize, capacity: usize) -> Run {
         Run {
-            front_end: Box::new(FrontEnd::new()),
+            front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); capacity],
             rig: rig(sensors, OFFSETS),
             place: Pose::IDENTITY,

@@ -5,12 +5,11 @@ extern crate std;
 use super::*;
 use crate::estimate::synthetic::{self, Drive, Errors, drive, errors};
 use crate::random::Random;
-use std::boxed::Box;
 use std::vec::Vec;
 
 /// A drive sweep by sweep: the states that came out, and the iterations that each took.
 fn pushed(estimator: &mut Estimator, drive: &Drive) -> Vec<(ObjectState, usize)> {
-    let mut lag = FixedLag::new();
+    let mut lag = raywake_alloc_guard::boxed!(FixedLag, FixedLag::new());
     let mut states = Vec::new();
     let mut from = 0;
     let mut history = drive.history.iter();
@@ -43,7 +42,7 @@ fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize) -> Errors 
 
 #[test]
 fn a_window_follows_sweep_by_sweep() {
-    let mut estimator = Box::new(Estimator::new());
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for seed in [1, 4] {
         let parked = drive(synthetic::parked(seed));
         // It stands, where it is, from the first state on.
@@ -59,7 +58,7 @@ fn a_window_follows_sweep_by_sweep() {
 /// From the first sweep on, in which many objects may appear at once.
 #[test]
 fn the_work_of_a_sweep_is_bounded() {
-    let mut estimator = Box::new(Estimator::new());
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for plan in [synthetic::parked(1), synthetic::moving(2), synthetic::tram(1, 7.0)] {
         let drive = drive(plan);
         let taken = pushed(&mut estimator, &drive);
@@ -75,7 +74,7 @@ fn the_work_of_a_sweep_is_bounded() {
 /// One end of it comes into view while the middle of what is seen hardly moves.
 #[test]
 fn a_window_finds_out_that_a_long_side_moves() {
-    let mut estimator = Box::new(Estimator::new());
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for (seed, speed) in [(1, 5.0), (2, 7.0), (3, 9.0)] {
         let drive = drive(synthetic::tram(seed, speed));
         let ours = streamed(&mut estimator, &drive, 8);
@@ -85,9 +84,9 @@ fn a_window_finds_out_that_a_long_side_moves() {
 
 #[test]
 fn a_window_survives_bad_input() {
-    let mut estimator = Box::new(Estimator::new());
+    let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     let params = EstimateParams::DEFAULT;
-    let mut lag = FixedLag::new();
+    let mut lag = raywake_alloc_guard::boxed!(FixedLag, FixedLag::new());
     let mut random = Random(8);
     let mut push = |lag: &mut FixedLag, time_s: f64, count: usize, scale: f32| {
         let returns: Vec<ObjectReturn> = (0..count)
