@@ -43,14 +43,21 @@ struct TrackerParts {
 }
 
 /// Room for the estimate of a track, and how it went.
-#[derive(Default)]
 struct Solver {
-    estimator: Estimator,
+    estimator: Box<Estimator>,
     report: EstimateReport,
     milliseconds: f64,
 }
 
 impl Solver {
+    fn new() -> Solver {
+        Solver {
+            estimator: raywake_alloc_guard::boxed!(Estimator, Estimator::new()),
+            report: EstimateReport::default(),
+            milliseconds: 0.0,
+        }
+    }
+
     fn solve(&mut self, params: &EstimateParams, track: &Track) {
         let clock = Instant::now();
         self.report = self.estimator.solve(params, track.returns(), track.history());
@@ -72,14 +79,20 @@ fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slot
 }
 
 /// The estimate of a track over its last seconds, sweep by sweep.
-#[derive(Default)]
 struct Lag {
-    filter: FixedLag,
+    filter: Box<FixedLag>,
     /// One for each update of the track, thinned as its history is.
     states: Thinned<ObjectState, HISTORY_MAX>,
 }
 
 impl Lag {
+    fn new() -> Lag {
+        Lag {
+            filter: raywake_alloc_guard::boxed!(FixedLag, FixedLag::new()),
+            states: Thinned::default(),
+        }
+    }
+
     /// Takes in what the last step saw of a track.
     fn update(&mut self, params: &EstimateParams, track: &Track, estimator: &mut Estimator) {
         let Some(state) = track.state().filter(|_| track.life == Life::Live) else { return };
@@ -107,8 +120,8 @@ impl Tracker {
         let parts = TrackerParts {
             front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
-            solvers: (0..THREADS_MAX).map(|_| Solver::default()).collect(),
-            lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::default()).collect(),
+            solvers: (0..THREADS_MAX).map(|_| Solver::new()).collect(),
+            lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::new()).collect(),
         };
         Tracker {
             rig: rig.clone(),
@@ -124,11 +137,13 @@ impl Tracker {
 
     /// The parts of the host's memory held: name, type and bytes, those of the flow apart.
     pub fn parts() -> [(&'static str, &'static str, usize); 4] {
+        let solver = size_of::<Solver>() + size_of::<Estimator>();
+        let lag = size_of::<Lag>() + size_of::<FixedLag>();
         [
             ("front end", "FrontEnd", size_of::<FrontEnd>()),
             ("tracks", "Track", TRACKS_MAX * size_of::<Track>()),
-            ("estimates, one for each thread", "Solver", THREADS_MAX * size_of::<Solver>()),
-            ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * size_of::<Lag>()),
+            ("estimates, one for each thread", "Solver", THREADS_MAX * solver),
+            ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * lag),
         ]
     }
 
