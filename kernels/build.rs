@@ -90,6 +90,9 @@ fn compile(
         if used && n >= declared.arguments.len() {
             fail(format!("`{}` uses `{name}`, which its stage does not have", declared.name));
         }
+        if bound.writes && !declared.arguments[n].writes {
+            fail(format!("`{}` writes `{name}`, which its stage only reads", declared.name));
+        }
         if let (Some(found), Some(wanted)) = (bound.stride, prelude::stride(argument))
             && found != wanted
         {

@@ -123,7 +123,7 @@ constants! {
     REACH, RANGE_STEPS_MAX, LOG_ODDS_FREE, LOG_ODDS_OCCUPIED, LOG_ODDS_SOLID
 }
 
-use GroupCount::{GroupPer, One, ThreadPer, Threads, Tiles};
+use GroupCount::{GroupPerColumn, One, ThreadPer, Threads, Tiles};
 use List::{Distinct, Foreground};
 use StageOp::{Fill, Fused, Part, ReadBack, Repeat, Rounds, Run, Upload};
 
@@ -217,12 +217,12 @@ pub const FLOW: &[StageOp] = &[
         (sweep, constancy_weights, constancy_costs, list foreground, columns_before, columns_now,
             mut pair_cost),
         scalar: occupancy_constancy::occupancy_constancy_by_bytes,
-        GroupPer(Foreground)
+        GroupPerColumn
     )),
     Run(stage!(
         window in window,
         (sweep, list foreground, foreground_index, quads pair_cost, mut quads window_cost),
-        GroupPer(Foreground)
+        GroupPerColumn
     )),
     Fill(Buffer::flow, 0),
     Fill(Buffer::target_energy, NONE),

@@ -2,7 +2,7 @@
 //! them.
 
 use raywake_core::record::SweepUniform;
-use raywake_core::stages::{Argument, BufferRow, CONSTANTS, View};
+use raywake_core::stages::{Argument, Buffer, CONSTANTS, View};
 use std::fmt::Write;
 
 /// Constants and the uniform record, in front of every kernel.
@@ -23,9 +23,8 @@ pub fn bindings(arguments: &[Argument]) -> String {
     let mut text = String::new();
     for (n, a) in arguments.iter().enumerate() {
         let (name, access) = (a.name, if a.writes { "read_write" } else { "read" });
-        let row = a.buffer.row();
-        let kind = if is_uniform(row) {
-            row.wgsl.to_string()
+        let kind = if a.buffer == Buffer::sweep {
+            a.buffer.row().wgsl.to_string()
         } else {
             let _ = writeln!(text, "struct Buffer_{name} {{ d: array<{}> }}", element(a));
             format!("Buffer_{name}")
@@ -33,10 +32,6 @@ pub fn bindings(arguments: &[Argument]) -> String {
         let _ = writeln!(text, "@group(0) @binding({n}) var<storage, {access}> {name}: {kind};");
     }
     text
-}
-
-fn is_uniform(row: &BufferRow) -> bool {
-    row.wgsl == "SweepUniform"
 }
 
 /// Type of an element as the kernel sees it.
@@ -47,7 +42,6 @@ fn element(a: &Argument) -> String {
     match a.view {
         View::Elements => own.to_string(),
         View::Atomic => format!("atomic<{scalar}>"),
-        View::Words => scalar.to_string(),
         View::Quads => format!("vec4<{scalar}>"),
     }
 }
@@ -55,7 +49,6 @@ fn element(a: &Argument) -> String {
 /// Bytes from one element of a buffer to the next that the kernels must come to as well, where they
 /// see its elements: two of 16 bits share a word.
 pub fn stride(a: &Argument) -> Option<u32> {
-    let row = a.buffer.row();
-    let elements = a.view == View::Elements && !is_uniform(row);
-    elements.then_some((row.element_bytes as u32).max(4))
+    let elements = a.view == View::Elements && a.buffer != Buffer::sweep;
+    elements.then_some((a.buffer.row().element_bytes as u32).max(4))
 }

@@ -119,7 +119,7 @@ impl Schedule {
             GroupCount::Tiles(count) => fixed(count(profile).div_ceil(TILE)),
             GroupCount::ThreadPer(List::Distinct) => indirect(GROUPS_DISTINCT),
             GroupCount::ThreadPer(List::Foreground) => indirect(GROUPS_FOREGROUND),
-            GroupCount::GroupPer(_) => indirect(GROUPS_ROWS),
+            GroupCount::GroupPerColumn => indirect(GROUPS_ROWS),
         }
     }
 }

@@ -5,9 +5,12 @@ use raywake_core::frame::{Window, central, place};
 use raywake_core::params::{POINTS_MAX, Profile};
 use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{Column, SweepUniform};
-use raywake_core::stages::{FLOW_PROGRAMS, GRID, Storage, run};
+use raywake_core::stages::{GRID, StageProgram, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
+
+/// All that a grid runs, and so all that its storage holds.
+const GRID_ALONE: &[StageProgram] = &[StageProgram { name: "grid", ops: GRID }];
 
 /// What [`Grid::sweep`] works with and leaves behind.
 pub struct Grid {
@@ -31,7 +34,7 @@ impl Grid {
             preparation: Preparation::new(),
             lattice_origin: None,
             offset: DVec3::ZERO,
-            words: vec![0; Storage::words(FLOW_PROGRAMS, &profile)],
+            words: vec![0; Storage::words(GRID_ALONE, &profile)],
             step: uniform_of(&profile, 0),
             columns: vec![[0; 2]; profile.columns()],
             of_point: vec![0; POINTS_MAX],
@@ -59,7 +62,7 @@ impl Grid {
             .unwrap_or_else(|| place(&self.profile, rig, pose, None).lattice_origin + self.offset);
         self.lattice_origin = Some(origin);
         let window = place(&self.profile, rig, pose, Some(origin));
-        let mut storage = Storage::over(&mut self.words, FLOW_PROGRAMS, &self.profile);
+        let mut storage = Storage::over(&mut self.words, GRID_ALONE, &self.profile);
         let (count, _) = self.preparation.prepare(
             &Alone,
             &Placement { profile: &self.profile, rig, window: &window, sweep },

@@ -11,7 +11,6 @@ use crate::params::Profile;
 macro_rules! argument {
     (mut $($rest:ident)+) => { Argument { writes: true, ..argument!($($rest)+) } };
     (atomic $($rest:ident)+) => { Argument { view: View::Atomic, ..argument!($($rest)+) } };
-    (words $($rest:ident)+) => { Argument { view: View::Words, ..argument!($($rest)+) } };
     (quads $($rest:ident)+) => { Argument { view: View::Quads, ..argument!($($rest)+) } };
     (list $($rest:ident)+) => { Argument { is_list: true, ..argument!($($rest)+) } };
     ($name:ident is $buffer:ident) => {
@@ -90,8 +89,6 @@ pub enum View {
     Elements,
     /// Atomic words.
     Atomic,
-    /// Plain words.
-    Words,
     /// Words by four.
     Quads,
 }
@@ -131,8 +128,8 @@ pub enum GroupCount {
     Tiles(fn(&Profile) -> usize),
     /// A thread per entry of a list.
     ThreadPer(List),
-    /// A workgroup per entry of a list.
-    GroupPer(List),
+    /// A workgroup per foreground column.
+    GroupPerColumn,
 }
 
 /// A stage: a twin, and the kernels that together do the same on a device.
@@ -152,7 +149,7 @@ impl Stage {
     /// What the kernels bind, in order: the arguments, and `counters` behind a list where threads
     /// have to know its length.
     pub fn bindings(&self) -> impl Iterator<Item = Argument> {
-        let by_group = |(_, groups): &(_, GroupCount)| matches!(groups, GroupCount::GroupPer(_));
+        let by_group = |(_, groups): &(_, GroupCount)| matches!(groups, GroupCount::GroupPerColumn);
         let counted = !self.kernels.iter().all(by_group);
         let of =
             move |a: &Argument| [Some(*a), (a.is_list && counted).then_some(argument!(counters))];
@@ -356,7 +353,7 @@ pub(super) fn words_of(buffer: Buffer, programs: &[StageProgram], profile: &Prof
 
 /// A stage: `stage!(NAME in MODULE, (ARGUMENTS), GROUPS)`. Its twin is the function of that name in
 /// the module, its kernel the entry point of that name. An argument is
-/// `[mut] [atomic|words|quads] BUFFER`, `[mut] NAME is BUFFER` where the stage serves several
+/// `[mut] [atomic|quads] BUFFER`, `[mut] NAME is BUFFER` where the stage serves several
 /// buffers, or `list BUFFER` where `counters` says how many elements of it there are.
 /// `scalar: FUNCTION` names what the scalar backend runs in the twin's place, `[ENTRY: GROUPS, ..]`
 /// the entry points where there are several.
@@ -391,10 +388,8 @@ macro_rules! stage {
 /// An argument of a stage as the twin takes it.
 macro_rules! passed {
     ($s:ident, mut atomic $($rest:ident)+) => { passed!($s, mut $($rest)+) };
-    ($s:ident, mut words $($rest:ident)+) => { passed!($s, mut $($rest)+) };
     ($s:ident, mut quads $($rest:ident)+) => { passed!($s, mut $($rest)+) };
     ($s:ident, atomic $($rest:ident)+) => { passed!($s, $($rest)+) };
-    ($s:ident, words $($rest:ident)+) => { passed!($s, $($rest)+) };
     ($s:ident, quads $($rest:ident)+) => { passed!($s, $($rest)+) };
     ($s:ident, list distinct) => { &$s.distinct[..$s.counters[DISTINCT_COUNT] as usize] };
     ($s:ident, list foreground) => { &$s.foreground[..$s.counters[FOREGROUND_COUNT] as usize] };
