@@ -4,6 +4,7 @@ use super::exact::owners;
 use super::objects::{Objects, Present};
 use super::row::{Row, class_of};
 use crate::grid::Grid;
+use crate::labels::trajectory::MOVING_MPS;
 use crate::labels::{Motion, View};
 use crate::simulate::truth::PointTruth;
 use glam::DVec3;
@@ -12,7 +13,7 @@ use raywake_core::frame::{Window, place};
 use raywake_core::output::{ColumnFlow, PointFlow};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
-use raywake_core::record::{Column, SweepUniform};
+use raywake_core::record::{Column, NONE, SweepUniform};
 use raywake_core::stages::background_filter::score;
 use raywake_core::stages::grid::shift::shift;
 use raywake_core::sweep::Rig;
@@ -81,6 +82,8 @@ pub struct Collector<'a> {
     grid: Grid,
     /// Columns of the first sweep in the second's window, where the filter sees them.
     before: Vec<Column>,
+    /// Whether the window of the first sweep has a column with flow that is not put out as moving.
+    stands: Vec<bool>,
 }
 
 impl<'a> Collector<'a> {
@@ -95,8 +98,8 @@ impl<'a> Collector<'a> {
         margin_m: f64,
     ) -> Collector<'a> {
         let grid = Grid::on_lattice(profile.clone(), place(&profile, &rig, &start, None));
-        let before = vec![[0; 2]; profile.columns()];
-        Collector { profile, rig, filter, view, margin_m, objects, grid, before }
+        let (before, stands) = (vec![[0; 2]; profile.columns()], vec![false; profile.columns()]);
+        Collector { profile, rig, filter, view, margin_m, objects, grid, before, stands }
     }
 
     /// Edge of a column, m.
@@ -121,6 +124,7 @@ impl<'a> Collector<'a> {
         shift(&step, &self.grid.columns, &mut self.before);
         let present = self.present(seen);
         let mut rows = Vec::with_capacity(seen.columns.len());
+        self.stands.fill(false);
         for flow in &seen.columns {
             let column = |window: &Window| {
                 let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
@@ -133,12 +137,25 @@ impl<'a> Collector<'a> {
                 }
                 None => present.iter().find(|p| p.footprint.holds(flat(flow), self.margin_m)),
             };
-            let column = column(&next);
+            let (here, column) = (column(&window), column(&next));
             let occupied = self.before[column][0] >> 16;
             let score = score(&step, &self.filter, &self.before, column);
-            rows.push(self.row(seen, flow, owner, occupied.count_ones() as u8, score));
+            let row = self.row(seen, flow, owner, occupied.count_ones() as u8, score);
+            self.stands[here] = !row.is_put_out_moving();
+            rows.push(row);
         }
         rows
+    }
+
+    /// Whether each return of the first sweep is put out as moving: with a velocity, and with its
+    /// column where that is solid. Of the sweep whose rows were made last.
+    pub fn returns_put_out_moving(&self, seen: &PairData) -> Vec<bool> {
+        let moving = |(flow, &column): (&PointFlow, &u32)| {
+            let [x, y] = flow.velocity_world_mps.map(f64::from);
+            let with_column = column == NONE || !self.stands[column as usize];
+            x.hypot(y) >= MOVING_MPS && with_column
+        };
+        seen.points.iter().zip(&self.grid.of_point).map(moving).collect()
     }
 
     fn row(
@@ -155,6 +172,7 @@ impl<'a> Collector<'a> {
         Row {
             sweep: seen.index as u32,
             frame: seen.first.frame,
+            stamp_s: seen.first.stamp_s,
             cell_i: flow.cell[0],
             cell_j: flow.cell[1],
             x,
@@ -163,6 +181,7 @@ impl<'a> Collector<'a> {
             track: object.map_or(0, |p| p.track + 1),
             in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
+            mover_m: Present::mover_m(self.present(seen), flat(flow)),
             voxels,
             score,
             origin: flow.origin as u8,

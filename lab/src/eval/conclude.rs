@@ -4,10 +4,10 @@ use super::calibration::{self, Calibration};
 use super::drive::Settings;
 use super::facts::Facts;
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
+use super::moving::{self, ColumnVerdicts, FirstSights};
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::Tally;
-use super::verdicts::Verdicts;
 use super::{figures, read_rows, return_tables, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Results};
@@ -17,11 +17,13 @@ use std::path::Path;
 /// Reads the rows of all drives, writes the report and returns its tables.
 pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Results, Error> {
     let mut tally = Tally::new();
-    let (mut calibration, mut verdicts) = (Calibration::default(), Verdicts::default());
+    let mut calibration = Calibration::default();
+    let (mut verdicts, mut sights) = (ColumnVerdicts::default(), FirstSights::default());
     read_rows(drives, out, |facts, row| {
         tally.row(row);
         calibration.row(row, facts.exact);
         verdicts.row(row, facts.exact);
+        sights.row(&facts.drive, row, facts.exact);
     })?;
     let curve = if settings.weights.has_filter() { tally.filter() } else { None };
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
@@ -34,7 +36,7 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Res
         .table(tables::tracklets(&tally))
         .chart(figures::settled(&tally))
         .chart(figures::tracklets(&tally));
-    report.section("Moving or not").table(verdicts.table());
+    moving(&mut report, drives, &verdicts, &sights);
     report
         .section("Uncertainty")
         .text(UNCERTAINTY)
@@ -54,6 +56,18 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Res
     pictures(&mut report, drives, out)?;
     choices(&mut report, drives, settings, &tally);
     report.write(out)
+}
+
+fn moving(report: &mut Report, drives: &[Facts], columns: &ColumnVerdicts, sights: &FirstSights) {
+    let section = report.section("Moving or not");
+    section
+        .table(moving::table(columns, drives))
+        .table(columns.by_kind())
+        .table(columns.false_motion(drives))
+        .table(sights.table());
+    if let Some(table) = moving::semantic_kitti(drives) {
+        section.table(table);
+    }
 }
 
 fn raw_flow(report: &mut Report, tally: &Tally, cell_m: f64) {
@@ -200,7 +214,11 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
         tally.out_of_view,
         crate::labels::trajectory::MOVING_MPS,
     ));
-    let views = drives.iter().map(|d| format!("`{}`: labelled in {}", d.drive, d.view));
+    let labelled = |d: &Facts| match d.has_boxes() {
+        true => format!("`{}`: labelled in {}", d.drive, d.view),
+        false => format!("`{}`: no labelled objects, only classes of returns", d.drive),
+    };
+    let views = drives.iter().map(labelled);
     let notes = drives.iter().flat_map(|d| d.notes.iter().map(|n| format!("`{}`: {n}", d.drive)));
     section.text(&views.chain(notes).take(200).collect::<Vec<_>>().join("\n\n"));
 }

@@ -3,9 +3,11 @@
 use super::collect::{Collector, PairData};
 use super::exact::Exact;
 use super::facts::{Facts, Panel};
+use super::moving::{ReturnCounts, ReturnVerdicts, Semantic};
 use super::objects::Objects;
 use super::panels::Panels;
 use super::points::{PointScores, Points};
+use super::row::Row;
 use super::rows_file;
 use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
@@ -28,7 +30,7 @@ const WAITING: usize = 2;
 
 /// Counts changes of what rows and facts mean: those of another number are made anew. Raise it with
 /// every such change.
-const ROWS: u32 = 3;
+const ROWS: u32 = 4;
 
 /// What all drives of an evaluation have in common.
 #[derive(Clone)]
@@ -142,7 +144,8 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     let files = Files::of(out, name);
-    let labels = labels::open(path, source.as_ref())?;
+    let semantic = Semantic::of(path, source.as_ref());
+    let labels = labels(path, source.as_ref(), semantic.is_some())?;
     let key = settings.key(source.as_ref(), &labels);
     if files.rows.is_file()
         && let Ok(facts) = Facts::read(&files.facts)
@@ -163,23 +166,27 @@ pub fn evaluate(
         notes: [source.notes(), &labels.notes].concat(),
         ..Facts::default()
     };
-    let collector = Collector::new(
-        settings.profile.clone(),
-        source.rig().clone(),
-        source.pose(0),
-        settings.weights.tables(&settings.profile)?.filter,
-        &objects,
-        labels.view,
-        settings.margin_m,
-    );
-    let points = Points::new(
-        labels.view,
-        source.rig().ground_m,
-        settings.margin_m,
-        settings.profile.voxel_m,
-    );
-    let exact = Exact::of(path);
-    run(source.as_mut(), settings, &files, collector, points, exact, &mut facts)?;
+    let judges = Judges {
+        collector: Collector::new(
+            settings.profile.clone(),
+            source.rig().clone(),
+            source.pose(0),
+            settings.weights.tables(&settings.profile)?.filter,
+            &objects,
+            labels.view,
+            settings.margin_m,
+        ),
+        points: Points::new(
+            labels.view,
+            source.rig().ground_m,
+            settings.margin_m,
+            settings.profile.voxel_m,
+        ),
+        returns: ReturnVerdicts::new(labels.view, settings.margin_m, semantic),
+        exact: Exact::of(path),
+        panels: Panels::default(),
+    };
+    run(source.as_mut(), settings, &files, judges, &mut facts)?;
     if settings.all_columns {
         facts.unfiltered = unfiltered(source.as_mut(), settings)?;
     }
@@ -188,10 +195,43 @@ pub fn evaluate(
     Ok((facts, false))
 }
 
+/// Boxes of the drive; none will do where its returns are labelled.
+fn labels(path: &Path, source: &dyn Source, semantic: bool) -> Result<Labels, Error> {
+    match labels::find(path, source)? {
+        None if semantic => Ok(Labels::none()),
+        Some(labels) => Ok(labels),
+        None => labels::open(path, source),
+    }
+}
+
 fn view(view: View) -> &'static str {
     match view {
         View::All => "all around",
         View::Camera => "the front camera's view",
+        View::Nowhere => "",
+    }
+}
+
+/// What judges the pairs of one drive.
+struct Judges<'a> {
+    collector: Collector<'a>,
+    points: Points,
+    returns: ReturnVerdicts,
+    exact: Option<Exact>,
+    panels: Panels,
+}
+
+impl Judges<'_> {
+    /// The rows of a pair.
+    fn pair(&mut self, seen: &PairData) -> Result<Vec<Row>, Error> {
+        let present = self.collector.present(seen);
+        let exact = self.exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;
+        self.points.pair(seen, present, exact.as_deref())?;
+        let rows = self.collector.rows(seen, exact.as_deref());
+        let put_out = self.collector.returns_put_out_moving(seen);
+        self.returns.pair(seen, present, exact.as_deref(), &put_out)?;
+        self.panels.consider(seen, &rows, present);
+        Ok(rows)
     }
 }
 
@@ -200,16 +240,14 @@ fn run(
     source: &mut dyn Source,
     settings: &Settings,
     files: &Files,
-    collector: Collector,
-    points: Points,
-    exact: Option<Exact>,
+    judges: Judges,
     facts: &mut Facts,
 ) -> Result<(), RunError> {
     let plan = settings.plan(source, settings.weights.clone());
     let (send, receive) = sync_channel(WAITING);
     let drive = facts.drive.clone();
     let (summary, written) = std::thread::scope(|scope| {
-        let rows = scope.spawn(move || collect(&drive, collector, points, exact, &receive, files));
+        let rows = scope.spawn(move || collect(&drive, judges, &receive, files));
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
@@ -226,7 +264,7 @@ fn run(
         return Err(Error::Usage("interrupted".into()).into());
     }
     let collected = written?;
-    facts.scores = collected.scores;
+    (facts.scores, facts.returns) = (collected.scores, collected.returns);
     facts.panels = collected.panels;
     facts.sweeps = summary.sweeps;
     facts.pairs = summary.pairs;
@@ -243,32 +281,22 @@ fn run(
 /// is no file of rows.
 fn collect(
     drive: &str,
-    mut collector: Collector,
-    mut points: Points,
-    exact: Option<Exact>,
+    mut judges: Judges,
     pairs: &Receiver<Option<PairData>>,
     files: &Files,
 ) -> Result<Collected, Error> {
-    let mut panels = Panels::default();
-    rows_file::write(&files.rows, drive, || {
-        let seen = match pairs.recv() {
-            Ok(Some(seen)) => seen,
-            Ok(None) => return Ok(None),
-            Err(_) => return Err(Error::Usage("interrupted".into())),
-        };
-        let present = collector.present(&seen);
-        let returns = exact.as_ref().map(|e| e.returns(&seen.first)).transpose()?;
-        points.pair(&seen, present, returns.as_deref())?;
-        let rows = collector.rows(&seen, returns.as_deref());
-        panels.consider(&seen, &rows, present);
-        Ok(Some(rows))
+    rows_file::write(&files.rows, drive, || match pairs.recv() {
+        Ok(Some(seen)) => judges.pair(&seen).map(Some),
+        Ok(None) => Ok(None),
+        Err(_) => Err(Error::Usage("interrupted".into())),
     })?;
-    let panels = panels.write(&files.panels, drive, collector.cell_m())?;
-    Ok(Collected { scores: points.scores, panels })
+    let panels = judges.panels.write(&files.panels, drive, judges.collector.cell_m())?;
+    Ok(Collected { scores: judges.points.scores, returns: judges.returns.counts, panels })
 }
 
 /// What the thread that makes rows has besides.
 struct Collected {
     scores: [PointScores; 3],
+    returns: ReturnCounts,
     panels: Vec<Panel>,
 }

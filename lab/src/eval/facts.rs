@@ -1,5 +1,6 @@
 //! What is kept of a drive beside its rows: settings, times, notes.
 
+use super::moving::ReturnCounts;
 use super::points::PointScores;
 use raywake::laps::Laps;
 use raywake_io::Error;
@@ -34,7 +35,7 @@ pub struct Facts {
     pub drive: String,
     /// Everything that decides what its rows are; another run with the same need not be done.
     pub settings: serde_json::Value,
-    /// Where objects are labelled.
+    /// Where objects are labelled; empty where none are.
     pub view: String,
     /// Whether labels are a simulator's, without noise.
     pub exact: bool,
@@ -60,6 +61,8 @@ pub struct Facts {
     pub notes: Vec<String>,
     /// Scores of single returns, in the order of [`super::points::ESTIMATES`].
     pub scores: [PointScores; 3],
+    /// Returns put out as moving, by what they are.
+    pub returns: ReturnCounts,
     /// Pictures of its best and worst sweeps.
     pub panels: Vec<Panel>,
     /// Wall time of the evaluation, s.
@@ -79,6 +82,11 @@ impl Facts {
         }
         self.totals.push(total);
         self.points.push(points);
+    }
+
+    /// Whether objects are labelled with boxes.
+    pub fn has_boxes(&self) -> bool {
+        !self.view.is_empty()
     }
 
     /// Reads the facts of an earlier run.

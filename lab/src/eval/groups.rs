@@ -125,7 +125,8 @@ impl ClassGroup {
         (1..CLASSES.len() as u8).map(ClassGroup::Class).chain([ClassGroup::Labelled])
     }
 
-    fn holds(self, class: usize) -> bool {
+    /// Whether a class of [`CLASSES`] is one of it.
+    pub fn holds(self, class: usize) -> bool {
         match self {
             ClassGroup::Class(c) => usize::from(c) == class,
             ClassGroup::Labelled => class > 0,

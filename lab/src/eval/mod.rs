@@ -15,6 +15,7 @@ mod exact;
 mod facts;
 mod figures;
 mod groups;
+mod moving;
 mod objects;
 mod panels;
 mod points;
@@ -26,7 +27,6 @@ mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
-mod verdicts;
 
 use conclude::conclude;
 use drive::{Files, Settings};

@@ -28,6 +28,13 @@ pub struct Present {
 }
 
 impl Present {
+    /// From a point of the vehicle frame to the nearest box of those that move, seen from above,
+    /// m; infinite where nothing moves.
+    pub fn mover_m(all: &[Present], at: DVec3) -> f32 {
+        let movers = all.iter().filter(|p| p.motion == Motion::Moving);
+        movers.map(|p| p.footprint.distance_m(at)).fold(f64::INFINITY, f64::min) as f32
+    }
+
     /// Whether a point of the vehicle frame lies in the box, or within `margin_m` of it.
     pub fn holds(&self, at: DVec3, margin_m: f64) -> bool {
         self.footprint.holds(at, margin_m)

@@ -2,12 +2,13 @@
 //! to choose between them. Written as Parquet, so that any engine can aggregate many drives.
 
 use crate::labels::Kind;
+use crate::labels::trajectory::MOVING_MPS;
 use arrow_array::builder::BooleanBuilder;
 use arrow_array::cast::AsArray;
-use arrow_array::types::{Float32Type, Int32Type, UInt8Type, UInt32Type, UInt64Type};
+use arrow_array::types::{Float32Type, Float64Type, Int32Type, UInt8Type, UInt32Type, UInt64Type};
 use arrow_array::{
-    Array, ArrayRef, BooleanArray, DictionaryArray, Float32Array, Int32Array, RecordBatch,
-    StringArray, UInt8Array, UInt32Array, UInt64Array,
+    Array, ArrayRef, BooleanArray, DictionaryArray, Float32Array, Float64Array, Int32Array,
+    RecordBatch, StringArray, UInt8Array, UInt32Array, UInt64Array,
 };
 use arrow_schema::{DataType, Field, Schema};
 use raywake_core::output::Origin;
@@ -57,6 +58,7 @@ macro_rules! cell {
 }
 
 cell!(f32, Float32Array, Float32Type, Float32);
+cell!(f64, Float64Array, Float64Type, Float64);
 cell!(i32, Int32Array, Int32Type, Int32);
 cell!(u8, UInt8Array, UInt8Type, UInt8);
 cell!(u32, UInt32Array, UInt32Type, UInt32);
@@ -111,6 +113,8 @@ row! {
     sweep: u32,
     /// Frame as the source counts.
     frame: u64,
+    /// Stamp of the sweep, s.
+    stamp_s: f64,
     /// Cell of the lattice.
     cell_i: i32,
     /// Cell of the lattice.
@@ -127,6 +131,9 @@ row! {
     in_view: bool,
     /// 0: parked, or of no object; 1: slow; 2: moving ([`crate::labels::Motion`]).
     motion: u8,
+    /// From the column's centre to the nearest box of an object that moves, seen from above, m: 0
+    /// within it, infinite where nothing moves.
+    mover_m: f32,
     /// Occupied voxels of the column: its weight in the dissertation's tables.
     voxels: u8,
     /// Score of the background filter, in the weights' integers; foreground above 0.
@@ -182,14 +189,31 @@ impl Row {
         self.motion == 2
     }
 
+    /// Whether it moves or stands; `None` where that cannot be told: out of view, and of what is
+    /// slow.
+    pub fn moves(&self) -> Option<bool> {
+        (self.in_view && self.motion != 1).then_some(self.is_moving())
+    }
+
     /// Whether the flow is that of a match, the column's own or its thing's.
     pub fn is_matched(&self) -> bool {
         self.origin >= Origin::Matched as u8
     }
 
     /// Whether a displacement over ground was put out.
-    pub fn is_put_out_moving(&self) -> bool {
+    pub fn is_displaced(&self) -> bool {
         self.flow_x != 0.0 || self.flow_y != 0.0
+    }
+
+    /// Whether it was put out as moving: with a displacement and a velocity of [`MOVING_MPS`].
+    pub fn is_put_out_moving(&self) -> bool {
+        let by_velocity = f64::from(self.velocity_x.hypot(self.velocity_y)) >= MOVING_MPS;
+        by_velocity && self.is_moving_by_flow()
+    }
+
+    /// Whether its displacement alone is one of [`MOVING_MPS`] over the time between the sweeps.
+    pub fn is_moving_by_flow(&self) -> bool {
+        f64::from(self.flow_x.hypot(self.flow_y)) >= MOVING_MPS * f64::from(self.dt)
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.
@@ -238,7 +262,7 @@ mod tests {
             .collect();
         let batch = batch("a", &rows);
         assert_eq!(super::rows(&batch).unwrap(), rows);
-        let less = batch.project(&(0..6).collect::<Vec<_>>()).unwrap();
+        let less = batch.project(&(0..7).collect::<Vec<_>>()).unwrap();
         assert_eq!(super::rows(&less), Err("x"));
     }
 

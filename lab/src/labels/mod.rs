@@ -18,7 +18,7 @@ mod tests;
 
 pub use footprint::Footprint;
 pub use kind::kind;
-pub use open::open;
+pub use open::{find, open};
 pub use raywake_io::Error;
 pub(crate) use sweeps::turn;
 pub use trajectory::{Motion, Trajectory, trajectories};
@@ -88,6 +88,8 @@ pub enum View {
     All,
     /// In the view of a camera that looks forward (KITTI).
     Camera,
+    /// Nowhere: the drive has no boxes.
+    Nowhere,
 }
 
 /// Half of the camera's view in which KITTI has labels for certain, degrees; at its border boxes
@@ -97,8 +99,11 @@ pub const CAMERA_DEG: f64 = 40.0;
 impl View {
     /// Whether labels are complete at a point of the vehicle frame.
     pub fn holds(self, at: DVec3) -> bool {
-        let ahead = || at.x > 0.0 && at.y.atan2(at.x).abs().to_degrees() <= CAMERA_DEG;
-        self == View::All || ahead()
+        match self {
+            View::All => true,
+            View::Camera => at.x > 0.0 && at.y.atan2(at.x).abs().to_degrees() <= CAMERA_DEG,
+            View::Nowhere => false,
+        }
     }
 }
 
@@ -113,4 +118,11 @@ pub struct Labels {
     pub exact: bool,
     /// What was left out, and why: one line each for people.
     pub notes: Vec<String>,
+}
+
+impl Labels {
+    /// Of a drive without boxes.
+    pub fn none() -> Labels {
+        Labels { tracks: Vec::new(), view: View::Nowhere, exact: false, notes: Vec::new() }
+    }
 }

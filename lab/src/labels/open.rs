@@ -26,33 +26,37 @@ use std::path::{Path, PathBuf};
 ///
 /// Fails where there are no labels, and where they cannot be read.
 pub fn open(path: &Path, source: &dyn Source) -> Result<Labels, Error> {
+    let names = "`truth/objects.feather`, `tracklet_labels.xml`, `boxes.csv`, \
+                 `annotations.feather`, `label_02/NNNN.txt`";
+    let missing = || Error::input(path, "", format!("no labels found: none of {names}"));
+    find(path, source)?.ok_or_else(missing)
+}
+
+/// The same; none where there are none.
+pub fn find(path: &Path, source: &dyn Source) -> Result<Option<Labels>, Error> {
     // Labels lie in the folder that has the clouds, the one named where that is not to be told.
     let root = recognise(path).map_or_else(|_| path.to_path_buf(), |found| found.1);
-    let mut labels = read(&root)?;
-    fit(&mut labels, &Sweeps::of(source));
+    let mut labels = read(&root).transpose()?;
+    labels.iter_mut().for_each(|labels| fit(labels, &Sweeps::of(source)));
     Ok(labels)
 }
 
-fn read(root: &Path) -> Result<Labels, Error> {
+/// The labels in a folder; none where there are none.
+fn read(root: &Path) -> Option<Result<Labels, Error>> {
     let there = |name: &str| Some(root.join(name)).filter(|file| file.is_file());
     if let Some(file) = there("truth/objects.feather") {
-        return feather::objects(&file);
+        return Some(feather::objects(&file));
     }
     if let Some(file) = there("tracklet_labels.xml") {
-        return tracklets::read(&file);
+        return Some(tracklets::read(&file));
     }
     if let Some(file) = there("boxes.csv") {
-        return boxes_csv::read(&file);
+        return Some(boxes_csv::read(&file));
     }
     if let Some(file) = there("annotations.feather") {
-        return feather::annotations(&file);
+        return Some(feather::annotations(&file));
     }
-    if let Some((labels, calib)) = tracking(root) {
-        return kitti_tracking::read(&labels, &calib);
-    }
-    let names = "`truth/objects.feather`, `tracklet_labels.xml`, `boxes.csv`, \
-                 `annotations.feather`, `label_02/NNNN.txt`";
-    Err(Error::input(root, "", format!("no labels found: none of {names}")))
+    tracking(root).map(|(labels, calib)| kitti_tracking::read(&labels, &calib))
 }
 
 /// Labels and calibration of a sequence of the tracking benchmark.

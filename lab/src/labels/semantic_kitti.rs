@@ -59,6 +59,11 @@ impl PointLabel {
         CLASSES.iter().find(|c| c.0 == self.class).map(|c| c.1)
     }
 
+    /// Whether it has no class, or is no thing at all (0 and 1).
+    pub fn is_unlabelled(self) -> bool {
+        self.class <= 1
+    }
+
     /// Whether it is something that moved somewhere in the sequence (252 to 259).
     pub fn moving(self) -> bool {
         (252..=259).contains(&self.class)

@@ -47,7 +47,7 @@ impl Quantity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
     /// Those put out with a displacement over ground, whatever they are.
-    PutOutMoving,
+    Displaced,
     /// Those of a group with a motion.
     Of(ClassGroup, MotionGroup),
 }
@@ -95,7 +95,7 @@ impl Calibration {
         for (quantity, by_truth) in Quantity::ALL.iter().zip(&mut self.claims) {
             let Some((error, covariance)) = quantity.of(row) else { continue };
             let cells = &mut by_truth[usize::from(exact)];
-            let moving = usize::from(row.is_put_out_moving());
+            let moving = usize::from(row.is_displaced());
             let claims = &mut cells[row.class as usize][row.motion as usize][moving];
             if covariance == [0.0; 3] {
                 claims.without += 1;
@@ -119,7 +119,7 @@ impl Calibration {
             all.without += claims.without;
         };
         match columns {
-            Columns::PutOutMoving => of.iter().flatten().for_each(|c| add(&c[1])),
+            Columns::Displaced => of.iter().flatten().for_each(|c| add(&c[1])),
             Columns::Of(group, motion) => {
                 cells(group, motion).for_each(|(c, m)| of[c][m].iter().for_each(&mut add));
             }
@@ -222,11 +222,11 @@ mod tests {
             let s = calibration.sample(Quantity::Flow, false, columns);
             [s.content.count(), s.without]
         };
-        assert_eq!(counts(Columns::PutOutMoving), [2, 1]);
+        assert_eq!(counts(Columns::Displaced), [2, 1]);
         assert_eq!(counts(Columns::Of(ClassGroup::Labelled, MotionGroup::Any)), [2, 1]);
         assert_eq!(counts(Columns::Of(ClassGroup::Class(1), MotionGroup::Moving)), [0, 1]);
         assert_eq!(counts(Columns::Of(ClassGroup::Class(0), MotionGroup::Any)), [1, 0]);
-        let exact = calibration.sample(Quantity::Flow, true, Columns::PutOutMoving);
+        let exact = calibration.sample(Quantity::Flow, true, Columns::Displaced);
         assert!(exact.content.share_below(0.95).is_nan() && exact.without == 0);
     }
 }

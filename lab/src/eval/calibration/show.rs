@@ -28,7 +28,7 @@ impl Quantity {
 impl Columns {
     fn label(self) -> String {
         match self {
-            Columns::PutOutMoving => "put out as moving".into(),
+            Columns::Displaced => "put out with a displacement".into(),
             Columns::Of(group, MotionGroup::Any) => group.label().into(),
             Columns::Of(group, motion) => format!("{}, {}", group.label(), motion.label()),
         }
@@ -40,7 +40,7 @@ impl Columns {
         let rest = [MotionGroup::Slow, MotionGroup::Parked, MotionGroup::Any];
         let rest = rest.map(|m| Columns::Of(ClassGroup::Labelled, m));
         let background = [Columns::Of(ClassGroup::Class(0), MotionGroup::Any)];
-        [Columns::PutOutMoving].into_iter().chain(movers).chain(rest).chain(background)
+        [Columns::Displaced].into_iter().chain(movers).chain(rest).chain(background)
     }
 }
 

@@ -1,0 +1,147 @@
+//! Verdicts on columns.
+
+use super::false_motion::FalseMotion;
+use super::{MotionCounts, percent, sweeps};
+use crate::eval::calibration::truth;
+use crate::eval::facts::Facts;
+use crate::eval::groups::{COUNT, ClassGroup, MotionGroup, cells};
+use crate::eval::row::Row;
+use crate::report::{Cell, Table, TableRow};
+
+/// Columns of one class and motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct PutOut {
+    columns: u64,
+    /// Put out as moving.
+    moving: u64,
+    /// By the displacement alone.
+    by_flow: u64,
+}
+
+/// Verdicts of one kind of truth.
+#[derive(Clone, Debug, Default)]
+struct OfTruth {
+    counts: MotionCounts,
+    /// By class, then by [`Row::motion`].
+    kinds: [[PutOut; 3]; COUNT],
+    wrong: FalseMotion,
+}
+
+/// Verdicts on the columns of drives with smoothed and with exact labels.
+#[derive(Clone, Debug, Default)]
+pub struct ColumnVerdicts([OfTruth; 2]);
+
+impl ColumnVerdicts {
+    /// Counts a row; `exact`: of a drive whose labels are exact.
+    pub fn row(&mut self, row: &Row, exact: bool) {
+        if !row.in_view {
+            return;
+        }
+        let of = &mut self.0[usize::from(exact)];
+        let put_out = row.is_put_out_moving();
+        let kind = &mut of.kinds[row.class as usize][row.motion as usize];
+        kind.columns += 1;
+        kind.moving += u64::from(put_out);
+        kind.by_flow += u64::from(row.is_moving_by_flow());
+        let Some(moves) = row.moves() else { return };
+        of.counts.add(moves, put_out, row.mover_m);
+        if !moves {
+            of.wrong.standing(row, put_out);
+        }
+    }
+
+    /// All of them.
+    pub fn counts(&self, exact: bool) -> MotionCounts {
+        self.0[usize::from(exact)].counts
+    }
+
+    fn of(&self, exact: bool, group: ClassGroup, motion: MotionGroup) -> PutOut {
+        let mut all = PutOut::default();
+        for (class, motion) in cells(group, motion) {
+            let kind = self.0[usize::from(exact)].kinds[class][motion];
+            all.columns += kind.columns;
+            all.moving += kind.moving;
+            all.by_flow += kind.by_flow;
+        }
+        all
+    }
+
+    /// What is put out as moving, by what it is.
+    pub fn by_kind(&self) -> Table {
+        let mut rows = Vec::new();
+        for exact in [true, false] {
+            for group in ClassGroup::labelled().chain([ClassGroup::Class(0)]) {
+                for motion in MotionGroup::of(group) {
+                    let of = self.of(exact, group, *motion);
+                    if of.columns > 0 {
+                        rows.push(TableRow::new([
+                            truth(exact).into(),
+                            group.label().into(),
+                            motion.label().into(),
+                            Cell::Count(of.columns),
+                            percent(of.moving, of.columns),
+                            percent(of.by_flow, of.columns),
+                        ]));
+                    }
+                }
+            }
+        }
+        let columns =
+            ["Truth", "Class", "Motion", "Columns", "Put out as moving, %", "By flow alone, %"];
+        let caption = "Columns put out as moving, by what they are; by flow alone, by their \
+            displacement, whatever the velocity.";
+        Table::new("moving-by-class", caption, &columns, rows)
+    }
+
+    /// Where false motion is, by what the columns are like.
+    pub fn false_motion(&self, drives: &[Facts]) -> Table {
+        let of = |exact| (exact, sweeps(drives, exact), &self.0[usize::from(exact)].wrong);
+        FalseMotion::table([true, false].map(of))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missed_and_false_motion() {
+        let row = |class, motion, flow_x, velocity_x, mover_m| Row {
+            class,
+            motion,
+            in_view: true,
+            flow_x,
+            velocity_x,
+            mover_m,
+            dt: 0.1,
+            ..Row::default()
+        };
+        let mut verdicts = ColumnVerdicts::default();
+        for row in [
+            row(1, 2, 0.3, 2.9, 0.0),
+            row(1, 2, 0.0, 0.0, 0.0),
+            // A displacement, though the tracklet says that it stands, and the reverse.
+            row(1, 0, 0.3, 0.2, 9.0),
+            row(1, 0, 0.0, 2.0, 9.0),
+            row(0, 0, -0.3, -3.0, 1.0),
+            // A displacement slower than what moves; what is slow may be put out as it likes.
+            row(0, 0, 0.04, 3.0, 0.2),
+            row(8, 1, 0.1, 1.0, 0.0),
+            Row { in_view: false, ..row(0, 0, 0.3, 3.0, 0.0) },
+        ] {
+            verdicts.row(&row, true);
+        }
+        let found = MotionCounts { found: 1, missed: 1, wrong: [0, 1, 0] };
+        assert_eq!(verdicts.counts(true), found);
+        let of = |group, motion| {
+            let PutOut { columns, moving, by_flow } = verdicts.of(true, group, motion);
+            [columns, moving, by_flow]
+        };
+        assert_eq!(of(ClassGroup::Labelled, MotionGroup::Moving), [2, 1, 1]);
+        assert_eq!(of(ClassGroup::Labelled, MotionGroup::Parked), [2, 0, 1]);
+        assert_eq!(of(ClassGroup::Labelled, MotionGroup::Slow), [1, 1, 1]);
+        assert_eq!(of(ClassGroup::Class(0), MotionGroup::Any), [2, 1, 1]);
+        // Cars and all labelled, moving and parked; what is slow, twice; the background.
+        assert_eq!(verdicts.by_kind().rows.len(), 7);
+    }
+}

@@ -1,0 +1,154 @@
+//! Moving or not: what is put out as moving beside what moves, by columns and by returns.
+
+mod columns;
+mod false_motion;
+mod first_sight;
+mod returns;
+
+pub use columns::ColumnVerdicts;
+pub use first_sight::FirstSights;
+pub use returns::{ReturnCounts, ReturnVerdicts, Semantic, semantic_kitti};
+
+use super::calibration::truth;
+use super::facts::Facts;
+use crate::labels::trajectory::MOVING_MPS;
+use crate::report::{Cell, Table, TableRow};
+use serde::{Deserialize, Serialize};
+
+/// Up to here from the box of a mover false motion is forgiven in one of the columns, m: labels,
+/// swinging limbs and columns on the border are no finer.
+pub const FORGIVEN_M: f32 = 0.5;
+/// Up to here it is near a mover, m: what a cluster drags along.
+pub const NEAR_M: f32 = 2.0;
+
+/// Names of the zones around movers; see [`zone`].
+const ZONES: [&str; 3] = ["within 0.5 m of a mover", "0.5 to 2 m", "farther"];
+
+/// The zone of something so far from the nearest mover's box, m.
+fn zone(mover_m: f32) -> usize {
+    [FORGIVEN_M, NEAR_M].iter().filter(|end| mover_m > **end).count()
+}
+
+/// Verdicts on columns or returns of which is known whether they move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MotionCounts {
+    /// Move, and are put out so.
+    pub found: u64,
+    /// Move, and are not.
+    pub missed: u64,
+    /// Stand and are put out as moving, by zone.
+    pub wrong: [u64; 3],
+}
+
+fn percent(part: u64, whole: u64) -> Cell {
+    Cell::Number(if whole == 0 { f64::NAN } else { 100.0 * part as f64 / whole as f64 }, 1)
+}
+
+fn per_sweep(count: u64, sweeps: u64) -> Cell {
+    Cell::Number(if sweeps == 0 { f64::NAN } else { count as f64 / sweeps as f64 }, 2)
+}
+
+impl MotionCounts {
+    /// Counts one, so far from the nearest mover's box, m.
+    pub fn add(&mut self, moves: bool, put_out: bool, mover_m: f32) {
+        match (moves, put_out) {
+            (true, true) => self.found += 1,
+            (true, false) => self.missed += 1,
+            (false, true) => self.wrong[zone(mover_m)] += 1,
+            (false, false) => {}
+        }
+    }
+
+    /// Adds what was counted elsewhere.
+    pub fn merge(&mut self, other: &MotionCounts) {
+        self.found += other.found;
+        self.missed += other.missed;
+        self.wrong.iter_mut().zip(other.wrong).for_each(|(a, b)| *a += b);
+    }
+
+    /// As [`COLUMNS`] has them.
+    fn cells(&self, sweeps: u64) -> Vec<Cell> {
+        let MotionCounts { found, missed, wrong } = *self;
+        let all_wrong: u64 = wrong.iter().sum();
+        let counts = [found, all_wrong, missed].map(Cell::Count);
+        let shares = [
+            percent(found, found + all_wrong),
+            percent(found, found + missed),
+            percent(found, found + all_wrong + missed),
+            percent(found, found + all_wrong - wrong[0]),
+        ];
+        counts.into_iter().chain(shares).chain(wrong.map(|n| per_sweep(n, sweeps))).collect()
+    }
+}
+
+/// Columns of [`table`].
+const COLUMNS: [&str; 12] = [
+    "Counted",
+    "Truth",
+    "True",
+    "False",
+    "Missed",
+    "Precision, %",
+    "Recall, %",
+    "IoU, %",
+    "Precision, 0.5 m forgiven, %",
+    "False a sweep within 0.5 m of a mover",
+    "0.5 to 2 m",
+    "Farther",
+];
+
+/// Moving against standing, by columns and by returns.
+pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
+    let mut rows = Vec::new();
+    for exact in [true, false] {
+        let sweeps = sweeps(drives, exact);
+        let mut returns = MotionCounts::default();
+        let of = |d: &&Facts| d.exact == exact;
+        drives.iter().filter(of).for_each(|d| returns.merge(&d.returns.in_boxes));
+        for (what, counts) in [("columns", columns.counts(exact)), ("returns", returns)] {
+            if sweeps > 0 {
+                let head = [what, truth(exact)].map(Cell::from).into_iter();
+                rows.push(TableRow::new(head.chain(counts.cells(sweeps))));
+            }
+        }
+    }
+    let caption = format!(
+        "Moving against standing: solid columns and returns, true where they belong to an object \
+         of {MOVING_MPS} m/s or more and are put out as moving, with a displacement and a velocity \
+         of as much."
+    );
+    let note = "Parked objects and whatever no label holds stand; slow objects do not count. IoU \
+        is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
+        motion is told apart by its distance from the nearest box of a mover, seen from above.";
+    Table::new("moving-or-not", caption, &COLUMNS, rows).note(note)
+}
+
+/// Pairs of sweeps of drives with boxes.
+fn sweeps(drives: &[Facts], exact: bool) -> u64 {
+    drives.iter().filter(|d| d.exact == exact && d.has_boxes()).map(|d| d.pairs).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_by_hand() {
+        let mut counts = MotionCounts::default();
+        let cases = [(true, true, 0.0), (true, false, 0.0), (false, true, 0.5), (false, true, 1.9)];
+        let more = [(true, true, 0.0), (false, true, f32::INFINITY), (false, false, 0.1)];
+        for (moves, put_out, mover_m) in cases.into_iter().chain(more) {
+            counts.add(moves, put_out, mover_m);
+        }
+        assert_eq!(counts, MotionCounts { found: 2, missed: 1, wrong: [1, 1, 1] });
+        let mut twice = counts;
+        twice.merge(&counts);
+        let cells = twice.cells(4);
+        let number = |n: usize| match cells[n] {
+            Cell::Number(value, _) => value,
+            _ => panic!("{:?}", cells[n]),
+        };
+        assert_eq!(cells[..3], [4, 6, 2].map(Cell::Count));
+        assert_eq!([3, 5, 6, 7, 9].map(number), [40.0, 400.0 / 12.0, 50.0, 0.5, 0.5]);
+    }
+}

@@ -1,0 +1,214 @@
+//! Verdicts on returns: by labelled boxes or exact truth, and by the classes of SemanticKITTI.
+
+use super::MotionCounts;
+use super::percent;
+use crate::eval::collect::PairData;
+use crate::eval::facts::Facts;
+use crate::eval::objects::Present;
+use crate::labels::semantic_kitti::{self as labels, PointLabel};
+use crate::labels::{Motion, View};
+use crate::report::{Cell, Table, TableRow};
+use crate::simulate::truth::PointTruth;
+use glam::DVec3;
+use raywake_io::Error;
+use raywake_io::source::{Source, SweepData, recognise};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What was counted of a drive's returns.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReturnCounts {
+    /// Those in view, by the boxes.
+    pub in_boxes: MotionCounts,
+    /// By SemanticKITTI's class: how many, and put out as moving.
+    pub classes: BTreeMap<u16, [u64; 2]>,
+}
+
+/// Counts the returns of one drive.
+pub struct ReturnVerdicts {
+    view: View,
+    margin_m: f64,
+    semantic: Option<Semantic>,
+    /// So far.
+    pub counts: ReturnCounts,
+}
+
+impl ReturnVerdicts {
+    /// Nothing counted yet.
+    pub fn new(view: View, margin_m: f64, semantic: Option<Semantic>) -> ReturnVerdicts {
+        ReturnVerdicts { view, margin_m, semantic, counts: ReturnCounts::default() }
+    }
+
+    /// Counts the returns of a pair's first sweep, with what was put out of each as moving, by the
+    /// exact truth where there is any. Fails where its classes cannot be read.
+    pub fn pair(
+        &mut self,
+        seen: &PairData,
+        present: &[Present],
+        exact: Option<&[PointTruth]>,
+        put_out: &[bool],
+    ) -> Result<(), Error> {
+        let next_from_world = seen.then.inverse();
+        for (n, (point, put_out)) in seen.first.points.iter().zip(put_out).enumerate() {
+            let at = DVec3::from_array(point.position.map(f64::from));
+            if !at.is_finite() || !self.view.holds(at) {
+                continue;
+            }
+            let object = match exact {
+                Some(returns) => present.iter().find(|p| p.id == Some(returns[n].object)),
+                None => present.iter().find(|p| p.holds(at, self.margin_m)),
+            };
+            let there = object.map_or(Some(seen.now()), |o| Some(o.step?.raw * seen.now()));
+            let stays = |by| self.view.holds((next_from_world * by).transform(at));
+            if there.is_some_and(stays)
+                && let Some(moves) = moves(object)
+            {
+                let mover_m = if *put_out { Present::mover_m(present, at) } else { 0.0 };
+                self.counts.in_boxes.add(moves, *put_out, mover_m);
+            }
+        }
+        let Some(semantic) = &self.semantic else { return Ok(()) };
+        for (label, put_out) in semantic.returns(&seen.first)?.iter().zip(put_out) {
+            let [all, moving] = self.counts.classes.entry(label.class).or_default();
+            *all += 1;
+            *moving += u64::from(*put_out);
+        }
+        Ok(())
+    }
+}
+
+/// Whether what belongs to an object moves; `None` where that cannot be told.
+fn moves(object: Option<&Present>) -> Option<bool> {
+    match object.map(|o| o.motion) {
+        Some(Motion::Moving) => Some(true),
+        Some(Motion::Slow) => None,
+        Some(Motion::Parked) | None => Some(false),
+    }
+}
+
+/// SemanticKITTI's labels beside a drive.
+pub struct Semantic(PathBuf);
+
+impl Semantic {
+    /// Of the drive in a folder; none where it has none for its first sweep.
+    pub fn of(drive: &Path, source: &dyn Source) -> Option<Semantic> {
+        let drive = recognise(drive).map_or_else(|_| drive.to_path_buf(), |found| found.1);
+        labels::file(&drive, source.frame(0)).is_file().then_some(Semantic(drive))
+    }
+
+    fn returns(&self, sweep: &SweepData) -> Result<Vec<PointLabel>, Error> {
+        labels::read(&labels::file(&self.0, sweep.frame), sweep.points.len())
+    }
+}
+
+/// What is known of a class's returns.
+fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
+    match label.kind() {
+        _ if label.is_unlabelled() => None,
+        Some(_) if !drive_tells => None,
+        _ => Some(label.moving()),
+    }
+}
+
+/// False motion by SemanticKITTI's classes; none where no drive has any.
+pub fn semantic_kitti(drives: &[Facts]) -> Option<Table> {
+    let label = |class: u16| PointLabel { class, instance: 0 };
+    let (mut classes, mut counts) = (BTreeMap::<u16, [u64; 2]>::new(), MotionCounts::default());
+    let mut standing = [0; 2];
+    for drive in drives {
+        let of_drive = &drive.returns.classes;
+        let tells = of_drive.keys().any(|c| label(*c).moving());
+        for (&class, &[all, moving]) in of_drive {
+            let sum = classes.entry(class).or_default();
+            *sum = [sum[0] + all, sum[1] + moving];
+            match class_moves(label(class), tells) {
+                Some(true) => {
+                    counts.found += moving;
+                    counts.missed += all - moving;
+                }
+                Some(false) => standing = [standing[0] + all, standing[1] + moving],
+                None => {}
+            }
+        }
+    }
+    if classes.is_empty() {
+        return None;
+    }
+    counts.wrong[2] = standing[1];
+    let row = |name: &str, [all, moving]: [u64; 2]| {
+        TableRow::new([name.into(), Cell::Count(all), Cell::Count(moving), percent(moving, all)])
+    };
+    let name = |class: u16| label(class).name().map_or(format!("class {class}"), String::from);
+    let mut rows: Vec<TableRow> = classes.iter().map(|(&c, &sum)| row(&name(c), sum)).collect();
+    rows.push(row("all that stands", standing));
+    let moving = counts.found + counts.missed;
+    if moving > 0 {
+        rows.push(row("all that moves", [moving, counts.found]));
+    }
+    let caption = "Returns put out as moving, by SemanticKITTI's classes.";
+    let columns = ["Class", "Returns", "Put out as moving", "Put out as moving, %"];
+    let mut table = Table::new("semantic-kitti", caption, &columns, rows);
+    table.notes.push(note(&counts));
+    Some(table)
+}
+
+fn note(counts: &MotionCounts) -> String {
+    let MotionCounts { found, missed, wrong } = *counts;
+    let all = found + missed + wrong.iter().sum::<u64>();
+    match found + missed {
+        0 => "Whether vehicles and people move is not labelled: they count neither as standing \
+              nor as moving."
+            .into(),
+        _ => format!(
+            "Moving object segmentation: IoU of the moving class {:.1} %, over all labelled \
+             returns.",
+            100.0 * found as f64 / all as f64
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scratch::Scratch;
+    use raywake_core::pose::Pose;
+    use raywake_core::sweep::Point;
+
+    fn drive(classes: &[(u16, [u64; 2])]) -> Facts {
+        let returns =
+            ReturnCounts { classes: classes.iter().copied().collect(), ..Default::default() };
+        Facts { returns, ..Facts::default() }
+    }
+
+    #[test]
+    fn classes_of_a_drive_that_tells_what_moves_and_of_one_that_does_not() {
+        assert!(semantic_kitti(&[drive(&[])]).is_none());
+        let merged = drive(&[(0, [90, 9]), (10, [50, 20]), (40, [200, 3]), (50, [100, 1])]);
+        let table = semantic_kitti(&[merged.clone()]).unwrap();
+        assert_eq!(table.rows.len(), 5);
+        assert!(format!("{:?}", table.rows[4]).contains("Count(300), Count(4)"));
+        let told = drive(&[(1, [7, 7]), (10, [50, 2]), (252, [40, 30])]);
+        let both = semantic_kitti(&[merged, told]).unwrap();
+        assert!(format!("{:?}", both.rows[6]).contains("Count(350), Count(6)"), "{both:?}");
+        assert!(format!("{:?}", both.rows[7]).contains("Count(40), Count(30)"), "{both:?}");
+        // 30 of 40 that move and 6 that stand.
+        assert!(both.notes[0].contains("65.2 %"), "{:?}", both.notes);
+    }
+
+    #[test]
+    fn returns_are_counted_by_class() {
+        let scratch = Scratch::new();
+        let words = [50u32, 50 | 3 << 16, 10, 0].map(u32::to_le_bytes);
+        scratch.write("labels/000004.label", words.as_flattened());
+        let first = SweepData { frame: 4, points: vec![Point::default(); 4], ..Default::default() };
+        let (columns, points) = (Vec::new(), Vec::new());
+        let seen = PairData { index: 0, first, then: Pose::IDENTITY, dt_s: 0.1, columns, points };
+        let semantic = Some(Semantic(scratch.path().to_path_buf()));
+        let mut verdicts = ReturnVerdicts::new(View::Nowhere, 0.0, semantic);
+        verdicts.pair(&seen, &[], None, &[true, false, true, false]).unwrap();
+        let classes: Vec<_> = verdicts.counts.classes.into_iter().collect();
+        assert_eq!(classes, [(0, [1, 0]), (10, [1, 1]), (50, [2, 1])]);
+        assert_eq!(verdicts.counts.in_boxes, MotionCounts::default());
+    }
+}
