@@ -3,50 +3,63 @@
 use super::calibration::{self, Calibration};
 use super::drive::Settings;
 use super::facts::Facts;
+use super::flow_tables::Tallies;
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::moving::{self, ColumnVerdicts, FirstSights};
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::Tally;
-use super::{figures, read_rows, return_tables, tables};
+use super::{PAIRS, figures, flow_tables, read_rows, return_tables, tables};
 use crate::labels::CAMERA_DEG;
 use crate::report::{Picture, Report, Results};
 use raywake_io::Error;
 use std::path::Path;
 
-/// Reads the rows of all drives, writes the report and returns its tables.
-pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Results, Error> {
-    let mut tally = Tally::new();
-    let mut calibration = Calibration::default();
-    let (mut verdicts, mut sights) = (ColumnVerdicts::default(), FirstSights::default());
-    read_rows(drives, out, |facts, row| {
-        tally.row(row);
-        calibration.row(row, facts.exact);
-        verdicts.row(row, facts.exact);
-        sights.row(&facts.drive, row, facts.exact);
-    })?;
-    let curve = if settings.weights.has_filter() { tally.filter() } else { None };
+/// What the rows of all drives come to.
+struct Evidence {
+    tally: Tally,
+    /// The same pair by pair.
+    alone: Option<Tally>,
+    calibration: Calibration,
+    verdicts: ColumnVerdicts,
+    sights: FirstSights,
+}
+
+impl Evidence {
+    fn read(drives: &[Facts], pairs: &[Facts], out: &Path) -> Result<Evidence, Error> {
+        let (mut tally, mut calibration) = (Tally::new(), Calibration::default());
+        let (mut verdicts, mut sights) = (ColumnVerdicts::default(), FirstSights::default());
+        read_rows(drives, out, |facts, row| {
+            tally.row(row);
+            calibration.row(row, facts.exact);
+            verdicts.row(row, facts.exact);
+            sights.row(&facts.drive, row, facts.exact);
+        })?;
+        let mut alone = Tally::new();
+        read_rows(pairs, &out.join(PAIRS), |_, row| alone.row(row))?;
+        let alone = Some(alone).filter(|_| !pairs.is_empty());
+        Ok(Evidence { tally, alone, calibration, verdicts, sights })
+    }
+}
+
+/// Reads the rows of all drives, writes the report and returns its tables. `pairs`: the drives that
+/// were run pair by pair, too.
+pub fn conclude(
+    drives: &[Facts],
+    pairs: &[Facts],
+    settings: &Settings,
+    out: &Path,
+) -> Result<Results, Error> {
+    let evidence = Evidence::read(drives, pairs, out)?;
     let mut report = Report::new("Temporal scene flow", &subtitle(drives));
-    headlines(&mut report, &tally, drives);
+    headlines(&mut report, &evidence, drives);
     facts(&mut report, drives, settings);
-    raw_flow(&mut report, &tally, settings.profile.voxel_m);
-    report
-        .section("Temporal scene flow")
-        .text(TRACKLETS)
-        .table(tables::tracklets(&tally))
-        .chart(figures::settled(&tally))
-        .chart(figures::tracklets(&tally));
-    moving(&mut report, drives, &verdicts, &sights);
-    report
-        .section("Uncertainty")
-        .text(UNCERTAINTY)
-        .table(calibration::table(&calibration))
-        .chart(calibration::reliability(&calibration));
-    returns(&mut report, drives);
-    report
-        .section("Background filter")
-        .table(tables::filter(curve.as_ref()))
-        .chart(figures::precision_recall(curve.as_ref()));
+    if drives.iter().any(Facts::has_boxes) {
+        of_boxes(&mut report, drives, &evidence, settings);
+    }
+    if let Some(table) = moving::semantic_kitti(drives) {
+        report.section("Classes of returns").table(table);
+    }
     report
         .section("Time")
         .text(TIME)
@@ -54,34 +67,50 @@ pub fn conclude(drives: &[Facts], settings: &Settings, out: &Path) -> Result<Res
         .chart(figures::times(drives))
         .chart(figures::time_by_points(drives));
     pictures(&mut report, drives, out)?;
-    choices(&mut report, drives, settings, &tally);
+    choices(&mut report, drives, settings, &evidence.tally);
     report.write(out)
 }
 
-fn moving(report: &mut Report, drives: &[Facts], columns: &ColumnVerdicts, sights: &FirstSights) {
-    let section = report.section("Moving or not");
-    section
-        .table(moving::table(columns, drives))
-        .table(columns.by_kind())
-        .table(columns.false_motion(drives))
+/// The sections that need labelled objects.
+fn of_boxes(report: &mut Report, drives: &[Facts], evidence: &Evidence, settings: &Settings) {
+    let Evidence { tally, alone, calibration, verdicts, sights } = evidence;
+    report
+        .section("Moving or not")
+        .table(moving::table(verdicts, drives))
+        .table(verdicts.by_kind())
+        .table(verdicts.false_motion(drives))
         .table(sights.table());
-    if let Some(table) = moving::semantic_kitti(drives) {
-        section.table(table);
-    }
+    raw_flow(report, Tallies { run: tally, pairs: alone.as_ref() }, settings.profile.voxel_m);
+    report
+        .section("Temporal scene flow")
+        .text(TRACKLETS)
+        .table(tables::tracklets(tally))
+        .chart(figures::settled(tally))
+        .chart(figures::tracklets(tally));
+    report
+        .section("Uncertainty")
+        .text(UNCERTAINTY)
+        .table(calibration::table(calibration))
+        .chart(calibration::reliability(calibration));
+    returns(report, drives);
+    let curve = tally.filter().filter(|_| settings.weights.has_filter());
+    report
+        .section("Background filter")
+        .table(tables::filter(curve.as_ref()))
+        .chart(figures::precision_recall(curve.as_ref()));
 }
 
-fn raw_flow(report: &mut Report, tally: &Tally, cell_m: f64) {
-    let [by_class, by_motion] = figures::histograms(tally, cell_m);
+fn raw_flow(report: &mut Report, tallies: Tallies, cell_m: f64) {
+    let [by_class, by_motion] = figures::histograms(tallies.run, cell_m);
     report
         .section("Raw scene flow")
         .text(RAW)
-        .table(tables::raw_flow(tally, Weight::Column))
+        .table(flow_tables::raw_flow(tallies))
         .chart(by_class)
         .chart(by_motion)
-        .table(tables::references(tally, Truth::Raw))
-        .chart(figures::references(tally))
-        .table(tables::references(tally, Truth::Smooth))
-        .table(tables::raw_flow(tally, Weight::Voxel));
+        .table(flow_tables::references(tallies, Truth::Raw))
+        .chart(figures::references(tallies.run))
+        .table(flow_tables::references(tallies, Truth::Smooth));
 }
 
 fn returns(report: &mut Report, drives: &[Facts]) {
@@ -130,24 +159,33 @@ fn subtitle(drives: &[Facts]) -> String {
     format!("{drives}, {pairs} pairs of sweeps")
 }
 
-fn headlines(report: &mut Report, tally: &Tally, drives: &[Facts]) {
-    let flow = |motion| {
-        tally.flow(Estimate::Ours, Truth::Raw, ClassGroup::Labelled, motion, Weight::Column)
+/// A number with its unit; a dash where there is none.
+fn number(value: f64, unit: &str, digits: usize) -> String {
+    if value.is_finite() { format!("{value:.digits$} {unit}") } else { "–".into() }
+}
+
+fn headlines(report: &mut Report, evidence: &Evidence, drives: &[Facts]) {
+    let tally = &evidence.tally;
+    let moving = |tally: &Tally| {
+        let (labelled, moving) = (ClassGroup::Labelled, MotionGroup::Moving);
+        let errors = tally.flow(Estimate::Ours, Truth::Raw, labelled, moving, Weight::Column);
+        number(100.0 * errors.quantile(0.5), "cm", 1)
     };
-    let number = |v: f64, unit: &str, digits: usize| {
-        if v.is_finite() { format!("{v:.digits$} {unit}") } else { "–".into() }
-    };
-    let (moving, parked) = (flow(MotionGroup::Moving), flow(MotionGroup::Parked));
+    let alone = evidence.alone.as_ref().map(|t| format!("pair by pair: {}; ", moving(t)));
     let settled = tally.settled(ClassGroup::Labelled, MotionGroup::Moving, Weight::Column);
+    let counts = evidence.verdicts.all();
     report.headline(
-        &number(100.0 * moving.quantile(0.5), "cm", 1),
-        "median error of raw flow, moving",
-        "all labelled, moving and parked, in the dissertation: 11.0 cm",
+        &number(counts.precision_percent(), "%", 1),
+        "of the columns put out as moving do",
+        &format!(
+            "and {} of those that move are put out so",
+            number(counts.recall_percent(), "%", 1)
+        ),
     );
     report.headline(
-        &number(100.0 * parked.quantile(0.5), "cm", 1),
-        "median error of raw flow, parked",
-        "truth: labels as they are, which jitter",
+        &moving(tally),
+        "median error of raw flow, moving",
+        &format!("{}all labelled in the dissertation: 11.0 cm", alone.unwrap_or_default()),
     );
     report.headline(
         &number(settled.quantile(0.5), "m/s", 2),

@@ -5,6 +5,7 @@ use super::exact::Exact;
 use super::facts::{Facts, Panel};
 use super::moving::{ReturnCounts, ReturnVerdicts, Semantic};
 use super::objects::Objects;
+use super::pair_by_pair::PairByPair;
 use super::panels::Panels;
 use super::points::{PointScores, Points};
 use super::row::Row;
@@ -51,16 +52,18 @@ pub struct Settings {
     pub sweeps: usize,
     /// Time the pipeline without its filter too.
     pub all_columns: bool,
+    /// Whether the pipeline keeps what it knows from one pair to the next.
+    pub history: bool,
 }
 
 impl Settings {
     /// A run that writes nothing.
-    fn plan(&self, source: &dyn Source, weights: WeightFiles) -> RunPlan<'_> {
+    fn plan(&self, sweeps: usize, weights: WeightFiles) -> RunPlan<'_> {
         RunPlan {
             profile: self.profile.clone(),
             weights,
             backend: &self.backend,
-            sweeps: 0..self.sweeps.min(source.len()),
+            sweeps: 0..sweeps,
             out: None,
             kinds: Kinds::default(),
             summary: None,
@@ -81,6 +84,7 @@ impl Settings {
             "backend": format!("{:?}", self.backend.backend),
             "margin_m": self.margin_m,
             "all_columns": self.all_columns,
+            "history": self.history,
             "sweeps": self.sweeps.min(source.len()),
             "drive": format!("{:016x}", Digest::of(drive.as_bytes())),
         })
@@ -90,7 +94,8 @@ impl Settings {
 /// Total time of every pair where every solid column is foreground, ms.
 fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, RunError> {
     let mut totals = Vec::new();
-    let plan = settings.plan(source, settings.weights.clone().without_filter());
+    let sweeps = settings.sweeps.min(source.len());
+    let plan = settings.plan(sweeps, settings.weights.clone().without_filter());
     let summary = engine::execute(&plan, source, &mut |_, pair| {
         totals.push(pair.laps.stages().map(|s| s.1).sum());
     })?;
@@ -186,7 +191,14 @@ pub fn evaluate(
         exact: Exact::of(path),
         panels: Panels::default(),
     };
-    run(source.as_mut(), settings, &files, judges, &mut facts)?;
+    let sweeps = settings.sweeps.min(source.len());
+    if settings.history {
+        run(source.as_mut(), sweeps, settings, &files, judges, &mut facts)?;
+    } else {
+        let mut pairs = PairByPair::of(source.as_mut(), sweeps);
+        let sweeps = pairs.len();
+        run(&mut pairs, sweeps, settings, &files, judges, &mut facts)?;
+    }
     if settings.all_columns {
         facts.unfiltered = unfiltered(source.as_mut(), settings)?;
     }
@@ -238,20 +250,22 @@ impl Judges<'_> {
 /// The pipeline here, rows on a thread of their own.
 fn run(
     source: &mut dyn Source,
+    sweeps: usize,
     settings: &Settings,
     files: &Files,
     judges: Judges,
     facts: &mut Facts,
 ) -> Result<(), RunError> {
-    let plan = settings.plan(source, settings.weights.clone());
+    let plan = settings.plan(sweeps, settings.weights.clone());
     let (send, receive) = sync_channel(WAITING);
-    let drive = facts.drive.clone();
+    let (drive, history) = (facts.drive.clone(), settings.history);
     let (summary, written) = std::thread::scope(|scope| {
         let rows = scope.spawn(move || collect(&drive, judges, &receive, files));
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
             // Fails where the other thread has; it will say why.
-            let _ = send.send(Some(PairData::of(pair)));
+            let index = if history { pair.index } else { PairByPair::sweep(pair.index) };
+            let _ = send.send(Some(PairData { index, ..PairData::of(pair) }));
         });
         if summary.as_ref().is_ok_and(|s| !s.facts.interrupted) {
             let _ = send.send(None);
@@ -269,9 +283,10 @@ fn run(
     facts.sweeps = summary.sweeps;
     facts.pairs = summary.pairs;
     facts.digest = summary.digest;
-    facts
-        .notes
-        .extend(summary.resets.iter().skip(1).map(|r| format!("frame {}: {}", r.frame, r.text)));
+    if history {
+        let resets = summary.resets.iter().skip(1);
+        facts.notes.extend(resets.map(|r| format!("frame {}: {}", r.frame, r.text)));
+    }
     let dropped = summary.dropped.to_string();
     facts.notes.push(format!("left out by the pipeline: {dropped}"));
     Ok(())

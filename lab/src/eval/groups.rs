@@ -1,6 +1,7 @@
 //! What the tables tell apart: estimates, truths, classes and motions.
 
-use super::row::{CLASSES, Row};
+use super::row::{CLASSES, Row, class_of};
+use crate::labels::Kind;
 
 /// What is compared with the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -112,6 +113,9 @@ pub enum ClassGroup {
 }
 
 impl ClassGroup {
+    /// People on foot.
+    pub const PEOPLE: ClassGroup = ClassGroup::Class(class_of(Kind::Pedestrian));
+
     /// For people.
     pub fn label(self) -> &'static str {
         match self {

@@ -14,9 +14,11 @@ mod drive;
 mod exact;
 mod facts;
 mod figures;
+mod flow_tables;
 mod groups;
 mod moving;
 mod objects;
+mod pair_by_pair;
 mod panels;
 mod points;
 mod return_tables;
@@ -81,9 +83,13 @@ impl Inputs {
             margin_m: self.margin,
             sweeps: self.count.unwrap_or(usize::MAX),
             all_columns: false,
+            history: true,
         })
     }
 }
+
+/// Folder in that of the results with those of pairs on their own: a folder of results, too.
+const PAIRS: &str = "pairs";
 
 /// `raywake-lab eval`: report.html, rows/DRIVE.parquet, drives/DRIVE.json and charts.
 #[derive(clap::Args)]
@@ -102,6 +108,10 @@ pub struct Args {
     /// Run every drive once more without the filter, for the time that all columns take
     #[arg(long)]
     all_columns: bool,
+    /// Run every drive once more, pair by pair: everything known from earlier sweeps is dropped
+    /// before each pair. Its raw flow stands beside the other
+    #[arg(long)]
+    pairs: bool,
     /// Leave rows and facts only: for many processes that share a folder, the report coming last
     #[arg(long)]
     rows_only: bool,
@@ -112,9 +122,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let settings = Settings { all_columns: args.all_columns, ..args.inputs.settings()? };
     let out = args.out.as_deref().ok_or_else(|| Error::Usage("--out is missing".into()))?;
     let names = names(&args.drives)?;
-    let (done, failed) = all(&names, &settings, out, args.jobs.max(1))?;
+    let (done, mut failed) = all(&names, &settings, out, args.jobs.max(1))?;
+    let mut pairs = Vec::new();
+    if args.pairs {
+        let alone = Settings { history: false, all_columns: false, ..settings.clone() };
+        let (done, more) = all(&names, &alone, &out.join(PAIRS), args.jobs.max(1))?;
+        pairs = done;
+        failed.extend(more.into_iter().map(|(name, e)| (format!("{name}, pair by pair"), e)));
+    }
     if !done.is_empty() && !args.rows_only {
-        conclude(&done, &settings, out)?.print(out);
+        conclude(&done, &pairs, &settings, out)?.print(out);
     }
     failures("drives", &failed)
 }

@@ -29,7 +29,7 @@ pub const CLASSES: [&str; 10] = [
 ];
 
 /// Index of a kind in [`CLASSES`].
-pub fn class_of(kind: Kind) -> u8 {
+pub const fn class_of(kind: Kind) -> u8 {
     kind as u8 + 1
 }
 

@@ -27,6 +27,8 @@ pub struct Tally {
     raw: [Cells; 5],
     /// The same against smoothed labels.
     smooth: [Cells; 5],
+    /// Of what moves: errors against the labels as they are, over the true displacement.
+    relative: Cells,
     /// Settled tracklets.
     settled: Velocities,
     /// Errors of tracklets by age, against smoothed labels.
@@ -71,6 +73,10 @@ impl Tally {
             self.raw[n][class][motion].push(distance(flow, raw), row.voxels);
             self.smooth[n][class][motion].push(distance(flow, smooth), row.voxels);
         }
+        if row.is_moving() {
+            let error = distance([row.flow_x, row.flow_y], raw) / raw[0].hypot(raw[1]);
+            self.relative[class][motion].push(error, row.voxels);
+        }
         self.columns[class][motion] += 1;
         if row.is_matched() {
             self.tracklet(row, class, motion);
@@ -112,6 +118,11 @@ impl Tally {
         let by = if truth == Truth::Raw { &self.raw } else { &self.smooth };
         let n = Estimate::ALL.iter().position(|e| *e == estimate).expect("all are listed");
         gather(&by[n], group, motion).sorted(weight)
+    }
+
+    /// Errors of displacement as shares of the true one; only what moves has any.
+    pub fn relative(&self, group: ClassGroup, motion: MotionGroup, weight: Weight) -> Sorted {
+        gather(&self.relative, group, motion).sorted(weight)
     }
 
     /// Errors of the velocity of settled tracklets against smoothed labels, m/s.
@@ -193,6 +204,9 @@ mod tests {
             Weight::Voxel,
         );
         assert_eq!(voxels.count(), 9);
+        // 0.1 m of 0.5 m, and all of 0.4 m.
+        let relative = tally.relative(ClassGroup::Labelled, MotionGroup::Any, Weight::Column);
+        assert!(relative.count() == 2 && near(relative.mean(), 0.6));
         assert_eq!(tally.coverage(ClassGroup::Labelled, MotionGroup::Moving), [2, 1]);
         assert!(near(
             tally.settled(ClassGroup::Labelled, MotionGroup::Moving, Weight::Column).mean(),

@@ -2,9 +2,9 @@
 
 use super::variants::{VARIANTS, Variant};
 use crate::eval::facts::Facts;
+use crate::eval::flow_tables::WITHIN_M;
 use crate::eval::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use crate::eval::statistics::Weight;
-use crate::eval::tables::WITHIN_M;
 use crate::eval::tally::Tally;
 use crate::report::{Cell, Table, TableRow};
 use raywake::budget::device_bytes;

@@ -50,7 +50,14 @@ impl ColumnVerdicts {
         }
     }
 
-    /// All of them.
+    /// Of any truth.
+    pub fn all(&self) -> MotionCounts {
+        let mut all = self.counts(true);
+        all.merge(&self.counts(false));
+        all
+    }
+
+    /// Of one kind of truth.
     pub fn counts(&self, exact: bool) -> MotionCounts {
         self.0[usize::from(exact)].counts
     }

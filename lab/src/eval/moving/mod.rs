@@ -40,8 +40,13 @@ pub struct MotionCounts {
     pub wrong: [u64; 3],
 }
 
+/// A share, %; NaN of nothing.
+fn share(part: u64, whole: u64) -> f64 {
+    if whole == 0 { f64::NAN } else { 100.0 * part as f64 / whole as f64 }
+}
+
 fn percent(part: u64, whole: u64) -> Cell {
-    Cell::Number(if whole == 0 { f64::NAN } else { 100.0 * part as f64 / whole as f64 }, 1)
+    Cell::Number(share(part, whole), 1)
 }
 
 fn per_sweep(count: u64, sweeps: u64) -> Cell {
@@ -66,17 +71,28 @@ impl MotionCounts {
         self.wrong.iter_mut().zip(other.wrong).for_each(|(a, b)| *a += b);
     }
 
+    /// Share of what is put out as moving that moves, %.
+    pub fn precision_percent(&self) -> f64 {
+        share(self.found, self.found + self.wrong.iter().sum::<u64>())
+    }
+
+    /// Share of what moves that is put out so, %.
+    pub fn recall_percent(&self) -> f64 {
+        share(self.found, self.found + self.missed)
+    }
+
     /// As [`COLUMNS`] has them.
     fn cells(&self, sweeps: u64) -> Vec<Cell> {
         let MotionCounts { found, missed, wrong } = *self;
         let all_wrong: u64 = wrong.iter().sum();
         let counts = [found, all_wrong, missed].map(Cell::Count);
         let shares = [
-            percent(found, found + all_wrong),
-            percent(found, found + missed),
-            percent(found, found + all_wrong + missed),
-            percent(found, found + all_wrong - wrong[0]),
+            self.precision_percent(),
+            self.recall_percent(),
+            share(found, found + all_wrong + missed),
+            share(found, found + all_wrong - wrong[0]),
         ];
+        let shares = shares.map(|v| Cell::Number(v, 1));
         counts.into_iter().chain(shares).chain(wrong.map(|n| per_sweep(n, sweeps))).collect()
     }
 }

@@ -1,7 +1,6 @@
 //! Verdicts on returns: by labelled boxes or exact truth, and by the classes of SemanticKITTI.
 
-use super::MotionCounts;
-use super::percent;
+use super::{MotionCounts, share};
 use crate::eval::collect::PairData;
 use crate::eval::facts::Facts;
 use crate::eval::objects::Present;
@@ -61,12 +60,10 @@ impl ReturnVerdicts {
             };
             let there = object.map_or(Some(seen.now()), |o| Some(o.step?.raw * seen.now()));
             let stays = |by| self.view.holds((next_from_world * by).transform(at));
-            if there.is_some_and(stays)
-                && let Some(moves) = moves(object)
-            {
-                let mover_m = if *put_out { Present::mover_m(present, at) } else { 0.0 };
-                self.counts.in_boxes.add(moves, *put_out, mover_m);
-            }
+            let Some(moves) = moves(object).filter(|_| there.is_some_and(stays)) else { continue };
+            // The distance matters to false motion alone.
+            let mover_m = if *put_out { Present::mover_m(present, at) } else { 0.0 };
+            self.counts.in_boxes.add(moves, *put_out, mover_m);
         }
         let Some(semantic) = &self.semantic else { return Ok(()) };
         for (label, put_out) in semantic.returns(&seen.first)?.iter().zip(put_out) {
@@ -102,70 +99,69 @@ impl Semantic {
     }
 }
 
-/// What is known of a class's returns.
-fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
-    match label.kind() {
-        _ if label.is_unlabelled() => None,
-        Some(_) if !drive_tells => None,
-        _ => Some(label.moving()),
+/// The classes of all drives.
+#[derive(Default)]
+struct ClassSums {
+    /// How many returns, and put out as moving.
+    classes: BTreeMap<u16, [u64; 2]>,
+    /// Of those that stand, and of those that move.
+    of_motion: [[u64; 2]; 2],
+}
+
+impl ClassSums {
+    fn add(&mut self, of_drive: &BTreeMap<u16, [u64; 2]>) {
+        let drive_tells = of_drive.keys().any(|class| label(*class).moving());
+        for (&class, counts) in of_drive {
+            let add = |sum: &mut [u64; 2]| sum.iter_mut().zip(counts).for_each(|(s, n)| *s += n);
+            add(self.classes.entry(class).or_default());
+            if let Some(moves) = class_moves(label(class), drive_tells) {
+                add(&mut self.of_motion[usize::from(moves)]);
+            }
+        }
     }
+
+    fn note(&self) -> String {
+        let [[_, wrong], [moving, found]] = self.of_motion;
+        if moving == 0 {
+            return "Whether vehicles and people move is not labelled: they count neither as \
+                standing nor as moving."
+                .into();
+        }
+        let iou = share(found, moving + wrong);
+        format!("Moving object segmentation: IoU {iou:.1} % of all labelled returns.")
+    }
+}
+
+fn label(class: u16) -> PointLabel {
+    PointLabel { class, instance: 0 }
+}
+
+/// Whether the returns of a class move; `None` where that cannot be told. A drive whose moving
+/// objects have no classes of their own tells nothing of what could move.
+fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
+    let told = drive_tells || label.kind().is_none();
+    (told && !label.is_unlabelled()).then_some(label.moving())
 }
 
 /// False motion by SemanticKITTI's classes; none where no drive has any.
 pub fn semantic_kitti(drives: &[Facts]) -> Option<Table> {
-    let label = |class: u16| PointLabel { class, instance: 0 };
-    let (mut classes, mut counts) = (BTreeMap::<u16, [u64; 2]>::new(), MotionCounts::default());
-    let mut standing = [0; 2];
-    for drive in drives {
-        let of_drive = &drive.returns.classes;
-        let tells = of_drive.keys().any(|c| label(*c).moving());
-        for (&class, &[all, moving]) in of_drive {
-            let sum = classes.entry(class).or_default();
-            *sum = [sum[0] + all, sum[1] + moving];
-            match class_moves(label(class), tells) {
-                Some(true) => {
-                    counts.found += moving;
-                    counts.missed += all - moving;
-                }
-                Some(false) => standing = [standing[0] + all, standing[1] + moving],
-                None => {}
-            }
-        }
-    }
-    if classes.is_empty() {
+    let mut sums = ClassSums::default();
+    drives.iter().for_each(|drive| sums.add(&drive.returns.classes));
+    if sums.classes.is_empty() {
         return None;
     }
-    counts.wrong[2] = standing[1];
     let row = |name: &str, [all, moving]: [u64; 2]| {
-        TableRow::new([name.into(), Cell::Count(all), Cell::Count(moving), percent(moving, all)])
+        let percent = Cell::Number(share(moving, all), 2);
+        TableRow::new([name.into(), Cell::Count(all), Cell::Count(moving), percent])
     };
     let name = |class: u16| label(class).name().map_or(format!("class {class}"), String::from);
-    let mut rows: Vec<TableRow> = classes.iter().map(|(&c, &sum)| row(&name(c), sum)).collect();
-    rows.push(row("all that stands", standing));
-    let moving = counts.found + counts.missed;
-    if moving > 0 {
-        rows.push(row("all that moves", [moving, counts.found]));
-    }
+    let classes = sums.classes.iter().map(|(&class, &counts)| row(&name(class), counts));
+    let motions = ["all that stands", "all that moves"].into_iter().zip(sums.of_motion);
+    let motions = motions.filter(|(_, counts)| counts[0] > 0).map(|(name, c)| row(name, c));
     let caption = "Returns put out as moving, by SemanticKITTI's classes.";
     let columns = ["Class", "Returns", "Put out as moving", "Put out as moving, %"];
-    let mut table = Table::new("semantic-kitti", caption, &columns, rows);
-    table.notes.push(note(&counts));
-    Some(table)
-}
-
-fn note(counts: &MotionCounts) -> String {
-    let MotionCounts { found, missed, wrong } = *counts;
-    let all = found + missed + wrong.iter().sum::<u64>();
-    match found + missed {
-        0 => "Whether vehicles and people move is not labelled: they count neither as standing \
-              nor as moving."
-            .into(),
-        _ => format!(
-            "Moving object segmentation: IoU of the moving class {:.1} %, over all labelled \
-             returns.",
-            100.0 * found as f64 / all as f64
-        ),
-    }
+    let rows = classes.chain(motions).collect();
+    Some(Table::new("semantic-kitti", caption, &columns, rows).note(&sums.note()))
 }
 
 #[cfg(test)]
@@ -185,7 +181,7 @@ mod tests {
     fn classes_of_a_drive_that_tells_what_moves_and_of_one_that_does_not() {
         assert!(semantic_kitti(&[drive(&[])]).is_none());
         let merged = drive(&[(0, [90, 9]), (10, [50, 20]), (40, [200, 3]), (50, [100, 1])]);
-        let table = semantic_kitti(&[merged.clone()]).unwrap();
+        let table = semantic_kitti(std::slice::from_ref(&merged)).unwrap();
         assert_eq!(table.rows.len(), 5);
         assert!(format!("{:?}", table.rows[4]).contains("Count(300), Count(4)"));
         let told = drive(&[(1, [7, 7]), (10, [50, 2]), (252, [40, 30])]);

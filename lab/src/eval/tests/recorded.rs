@@ -1,0 +1,59 @@
+//! Recorded drives: what is measured on them must not get worse. `RAYWAKE_DATA` names the folder
+//! that holds them. Limits stand a little beyond what was measured when they were written; where
+//! something gets better, tighten them.
+
+use super::{eval, figure};
+use crate::scratch::Scratch;
+use std::path::{Path, PathBuf};
+
+/// Evaluates a recorded drive and returns the folder of results.
+fn evaluated(scratch: &Scratch, drive: &str, options: &[&str]) -> PathBuf {
+    let folder = std::env::var_os("RAYWAKE_DATA").expect("RAYWAKE_DATA");
+    let out = scratch.path().join("out");
+    eval(&[&PathBuf::from(folder).join(drive), Path::new("--out"), &out], options).unwrap();
+    out
+}
+
+#[test]
+#[ignore = "needs RAYWAKE_DATA"]
+fn movers_are_found_and_little_else() {
+    let scratch = Scratch::new();
+    let out = evaluated(&scratch, "kitti_raw_0005", &["-n", "40", "--pairs"]);
+    let verdict = |of: &str, column: &str| figure(&out, "moving-or-not", &[of, "labels"], column);
+    let flow = |column: &str| figure(&out, "table-3-1", &["All labelled", "moving"], column);
+    let late =
+        |class: &str| figure(&out, "first-sight", &["labels", class], "Half of it: median, s");
+    for (what, value, least, most) in [
+        ("precision of columns", verdict("columns", "Precision, %"), 45.0, 100.0),
+        ("recall of columns", verdict("columns", "Recall, %"), 91.5, 100.0),
+        ("IoU of columns", verdict("columns", "IoU, %"), 44.0, 100.0),
+        ("0.5 m forgiven", verdict("columns", "Precision, 0.5 m forgiven, %"), 58.0, 100.0),
+        ("false columns a sweep far from movers", verdict("columns", "Farther"), 0.0, 30.0),
+        ("IoU of returns", verdict("returns", "IoU, %"), 55.0, 100.0),
+        ("median error of raw flow, cm", flow("Median, cm"), 0.0, 2.0),
+        ("the same pair by pair, cm", flow("Median, cm (pair by pair)"), 0.0, 1.8),
+        ("seconds until half the van is found", late("Van"), 0.1, 0.15),
+        ("seconds until half the cyclist is found", late("Cyclist"), 0.1, 0.15),
+    ] {
+        println!("{what}: {value}");
+        assert!((least..=most).contains(&value), "{what}: {value}, not {least} to {most}");
+    }
+}
+
+#[test]
+#[ignore = "needs RAYWAKE_DATA"]
+fn what_stands_is_put_out_so() {
+    let scratch = Scratch::new();
+    let out = evaluated(&scratch, "kitti_odometry_00", &["--deskew", "off"]);
+    let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Put out as moving, %");
+    for (class, most) in [
+        ("all that stands", 0.25),
+        ("building", 0.35),
+        ("vegetation", 0.45),
+        ("fence", 2.5),
+        ("sidewalk", 0.35),
+    ] {
+        println!("{class}: {}", share(class));
+        assert!(share(class) <= most, "{} % of {class}", share(class));
+    }
+}
