@@ -57,7 +57,7 @@ pub fn conclude(
     if drives.iter().any(Facts::has_boxes) {
         of_boxes(&mut report, drives, &evidence, settings);
     }
-    if let Some(table) = moving::semantic_kitti(drives) {
+    if let Some(table) = moving::semantic_kitti(drives.iter().map(|d| &d.returns)) {
         report.section("Classes of returns").table(table);
     }
     report

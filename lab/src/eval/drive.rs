@@ -161,36 +161,8 @@ pub fn evaluate(
     // Rows of other settings must not pass for those of the facts that are there.
     files.forget()?;
     let objects = Objects::new(&labels, source.as_ref());
-    let mut facts = Facts {
-        drive: name.to_string(),
-        settings: key,
-        view: view(labels.view).into(),
-        exact: labels.exact,
-        tracks: labels.tracks.len(),
-        boxes: labels.tracks.iter().map(|t| t.boxes.len()).sum(),
-        notes: [source.notes(), &labels.notes].concat(),
-        ..Facts::default()
-    };
-    let judges = Judges {
-        collector: Collector::new(
-            settings.profile.clone(),
-            source.rig().clone(),
-            source.pose(0),
-            settings.weights.tables(&settings.profile)?.filter,
-            &objects,
-            labels.view,
-            settings.margin_m,
-        ),
-        points: Points::new(
-            labels.view,
-            source.rig().ground_m,
-            settings.margin_m,
-            settings.profile.voxel_m,
-        ),
-        returns: ReturnVerdicts::new(labels.view, settings.margin_m, semantic),
-        exact: Exact::of(path),
-        panels: Panels::default(),
-    };
+    let mut facts = known(name, key, source.as_ref(), &labels);
+    let judges = Judges::new(path, source.as_ref(), settings, &labels, &objects, semantic)?;
     let sweeps = settings.sweeps.min(source.len());
     if settings.history {
         run(source.as_mut(), sweeps, settings, &files, judges, &mut facts)?;
@@ -205,6 +177,20 @@ pub fn evaluate(
     facts.seconds = begin.elapsed().as_secs_f64();
     facts.write(&files.facts)?;
     Ok((facts, false))
+}
+
+/// What is known of a drive before it is run.
+fn known(name: &str, key: serde_json::Value, source: &dyn Source, labels: &Labels) -> Facts {
+    Facts {
+        drive: name.to_string(),
+        settings: key,
+        view: view(labels.view).into(),
+        exact: labels.exact,
+        tracks: labels.tracks.len(),
+        boxes: labels.tracks.iter().map(|t| t.boxes.len()).sum(),
+        notes: [source.notes(), &labels.notes].concat(),
+        ..Facts::default()
+    }
 }
 
 /// Boxes of the drive; none will do where its returns are labelled.
@@ -233,7 +219,27 @@ struct Judges<'a> {
     panels: Panels,
 }
 
-impl Judges<'_> {
+impl<'a> Judges<'a> {
+    fn new(
+        path: &Path,
+        source: &dyn Source,
+        settings: &Settings,
+        labels: &Labels,
+        objects: &'a Objects,
+        semantic: Option<Semantic>,
+    ) -> Result<Judges<'a>, Error> {
+        let (profile, view, margin_m) = (&settings.profile, labels.view, settings.margin_m);
+        let filter = settings.weights.tables(profile)?.filter;
+        let (rig, start) = (source.rig().clone(), source.pose(0));
+        Ok(Judges {
+            points: Points::new(view, rig.ground_m, margin_m, profile.voxel_m),
+            collector: Collector::new(profile.clone(), rig, start, filter, objects, view, margin_m),
+            returns: ReturnVerdicts::new(view, margin_m, semantic),
+            exact: Exact::of(path),
+            panels: Panels::default(),
+        })
+    }
+
     /// The rows of a pair.
     fn pair(&mut self, seen: &PairData) -> Result<Vec<Row>, Error> {
         let present = self.collector.present(seen);

@@ -53,8 +53,9 @@ pub fn tracklets(tally: &Tally) -> Table {
         rows.extend(published_tracklets(group));
     }
     let caption = "As table 3.2 of the dissertation: error of the velocity of tracklets of age 10 \
-        and more. Truth: smoothed labels, parked objects at rest, and beside them the labels as they are, whose \
-        distance from the smoothed ones is their floor; a simulator's labels are exact. Coverage: columns with such a tracklet, of all.";
+        and more. Truth: smoothed labels, parked objects at rest, and beside them the labels as \
+        they are, whose distance from the smoothed ones is their floor; a simulator's labels are \
+        exact. Coverage: columns with such a tracklet, of all.";
     Table::new("table-3-2", caption, &TRACKLETS, rows)
 }
 

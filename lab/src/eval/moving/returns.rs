@@ -2,7 +2,6 @@
 
 use super::{MotionCounts, share};
 use crate::eval::collect::PairData;
-use crate::eval::facts::Facts;
 use crate::eval::objects::Present;
 use crate::labels::semantic_kitti::{self as labels, PointLabel};
 use crate::labels::{Motion, View};
@@ -144,9 +143,9 @@ fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
 }
 
 /// False motion by SemanticKITTI's classes; none where no drive has any.
-pub fn semantic_kitti(drives: &[Facts]) -> Option<Table> {
+pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Option<Table> {
     let mut sums = ClassSums::default();
-    drives.iter().for_each(|drive| sums.add(&drive.returns.classes));
+    drives.for_each(|drive| sums.add(&drive.classes));
     if sums.classes.is_empty() {
         return None;
     }
@@ -171,21 +170,19 @@ mod tests {
     use raywake_core::pose::Pose;
     use raywake_core::sweep::Point;
 
-    fn drive(classes: &[(u16, [u64; 2])]) -> Facts {
-        let returns =
-            ReturnCounts { classes: classes.iter().copied().collect(), ..Default::default() };
-        Facts { returns, ..Facts::default() }
+    fn drive(classes: &[(u16, [u64; 2])]) -> ReturnCounts {
+        ReturnCounts { classes: classes.iter().copied().collect(), ..ReturnCounts::default() }
     }
 
     #[test]
     fn classes_of_a_drive_that_tells_what_moves_and_of_one_that_does_not() {
-        assert!(semantic_kitti(&[drive(&[])]).is_none());
+        assert!(semantic_kitti([drive(&[])].iter()).is_none());
         let merged = drive(&[(0, [90, 9]), (10, [50, 20]), (40, [200, 3]), (50, [100, 1])]);
-        let table = semantic_kitti(std::slice::from_ref(&merged)).unwrap();
+        let table = semantic_kitti([&merged].into_iter()).unwrap();
         assert_eq!(table.rows.len(), 5);
         assert!(format!("{:?}", table.rows[4]).contains("Count(300), Count(4)"));
         let told = drive(&[(1, [7, 7]), (10, [50, 2]), (252, [40, 30])]);
-        let both = semantic_kitti(&[merged, told]).unwrap();
+        let both = semantic_kitti([merged, told].iter()).unwrap();
         assert!(format!("{:?}", both.rows[6]).contains("Count(350), Count(6)"), "{both:?}");
         assert!(format!("{:?}", both.rows[7]).contains("Count(40), Count(30)"), "{both:?}");
         // 30 of 40 that move and 6 that stand.
