@@ -1,5 +1,5 @@
 //! Writes two pictures of a sweep, from above and as the sensor sees it:
-//! `look SEED SWEEP FOLDER [RIG]`.
+//! `look SEED SWEEP FOLDER [RIG] [SCENERY]`.
 
 use raywake_sim::{Class, Drive, Options, SensorRig, SimSweep};
 use std::io::Write;
@@ -71,7 +71,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = arguments.get(2).map_or(".", String::as_str);
     let rig: SensorRig = arguments.get(3).map_or("hdl64", String::as_str).parse()?;
     let eye = rig.mounts.first().map_or(0.0, |m| m.vehicle_from_sensor.translation.z) as f32;
-    let drive = Drive::new(number(0), Options { rig, ..Options::default() });
+    let scenery = arguments.get(4).map_or("street", String::as_str).parse()?;
+    let drive = Drive::new(number(0), Options { rig, scenery, ..Options::default() });
     let begin = std::time::Instant::now();
     let sweep = drive.sweep(number(1) as usize);
     println!("{} returns in {:.0} ms", sweep.points.len(), 1e3 * begin.elapsed().as_secs_f64());

@@ -6,6 +6,7 @@ use crate::path::Path;
 use crate::rig::{PERIOD_S, SensorRig, stamp_s};
 use crate::rng::Rng;
 use crate::scene::{ObjectState, Scene};
+use crate::scenery::Scenery;
 use crate::still::Still;
 use crate::truth::Truth;
 use glam::DQuat;
@@ -17,7 +18,9 @@ use raywake_core::sweep::{Point, Rig};
 pub struct Options {
     /// Sweeps, 10 a second.
     pub sweeps: usize,
-    /// What the vehicle does.
+    /// What is driven through.
+    pub scenery: Scenery,
+    /// What the vehicle does in a street; elsewhere the scene knows.
     pub ego: Ego,
     /// Amount of traffic; 1 is a busy street, 0 an empty one.
     pub density: f64,
@@ -30,7 +33,14 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { sweeps: 30, ego: Ego::Any, density: 1.0, rig: SensorRig::hdl64(), threads: 0 }
+        Options {
+            sweeps: 30,
+            scenery: Scenery::Street,
+            ego: Ego::Any,
+            density: 1.0,
+            rig: SensorRig::hdl64(),
+            threads: 0,
+        }
     }
 }
 
@@ -62,12 +72,12 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive down a street that the seed draws.
+    /// A drive through a scene that the seed draws.
     pub fn new(seed: u64, options: Options) -> Drive {
         let duration_s = options.sweeps as f64 * PERIOD_S;
-        let plan = options.ego.plan(seed, duration_s);
-        let scene = Scene::around(seed, &plan, duration_s, options.density);
-        Drive::through(scene, plan.path, seed, options)
+        let Options { scenery, ego, density, .. } = options;
+        let (scene, path) = scenery.draw(seed, ego, duration_s, density);
+        Drive::through(scene, path, seed, options)
     }
 
     /// A drive along a path (street frame) through a given scene; the seed draws the noise, and

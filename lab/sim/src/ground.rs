@@ -1,9 +1,10 @@
 //! The ground: two gently sloped planes that meet in a valley or a crest, and sidewalks raised by
-//! a kerb beside two roads that cross.
+//! a kerb beside two roads that cross. Or any other relief.
 //!
 //! Street frame: x along the main road, y left, z up.
 
 use crate::dimensions::{CROSS_HALF, ROAD_HALF, SIDEWALK};
+use crate::relief::Relief;
 use crate::roughness::roughness;
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
@@ -24,6 +25,8 @@ pub struct Ground {
     kerb: f64,
     /// Largest unevenness of the road, m.
     bumps: f64,
+    /// What lies there instead of the planes and the roads.
+    relief: Option<Relief>,
 }
 
 /// Where a ray meets the ground.
@@ -38,7 +41,19 @@ pub struct Contact {
 impl Ground {
     /// The plane z = 0.
     pub fn flat() -> Ground {
-        Ground { planes: [DVec3::ZERO; 2], valley: true, crossing: None, kerb: 0.0, bumps: 0.0 }
+        Ground {
+            planes: [DVec3::ZERO; 2],
+            valley: true,
+            crossing: None,
+            kerb: 0.0,
+            bumps: 0.0,
+            relief: None,
+        }
+    }
+
+    /// Ground of another relief, without kerbs.
+    pub(crate) fn of(relief: Relief) -> Ground {
+        Ground { relief: Some(relief), ..Ground::flat() }
     }
 
     /// A street whose slope changes at `bend_m` from `slopes[0]` to `slopes[1]` (rise over run
@@ -56,7 +71,7 @@ impl Ground {
             valley: slopes[1] >= slopes[0],
             crossing: Some(crossing_m),
             kerb: kerb_m,
-            bumps: 0.0,
+            ..Ground::flat()
         }
     }
 
@@ -77,6 +92,9 @@ impl Ground {
     /// Height as a foot or wheel finds it, m: the road, or the sidewalk with its kerb smoothed to
     /// a ramp so that whoever climbs it has a velocity.
     pub fn height(&self, x: f64, y: f64) -> f64 {
+        if let Some(relief) = &self.relief {
+            return relief.height(x, y);
+        }
         let [a, b] = self.planes.map(|p| p.x * x + p.y * y + p.z);
         let road = if self.valley { a.max(b) } else { a.min(b) };
         let u = (0.5 + self.beyond_kerb(x, y) / RAMP).clamp(0.0, 1.0);
@@ -96,9 +114,21 @@ impl Ground {
 
     /// Where the ray from `o` (above the ground) along the unit vector `d` meets the ground.
     pub fn contact(&self, o: DVec3, d: DVec3) -> Option<Contact> {
+        if let Some(relief) = &self.relief {
+            let range = relief.reach(o, d)?;
+            let at = o + d * range;
+            let contact = Contact { range, cosine: relief.cosine(at, d) };
+            return Some(self.bumped(contact, at, relief.roughening(at.x, at.y)));
+        }
         let level = |range: f64| {
             let met = range > 0.0 && range.is_finite();
-            met.then(|| self.bumped(o, d, Contact { range, cosine: self.cosine(d) }))
+            met.then(|| {
+                let (contact, at) = (Contact { range, cosine: self.cosine(d) }, o + d * range);
+                let beyond = self.beyond_kerb(at.x, at.y);
+                let scale =
+                    1.0 + 0.5 * beyond.clamp(0.0, 1.0) + (beyond - SIDEWALK).clamp(0.0, 2.5);
+                self.bumped(contact, at, scale)
+            })
         };
         let low = self.reach(o, d, 0.0);
         if self.crossing.is_none() {
@@ -125,14 +155,12 @@ impl Ground {
         Some(Contact { range: after, cosine: if along_x { d.y.abs() } else { d.x.abs() } })
     }
 
-    /// The contact moved along the ray to where the bump at its place is met.
-    fn bumped(&self, o: DVec3, d: DVec3, contact: Contact) -> Contact {
+    /// The contact moved along the ray to where the bump at its place is met; bumps are `scale`
+    /// times as high as on the road.
+    fn bumped(&self, contact: Contact, at: DVec3, scale: f64) -> Contact {
         if self.bumps == 0.0 {
             return contact;
         }
-        let at = o + d * contact.range;
-        let beyond = self.beyond_kerb(at.x, at.y);
-        let scale = 1.0 + 0.5 * beyond.clamp(0.0, 1.0) + (beyond - SIDEWALK).clamp(0.0, 2.5);
         let height = self.bumps * scale * roughness(at.x, at.y);
         // A grazing ray meets a bump long before it or flies over: no farther than its width.
         let shift = (height / contact.cosine.max(1e-3)).clamp(-1.0, 1.0);

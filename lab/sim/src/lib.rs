@@ -1,9 +1,10 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 //! A small deterministic LIDAR simulator: a street with buildings, trees, parked and moving
-//! traffic, seen by spinning sensors on a moving vehicle, with the exact truth of every return.
+//! traffic, or another [`Scenery`], seen by spinning sensors on a moving vehicle, with the exact
+//! truth of every return.
 //!
-//! [`Drive::new`] draws a street and iterates its sweeps; [`Drive::through`] takes a [`Scene`] put
+//! [`Drive::new`] draws a scene and iterates its sweeps; [`Drive::through`] takes a [`Scene`] put
 //! together by hand. The same seed gives the same bytes on the same machine, whatever the number
 //! of threads.
 //!
@@ -12,6 +13,7 @@
 //! crate is in the world or vehicle frame unless it says otherwise. Where the vehicle frame lies on
 //! the vehicle is the rig's choice ([`SensorRig::origin`]).
 
+mod bend;
 mod cast;
 mod dimensions;
 mod drive;
@@ -19,11 +21,14 @@ mod ego;
 mod ground;
 pub mod models;
 mod object;
+mod outskirts;
 mod path;
+mod relief;
 mod rig;
 mod rng;
 mod roughness;
 mod scene;
+mod scenery;
 mod sensor;
 mod shape;
 mod still;
@@ -36,10 +41,12 @@ pub use drive::{Drive, Options, SimSweep};
 pub use ego::Ego;
 pub use ground::{Contact, Ground};
 pub use object::{Class, Fixture, Object, Part, Surface, Swing};
+pub use outskirts::Place;
 pub use path::{Path, State};
 pub use rig::{Mount, PERIOD_S, SensorRig, UnknownRig, stamp_s};
 pub use rng::Rng;
 pub use scene::{ObjectState, Scene};
+pub use scenery::{Scenery, UnknownScenery};
 pub use sensor::{Beam, Sensor};
 pub use shape::{Crossing, Shape};
 pub use truth::Truth;

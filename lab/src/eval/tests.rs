@@ -40,7 +40,7 @@ fn drive(folder: &Path) -> PathBuf {
 }
 
 fn drive_of(folder: &Path, motion: Motion, sweeps: usize) -> PathBuf {
-    let recipe = Recipe { seed: 3, sweeps, sensor: "hdl64".to_string(), motion, density: 1.0 };
+    let recipe = Recipe { seed: 3, sweeps, motion, ..Recipe::default() };
     write(folder, &recipe, 1, 2, true).unwrap();
     folder.join("2000_01_01/2000_01_01_drive_0000_sync")
 }

@@ -8,7 +8,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
 use raywake_io::Error;
 use raywake_io::sink::atomic::create_folder;
-use raywake_sim::{Drive, Ego, Options, Rng, SensorRig, SimSweep};
+use raywake_sim::{Drive, Ego, Options, Rng, Scenery, SensorRig, SimSweep};
 use serde_json::json;
 use std::fs;
 use std::io;
@@ -44,17 +44,31 @@ pub struct Recipe {
     pub sweeps: usize,
     /// One of [`SensorRig::NAMES`].
     pub sensor: String,
-    /// What the vehicle does.
+    /// What is driven through.
+    pub scenery: Scenery,
+    /// What the vehicle does in a street.
     pub motion: Motion,
     /// Amount of traffic; 1 is a busy street.
     pub density: f64,
 }
 
+impl Default for Recipe {
+    fn default() -> Recipe {
+        Recipe {
+            seed: 1,
+            sweeps: 100,
+            sensor: "hdl64".to_owned(),
+            scenery: Scenery::Street,
+            motion: Motion::Any,
+            density: 1.0,
+        }
+    }
+}
+
 impl Recipe {
     /// The simulator of drive `number`.
     pub fn drive(&self, number: usize, threads: usize) -> Result<Drive, Error> {
-        let mut rng = Rng::split(self.seed, number as u64);
-        let seed = rng.bits();
+        let (seed, mut rng) = self.chance(number);
         let ego = match self.motion {
             Motion::Any => Ego::Any,
             Motion::Standing => Ego::Standing,
@@ -62,8 +76,21 @@ impl Recipe {
             Motion::Turn => Ego::turn(&mut rng),
             Motion::StopAndGo => Ego::stop_and_go(&mut rng),
         };
-        let (sweeps, density, rig) = (self.sweeps, self.density, self.sensors()?);
-        Ok(Drive::new(seed, Options { sweeps, ego, density, rig, threads }))
+        let options = Options {
+            sweeps: self.sweeps,
+            scenery: self.scenery,
+            ego,
+            density: self.density,
+            rig: self.sensors()?,
+            threads,
+        };
+        Ok(Drive::new(seed, options))
+    }
+
+    /// The seed of drive `number`, and what its motion is drawn from.
+    fn chance(&self, number: usize) -> (u64, Rng) {
+        let mut rng = Rng::split(self.seed, number as u64);
+        (rng.bits(), rng)
     }
 
     /// The sensors.
@@ -81,7 +108,7 @@ impl Recipe {
     /// What tells a drive from any other.
     fn manifest(&self, number: usize) -> String {
         let motion = clap::ValueEnum::to_possible_value(&self.motion);
-        let manifest = json!({
+        let mut manifest = json!({
             "raywake": env!("CARGO_PKG_VERSION"),
             "seed": self.seed,
             "drive": number,
@@ -90,6 +117,13 @@ impl Recipe {
             "ego": motion.map_or_else(String::new, |m| m.get_name().to_owned()),
             "density": self.density,
         });
+        // What was there before anything else could be chosen says no more than it did.
+        if self.scenery != Scenery::Street {
+            manifest["scenery"] = self.scenery.name().into();
+        }
+        if let Some(place) = self.scenery.place(self.chance(number).0) {
+            manifest["place"] = place.name().into();
+        }
         format!("{manifest}\n")
     }
 }

@@ -17,12 +17,12 @@ mod tests;
 
 pub use drive::{Motion, Recipe};
 
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use drive::State;
 use raywake::progress::Progress;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_sim::SensorRig;
+use raywake_sim::{Scenery, SensorRig};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -53,7 +53,11 @@ pub struct Args {
     #[arg(long, default_value = "hdl64")]
     #[arg(value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
     sensor: String,
-    /// What the vehicle does.
+    /// What is driven through: a street; or `outskirts`, which nothing is trained or tuned on, one
+    /// of the places after it, drawn for every drive.
+    #[arg(long, default_value = "street", value_parser = sceneries())]
+    scenery: Scenery,
+    /// What the vehicle does in a street; elsewhere the place tells.
     #[arg(long, value_enum, default_value = "any")]
     ego: Motion,
     /// Amount of traffic: 1 is a busy street, 0 an empty one.
@@ -62,6 +66,12 @@ pub struct Args {
     /// Threads; as many as the machine runs at once unless given.
     #[arg(long)]
     jobs: Option<usize>,
+}
+
+/// Reads the name of a scenery.
+fn sceneries() -> impl TypedValueParser<Value = Scenery> {
+    PossibleValuesParser::new(Scenery::all().map(Scenery::name))
+        .try_map(|name| name.parse::<Scenery>())
 }
 
 /// Reads a density.
@@ -86,6 +96,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         seed: args.seed,
         sweeps: args.sweeps as usize,
         sensor: args.sensor.clone(),
+        scenery: args.scenery,
         motion: args.ego,
         density: args.density,
     };

@@ -7,13 +7,13 @@ use crate::scratch::Scratch;
 use glam::DVec3;
 use raywake_core::sweep::Timing;
 use raywake_io::source::{OpenOptions, SweepData, open};
-use raywake_sim::SimSweep;
+use raywake_sim::{Scenery, SimSweep};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 fn recipe(sensor: &str, motion: Motion, sweeps: usize) -> Recipe {
-    Recipe { seed: 5, sweeps, sensor: sensor.into(), motion, density: 0.6 }
+    Recipe { seed: 5, sweeps, sensor: sensor.into(), motion, density: 0.6, ..Recipe::default() }
 }
 
 fn drive_folder(out: &Path, number: usize) -> PathBuf {

@@ -1,0 +1,88 @@
+//! Lines of constant curvature: the axis of a road that bends evenly.
+
+use crate::path::{Path, State};
+
+/// Curvature below which a line is taken as straight, 1/m: a kilometre of it leaves the straight
+/// line by half a millimetre.
+const STRAIGHT: f64 = 1e-9;
+
+/// A line through the origin of the street frame, where it runs along +x. Places beside it are
+/// told by station (m along it) and offset (m to the left).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bend {
+    /// 1/m, left positive.
+    pub(crate) curvature: f64,
+}
+
+impl Bend {
+    /// Station and offset of a place, for stations within half a turn.
+    pub(crate) fn beside(&self, x: f64, y: f64) -> [f64; 2] {
+        if self.curvature.abs() < STRAIGHT {
+            return [x, y];
+        }
+        let radius = 1.0 / self.curvature;
+        let (side, down) = (radius.signum(), radius - y);
+        let offset = radius - side * x.hypot(down);
+        [radius.abs() * x.atan2(side * down), offset]
+    }
+
+    /// Place and heading (rad) at a station and offset.
+    pub(crate) fn at(&self, station: f64, offset: f64) -> [f64; 3] {
+        if self.curvature.abs() < STRAIGHT {
+            return [station, offset, 0.0];
+        }
+        let (radius, yaw) = (1.0 / self.curvature, station * self.curvature);
+        let (s, c) = yaw.sin_cos();
+        [(radius - offset) * s, radius - (radius - offset) * c, yaw]
+    }
+
+    /// State of somebody at a station and offset who goes along the line (`way` 1) or back (-1).
+    pub(crate) fn state(&self, [station, offset]: [f64; 2], way: f64, speed: f64) -> State {
+        let [x, y, yaw] = self.at(station, offset);
+        let turned = if way < 0.0 { std::f64::consts::PI } else { 0.0 };
+        State { x, y, yaw: yaw + turned, speed }
+    }
+
+    /// Curvature of the way of somebody at this offset.
+    pub(crate) fn turn(&self, offset: f64, way: f64) -> f64 {
+        way * self.curvature / (1.0 - self.curvature * offset)
+    }
+
+    /// Along the line at a constant offset for this long, s; at station `place[0]` at time 0.
+    pub(crate) fn follow(&self, place: [f64; 2], way: f64, speed: f64, long_s: f64) -> Path {
+        Path::from(self.state(place, way, speed)).then(long_s, 0.0, self.turn(place[1], way))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_and_back() {
+        for curvature in [0.0, 0.01, -0.004] {
+            let bend = Bend { curvature };
+            for place in [[30.0, 5.0], [-80.0, -12.0], [120.0, 0.0]] {
+                let [x, y, yaw] = bend.at(place[0], place[1]);
+                let back = bend.beside(x, y);
+                assert!((back[0] - place[0]).abs() < 1e-9 && (back[1] - place[1]).abs() < 1e-9);
+                assert_eq!(yaw, place[0] * curvature);
+            }
+        }
+    }
+
+    #[test]
+    fn who_follows_keeps_the_offset() {
+        for (curvature, way) in [(0.01, 1.0), (0.01, -1.0), (-0.02, 1.0), (0.0, -1.0)] {
+            let bend = Bend { curvature };
+            let path = bend.follow([10.0, -3.0], way, 9.0, 20.0);
+            for t in [-2.0, 1.0, 5.0] {
+                let at = path.at(t);
+                let [station, offset] = bend.beside(at.x, at.y);
+                assert!((offset + 3.0).abs() < 1e-9, "{offset}");
+                let gone = way * 9.0 * t / (1.0 + 3.0 * curvature);
+                assert!((station - 10.0 - gone).abs() < 1e-9, "{station}");
+            }
+        }
+    }
+}

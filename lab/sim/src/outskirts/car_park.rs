@@ -1,0 +1,322 @@
+//! A car park: rows of parked cars, shelters for trolleys, cars that manoeuvre, people between.
+
+use super::crowd::{Crowd, Model};
+use super::site::Site;
+use super::{Layout, VIEW_M};
+use crate::bend::Bend;
+use crate::ground::Ground;
+use crate::models;
+use crate::object::{Class, Surface};
+use crate::path::{EASE_S, Path, State};
+use crate::relief::{Relief, Term};
+use crate::rng::Rng;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Length of a bay, m.
+const BAY_M: f64 = 5.2;
+/// Aisles on either side of the vehicle's.
+const AISLES: i32 = 3;
+/// Between the heads of two rows there is a bed or a path this wide, m.
+const BED_M: f64 = 1.6;
+
+pub(super) struct CarPark {
+    /// Width of an aisle and of a bay, m.
+    aisle: f64,
+    bay: f64,
+    /// Share of the bays that is taken.
+    full: f64,
+    /// Of the vehicle, m/s.
+    speed: f64,
+    course: Course,
+    wave: [f64; 3],
+    /// Of the rows, m.
+    x: [f64; 2],
+    /// Between two groups of bays there is a way across: x of its middle, m.
+    across: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Course {
+    Straight,
+    Stops,
+    /// Into the way across.
+    Turns,
+}
+
+impl CarPark {
+    pub(super) fn drawn(rng: &mut Rng, duration_s: f64) -> CarPark {
+        let courses = [Course::Straight, Course::Stops, Course::Turns];
+        let (course, speed) = (courses[(rng.unit() * 3.0) as usize], rng.range(1.5, 5.0));
+        let turning = course == Course::Turns;
+        CarPark {
+            aisle: rng.range(6.0, 7.5),
+            bay: rng.range(2.5, 3.0),
+            full: rng.range(0.35, 0.85),
+            speed,
+            course,
+            wave: [rng.range(0.05, 0.25), rng.range(45.0, 90.0), rng.range(0.0, TAU)],
+            x: [-45.0, speed * duration_s + 55.0],
+            across: if turning { 3.0 * speed + 6.0 } else { rng.range(20.0, 40.0) },
+        }
+    }
+
+    /// Between the middles of two aisles.
+    fn pitch(&self) -> f64 {
+        self.aisle + 2.0 * BAY_M + BED_M
+    }
+
+    fn middle(&self, aisle: i32) -> f64 {
+        f64::from(aisle) * self.pitch()
+    }
+
+    /// Whether bays at this x would lie on the way across.
+    fn crossed(&self, x: f64) -> bool {
+        (x - self.across).abs() < 0.5 * self.aisle + 1.5
+    }
+
+    /// Middle of every bay and the way in (rad), row by row.
+    fn bays(&self) -> Vec<[f64; 3]> {
+        let count = ((self.x[1] - self.x[0]) / self.bay) as u32;
+        let mut bays = Vec::new();
+        for aisle in -AISLES..=AISLES {
+            for side in [-1.0, 1.0] {
+                let y = self.middle(aisle) + side * 0.5 * (self.aisle + BAY_M);
+                let xs = (0..count).map(|n| self.x[0] + self.bay * (f64::from(n) + 0.5));
+                bays.extend(xs.filter(|&x| !self.crossed(x)).map(|x| [x, y, side * FRAC_PI_2]));
+            }
+        }
+        bays
+    }
+
+    /// Trees, lamps, kerbs and low hedges in the beds between the rows.
+    fn beds(&self, site: &mut Site) {
+        for aisle in -AISLES..AISLES {
+            let y = self.middle(aisle) + 0.5 * self.pitch();
+            let mut x = self.x[0];
+            let planted = site.rng.chance(0.6);
+            while x < self.x[1] {
+                let far = !self.crossed(x);
+                match site.count(0, 8) {
+                    0 if far => site.forked_tree([x, y]),
+                    1 if far => site.post(Class::Pole, [x, y], [0.09, 7.0]),
+                    2 | 3 if planted && far => site.spread_bush([x, y]),
+                    4 if planted && far => {
+                        site.trimmed_hedge([x, y, 0.0], [3.0, 0.8, 0.9]);
+                    }
+                    5 if far => site.post(Class::Fixture, [x, y], [0.07, 0.9]),
+                    _ => {}
+                }
+                if far {
+                    let kerb = Surface::matt(0.4);
+                    for side in [-0.5, 0.5] {
+                        let at = [x, y + side * (BED_M - 0.2), 0.0];
+                        site.block(Class::Ground, at, [1.0, 0.15, 0.1], kerb);
+                    }
+                }
+                x += site.rng.range(2.0, 5.0);
+            }
+        }
+    }
+
+    /// A shelter over two bays: posts, a roof, panes on three sides, and trolleys in rows.
+    fn shelter(&self, site: &mut Site, [x, y, yaw]: [f64; 3]) {
+        let (long, wide) = (BAY_M - 0.6, 2.0 * self.bay - 0.8);
+        let (s, c) = yaw.sin_cos();
+        let at = |along: f64, aside: f64| [x + along * c - aside * s, y + along * s + aside * c];
+        for along in [-0.5 * long, 0.0, 0.5 * long] {
+            for aside in [-0.5 * wide, 0.5 * wide] {
+                site.post(Class::Fixture, at(along, aside), [0.04, 2.1]);
+            }
+        }
+        site.raised(Class::Fixture, [x, y, yaw], [long, wide, 0.08], 2.15, Surface::matt(0.3));
+        let pane = Surface::glass(0.3);
+        for aside in [-0.5 * wide, 0.5 * wide] {
+            let [px, py] = at(0.0, aside);
+            site.raised(Class::Fixture, [px, py, yaw], [long, 0.03, 1.5], 0.3, pane);
+        }
+        let [px, py] = at(0.5 * long, 0.0);
+        site.raised(Class::Fixture, [px, py, yaw + FRAC_PI_2], [wide, 0.03, 1.5], 0.3, pane);
+        for aside in [-0.28 * wide, 0.0, 0.28 * wide] {
+            let filled = site.rng.range(0.3, 0.9) * long;
+            let [px, py] = at(0.5 * (long - filled) - 0.2, aside);
+            // Wire, most of which rays go through, over wheels that stop them.
+            let wire = Surface::porous(0.5, 0.55);
+            site.raised(Class::Fixture, [px, py, yaw], [filled, 0.55, 0.55], 0.45, wire);
+            site.raised(
+                Class::Fixture,
+                [px, py, yaw],
+                [filled, 0.45, 0.3],
+                0.05,
+                Surface::porous(0.3, 0.8),
+            );
+        }
+    }
+
+    /// A market behind a front of glass and pillars, a fence and trees on the other sides.
+    fn around(&self, site: &mut Site) {
+        let edge = self.middle(AISLES) + 0.5 * self.pitch();
+        let [from, to] = self.x;
+        let (y, deep, high) = (edge + 10.0, 30.0, site.rng.range(5.0, 8.0));
+        let wall = Surface::matt(0.45);
+        let [x, long] = [0.5 * (from + to), 0.8 * (to - from)];
+        site.block(Class::Building, [x, y + 0.5 * deep + 6.0, 0.0], [long, deep, high], wall);
+        site.raised(Class::Building, [x, y + 3.0, 0.0], [long, 6.0, 0.5], 3.2, wall);
+        let mut at = x - 0.5 * long;
+        while at < x + 0.5 * long {
+            site.post(Class::Building, [at, y + 0.6], [0.22, 3.2]);
+            site.raised(
+                Class::Building,
+                [at + 2.0, y + 5.0, 0.0],
+                [3.9, 0.04, 3.0],
+                0.1,
+                Surface::glass(0.3),
+            );
+            at += 4.0;
+        }
+        let mesh = Surface::porous(0.35, site.rng.range(0.5, 0.85));
+        let mut at = from;
+        while at < to {
+            site.post(Class::Fixture, [at, -edge - 3.0], [0.03, 1.8]);
+            site.raised(Class::Fixture, [at + 1.25, -edge - 3.0, 0.0], [2.5, 0.03, 1.7], 0.1, mesh);
+            if site.rng.chance(0.3) {
+                let back = site.rng.range(1.5, 9.0);
+                site.forked_tree([at, -edge - 3.0 - back]);
+            }
+            at += 2.5;
+        }
+        for end in [from - 9.0, to + 9.0] {
+            for n in 0..30 {
+                let y = -edge + 2.0 * edge * f64::from(n) / 30.0;
+                let back = site.rng.range(0.0, 4.0);
+                site.spread_bush([end + back.copysign(end), y]);
+            }
+        }
+    }
+
+    /// Out of a bay in reverse, a halt, and off along the aisle.
+    fn leaving_bay(&self, rng: &mut Rng, [x, y, yaw]: [f64; 3], duration_s: f64) -> Path {
+        let (speed, way) = (rng.range(1.0, 1.9), rng.sign());
+        let radius = rng.range(4.0, 5.0);
+        let begin = rng.range(-4.0, 0.6 * duration_s);
+        let start = Path::starting(begin, State { x, y, yaw, speed: 0.0 });
+        // A metre or two straight, then the tail swings into the aisle.
+        let straight = rng.range(2.2, 3.2);
+        let path = start.then(1.0, -speed, 0.0).then(straight / speed, 0.0, 0.0);
+        let path = path.then(FRAC_PI_2 * radius / speed, 0.0, way / radius);
+        path.then(1.0, speed, 0.0).then(rng.range(0.3, 1.5), 0.0, 0.0).then(2.0, 1.2, 0.0)
+    }
+
+    /// Along an aisle in search of a bay.
+    fn searching(&self, rng: &mut Rng, duration_s: f64) -> Path {
+        let (way, speed) = (rng.sign(), rng.range(1.0, 3.0));
+        let y = self.middle(aisle(rng)) - way * rng.range(0.8, 1.6);
+        let gone = way * speed * rng.range(0.0, duration_s);
+        let x = self.speed * 0.5 * duration_s + rng.range(-30.0, 30.0) - gone;
+        Path::from(State { x, y, yaw: if way > 0.0 { 0.0 } else { PI }, speed })
+    }
+
+    /// Along an aisle, between parked cars, or here and there with a bend.
+    fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
+        let speed = rng.range(1.0, 1.6);
+        let x = self.speed * 0.5 * duration_s + rng.range(-28.0, 28.0);
+        let yaw = match (rng.unit() * 3.0) as u32 {
+            0 => rng.range(-PI, PI),
+            1 => FRAC_PI_2 * rng.sign(),
+            _ => FRAC_PI_2 * (1.0 - rng.sign()) + rng.range(-0.1, 0.1),
+        };
+        let y = self.middle(aisle(rng)) + rng.range(-0.5, 0.5) * self.aisle;
+        let before = rng.range(0.0, duration_s);
+        let gone = before * speed;
+        let start = State { x: x - gone * yaw.cos(), y: y - gone * yaw.sin(), yaw, speed };
+        let path = Path::from(start).then(before, 0.0, 0.0);
+        match rng.chance(0.4) {
+            true => path.then_turn(rng.sign() * FRAC_PI_2, 0.7, 0.4),
+            false => path,
+        }
+    }
+}
+
+/// One of the aisles near the vehicle's.
+fn aisle(rng: &mut Rng) -> i32 {
+    [0, 0, 0, 1, -1, 2, -2][(rng.unit() * 7.0) as usize]
+}
+
+impl Layout for CarPark {
+    fn ground(&self) -> Ground {
+        let far = self.middle(AISLES + 1);
+        // It falls to one side, for the rain.
+        let level = Bend { curvature: 0.0 };
+        let banks = Term::Banks(level, vec![[-far, -0.01 * far], [far, 0.01 * far]]);
+        let terms = vec![banks, Term::Wave(self.wave)];
+        Ground::of(Relief { terms, paved: (level, VIEW_M) })
+    }
+
+    fn vehicle(&self) -> Path {
+        let start = Path::from(State { x: 0.0, y: -1.5, yaw: 0.0, speed: self.speed });
+        match self.course {
+            Course::Straight => start,
+            Course::Stops => start
+                .then(2.0, 0.0, 0.0)
+                .then_to_speed(0.0, 1.5, 0.5 * EASE_S)
+                .then(1.5, 0.0, 0.0)
+                .then_to_speed(self.speed, 1.0, 0.5 * EASE_S),
+            Course::Turns => {
+                let turned = Path::from(start.at(0.0)).then_turn(-FRAC_PI_2, 6.0, EASE_S).end();
+                // So that the turn ends in the way across.
+                let before = (self.across - 1.0 - turned.x) / self.speed;
+                start.then(before.max(0.1), 0.0, 0.0).then_turn(-FRAC_PI_2, 6.0, EASE_S)
+            }
+        }
+    }
+
+    fn furnish(&self, site: &mut Site) {
+        self.beds(site);
+        self.around(site);
+        let bays = self.bays();
+        for _ in 0..4 {
+            let bay = bays[site.count(0, bays.len() as u32 - 1) as usize];
+            if !self.crossed(bay[0] + self.bay) {
+                self.shelter(site, [bay[0] + 0.5 * self.bay, bay[1], bay[2]]);
+            }
+        }
+    }
+
+    fn populate(&self, crowd: &mut Crowd) {
+        let bays = self.bays();
+        let here = 0.5 * self.speed * crowd.duration_s;
+        let near: Vec<[f64; 3]> = bays
+            .iter()
+            .filter(|bay| (bay[0] - here).abs() < 25.0 && bay[1].abs() < 1.2 * self.pitch())
+            .copied()
+            .collect();
+        crowd.add(4.0, models::car, |r, t| {
+            let bay = near[(r.unit() * near.len() as f64) as usize];
+            self.leaving_bay(r, bay, t)
+        });
+        crowd.add(3.0, models::car, |r, t| self.searching(r, t));
+        for [x, y, yaw] in bays {
+            if !crowd.rng.chance(self.full) {
+                continue;
+            }
+            let kinds: [Model; 8] = [
+                models::car,
+                models::car,
+                models::car,
+                models::car,
+                models::car,
+                models::car,
+                models::van,
+                models::motorcycle,
+            ];
+            let model = kinds[(crowd.rng.unit() * 8.0) as usize];
+            let out = if crowd.rng.chance(0.3) { PI } else { 0.0 };
+            let [dx, dy, turn] = [0.15, 0.3, 0.04].map(|far| crowd.rng.range(-far, far));
+            crowd.park(model, Path::standing(x + dx, y + dy, yaw + out + turn));
+        }
+        crowd.add(22.0, models::pedestrian, |r, t| self.walking(r, t));
+        crowd.add(3.0, models::pedestrian, |r, t| {
+            let path = self.walking(r, t).at(0.0);
+            Path::standing(path.x, path.y, path.yaw)
+        });
+    }
+}

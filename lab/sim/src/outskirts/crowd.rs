@@ -1,0 +1,75 @@
+//! Who moves and who is parked: each on a way clear of fixtures, of the others and of the vehicle.
+
+use super::clearance::Way;
+use crate::ground::Ground;
+use crate::object::{Fixture, Object};
+use crate::path::Path;
+use crate::rng::Rng;
+
+/// Tries to find a clear way for somebody.
+const TRIES: u32 = 15;
+/// Kept clear around everybody, m.
+const MARGIN_M: f64 = 0.1;
+
+/// One of [`crate::models`].
+pub(super) type Model = fn(u32, Path, &mut Rng) -> Object;
+
+/// Traffic while it is being drawn.
+pub(super) struct Crowd<'a> {
+    pub(super) objects: Vec<Object>,
+    pub(super) rng: &'a mut Rng,
+    /// Of the drive, s.
+    pub(super) duration_s: f64,
+    density: f64,
+    taken: Vec<Way>,
+}
+
+impl<'a> Crowd<'a> {
+    /// Nobody yet, among these fixtures and the vehicle on its way.
+    pub(super) fn new(
+        (ground, fixtures): (&Ground, &[Fixture]),
+        vehicle: Way,
+        (duration_s, density): (f64, f64),
+        rng: &'a mut Rng,
+    ) -> Crowd<'a> {
+        let mut taken = vec![vehicle];
+        taken.extend(fixtures.iter().map(|fixture| Way::under(fixture, ground)));
+        Crowd { objects: Vec::new(), rng, duration_s, density, taken }
+    }
+
+    /// Adds somebody if the path is clear, and says so.
+    pub(super) fn offer(&mut self, model: Model, path: Path) -> bool {
+        let object = model(self.objects.len() as u32 + 1, path, self.rng);
+        let way = Way::along(&object.path, object.size, MARGIN_M, self.duration_s);
+        let clear = !self.taken.iter().any(|other| way.meets(other));
+        if clear {
+            self.taken.push(way);
+            self.objects.push(object);
+        }
+        clear
+    }
+
+    /// Adds somebody who stands there with the density as probability, if there is room.
+    pub(super) fn park(&mut self, model: Model, path: Path) {
+        if self.rng.chance(self.density) {
+            self.offer(model, path);
+        }
+    }
+
+    /// So many of a kind at the density 1, each on the first drawn path that is clear.
+    pub(super) fn add(
+        &mut self,
+        amount: f64,
+        model: Model,
+        mut draw: impl FnMut(&mut Rng, f64) -> Path,
+    ) {
+        for _ in 0..(amount * self.density).round() as u32 {
+            for _ in 0..TRIES {
+                let path = draw(self.rng, self.duration_s);
+                if self.offer(model, path) {
+                    break;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Kinds of scenery to drive through.
+
+use crate::ego::Ego;
+use crate::outskirts::{self, Place};
+use crate::path::Path;
+use crate::scene::Scene;
+use std::fmt;
+use std::str::FromStr;
+
+/// What is driven through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scenery {
+    /// A street with houses, trees and parked cars: what training draws from.
+    #[default]
+    Street,
+    /// One of [`Place::ALL`], drawn by the seed: never trained or tuned on.
+    Outskirts,
+    /// This one of them.
+    Only(Place),
+}
+
+/// A name that no scenery has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnknownScenery(String);
+
+impl fmt::Display for UnknownScenery {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let names: Vec<_> = Scenery::all().map(Scenery::name).collect();
+        write!(f, "no scenery is called `{}`; there are {}", self.0, names.join(", "))
+    }
+}
+
+impl std::error::Error for UnknownScenery {}
+
+impl Scenery {
+    /// Every scenery.
+    pub fn all() -> impl Iterator<Item = Scenery> {
+        let places = Place::ALL.into_iter().map(Scenery::Only);
+        [Scenery::Street, Scenery::Outskirts].into_iter().chain(places)
+    }
+
+    /// What [`Scenery::from_str`] understands.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scenery::Street => "street",
+            Scenery::Outskirts => "outskirts",
+            Scenery::Only(place) => place.name(),
+        }
+    }
+
+    /// The place of the outskirts that a drive of this seed goes through.
+    pub fn place(self, seed: u64) -> Option<Place> {
+        match self {
+            Scenery::Street => None,
+            Scenery::Outskirts => Some(Place::drawn(seed)),
+            Scenery::Only(place) => Some(place),
+        }
+    }
+
+    /// A scene and the path of the vehicle through it. `ego` counts in the street only.
+    pub(crate) fn draw(self, seed: u64, ego: Ego, duration_s: f64, density: f64) -> (Scene, Path) {
+        if let Some(place) = self.place(seed) {
+            return outskirts::draw(place, seed, duration_s, density);
+        }
+        let plan = ego.plan(seed, duration_s);
+        (Scene::around(seed, &plan, duration_s, density), plan.path)
+    }
+}
+
+impl FromStr for Scenery {
+    type Err = UnknownScenery;
+
+    fn from_str(name: &str) -> Result<Scenery, UnknownScenery> {
+        let found = Scenery::all().find(|scenery| scenery.name() == name);
+        found.ok_or_else(|| UnknownScenery(name.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names() {
+        for scenery in Scenery::all() {
+            assert_eq!(scenery.name().parse(), Ok(scenery));
+        }
+        let error = "strase".parse::<Scenery>().unwrap_err().to_string();
+        assert!(error.contains("strase") && error.contains("motorway"), "{error}");
+    }
+
+    #[test]
+    fn seeds_draw_every_place() {
+        let drawn: BTreeSet<_> = (0..60).filter_map(|n| Scenery::Outskirts.place(n)).collect();
+        assert_eq!(drawn.len(), Place::ALL.len());
+        assert_eq!(Scenery::Street.place(1), None);
+    }
+}
