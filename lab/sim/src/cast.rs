@@ -1,6 +1,7 @@
 //! Casting one sweep: every column of every sensor at its own time, from the moving vehicle, at
 //! the scene as it is at that time.
 
+use crate::clutter::{Air, Clutter};
 use crate::object::Surface;
 use crate::rig::{Firing, SensorRig, stamp_s};
 use crate::rng::Rng;
@@ -21,6 +22,7 @@ pub(crate) struct Caster<'a> {
     scene: &'a Scene,
     still: &'a Still,
     rig: &'a SensorRig,
+    clutter: Clutter,
     /// Objects that move: index and radius.
     movers: Vec<(usize, f64)>,
     /// Directions of every sensor's beams at azimuth 0, and its [`Sensor::spread`].
@@ -37,11 +39,16 @@ fn directions(sensor: &Sensor) -> Vec<DVec3> {
 }
 
 impl<'a> Caster<'a> {
-    pub(crate) fn new(scene: &'a Scene, still: &'a Still, rig: &'a SensorRig) -> Caster<'a> {
+    pub(crate) fn new(
+        scene: &'a Scene,
+        still: &'a Still,
+        rig: &'a SensorRig,
+        clutter: Clutter,
+    ) -> Caster<'a> {
         let objects = scene.objects.iter().enumerate();
         let movers = objects.filter(|(_, o)| !o.is_still()).map(|(i, o)| (i, o.reach())).collect();
         let beams = rig.mounts.iter().map(|m| (directions(&m.sensor), m.sensor.spread())).collect();
-        Caster { scene, still, rig, movers, beams }
+        Caster { scene, still, rig, clutter, movers, beams }
     }
 
     /// Sweep `index`, `ego` being `street_from_vehicle` over time; cast by `threads` threads, the
@@ -86,6 +93,7 @@ impl<'a> Caster<'a> {
         let turn = street_from_sensor.matrix();
         let fan = self.fan(firing, street_from_sensor);
         let moving = self.moving_targets(&fan, t);
+        let air = Air::about(self.clutter, self.scene, &fan, t);
         let mut motions = Motions::at(self.scene, t);
         for nominal in self.rays(firing) {
             let ray = Ray {
@@ -93,18 +101,23 @@ impl<'a> Caster<'a> {
                 direction: turn * disturbed(sensor, nominal, &mut rng),
                 seed: rng.bits(),
             };
-            let Some(hit) = self.nearest(&ray, sensor, &moving) else {
+            let hit = self.nearest(&ray, sensor, &moving);
+            if let Some(range) = air.echo(&ray, hit.map_or(sensor.range[1], |hit| hit.range)) {
+                let (range, intensity) = diffuse(sensor, range, &mut rng);
+                if (sensor.range[0]..sensor.range[1]).contains(&range) {
+                    returns.0.push(mount.point(firing, nominal * range, intensity));
+                    returns.1.push(Truth::CLUTTER);
+                }
+                continue;
+            }
+            let Some(hit) = hit else {
                 continue;
             };
-            let Some((range, intensity)) = measured(sensor, &hit, &mut rng) else {
+            let clearness = air.clearness(hit.range);
+            let Some((range, intensity)) = measured(sensor, &hit, clearness, &mut rng) else {
                 continue;
             };
-            returns.0.push(Point {
-                position: mount.vehicle_from_sensor.transform(nominal * range).as_vec3().to_array(),
-                intensity: intensity as f32,
-                offset_s: firing.offset_s as f32,
-                sensor: firing.mount as u32,
-            });
+            returns.0.push(mount.point(firing, nominal * range, intensity));
             returns.1.push(motions.truth(&hit, ray.origin + ray.direction * hit.range));
         }
     }
@@ -175,11 +188,18 @@ fn disturbed(sensor: &Sensor, u: DVec3, rng: &mut Rng) -> DVec3 {
     v / v.dot(v).sqrt()
 }
 
-/// Range and intensity as measured, where there is a return.
-fn measured(sensor: &Sensor, hit: &Hit, rng: &mut Rng) -> Option<(f64, f64)> {
+/// Range and intensity as measured of what is too fine to be a surface.
+fn diffuse(sensor: &Sensor, range: f64, rng: &mut Rng) -> (f64, f64) {
+    (range + sensor.range_noise * rng.bell(), 0.08 * rng.unit())
+}
+
+/// Range and intensity as measured, where there is a return; `clearness` is the share of the light
+/// that the air lets through.
+fn measured(sensor: &Sensor, hit: &Hit, clearness: f64, rng: &mut Rng) -> Option<(f64, f64)> {
     let asphalt = Surface::matt(0.2);
     let surface = hit.target.map_or(asphalt, |t| t.surface);
     let signal = sensor.signal * surface.reflectivity * hit.cosine / (hit.range * hit.range);
+    let signal = clearness * signal;
     let kept = (1.0 - surface.loss) * (1.0 - sensor.dropout) * (1.0 - (-signal).exp());
     let (lost, noise) = (!rng.chance(kept), rng.bell());
     let range = hit.range + sensor.range_noise * noise;
@@ -201,7 +221,7 @@ mod tests {
             let rig: SensorRig = name.parse().unwrap();
             let (scene, mut rng) = (Scene::street(seed), Rng::new(seed));
             let still = Still::new(&scene);
-            let caster = Caster::new(&scene, &still, &rig);
+            let caster = Caster::new(&scene, &still, &rig, Clutter::None);
             for firing in rig.firings(30).iter().step_by(31) {
                 let t = stamp_s(30) + firing.offset_s;
                 let mount = &rig.mounts[firing.mount];

@@ -1,6 +1,7 @@
 //! A drive through a scene, sweep by sweep.
 
 use crate::cast::Caster;
+use crate::clutter::Clutter;
 use crate::ego::Ego;
 use crate::path::Path;
 use crate::rig::{PERIOD_S, SensorRig, stamp_s};
@@ -24,6 +25,8 @@ pub struct Options {
     pub ego: Ego,
     /// Amount of traffic; 1 is a busy street, 0 an empty one.
     pub density: f64,
+    /// What is in the air.
+    pub clutter: Clutter,
     /// The sensors.
     pub rig: SensorRig,
     /// Threads that cast rays; 0: as many as the machine runs at once. The sweeps are the same
@@ -38,6 +41,7 @@ impl Default for Options {
             scenery: Scenery::Street,
             ego: Ego::Any,
             density: 1.0,
+            clutter: Clutter::None,
             rig: SensorRig::hdl64(),
             threads: 0,
         }
@@ -143,7 +147,8 @@ impl Drive {
     /// Sweep `index`, whichever sweeps were cast before.
     pub fn sweep(&self, index: usize) -> SimSweep {
         let stamp_s = stamp_s(index);
-        let caster = Caster::new(&self.scene, &self.still, &self.options.rig);
+        let Options { rig, clutter, .. } = &self.options;
+        let caster = Caster::new(&self.scene, &self.still, rig, *clutter);
         let seed = Rng::split(self.seed, 16 + index as u64).bits();
         let ego = |t: f64| self.street_from_vehicle(t);
         let (points, truth) = caster.sweep(&ego, index, seed, self.threads());

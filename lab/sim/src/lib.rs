@@ -15,6 +15,7 @@
 
 mod bend;
 mod cast;
+mod clutter;
 mod dimensions;
 mod drive;
 mod ego;
@@ -37,6 +38,7 @@ mod target;
 mod traffic;
 mod truth;
 
+pub use clutter::{Clutter, UnknownClutter};
 pub use drive::{Drive, Options, SimSweep};
 pub use ego::Ego;
 pub use ground::{Contact, Ground};

@@ -37,12 +37,14 @@ pub enum Class {
     Cyclist = 11,
     /// Somebody on foot.
     Pedestrian = 12,
+    /// Rain, fog or dust: no object at all.
+    Clutter = 13,
 }
 
 impl Class {
     /// Whether a background filter should keep it: whatever could move, even if it does not.
     pub fn is_foreground(self) -> bool {
-        self >= Class::Car
+        (Class::Car..=Class::Pedestrian).contains(&self)
     }
 }
 

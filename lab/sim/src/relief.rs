@@ -103,6 +103,11 @@ impl Relief {
         self.terms.iter().map(|term| term.local(x, y).height).sum()
     }
 
+    /// Whether a place lies in the ground.
+    fn holds(&self, at: DVec3) -> bool {
+        at.z <= self.height(at.x, at.y)
+    }
+
     /// How much higher bumps are than on a road.
     pub(crate) fn roughening(&self, x: f64, y: f64) -> f64 {
         let (axis, half) = self.paved;
@@ -147,8 +152,7 @@ impl Relief {
     fn between(&self, o: DVec3, d: DVec3, mut above: f64, mut below: f64) -> f64 {
         for _ in 0..HALVINGS {
             let middle = 0.5 * (above + below);
-            let at = o + d * middle;
-            let under = at.z <= self.height(at.x, at.y);
+            let under = self.holds(o + d * middle);
             *(if under { &mut below } else { &mut above }) = middle;
         }
         below
@@ -190,10 +194,7 @@ mod tests {
         for _ in 0..3000 {
             let o = DVec3::new(rng.range(-30.0, 10.0), rng.range(-3.0, 3.0), 2.6);
             let d = DVec3::new(rng.bell(), rng.bell(), -0.2 * rng.unit()).normalize();
-            let under = |range: f64| {
-                let at = o + d * range;
-                at.z <= relief.height(at.x, at.y)
-            };
+            let under = |range: f64| relief.holds(o + d * range);
             let slow = (0..12_000).map(|n| 0.01 * f64::from(n)).find(|&range| under(range));
             let fast = relief.reach(o, d).filter(|&range| range < 119.0);
             let Some(slow) = slow.filter(|_| fast.is_some()) else {

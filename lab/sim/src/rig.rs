@@ -3,13 +3,17 @@
 use crate::sensor::Sensor;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Rig, SENSORS_MAX, Timing};
+use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
 use std::fmt;
 use std::str::FromStr;
 
 /// Duration of a sweep, s: what all sensors fire from half of it before the stamp to half of it
 /// after.
 pub const PERIOD_S: f64 = 0.1;
+
+/// Time from one firing of all beams of an HDL-32E to the next, s (Velodyne, HDL-32E user manual
+/// 63-9113).
+const HDL32_FIRING_S: f64 = 46.08e-6;
 
 /// Stamp of sweep `index`, s.
 pub fn stamp_s(index: usize) -> f64 {
@@ -26,6 +30,18 @@ pub struct Mount {
     /// Time at which it first looks along its x axis, s: two sensors of one turn and different
     /// phases look apart for ever, and sensors of different turns drift apart.
     pub phase_s: f64,
+}
+
+impl Mount {
+    /// A return of a firing at this place of the sensor's frame.
+    pub(crate) fn point(&self, firing: &Firing, at: DVec3, intensity: f64) -> Point {
+        Point {
+            position: self.vehicle_from_sensor.transform(at).as_vec3().to_array(),
+            intensity: intensity as f32,
+            offset_s: firing.offset_s as f32,
+            sensor: firing.mount as u32,
+        }
+    }
 }
 
 /// One to [`SENSORS_MAX`] sensors on a vehicle.
@@ -71,7 +87,7 @@ fn upright(x: f64, y: f64, z: f64) -> Pose {
 
 impl SensorRig {
     /// What [`SensorRig::from_str`] understands.
-    pub const NAMES: [&str; 4] = ["hdl64", "hdl32x4", "vlp32x2", "beam128"];
+    pub const NAMES: [&str; 5] = ["hdl64", "hdl32x4", "hdl32x4-full", "vlp32x2", "beam128"];
 
     /// One sensor, upright, `height` above the ground (m) over the vehicle's middle; the vehicle
     /// frame is the sensor's.
@@ -110,6 +126,17 @@ impl SensorRig {
             }
         };
         SensorRig { mounts: (0..4).map(mount).collect(), origin: REAR_AXLE }
+    }
+
+    /// The same four at the device's full rate, which does not depend on how fast it spins: 32 beams
+    /// every 46.08 us are 694,444 rays a second each. 277,778 rays a sweep, of which those into the
+    /// sky do not return.
+    pub fn hdl32x4_full() -> SensorRig {
+        let mut rig = SensorRig::hdl32x4();
+        for Mount { sensor, .. } in &mut rig.mounts {
+            sensor.columns = (sensor.turn_s / HDL32_FIRING_S).round() as usize;
+        }
+        rig
     }
 
     /// Argoverse 2's: two VLP-32C stacked on the roof, 1.64 and 1.56 m above the rear axle, where
@@ -183,6 +210,7 @@ impl FromStr for SensorRig {
         match name {
             "hdl64" => Ok(SensorRig::hdl64()),
             "hdl32x4" => Ok(SensorRig::hdl32x4()),
+            "hdl32x4-full" => Ok(SensorRig::hdl32x4_full()),
             "vlp32x2" => Ok(SensorRig::vlp32x2()),
             "beam128" => Ok(SensorRig::beam128()),
             _ => Err(UnknownRig(name.to_string())),
@@ -213,7 +241,11 @@ mod tests {
                 let firings = rig.firings(index);
                 let rays: usize =
                     firings.iter().map(|f| rig.mounts[f.mount].sensor.beams.len()).sum();
-                assert!((110_000..=POINTS_MAX).contains(&rays), "{name}: {rays} rays");
+                let wanted = match name {
+                    "hdl32x4-full" => 277_600..=277_900,
+                    _ => 110_000..=POINTS_MAX,
+                };
+                assert!(wanted.contains(&rays), "{name}: {rays} rays");
                 assert!(firings.windows(2).all(|f| f[0].offset_s <= f[1].offset_s));
                 for f in firings {
                     assert!((-0.05 - 1e-12..0.05).contains(&f.offset_s), "{name}: {f:?}");

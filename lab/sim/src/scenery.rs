@@ -13,6 +13,8 @@ pub enum Scenery {
     /// A street with houses, trees and parked cars: what training draws from.
     #[default]
     Street,
+    /// The same with more that makes still things seem to move, to choose numbers on.
+    StreetCluttered,
     /// One of [`Place::ALL`], drawn by the seed: never trained or tuned on.
     Outskirts,
     /// This one of them.
@@ -36,13 +38,14 @@ impl Scenery {
     /// Every scenery.
     pub fn all() -> impl Iterator<Item = Scenery> {
         let places = Place::ALL.into_iter().map(Scenery::Only);
-        [Scenery::Street, Scenery::Outskirts].into_iter().chain(places)
+        [Scenery::Street, Scenery::StreetCluttered, Scenery::Outskirts].into_iter().chain(places)
     }
 
     /// What [`Scenery::from_str`] understands.
     pub fn name(self) -> &'static str {
         match self {
             Scenery::Street => "street",
+            Scenery::StreetCluttered => "street-cluttered",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -51,7 +54,7 @@ impl Scenery {
     /// The place of the outskirts that a drive of this seed goes through.
     pub fn place(self, seed: u64) -> Option<Place> {
         match self {
-            Scenery::Street => None,
+            Scenery::Street | Scenery::StreetCluttered => None,
             Scenery::Outskirts => Some(Place::drawn(seed)),
             Scenery::Only(place) => Some(place),
         }
@@ -62,8 +65,8 @@ impl Scenery {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);
         }
-        let plan = ego.plan(seed, duration_s);
-        (Scene::around(seed, &plan, duration_s, density), plan.path)
+        let (plan, cluttered) = (ego.plan(seed, duration_s), self == Scenery::StreetCluttered);
+        (Scene::around(seed, &plan, duration_s, density, cluttered), plan.path)
     }
 }
 

@@ -103,8 +103,8 @@ impl Sensor {
     }
 
     /// The HDL-32E: 32 beams from +10.67 to -30.67 degrees in steps of 1.33, 100 m. 1000 firings a
-    /// turn, fewer than half of the device's at 10 turns a second, so that four of them stay within
-    /// a sweep.
+    /// turn, fewer than half of the device's 2170 at 10 turns a second, so that four of them stay
+    /// within a sweep; [`crate::SensorRig::hdl32x4_full`] has them all.
     pub fn hdl32() -> Sensor {
         let beam = |i| Beam::degrees((32.0 - 4.0 * f64::from(i)) / 3.0, 0.0);
         let beams = (0..32).map(beam).collect();

@@ -22,6 +22,12 @@ pub struct Truth {
     pub flow_world: [f32; 3],
 }
 
+impl Truth {
+    /// Of what hangs in the air: no object, at rest.
+    pub(crate) const CLUTTER: Truth =
+        Truth { object: 0, class: Class::Clutter, velocity_world: [0.0; 3], flow_world: [0.0; 3] };
+}
+
 /// Half the step of the central difference that gives velocities, s.
 const STEP_S: f64 = 5e-4;
 

@@ -1,6 +1,7 @@
 //! One drive: what it is made of, and its folder.
 
 use super::calibration::{Camera, imu};
+use super::gnss::Errors;
 use super::layout::{drive_name, frame_name, spaced, timestamp};
 use super::tracklets::Tracklets;
 use super::{oxts, truth};
@@ -8,7 +9,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
 use raywake_io::Error;
 use raywake_io::sink::atomic::create_folder;
-use raywake_sim::{Drive, Ego, Options, Rng, Scenery, SensorRig, SimSweep};
+use raywake_sim::{Clutter, Drive, Ego, Options, Rng, Scenery, SensorRig, SimSweep};
 use serde_json::json;
 use std::fs;
 use std::io;
@@ -35,6 +36,16 @@ pub enum Motion {
     StopAndGo,
 }
 
+/// Poses that a drive's `oxts/` tells; `truth/` always tells the exact ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Poses {
+    /// The exact ones.
+    Exact,
+    /// With the errors of an inertial unit aided by satellites: reports on a clock of 10 ms, some
+    /// 4 cm of position and 0.2 degrees of heading that change slowly, 1 cm on every sweep.
+    Gnss,
+}
+
 /// What the drives of a run have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
@@ -50,6 +61,10 @@ pub struct Recipe {
     pub motion: Motion,
     /// Amount of traffic; 1 is a busy street.
     pub density: f64,
+    /// What is in the air.
+    pub clutter: Clutter,
+    /// How good the poses are.
+    pub poses: Poses,
 }
 
 impl Default for Recipe {
@@ -61,6 +76,8 @@ impl Default for Recipe {
             scenery: Scenery::Street,
             motion: Motion::Any,
             density: 1.0,
+            clutter: Clutter::None,
+            poses: Poses::Exact,
         }
     }
 }
@@ -81,6 +98,7 @@ impl Recipe {
             scenery: self.scenery,
             ego,
             density: self.density,
+            clutter: self.clutter,
             rig: self.sensors()?,
             threads,
         };
@@ -91,6 +109,16 @@ impl Recipe {
     fn chance(&self, number: usize) -> (u64, Rng) {
         let mut rng = Rng::split(self.seed, number as u64);
         (rng.bits(), rng)
+    }
+
+    /// Fails where what is asked for does not fit together.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.motion != Motion::Any && self.scenery.place(self.seed).is_some() {
+            let name = self.scenery.name();
+            let what = format!("--ego is for the street: {name} tells what the vehicle does");
+            return Err(Error::Usage(what));
+        }
+        Ok(())
     }
 
     /// The sensors.
@@ -120,6 +148,12 @@ impl Recipe {
         // What was there before anything else could be chosen says no more than it did.
         if self.scenery != Scenery::Street {
             manifest["scenery"] = self.scenery.name().into();
+        }
+        if self.clutter != Clutter::None {
+            manifest["clutter"] = self.clutter.name().into();
+        }
+        if self.poses == Poses::Gnss {
+            manifest["poses"] = "gnss".into();
         }
         if let Some(place) = self.scenery.place(self.chance(number).0) {
             manifest["place"] = place.name().into();
@@ -182,7 +216,8 @@ pub fn write(
         fs::remove_dir_all(&partial).map_err(Error::writing(&partial))?;
     }
     let drive = recipe.drive(number, threads)?;
-    let mut writer = Writer::new(&partial, &drive)?;
+    let errors = (recipe.poses == Poses::Gnss).then(|| Errors::new(recipe.chance(number).0));
+    let mut writer = Writer::new(&partial, &drive, errors, recipe.clutter)?;
     for frame in 0..recipe.sweeps {
         writer.sweep(frame)?;
         if !tell() {
@@ -206,6 +241,8 @@ struct Writer<'a> {
     drive: &'a Drive,
     vehicle_from_imu: Pose,
     unit: oxts::Unit,
+    /// Of the poses; none where they are exact.
+    errors: Option<Errors>,
     sidecars: bool,
     tracklets: Tracklets,
     objects: Vec<truth::ObjectTruth>,
@@ -214,7 +251,12 @@ struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    fn new(root: &Path, drive: &'a Drive) -> Result<Writer<'a>, Error> {
+    fn new(
+        root: &Path,
+        drive: &'a Drive,
+        errors: Option<Errors>,
+        clutter: Clutter,
+    ) -> Result<Writer<'a>, Error> {
         let rig = drive.rig();
         let sidecars = rig.sensors.iter().any(|pose| *pose != Pose::IDENTITY)
             || rig.sensors.len() != 1
@@ -228,7 +270,7 @@ impl<'a> Writer<'a> {
             save(root, "velodyne_points/sensors.txt", sensors(&rig))?;
         }
         save(root, "oxts/dataformat.txt", oxts::FORMAT)?;
-        save(root, "truth/classes.txt", truth::classes())?;
+        save(root, "truth/classes.txt", truth::classes(clutter))?;
         let vehicle_from_imu = imu(&rig);
         let unit = oxts::Unit::new(drive.world_from_vehicle(0.0) * vehicle_from_imu);
         let tracklets = Tracklets::new(Camera::new(&rig));
@@ -239,6 +281,7 @@ impl<'a> Writer<'a> {
             drive,
             vehicle_from_imu,
             unit,
+            errors,
             sidecars,
             tracklets,
             objects,
@@ -255,8 +298,7 @@ impl<'a> Writer<'a> {
         if self.sidecars {
             self.beside(&bin, &sweep)?;
         }
-        let world_from_imu = |t: f64| self.drive.world_from_vehicle(t) * self.vehicle_from_imu;
-        let packet = self.unit.packet(&world_from_imu, sweep.stamp_s);
+        let packet = self.packet(sweep.stamp_s);
         save(&self.root, &format!("oxts/data/{}", frame_name(frame, "txt")), packet)?;
         let path = truth::points_path(&self.root, frame as u64);
         truth::write_points(&path, &truth::of_points(&sweep))?;
@@ -266,6 +308,18 @@ impl<'a> Writer<'a> {
         self.poses += &truth::pose_row(&sweep.world_from_vehicle);
         self.frames = frame + 1;
         Ok(())
+    }
+
+    /// What the inertial unit reports for a stamp.
+    fn packet(&mut self, stamp_s: f64) -> String {
+        let world_from_imu = |t: f64| self.drive.world_from_vehicle(t) * self.vehicle_from_imu;
+        match self.errors.as_mut().map(Errors::next) {
+            None => self.unit.packet(&world_from_imu, stamp_s),
+            Some(error) => {
+                let reported = |t: f64| error.of(world_from_imu(t + error.late_s));
+                self.unit.packet(&reported, stamp_s)
+            }
+        }
     }
 
     /// Times and sensors of the returns.

@@ -7,6 +7,7 @@
 
 mod calibration;
 mod drive;
+mod gnss;
 mod layout;
 mod oxts;
 mod tracklets;
@@ -15,14 +16,14 @@ pub mod truth;
 #[cfg(test)]
 mod tests;
 
-pub use drive::{Motion, Recipe};
+pub use drive::{Motion, Poses, Recipe};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use drive::State;
 use raywake::progress::Progress;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_sim::{Scenery, SensorRig};
+use raywake_sim::{Clutter, Scenery, SensorRig};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -63,6 +64,12 @@ pub struct Args {
     /// Amount of traffic: 1 is a busy street, 0 an empty one.
     #[arg(long, default_value_t = 1.0, value_parser = density)]
     density: f64,
+    /// What hangs in the air and sends rays back, without being an object.
+    #[arg(long, default_value = "none", value_parser = clutters())]
+    clutter: Clutter,
+    /// Poses that the drives tell; their truth always has the exact ones.
+    #[arg(long, value_enum, default_value = "exact")]
+    poses: Poses,
     /// Threads; as many as the machine runs at once unless given.
     #[arg(long)]
     jobs: Option<usize>,
@@ -72,6 +79,12 @@ pub struct Args {
 fn sceneries() -> impl TypedValueParser<Value = Scenery> {
     PossibleValuesParser::new(Scenery::all().map(Scenery::name))
         .try_map(|name| name.parse::<Scenery>())
+}
+
+/// Reads the name of a clutter.
+fn clutters() -> impl TypedValueParser<Value = Clutter> {
+    PossibleValuesParser::new(Clutter::ALL.map(Clutter::name))
+        .try_map(|name| name.parse::<Clutter>())
 }
 
 /// Reads a density.
@@ -99,6 +112,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
         scenery: args.scenery,
         motion: args.ego,
         density: args.density,
+        clutter: args.clutter,
+        poses: args.poses,
     };
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let start = Instant::now();
@@ -118,7 +133,8 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
 ///
 /// Drives that are there are kept; a drive that a run left unfinished is begun anew. Two runs must
 /// not write to one folder at once. Fails where a folder holds something else than the drive meant
-/// to be there, before anything is written, and where a file cannot be written.
+/// to be there or where the recipe does not fit together, before anything is written, and where a
+/// file cannot be written.
 pub fn write(
     out: &Path,
     recipe: &Recipe,
@@ -126,6 +142,7 @@ pub fn write(
     jobs: usize,
     quiet: bool,
 ) -> Result<Written, Error> {
+    recipe.check()?;
     let rig = recipe.rig()?;
     let day = out.join(layout::DATE);
     let mut missing = Vec::new();

@@ -1,13 +1,13 @@
 //! Drives written, and read back by those who read recordings.
 
 use super::calibration::Camera;
-use super::drive::{Motion, Recipe};
+use super::drive::{Motion, Poses, Recipe};
 use super::{Written, truth, write};
 use crate::scratch::Scratch;
 use glam::DVec3;
 use raywake_core::sweep::Timing;
 use raywake_io::source::{OpenOptions, SweepData, open};
-use raywake_sim::{Scenery, SimSweep};
+use raywake_sim::{Clutter, Scenery, SimSweep};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -275,6 +275,9 @@ fn what_is_in_the_way() {
     assert!(refused(t.path(), &small).contains("is there and is no drive of this program"));
     let text = refused(t.path(), &Recipe { sensor: "hdl65".into(), ..small });
     assert!(text.contains("hdl65"));
+    let there = Recipe { scenery: Scenery::Outskirts, ..recipe("hdl64", Motion::Turn, 1) };
+    let text = refused(t.path(), &there);
+    assert!(text.contains("--ego is for the street: outskirts"), "{text}");
 }
 
 #[test]
@@ -301,4 +304,50 @@ fn damaged_truth() {
     assert!(refused().contains("points.feather, row 1: a number is null or not finite"));
     let text = truth::read_objects(&path).unwrap_err().to_string();
     assert!(text.contains("has no column `frame`"), "{text}");
+}
+
+#[test]
+fn poses_with_the_errors_of_an_inertial_unit() {
+    let t = Scratch::new();
+    let recipe = Recipe { poses: Poses::Gnss, ..recipe("hdl64", Motion::Straight, 3) };
+    let exact = Recipe { poses: Poses::Exact, ..recipe.clone() };
+    write(&t.path().join("gnss"), &recipe, 1, 2, true).unwrap();
+    write(&t.path().join("exact"), &exact, 1, 2, true).unwrap();
+    let [gnss, exact] = ["gnss", "exact"].map(|name| files(&drive_folder(&t.path().join(name), 0)));
+    for (name, content) in &exact {
+        let differs = gnss[name] != *content;
+        let of_poses = name.starts_with("oxts/data") || name == Path::new("manifest.json");
+        assert_eq!(differs, of_poses, "{}", name.display());
+    }
+    let read = |name: &str| {
+        let mut source =
+            open(&drive_folder(&t.path().join(name), 0), &OpenOptions::default()).unwrap();
+        let mut sweep = SweepData::default();
+        source.read(2, &mut sweep).unwrap();
+        sweep.world_from_vehicle
+    };
+    let off = read("exact").inverse() * read("gnss");
+    let metres = off.translation.length();
+    assert!((0.001..0.3).contains(&metres), "{metres} m over two sweeps");
+}
+
+#[test]
+fn the_air_and_the_place_are_told() {
+    let t = Scratch::new();
+    let recipe = Recipe {
+        scenery: Scenery::Outskirts,
+        clutter: Clutter::Fog,
+        ..recipe("hdl64", Motion::Any, 2)
+    };
+    write(t.path(), &recipe, 1, 2, true).unwrap();
+    let folder = drive_folder(t.path(), 0);
+    let told = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    let manifest = told("manifest.json");
+    for part in ["\"scenery\":\"outskirts\"", "\"clutter\":\"fog\"", "\"place\":\""] {
+        assert!(manifest.contains(part), "{manifest}");
+    }
+    assert!(told("truth/classes.txt").ends_with("13 Clutter\n"));
+    let points = truth::read_points(&truth::points_path(&folder, 1)).unwrap();
+    let clutter = points.iter().filter(|p| p.class == raywake_sim::Class::Clutter);
+    assert!(clutter.inspect(|p| assert_eq!((p.object, p.flow), (0, [0.0; 3]))).count() > 500);
 }

@@ -13,14 +13,14 @@ use raywake_core::pose::Pose;
 use raywake_io::Error;
 use raywake_io::sink::table::{TableWriter, Values};
 use raywake_io::source::feather;
-use raywake_sim::{Class, Drive, ObjectState, SimSweep};
+use raywake_sim::{Class, Clutter, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
 
 /// Step of the difference that gives turn rates, s.
 const STEP_S: f64 = 5e-4;
 
 /// All classes, by number.
-const CLASSES: [Class; 13] = [
+const CLASSES: [Class; 14] = [
     Class::Ground,
     Class::Building,
     Class::Pole,
@@ -34,6 +34,7 @@ const CLASSES: [Class; 13] = [
     Class::Motorcycle,
     Class::Cyclist,
     Class::Pedestrian,
+    Class::Clutter,
 ];
 
 /// What a return really comes from.
@@ -87,12 +88,14 @@ pub fn class_name(class: Class) -> &'static str {
         Class::Motorcycle => "Motorcycle",
         Class::Cyclist => "Cyclist",
         Class::Pedestrian => "Pedestrian",
+        Class::Clutter => "Clutter",
     }
 }
 
-/// The lines of `classes.txt`.
-pub(super) fn classes() -> String {
-    CLASSES.iter().map(|&c| format!("{} {}\n", c as u8, class_name(c))).collect()
+/// The lines of `classes.txt`; what hangs in the air is told only where there is any.
+pub(super) fn classes(clutter: Clutter) -> String {
+    let told = |c: &&Class| **c != Class::Clutter || clutter != Clutter::None;
+    CLASSES.iter().filter(told).map(|&c| format!("{} {}\n", c as u8, class_name(c))).collect()
 }
 
 /// The truth of a frame's returns, in the folder of a drive.

@@ -1,7 +1,7 @@
 //! A car park: rows of parked cars, shelters for trolleys, cars that manoeuvre, people between.
 
 use super::crowd::{Crowd, Model};
-use super::site::Site;
+use super::site::{Site, every};
 use super::{Layout, VIEW_M};
 use crate::bend::Bend;
 use crate::ground::Ground;
@@ -92,26 +92,10 @@ impl CarPark {
     fn beds(&self, site: &mut Site) {
         for aisle in -AISLES..AISLES {
             let y = self.middle(aisle) + 0.5 * self.pitch();
-            let mut x = self.x[0];
-            let planted = site.rng.chance(0.6);
+            let (mut x, planted) = (self.x[0], site.rng.chance(0.6));
             while x < self.x[1] {
-                let far = !self.crossed(x);
-                match site.count(0, 8) {
-                    0 if far => site.forked_tree([x, y]),
-                    1 if far => site.post(Class::Pole, [x, y], [0.09, 7.0]),
-                    2 | 3 if planted && far => site.spread_bush([x, y]),
-                    4 if planted && far => {
-                        site.trimmed_hedge([x, y, 0.0], [3.0, 0.8, 0.9]);
-                    }
-                    5 if far => site.post(Class::Fixture, [x, y], [0.07, 0.9]),
-                    _ => {}
-                }
-                if far {
-                    let kerb = Surface::matt(0.4);
-                    for side in [-0.5, 0.5] {
-                        let at = [x, y + side * (BED_M - 0.2), 0.0];
-                        site.block(Class::Ground, at, [1.0, 0.15, 0.1], kerb);
-                    }
+                if !self.crossed(x) {
+                    bed(site, [x, y], planted);
                 }
                 x += site.rng.range(2.0, 5.0);
             }
@@ -119,76 +103,65 @@ impl CarPark {
     }
 
     /// A shelter over two bays: posts, a roof, panes on three sides, and trolleys in rows.
-    fn shelter(&self, site: &mut Site, [x, y, yaw]: [f64; 3]) {
+    fn shelter(&self, site: &mut Site, bay: [f64; 3]) {
         let (long, wide) = (BAY_M - 0.6, 2.0 * self.bay - 0.8);
-        let (s, c) = yaw.sin_cos();
-        let at = |along: f64, aside: f64| [x + along * c - aside * s, y + along * s + aside * c];
         for along in [-0.5 * long, 0.0, 0.5 * long] {
             for aside in [-0.5 * wide, 0.5 * wide] {
-                site.post(Class::Fixture, at(along, aside), [0.04, 2.1]);
+                let [x, y, _] = within(bay, along, aside);
+                site.post(Class::Fixture, [x, y], [0.04, 2.1]);
             }
         }
-        site.raised(Class::Fixture, [x, y, yaw], [long, wide, 0.08], 2.15, Surface::matt(0.3));
-        let pane = Surface::glass(0.3);
+        site.raised(Class::Fixture, bay, [long, wide, 0.08], 2.15, Surface::matt(0.3));
         for aside in [-0.5 * wide, 0.5 * wide] {
-            let [px, py] = at(0.0, aside);
-            site.raised(Class::Fixture, [px, py, yaw], [long, 0.03, 1.5], 0.3, pane);
+            site.pane(within(bay, 0.0, aside), [long, 1.5], 0.3);
         }
-        let [px, py] = at(0.5 * long, 0.0);
-        site.raised(Class::Fixture, [px, py, yaw + FRAC_PI_2], [wide, 0.03, 1.5], 0.3, pane);
+        let [x, y, yaw] = within(bay, 0.5 * long, 0.0);
+        site.pane([x, y, yaw + FRAC_PI_2], [wide, 1.5], 0.3);
         for aside in [-0.28 * wide, 0.0, 0.28 * wide] {
             let filled = site.rng.range(0.3, 0.9) * long;
-            let [px, py] = at(0.5 * (long - filled) - 0.2, aside);
-            // Wire, most of which rays go through, over wheels that stop them.
-            let wire = Surface::porous(0.5, 0.55);
-            site.raised(Class::Fixture, [px, py, yaw], [filled, 0.55, 0.55], 0.45, wire);
-            site.raised(
-                Class::Fixture,
-                [px, py, yaw],
-                [filled, 0.45, 0.3],
-                0.05,
-                Surface::porous(0.3, 0.8),
-            );
+            trolleys(site, within(bay, 0.5 * (long - filled) - 0.2, aside), filled);
         }
     }
 
-    /// A market behind a front of glass and pillars, a fence and trees on the other sides.
-    fn around(&self, site: &mut Site) {
-        let edge = self.middle(AISLES) + 0.5 * self.pitch();
+    /// Distance of the outermost rows' far end from the vehicle's aisle, m.
+    fn edge(&self) -> f64 {
+        self.middle(AISLES) + 0.5 * self.pitch()
+    }
+
+    /// A market behind a front of glass and pillars, under a roof.
+    fn market(&self, site: &mut Site) {
         let [from, to] = self.x;
-        let (y, deep, high) = (edge + 10.0, 30.0, site.rng.range(5.0, 8.0));
-        let wall = Surface::matt(0.45);
-        let [x, long] = [0.5 * (from + to), 0.8 * (to - from)];
+        let (y, deep, high) = (self.edge() + 10.0, 30.0, site.rng.range(5.0, 8.0));
+        let (x, long, wall) = (0.5 * (from + to), 0.8 * (to - from), Surface::matt(0.45));
         site.block(Class::Building, [x, y + 0.5 * deep + 6.0, 0.0], [long, deep, high], wall);
         site.raised(Class::Building, [x, y + 3.0, 0.0], [long, 6.0, 0.5], 3.2, wall);
-        let mut at = x - 0.5 * long;
-        while at < x + 0.5 * long {
+        for n in 0..(long / 4.0) as u32 {
+            let at = x - 0.5 * long + 4.0 * f64::from(n);
             site.post(Class::Building, [at, y + 0.6], [0.22, 3.2]);
-            site.raised(
-                Class::Building,
-                [at + 2.0, y + 5.0, 0.0],
-                [3.9, 0.04, 3.0],
-                0.1,
-                Surface::glass(0.3),
-            );
-            at += 4.0;
+            site.pane([at + 2.0, y + 5.0, 0.0], [3.9, 3.0], 0.1);
         }
-        let mesh = Surface::porous(0.35, site.rng.range(0.5, 0.85));
-        let mut at = from;
-        while at < to {
-            site.post(Class::Fixture, [at, -edge - 3.0], [0.03, 1.8]);
-            site.raised(Class::Fixture, [at + 1.25, -edge - 3.0, 0.0], [2.5, 0.03, 1.7], 0.1, mesh);
+    }
+
+    /// A fence of mesh on one side, trees behind it.
+    fn fence(&self, site: &mut Site) {
+        let (mesh, y) = (Surface::porous(0.35, site.rng.range(0.5, 0.85)), -self.edge() - 3.0);
+        every(self.x, 2.5, |x| {
+            site.post(Class::Fixture, [x, y], [0.03, 1.8]);
+            site.raised(Class::Fixture, [x + 1.25, y, 0.0], [2.5, 0.03, 1.7], 0.1, mesh);
             if site.rng.chance(0.3) {
                 let back = site.rng.range(1.5, 9.0);
-                site.forked_tree([at, -edge - 3.0 - back]);
+                site.forked_tree([x, y - back]);
             }
-            at += 2.5;
-        }
-        for end in [from - 9.0, to + 9.0] {
+        });
+    }
+
+    /// Bushes at both ends of the rows.
+    fn ends(&self, site: &mut Site) {
+        for x in [self.x[0] - 9.0, self.x[1] + 9.0] {
             for n in 0..30 {
-                let y = -edge + 2.0 * edge * f64::from(n) / 30.0;
+                let y = self.edge() * (f64::from(n) / 15.0 - 1.0);
                 let back = site.rng.range(0.0, 4.0);
-                site.spread_bush([end + back.copysign(end), y]);
+                site.spread_bush([x + back.copysign(x), y]);
             }
         }
     }
@@ -206,6 +179,33 @@ impl CarPark {
         path.then(1.0, speed, 0.0).then(rng.range(0.3, 1.5), 0.0, 0.0).then(2.0, 1.2, 0.0)
     }
 
+    /// Cars on their way out of bays near the vehicle, and in search of one.
+    fn manoeuvring(&self, crowd: &mut Crowd) {
+        let here = 0.5 * self.speed * crowd.duration_s;
+        let mut near = self.bays();
+        near.retain(|bay| (bay[0] - here).abs() < 25.0 && bay[1].abs() < 1.2 * self.pitch());
+        crowd.add(4.0, models::car, |r, t| {
+            let bay = near[(r.unit() * near.len() as f64) as usize];
+            self.leaving_bay(r, bay, t)
+        });
+        crowd.add(3.0, models::car, |r, t| self.searching(r, t));
+    }
+
+    fn parked(&self, crowd: &mut Crowd) {
+        for [x, y, yaw] in self.bays() {
+            if crowd.rng.chance(self.full) {
+                let model: Model = match (crowd.rng.unit() * 8.0) as u32 {
+                    0 => models::van,
+                    1 => models::motorcycle,
+                    _ => models::car,
+                };
+                let out = if crowd.rng.chance(0.3) { PI } else { 0.0 };
+                let [dx, dy, turn] = [0.15, 0.3, 0.04].map(|far| crowd.rng.range(-far, far));
+                crowd.park(model, Path::standing(x + dx, y + dy, yaw + out + turn));
+            }
+        }
+    }
+
     /// Along an aisle in search of a bay.
     fn searching(&self, rng: &mut Rng, duration_s: f64) -> Path {
         let (way, speed) = (rng.sign(), rng.range(1.0, 3.0));
@@ -213,6 +213,11 @@ impl CarPark {
         let gone = way * speed * rng.range(0.0, duration_s);
         let x = self.speed * 0.5 * duration_s + rng.range(-30.0, 30.0) - gone;
         Path::from(State { x, y, yaw: if way > 0.0 { 0.0 } else { PI }, speed })
+    }
+
+    fn waiting(&self, rng: &mut Rng, duration_s: f64) -> Path {
+        let State { x, y, yaw, .. } = self.walking(rng, duration_s).at(0.0);
+        Path::standing(x, y, yaw)
     }
 
     /// Along an aisle, between parked cars, or here and there with a bend.
@@ -234,6 +239,35 @@ impl CarPark {
             false => path,
         }
     }
+}
+
+/// One thing in a bed, and the kerbs beside it.
+fn bed(site: &mut Site, [x, y]: [f64; 2], planted: bool) {
+    match site.count(0, 8) {
+        0 => site.forked_tree([x, y]),
+        1 => site.post(Class::Pole, [x, y], [0.09, 7.0]),
+        2 | 3 if planted => site.spread_bush([x, y]),
+        4 if planted => site.trimmed_hedge([x, y, 0.0], [3.0, 0.8, 0.9]),
+        5 => site.post(Class::Fixture, [x, y], [0.07, 0.9]),
+        _ => {}
+    }
+    for side in [-0.5, 0.5] {
+        let at = [x, y + side * (BED_M - 0.2), 0.0];
+        site.block(Class::Ground, at, [1.0, 0.15, 0.1], Surface::matt(0.4));
+    }
+}
+
+/// A place in a bay: so far in, so far to the left.
+fn within([x, y, yaw]: [f64; 3], along: f64, aside: f64) -> [f64; 3] {
+    let (s, c) = yaw.sin_cos();
+    [x + along * c - aside * s, y + along * s + aside * c, yaw]
+}
+
+/// Trolleys pushed into one another: wire, most of which rays go through, and wheels below.
+fn trolleys(site: &mut Site, at: [f64; 3], long: f64) {
+    let [wire, wheels] = [0.55, 0.8].map(|porosity| Surface::porous(0.4, porosity));
+    site.raised(Class::Fixture, at, [long, 0.55, 0.55], 0.45, wire);
+    site.raised(Class::Fixture, at, [long, 0.45, 0.3], 0.05, wheels);
 }
 
 /// One of the aisles near the vehicle's.
@@ -271,7 +305,9 @@ impl Layout for CarPark {
 
     fn furnish(&self, site: &mut Site) {
         self.beds(site);
-        self.around(site);
+        self.market(site);
+        self.fence(site);
+        self.ends(site);
         let bays = self.bays();
         for _ in 0..4 {
             let bay = bays[site.count(0, bays.len() as u32 - 1) as usize];
@@ -282,41 +318,9 @@ impl Layout for CarPark {
     }
 
     fn populate(&self, crowd: &mut Crowd) {
-        let bays = self.bays();
-        let here = 0.5 * self.speed * crowd.duration_s;
-        let near: Vec<[f64; 3]> = bays
-            .iter()
-            .filter(|bay| (bay[0] - here).abs() < 25.0 && bay[1].abs() < 1.2 * self.pitch())
-            .copied()
-            .collect();
-        crowd.add(4.0, models::car, |r, t| {
-            let bay = near[(r.unit() * near.len() as f64) as usize];
-            self.leaving_bay(r, bay, t)
-        });
-        crowd.add(3.0, models::car, |r, t| self.searching(r, t));
-        for [x, y, yaw] in bays {
-            if !crowd.rng.chance(self.full) {
-                continue;
-            }
-            let kinds: [Model; 8] = [
-                models::car,
-                models::car,
-                models::car,
-                models::car,
-                models::car,
-                models::car,
-                models::van,
-                models::motorcycle,
-            ];
-            let model = kinds[(crowd.rng.unit() * 8.0) as usize];
-            let out = if crowd.rng.chance(0.3) { PI } else { 0.0 };
-            let [dx, dy, turn] = [0.15, 0.3, 0.04].map(|far| crowd.rng.range(-far, far));
-            crowd.park(model, Path::standing(x + dx, y + dy, yaw + out + turn));
-        }
+        self.manoeuvring(crowd);
+        self.parked(crowd);
         crowd.add(22.0, models::pedestrian, |r, t| self.walking(r, t));
-        crowd.add(3.0, models::pedestrian, |r, t| {
-            let path = self.walking(r, t).at(0.0);
-            Path::standing(path.x, path.y, path.yaw)
-        });
+        crowd.add(3.0, models::pedestrian, |r, t| self.waiting(r, t));
     }
 }

@@ -1,7 +1,7 @@
 //! A country road: banks, ditches, hedges dense and gappy, wooden fences, single trees, reflectors.
 
 use super::crowd::{Crowd, Model};
-use super::site::Site;
+use super::site::{Site, away, every};
 use super::{Layout, VIEW_M};
 use crate::bend::Bend;
 use crate::ground::Ground;
@@ -82,15 +82,12 @@ impl Country {
     }
 
     fn reflectors(&self, site: &mut Site) {
-        let step = site.rng.range(25.0, 50.0);
-        let mut station = self.stations[0];
-        while station < self.stations[1] {
+        every(self.stations, site.rng.range(25.0, 50.0), |station| {
             for side in [-1.0, 1.0] {
                 let at = self.axis.at(station, self.beyond(side, 0.5));
                 site.block(Class::Pole, at, [0.12, 0.1, 0.95], Surface::matt(0.7));
             }
-            station += step;
-        }
+        });
     }
 
     /// Stretches of hedge, fence or nothing along the top of the bank or the edge of the verge.
@@ -132,33 +129,28 @@ impl Country {
     }
 
     /// Posts and two or three rails.
-    fn wooden_fence(&self, site: &mut Site, [from, to]: [f64; 2], offset: f64) {
+    fn wooden_fence(&self, site: &mut Site, stretch: [f64; 2], offset: f64) {
         let (step, rails) = (site.rng.range(1.8, 3.0), site.count(2, 4));
-        let wood = Surface::matt(0.35);
-        let mut station = from;
-        while station < to {
+        every(stretch, step, |station| {
             let [a, b] = [station, station + step].map(|s| self.axis.at(s, offset));
             site.post(Class::Fixture, [a[0], a[1]], [0.06, 1.25]);
             for rail in 1..=rails {
                 let up = 1.15 * f64::from(rail) / f64::from(rails);
                 let ends = [[a[0], a[1], up], [b[0], b[1], up]];
-                site.bar(Class::Fixture, ends, 0.045, wood);
+                site.bar(Class::Fixture, ends, 0.045, Surface::matt(0.35));
             }
-            station += step;
-        }
+        });
     }
 
     /// Thin posts with wire between, which few rays meet.
-    fn wire_fence(&self, site: &mut Site, [from, to]: [f64; 2], offset: f64) {
+    fn wire_fence(&self, site: &mut Site, stretch: [f64; 2], offset: f64) {
         let (step, wire) = (site.rng.range(2.5, 4.0), Surface::porous(0.3, 0.93));
-        let mut station = from;
-        while station < to {
+        every(stretch, step, |station| {
             let [x, y, _] = self.axis.at(station, offset);
             site.post(Class::Fixture, [x, y], [0.04, 1.2]);
             let middle = self.axis.at(station + 0.5 * step, offset);
             site.raised(Class::Fixture, middle, [step, 0.03, 1.0], 0.15, wire);
-            station += step;
-        }
+        });
     }
 
     /// Trees by the road, in the fields and in woods.
@@ -177,32 +169,30 @@ impl Country {
         }
     }
 
-    /// A barn or a stack of bales, and a pole that carries a line, here and there.
+    /// A barn or a row of bales here and there.
     fn farms(&self, site: &mut Site, side: f64) {
         let mut station = self.stations[0] + site.rng.range(0.0, 60.0);
         while station < self.stations[1] {
             let out = self.foot(side) + site.rng.range(8.0, 35.0);
             let [x, y, yaw] = self.axis.at(station, self.beyond(side, out));
-            let yaw = yaw + site.rng.range(-0.6, 0.6);
+            let at = [x, y, yaw + site.rng.range(-0.6, 0.6)];
             if site.rng.chance(0.4) {
                 let size = [site.rng.range(9.0, 24.0), 10.0, site.rng.range(3.5, 7.0)];
-                site.block(Class::Building, [x, y, yaw], size, Surface::matt(0.4));
+                site.block(Class::Building, at, size, Surface::matt(0.4));
             } else {
-                for n in 0..site.count(2, 7) {
-                    let along = 1.7 * f64::from(n);
-                    let at = [x + along * yaw.cos(), y + along * yaw.sin(), yaw + FRAC_PI_2];
-                    site.block(Class::Fixture, at, [1.3, 1.4, 1.3], Surface::matt(0.45));
-                }
+                bales(site, at);
             }
             station += site.rng.range(40.0, 150.0);
         }
-        let (step, out) = (site.rng.range(35.0, 55.0), self.foot(side) + 4.0);
-        let mut station = self.stations[0];
-        while side > 0.0 && station < self.stations[1] {
-            let [x, y, _] = self.axis.at(station, self.beyond(side, out));
+    }
+
+    /// Poles that carry a line along one side.
+    fn line(&self, site: &mut Site) {
+        let offset = self.beyond(1.0, self.foot(1.0) + 4.0);
+        every(self.stations, site.rng.range(35.0, 55.0), |station| {
+            let [x, y, _] = self.axis.at(station, offset);
             site.post(Class::Pole, [x, y], [0.13, 8.0]);
-            station += step;
-        }
+        });
     }
 
     /// Somebody in a lane who is somewhere near the vehicle at some time.
@@ -210,21 +200,36 @@ impl Country {
         let (way, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-60.0, 60.0));
         let station = self.speed * t + ahead - way * speed * t;
-        let steady = self.axis.follow([station, -way * beside], way, speed, long_s + ON_S);
+        let place = [station, -way * beside];
         match speed > 6.0 && rng.chance(0.25) {
-            // Braking or speeding up.
-            true => {
-                let later = speed * rng.range(0.5, 1.3);
-                let place = [station, -way * beside];
-                let turn = self.axis.turn(-way * beside, way);
-                let rate = 2.0f64.copysign(later - speed);
-                Path::from(self.axis.state(place, way, speed))
-                    .then(t, 0.0, turn)
-                    .then((later - speed) / rate, rate, turn)
-                    .then(long_s + ON_S, 0.0, turn)
-            }
-            false => steady,
+            true => self.changing(rng, place, way, [speed, t], long_s),
+            false => self.axis.follow(place, way, speed, long_s + ON_S),
         }
+    }
+
+    /// Brakes or speeds up from a time on.
+    fn changing(
+        &self,
+        rng: &mut Rng,
+        place: [f64; 2],
+        way: f64,
+        [speed, from_s]: [f64; 2],
+        long_s: f64,
+    ) -> Path {
+        let (later, turn) = (speed * rng.range(0.5, 1.3), self.axis.turn(place[1], way));
+        let rate = 2.0f64.copysign(later - speed);
+        Path::from(self.axis.state(place, way, speed))
+            .then(from_s, 0.0, turn)
+            .then((later - speed) / rate, rate, turn)
+            .then(long_s + ON_S, 0.0, turn)
+    }
+}
+
+/// Bales of straw side by side.
+fn bales(site: &mut Site, [x, y, yaw]: [f64; 3]) {
+    for n in 0..site.count(2, 7) {
+        let [x, y] = away([x, y], yaw, 1.7 * f64::from(n));
+        site.block(Class::Fixture, [x, y, yaw + FRAC_PI_2], [1.3, 1.4, 1.3], Surface::matt(0.45));
     }
 }
 
@@ -257,6 +262,7 @@ impl Layout for Country {
 
     fn furnish(&self, site: &mut Site) {
         self.reflectors(site);
+        self.line(site);
         for side in [-1.0, 1.0] {
             self.borders(site, side);
             self.trees(site, side);

@@ -96,15 +96,7 @@ impl Market {
         site.raised(Class::Fixture, [x, y, 0.0], [long, deep, 0.07], 0.8, wood);
         let drape = [x, y - side * 0.5 * deep, 0.0];
         site.raised(Class::Fixture, drape, [long, 0.03, 0.7], 0.1, Surface::matt(0.5));
-        for _ in 0..site.count(4, 12) {
-            let at = [
-                x + site.rng.range(-0.45, 0.45) * long,
-                y + site.rng.range(-0.4, 0.4) * deep,
-                site.rng.range(0.0, PI),
-            ];
-            let size = [0.5, 0.35, site.rng.range(0.1, 0.45)];
-            site.raised(Class::Fixture, at, size, 0.87, Surface::matt(0.5));
-        }
+        goods(site, [x, y], [long, deep]);
         let heights = [site.rng.range(1.95, 2.2), site.rng.range(2.3, 2.7)];
         for end in [-0.5, 0.5] {
             for (row, up) in [-0.5, 0.5].into_iter().zip(heights) {
@@ -150,27 +142,23 @@ impl Market {
     fn along(&self, site: &mut Site, side: f64) {
         let mut x = self.x[0];
         while x < self.x[1] {
-            let y = side * (self.half - site.rng.range(0.6, 1.4));
             match site.count(0, 12) {
                 0..5 => self.stall(site, x, side),
                 5 | 6 => self.cafe(site, x, side),
                 7 => site.post(Class::Pole, [x, side * (FREE_M + 0.4)], [0.07, 4.5]),
                 8 => site.forked_tree([x, side * (FREE_M + 0.8)]),
-                9 => {
-                    let size = [1.2, 0.5, 0.5];
-                    site.block(Class::Fixture, [x, y, 0.0], size, Surface::matt(0.4));
-                    site.leaves([x, y], [1.2, 0.7, 0.8], 0.4, 0.4);
-                }
-                10 => {
-                    // A board that says what there is to eat.
-                    let yaw = site.rng.range(0.0, PI);
-                    let at = [x, side * (FREE_M + 0.5), yaw];
-                    site.block(Class::Fixture, at, [0.05, 0.7, 1.1], Surface::matt(0.3));
-                }
+                9 => self.planter(site, x, side),
+                10 => menu(site, [x, side * (FREE_M + 0.5)]),
                 _ => {}
             }
             x += site.rng.range(2.4, 6.0);
         }
+    }
+
+    fn planter(&self, site: &mut Site, x: f64, side: f64) {
+        let y = side * (self.half - site.rng.range(0.6, 1.4));
+        site.block(Class::Fixture, [x, y, 0.0], [1.2, 0.5, 0.5], Surface::matt(0.4));
+        site.leaves([x, y], [1.2, 0.7, 0.8], 0.4, 0.4);
     }
 
     /// Somebody who walks up or down the street near the vehicle, perhaps with a bend.
@@ -192,6 +180,22 @@ impl Market {
         let y = rng.sign() * rng.range(1.4, self.half - 0.4);
         Path::standing(x, y, rng.range(-PI, PI))
     }
+}
+
+/// Boxes on a table of this length and depth.
+fn goods(site: &mut Site, [x, y]: [f64; 2], [long, deep]: [f64; 2]) {
+    for _ in 0..site.count(4, 12) {
+        let [dx, dy] = [0.45 * long, 0.4 * deep].map(|far| site.rng.range(-far, far));
+        let at = [x + dx, y + dy, site.rng.range(0.0, PI)];
+        let size = [0.5, 0.35, site.rng.range(0.1, 0.45)];
+        site.raised(Class::Fixture, at, size, 0.87, Surface::matt(0.5));
+    }
+}
+
+/// A board that says what there is to eat.
+fn menu(site: &mut Site, [x, y]: [f64; 2]) {
+    let yaw = site.rng.range(0.0, PI);
+    site.block(Class::Fixture, [x, y, yaw], [0.05, 0.7, 1.1], Surface::matt(0.3));
 }
 
 impl Layout for Market {

@@ -1,7 +1,7 @@
 //! A motorway: guard rails, a concrete barrier in the middle, noise walls, gantries, fast traffic.
 
 use super::crowd::{Crowd, Model};
-use super::site::Site;
+use super::site::{Site, every};
 use super::{Layout, VIEW_M};
 use crate::bend::Bend;
 use crate::ground::Ground;
@@ -70,15 +70,10 @@ impl Motorway {
         INNER_M + LANE_M * f64::from(self.lanes) + SHOULDER_M
     }
 
-    /// Every `step` from one station to another.
-    fn every(&self, [from, to]: [f64; 2], step: f64, mut put: impl FnMut(f64)) {
-        (0..((to - from) / step).ceil() as u32).for_each(|n| put(from + step * f64::from(n)));
-    }
-
     /// Posts and a rail of two waves.
     fn guard_rail(&self, site: &mut Site, offset: f64) {
         let (step, steel) = (2.0, Surface::matt(0.55));
-        self.every(self.stations, step, |station| {
+        every(self.stations, step, |station| {
             let [x, y, yaw] = self.axis.at(station, offset);
             let back = 0.12 * offset.signum();
             let post = self.axis.at(station, offset + back);
@@ -94,13 +89,13 @@ impl Motorway {
     fn barrier(&self, site: &mut Site) {
         let (long, concrete) = (6.0, Surface::matt(0.45));
         let height = site.rng.range(0.8, 1.1);
-        self.every(self.stations, long, |station| {
+        every(self.stations, long, |station| {
             let at = self.axis.at(station, 0.0);
             site.block(Class::Fixture, at, [long, 0.6, 0.25], concrete);
             site.block(Class::Fixture, at, [long, 0.2, height], concrete);
         });
         if site.rng.chance(0.4) {
-            self.every(self.stations, 40.0, |station| {
+            every(self.stations, 40.0, |station| {
                 let [x, y, _] = self.axis.at(station, 0.0);
                 site.post(Class::Pole, [x, y], [0.1, 10.0]);
             });
@@ -128,7 +123,7 @@ impl Motorway {
         let offset = side * (self.edge() + site.rng.range(1.2, 2.2));
         let panel = Surface::matt(site.rng.range(0.25, 0.5));
         let glazed = site.rng.range(0.0, 0.4);
-        self.every(stretch, step, |station| {
+        every(stretch, step, |station| {
             let post = self.axis.at(station, offset);
             site.block(Class::Fixture, post, [0.2, 0.22, height + 0.1], Surface::matt(0.5));
             let middle = self.axis.at(station + 0.5 * step, offset);
@@ -179,6 +174,25 @@ impl Motorway {
         self.axis.follow([station, -way * self.lane(lane)], way, speed, long_s + ON_S)
     }
 
+    /// All that goes one way: who comes towards the vehicle is soon behind it, so there are more.
+    fn one_way(&self, crowd: &mut Crowd, way: f64) {
+        let a_second = if way < 0.0 { 0.2 } else { 0.03 };
+        let more = 1.0 + a_second * crowd.duration_s;
+        for (amount, model) in [(4.0, models::truck as Model), (1.0, models::bus)] {
+            crowd.add(more * amount, model, |r, t| self.heavy(r, t, way));
+        }
+        for (amount, model) in
+            [(9.0, models::car as Model), (2.0, models::van), (1.0, models::motorcycle)]
+        {
+            crowd.add(more * amount, model, |r, t| self.car(r, t, way));
+        }
+    }
+
+    fn heavy(&self, rng: &mut Rng, long_s: f64, way: f64) -> Path {
+        let speed = rng.range(21.0, 25.0);
+        self.driving(rng, long_s, way, 0, speed)
+    }
+
     /// Speed and lane of a car.
     fn car(&self, rng: &mut Rng, long_s: f64, way: f64) -> Path {
         let lane = (rng.unit() * f64::from(self.lanes)) as u32;
@@ -223,23 +237,8 @@ impl Layout for Motorway {
     }
 
     fn populate(&self, crowd: &mut Crowd) {
-        let long_s = crowd.duration_s;
-        let more = 1.0 + 0.03 * long_s;
         for way in [1.0, -1.0] {
-            let heavy: [(f64, Model); 2] = [(4.0, models::truck), (1.0, models::bus)];
-            for (amount, model) in heavy {
-                let amount = amount * if way < 0.0 { 1.0 + 0.2 * long_s } else { more };
-                crowd.add(amount, model, |r, t| {
-                    let speed = r.range(21.0, 25.0);
-                    self.driving(r, t, way, 0, speed)
-                });
-            }
-            let light: [(f64, Model); 3] =
-                [(9.0, models::car), (2.0, models::van), (1.0, models::motorcycle)];
-            for (amount, model) in light {
-                let amount = amount * if way < 0.0 { 1.0 + 0.2 * long_s } else { more };
-                crowd.add(amount, model, |r, t| self.car(r, t, way));
-            }
+            self.one_way(crowd, way);
         }
         // Somebody has stopped on the shoulder.
         crowd.add(1.0, models::truck, |r, _| {

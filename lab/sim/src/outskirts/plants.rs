@@ -1,6 +1,6 @@
 //! Trees, bushes and hedges: trunks that fork, crowns at the ends of branches, hedges with gaps.
 
-use super::site::Site;
+use super::site::{Site, away};
 use crate::object::{Class, Surface};
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ impl Site<'_> {
         for n in 0..branches {
             let turn = TAU * (f64::from(n) + self.rng.range(-0.3, 0.3)) / f64::from(branches);
             let out = long * self.rng.range(0.3, 0.9);
-            let end = [at[0] + out * turn.cos(), at[1] + out * turn.sin()];
+            let end = away(at, turn, out);
             let up = height + long * self.rng.range(0.5, 1.1);
             let wood = Surface::matt(0.35);
             self.bar(Class::Pole, [fork, [end[0], end[1], up]], 0.35 * radius, wood);
@@ -41,8 +41,7 @@ impl Site<'_> {
     pub(super) fn spread_bush(&mut self, at: [f64; 2]) {
         let (height, porosity) = (self.rng.range(0.6, 2.2), self.rng.range(0.4, 0.85));
         for _ in 0..self.count(3, 7) {
-            let (turn, out) = (self.rng.range(0.0, TAU), self.rng.range(0.1, 0.5) * height);
-            let end = [at[0] + out * turn.cos(), at[1] + out * turn.sin()];
+            let end = away(at, self.rng.range(0.0, TAU), self.rng.range(0.1, 0.5) * height);
             let wide = height * self.rng.range(0.35, 0.7);
             let lift = height * self.rng.range(-0.1, 0.45);
             self.leaves(end, [wide, wide, 0.9 * wide], lift, porosity);

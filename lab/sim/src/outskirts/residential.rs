@@ -2,7 +2,7 @@
 
 use super::Layout;
 use super::crowd::{Crowd, Model};
-use super::site::Site;
+use super::site::{Site, every};
 use crate::bend::Bend;
 use crate::ground::Ground;
 use crate::models;
@@ -91,32 +91,35 @@ impl Residential {
 
     /// What parts a garden from the footpath, with a gap for the drive.
     fn border(&self, site: &mut Site, plot: Plot) {
-        let to = plot.to - DRIVE_M - 1.2;
+        let stretch = [plot.from, plot.to - DRIVE_M - 1.2];
         match site.count(0, 10) {
-            0..4 => self.chain_link(site, plot.side, [plot.from, to]),
-            4..6 => {
-                let (wide, high) = (site.rng.range(0.5, 1.0), site.rng.range(0.8, 2.0));
-                self.pieces([plot.from, to], 2.5, |middle, long| {
-                    let at = self.at(middle, plot.side, 0.6);
-                    site.trimmed_hedge(at, [long, wide, high]);
-                });
-            }
-            6..8 => {
-                let high = site.rng.range(0.4, 1.6);
-                let stone = Surface::matt(0.4);
-                self.pieces([plot.from, to], 2.5, |middle, long| {
-                    let at = self.at(middle, plot.side, 0.2);
-                    site.block(Class::Fixture, at, [long, 0.3, high], stone);
-                });
-            }
-            _ => {
-                let mut station = plot.from;
-                while station < to {
-                    let [x, y, _] = self.at(station, plot.side, 0.9);
-                    site.spread_bush([x, y]);
-                    station += site.rng.range(1.0, 3.5);
-                }
-            }
+            0..4 => self.chain_link(site, plot.side, stretch),
+            4..6 => self.hedge(site, plot.side, stretch),
+            6..8 => self.wall(site, plot.side, stretch),
+            _ => self.bushes(site, plot.side, stretch),
+        }
+    }
+
+    fn hedge(&self, site: &mut Site, side: f64, stretch: [f64; 2]) {
+        let (wide, high) = (site.rng.range(0.5, 1.0), site.rng.range(0.8, 2.0));
+        self.pieces(stretch, 2.5, |middle, long| {
+            site.trimmed_hedge(self.at(middle, side, 0.6), [long, wide, high]);
+        });
+    }
+
+    fn wall(&self, site: &mut Site, side: f64, stretch: [f64; 2]) {
+        let (high, stone) = (site.rng.range(0.4, 1.6), Surface::matt(0.4));
+        self.pieces(stretch, 2.5, |middle, long| {
+            site.block(Class::Fixture, self.at(middle, side, 0.2), [long, 0.3, high], stone);
+        });
+    }
+
+    fn bushes(&self, site: &mut Site, side: f64, [from, to]: [f64; 2]) {
+        let mut station = from;
+        while station < to {
+            let [x, y, _] = self.at(station, side, 0.9);
+            site.spread_bush([x, y]);
+            station += site.rng.range(1.0, 3.5);
         }
     }
 
@@ -145,31 +148,33 @@ impl Residential {
         let (deep, high) = (site.rng.range(7.0, 11.0), site.rng.range(2.8, 6.0));
         let middle = plot.from + 0.5 * long + 0.6;
         let wall = Surface::matt(site.rng.range(0.25, 0.65));
-        let [x, y, yaw] = self.at(middle, plot.side, plot.garden + 0.5 * deep);
-        site.block(Class::Building, [x, y, yaw], [long, deep, high], wall);
-        // The roof is a beam that stands on one of its edges.
-        let slant = deep / 2.0f64.sqrt();
-        let turn = DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(FRAC_PI_4);
-        let z = site.ground.height(x, y) + high;
-        let shape = Shape::cuboid(long + 0.6, slant, slant);
-        let pose = Pose::new(turn, DVec3::new(x, y, z));
-        site.fix(Class::Building, shape, pose, Surface::matt(0.25));
+        let at = self.at(middle, plot.side, plot.garden + 0.5 * deep);
+        site.block(Class::Building, at, [long, deep, high], wall);
+        roof(site, at, [long, deep, high]);
+        self.windows(site, plot, middle, long);
+        let door = middle + site.rng.range(-0.3, 0.3) * long;
+        self.stairs(site, plot, door);
+        if site.rng.chance(0.5) {
+            self.terrace(site, plot, middle - 0.2 * long, 0.4 * long);
+        }
+    }
+
+    fn windows(&self, site: &mut Site, plot: Plot, middle: f64, long: f64) {
         for _ in 0..site.count(2, 6) {
             let station = middle + site.rng.range(-0.42, 0.42) * long;
             let at = self.at(station, plot.side, plot.garden + 0.02);
             let size = [site.rng.range(0.8, 1.8), 0.16, 1.3];
             site.raised(Class::Building, at, size, 0.9, Surface::glass(0.35));
         }
-        let door = middle + site.rng.range(-0.3, 0.3) * long;
-        self.stairs(site, plot, door);
-        if site.rng.chance(0.5) {
-            let at = self.at(middle - 0.2 * long, plot.side, plot.garden - 1.2);
-            let size = [0.4 * long, 2.4, site.rng.range(0.3, 1.0)];
-            site.block(Class::Fixture, at, size, Surface::matt(0.4));
-            let rail = self.at(middle - 0.2 * long, plot.side, plot.garden - 2.35);
-            let bars = Surface::porous(0.4, 0.6);
-            site.raised(Class::Fixture, rail, [0.4 * long, 0.05, 0.9], size[2], bars);
-        }
+    }
+
+    /// A terrace before the house, with a rail.
+    fn terrace(&self, site: &mut Site, plot: Plot, station: f64, long: f64) {
+        let high = site.rng.range(0.3, 1.0);
+        let at = self.at(station, plot.side, plot.garden - 1.2);
+        site.block(Class::Fixture, at, [long, 2.4, high], Surface::matt(0.4));
+        let rail = self.at(station, plot.side, plot.garden - 2.35);
+        site.raised(Class::Fixture, rail, [long, 0.05, 0.9], high, Surface::porous(0.4, 0.6));
     }
 
     /// Steps up to a door.
@@ -210,42 +215,13 @@ impl Residential {
         }
     }
 
-    /// Trees, bushes, bins, swings and stacked wood.
+    /// Trees, bushes, swings and stacked wood behind the border, bins before it.
     fn garden(&self, site: &mut Site, plot: Plot) {
         for _ in 0..site.count(2, 8) {
             let station = site.rng.range(plot.from, plot.to - DRIVE_M - 1.5);
             let out = site.rng.range(1.5, plot.garden - 0.8);
-            let [x, y, yaw] = self.at(station, plot.side, out);
-            match site.count(0, 9) {
-                0 | 1 => site.forked_tree([x, y]),
-                2 => site.column_tree([x, y]),
-                3..6 => site.spread_bush([x, y]),
-                6 => site.block(Class::Fixture, [x, y, yaw], [1.6, 0.5, 1.1], Surface::matt(0.35)),
-                7 => {
-                    // A swing: two slanting pairs of legs and a beam.
-                    for end in [-1.0, 1.0] {
-                        for leg in [-0.6, 0.6] {
-                            let top = [x + end * yaw.cos(), y + end * yaw.sin(), 2.0];
-                            let foot = [top[0] - leg * yaw.sin(), top[1] + leg * yaw.cos(), 0.0];
-                            let wood = Surface::matt(0.35);
-                            site.bar(Class::Fixture, [foot, top], 0.04, wood);
-                        }
-                    }
-                    site.raised(
-                        Class::Fixture,
-                        [x, y, yaw],
-                        [2.2, 0.08, 0.08],
-                        2.0,
-                        Surface::matt(0.35),
-                    );
-                }
-                _ => {
-                    let net = Surface::porous(0.3, 0.75);
-                    let shape = Shape::cylinder(1.3, 1.6);
-                    let z = site.ground.height(x, y) + 1.5;
-                    site.fix(Class::Fixture, shape, Pose::planar(x, y, z, 0.0), net);
-                }
-            }
+            let at = self.at(station, plot.side, out);
+            in_garden(site, at);
         }
         let station = plot.to - DRIVE_M - 1.0;
         for n in 0..site.count(0, 4) {
@@ -256,12 +232,10 @@ impl Residential {
 
     fn lamps(&self, site: &mut Site) {
         let (step, side) = (site.rng.range(25.0, 40.0), site.rng.sign());
-        let mut station = self.stations[0];
-        while station < self.stations[1] {
+        every(self.stations, step, |station| {
             let [x, y, _] = self.at(station, side, -0.15);
             site.post(Class::Pole, [x, y], [0.06, 4.5]);
-            station += step;
-        }
+        });
     }
 
     fn driving(&self, rng: &mut Rng, long_s: f64, beside: f64, speeds: [f64; 2]) -> Path {
@@ -278,6 +252,19 @@ impl Residential {
         self.driving(rng, long_s, beside, [0.8, 1.8])
     }
 
+    /// A car on a drive, and one by the road.
+    fn parked(&self, crowd: &mut Crowd, [station, side]: [f64; 2]) {
+        let out = if crowd.rng.chance(0.4) { 0.0 } else { PI };
+        let [x, y, yaw] = self.at(station, side, crowd.rng.range(2.6, 3.2));
+        if crowd.rng.chance(0.6) {
+            crowd.park(models::car, Path::standing(x, y, yaw + side * FRAC_PI_2 + out));
+        }
+        if crowd.rng.chance(0.4) {
+            let [x, y, yaw] = self.axis.at(station - 8.0, side * (self.half + 0.1));
+            crowd.park(models::car, Path::standing(x, y, yaw));
+        }
+    }
+
     /// Out of a drive in reverse, a halt on the road, and off.
     fn backing(&self, rng: &mut Rng, long_s: f64) -> Path {
         let near = |d: &&[f64; 2]| (d[0] - 0.5 * self.speed * long_s).abs() < 35.0;
@@ -292,6 +279,46 @@ impl Residential {
         let path = path.then(FRAC_PI_2 * 4.5 / speed, 0.0, way / 4.5);
         path.then(1.0, speed, 0.0).then(1.0, 0.0, 0.0).then(2.5, 1.5, 0.0)
     }
+}
+
+/// A roof over a house of this size: a beam that stands on one of its edges.
+fn roof(site: &mut Site, [x, y, yaw]: [f64; 3], [long, deep, high]: [f64; 3]) {
+    let slant = deep / 2.0f64.sqrt();
+    let turn = DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(FRAC_PI_4);
+    let at = DVec3::new(x, y, site.ground.height(x, y) + high);
+    let shape = Shape::cuboid(long + 0.6, slant, slant);
+    site.fix(Class::Building, shape, Pose::new(turn, at), Surface::matt(0.25));
+}
+
+/// Something that grows or stands in a garden.
+fn in_garden(site: &mut Site, at: [f64; 3]) {
+    let [x, y, _] = at;
+    match site.count(0, 9) {
+        0 | 1 => site.forked_tree([x, y]),
+        2 => site.column_tree([x, y]),
+        3..6 => site.spread_bush([x, y]),
+        6 => site.block(Class::Fixture, at, [1.6, 0.5, 1.1], Surface::matt(0.35)),
+        7 => swing(site, at),
+        _ => trampoline(site, [x, y]),
+    }
+}
+
+/// Two slanting pairs of legs and a beam.
+fn swing(site: &mut Site, [x, y, yaw]: [f64; 3]) {
+    let ((s, c), wood) = (yaw.sin_cos(), Surface::matt(0.35));
+    for (end, leg) in [(-1.0, -0.6), (-1.0, 0.6), (1.0, -0.6), (1.0, 0.6)] {
+        let top = [x + end * c, y + end * s, 2.0];
+        let foot = [top[0] - leg * s, top[1] + leg * c, 0.0];
+        site.bar(Class::Fixture, [foot, top], 0.04, wood);
+    }
+    site.raised(Class::Fixture, [x, y, yaw], [2.2, 0.08, 0.08], 2.0, wood);
+}
+
+/// A round net.
+fn trampoline(site: &mut Site, [x, y]: [f64; 2]) {
+    let z = site.ground.height(x, y) + 1.5;
+    let (net, shape) = (Surface::porous(0.3, 0.75), Shape::cylinder(1.3, 1.6));
+    site.fix(Class::Fixture, shape, Pose::planar(x, y, z, 0.0), net);
 }
 
 impl Layout for Residential {
@@ -349,16 +376,8 @@ impl Layout for Residential {
         }
         crowd.add(4.0, models::cyclist, |r, t| self.driving(r, t, self.half - 0.7, [2.5, 6.0]));
         crowd.add(10.0, models::pedestrian, |r, t| self.walking(r, t));
-        for &[station, side] in &self.drives {
-            let out = if crowd.rng.chance(0.4) { 0.0 } else { PI };
-            let [x, y, yaw] = self.at(station, side, crowd.rng.range(2.6, 3.2));
-            if crowd.rng.chance(0.6) {
-                crowd.park(models::car, Path::standing(x, y, yaw + side * FRAC_PI_2 + out));
-            }
-            if crowd.rng.chance(0.4) {
-                let [x, y, yaw] = self.axis.at(station - 8.0, side * (self.half + 0.1));
-                crowd.park(models::car, Path::standing(x, y, yaw));
-            }
+        for &drive in &self.drives {
+            self.parked(crowd, drive);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A roundabout: traffic circles a planted mound, comes and goes on its arms; cyclists go around.
 
 use super::crowd::{Crowd, Model};
-use super::site::Site;
+use super::site::{Site, away};
 use super::{Layout, VIEW_M};
 use crate::bend::Bend;
 use crate::ground::Ground;
@@ -45,6 +45,11 @@ fn arc_s(angle: f64, radius: f64, speed: f64) -> f64 {
     angle * radius / speed
 }
 
+/// A place at an angle, so far from the middle.
+fn around_middle(angle: f64, far: f64) -> [f64; 2] {
+    away([0.0; 2], angle, far)
+}
+
 impl Roundabout {
     pub(super) fn drawn(rng: &mut Rng) -> Roundabout {
         let mound = rng.range(6.0, 13.0);
@@ -71,11 +76,6 @@ impl Roundabout {
         }
     }
 
-    /// A place so far from the middle, at an angle.
-    fn polar(&self, angle: f64, away: f64) -> [f64; 2] {
-        [away * angle.cos(), away * angle.sin()]
-    }
-
     /// A place on an arm: so far out, so far to the left of the way out.
     fn on_arm(&self, arm: f64, out: f64, left: f64) -> [f64; 2] {
         let (s, c) = arm.sin_cos();
@@ -84,7 +84,7 @@ impl Roundabout {
 
     /// Counter-clockwise around the middle for this long.
     fn circling(&self, angle: f64, away: f64, speed: f64, long_s: f64) -> Path {
-        let [x, y] = self.polar(angle, away);
+        let [x, y] = around_middle(angle, away);
         let start = State { x, y, yaw: angle + FRAC_PI_2, speed };
         Path::from(start).then(long_s, 0.0, 1.0 / away)
     }
@@ -138,11 +138,9 @@ impl Roundabout {
 
     /// What grows and stands on the mound.
     fn island(&self, site: &mut Site) {
-        let [mound, ..] = self.radii;
         for _ in 0..site.count(4, 22) {
-            let away = (mound - 1.5) * site.rng.unit().sqrt();
-            let turn = site.rng.range(0.0, TAU);
-            let at = self.polar(turn, away);
+            let far = (self.radii[0] - 1.5) * site.rng.unit().sqrt();
+            let at = around_middle(site.rng.range(0.0, TAU), far);
             match site.count(0, 6) {
                 0 => site.forked_tree(at),
                 1 => site.column_tree(at),
@@ -150,17 +148,23 @@ impl Roundabout {
             }
         }
         if site.rng.chance(0.5) {
-            // A sculpture: a few slanting slabs.
-            for n in 0..site.count(2, 5) {
-                let at = self.polar(f64::from(n) * 2.1, 1.2);
-                let size = [0.3, 1.2, site.rng.range(1.5, 4.0)];
-                let yaw = site.rng.range(0.0, PI);
-                site.block(Class::Fixture, [at[0], at[1], yaw], size, Surface::matt(0.5));
-            }
+            self.sculpture(site);
         }
-        // Signs that show the way around, before each arm.
+    }
+
+    /// A few slanting slabs.
+    fn sculpture(&self, site: &mut Site) {
+        for n in 0..site.count(2, 5) {
+            let [x, y] = around_middle(f64::from(n) * 2.1, 1.2);
+            let (size, yaw) = ([0.3, 1.2, site.rng.range(1.5, 4.0)], site.rng.range(0.0, PI));
+            site.block(Class::Fixture, [x, y, yaw], size, Surface::matt(0.5));
+        }
+    }
+
+    /// Signs that show the way around, before each arm.
+    fn signs(&self, site: &mut Site) {
         for &arm in &self.arms {
-            let [x, y] = self.polar(arm, mound - 0.6);
+            let [x, y] = around_middle(arm, self.radii[0] - 0.6);
             site.post(Class::Pole, [x, y], [0.04, 1.0]);
             site.raised(Class::Pole, [x, y, arm], [0.05, 0.7, 0.7], 0.9, Surface::matt(1.0));
         }
@@ -174,7 +178,7 @@ impl Roundabout {
                 let angle = TAU * f64::from(n) / f64::from(count);
                 let gap = self.off_arm(angle, away);
                 if away < self.radii[1] || gap > ARM_M + 2.5 {
-                    let [x, y] = self.polar(angle, away);
+                    let [x, y] = around_middle(angle, away);
                     let at = [x, y, angle + FRAC_PI_2];
                     site.block(Class::Ground, at, [1.0, 0.25, 0.11], Surface::matt(0.4));
                 }
@@ -197,7 +201,7 @@ impl Roundabout {
             let angle = site.rng.range(0.0, TAU);
             let away = self.radii[2] + 6.5 + 75.0 * site.rng.unit();
             let aside = self.off_arm(angle, away);
-            let [x, y] = self.polar(angle, away);
+            let [x, y] = around_middle(angle, away);
             match site.count(0, 12) {
                 0..3 if aside > ARM_M + 3.5 => site.forked_tree([x, y]),
                 3..6 if aside > ARM_M + 3.0 => site.spread_bush([x, y]),
@@ -237,6 +241,43 @@ impl Roundabout {
     }
 }
 
+impl Roundabout {
+    fn any_arm(&self, rng: &mut Rng) -> f64 {
+        self.arms[(rng.unit() * self.arms.len() as f64) as usize]
+    }
+
+    /// On the ring, in, out, and waiting. All on the ring go as fast as the vehicle, so that none
+    /// catches up.
+    fn driving(&self, crowd: &mut Crowd, amount: f64, model: Model) {
+        let (speed, on_s) = (self.vehicle.1, crowd.duration_s + ON_S);
+        crowd.add(0.5 * amount, model, |r, _| {
+            self.circling(r.range(0.0, TAU), self.radii[1], speed, on_s)
+        });
+        crowd.add(amount, model, |r, t| {
+            self.entering(self.any_arm(r), speed, r.range(0.0, t.max(3.0)), on_s, false)
+        });
+        crowd.add(amount, model, |r, t| {
+            self.leaving(self.any_arm(r), speed, r.range(0.0, t.max(3.0)))
+        });
+        crowd.add(0.7 * amount, model, |r, t| {
+            self.yielding(self.any_arm(r), r.range(4.0, 10.0), r.range(0.0, 0.5 * t), 2.5)
+        });
+    }
+
+    /// Along an arm, or across it.
+    fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
+        let (arm, speed, way) = (self.any_arm(rng), rng.range(0.8, 1.9), rng.sign());
+        let gone = speed * rng.range(0.0, duration_s);
+        let (out, left, yaw) = match rng.chance(0.5) {
+            true => (rng.range(25.0, 60.0) - way * gone, rng.sign() * (ARM_M + 2.0), 0.0),
+            false => (self.radii[2] + 5.5, -way * gone, FRAC_PI_2),
+        };
+        let [x, y] = self.on_arm(arm, out, left);
+        let yaw = arm + yaw + if way < 0.0 { PI } else { 0.0 };
+        Path::from(State { x, y, yaw, speed })
+    }
+}
+
 impl Layout for Roundabout {
     fn ground(&self) -> Ground {
         let [mound, ..] = self.radii;
@@ -256,6 +297,7 @@ impl Layout for Roundabout {
 
     fn furnish(&self, site: &mut Site) {
         self.island(site);
+        self.signs(site);
         self.kerbs(site);
         self.corners(site);
         for &arm in &self.arms {
@@ -264,45 +306,14 @@ impl Layout for Roundabout {
     }
 
     fn populate(&self, crowd: &mut Crowd) {
-        let pick = |r: &mut Rng| self.arms[(r.unit() * self.arms.len() as f64) as usize];
-        let on_s = crowd.duration_s + ON_S;
-        // All on the ring go as fast as the vehicle, so that none catches up.
-        let speed = self.vehicle.1;
         let kinds: [(f64, Model); 4] =
             [(1.0, models::bus), (5.0, models::car), (2.0, models::van), (1.0, models::motorcycle)];
-        for (amount, model) in kinds {
-            crowd.add(0.5 * amount, model, |r, _| {
-                self.circling(r.range(0.0, TAU), self.radii[1], speed, on_s)
-            });
-            crowd.add(amount, model, |r, t| {
-                let (arm, wait_s) = (pick(r), r.range(0.0, t.max(3.0)));
-                self.entering(arm, speed, wait_s, on_s, false)
-            });
-            crowd.add(amount, model, |r, t| {
-                let (arm, round_s) = (pick(r), r.range(0.0, t.max(3.0)));
-                self.leaving(arm, speed, round_s)
-            });
-            crowd.add(0.7 * amount, model, |r, t| {
-                let (arm, before_s) = (pick(r), r.range(0.0, 0.5 * t));
-                let speed = r.range(4.0, 10.0);
-                self.yielding(arm, speed, before_s, 2.5)
-            });
-        }
+        kinds.iter().for_each(|&(amount, model)| self.driving(crowd, amount, model));
+        let on_s = crowd.duration_s + ON_S;
         crowd.add(6.0, models::cyclist, |r, _| {
             let (angle, away) = (r.range(0.0, TAU), self.radii[2] + r.range(1.4, 2.4));
             self.circling(angle, away, r.range(2.5, 5.0), on_s)
         });
-        crowd.add(12.0, models::pedestrian, |r, t| {
-            // Along an arm, or across it.
-            let (arm, speed, way) = (pick(r), r.range(0.8, 1.9), r.sign());
-            let gone = speed * r.range(0.0, t);
-            let (out, left, yaw) = match r.chance(0.5) {
-                true => (r.range(25.0, 60.0) - way * gone, r.sign() * (ARM_M + 2.0), 0.0),
-                false => (self.radii[2] + 5.5, -way * gone, FRAC_PI_2),
-            };
-            let [x, y] = self.on_arm(arm, out, left);
-            let yaw = arm + yaw + if way < 0.0 { PI } else { 0.0 };
-            Path::from(State { x, y, yaw, speed })
-        });
+        crowd.add(12.0, models::pedestrian, |r, t| self.walking(r, t));
     }
 }

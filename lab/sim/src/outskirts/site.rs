@@ -11,6 +11,17 @@ use raywake_core::pose::Pose;
 /// How far everything that stands is sunk, m: no ray passes beneath it where the ground slopes.
 const SUNK_M: f64 = 0.4;
 
+/// Every `step` metres from one station up to another.
+pub(super) fn every([from, to]: [f64; 2], step: f64, put: impl FnMut(f64)) {
+    let count = ((to - from) / step).ceil() as u32;
+    (0..count).map(|n| from + step * f64::from(n)).for_each(put);
+}
+
+/// The place so far away from another in a direction, rad.
+pub(super) fn away([x, y]: [f64; 2], turn: f64, far: f64) -> [f64; 2] {
+    [x + far * turn.cos(), y + far * turn.sin()]
+}
+
 /// A scene's background while it is being put up.
 pub(super) struct Site<'a> {
     pub(super) ground: &'a Ground,
@@ -51,6 +62,11 @@ impl<'a> Site<'a> {
     pub(super) fn block(&mut self, class: Class, at: [f64; 3], size: [f64; 3], surface: Surface) {
         let [length, width, height] = size;
         self.raised(class, at, [length, width, height + SUNK_M], -SUNK_M, surface);
+    }
+
+    /// An upright pane of glass of this width and height.
+    pub(super) fn pane(&mut self, at: [f64; 3], [wide, high]: [f64; 2], lift: f64) {
+        self.raised(Class::Fixture, at, [wide, 0.03, high], lift, Surface::glass(0.3));
     }
 
     /// A round post.

@@ -1,5 +1,6 @@
 //! The street's background, block by block: closed rows of houses, houses behind gardens, green.
 
+mod cluttered;
 mod fronts;
 mod furniture;
 mod green;
@@ -47,6 +48,18 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
         yard.kerb_side(extent.x, side);
     }
     yard.signals();
+    yard.fixtures
+}
+
+/// More of it, for [`crate::Scenery::StreetCluttered`].
+pub(crate) fn clutter(
+    ground: &Ground,
+    extent: Extent,
+    crossing: f64,
+    rng: &mut Rng,
+) -> Vec<Fixture> {
+    let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
+    yard.clutter(extent.x);
     yard.fixtures
 }
 
