@@ -175,11 +175,11 @@ fn headlines(report: &mut Report, evidence: &Evidence, drives: &[Facts]) {
     let settled = tally.settled(ClassGroup::Labelled, MotionGroup::Moving, Weight::Column);
     let counts = evidence.verdicts.all();
     report.headline(
-        &number(counts.precision_percent(), "%", 1),
+        &number(100.0 * counts.precision(), "%", 1),
         "of the columns put out as moving do",
         &format!(
             "and {} of those that move are put out so",
-            number(counts.recall_percent(), "%", 1)
+            number(100.0 * counts.recall(), "%", 1)
         ),
     );
     report.headline(

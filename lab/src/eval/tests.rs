@@ -287,6 +287,8 @@ fn variants_in_one_table() {
     // Whole cells are farther off what moves, and the filter changes what is found.
     assert!(number(1, 3) > 2.0 * number(0, 3), "{table:?}");
     assert_ne!(table[3][3..10], table[0][3..10]);
+    // Precision and recall.
+    assert!([18, 19].iter().all(|&n| (30.0..=100.0).contains(&number(0, n))), "{table:?}");
     assert!(number(0, 13) > number(0, 14) && number(0, 14) > 0.0, "{table:?}");
     // A variant's folder is one of `eval`, which finds it done and has the same figures.
     let base = out.join("base");

@@ -4,6 +4,7 @@ mod table;
 mod variants;
 
 use super::drive::Settings;
+use super::moving::ColumnVerdicts;
 use super::tally::Tally;
 use super::{Inputs, all, failures, names, read_rows};
 use crate::report::{self, Report, Results};
@@ -88,9 +89,12 @@ fn row(
 ) -> Result<report::TableRow, Error> {
     let (done, failed) = all(names, settings, out, 1)?;
     failures("drives", &failed)?;
-    let mut tally = Tally::new();
-    read_rows(&done, out, |_, row| tally.row(row))?;
-    Ok(table::row(variant, &settings.profile, &tally, &done))
+    let (mut tally, mut verdicts) = (Tally::new(), ColumnVerdicts::default());
+    read_rows(&done, out, |facts, row| {
+        tally.row(row);
+        verdicts.row(row, facts.exact);
+    })?;
+    Ok(table::row(variant, &settings.profile, (&tally, &verdicts), &done))
 }
 
 fn write(

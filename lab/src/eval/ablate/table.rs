@@ -4,6 +4,7 @@ use super::variants::{VARIANTS, Variant};
 use crate::eval::facts::Facts;
 use crate::eval::flow_tables::WITHIN_M;
 use crate::eval::groups::{ClassGroup, Estimate, MotionGroup, Truth};
+use crate::eval::moving::ColumnVerdicts;
 use crate::eval::statistics::Weight;
 use crate::eval::tally::Tally;
 use crate::report::{Cell, Table, TableRow};
@@ -11,7 +12,7 @@ use raywake::budget::device_bytes;
 use raywake::order_statistics::median;
 use raywake_core::params::Profile;
 
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 22] = [
     "Variant",
     "What",
     "Moving columns",
@@ -30,6 +31,10 @@ const COLUMNS: [&str; 18] = [
     "Flow, ms",
     "Refine, track, out, ms",
     "Device, MB",
+    "Put out as moving: precision, %",
+    "Recall, %",
+    "Precision, 0.5 m forgiven, %",
+    "False a sweep, 2 m and more from movers",
 ];
 
 /// Stages of a pair that are shown together.
@@ -40,7 +45,12 @@ const PARTS: [&[&str]; 3] = [
 ];
 
 /// The row of a variant: what its rows and facts tell.
-pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]) -> TableRow {
+pub fn row(
+    variant: &Variant,
+    profile: &Profile,
+    (tally, verdicts): (&Tally, &ColumnVerdicts),
+    drives: &[Facts],
+) -> TableRow {
     let mut cells = vec![Cell::from(variant.name), variant.what.into()];
     let flow =
         |group, motion| tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column);
@@ -67,6 +77,11 @@ pub fn row(variant: &Variant, profile: &Profile, tally: &Tally, drives: &[Facts]
     cells.push(time(median(drives.iter().flat_map(|d| &d.totals).copied())));
     cells.extend(PARTS.map(|names| time(median(drives.iter().flat_map(|d| part(d, names))))));
     cells.push(Cell::Number(device_bytes(profile) as f64 / 1e6, 1));
+    let moving = verdicts.all();
+    let shares = [moving.precision(), moving.recall(), moving.forgiven_precision()];
+    cells.extend(shares.map(percent));
+    let pairs: u64 = drives.iter().filter(|d| d.has_boxes()).map(|d| d.pairs).sum();
+    cells.push(Cell::Number(moving.far() as f64 / pairs as f64, 2));
     TableRow::new(cells)
 }
 
@@ -87,7 +102,8 @@ pub fn table(rows: Vec<TableRow>, failures: &[String]) -> Table {
     let caption = "Variants of the base, one thing changed in each: error of the raw flow of \
         labelled columns (labels as they are) and of the background, median error of the velocity \
         of tracklets of age 10 and more (smoothed labels), columns with such a tracklet, median \
-        times of a pair of sweeps, bytes of the device's heaps.";
+        times of a pair of sweeps, bytes of the device's heaps; and what is put out as moving, as \
+        `eval` counts it.";
     let note = "Times of one table are of one machine, one variant and one drive at a time, while \
         another thread makes rows. Voxels are cubes: with smaller cells the levels of a column \
         shrink too, though the learned numbers are for levels of 0.30 m; and columns and their \
@@ -125,7 +141,8 @@ mod tests {
         assert_eq!(part(&facts, PARTS[0]).collect::<Vec<_>>(), [31.0, 12.0, 23.0]);
         assert_eq!(median(part(&facts, PARTS[0])), 23.0);
         assert_eq!(median(part(&facts, PARTS[2])), 0.0);
-        let row = row(&VARIANTS[0], &Profile::hdl64(), &Tally::new(), &[facts]);
+        let none = (&Tally::new(), &ColumnVerdicts::default());
+        let row = row(&VARIANTS[0], &Profile::hdl64(), none, &[facts]);
         let whole = table(vec![row, failed(&VARIANTS[1])], &["refine-0: why".into()]);
         assert!(whole.text().contains("refine-0") && whole.notes.len() == 2);
     }

@@ -40,13 +40,13 @@ pub struct MotionCounts {
     pub wrong: [u64; 3],
 }
 
-/// A share, %; NaN of nothing.
+/// A share; NaN of nothing.
 fn share(part: u64, whole: u64) -> f64 {
-    if whole == 0 { f64::NAN } else { 100.0 * part as f64 / whole as f64 }
+    if whole == 0 { f64::NAN } else { part as f64 / whole as f64 }
 }
 
 fn percent(part: u64, whole: u64) -> Cell {
-    Cell::Number(share(part, whole), 1)
+    Cell::Number(100.0 * share(part, whole), 1)
 }
 
 fn per_sweep(count: u64, sweeps: u64) -> Cell {
@@ -71,13 +71,23 @@ impl MotionCounts {
         self.wrong.iter_mut().zip(other.wrong).for_each(|(a, b)| *a += b);
     }
 
-    /// Share of what is put out as moving that moves, %.
-    pub fn precision_percent(&self) -> f64 {
+    /// Share of what is put out as moving that moves.
+    pub fn precision(&self) -> f64 {
         share(self.found, self.found + self.wrong.iter().sum::<u64>())
     }
 
-    /// Share of what moves that is put out so, %.
-    pub fn recall_percent(&self) -> f64 {
+    /// The same, but for what lies within [`FORGIVEN_M`] of a mover.
+    pub fn forgiven_precision(&self) -> f64 {
+        share(self.found, self.found + self.wrong[1] + self.wrong[2])
+    }
+
+    /// False ones farther from movers than [`NEAR_M`].
+    pub fn far(&self) -> u64 {
+        self.wrong[2]
+    }
+
+    /// Share of what moves that is put out so.
+    pub fn recall(&self) -> f64 {
         share(self.found, self.found + self.missed)
     }
 
@@ -87,12 +97,12 @@ impl MotionCounts {
         let all_wrong: u64 = wrong.iter().sum();
         let counts = [found, all_wrong, missed].map(Cell::Count);
         let shares = [
-            self.precision_percent(),
-            self.recall_percent(),
+            self.precision(),
+            self.recall(),
             share(found, found + all_wrong + missed),
-            share(found, found + all_wrong - wrong[0]),
+            self.forgiven_precision(),
         ];
-        let shares = shares.map(|v| Cell::Number(v, 1));
+        let shares = shares.map(|v| Cell::Number(100.0 * v, 1));
         counts.into_iter().chain(shares).chain(wrong.map(|n| per_sweep(n, sweeps))).collect()
     }
 }

@@ -126,7 +126,7 @@ impl ClassSums {
                 standing nor as moving."
                 .into();
         }
-        let iou = share(found, moving + wrong);
+        let iou = 100.0 * share(found, moving + wrong);
         format!("Moving object segmentation: IoU {iou:.1} % of all labelled returns.")
     }
 }
@@ -150,7 +150,7 @@ pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Opt
         return None;
     }
     let row = |name: &str, [all, moving]: [u64; 2]| {
-        let percent = Cell::Number(share(moving, all), 2);
+        let percent = Cell::Number(100.0 * share(moving, all), 2);
         TableRow::new([name.into(), Cell::Count(all), Cell::Count(moving), percent])
     };
     let name = |class: u16| label(class).name().map_or(format!("class {class}"), String::from);
