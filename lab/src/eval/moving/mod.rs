@@ -175,6 +175,6 @@ mod tests {
             _ => panic!("{:?}", cells[n]),
         };
         assert_eq!(cells[..3], [4, 6, 2].map(Cell::Count));
-        assert_eq!([3, 5, 6, 7, 9].map(number), [40.0, 400.0 / 12.0, 50.0, 0.5, 0.5]);
+        assert_eq!([3, 5, 6, 7, 9].map(number), [40.0, 100.0 * (4.0 / 12.0), 50.0, 0.5, 0.5]);
     }
 }
