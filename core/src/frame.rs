@@ -195,6 +195,20 @@ impl<'a> SweepPair<'a> {
         }
     }
 
+    /// Puts out an observed column as static, though it may not be: it then moves on with
+    /// [`ColumnFlow::probability`] as was found.
+    pub fn set_static(&self, at: DVec3, flow: &mut ColumnFlow) {
+        let p = flow.probability;
+        let despite = |covariance: &mut [f32; 3], by: &mut [f32; 2]| {
+            let [x, y] = core::mem::take(by);
+            *covariance =
+                [covariance[0] + p * x * x, covariance[1] + p * x * y, covariance[2] + p * y * y];
+        };
+        despite(&mut flow.displacement_covariance, &mut flow.displacement_m);
+        despite(&mut flow.covariance, &mut flow.velocity_world_mps);
+        self.set_relative(at, flow);
+    }
+
     /// The velocity relative to the vehicle that goes with a column's velocity over ground.
     pub fn set_relative(&self, at: DVec3, flow: &mut ColumnFlow) {
         let planar = DVec3::new(at.x, at.y, 0.0);

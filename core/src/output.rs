@@ -6,6 +6,7 @@
 
 use crate::continuity::Reset;
 use crate::dropped::DroppedReturns;
+use crate::refinement::cues::Cues;
 use crate::tracklet::TrackletTurnover;
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
@@ -97,6 +98,11 @@ pub struct ColumnFlow {
     pub age: u32,
     /// Where the flow comes from.
     pub origin: Origin,
+    /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min) displacement and
+    /// velocity are those of what stands.
+    pub probability: f32,
+    /// What that was told by; zeros where nothing was found to move.
+    pub cues: Cues,
 }
 
 /// Flow of one return of the pair's first sweep.
@@ -113,6 +119,8 @@ pub struct PointFlow {
     pub age: u32,
     /// Where the flow comes from; returns outside the window are background.
     pub origin: Origin,
+    /// P(moves), that of its column.
+    pub probability: f32,
 }
 
 /// A flow tracklet after the step (section 3.6), at the time of the pair's second sweep.
@@ -139,4 +147,6 @@ pub struct TrackletState {
     pub covariance: [[f32; 5]; 5],
     /// Observations after birth.
     pub age: u32,
+    /// P(moves), as last observed.
+    pub probability: f32,
 }

@@ -12,7 +12,7 @@ use crate::params::Profile;
 use crate::perceive::{Machine, Perceive, Perceived, StageTimer};
 use crate::prepare::Setup;
 use crate::record::SweepUniform;
-use crate::refinement::Refinement;
+use crate::refinement::{Prediction, Refinement};
 use crate::returns::Returns;
 use crate::sweep::{Point, Sweep};
 use crate::team::Team;
@@ -119,7 +119,7 @@ impl Pipeline {
             let cells = |v: f32| v * pair.dt_s as f32 / pair.profile.voxel_m as f32;
             self.refinement.run(team, sweep, perceived, |column| {
                 let t = tracklets.at(column).filter(|t| t.age > 0)?;
-                Some(t.ekf.velocity().0.map(cells))
+                Some(Prediction { by: t.ekf.velocity().0.map(cells), certainty: t.ekf.certainty() })
             });
         }
         left

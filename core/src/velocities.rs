@@ -81,7 +81,11 @@ impl Found<'_> {
                 flow.origin = if matched { Origin::Matched } else { Origin::Joined };
                 let tracklet = self.tracklets.all().get(o.slot as usize);
                 flow.age = tracklet.map_or(0, |t| t.age);
+                (flow.probability, flow.cues) = (o.probability, o.cues);
                 self.pair.set_motion(at, o, tracklet, &mut flow);
+                if !self.moves(o.probability) {
+                    self.pair.set_static(at, &mut flow);
+                }
             } else {
                 self.pair.set_relative(at, &mut flow);
             }
@@ -90,6 +94,12 @@ impl Found<'_> {
             count += 1;
         }
         (count, valid)
+    }
+
+    /// Whether what moves with a probability is put out so. Whole cells have no other evidence.
+    fn moves(&self, probability: f32) -> bool {
+        let profile = self.pair.profile;
+        profile.refinement_sweeps == 0 || probability >= profile.moves.moves_min
     }
 
     /// The record of a column whose centre is at `at` in the first sweep's vehicle frame.
@@ -154,13 +164,17 @@ impl Found<'_> {
             out.covariance = flow.covariance;
             out.age = flow.age;
             out.origin = flow.origin;
+            out.probability = flow.probability;
         } else if self.pair.profile.refinement_sweeps > 0 && !is_apart && column != NONE {
             // Its column is not solid, but part of a cluster.
             if let Some(found) = self.refinement.at(column) {
                 let (r, dt) = (self.pair.profile.voxel_m as f32, self.pair.dt_s as f32);
-                out.velocity_world_mps = found.by.map(|v| v * r / dt);
-                out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
+                out.probability = found.cues.probability(&self.pair.profile.moves);
                 out.origin = Origin::Joined;
+                if self.moves(out.probability) {
+                    out.velocity_world_mps = found.by.map(|v| v * r / dt);
+                    out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
+                }
             }
         }
         let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });

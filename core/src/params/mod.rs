@@ -6,11 +6,13 @@
 //! `PARAMETERS.md`. [`ceilings`] holds what sizes storage and therefore cannot be set.
 
 mod ceilings;
+mod moves;
 mod profile;
 mod refinement;
 mod tracklet;
 
 pub use ceilings::*;
+pub use moves::MovesParams;
 pub use profile::{Frame, Profile};
 pub use refinement::{GroundParams, RefinementParams};
 pub use tracklet::{Birth, TrackletParams};

@@ -1,8 +1,8 @@
 //! A profile: the parameters of one run of the flow pipeline.
 
 use super::{
-    COLUMNS_MAX, COST_UNKNOWN, GroundParams, Kind, LEVELS_MAX, Parameters, ProfileError,
-    RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
+    COLUMNS_MAX, COST_UNKNOWN, GroundParams, Kind, LEVELS_MAX, MovesParams, Parameters,
+    ProfileError, RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
 };
 use crate::continuity::ContinuityLimits;
 use heapless::String;
@@ -80,6 +80,8 @@ crate::params! {
         pub ground: GroundParams = GroundParams::DEFAULT;
         /// Refinement.
         pub refinement: RefinementParams = RefinementParams::DEFAULT;
+        /// Whether a column moves.
+        pub moves: MovesParams = MovesParams::DEFAULT;
         /// Tracklet filter.
         pub tracklet: TrackletParams = TrackletParams::DEFAULT;
         /// Beyond these two sweeps make no pair, and tracklets are dropped.
@@ -128,11 +130,12 @@ impl Profile {
     }
 
     /// Its groups of parameters, each with its name; that of the first is empty.
-    pub fn groups(&self) -> [(&'static str, &dyn Parameters); 5] {
+    pub fn groups(&self) -> [(&'static str, &dyn Parameters); 6] {
         [
             ("", self),
             ("ground", &self.ground),
             ("refinement", &self.refinement),
+            ("moves", &self.moves),
             ("tracklet", &self.tracklet),
             ("limits", &self.limits),
         ]
@@ -143,6 +146,7 @@ impl Profile {
         match name {
             "ground" => &mut self.ground,
             "refinement" => &mut self.refinement,
+            "moves" => &mut self.moves,
             "tracklet" => &mut self.tracklet,
             "limits" => &mut self.limits,
             _ => self,

@@ -93,6 +93,10 @@ crate::params! {
         /// the last sweep, or beside one that moves.
         pub evidence_prior_ratio: f32 = 0.4, "", (0 to 1),
             "The least that keeps false motion in a still simulated street within its bound.";
+        /// Share of a cluster's columns whose tracklets must have moved for it to need only so
+        /// much; of fewer it needs more in proportion: a car's tracklets touch the road.
+        pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
+            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952.";
         /// From this length on a cluster that moved needs less, in inverse proportion: its sides
         /// slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
@@ -124,10 +128,10 @@ crate::params! {
         pub visible_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
         /// How far a fragment may lie from a moving cluster that takes it along.
         pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;
-        /// How far a column of low returns may lie from a moving cluster whose edge it is.
-        pub edge_distance_m: f64 = 0.6, "m", (0 to 20), SIMULATED;
-        /// How far the match of such a column may lie from the cluster's motion.
-        pub edge_match_cells: f32 = 1.5, "cells", (0 to 30), SIMULATED;
+        /// How far the ground that a moving cluster stands on reaches beyond its returns.
+        pub footprint_margin_m: f64 = 0.1, "m", (0 to 5),
+            "Labelled boxes hold 589 of its columns and 65 others on `kitti_raw_0005`; 467 and 12 \
+             at 0 m, 702 and 293 at 0.2 m.";
 
         /// Standard deviation of the displacement of what is static and fits perfectly.
         pub static_sigma_m: f64 = 0.0075, "m", (0.0001 to 10), CALIBRATED;

@@ -2,6 +2,7 @@
 //! take along.
 
 use super::cluster::{Cluster, VisitedColumns};
+use super::cues::{Cues, Prediction};
 use super::hypothesis::{self, Hypothesis, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
@@ -19,6 +20,8 @@ pub struct Clusters {
     /// Cluster of each column of the first sweep's window.
     of_column: [u32; COLUMNS_MAX],
     found: heapless::Vec<Hypothesis, COLUMNS_MAX>,
+    /// By how much the returns of each column fit rest worse than its cluster's motion.
+    misfit: [f32; COLUMNS_MAX],
     /// Columns that may be part of something that moves, a bit each.
     suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
@@ -29,6 +32,7 @@ impl Clusters {
             segments: Segments::new(),
             of_column: [0; COLUMNS_MAX],
             found: heapless::Vec::new(),
+            misfit: [0.0; COLUMNS_MAX],
             suspects: [0; COLUMNS_MAX.div_ceil(64)],
         }
     }
@@ -43,20 +47,26 @@ impl Clusters {
         self.found.get(*self.of_column.get(column)? as usize)
     }
 
+    /// What tells whether a column moves.
+    pub fn cues(&self, column: usize) -> Cues {
+        let misfit = self.misfit[column];
+        self.of(column).map_or(Cues::default(), |found| Cues { misfit, ..found.cues })
+    }
+
     /// What became of all of them.
     #[cfg(test)]
     pub fn found(&self) -> &[Hypothesis] {
         &self.found
     }
 
-    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` the
-    /// displacement that its tracklet predicts, voxels.
+    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` what its
+    /// tracklet predicts.
     pub fn find(
         &mut self,
         team: &impl Team,
         scans: Scans,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
         self.segments.find(&scans, |_| true, flow);
         self.test_segments(team, scans, flow, predicted);
@@ -72,6 +82,14 @@ impl Clusters {
         self.test_segments(team, scans, flow, predicted);
         self.keep_moving_parts(scans, whole);
         self.take_along(scans);
+        self.cover_ground(scans);
+        let (of_column, found) = (&self.of_column, &self.found);
+        fill(team, 0, &mut self.misfit[..scans.first.side * scans.first.side], &|c| {
+            let found = found.get(of_column[c] as usize);
+            // What neither moves nor did tells nothing.
+            let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
+            found.map_or(0.0, |f| scans.misfit(c, &f.motion))
+        });
     }
 
     /// Appends the best motion of each segment to what was found.
@@ -80,7 +98,7 @@ impl Clusters {
         team: &impl Team,
         scans: Scans,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
         let before = self.found.len();
         // Parts are of what is static, and few: there is room.
@@ -148,6 +166,27 @@ impl Clusters {
             }
             if let Some(with) = self.joined(&cluster, &near, visited) {
                 columns.iter().for_each(|c| self.of_column[*c as usize] = with);
+            }
+        }
+    }
+
+    /// The ground below a moving cluster, where nothing else stands, goes with it.
+    fn cover_ground(&mut self, scans: Scans) {
+        let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
+        for c in 0..side * side {
+            let found = self.found.get_mut(self.of_column[c] as usize);
+            let Some(found) = found.filter(|f| f.is_dynamic) else { continue };
+            let returns = scans.first.column(c).map(|n| scans.first.sample(n).at);
+            returns.for_each(|[x, y, _]| found.footprint.add([x, y]));
+        }
+        for (n, found) in self.found.iter().enumerate().filter(|(_, f)| f.is_dynamic) {
+            let [rows, columns] = found.footprint.cells(margin, side);
+            for (i, j) in rows.flat_map(|i| columns.clone().map(move |j| (i, j))) {
+                let of_column = &mut self.of_column[i * side + j];
+                let at = [i as f32 + 0.5, j as f32 + 0.5];
+                if *of_column == NONE && found.footprint.holds(at, margin) {
+                    *of_column = n as u32;
+                }
             }
         }
     }

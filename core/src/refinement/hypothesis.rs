@@ -7,10 +7,12 @@
 //! and less still if it is long.
 
 use super::cluster::{Cluster, VisitedColumns};
+use super::cues::{Cues, Prediction, Prior};
+use super::footprint::Footprint;
 use super::motion::Motion;
 use super::scaled::Scaled;
 use super::search::search;
-use super::starts::{Votes, mean};
+use super::starts::Votes;
 use crate::record::Flow;
 
 /// Displacements that many columns voted for, tried as starts. A choice of time: each start costs a
@@ -37,6 +39,10 @@ pub struct Hypothesis {
     pub extent: f32,
     /// The cluster it is a part of, or itself.
     pub parent: u32,
+    /// What tells whether it moves; those of its columns are missing.
+    pub cues: Cues,
+    /// The ground it stands on, where it is dynamic.
+    pub footprint: Footprint,
 }
 
 /// Evidence for a motion against rest, by the residuals of both: 0 to 1.
@@ -106,42 +112,42 @@ impl Trials<'_> {
     }
 }
 
-/// Tests whether a cluster is dynamic. `predicted` is the displacement, voxels, that the tracklet
-/// of a column predicts, `flow` the match of a column.
+/// Tests whether a cluster is dynamic. `predicted` is what the tracklet of a column predicts,
+/// `flow` the match of a column.
 pub fn test(
     cluster: &Cluster,
     flow: impl Fn(usize) -> Flow,
-    predicted: impl Fn(usize) -> Option<[f32; 2]>,
+    predicted: impl Fn(usize) -> Option<Prediction>,
     visited: &mut VisitedColumns,
 ) -> Hypothesis {
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
     let static_residual = cluster.static_residual(visited).0;
-    let found = Hypothesis { static_residual, extent: cluster.extent, ..Hypothesis::default() };
-    let least = scaled.displacement_min;
-    let predicted = mean(cluster.columns.iter().filter_map(|c| predicted(*c as usize)));
-    let predicted = predicted.filter(|by| by[0] * by[0] + by[1] * by[1] > least * least);
+    let predictions = cluster.columns.iter().filter_map(|c| predicted(*c as usize));
+    let count = cluster.columns.len();
+    let prior = Prior::of(count, params.prior_quorum, scaled.displacement_min, predictions);
+    let cues =
+        Cues::of_cluster(-params.evidence_min, static_residual, cluster.samples.len(), &prior);
+    let found =
+        Hypothesis { static_residual, extent: cluster.extent, cues, ..Hypothesis::default() };
     let prior_ratio =
         params.evidence_prior_ratio * (scaled.evidence_length / cluster.extent).min(1.0);
-    let ease = if predicted.is_some() { prior_ratio } else { 1.0 };
+    let prior_ratio = 1.0 - prior.share * (1.0 - prior_ratio);
+    let ease = if prior.by.is_some() { prior_ratio } else { 1.0 };
     if static_residual < params.residual_static * ease || cluster.extent > scaled.extent_max {
         return found;
     }
     let tried = heapless::Vec::new();
     let motion = Motion::around(cluster.centre);
     let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
-    trials.run(predicted, flow);
+    trials.run(prior.by, flow);
     let Trials { residual, motion, .. } = trials;
     let as_predicted =
-        predicted.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
-    let needed = params.evidence_min;
-    decide(
-        cluster,
-        found,
-        motion,
-        residual,
-        if as_predicted { needed * prior_ratio } else { needed },
-    )
+        prior.by.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
+    let needed = params.evidence_min * if as_predicted { prior_ratio } else { 1.0 };
+    let margin = evidence(static_residual, residual) - needed;
+    let cues = Cues::of_cluster(margin, residual, cluster.samples.len(), &prior);
+    decide(cluster, Hypothesis { cues, ..found }, motion, residual, needed)
 }
 
 /// Whether a motion is believed, which takes `needed` evidence, and how uncertain it is.
@@ -166,6 +172,7 @@ fn decide(
             && motion.delta.xy().norm() > scaled.displacement_min
             && cluster.samples.len() >= params.returns_min as usize,
         variance: likely * (1.0 - likely),
+        footprint: Footprint::along(&motion),
         motion: Motion { covariance, ..motion },
         ..found
     }

@@ -18,7 +18,9 @@
 //! 5. A static cluster may have a part that moves; what remains of it, and fragments beside it, may
 //!    go with that ([`clusters`]).
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
-//!    that found no match. Covariances are inflated by the residual ([`refined`]).
+//!    that found no match, and the ground below it ([`footprint`]). Covariances are inflated by the
+//!    residual ([`refined`]).
+//! 7. Cues tell how likely it is that a column moves ([`cues`]).
 //!
 //! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres;
 //! inside, lengths are in voxels ([`scaled`]).
@@ -27,6 +29,8 @@ mod align;
 mod cloud;
 mod cluster;
 mod clusters;
+pub mod cues;
+mod footprint;
 mod hypothesis;
 mod motion;
 mod places;
@@ -48,6 +52,7 @@ use crate::team::Team;
 pub(crate) use cloud::SweepReturns;
 use cloud::{Cloud, Scratch};
 use clusters::Clusters;
+pub(crate) use cues::Prediction;
 use motion::TARGETS_MAX;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
@@ -101,14 +106,14 @@ impl Refinement {
         self.clouds[self.newest].fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `predicted` is the displacement that the
-    /// tracklet of a column of the new window predicts, voxels.
+    /// Motion of the clusters of the pair's first sweep. `predicted` is what the tracklet of a
+    /// column of the new window predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
         step: &SweepUniform,
         perceived: &Perceived,
-        predicted: impl Fn(usize) -> Option<[f32; 2]> + Sync,
+        predicted: impl Fn(usize) -> Option<Prediction> + Sync,
     ) {
         self.clusters.clear();
         let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
@@ -146,39 +151,25 @@ impl Refinement {
         let cluster = self.clusters.of(column as usize).filter(|f| f.is_dynamic)?;
         let side = self.clouds[index(self.newest, 1)].side as u32;
         let at = [column / side, column % side].map(|c| c as f32 + 0.5);
-        Some(Refined::of(self.scaled.as_ref()?, cluster, at))
+        let cues = self.clusters.cues(column as usize);
+        Some(Refined { cues, ..Refined::of(self.scaled.as_ref()?, cluster, at) })
     }
 
     /// How a column of the new window moved, or that it is static.
     pub(crate) fn of(&self, step: &SweepUniform, column: usize, flow: Flow) -> Refined {
         let Some(scaled) = &self.scaled else {
-            return Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false };
+            return Refined::nothing();
         };
         let side = step.side;
         let (i, j) = (column as i32 / side + step.shift_x, column as i32 % side + step.shift_y);
-        let cluster = |i: i32, j: i32| {
-            let inside = (0..side).contains(&i) && (0..side).contains(&j);
-            inside.then(|| self.clusters.of((i * side + j) as usize))?
-        };
-        let at = [i as f32 + 0.5, j as f32 + 0.5];
+        let inside = (0..side).contains(&i) && (0..side).contains(&j);
+        let before = (i * side + j) as usize;
         let matched = (flow & VALID != 0).then(|| flow_displacement(flow).map(|d| d as f32));
-        if let Some(own) = cluster(i, j) {
-            let refined = Refined::of(scaled, own, at);
-            return if own.is_dynamic { refined } else { refined.despite(scaled, matched) };
-        }
-        let rest = Refined::at_rest(scaled, 0.0);
-        let Some(cells) = matched else {
-            return rest;
+        let Some(own) = inside.then(|| self.clusters.of(before)).flatten() else {
+            return Refined::at_rest(scaled, 0.0).despite(scaled, matched);
         };
-        // Nothing but low returns: the lower edge of a cluster, where the match says so.
-        let (reach, near) = (scaled.edge_distance, scaled.params.edge_match_cells);
-        for (di, dj) in (-reach..=reach).flat_map(|a| (-reach..=reach).map(move |b| (a, b))) {
-            let Some(found) = cluster(i + di, j + dj).filter(|f| f.is_dynamic) else { continue };
-            let refined = Refined::of(scaled, found, at);
-            if (0..2).all(|a| (cells[a] - refined.by[a]).abs() <= near) {
-                return refined;
-            }
-        }
-        rest.despite(scaled, matched)
+        let refined = Refined::of(scaled, own, [i as f32 + 0.5, j as f32 + 0.5]);
+        let refined = Refined { cues: self.clusters.cues(before), ..refined };
+        if own.is_dynamic { refined } else { refined.despite(scaled, matched) }
     }
 }

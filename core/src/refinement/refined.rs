@@ -4,6 +4,7 @@
 //! uncertain about that goes into its covariance, which grows with the residual at rest and where
 //! the column's match disagrees.
 
+use super::cues::Cues;
 use super::hypothesis::{Hypothesis, variance_inflation};
 use super::scaled::Scaled;
 
@@ -16,6 +17,8 @@ pub(crate) struct Refined {
     pub covariance: [f32; 3],
     /// Whether it is part of a cluster that moves.
     pub is_dynamic: bool,
+    /// What tells whether it does.
+    pub cues: Cues,
 }
 
 impl Refined {
@@ -25,7 +28,12 @@ impl Refined {
         let ratio = scaled.params.motion_sigma_ratio;
         let variance = cluster.variance + if cluster.is_dynamic { ratio * ratio } else { 0.0 };
         let own = match cluster.is_dynamic {
-            true => Refined { by, covariance: cluster.motion.covariance_of(at), is_dynamic: true },
+            true => Refined {
+                by,
+                covariance: cluster.motion.covariance_of(at),
+                is_dynamic: true,
+                cues: Cues::default(),
+            },
             false => Refined::at_rest(scaled, cluster.static_residual),
         };
         own.with_alternative(by, variance)
@@ -43,9 +51,16 @@ impl Refined {
         self.with_alternative(matched.unwrap_or_default(), scaled.params.mismatch_variance)
     }
 
+    /// Where nothing is known.
+    pub fn nothing() -> Refined {
+        let cues = Cues::default();
+        Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }
+    }
+
     pub fn at_rest(scaled: &Scaled, residual: f32) -> Refined {
         let sigma = scaled.static_sigma;
         let variance = sigma * sigma * variance_inflation(scaled, residual);
-        Refined { by: [0.0; 2], covariance: [variance, 0.0, variance], is_dynamic: false }
+        let covariance = [variance, 0.0, variance];
+        Refined { covariance, ..Refined::nothing() }
     }
 }

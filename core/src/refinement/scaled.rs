@@ -33,8 +33,7 @@ pub(crate) struct Scaled {
     pub start_spacing: f32,
     /// Columns.
     pub fragment_distance: usize,
-    /// Columns.
-    pub edge_distance: i32,
+    pub footprint_margin: f32,
     pub static_sigma: f32,
     /// Voxels².
     pub confidence: f32,
@@ -72,7 +71,7 @@ impl Scaled {
             displacement_min: length(p.displacement_min_m),
             start_spacing: length(p.start_spacing_m),
             fragment_distance: whole(p.fragment_distance_m) as usize,
-            edge_distance: whole(p.edge_distance_m) as i32,
+            footprint_margin: length(p.footprint_margin_m),
             static_sigma: length(p.static_sigma_m),
             confidence: area(p.confidence_m2),
             range_min: length(p.range_min_m),

@@ -122,6 +122,18 @@ impl Scans<'_> {
         mean.value()
     }
 
+    /// By how much the returns of a column fit rest worse than a motion, 0 where that cannot be
+    /// seen.
+    pub fn misfit(&self, column: usize, motion: &Motion) -> f32 {
+        let mut mean = Mean::default();
+        for s in self.first.column(column).map(|n| self.first.sample(n)) {
+            if let Some(rest) = self.static_residual(&s) {
+                mean.add(rest - self.dynamic_residual(&s, motion, &self.targets[0]));
+            }
+        }
+        mean.value()
+    }
+
     /// The search of nearest returns: how far it goes, and how near is near enough.
     pub fn reach_inlier(&self) -> [f32; 2] {
         [self.scaled.match_distance, self.scaled.inlier]

@@ -39,13 +39,3 @@ impl Votes {
         Some(at.map(|v| v / sum))
     }
 }
-
-/// Mean displacement, if there is any.
-pub fn mean(of: impl Iterator<Item = [f32; 2]>) -> Option<[f32; 2]> {
-    let (mut n, mut sum) = (0.0, [0.0; 2]);
-    for v in of {
-        n += 1.0;
-        sum = [sum[0] + v[0], sum[1] + v[1]];
-    }
-    (n > 0.0).then(|| sum.map(|s| s / n))
-}

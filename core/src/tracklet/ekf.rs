@@ -186,6 +186,17 @@ impl Ekf {
     }
 }
 
+impl Ekf {
+    /// Logarithm of 1 + speed over its standard deviation.
+    pub fn certainty(&self) -> f32 {
+        let sigma = libm::sqrtf(self.scale * self.covariance[(3, 3)]).max(SIGMA_MIN_MPS);
+        libm::log1pf(self.mean[3].abs() / sigma)
+    }
+}
+
+/// No speed is known better than this, m/s: a filter that has seen the same for long thinks so.
+const SIGMA_MIN_MPS: f32 = 0.05;
+
 /// The same angle in (-pi, pi]; the argument must lie within three turns of it.
 fn wrap(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};

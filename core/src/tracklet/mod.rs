@@ -16,6 +16,7 @@ mod tests;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile, TrackletParams};
 use crate::record::{NONE, SweepUniform};
+use crate::refinement::cues::Cues;
 use ekf::Ekf;
 use nalgebra::Matrix2;
 
@@ -32,6 +33,8 @@ pub struct Tracklet {
     pub column: u32,
     /// The point it follows, from the column's corner, cells: 0 to 1.
     pub place: [f32; 2],
+    /// P(moves), as last observed.
+    pub probability: f32,
 }
 
 /// How a column of the pair's first sweep moved.
@@ -43,6 +46,10 @@ pub struct Observation {
     pub moved: [f32; 2],
     /// Its covariance (xx, xy, yy), m².
     pub covariance: [f32; 3],
+    /// What tells whether it moves.
+    pub cues: Cues,
+    /// P(moves).
+    pub probability: f32,
     /// Index of its tracklet in [`Tracklets::all`] after the step, or [`NONE`].
     pub slot: u32,
 }
@@ -328,7 +335,7 @@ fn continued(
         let mut t = *known;
         if observe(&mut t, profile, o.moved, o.covariance, dt) {
             turnover.updated += 1;
-            return Some(Tracklet { age: t.age + 1, missed: 0, ..t });
+            return Some(Tracklet { age: t.age + 1, missed: 0, probability: o.probability, ..t });
         }
         turnover.gated += 1;
         if profile.tracklet.birth == Birth::Source {
@@ -342,5 +349,6 @@ fn continued(
 fn born(profile: &Profile, o: &Observation, dt: f32) -> Tracklet {
     let noise = position_noise(&profile.tracklet, o.covariance);
     let ekf = Ekf::birth(&profile.tracklet, noise, o.moved, dt);
-    Tracklet { ekf, age: 0, missed: 0, column: o.column, place: [0.5; 2] }
+    let (column, probability) = (o.column, o.probability);
+    Tracklet { ekf, age: 0, missed: 0, column, place: [0.5; 2], probability }
 }

@@ -5,6 +5,7 @@ use crate::params::{FOREGROUND_MAX, Profile};
 use crate::perceive::Perceived;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
 use crate::refinement::Refinement;
+use crate::refinement::cues::Cues;
 
 /// How solid columns moved: those with a match, and those that a moving cluster took along.
 pub(crate) struct Observations {
@@ -39,32 +40,42 @@ impl Observations {
             } else {
                 whole_cells(profile, flow)
             };
-            let Some((moved, covariance)) = moved else { continue };
-            let o = Observation { column: column as u32, moved, covariance, slot: NONE };
+            let Some((moved, covariance, cues)) = moved else { continue };
+            let probability = match cues {
+                Some(cues) => cues.probability(&profile.moves),
+                None => (moved != [0.0; 2]) as u8 as f32,
+            };
+            let cues = cues.unwrap_or_default();
+            let column = column as u32;
+            let o = Observation { column, moved, covariance, cues, probability, slot: NONE };
             self.beyond_capacity += self.all.push(o).is_err() as usize;
         }
     }
 }
 
-/// Displacement, m, and covariance, m^2, that the refinement found.
+/// Displacement, m, its covariance, m², and, of a refined one, what tells whether it moves.
+type Moved = ([f32; 2], [f32; 3], Option<Cues>);
+
+/// What the refinement found.
 fn refined(
     profile: &Profile,
     sweep: &SweepUniform,
     refinement: &Refinement,
     column: usize,
     flow: u32,
-) -> Option<([f32; 2], [f32; 3])> {
+) -> Option<Moved> {
     let r = profile.voxel_m as f32;
     let found = refinement.of(sweep, column, flow);
     let observed = found.is_dynamic || flow & VALID != 0;
-    observed.then(|| (found.by.map(|v| v * r), found.covariance.map(|v| v * r * r)))
+    observed
+        .then(|| (found.by.map(|v| v * r), found.covariance.map(|v| v * r * r), Some(found.cues)))
 }
 
 /// The match itself: whole cells.
-fn whole_cells(profile: &Profile, flow: u32) -> Option<([f32; 2], [f32; 3])> {
+fn whole_cells(profile: &Profile, flow: u32) -> Option<Moved> {
     let r = profile.voxel_m as f32;
     let sigma_m = profile.tracklet.measurement_cells * r;
     let variance = 2.0 * sigma_m * sigma_m;
     let moved = flow_displacement(flow).map(|c| c as f32 * r);
-    (flow & VALID != 0).then_some((moved, [variance, 0.0, variance]))
+    (flow & VALID != 0).then_some((moved, [variance, 0.0, variance], None))
 }

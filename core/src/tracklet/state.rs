@@ -32,5 +32,6 @@ pub(crate) fn state_of(profile: &Profile, t: &Tracklet, current: &Side) -> Track
             core::array::from_fn(|b| t.ekf.scale * t.ekf.covariance[(a, b)])
         }),
         age: t.age,
+        probability: t.probability,
     }
 }

@@ -205,6 +205,13 @@ impl<'a> Collector<'a> {
             covariance_yy: flow.covariance[2],
             age: flow.age,
             dt: seen.dt_s as f32,
+            probability: flow.probability,
+            margin: flow.cues.margin,
+            share: flow.cues.share,
+            residual: flow.cues.residual,
+            returns: flow.cues.returns,
+            certainty: flow.cues.certainty,
+            misfit: flow.cues.misfit,
         }
     }
 

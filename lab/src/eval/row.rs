@@ -181,6 +181,20 @@ row! {
     age: u32,
     /// Time to the next sweep, s.
     dt: f32,
+    /// P(moves).
+    probability: f32,
+    /// See [`raywake_core::refinement::cues::Cues`], which these six are.
+    margin: f32,
+    /// See `margin`.
+    share: f32,
+    /// See `margin`.
+    residual: f32,
+    /// See `margin`.
+    returns: f32,
+    /// See `margin`.
+    certainty: f32,
+    /// See `margin`.
+    misfit: f32,
 }
 
 impl Row {

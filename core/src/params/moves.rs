@@ -1,0 +1,27 @@
+//! Parameters of whether a column moves: see [`crate::refinement::cues`].
+
+/// Where the weights come from.
+const FITTED: &str = "Fitted by `raywake-lab train moves`, see [`crate::refinement::cues`].";
+
+crate::params! {
+    /// How cues become P(moves): logistic regression, one weight a cue.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct MovesParams {
+        /// What is put out as moving has at least this P(moves).
+        pub moves_min: f32 = 0.5, "", (0 to 1), "As likely as not.";
+        /// Logit without any cue.
+        pub moves_bias: f32 = 0.0, "nat", (-100 to 100), FITTED;
+        /// Weight of the evidence beyond what the hypothesis test asked for.
+        pub moves_margin: f32 = 1.0, "nat", (-100 to 100), FITTED;
+        /// Weight of the share of a cluster's columns whose tracklets moved.
+        pub moves_share: f32 = 0.0, "nat", (-100 to 100), FITTED;
+        /// Weight of the residual of the motion.
+        pub moves_residual: f32 = 0.0, "nat", (-100 to 100), FITTED;
+        /// Weight of the logarithm of the number of returns that were registered.
+        pub moves_returns: f32 = 0.0, "nat", (-100 to 100), FITTED;
+        /// Weight of how certain those tracklets were.
+        pub moves_certainty: f32 = 0.0, "nat", (-100 to 100), FITTED;
+        /// Weight of by how much a column's own returns fit rest worse than the motion.
+        pub moves_misfit: f32 = 0.0, "nat", (-100 to 100), FITTED;
+    }
+}
