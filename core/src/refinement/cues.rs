@@ -123,3 +123,54 @@ macro_rules! cues {
         }
     };
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::{Parameters, Value};
+
+    fn prior(moving: usize, resting: usize) -> Prior {
+        let one = |x| Prediction { by: [x, 0.0], certainty: 2.0 * x };
+        let predictions = core::iter::repeat_n(one(1.0), moving);
+        let all = predictions.chain(core::iter::repeat_n(one(0.0), resting));
+        Prior::of(40, 0.5, 0.1, all)
+    }
+
+    #[test]
+    fn a_quorum_of_columns_makes_a_prior() {
+        let share = |moving| prior(moving, 0).share;
+        assert_eq!(
+            [share(0), share(1), share(10), share(20), share(40)],
+            [0.0, 0.05, 0.5, 1.0, 1.0]
+        );
+        assert_eq!(prior(20, 0).by, Some([1.0, 0.0]));
+        // One that moves among many that rest is no displacement, and its certainty its own.
+        let one = prior(1, 39);
+        assert_eq!((one.by, one.certainty), (None, 2.0));
+        assert_eq!(prior(0, 40).certainty, 0.0);
+    }
+
+    #[test]
+    fn cues_are_weighed_by_their_parameters() {
+        let zero = MovesParams { moves_bias: 0.0, ..MovesParams::DEFAULT };
+        assert_eq!(Cues::default().probability(&zero), 0.5);
+        for (n, name) in Cues::WEIGHTS.iter().enumerate() {
+            let mut params = zero;
+            for other in Cues::WEIGHTS {
+                let value = if other == name { 3f64.ln() } else { 0.0 };
+                params.set(other, Value::Number(value)).unwrap();
+            }
+            let mut cues = Cues::default();
+            let all = [
+                &mut cues.margin,
+                &mut cues.share,
+                &mut cues.residual,
+                &mut cues.returns,
+                &mut cues.certainty,
+                &mut cues.misfit,
+            ];
+            *all.into_iter().nth(n).unwrap() = 1.0;
+            assert!((cues.probability(&params) - 0.75).abs() < 1e-6, "{name}");
+        }
+    }
+}

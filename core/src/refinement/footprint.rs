@@ -68,7 +68,7 @@ mod tests {
         let motion = Motion::around([50.0; 2]).displaced([2.0, 2.0]);
         let mut footprint = Footprint::along(&motion);
         // A side of a car seen along a diagonal, and a corner of its front.
-        [[40.0, 40.0], [50.0, 50.0], [48.0, 52.0]].map(|at| footprint.add(at));
+        [[40.0, 40.0], [50.0, 50.0], [48.0, 52.0]].iter().for_each(|at| footprint.add(*at));
         assert!(footprint.holds([44.0, 46.0], 0.0) && footprint.holds([38.5, 41.5], 0.0));
         assert!(!footprint.holds([46.0, 44.0], 0.5) && footprint.holds([45.2, 44.8], 0.5));
         let [rows, columns] = footprint.cells(0.0, 167);

@@ -40,7 +40,7 @@ use raywake::error::RunError;
 use raywake::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use row::Row;
+pub use row::Row;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -155,6 +155,18 @@ fn read_rows(
     for facts in drives {
         let file = Files::of(out, &facts.drive).rows;
         rows_file::read(&file, |rows| rows.iter().for_each(|row| each(facts, row)))?;
+    }
+    Ok(())
+}
+
+/// Hands the rows of a folder of results to `each`, with the number of their drive.
+pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<(), Error> {
+    let folder = out.join("rows");
+    let entries = std::fs::read_dir(&folder).map_err(Error::reading(&folder))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    files.sort();
+    for (drive, file) in files.iter().enumerate() {
+        rows_file::read(file, |rows| rows.iter().for_each(|row| each(drive, row)))?;
     }
     Ok(())
 }

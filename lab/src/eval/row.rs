@@ -12,6 +12,7 @@ use arrow_array::{
 };
 use arrow_schema::{DataType, Field, Schema};
 use raywake_core::output::Origin;
+use raywake_core::refinement::cues::Cues;
 use std::sync::Arc;
 
 /// Names of [`Row::class`]: what belongs to no labelled object, then the kinds of [`Kind`].
@@ -228,6 +229,12 @@ impl Row {
     /// Whether its displacement alone is one of [`MOVING_MPS`] over the time between the sweeps.
     pub fn is_moving_by_flow(&self) -> bool {
         f64::from(self.flow_x.hypot(self.flow_y)) >= MOVING_MPS * f64::from(self.dt)
+    }
+
+    /// What its P(moves) was told by.
+    pub fn cues(&self) -> Cues {
+        let Row { margin, share, residual, returns, certainty, misfit, .. } = *self;
+        Cues { margin, share, residual, returns, certainty, misfit }
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.

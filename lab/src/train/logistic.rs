@@ -3,12 +3,12 @@
 use super::solve::cholesky;
 use serde::Serialize;
 
-/// Labelled rows of small counts.
-pub struct Data {
-    /// Counts of a row.
+/// Labelled rows of numbers, of small counts by default.
+pub struct Data<T = u8> {
+    /// Numbers of a row.
     pub width: usize,
     /// Rows, one behind the other.
-    pub rows: Vec<u8>,
+    pub rows: Vec<T>,
     /// Label of every row.
     pub labels: Vec<bool>,
     /// Weight of every row; they are to sum up to about 1.
@@ -40,12 +40,6 @@ const STEPS_MAX: usize = 40;
 const ENOUGH: f64 = 1e-9;
 
 impl Data {
-    /// Score of a row: `weights` has the bias last.
-    pub fn score(weights: &[f64], row: &[u8]) -> f64 {
-        let sum: f64 = row.iter().zip(weights).map(|(x, w)| f64::from(*x) * w).sum();
-        sum + weights[row.len()]
-    }
-
     /// Weights of rows, in proportion to `weights` within a class, under which both classes count
     /// the same and all sum up to 1.
     pub fn balanced(labels: &[bool], weights: impl Iterator<Item = f64>) -> Vec<f32> {
@@ -53,6 +47,14 @@ impl Data {
         let weights: Vec<f64> = weights.collect();
         labels.iter().zip(&weights).for_each(|(l, w)| sums[*l as usize] += w);
         labels.iter().zip(&weights).map(|(l, w)| (0.5 * w / sums[*l as usize]) as f32).collect()
+    }
+}
+
+impl<T: Copy + Into<f64> + Sync> Data<T> {
+    /// Score of a row: `weights` has the bias last.
+    pub fn score(weights: &[f64], row: &[T]) -> f64 {
+        let sum: f64 = row.iter().zip(weights).map(|(x, w)| (*x).into() * w).sum();
+        sum + weights[row.len()]
     }
 
     /// The loss at some weights.
@@ -125,7 +127,7 @@ impl Data {
             }
             let p = 1.0 / (1.0 + (-score).exp());
             let (slope, bend) = (weight * (p - label as u8 as f64), weight * p * (1.0 - p));
-            x.iter_mut().zip(row).for_each(|(x, c)| *x = f64::from(*c));
+            x.iter_mut().zip(row).for_each(|(x, c)| *x = (*c).into());
             for (i, &xi) in x.iter().enumerate().filter(|(_, x)| **x != 0.0) {
                 sum.gradient[i] += slope * xi;
                 let line = &mut sum.hessian[i * n..][..=i];

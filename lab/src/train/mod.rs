@@ -8,6 +8,7 @@ mod filter;
 mod filter_samples;
 mod inputs;
 mod logistic;
+mod moves;
 mod owner;
 mod pairs;
 mod ranking;
@@ -26,6 +27,8 @@ pub enum Command {
     Filter(filter::Args),
     /// The occupancy constancy (section 3.5.1).
     Constancy(constancy::Args),
+    /// P(moves): how cues are weighed (after the refinement, which has no section)
+    Moves(moves::Args),
 }
 
 /// Trains, writes and reports.
@@ -33,6 +36,7 @@ pub fn run(command: &Command) -> Result<(), Error> {
     match command {
         Command::Filter(args) => filter::run(args),
         Command::Constancy(args) => constancy::run(args),
+        Command::Moves(args) => moves::run(args),
     }
 }
 

@@ -4,6 +4,7 @@ extern crate std;
 use super::*;
 use crate::params::Profile;
 use crate::random::Random;
+use crate::tracklet::Tracklet;
 use std::vec::Vec;
 
 const DT: f32 = 0.1;
@@ -11,6 +12,11 @@ const DT: f32 = 0.1;
 /// Half a cell of 0.3 m.
 fn noise() -> Matrix2<f32> {
     Matrix2::from_diagonal_element(0.15 * 0.15)
+}
+
+/// Just born.
+fn tracklet(ekf: Ekf) -> Tracklet {
+    Tracklet { ekf, age: 0, missed: 0, column: 0, place: [0.5; 2], probability: 1.0 }
 }
 
 /// One object seen `steps` times with half a cell of noise; speed error and normalised squared
@@ -97,7 +103,7 @@ fn the_covariance_is_honest() {
 /// go: starting at rest, a polar state must not prefer the x axis.
 #[test]
 fn slow_walkers_in_any_direction() {
-    use crate::tracklet::{Tracklet, observe};
+    use crate::tracklet::observe;
     let profile = Profile { refinement_sweeps: 0, ..Profile::hdl64() };
     let variance = 2.0 * noise()[(0, 0)];
     for speed in [0.8f32, 1.5] {
@@ -113,7 +119,7 @@ fn slow_walkers_in_any_direction() {
                 };
                 let moved = |n: i32| [0, 1].map(|a| (at(n + 1)[a] - at(n)[a]) as f32 * 0.3);
                 let born = Ekf::birth(&profile.tracklet, noise(), moved(0), DT);
-                let mut t = Tracklet { ekf: born, age: 0, missed: 0, column: 0, place: [0.5; 2] };
+                let mut t = tracklet(born);
                 let covariance = [variance, 0.0, variance];
                 let mut alive = true;
                 for n in 1..20 {
@@ -144,7 +150,7 @@ fn slow_walkers_in_any_direction() {
 /// displacements err by themselves, 1 cm and `factor` times that, its speed and turning rate
 /// changing by `factor` times what is assumed.
 fn displaced(seed: u64, factor: f64, innovation_sweeps: f32) -> (f32, f32) {
-    use crate::tracklet::{Tracklet, observe};
+    use crate::tracklet::observe;
     let mut profile = Profile::hdl64();
     profile.tracklet.innovation_sweeps = innovation_sweeps;
     profile.tracklet.pose_noise_m = 0.0;
@@ -166,7 +172,7 @@ fn displaced(seed: u64, factor: f64, innovation_sweeps: f32) -> (f32, f32) {
     let variance = (sigma * sigma) as f32;
     let born = Matrix2::from_diagonal_element(0.5 * variance);
     let ekf = Ekf::birth(&params, born, see(&mut random).0, DT);
-    let mut t = Tracklet { ekf, age: 0, missed: 0, column: 0, place: [0.5; 2] };
+    let mut t = tracklet(ekf);
     let mut truth = [0.0; 2];
     for _ in 0..30 {
         let (moved, velocity) = see(&mut random);

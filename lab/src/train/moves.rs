@@ -1,0 +1,150 @@
+//! `raywake-lab train moves`: P(moves) from the cues of columns that `raywake-lab eval` left.
+
+use super::logistic::{Data, Progress};
+use super::report::{Counts, Outputs, RECALLS};
+use crate::curve::{Curve, Operating};
+use crate::eval::{Row, rows_of};
+use raywake_core::output::Origin;
+use raywake_core::refinement::cues::Cues;
+use raywake_io::Error;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Weight of the squared weights: there are few of them and many rows.
+const RIDGE: f64 = 1e-6;
+/// Every so many drives one is held out.
+const HELD_OUT: usize = 5;
+/// Parts that probabilities are compared with frequencies in.
+const BINS: usize = 10;
+
+/// Options of `train moves`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folders of results of `raywake-lab eval`; every fifth drive of each is held out
+    #[arg(required = true, value_name = "OUT")]
+    results: Vec<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    training: Counts,
+    held_out: Counts,
+    progress: Vec<Progress>,
+    /// Mean squared distance of P(moves) from the truth, of what was held out.
+    brier: f64,
+    /// By tenths of P(moves), of what was held out: its mean, how many moved, and of how many.
+    reliability: Vec<(f64, u64, u64)>,
+    curve: Vec<Operating>,
+}
+
+/// Fits, writes a configuration file and reports.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let [training, held_out] = samples(&args.results)?;
+    let counts = [&training, &held_out].map(|d| Counts::of(d.labels.iter().copied()));
+    counts[0].both("training", "columns that move", "columns that stand")?;
+    counts[1].both("held-out", "columns that move", "columns that stand")?;
+    let mut progress = Vec::new();
+    let weights = training.fit(&mut |weights, training| {
+        progress.push(Progress { training, held_out: held_out.loss(weights) });
+    });
+    let scored = || {
+        let rows = held_out.rows.chunks_exact(held_out.width).zip(&held_out.labels);
+        rows.map(|(row, &moves)| (Data::score(&weights, row), moves))
+    };
+    let (brier, reliability) = reliability(scored());
+    let curve =
+        Curve::of(scored().map(|(score, moves)| (score, moves, 1.0))).expect("both are there");
+    let curve = RECALLS.map(|r| curve.at_recall(r)).to_vec();
+    let [training, held_out] = counts;
+    let report = Report { training, held_out, progress, brier, reliability, curve };
+    args.outputs.write(&configuration(&weights), &report)
+}
+
+/// Those of all drives: to learn from, and held out.
+fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
+    let empty = || Data {
+        width: Cues::WEIGHTS.len(),
+        rows: Vec::new(),
+        labels: Vec::new(),
+        weights: Vec::new(),
+        ridge: 0.0,
+    };
+    let mut parts = [empty(), empty()];
+    for out in results {
+        rows_of(out, |drive, row| {
+            if counts(row) {
+                let part = &mut parts[usize::from(drive % HELD_OUT == HELD_OUT - 1)];
+                part.rows.extend(row.cues().values());
+                part.labels.push(row.is_moving());
+            }
+        })?;
+    }
+    for part in &mut parts {
+        part.weights = vec![1.0 / part.labels.len().max(1) as f32; part.labels.len()];
+    }
+    parts[0].ridge = RIDGE;
+    Ok(parts)
+}
+
+/// Whether something is known of the column, and it either moves or stands.
+fn counts(row: &Row) -> bool {
+    row.in_view && row.origin >= Origin::Matched as u8 && (row.is_moving() || row.motion == 0)
+}
+
+/// Brier score and reliability of logits beside what is true.
+fn reliability(scored: impl Iterator<Item = (f64, bool)>) -> (f64, Vec<(f64, u64, u64)>) {
+    let (mut squares, mut bins) = (0.0, vec![(0.0, 0, 0); BINS]);
+    for (score, moves) in scored {
+        let p = 1.0 / (1.0 + (-score).exp());
+        squares += (p - f64::from(u8::from(moves))).powi(2);
+        let bin = &mut bins[((p * BINS as f64) as usize).min(BINS - 1)];
+        *bin = (bin.0 + p, bin.1 + u64::from(moves), bin.2 + 1);
+    }
+    let count: u64 = bins.iter().map(|b| b.2).sum();
+    bins.iter_mut().for_each(|b| b.0 /= b.2.max(1) as f64);
+    (squares / count.max(1) as f64, bins)
+}
+
+/// For `--config`.
+fn configuration(weights: &[f64]) -> String {
+    let names = Cues::WEIGHTS.iter().chain([&"moves_bias"]);
+    names.zip(weights).fold(String::new(), |mut text, (name, weight)| {
+        let _ = writeln!(text, "{name} = {weight:.2}");
+        text
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_moves_and_what_stands_count() {
+        let row = Row { in_view: true, origin: 2, motion: 2, ..Row::default() };
+        assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
+        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { origin: 1, ..row }));
+        assert!(!counts(&Row { in_view: false, ..row }));
+    }
+
+    #[test]
+    fn probabilities_beside_frequencies() {
+        // P = 0.75 three times, twice true; P = 0.25 once.
+        let logit = 3f64.ln();
+        let scored = [(logit, true), (logit, true), (logit, false), (-logit, false)];
+        let (brier, bins) = reliability(scored.into_iter());
+        assert!((brier - (2.0 * 0.0625 + 0.5625 + 0.0625) / 4.0).abs() < 1e-12);
+        assert_eq!((bins[7].1, bins[7].2, bins[2].1, bins[2].2), (2, 3, 0, 1));
+        assert!((bins[7].0 - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn weights_are_a_configuration() {
+        let text = configuration(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.125]);
+        assert!(
+            text.starts_with("moves_margin = 1.00\n") && text.ends_with("moves_bias = -7.12\n")
+        );
+    }
+}
