@@ -48,7 +48,7 @@ impl Digest {
     }
 
     /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over
-    /// ground, velocity relative to the vehicle, covariance, age.
+    /// ground, velocity relative to the vehicle, covariance, age, P(moves).
     pub fn column(&mut self, c: &ColumnFlow) {
         c.cell.iter().for_each(|v| self.word(*v as u32));
         self.word(c.origin as u32);
@@ -60,15 +60,18 @@ impl Digest {
         c.velocity_ego_mps.iter().for_each(|v| self.float(*v));
         c.covariance.iter().for_each(|v| self.float(*v));
         self.word(c.age);
+        self.float(c.probability);
     }
 
-    /// Adds a tracklet: cell, position, heading, speed, turning rate, covariance, age.
+    /// Adds a tracklet: cell, position, heading, speed, turning rate, covariance, age,
+    /// P(moves).
     pub fn tracklet(&mut self, t: &TrackletState) {
         t.cell.iter().for_each(|v| self.word(*v as u32));
         t.position_vehicle_m.iter().for_each(|v| self.float(*v));
         [t.heading_rad, t.speed_mps, t.turn_rate_radps].iter().for_each(|v| self.float(*v));
         t.covariance.iter().flatten().for_each(|v| self.float(*v));
         self.word(t.age);
+        self.float(t.probability);
     }
 
     /// The digest so far.

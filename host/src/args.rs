@@ -115,6 +115,9 @@ pub struct ProfileChoice {
     /// Custom profile (TOML): `base = "hdl64"` and the parameters to change
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Put out as moving what moves with this probability or more (`moves_min` of PARAMETERS.md)
+    #[arg(long, value_name = "P")]
+    pub moving: Option<f32>,
     /// Set a parameter of the profile, as named in PARAMETERS.md; may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,

@@ -52,6 +52,10 @@ pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
         assign(&mut settings, assignment)
             .map_err(|e| Error::Usage(format!("--set {assignment}: {e}")))?;
     }
+    if let Some(p) = choice.moving {
+        settings.profile.moves.moves_min = p;
+        settings.profile.check().map_err(|_| Error::Usage("--moving must be 0 to 1".into()))?;
+    }
     let rule = |e: ProfileError| Error::Usage(format!("--set: `{}` must be {}", e.field, e.must));
     settings.check().map_err(rule)?;
     Ok(settings)

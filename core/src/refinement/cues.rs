@@ -1,8 +1,8 @@
 //! P(moves): whether what was found to move does.
 //!
 //! The hypothesis test says what a cluster most likely did. How likely that is, is told by cues of
-//! the cluster and of the column, weighed by logistic regression (`raywake-lab train moves`). What a
-//! pair of sweeps tells adds up over time in two of them: the tracklets that moved before.
+//! the cluster and of the column, weighed by logistic regression (`raywake-lab train moves`). What
+//! pairs of sweeps tell adds up over time in two of them: the tracklets that moved before.
 
 use crate::params::MovesParams;
 

@@ -159,8 +159,9 @@ fn read_rows(
     Ok(())
 }
 
-/// Hands the rows of a folder of results to `each`, with the number of their drive.
-pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<(), Error> {
+/// Hands the rows of a folder of results to `each`, with the number of their drive. Returns how
+/// many drives there are.
+pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<usize, Error> {
     let folder = out.join("rows");
     let entries = std::fs::read_dir(&folder).map_err(Error::reading(&folder))?;
     let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
@@ -168,7 +169,7 @@ pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<(), Erro
     for (drive, file) in files.iter().enumerate() {
         rows_file::read(file, |rows| rows.iter().for_each(|row| each(drive, row)))?;
     }
-    Ok(())
+    Ok(files.len())
 }
 
 /// A name for every drive: its folder's.

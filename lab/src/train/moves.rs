@@ -21,7 +21,7 @@ const BINS: usize = 10;
 /// Options of `train moves`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folders of results of `raywake-lab eval`; every fifth drive of each is held out
+    /// Folders of results of `raywake-lab eval`; every fifth drive is held out
     #[arg(required = true, value_name = "OUT")]
     results: Vec<PathBuf>,
     #[command(flatten)]
@@ -72,11 +72,12 @@ fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
         weights: Vec::new(),
         ridge: 0.0,
     };
-    let mut parts = [empty(), empty()];
+    let (mut parts, mut before) = ([empty(), empty()], 0);
     for out in results {
-        rows_of(out, |drive, row| {
+        before += rows_of(out, |drive, row| {
             if counts(row) {
-                let part = &mut parts[usize::from(drive % HELD_OUT == HELD_OUT - 1)];
+                let held_out = (before + drive) % HELD_OUT == HELD_OUT - 1;
+                let part = &mut parts[usize::from(held_out)];
                 part.rows.extend(row.cues().values());
                 part.labels.push(row.is_moving());
             }
@@ -111,7 +112,7 @@ fn reliability(scored: impl Iterator<Item = (f64, bool)>) -> (f64, Vec<(f64, u64
 /// For `--config`.
 fn configuration(weights: &[f64]) -> String {
     let names = Cues::WEIGHTS.iter().chain([&"moves_bias"]);
-    names.zip(weights).fold(String::new(), |mut text, (name, weight)| {
+    names.zip(weights).fold("base = \"hdl64\"\n".to_string(), |mut text, (name, weight)| {
         let _ = writeln!(text, "{name} = {weight:.2}");
         text
     })
@@ -144,7 +145,8 @@ mod tests {
     fn weights_are_a_configuration() {
         let text = configuration(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.125]);
         assert!(
-            text.starts_with("moves_margin = 1.00\n") && text.ends_with("moves_bias = -7.12\n")
+            text.starts_with("base = \"hdl64\"\nmoves_margin = 1.00\n")
+                && text.ends_with("moves_bias = -7.12\n")
         );
     }
 }

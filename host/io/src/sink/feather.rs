@@ -40,7 +40,8 @@ const COVARIANCE: [(&str, usize, usize); 15] = [
 /// `vx_ego_mps vy_ego_mps`, `cov_xx cov_xy cov_yy` ((m/s)^2, of the world velocity) float32;
 /// `displacement_i displacement_j` (whole cells), `energy_millinats` int32; `dx_world_m dy_world_m`
 /// (refined displacement over ground until the next sweep) and its covariance `cov_dx_dx cov_dx_dy
-/// cov_dy_dy` (m^2) float32; `age` uint32; `foreground` (not explained by odometry) and `valid`
+/// cov_dy_dy` (m^2) float32; `age` uint32; `p_moves` (how likely it is that the column moves)
+/// float32; `foreground` (not explained by odometry) and `valid`
 /// (with a match of its own or part of a thing that moves) bool.
 pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
     let mut t = TableWriter::default();
@@ -66,6 +67,7 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
     t.f32s("cov_dy_dy", columns, |c| c.displacement_covariance[2]);
     t.i32s("energy_millinats", columns, |c| c.energy);
     t.u32s("age", columns, |c| c.age);
+    t.f32s("p_moves", columns, |c| c.probability);
     t.bools("foreground", columns, |c| c.origin != Origin::Background);
     t.bools("valid", columns, |c| c.origin >= Origin::Matched);
     t.write(path, meta)
@@ -74,7 +76,8 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 /// Writes the flow of returns, one row each in the sweep's order.
 ///
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
-/// cov_yy` of the world velocity float32; `age` uint32; `foreground`, `valid` bool.
+/// cov_yy` of the world velocity float32; `age` uint32; `p_moves` float32; `foreground`, `valid`
+/// bool.
 ///
 /// `points` and `flows` are of the same sweep; fails with [`Error::Usage`] where their lengths
 /// differ.
@@ -101,6 +104,7 @@ pub fn write_points(
     t.f32s("cov_xy", flows, |f| f.covariance[1]);
     t.f32s("cov_yy", flows, |f| f.covariance[2]);
     t.u32s("age", flows, |f| f.age);
+    t.f32s("p_moves", flows, |f| f.probability);
     t.bools("foreground", flows, |f| f.origin != Origin::Background);
     t.bools("valid", flows, |f| f.origin >= Origin::Matched);
     t.write(path, meta)
@@ -110,7 +114,8 @@ pub fn write_points(
 ///
 /// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `heading_world_rad`,
 /// `speed_mps`, `turn_rate_radps`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps` and the
-/// upper half of the covariance, `cov_x_x` to `cov_turn_turn`, float32; `age` uint32.
+/// upper half of the covariance, `cov_x_x` to `cov_turn_turn`, float32; `age` uint32; `p_moves`
+/// float32.
 pub fn write_tracklets(
     path: &Path,
     tracklets: &[TrackletState],
@@ -134,6 +139,7 @@ pub fn write_tracklets(
         t.f32s(name, tracklets, |s| s.covariance[row][column]);
     }
     t.u32s("age", tracklets, |s| s.age);
+    t.f32s("p_moves", tracklets, |s| s.probability);
     t.write(path, meta)
 }
 
