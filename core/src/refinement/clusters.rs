@@ -50,7 +50,7 @@ impl Clusters {
     /// What tells whether a column moves.
     pub fn cues(&self, column: usize) -> Cues {
         let misfit = self.misfit[column];
-        self.of(column).map_or(Cues::default(), |found| Cues { misfit, ..found.cues })
+        self.of(column).map_or(Cues::NONE, |found| Cues { misfit, ..found.cues })
     }
 
     /// What became of all of them.

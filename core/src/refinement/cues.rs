@@ -109,6 +109,9 @@ macro_rules! cues {
         }
 
         impl $name {
+            /// Nothing told.
+            pub const NONE: $name = $name { $($field: 0.0),* };
+
             /// Names of the parameters that weigh them, in order.
             pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
 
@@ -153,14 +156,14 @@ mod tests {
     #[test]
     fn cues_are_weighed_by_their_parameters() {
         let zero = MovesParams { moves_bias: 0.0, ..MovesParams::DEFAULT };
-        assert_eq!(Cues::default().probability(&zero), 0.5);
+        assert_eq!(Cues::NONE.probability(&zero), 0.5);
         for (n, name) in Cues::WEIGHTS.iter().enumerate() {
             let mut params = zero;
             for other in Cues::WEIGHTS {
                 let value = if other == name { 3f64.ln() } else { 0.0 };
                 params.set(other, Value::Number(value)).unwrap();
             }
-            let mut cues = Cues::default();
+            let mut cues = Cues::NONE;
             let all = [
                 &mut cues.margin,
                 &mut cues.share,

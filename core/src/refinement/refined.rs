@@ -32,7 +32,7 @@ impl Refined {
                 by,
                 covariance: cluster.motion.covariance_of(at),
                 is_dynamic: true,
-                cues: Cues::default(),
+                cues: Cues::NONE,
             },
             false => Refined::at_rest(scaled, cluster.static_residual),
         };
@@ -53,7 +53,7 @@ impl Refined {
 
     /// Where nothing is known.
     pub fn nothing() -> Refined {
-        let cues = Cues::default();
+        let cues = Cues::NONE;
         Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }
     }
 

@@ -25,7 +25,7 @@ fn seen(column: i32, by: [f32; 2]) -> Observation {
         column: column as u32,
         moved: by.map(|v| v * 0.3),
         covariance: [variance, 0.0, variance],
-        cues: Cues::default(),
+        cues: Cues::NONE,
         probability: 1.0,
         slot: NONE,
     }

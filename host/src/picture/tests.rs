@@ -3,6 +3,7 @@
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
 use raywake_core::pose::Pose;
+use raywake_core::refinement::cues::Cues;
 use raywake_core::sweep::Point;
 use raywake_io::sink::feather::Voxel;
 use raywake_io::source::SweepData;
@@ -53,6 +54,8 @@ const COLUMN: ColumnFlow = ColumnFlow {
     covariance: [0.0; 3],
     age: 3,
     origin: Origin::Matched,
+    probability: 1.0,
+    cues: Cues::NONE,
 };
 
 #[test]
