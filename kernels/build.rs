@@ -84,25 +84,33 @@ fn compile(
     let index = index.unwrap_or_else(|| fail(format!("no entry point `{}`", declared.name)));
     let entry = &module.entry_points[index];
     let mut bindings = reflect::bindings(&module, info.get_entry_point(index));
-    for (n, (bound, argument)) in bindings.iter().zip(arguments).enumerate() {
-        let used = bound.reads || bound.writes;
-        let name = &bound.name;
-        if used && n >= declared.arguments.len() {
-            fail(format!("`{}` uses `{name}`, which its stage does not have", declared.name));
-        }
-        if bound.writes && !declared.arguments[n].writes {
-            fail(format!("`{}` writes `{name}`, which its stage only reads", declared.name));
-        }
-        if let (Some(found), Some(wanted)) = (bound.stride, prelude::stride(argument))
-            && found != wanted
-        {
-            fail(format!("elements of `{name}` take {found} bytes, in core {wanted}"));
-        }
+    if let Some(what) = mistake(declared, &bindings, arguments) {
+        fail(format!("`{}` {what}", declared.name));
     }
     bindings.truncate(declared.arguments.len());
     limits::check_entry(file, &module, entry, &bindings);
     let words = spirv(&module, &info, &entry.name, mode).unwrap_or_else(|e| fail(e));
     write_static(table, entry, &bindings, &words);
+}
+
+/// What an entry point does with its bindings that its stage does not say.
+fn mistake(
+    declared: &stages::Entry,
+    bindings: &[reflect::Bound],
+    arguments: &[raywake_core::stages::Argument],
+) -> Option<String> {
+    bindings.iter().zip(arguments).enumerate().find_map(|(n, (bound, argument))| {
+        let (name, own) = (&bound.name, declared.arguments.get(n));
+        if (bound.reads || bound.writes) && own.is_none() {
+            return Some(format!("uses `{name}`, which its stage does not have"));
+        }
+        if bound.writes && own.is_some_and(|a| !a.writes) {
+            return Some(format!("writes `{name}`, which its stage only reads"));
+        }
+        let (found, wanted) = (bound.stride?, prelude::stride(argument)?);
+        let told = || format!("sees {found} bytes an element of `{name}`, core {wanted}");
+        (found != wanted).then(told)
+    })
 }
 
 fn spirv(
