@@ -1,5 +1,5 @@
 //! Writes two pictures of a sweep, from above and as the sensor sees it:
-//! `look SEED SWEEP FOLDER [RIG] [SCENERY]`.
+//! `look SEED SWEEP FOLDER [RIG] [SCENERY] [CLUTTER]`.
 
 use raywake_sim::{Class, Drive, Options, SensorRig, SimSweep};
 use std::io::Write;
@@ -18,6 +18,7 @@ fn colour(class: Class, fast: bool) -> [u8; 3] {
         Class::Pole => [220, 220, 60],
         Class::Vegetation => [40, 160, 40],
         Class::Fixture => [150, 150, 200],
+        Class::Clutter => [255, 255, 255],
         _ if fast => [255, 60, 60],
         _ => [80, 160, 255],
     }
@@ -72,7 +73,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rig: SensorRig = arguments.get(3).map_or("hdl64", String::as_str).parse()?;
     let eye = rig.mounts.first().map_or(0.0, |m| m.vehicle_from_sensor.translation.z) as f32;
     let scenery = arguments.get(4).map_or("street", String::as_str).parse()?;
-    let drive = Drive::new(number(0), Options { rig, scenery, ..Options::default() });
+    let clutter = arguments.get(5).map_or("none", String::as_str).parse()?;
+    let drive = Drive::new(number(0), Options { rig, scenery, clutter, ..Options::default() });
     let begin = std::time::Instant::now();
     let sweep = drive.sweep(number(1) as usize);
     println!("{} returns in {:.0} ms", sweep.points.len(), 1e3 * begin.elapsed().as_secs_f64());

@@ -63,14 +63,14 @@ const RAIN: Drops = Drops { share: 0.015, mean_m: 5.0, loss: 0.004, patchy: fals
 const FOG: Drops = Drops { share: 0.15, mean_m: 4.0, loss: 0.1, patchy: true };
 
 /// A cloud of dust is made of puffs, one in so many seconds, which last for so long.
-const PUFF_S: f64 = 0.25;
+const PUFF_S: f64 = 0.1;
 const DUST_S: f64 = 3.0;
 /// Speed from which a vehicle raises dust, m/s.
 const DUSTY: f64 = 3.0;
 /// Radius of a fresh puff (m) and its growth (m/s).
 const PUFF: [f64; 2] = [0.7, 0.45];
 /// Returns per metre of a ray in a fresh puff, and the time in which they fall to a third, s.
-const THICK: [f64; 2] = [0.35, 1.2];
+const THICK: [f64; 2] = [0.15, 1.2];
 /// Splits what chance decides in puffs from what it decides elsewhere along a ray.
 const OF_PUFFS: u64 = 0xD057;
 const OF_DROPS: u64 = 0xF06;
@@ -151,7 +151,7 @@ impl Air {
         }
         // The first puff of every object that is not older than they last.
         let first = ((t - DUST_S) / PUFF_S).ceil() as i64;
-        for object in scene.objects.iter().filter(|o| raises_dust(o)) {
+        for object in scene.objects.iter().filter(|o| raises_dust(o) && is_near(o, fan, t)) {
             let times = (first..).map(|n| n as f64 * PUFF_S).take_while(|&then| then <= t);
             let moving = times.filter(|&then| object.path.at(then).speed > DUSTY);
             let puffs = moving.map(|then| Puff::behind(object, &scene.ground, then, t));
@@ -190,6 +190,14 @@ impl Drops {
         let share = self.share * if self.patchy { patch() } else { 1.0 };
         (rng.chance(share) && range < DROPS_M).then_some(range)
     }
+}
+
+/// Whether a column can meet the dust of an object.
+fn is_near(object: &Object, fan: &Fan, t: f64) -> bool {
+    let [now, then] = [t, t - DUST_S].map(|t| object.path.at(t));
+    let middle = DVec3::new(0.5 * (now.x + then.x), 0.5 * (now.y + then.y), fan.origin.z);
+    // Half as long again, for bends; and what is as long as a truck, high up or down a hill.
+    fan.meets(middle, 0.75 * (now.x - then.x).hypot(now.y - then.y) + 20.0)
 }
 
 /// Every second vehicle on wheels that moves.
@@ -255,7 +263,7 @@ mod tests {
         };
         let puffs = |t: f64| Air::about(Clutter::Dust, &scene, &fan, t).puffs;
         let (now, later) = (puffs(2.0), puffs(2.05));
-        assert_eq!(now.len(), 13);
+        assert_eq!(now.len(), 31);
         let tail = 30.0 + 12.0 * 2.0 - 0.5 * scene.objects[0].size[0];
         assert!(now.iter().all(|p| p.centre.x < tail + 1e-9 && p.centre.x > tail - 36.1));
         // The same puffs a moment later, a little larger.

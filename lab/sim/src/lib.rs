@@ -16,6 +16,8 @@
 mod bend;
 mod cast;
 mod clutter;
+#[cfg(test)]
+mod collisions;
 mod dimensions;
 mod drive;
 mod ego;

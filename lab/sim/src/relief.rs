@@ -11,8 +11,11 @@ use std::f64::consts::{PI, TAU};
 const STEP_M: f64 = 0.2;
 /// Rays are followed this far, m: farther than any sensor reports.
 const FAR_M: f64 = 250.0;
-/// Halvings of the last step: 0.2 m become less than a micrometre.
-const HALVINGS: u32 = 24;
+/// Times that the place where a ray meets the ground is put where a straight slope would: on one
+/// slope the first is exact, over an edge the error shrinks by half or more each time.
+const SECANTS: u32 = 8;
+/// Nearer than this to the ground is on it, m.
+const EXACT_M: f64 = 1e-6;
 /// Step of the differences that give the normal, m.
 const NORMAL_M: f64 = 0.05;
 
@@ -47,7 +50,7 @@ pub(crate) struct Relief {
 impl Term {
     fn local(&self, x: f64, y: f64) -> Local {
         match self {
-            Term::Banks(axis, points) => banks(points, axis.beside(x, y)[1]),
+            Term::Banks(axis, points) => banks(points, axis.offset(x, y)),
             Term::Wave([height, length, phase]) => Local {
                 height: height * (TAU * x / length + phase).sin(),
                 slope: self.slope(),
@@ -103,15 +106,10 @@ impl Relief {
         self.terms.iter().map(|term| term.local(x, y).height).sum()
     }
 
-    /// Whether a place lies in the ground.
-    fn holds(&self, at: DVec3) -> bool {
-        at.z <= self.height(at.x, at.y)
-    }
-
     /// How much higher bumps are than on a road.
     pub(crate) fn roughening(&self, x: f64, y: f64) -> f64 {
         let (axis, half) = self.paved;
-        1.0 + 2.0 * (axis.beside(x, y)[1].abs() - half).clamp(0.0, 1.0)
+        1.0 + 2.0 * (axis.offset(x, y).abs() - half).clamp(0.0, 1.0)
     }
 
     fn local(&self, x: f64, y: f64) -> Local {
@@ -132,30 +130,40 @@ impl Relief {
         if closing(steepest) <= 0.0 {
             return None;
         }
-        let (mut before, mut range) = (0.0, 0.0);
+        let (mut before, mut range) = ([0.0; 2], 0.0);
         while range < FAR_M {
             let at = o + d * range;
             let local = self.local(at.x, at.y);
             let above = at.z - local.height;
             if above <= 0.0 {
-                return Some(self.between(o, d, before, range));
+                return Some(self.between(o, d, before, [range, above]));
             }
             let near = closing(local.slope);
             let here = if near > 0.0 { above / near } else { f64::INFINITY };
             let here = here.min(local.within / flat.max(f64::MIN_POSITIVE));
-            before = range;
+            before = [range, above];
             range += here.max(above / closing(steepest)).max(STEP_M);
         }
         None
     }
 
-    fn between(&self, o: DVec3, d: DVec3, mut above: f64, mut below: f64) -> f64 {
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (above + below);
-            let under = self.holds(o + d * middle);
-            *(if under { &mut below } else { &mut above }) = middle;
+    /// Where a ray meets the ground between two places of it: range and height above the ground of
+    /// one that lies over it and one that does not.
+    fn between(&self, o: DVec3, d: DVec3, mut over: [f64; 2], mut under: [f64; 2]) -> f64 {
+        for _ in 0..SECANTS {
+            let share = over[1] / (over[1] - under[1]).max(f64::MIN_POSITIVE);
+            let range = over[0] + share.min(1.0) * (under[0] - over[0]);
+            let at = o + d * range;
+            let above = at.z - self.height(at.x, at.y);
+            // The end that stays counts half, or one end would stay for ever.
+            let (moved, stays) =
+                if above > 0.0 { (&mut over, &mut under) } else { (&mut under, &mut over) };
+            (*moved, stays[1]) = ([range, above], 0.5 * stays[1]);
+            if above.abs() < EXACT_M {
+                return range;
+            }
         }
-        below
+        under[0]
     }
 
     /// Cosine between a direction and the normal at a place.
@@ -194,7 +202,10 @@ mod tests {
         for _ in 0..3000 {
             let o = DVec3::new(rng.range(-30.0, 10.0), rng.range(-3.0, 3.0), 2.6);
             let d = DVec3::new(rng.bell(), rng.bell(), -0.2 * rng.unit()).normalize();
-            let under = |range: f64| relief.holds(o + d * range);
+            let under = |range: f64| {
+                let at = o + d * range;
+                at.z <= relief.height(at.x, at.y)
+            };
             let slow = (0..12_000).map(|n| 0.01 * f64::from(n)).find(|&range| under(range));
             let fast = relief.reach(o, d).filter(|&range| range < 119.0);
             let Some(slow) = slow.filter(|_| fast.is_some()) else {

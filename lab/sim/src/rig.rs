@@ -128,9 +128,9 @@ impl SensorRig {
         SensorRig { mounts: (0..4).map(mount).collect(), origin: REAR_AXLE }
     }
 
-    /// The same four at the device's full rate, which does not depend on how fast it spins: 32
-    /// beams every 46.08 us are 694,444 rays a second each. 277,778 rays a sweep, of which those
-    /// into the sky do not return.
+    /// The same four at the device's full rate, however fast it spins: 32 beams every 46.08 us are
+    /// 694,444 rays a second each. 277,778 rays a sweep, of which those into the sky do not return:
+    /// some 243,000 returns in a street.
     pub fn hdl32x4_full() -> SensorRig {
         let mut rig = SensorRig::hdl32x4();
         for Mount { sensor, .. } in &mut rig.mounts {

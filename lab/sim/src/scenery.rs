@@ -82,6 +82,7 @@ impl FromStr for Scenery {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::collisions::check_clear;
     use std::collections::BTreeSet;
 
     #[test]
@@ -91,6 +92,24 @@ mod tests {
         }
         let error = "strase".parse::<Scenery>().unwrap_err().to_string();
         assert!(error.contains("strase") && error.contains("motorway"), "{error}");
+    }
+
+    #[test]
+    fn nobody_goes_through_what_clutters_a_street() {
+        for seed in 0..10 {
+            let of = |scenery: Scenery| scenery.draw(seed, Ego::Any, 6.0, 1.0);
+            let (plain, _) = of(Scenery::Street);
+            let (scene, path) = of(Scenery::StreetCluttered);
+            let more = &scene.fixtures[plain.fixtures.len()..];
+            assert_eq!(plain.fixtures[..], scene.fixtures[..plain.fixtures.len()]);
+            assert!(more.len() > 200, "{}", more.len());
+            let empty = Scene { objects: Vec::new(), ..scene.clone() };
+            check_clear("the vehicle", &empty, more, Some((&path, [4.6, 1.9, 2.0])));
+            for object in scene.objects {
+                let alone = Scene { objects: vec![object], ..empty.clone() };
+                check_clear(&format!("seed {seed}"), &alone, more, None);
+            }
+        }
     }
 
     #[test]

@@ -1,12 +1,16 @@
 //! Errors of an inertial unit aided by satellites, as real poses have them.
 //!
 //! - Clock: the unit reports every 10 ms, and a sweep gets the report nearest to its stamp. The
-//!   scanner's period is no multiple of 10 ms (KITTI's is 103.6 ms), so the report is up to 5 ms
-//!   off and walks by 3.6 ms a sweep; the drive's own times do not tell.
+//!   scanner's period is no multiple of 10 ms (KITTI's is 103.6 ms): the report is up to 5 ms off
+//!   and walks by 3.6 ms a sweep; the drive's own times do not tell.
 //! - Position: a first-order Gauss-Markov process of 4 cm along each axis that forgets within 20 s
 //!   (a random walk over a few seconds, 0.4 cm a sweep), and 1 cm anew on every sweep.
 //! - Attitude: the same process of 0.2 degrees of heading and 0.05 degrees of roll and pitch, and a
 //!   tenth of that anew on every sweep.
+//!
+//! For comparison: on KITTI's raw drive 0005 (4.6 m/s) the unit's steps from sweep to sweep differ
+//! from those of scan matching by 2.5 cm along, 1.8 cm across and 0.047 degrees; here, at that
+//! speed, by 2.6 cm, 1.5 cm and 0.035 degrees, as follows from the above.
 
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;

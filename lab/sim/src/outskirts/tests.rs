@@ -1,11 +1,10 @@
 //! That nobody drives through anything, that there is something to see, and that it moves.
 
 use super::{Place, VEHICLE, draw};
-use crate::object::Fixture;
+use crate::collisions::check_clear;
 use crate::path::Path;
 use crate::scene::Scene;
 use glam::DVec3;
-use raywake_core::pose::Pose;
 
 const DURATION_S: f64 = 6.0;
 const SEEDS: u64 = 10;
@@ -19,63 +18,10 @@ fn scenes() -> impl Iterator<Item = (String, Scene, Path)> {
     })
 }
 
-/// Points of a box that stands at a pose, low, at half its height and high, 0.3 m apart at most
-/// and well within it.
-fn points(pose: &Pose, size: [f64; 3]) -> Vec<DVec3> {
-    let [count_x, count_y] = [size[0], size[1]].map(|length| (length / 0.3).ceil() as u32);
-    let along =
-        |n: u32, count: u32, length: f64| 0.95 * length * (f64::from(n) / f64::from(count) - 0.5);
-    let mut points = Vec::new();
-    for i in 0..=count_x {
-        for j in 0..=count_y {
-            for up in [0.3, 0.5 * size[2], 0.9 * size[2]] {
-                let at = DVec3::new(along(i, count_x, size[0]), along(j, count_y, size[1]), up);
-                points.push(pose.transform(at));
-            }
-        }
-    }
-    points
-}
-
-fn holds(fixture: &Fixture, point: DVec3) -> bool {
-    let at = fixture.pose.inverse().transform(point).abs();
-    (fixture.shape.half() - at).min_element() > 0.0
-}
-
 #[test]
 fn nobody_goes_through_anything() {
     for (name, scene, path) in scenes() {
-        let others = scene.objects.iter().map(|o| (&o.path, o.size));
-        let all: Vec<_> = [(&path, VEHICLE)].into_iter().chain(others).collect();
-        for step in 0..=12 {
-            let t = 0.5 * f64::from(step);
-            let place = |(path, size): &(&Path, [f64; 3])| {
-                let at = path.at(t);
-                let pose = Pose::planar(at.x, at.y, scene.ground.height(at.x, at.y), at.yaw);
-                (pose, *size, 0.5 * DVec3::from_array(*size).length())
-            };
-            let boxes: Vec<_> = all.iter().map(place).collect();
-            for (n, (pose, size, reach)) in boxes.iter().enumerate() {
-                if step > 0 && all[n].0.is_still() {
-                    continue;
-                }
-                let apart = |other: DVec3| (other - pose.translation).length() - reach;
-                let near = |f: &&Fixture| apart(f.pose.translation) < f.shape.reach() + 1.0;
-                let fixtures: Vec<_> = scene.fixtures.iter().filter(near).collect();
-                let mut others: Vec<_> =
-                    boxes.iter().enumerate().filter(|(m, _)| *m != n).collect();
-                others.retain(|(_, (other, _, reach))| apart(other.translation) < *reach);
-                for point in points(pose, *size) {
-                    let hit = fixtures.iter().find(|f| holds(f, point));
-                    assert!(hit.is_none(), "{name}, {t} s: {n} of {size:?} at {point} in {hit:?}");
-                    for (m, (other, size, _)) in &others {
-                        let at = other.inverse().transform(point).abs();
-                        let inside = at.x < 0.5 * size[0] && at.y < 0.5 * size[1];
-                        assert!(!inside, "{name}, {t} s: {n} and {m} at {point}");
-                    }
-                }
-            }
-        }
+        check_clear(&name, &scene, &scene.fixtures, Some((&path, VEHICLE)));
     }
 }
 

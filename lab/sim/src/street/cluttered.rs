@@ -11,7 +11,7 @@ use raywake_core::pose::Pose;
 
 /// Walkers keep to the inner part of the sidewalk: what stands beyond this distance from the
 /// road's middle is in nobody's way, m.
-const FREE_M: f64 = EDGE - 0.6;
+const FREE_M: f64 = EDGE - 0.4;
 
 impl Yard<'_> {
     /// Along both sides of the main road.
