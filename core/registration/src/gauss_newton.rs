@@ -2,7 +2,7 @@
 //! planes.
 
 use glam::{DMat3, DVec3};
-use nalgebra::{Matrix6, SymmetricEigen, Vector6};
+use nalgebra::{Matrix6, SymmetricEigen, U6, Vector6};
 use raywake_core::pose::{Pose, Twist};
 
 /// A point of the source and the plane of the target that it belongs to.
@@ -53,10 +53,7 @@ pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<Gaus
     if total.is_nan() || total <= 0.0 {
         return None;
     }
-    let centre = correspondences.iter().map(|c| c.weight * c.point).sum::<DVec3>() / total;
-    let square = |c: &Correspondence| c.weight * c.point.distance_squared(centre);
-    let spread = libm::sqrt(correspondences.iter().map(square).sum::<f64>() / total);
-    let spread = spread.max(SPREAD_MIN_M);
+    let (centre, spread) = centre_and_spread(correspondences, total);
     let (mut matrix, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for correspondence in correspondences {
         let row = jacobian(correspondence, centre, spread);
@@ -65,14 +62,7 @@ pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<Gaus
         right.axpy(-weight * correspondence.residual(), &row, 1.0);
     }
     let eigen = SymmetricEigen::new(matrix);
-    let (mut x, mut unobserved) = (Vector6::zeros(), 0);
-    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-        if *value > observable {
-            x.axpy(vector.dot(&right) / value, &vector, 1.0);
-        } else {
-            unobserved += 1;
-        }
-    }
+    let (x, unobserved) = observed(&eigen, &right, observable);
     let (turn, shift) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]));
     Some(GaussNewtonStep {
         motion: about(centre, turn / spread, shift),
@@ -80,6 +70,32 @@ pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<Gaus
         least_eigenvalue: eigen.eigenvalues.min().max(0.0),
         unobserved,
     })
+}
+
+/// Weighted mean of the points, and the root mean square of their distance from it, m.
+fn centre_and_spread(correspondences: &[Correspondence], total: f64) -> (DVec3, f64) {
+    let centre = correspondences.iter().map(|c| c.weight * c.point).sum::<DVec3>() / total;
+    let square = |c: &Correspondence| c.weight * c.point.distance_squared(centre);
+    let spread = libm::sqrt(correspondences.iter().map(square).sum::<f64>() / total);
+    (centre, spread.max(SPREAD_MIN_M))
+}
+
+/// The solution in the eigenvectors whose eigenvalue is above `observable`, and how many there are
+/// besides.
+fn observed(
+    eigen: &SymmetricEigen<f64, U6>,
+    right: &Vector6<f64>,
+    observable: f64,
+) -> (Vector6<f64>, usize) {
+    let (mut x, mut unobserved) = (Vector6::zeros(), 0);
+    for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        if *value > observable {
+            x.axpy(vector.dot(right) / value, &vector, 1.0);
+        } else {
+            unobserved += 1;
+        }
+    }
+    (x, unobserved)
 }
 
 /// Derivatives of the residual by rotation about the centre (times the spread) and translation.
