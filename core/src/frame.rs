@@ -37,35 +37,37 @@ pub fn central(profile: &Profile) -> [i32; 3] {
 /// lattice then has a cell centre at the anchor, the point of the vehicle's axis
 /// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
 pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
-    let below = central(profile);
     let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
-    let r = profile.voxel_m;
-    let metres = |c: [i32; 3]| DVec3::new(c[0] as f64, c[1] as f64, c[2] as f64) * r;
     match profile.frame {
         Frame::Sensor => Window {
             grid_from_vehicle: Pose { translation: -anchor, ..Pose::IDENTITY },
-            corner: below.map(|b| -b),
+            corner: central(profile).map(|b| -b),
             lattice_origin: pose.translation,
         },
         Frame::Lattice => {
             let at = pose.transform(anchor);
-            let origin = lattice_origin.unwrap_or(at);
-            // A pose a world away saturates; its sweep is no continuation of any other.
-            let cell = ((at - origin) / r)
-                .to_array()
-                .map(|c| libm::floor(c + 0.5).clamp(-1e9, 1e9) as i32);
-            let corner = [cell[0] - below[0], cell[1] - below[1], cell[2] - below[2]];
-            Window {
-                grid_from_vehicle: Pose {
-                    rotation: pose.rotation,
-                    translation: pose.translation - origin - metres(cell),
-                },
-                corner,
-                lattice_origin: origin,
-            }
+            place_on_lattice(profile, pose, at, lattice_origin.unwrap_or(at))
         }
     }
 }
+
+/// [`place`] where the anchor is `at` in the world.
+fn place_on_lattice(profile: &Profile, pose: &Pose, at: DVec3, origin: DVec3) -> Window {
+    // A pose a world away saturates; its sweep is no continuation of any other.
+    let index = |c: f64| libm::floor(c + 0.5).clamp(-FAR_CELLS, FAR_CELLS) as i32;
+    let cell = ((at - origin) / profile.voxel_m).to_array().map(index);
+    let below = central(profile);
+    let centre = DVec3::from_array(cell.map(f64::from)) * profile.voxel_m;
+    let translation = pose.translation - origin - centre;
+    Window {
+        grid_from_vehicle: Pose { rotation: pose.rotation, translation },
+        corner: [0, 1, 2].map(|a| cell[a] - below[a]),
+        lattice_origin: origin,
+    }
+}
+
+/// Farther than any drive leads, and within what an integer holds, cells.
+const FAR_CELLS: f64 = 1e9;
 
 /// One sweep's side of a pair.
 #[derive(Clone, Copy, Debug)]
@@ -168,7 +170,7 @@ impl<'a> SweepPair<'a> {
         tracklet: Option<&Tracklet>,
         flow: &mut ColumnFlow,
     ) {
-        let (dt, planar) = (self.dt_s as f32, DVec3::new(at.x, at.y, 0.0));
+        let dt = self.dt_s as f32;
         let of_pair = (o.moved.map(|v| v / dt), o.covariance.map(|v| v / (dt * dt)));
         flow.displacement_m = o.moved;
         flow.displacement_covariance = o.covariance;
@@ -179,18 +181,12 @@ impl<'a> SweepPair<'a> {
                 self.set_relative(at, flow);
             }
             Frame::Sensor => {
-                let by = DVec3::new(o.moved[0] as f64, o.moved[1] as f64, 0.0);
-                let by = self.current.pose.transform(at + by) - self.before.pose.transform(at);
-                flow.displacement_m = [by.x as f32, by.y as f32];
                 // The tracklet has gone over to the second sweep's axes.
                 let turned_back = |t: &Tracklet| {
                     let (velocity, covariance) = t.ekf.velocity();
                     turn(self.turned_rad, velocity, covariance)
                 };
-                let (velocity, covariance) = tracklet.map_or(of_pair, turned_back);
-                flow.velocity_ego_mps = velocity;
-                flow.velocity_world_mps = self.ego.world_from_ego(planar, velocity);
-                flow.covariance = self.ego.turn_covariance(covariance);
+                self.set_over_ground(at, tracklet.map_or(of_pair, turned_back), flow);
             }
         }
     }
@@ -207,6 +203,24 @@ impl<'a> SweepPair<'a> {
         despite(&mut flow.displacement_covariance, &mut flow.displacement_m);
         despite(&mut flow.covariance, &mut flow.velocity_world_mps);
         self.set_relative(at, flow);
+    }
+
+    /// What goes over ground with a column's displacement and velocity (and its covariance) along
+    /// the vehicle's axes.
+    fn set_over_ground(
+        &self,
+        at: DVec3,
+        (velocity, covariance): ([f32; 2], [f32; 3]),
+        flow: &mut ColumnFlow,
+    ) {
+        let [x, y] = flow.displacement_m.map(f64::from);
+        let to = self.current.pose.transform(at + DVec3::new(x, y, 0.0));
+        let by = to - self.before.pose.transform(at);
+        flow.displacement_m = [by.x as f32, by.y as f32];
+        flow.velocity_ego_mps = velocity;
+        let planar = DVec3::new(at.x, at.y, 0.0);
+        flow.velocity_world_mps = self.ego.world_from_ego(planar, velocity);
+        flow.covariance = self.ego.turn_covariance(covariance);
     }
 
     /// The velocity relative to the vehicle that goes with a column's velocity over ground.

@@ -70,8 +70,8 @@ impl GroundGrid {
         under: [f32; 3],
         returns: impl Iterator<Item = (usize, [f32; 3])>,
     ) {
-        let edge = libm::round(params.ground_cell_m / column_m) as usize;
-        let edge = edge.max(CELL_COLUMNS_MIN);
+        let edge = libm::round(params.ground_cell_m / column_m);
+        let edge = (edge as usize).max(CELL_COLUMNS_MIN);
         self.list_cells(side, edge);
         let drop = (params.ground_drop_m / column_m) as f32;
         self.lowest.fill([f32::INFINITY; 3]);
@@ -80,18 +80,17 @@ impl GroundGrid {
             if p[2] < under[2] - drop - params.ground_drop_slope * away {
                 continue;
             }
-            let cell = self.cell[column] as usize;
-            let mut z = p[2];
-            for low in &mut self.lowest[cell] {
-                (*low, z) = (low.min(z), low.max(z));
-            }
-        }
-        for (height, lowest) in self.height.iter_mut().zip(&self.lowest) {
-            *height = lowest[2];
+            self.lower(column, p[2]);
         }
         let fall = (params.ground_fall_slope * edge as f64) as f32;
-        for _ in 0..params.ground_passes {
-            self.extrapolate(fall);
+        self.height.iter_mut().zip(&self.lowest).for_each(|(height, lowest)| *height = lowest[2]);
+        (0..params.ground_passes).for_each(|_| self.extrapolate(fall));
+    }
+
+    /// Keeps the height of a return in a column if it is among the three lowest of its cell.
+    fn lower(&mut self, column: usize, mut z: f32) {
+        for low in &mut self.lowest[self.cell[column] as usize] {
+            (*low, z) = (low.min(z), low.max(z));
         }
     }
 

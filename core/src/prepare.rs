@@ -149,11 +149,8 @@ impl<'a> Caster<'a> {
         let Placement { profile, rig, window, sweep } = *placement;
         let deskew = profile.deskew && rig.distorted;
         let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
-        let mut to_voxel = [[[0.0; 4]; 3]; SLOTS];
-        for (slot, matrix) in to_voxel.iter_mut().enumerate() {
-            let moved = if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
-            *matrix = voxel_matrix(profile, &(window.grid_from_vehicle * moved));
-        }
+        let moved = |slot| if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
+        let matrix = |slot| voxel_matrix(profile, &(window.grid_from_vehicle * moved(slot)));
         let [from_s, to_s] = [0.0, SLOTS as f64].map(|when| rig.timing.offset_s(when) as f32);
         let slot_s = (to_s - from_s) / SLOTS as f32;
         Caster {
@@ -163,7 +160,7 @@ impl<'a> Caster<'a> {
             levels: profile.levels,
             centre: central(profile),
             moving,
-            to_voxel,
+            to_voxel: core::array::from_fn(matrix),
             origin_ids: place_origins(placement, moving, origins),
             drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
             from_s,
@@ -273,12 +270,15 @@ fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
     })
 }
 
-/// A point in voxels from the window's central one. Values far beyond any window saturate.
+/// Beyond any window, voxels: coordinates saturate there.
+const FAR: f32 = 1e6;
+
+/// A point in voxels from the window's central one.
 #[inline]
 fn in_voxels(m: &ToVoxel, p: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|a| {
         let v = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
-        v.clamp(-1e6, 1e6)
+        v.clamp(-FAR, FAR)
     })
 }
 
@@ -292,6 +292,11 @@ fn voxel(at: [f32; 3]) -> [i32; 3] {
     })
 }
 
+/// The integer nearest to a coordinate, voxels.
+fn nearest(coordinate: f64) -> i32 {
+    libm::floor(coordinate + 0.5).clamp(-f64::from(FAR), f64::from(FAR)) as i32
+}
+
 /// Index of the origin of every sensor in every slot.
 type OriginIds = [[u32; SLOTS]; SENSORS_MAX];
 
@@ -302,27 +307,23 @@ fn place_origins(placement: &Placement, moving: bool, origins: &mut [[i32; 4]]) 
     let Placement { profile, rig, window, sweep } = *placement;
     let mut ids = [[0; SLOTS]; SENSORS_MAX];
     // Looked up here, not in `origins`: that may be memory of a device, slow to read.
-    let mut table = [[0; 4]; ORIGINS_MAX];
-    let mut count = 0;
+    let mut table = heapless::Vec::<[i32; 4], ORIGINS_MAX>::new();
     let slots = if moving { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
             let moved = if moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
             let at = (window.grid_from_vehicle * moved * *mounted).translation;
-            let v = (at / profile.voxel_m)
-                .to_array()
-                .map(|c| libm::floor(c + 0.5).clamp(-1e6, 1e6) as i32);
+            let v = (at / profile.voxel_m).to_array().map(nearest);
             let [x, y, z] = add(v, central(profile));
-            let v = [x, y, z, 0];
-            let known = table[..count].iter().position(|o| *o == v);
-            *id = known.unwrap_or(count) as u32;
+            let known = table.iter().position(|o| *o == [x, y, z, 0]);
+            *id = known.unwrap_or(table.len()) as u32;
             if known.is_none() {
-                table[count] = v;
-                count += 1;
+                // There is room for all.
+                let _ = table.push([x, y, z, 0]);
             }
         }
     }
-    origins[..count].copy_from_slice(&table[..count]);
+    origins[..table.len()].copy_from_slice(&table);
     ids
 }
 

@@ -43,12 +43,11 @@ pub mod map {
 }
 pub mod occupancy_constancy;
 pub mod prefix_sum;
+mod program;
 pub mod window;
 
-pub use declare::{
-    Argument, BufferElement, BufferRow, GroupCount, List, Runner, Stage, StageOp, StageProgram,
-    View, needed, run, walk,
-};
+pub use declare::{Argument, BufferElement, BufferRow, GroupCount, List, Stage, View};
+pub use program::{Runner, StageOp, StageProgram, needed, run, walk};
 
 use crate::params::*;
 use crate::record::{Column, Flow, MinCost, NO_END, NONE, Proposal, Ray, SweepUniform, VALID};

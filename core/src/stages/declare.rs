@@ -4,7 +4,7 @@
 //! `memory-layout.md`, the bindings and struct wrappers of the kernels, the device's schedule and
 //! the names in every table of times come from it.
 
-use super::{Buffer, Storage};
+use super::{Buffer, Runner, StageProgram, Storage, needed};
 use crate::params::Profile;
 
 /// An argument of a stage as the kernel binds it.
@@ -155,98 +155,6 @@ impl Stage {
             move |a: &Argument| [Some(*a), (a.is_list && counted).then_some(argument!(counters))];
         self.arguments.iter().flat_map(of).flatten()
     }
-}
-
-/// A step of a program.
-#[derive(Clone, Copy, Debug)]
-pub enum StageOp {
-    /// The host's words go to the device.
-    Upload(Buffer),
-    /// Every word of a buffer is set.
-    Fill(Buffer, u32),
-    /// A stage.
-    Run(&'static Stage),
-    /// One stage of the scalar backend that is several steps on a device.
-    Fused(&'static Stage, &'static [StageOp]),
-    /// Steps that are a list of their own.
-    Part(&'static [StageOp]),
-    /// As often as there are rounds of the energy minimisation.
-    Rounds(&'static [StageOp]),
-    /// A fixed number of times.
-    Repeat(u32, &'static [StageOp]),
-    /// The device's words go to the host.
-    ReadBack(Buffer),
-}
-
-/// Steps that run as a whole.
-#[derive(Clone, Copy, Debug)]
-pub struct StageProgram {
-    /// For messages and documents.
-    pub name: &'static str,
-    /// The steps, in order.
-    pub ops: &'static [StageOp],
-}
-
-/// Who runs a program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Runner {
-    /// The twins.
-    Scalar,
-    /// The kernels.
-    Device,
-}
-
-/// Calls `each` with every upload, fill, stage and readback in the order they run.
-pub fn walk(ops: &[StageOp], runner: Runner, rounds: u32, each: &mut dyn FnMut(StageOp)) {
-    for op in ops {
-        let (times, inner) = match *op {
-            StageOp::Fused(stage, _) if runner == Runner::Scalar => {
-                each(StageOp::Run(stage));
-                continue;
-            }
-            StageOp::Fused(_, inner) | StageOp::Part(inner) => (1, inner),
-            StageOp::Rounds(inner) => (rounds, inner),
-            StageOp::Repeat(times, inner) => (times, inner),
-            leaf => {
-                each(leaf);
-                continue;
-            }
-        };
-        (0..times).for_each(|_| walk(inner, runner, rounds, each));
-    }
-}
-
-/// Runs steps on the CPU. `lap` is called with the name of each stage when it is done.
-pub fn run(ops: &[StageOp], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&'static str)) {
-    walk(ops, Runner::Scalar, rounds, &mut |op| match op {
-        StageOp::Fill(buffer, word) => storage.fill(buffer, word),
-        StageOp::Run(stage) => {
-            (stage.scalar)(storage);
-            lap(stage.name);
-        }
-        // The storage is the host's own memory.
-        _ => {}
-    });
-}
-
-impl StageOp {
-    /// Whether this step, which [`walk`] has come to, touches a buffer.
-    pub fn touches(&self, buffer: Buffer) -> bool {
-        match *self {
-            StageOp::Upload(b) | StageOp::ReadBack(b) | StageOp::Fill(b, _) => b == buffer,
-            StageOp::Run(stage) => stage.bindings().any(|a| a.buffer == buffer),
-            _ => false,
-        }
-    }
-}
-
-/// Whether some of the programs need a buffer.
-pub fn needed(programs: &[StageProgram], runner: Runner, buffer: Buffer) -> bool {
-    let mut found = false;
-    for program in programs {
-        walk(program.ops, runner, 1, &mut |op| found |= op.touches(buffer));
-    }
-    found
 }
 
 /// Declares the table of buffers: [`Buffer`], [`BUFFERS`](super::BUFFERS) and [`Storage`].

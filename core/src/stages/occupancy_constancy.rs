@@ -30,6 +30,20 @@ pub struct Scores {
     pub count: i32,
 }
 
+impl Scores {
+    /// A level contributes one of its three weights or nothing.
+    fn of(weights: &[i32]) -> Scores {
+        let bias = weights[3 * LEVELS_MAX];
+        let (mut min, mut max) = (bias, bias);
+        for k in 0..LEVELS_MAX {
+            let of_level = [weights[k], weights[LEVELS_MAX + k], weights[2 * LEVELS_MAX + k]];
+            min += of_level.into_iter().min().unwrap_or(0).min(0);
+            max += of_level.into_iter().max().unwrap_or(0).max(0);
+        }
+        Scores { min, count: max - min + 1 }
+    }
+}
+
 /// Reads a weights file of kind `constancy`, shape (3 for free, occupied, mixed; levels).
 ///
 /// `weights` must hold [`WEIGHT_WORDS`] elements, `costs` [`SCORES_MAX`]; `costs[s - min]` becomes
@@ -47,26 +61,21 @@ pub fn load(
         let at = if n < 3 * levels { n / levels * LEVELS_MAX + n % levels } else { 3 * LEVELS_MAX };
         weights[at] = value;
     }
-    let bias = weights[3 * LEVELS_MAX];
-    // A level contributes one of its three weights or nothing.
-    let (mut low, mut high) = (bias, bias);
-    for k in 0..LEVELS_MAX {
-        let of_level = [weights[k], weights[LEVELS_MAX + k], weights[2 * LEVELS_MAX + k]];
-        low += of_level.into_iter().min().unwrap_or(0).min(0);
-        high += of_level.into_iter().max().unwrap_or(0).max(0);
-    }
-    let count = high - low + 1;
-    if count as usize > SCORES_MAX {
+    let scores = Scores::of(weights);
+    if scores.count as usize > SCORES_MAX {
         return Err(WeightsError::Range);
     }
-    for (n, cost) in costs.iter_mut().enumerate() {
-        let x = (low + n as i32) as f64 / file.scale as f64;
+    for (score, cost) in (scores.min..).zip(costs) {
+        let x = score as f64 / file.scale as f64;
         // -log sigmoid(x) = log(1 + exp(-x))
         let nats = libm::log1p(libm::exp(-x));
-        *cost = (libm::floor(nats * 1000.0 + 0.5) as u32).min(COST_MAX);
+        *cost = (libm::floor(nats * MILLINATS + 0.5) as u32).min(COST_MAX);
     }
-    Ok(Scores { min: low, count })
+    Ok(scores)
 }
+
+/// Parts of a nat that costs count.
+const MILLINATS: f64 = 1000.0;
 
 /// What each mask bit of a target adds to the score of `source`: free in the low half, occupied in
 /// the high half.

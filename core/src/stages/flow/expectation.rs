@@ -30,14 +30,8 @@ pub fn expectation(
         for index in (0..ROW).filter(|index| index % LINE < SIDE) {
             let d = displacement(index as i32);
             let Some(target) = inside(sweep, column, d) else { continue };
-            let square = |d: [i32; 2]| d[0] * d[0] + d[1] * d[1];
-            let smoothing = around.iter().map(|s| square([d[0] - s[0], d[1] - s[1]]));
-            let energy = row[index] as i32
-                + outside
-                + sweep.displacement_cost * square(d)
-                + sweep.smoothing * smoothing.sum::<i32>();
             // Energies are never negative: unsigned order is theirs, and NONE is above all.
-            let energy = energy as u32;
+            let energy = (row[index] as i32 + outside + prior(sweep, &around, d)) as u32;
             if energy < least[0] {
                 least = [energy, index as u32];
             }
@@ -51,6 +45,14 @@ pub fn expectation(
         }
         proposal[n] = best;
     }
+}
+
+/// Energy of a displacement before it is compared with anything: of its length, and of how far it
+/// is from those around.
+fn prior(sweep: &SweepUniform, around: &[[i32; 2]], d: [i32; 2]) -> i32 {
+    let square = |d: [i32; 2]| d[0] * d[0] + d[1] * d[1];
+    let smoothing = around.iter().map(|s| square([d[0] - s[0], d[1] - s[1]]));
+    sweep.displacement_cost * square(d) + sweep.smoothing * smoothing.sum::<i32>()
 }
 
 /// Where a displacement leads, if that is in the window.
@@ -101,7 +103,6 @@ pub fn expectation_by_rings(
     proposal: &mut [Proposal],
 ) {
     for (n, &column) in foreground.iter().enumerate() {
-        let around = Sums::of(sweep, flow, column);
         let search = Search {
             sweep,
             row: &window_cost[n * ROW..][..ROW],
@@ -111,23 +112,9 @@ pub fn expectation_by_rings(
             i: column as i32 / sweep.side,
             j: column as i32 % sweep.side,
         };
-        let outside = outside_cost(sweep, column as usize);
-        let mut best = Best { energy: i32::MAX, index: i32::MAX };
-        if around.count == 0 {
-            let [energy, index] = min_cost[n];
-            if index != NONE {
-                search.consider(index as i32, energy as i32, &mut best);
-            }
-            if best.index == i32::MAX {
-                min_cost[n] = search.everywhere(outside, &mut best);
-            }
-        } else {
-            search.rings(outside, min_cost[n][0] as i32, &around, &mut best);
-        }
-        proposal[n] = match best.index {
-            i32::MAX => [0, NONE],
-            index => [pack_flow(displacement(index)), best.energy as u32],
-        };
+        let best = search.best(&Sums::of(sweep, flow, column), &mut min_cost[n]);
+        proposal[n] =
+            best.map_or([0, NONE], |b| [pack_flow(displacement(b.index)), b.energy as u32]);
     }
 }
 
@@ -146,21 +133,12 @@ struct Sums {
 
 impl Sums {
     fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
-        let side = sweep.side;
-        let (i, j) = (column as i32 / side, column as i32 % side);
         let mut n = Sums { count: 0, sum: [0; 2], squares: 0 };
-        let (from, to) = ((j - 2).max(0), (j + 2).min(side - 1));
-        for ni in (i - 2).max(0)..=(i + 2).min(side - 1) {
-            for c in ni * side + from..=ni * side + to {
-                let flow = flow[c as usize];
-                if flow & VALID != 0 && c != column as i32 {
-                    let s = flow_displacement(flow);
-                    n.count += 1;
-                    n.sum = [n.sum[0] + s[0], n.sum[1] + s[1]];
-                    n.squares += s[0] * s[0] + s[1] * s[1];
-                }
-            }
-        }
+        neighbours(sweep, flow, column).for_each(|[u, v]| {
+            n.count += 1;
+            n.sum = [n.sum[0] + u, n.sum[1] + v];
+            n.squares += u * u + v * v;
+        });
         n
     }
 }
@@ -177,6 +155,24 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// The best feasible candidate.
+    fn best(&self, around: &Sums, min_cost: &mut MinCost) -> Option<Best> {
+        let outside = outside_cost(self.sweep, self.column as usize);
+        let mut best = Best { energy: i32::MAX, index: i32::MAX };
+        let [energy, index] = *min_cost;
+        if around.count > 0 {
+            self.rings(outside, energy as i32, around, &mut best);
+        } else {
+            if index != NONE {
+                self.consider(index as i32, energy as i32, &mut best);
+            }
+            if best.index == i32::MAX {
+                *min_cost = self.everywhere(outside, &mut best);
+            }
+        }
+        (best.index != i32::MAX).then_some(best)
+    }
+
     /// Takes the candidate at `index` if it is feasible and better, or as good and earlier.
     #[inline]
     fn consider(&self, index: i32, energy: i32, best: &mut Best) {
@@ -223,6 +219,11 @@ impl Search<'_> {
     fn rings(&self, outside: i32, least: i32, around: &Sums, best: &mut Best) {
         let (n, [su, sv], smoothing) = (around.count, around.sum, self.sweep.smoothing);
         let mean = [round_div(su, n), round_div(sv, n)];
+        let costs = |u: i32, v: i32| {
+            let square = u * u + v * v;
+            let smooth = around.squares + n * square - 2 * (u * su + v * sv);
+            outside + self.sweep.displacement_cost * square + smoothing * smooth
+        };
         // |s - mean|² summed: what the smoothing costs at the mean itself, rounded down.
         let spread = (n * around.squares - su * su - sv * sv) / n;
         for ring in 0..=2 * REACH {
@@ -238,13 +239,8 @@ impl Search<'_> {
                 while dv <= ring {
                     let v = mean[1] + dv;
                     if self.reach(self.i).contains(&u) && self.reach(self.j).contains(&v) {
-                        let square = u * u + v * v;
-                        let smooth = around.squares + n * square - 2 * (u * su + v * sv);
                         let index = (u + REACH) * LINE as i32 + v + REACH;
-                        let energy = self.row[index as usize] as i32
-                            + outside
-                            + self.sweep.displacement_cost * square
-                            + smoothing * smooth;
+                        let energy = self.row[index as usize] as i32 + costs(u, v);
                         self.consider(index, energy, best);
                     }
                     dv += stride;

@@ -22,26 +22,8 @@ pub fn ray_merge(
     let rays = &rays[..sweep.rays as usize];
     assert!(slots.len() == MERGE_SLOTS && distinct.len() >= rays.len());
     let mut used = 0;
-    for (index, ray) in rays.iter().enumerate() {
-        let mut slot = hash(*ray);
-        let mut probes = 0;
-        let entry = loop {
-            if probes == MERGE_PROBES {
-                break (MERGE_SLOTS + index) as u32;
-            }
-            let [holder, _] = slots[slot];
-            if holder == 0 {
-                slots[slot] = [index as u32 + 1, 1];
-                break slot as u32;
-            }
-            if rays[holder as usize - 1] == *ray {
-                slots[slot][1] += 1;
-                break NOTHING_NEW;
-            }
-            slot = (slot + 1) & (MERGE_SLOTS - 1);
-            probes += 1;
-        };
-        if entry != NOTHING_NEW {
+    for index in 0..rays.len() {
+        if let Some(entry) = merge(rays, index, slots) {
             distinct[used] = entry;
             used += 1;
         }
@@ -49,7 +31,23 @@ pub fn ray_merge(
     counters[DISTINCT_COUNT] = used as u32;
 }
 
-const NOTHING_NEW: u32 = u32::MAX;
+/// Merges one ray. Returns its entry of `distinct`, unless an equal one is there already.
+#[inline]
+fn merge(rays: &[Ray], index: usize, slots: &mut [[u32; 2]]) -> Option<u32> {
+    let first = hash(rays[index]);
+    for slot in (first..first + MERGE_PROBES as usize).map(|n| n & (MERGE_SLOTS - 1)) {
+        let [holder, _] = slots[slot];
+        if holder == 0 {
+            slots[slot] = [index as u32 + 1, 1];
+            return Some(slot as u32);
+        }
+        if rays[holder as usize - 1] == rays[index] {
+            slots[slot][1] += 1;
+            return None;
+        }
+    }
+    Some((MERGE_SLOTS + index) as u32)
+}
 
 /// First slot of a ray: multiply and fold, as the kernel does.
 #[inline]

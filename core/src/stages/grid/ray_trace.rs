@@ -20,23 +20,29 @@ pub fn ray_trace(
     for &entry in distinct {
         let (ray, weight) = merged(entry, rays, slots);
         let [x, y, z, _] = origins[ray_origin(ray)];
-        let (start, end) = ([x, y, z], ray_end(ray));
-        let mut entered = false;
-        for voxel in Walk::new(start, end, sweep.range_steps) {
-            match inside(sweep, voxel) {
-                Some(index) => {
-                    entered = true;
-                    log_odds[index] += LOG_ODDS_FREE * weight;
-                }
-                // The window is convex: once left, it is never met again.
-                None if entered => break,
-                None => {}
+        trace(sweep, [x, y, z], ray, weight, log_odds);
+    }
+}
+
+/// Adds the updates of a ray that counts `weight` times.
+#[inline]
+fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds: &mut [i32]) {
+    let end = ray_end(ray);
+    let mut entered = false;
+    for voxel in Walk::new(start, end, sweep.range_steps) {
+        match inside(sweep, voxel) {
+            Some(index) => {
+                entered = true;
+                log_odds[index] += LOG_ODDS_FREE * weight;
             }
+            // The window is convex: once left, it is never met again.
+            None if entered => break,
+            None => {}
         }
-        let hit = ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps);
-        if let (true, Some(index)) = (hit, inside(sweep, end)) {
-            log_odds[index] += LOG_ODDS_OCCUPIED * weight;
-        }
+    }
+    let hit = ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps);
+    if let (true, Some(index)) = (hit, inside(sweep, end)) {
+        log_odds[index] += LOG_ODDS_OCCUPIED * weight;
     }
 }
 

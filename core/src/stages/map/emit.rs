@@ -19,7 +19,7 @@ pub fn count(
 ) {
     counts.fill(0);
     for (&entry, count) in distinct.iter().zip(counts) {
-        walk(sweep, origins, rays, slots, entry, |_| *count += 1);
+        walk(sweep, origins, merged(entry, rays, slots), |_| *count += 1);
     }
 }
 
@@ -35,7 +35,7 @@ pub fn emit(
 ) {
     for (&entry, &offset) in distinct.iter().zip(offsets) {
         let mut at = offset as usize;
-        walk(sweep, origins, rays, slots, entry, |update| {
+        walk(sweep, origins, merged(entry, rays, slots), |update| {
             updates[at] = update;
             at += 1;
         });
@@ -47,17 +47,12 @@ pub fn emit(
 fn walk(
     sweep: &SweepUniform,
     origins: &[[i32; 4]],
-    rays: &[Ray],
-    slots: &[[u32; 2]],
-    entry: u32,
+    (ray, weight): (Ray, i32),
     mut each: impl FnMut(Update),
 ) {
-    let (ray, weight) = merged(entry, rays, slots);
     let [x, y, z, _] = origins[ray_origin(ray)];
     let (start, end) = ([x, y, z], ray_end(ray));
-    // Keys ascend with x: a ray beside the band's slabs has nothing in it.
-    let slab = sweep.side * sweep.levels;
-    if end[0].max(x) < sweep.band_from / slab || end[0].min(x) > sweep.band_to / slab {
+    if is_beside_band(sweep, x, end[0]) {
         return;
     }
     let band = sweep.band_from as usize..sweep.band_to as usize;
@@ -72,4 +67,11 @@ fn walk(
     if ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps) {
         put(end, LOG_ODDS_OCCUPIED);
     }
+}
+
+/// Whether a ray lies beside the band's slabs: keys ascend with x, so it has nothing in it.
+#[inline]
+fn is_beside_band(sweep: &SweepUniform, from_x: i32, to_x: i32) -> bool {
+    let slab = sweep.side * sweep.levels;
+    from_x.max(to_x) < sweep.band_from / slab || from_x.min(to_x) > sweep.band_to / slab
 }
