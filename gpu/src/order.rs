@@ -4,24 +4,27 @@ use crate::{Groups, Op};
 
 /// What one step does to one buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Access {
+pub struct Access {
+    /// Row of the buffer table.
     pub buffer: usize,
+    /// Whether it is read.
     pub reads: bool,
+    /// Whether it is written.
     pub writes: bool,
 }
 
 impl Access {
-    pub fn read(buffer: usize) -> Self {
+    pub(crate) fn read(buffer: usize) -> Self {
         Self { buffer, reads: true, writes: false }
     }
 
-    pub fn write(buffer: usize) -> Self {
+    pub(crate) fn write(buffer: usize) -> Self {
         Self { buffer, reads: false, writes: true }
     }
 }
 
 /// Everything a step touches. An indirect dispatch also reads its group counts.
-pub(crate) fn accesses(op: &Op) -> Vec<Access> {
+pub fn accesses(op: &Op) -> Vec<Access> {
     match op {
         Op::Fill { buffer, .. } => vec![Access::write(*buffer)],
         Op::Copy { from, to } => vec![Access::read(*from), Access::write(*to)],

@@ -7,7 +7,7 @@ use ash::vk;
 use std::ffi::CString;
 use std::ptr;
 
-struct Pipeline {
+struct KernelPipeline {
     kernel: &'static Kernel,
     set_layout: vk::DescriptorSetLayout,
     layout: vk::PipelineLayout,
@@ -22,7 +22,7 @@ struct Set {
 
 /// What a dispatch binds before it starts.
 #[derive(Clone, Copy)]
-pub(crate) struct Bound {
+pub(crate) struct Bindings {
     pub pipeline: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set: vk::DescriptorSet,
@@ -30,7 +30,7 @@ pub(crate) struct Bound {
 
 /// All that the dispatches of all programs bind.
 pub(crate) struct Pipelines {
-    pipelines: Vec<Pipeline>,
+    pipelines: Vec<KernelPipeline>,
     sets: Vec<Set>,
 }
 
@@ -59,13 +59,13 @@ impl Pipelines {
     }
 
     /// For a dispatch of one of the programs given to `new`.
-    pub fn bound(&self, kernel: &Kernel, buffers: &[usize]) -> Option<Bound> {
+    pub fn bound(&self, kernel: &Kernel, buffers: &[usize]) -> Option<Bindings> {
         let set = self
             .sets
             .iter()
             .find(|s| ptr::eq(self.pipelines[s.pipeline].kernel, kernel) && s.buffers == buffers)?;
         let pipeline = &self.pipelines[set.pipeline];
-        Some(Bound { pipeline: pipeline.handle, layout: pipeline.layout, set: set.handle })
+        Some(Bindings { pipeline: pipeline.handle, layout: pipeline.layout, set: set.handle })
     }
 
     /// The kernel's pipeline, made if there is none yet.
@@ -84,7 +84,7 @@ impl Pipelines {
         let set_layout = gpu.set_layout(&bindings.collect::<Vec<_>>())?;
         let layout = gpu.pipeline_layout(set_layout)?;
         let entry = CString::new(kernel.name).expect("the check saw no zero");
-        self.pipelines.push(Pipeline {
+        self.pipelines.push(KernelPipeline {
             kernel,
             set_layout,
             layout,

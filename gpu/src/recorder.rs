@@ -3,7 +3,7 @@
 use crate::arena::Slot;
 use crate::order::{Access, accesses, barriers};
 use crate::owner::Gpu;
-use crate::program::{Bound, Pipelines};
+use crate::program::{Bindings, Pipelines};
 use crate::timer::Timer;
 use crate::{GpuError, Groups, Heap, Op, Program};
 use ash::vk;
@@ -87,7 +87,7 @@ impl Recorder<'_> {
         }
     }
 
-    fn dispatch(&self, bound: Bound, groups: Groups) {
+    fn dispatch(&self, bound: Bindings, groups: Groups) {
         let (device, commands) = (self.device, self.commands);
         let compute = vk::PipelineBindPoint::COMPUTE;
         let sets = [bound.set];

@@ -1,6 +1,6 @@
 //! Who writes and who reads each buffer, as the schedules say.
 
-use raywake_gpu::{Groups, Heap, Op};
+use raywake_gpu::{Heap, Op, accesses};
 use raywake_kernels::schedule::Schedule;
 
 /// Names of the steps that touch a buffer, each once, from first to last.
@@ -28,25 +28,13 @@ pub(super) fn of(schedule: &Schedule) -> Vec<Traffic> {
 }
 
 fn step(op: &Op, all: &mut [Traffic]) {
-    let name = op.name();
-    match op {
-        Op::Fill { buffer, .. } => note(&mut all[*buffer].writers, name),
-        Op::Copy { from, to } => {
-            note(&mut all[*from].readers, name);
-            note(&mut all[*to].writers, name);
+    for access in accesses(op) {
+        let traffic = &mut all[access.buffer];
+        if access.writes {
+            note(&mut traffic.writers, op.name());
         }
-        Op::Dispatch { kernel, buffers, groups, .. } => {
-            for (binding, buffer) in kernel.bindings.iter().zip(buffers) {
-                if binding.writes {
-                    note(&mut all[*buffer].writers, name);
-                }
-                if binding.reads {
-                    note(&mut all[*buffer].readers, name);
-                }
-            }
-            if let Groups::Indirect { buffer, .. } = groups {
-                note(&mut all[*buffer].readers, name);
-            }
+        if access.reads {
+            note(&mut traffic.readers, op.name());
         }
     }
 }

@@ -19,7 +19,7 @@ use raywake_core::ctrv::{CHI2_99_2DOF, TwoPointStart};
 
 /// Elements of the state.
 pub const STATE: usize = 7;
-type Mean = SVector<f64, STATE>;
+type StateVector = SVector<f64, STATE>;
 type Covariance = SMatrix<f64, STATE, STATE>;
 
 raywake_core::params! {
@@ -92,7 +92,7 @@ enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CentroidEkf {
     time_s: f64,
-    mean: Mean,
+    mean: StateVector,
     covariance: Covariance,
     phase: Phase,
 }
@@ -113,8 +113,8 @@ impl CentroidEkf {
         ];
         CentroidEkf {
             time_s,
-            mean: Mean::from([x, y, z, 0.0, 0.0, 0.0, 0.0]),
-            covariance: Covariance::from_diagonal(&Mean::from(deviations.map(|s| s * s))),
+            mean: StateVector::from([x, y, z, 0.0, 0.0, 0.0, 0.0]),
+            covariance: Covariance::from_diagonal(&StateVector::from(deviations.map(|s| s * s))),
             phase: Phase::Resting { first: [x, y], since_s: time_s },
         }
     }
@@ -137,8 +137,9 @@ impl CentroidEkf {
         };
         transition[(2, 5)] = dt;
         // Noise that enters all along, half of it carried on: exact to the second order.
-        let noise =
-            Covariance::from_diagonal(&Mean::from(params.noise.sigmas().map(|s| 0.5 * s * s * dt)));
+        let noise = Covariance::from_diagonal(&StateVector::from(
+            params.noise.sigmas().map(|s| 0.5 * s * s * dt),
+        ));
         self.covariance = transition * (self.covariance + noise) * transition.transpose() + noise;
         self.mean = advance(&self.mean, dt);
     }
@@ -274,7 +275,7 @@ impl CentroidEkf {
 
 /// The unicycle of (2.6) after `dt` seconds: along the chord of its arc, whose length is taken to
 /// be that of the arc.
-fn advance(m: &Mean, dt: f64) -> Mean {
+fn advance(m: &StateVector, dt: f64) -> StateVector {
     let way = m[3] + 0.5 * dt * m[6];
     let mut next = *m;
     next[0] += m[4] * libm::cos(way) * dt;
@@ -285,7 +286,7 @@ fn advance(m: &Mean, dt: f64) -> Mean {
 }
 
 /// Derivative of [`advance`] by the state.
-fn jacobian(m: &Mean, dt: f64) -> Covariance {
+fn jacobian(m: &StateVector, dt: f64) -> Covariance {
     let way = m[3] + 0.5 * dt * m[6];
     let (along_x, along_y) = (libm::cos(way) * dt, libm::sin(way) * dt);
     let mut f = Covariance::identity();

@@ -9,7 +9,7 @@ const PARAMS: CentroidParams = CentroidParams::DEFAULT;
 
 #[test]
 fn the_jacobian_is_that_of_the_motion() {
-    let at = Mean::from([3.0, -2.0, 0.5, 2.1, 8.0, -0.4, 0.7]);
+    let at = StateVector::from([3.0, -2.0, 0.5, 2.1, 8.0, -0.4, 0.7]);
     for dt in [0.01, 0.1, 0.9] {
         let jacobian = jacobian(&at, dt);
         for n in 0..STATE {

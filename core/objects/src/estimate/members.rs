@@ -15,7 +15,7 @@ impl Members {
         Members { indices: [0; RETURNS_MAX], starts: [0; MODEL_MAX + 1] }
     }
 
-    /// DisjointSets the returns of a model of so many points.
+    /// Groups the returns of a model of so many points.
     pub fn group(&mut self, points: usize, observations: &[Observation]) {
         let starts = &mut self.starts[..=points];
         starts.fill(0);

@@ -92,25 +92,7 @@ impl VelocitySearch {
             return None;
         }
         let mean = drift(samples);
-        let centred = |one: &Sample| CentredReturn {
-            at: core::array::from_fn(|d| (f64::from(one.position[d]) - mean.position[d]) as f32),
-            time_s: (f64::from(one.time_s) - mean.time_s) as f32,
-        };
-        for (at, n) in self.points.iter_mut().zip(evenly(samples.len(), count)) {
-            *at = centred(&samples[n]);
-        }
-        let passed = || samples.iter().filter(|one| one.passed.contains(&true));
-        let all = passed().count();
-        let edges = all.min(EDGES);
-        let taken = passed().enumerate().filter(|(n, _)| (n + 1) * edges / all > n * edges / all);
-        for (at, (_, one)) in self.points[count..].iter_mut().zip(taken) {
-            *at = centred(one);
-        }
-        let count = Counts { all: count, edges };
-        let entropy = |n: usize| if n > 0 { n as f32 * libm::logf(n as f32) } else { 0.0 };
-        for (n, gain) in self.gains[1..=count.all + edges].iter_mut().enumerate() {
-            *gain = entropy(n + 1) - entropy(n);
-        }
+        let count = self.gather(samples, count, &mean);
         let length_m = length_m.max(1.0);
         let mut cell_m = params.search_cell_m.max(length_m / params.search_cells_along);
         // A step moves the first and the last by a cell.
@@ -127,6 +109,29 @@ impl VelocitySearch {
             velocity = self.best(count, &lattice, params);
         }
         Some(SteadyMotion { velocity, ..mean })
+    }
+
+    /// Takes so many returns and, behind them, those that rays pass, about a motion.
+    fn gather(&mut self, samples: &[Sample], count: usize, mean: &SteadyMotion) -> Counts {
+        let centred = |one: &Sample| CentredReturn {
+            at: core::array::from_fn(|d| (f64::from(one.position[d]) - mean.position[d]) as f32),
+            time_s: (f64::from(one.time_s) - mean.time_s) as f32,
+        };
+        for (at, n) in self.points.iter_mut().zip(evenly(samples.len(), count)) {
+            *at = centred(&samples[n]);
+        }
+        let passed = || samples.iter().filter(|one| one.passed.contains(&true));
+        let all = passed().count();
+        let edges = all.min(EDGES);
+        let taken = passed().enumerate().filter(|(n, _)| (n + 1) * edges / all > n * edges / all);
+        for (at, (_, one)) in self.points[count..].iter_mut().zip(taken) {
+            *at = centred(one);
+        }
+        let entropy = |n: usize| if n > 0 { n as f32 * libm::logf(n as f32) } else { 0.0 };
+        for (n, gain) in self.gains[1..=count + edges].iter_mut().enumerate() {
+            *gain = entropy(n + 1) - entropy(n);
+        }
+        Counts { all: count, edges }
     }
 
     /// The velocity of a lattice with the fullest cells.

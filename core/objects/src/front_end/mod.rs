@@ -43,7 +43,7 @@ use batch::{Batch, BatchReturn};
 use object_returns::ObjectReturns;
 use raywake_core::params::COLUMNS_MAX;
 use raywake_core::sweep::{Rig, Sweep};
-use segments::Segments;
+use segments::Segmentation;
 
 /// Tracks followed at once at most.
 pub const TRACKS_MAX: usize = 160;
@@ -61,7 +61,7 @@ const _: () = assert!(CELLS <= COLUMNS_MAX);
 pub struct FrontEnd {
     batch: Batch,
     objects: ObjectReturns,
-    segments: Segments,
+    segments: Segmentation,
     association: Association,
     panorama: Panorama,
     /// Segments without a track.
@@ -82,7 +82,7 @@ impl FrontEnd {
         FrontEnd {
             batch: Batch::new(),
             objects: ObjectReturns::new(),
-            segments: Segments::new(),
+            segments: Segmentation::new(),
             association: Association::new(),
             panorama: Panorama::new(),
             unassigned: heapless::Vec::new(),

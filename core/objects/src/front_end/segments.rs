@@ -44,7 +44,7 @@ impl Segment {
 }
 
 /// The segments of a batch.
-pub(super) struct Segments {
+pub(super) struct Segmentation {
     chunks: Chunks,
     /// Chunk of every return, or [`NONE`].
     of_return: [u32; POINTS_MAX],
@@ -54,9 +54,9 @@ pub(super) struct Segments {
     of_chunk: [u32; CHUNKS_MAX],
 }
 
-impl Segments {
-    pub const fn new() -> Segments {
-        Segments {
+impl Segmentation {
+    pub const fn new() -> Segmentation {
+        Segmentation {
             chunks: Chunks::new(),
             of_return: [0; POINTS_MAX],
             groups: DisjointSets::new(),
@@ -98,7 +98,7 @@ impl Segments {
 
     /// Joins chunks that are near each other.
     fn connect(&mut self, params: &FrontEndParams) {
-        let Segments { chunks, groups, .. } = self;
+        let Segmentation { chunks, groups, .. } = self;
         let count = chunks.all().len();
         groups.start(count, |_| true);
         for (n, chunk) in chunks.all().iter().enumerate() {
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn components_equal_a_flood_fill() {
-        let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
+        let mut segments = raywake_alloc_guard::boxed!(Segmentation, Segmentation::new());
         let params = FrontEndParams { returns_min: 1, ..PARAMS };
         let mut several = 0;
         for seed in 0..20 {
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn returns_join_the_nearest_chunk_and_segments_sum_them() {
-        let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
+        let mut segments = raywake_alloc_guard::boxed!(Segmentation, Segmentation::new());
         for seed in 0..10 {
             let batch = batch(seed);
             segments.find(&PARAMS, &batch, |n| n % 7 != 0, &mut TrackingCounts::default());
