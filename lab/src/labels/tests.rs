@@ -2,65 +2,39 @@
 
 use super::*;
 use crate::scratch::Scratch;
-use raywake_core::sweep::Rig;
 use raywake_io::source::simulated::Simulated;
-use raywake_io::source::{OpenOptions, Source, SweepData};
+use raywake_io::source::{OpenOptions, Overview, PoseTrack, Source, SweepData};
 use std::fs;
 use std::path::PathBuf;
 
 /// Sweeps without clouds.
-pub(super) struct Road {
-    rig: Rig,
-    moments: Vec<(f64, Pose)>,
-}
+pub(super) struct Road(Overview);
 
 impl Road {
     /// Stamps, s, and poses of the vehicle.
     pub fn of(moments: impl Iterator<Item = (f64, Pose)>) -> Road {
         let rig = Simulated::new(1, 1).rig().clone();
-        Road { rig, moments: moments.collect() }
+        let (stamps_s, poses): (Vec<f64>, Vec<Pose>) = moments.unzip();
+        let (name, frames, notes) = ("road".into(), (0..poses.len() as u64).collect(), Vec::new());
+        Road(Overview { name, rig, frames, track: PoseTrack { stamps_s, poses }, notes })
     }
 
     pub fn moment(&self, index: usize) -> (f64, Pose) {
-        self.moments[index]
+        (self.stamp_s(index), self.pose(index))
     }
 }
 
 impl Source for Road {
-    fn name(&self) -> &str {
-        "road"
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
-    }
-
-    fn len(&self) -> usize {
-        self.moments.len()
+    fn overview(&self) -> &Overview {
+        &self.0
     }
 
     fn describe(&self) -> String {
         self.name().into()
     }
 
-    fn frame(&self, index: usize) -> u64 {
-        index as u64
-    }
-
-    fn stamp_s(&self, index: usize) -> f64 {
-        self.moments[index].0
-    }
-
-    fn pose(&self, index: usize) -> Pose {
-        self.moments[index].1
-    }
-
     fn read(&mut self, _: usize, _: &mut SweepData) -> Result<(), Error> {
         unreachable!("labels need no clouds")
-    }
-
-    fn notes(&self) -> &[String] {
-        &[]
     }
 }
 

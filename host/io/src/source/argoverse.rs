@@ -13,7 +13,7 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use super::feather::FeatherTable;
 use super::poses::{PoseTrack, check_rising};
 use super::recognise::numbered;
-use super::{OpenOptions, Source, SourceGaps, SweepData, apply, folder_name};
+use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, apply, folder_name};
 use crate::Error;
 
 /// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners turn once in
@@ -44,14 +44,11 @@ const POSE_COLUMNS: [&str; 7] = ["qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m"]
 
 /// An open log.
 pub(super) struct Argoverse {
+    overview: Overview,
     root: PathBuf,
-    name: String,
-    files: Vec<(u64, PathBuf)>,
-    track: PoseTrack,
-    rig: Rig,
+    files: Vec<PathBuf>,
     /// Index in [`SCANNERS`] of lasers 0 to 31.
     low_lasers: u32,
-    notes: Vec<String>,
 }
 
 impl Argoverse {
@@ -78,8 +75,9 @@ impl Argoverse {
             own_vehicle: Some(OWN_VEHICLE),
         };
         apply(options, &mut rig);
-        let (root, name) = (root.to_path_buf(), folder_name(root));
-        let mut log = Argoverse { root, name, files, track, rig, low_lasers: 0, notes };
+        let (frames, files) = files.into_iter().unzip();
+        let overview = Overview { name: folder_name(root), rig, frames, track, notes };
+        let mut log = Argoverse { overview, root: root.to_path_buf(), files, low_lasers: 0 };
         log.assign_lasers(&scanners)?;
         Ok(log)
     }
@@ -94,14 +92,14 @@ impl Argoverse {
         let (usual, swapped) = (spread(0), spread(1));
         if swapped < SWAP_BELOW * usual {
             self.low_lasers = 1;
-            self.notes.push("lasers 0 to 31 are the lower scanner's in this log".into());
+            self.overview.notes.push("lasers 0 to 31 are the lower scanner's in this log".into());
         }
         Ok(())
     }
 
     /// Reads the returns of a sweep, and hands back their laser numbers.
     fn read_points(&self, index: usize, into: &mut SweepData) -> Result<Vec<i64>, Error> {
-        let path = &self.files[index].1;
+        let path = &self.files[index];
         into.points.clear();
         let table = FeatherTable::read(path, &COLUMNS)?;
         let (x, y, z) = (table.floats("x")?, table.floats("y")?, table.floats("z")?);
@@ -127,48 +125,20 @@ impl Argoverse {
 const SWAP_BELOW: f64 = 0.7;
 
 impl Source for Argoverse {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
-    }
-
-    fn len(&self) -> usize {
-        self.files.len()
+    fn overview(&self) -> &Overview {
+        &self.overview
     }
 
     fn describe(&self) -> String {
-        let (sweeps, span) = (self.files.len(), self.track.duration_s());
-        format!("Argoverse 2 log {}: {sweeps} sweeps, {span:.1} s", self.root.display())
-    }
-
-    fn frame(&self, index: usize) -> u64 {
-        self.files[index].0
-    }
-
-    fn stamp_s(&self, index: usize) -> f64 {
-        self.track.stamps_s[index]
-    }
-
-    fn pose(&self, index: usize) -> Pose {
-        self.track.poses[index]
+        format!("Argoverse 2 log {}: {}", self.root.display(), self.overview.length())
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         self.read_points(index, into)?;
-        into.frame = self.files[index].0;
-        into.stamp_s = self.track.stamps_s[index];
-        into.world_from_vehicle = self.track.poses[index];
-        into.twist = self.track.twist(index);
+        self.overview.begin(index, into);
         let null = into.points.iter().filter(|p| p.position.iter().any(|v| v.is_nan())).count();
         into.dropped = SourceGaps { sweeps_before: 0, null_rows: null as u32 };
         Ok(())
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }
 

@@ -2,75 +2,42 @@
 
 use std::path::{Path, PathBuf};
 
-use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig};
+use raywake_core::sweep::Point;
 
-use super::poses::PoseTrack;
 use super::sidecars::Sidecars;
-use super::{Source, SourceGaps, SweepData, bin, pcd, ply};
+use super::{Overview, Source, SourceGaps, SweepData, bin, pcd, ply};
 use crate::Error;
 
 /// An open folder.
 pub(super) struct Clouds {
-    pub name: String,
+    pub overview: Overview,
     /// Format and folder, for [`Source::describe`].
     pub kind: String,
     /// Where the poses are from, for [`Source::describe`].
     pub poses_from: String,
-    /// Frame number and file, in order.
-    pub files: Vec<(u64, PathBuf)>,
-    pub track: PoseTrack,
-    pub rig: Rig,
+    /// File of every sweep.
+    pub files: Vec<PathBuf>,
     /// Files that tell times and sensors of returns.
     pub sidecars: Option<Sidecars>,
-    pub notes: Vec<String>,
 }
 
 impl Source for Clouds {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
-    }
-
-    fn len(&self) -> usize {
-        self.files.len()
+    fn overview(&self) -> &Overview {
+        &self.overview
     }
 
     fn describe(&self) -> String {
-        let (sweeps, span) = (self.files.len(), self.track.duration_s());
-        format!("{}: {sweeps} sweeps, {span:.1} s, poses from {}", self.kind, self.poses_from)
-    }
-
-    fn frame(&self, index: usize) -> u64 {
-        self.files[index].0
-    }
-
-    fn stamp_s(&self, index: usize) -> f64 {
-        self.track.stamps_s[index]
-    }
-
-    fn pose(&self, index: usize) -> Pose {
-        self.track.poses[index]
+        format!("{}: {}, poses from {}", self.kind, self.overview.length(), self.poses_from)
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
-        let (frame, path) = &self.files[index];
-        let before = index.checked_sub(1).map_or(*frame, |i| self.files[i].0 + 1);
-        into.frame = *frame;
-        into.dropped = SourceGaps { sweeps_before: frame - before, null_rows: 0 };
-        into.stamp_s = self.track.stamps_s[index];
-        into.world_from_vehicle = self.track.poses[index];
-        into.twist = self.track.twist(index);
+        self.overview.begin(index, into);
+        let expected = index.checked_sub(1).map_or(into.frame, |i| self.overview.frames[i] + 1);
+        into.dropped = SourceGaps { sweeps_before: into.frame - expected, null_rows: 0 };
+        let path = &self.files[index];
         read_cloud(path, &mut into.points)?;
         let Some(sidecars) = &self.sidecars else { return Ok(()) };
         sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    Float16Type, Float32Type, Float64Type, Int8Type, Int32Type, Int64Type, UInt8Type, UInt32Type,
-    UInt64Type,
+    ArrowPrimitiveType, Float16Type, Float32Type, Float64Type, Int8Type, Int32Type, Int64Type,
+    UInt8Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReaderBuilder;
@@ -55,48 +55,28 @@ impl FeatherTable {
 
     /// A column of floats of any width; null becomes NaN.
     pub fn floats(&self, name: &str) -> Result<Vec<f64>, Error> {
-        self.gather(name, "floats", |column, out: &mut Vec<f64>| {
+        self.gather(name, "floats", |column, out| {
             match column.data_type() {
-                DataType::Float16 => out.extend(
-                    column
-                        .as_primitive::<Float16Type>()
-                        .iter()
-                        .map(|v| v.map_or(f64::NAN, f64::from)),
-                ),
-                DataType::Float32 => out.extend(
-                    column
-                        .as_primitive::<Float32Type>()
-                        .iter()
-                        .map(|v| v.map_or(f64::NAN, f64::from)),
-                ),
-                DataType::Float64 => out.extend(
-                    column.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)),
-                ),
+                DataType::Float16 => extend::<Float16Type, f64>(column, out),
+                DataType::Float32 => extend::<Float32Type, f64>(column, out),
+                DataType::Float64 => extend::<Float64Type, f64>(column, out),
                 _ => return false,
             }
             true
         })
+        .map(|values| values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
     }
 
     /// A column of integers (u8, i8, i32, u32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
-        let values = self.gather(name, "integers", |column, out: &mut Vec<Option<i64>>| {
+        let values = self.gather(name, "integers", |column, out| {
             match column.data_type() {
-                DataType::UInt8 => {
-                    out.extend(column.as_primitive::<UInt8Type>().iter().map(|v| v.map(i64::from)))
-                }
-                DataType::UInt32 => {
-                    out.extend(column.as_primitive::<UInt32Type>().iter().map(|v| v.map(i64::from)))
-                }
-                DataType::Int8 => {
-                    out.extend(column.as_primitive::<Int8Type>().iter().map(|v| v.map(i64::from)))
-                }
-                DataType::Int32 => {
-                    out.extend(column.as_primitive::<Int32Type>().iter().map(|v| v.map(i64::from)))
-                }
-                DataType::Int64 => out.extend(column.as_primitive::<Int64Type>().iter()),
-                DataType::UInt64 => out
-                    .extend(column.as_primitive::<UInt64Type>().iter().map(|v| v?.try_into().ok())),
+                DataType::UInt8 => extend::<UInt8Type, i64>(column, out),
+                DataType::UInt32 => extend::<UInt32Type, i64>(column, out),
+                DataType::Int8 => extend::<Int8Type, i64>(column, out),
+                DataType::Int32 => extend::<Int32Type, i64>(column, out),
+                DataType::Int64 => extend::<Int64Type, i64>(column, out),
+                DataType::UInt64 => extend::<UInt64Type, i64>(column, out),
                 _ => return false,
             }
             true
@@ -157,4 +137,13 @@ impl FeatherTable {
         }
         Ok(out)
     }
+}
+
+/// Appends the numbers of a column; none where a number is null or cannot be a `V`.
+fn extend<T, V>(column: &dyn Array, out: &mut Vec<Option<V>>)
+where
+    T: ArrowPrimitiveType,
+    V: TryFrom<T::Native>,
+{
+    out.extend(column.as_primitive::<T>().iter().map(|v| v?.try_into().ok()));
 }

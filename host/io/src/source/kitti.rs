@@ -11,7 +11,7 @@ use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::{SPAN_MAX_S, Sidecars};
-use super::{OpenOptions, PosesFrame, apply, folder_name, oxts};
+use super::{OpenOptions, Overview, PosesFrame, apply, folder_name, oxts};
 use crate::Error;
 
 /// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
@@ -236,15 +236,13 @@ impl Opening {
             None => self.velodyne(&frames),
         };
         apply(options, &mut rig);
+        let name = folder_name(&self.root);
         Clouds {
-            name: folder_name(&self.root),
+            overview: Overview { name, rig, frames, track: self.track, notes: self.notes },
             kind: format!("{} {}", self.kind, self.root.display()),
             poses_from: self.poses_from,
-            files: self.files,
-            track: self.track,
-            rig,
+            files: self.files.into_iter().map(|f| f.1).collect(),
             sidecars: self.sidecars,
-            notes: self.notes,
         }
     }
 

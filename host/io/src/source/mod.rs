@@ -43,7 +43,7 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 use crate::Error;
 
 pub use clouds::read_cloud;
-pub use poses::{pose_row, read_pose};
+pub use poses::{PoseTrack, pose_row, read_pose};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again, so that its memory is reused.
@@ -97,41 +97,88 @@ pub struct SourceGaps {
     pub null_rows: u32,
 }
 
-/// A recording.
-pub trait Source {
-    /// Name of the recording: the log's or drive's folder.
-    fn name(&self) -> &str;
-
+/// What is known of a recording before a cloud of it is read.
+pub struct Overview {
+    /// Name of the log's or drive's folder.
+    pub name: String,
     /// Sensors, timing and frame of the vehicle.
-    fn rig(&self) -> &Rig;
+    pub rig: Rig,
+    /// File number (or timestamp in ns) of every sweep; at least one.
+    pub frames: Vec<u64>,
+    /// Stamp and pose of every sweep.
+    pub track: PoseTrack,
+    /// What the user should know: assumptions, gaps in frame numbers.
+    pub notes: Vec<String>,
+}
+
+impl Overview {
+    /// Puts into `sweep` what is known of the one with this index: all but its points and what the
+    /// source lacks there.
+    fn begin(&self, index: usize, sweep: &mut SweepData) {
+        sweep.frame = self.frames[index];
+        sweep.stamp_s = self.track.stamps_s[index];
+        sweep.world_from_vehicle = self.track.poses[index];
+        sweep.twist = self.track.twist(index);
+    }
+
+    /// Number of sweeps and time from the first to the last, for people.
+    fn length(&self) -> String {
+        format!("{} sweeps, {:.1} s", self.frames.len(), self.track.duration_s())
+    }
+}
+
+/// A recording. Indices of sweeps are below [`Source::len`].
+pub trait Source {
+    /// What is known before a cloud is read.
+    fn overview(&self) -> &Overview;
+
+    /// One line for people: format, folder, number of sweeps, duration, where the poses are from.
+    fn describe(&self) -> String;
+
+    /// Reads a sweep; the content of `into` is replaced and its memory reused.
+    ///
+    /// Fails where the file is unreadable or damaged; `into` then holds no points.
+    fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error>;
+
+    /// See [`Overview::name`].
+    fn name(&self) -> &str {
+        &self.overview().name
+    }
+
+    /// See [`Overview::rig`].
+    fn rig(&self) -> &Rig {
+        &self.overview().rig
+    }
 
     /// Number of sweeps, at least 1.
-    fn len(&self) -> usize;
+    fn len(&self) -> usize {
+        self.overview().frames.len()
+    }
 
     /// Never true: a source without sweeps does not open.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// One line for people: format, folder, number of sweeps, duration, where the poses are from.
-    fn describe(&self) -> String;
+    /// See [`Overview::frames`].
+    fn frame(&self, index: usize) -> u64 {
+        self.overview().frames[index]
+    }
 
-    /// File number (or timestamp in ns) of sweep `index < len`.
-    fn frame(&self, index: usize) -> u64;
+    /// [`SweepData::stamp_s`] of a sweep.
+    fn stamp_s(&self, index: usize) -> f64 {
+        self.overview().track.stamps_s[index]
+    }
 
-    /// Stamp of sweep `index < len`, s: [`SweepData::stamp_s`] without reading the cloud.
-    fn stamp_s(&self, index: usize) -> f64;
+    /// `world_from_vehicle` at the stamp of a sweep.
+    fn pose(&self, index: usize) -> Pose {
+        self.overview().track.poses[index]
+    }
 
-    /// `world_from_vehicle` at the stamp of sweep `index < len`, without reading the cloud.
-    fn pose(&self, index: usize) -> Pose;
-
-    /// Reads sweep `index < len`; the content of `into` is replaced and its memory reused.
-    ///
-    /// Fails where the file is unreadable or damaged; `into` then holds no points.
-    fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error>;
-
-    /// What the user should know: assumptions, gaps in frame numbers.
-    fn notes(&self) -> &[String];
+    /// See [`Overview::notes`].
+    fn notes(&self) -> &[String] {
+        &self.overview().notes
+    }
 }
 
 /// Kinds of recordings.

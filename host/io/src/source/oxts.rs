@@ -75,25 +75,8 @@ pub(super) fn pose(packet: &[f64; FIELDS], scale: f64) -> Pose {
         scale * EARTH_RADIUS_M * north,
         altitude,
     );
-    Pose::new(DQuat::from_mat3(&(about_z(yaw) * about_y(pitch) * about_x(roll))), translation)
-}
-
-/// Rotation about z.
-fn about_z(a: f64) -> DMat3 {
-    let (s, c) = (libm::sin(a), libm::cos(a));
-    DMat3::from_cols(DVec3::new(c, s, 0.0), DVec3::new(-s, c, 0.0), DVec3::Z)
-}
-
-/// Rotation about y.
-fn about_y(a: f64) -> DMat3 {
-    let (s, c) = (libm::sin(a), libm::cos(a));
-    DMat3::from_cols(DVec3::new(c, 0.0, -s), DVec3::Y, DVec3::new(s, 0.0, c))
-}
-
-/// Rotation about x.
-fn about_x(a: f64) -> DMat3 {
-    let (s, c) = (libm::sin(a), libm::cos(a));
-    DMat3::from_cols(DVec3::X, DVec3::new(0.0, c, s), DVec3::new(0.0, -s, c))
+    let [z, y] = [DMat3::from_rotation_z(yaw), DMat3::from_rotation_y(pitch)];
+    Pose::new(DQuat::from_mat3(&(z * y * DMat3::from_rotation_x(roll))), translation)
 }
 
 #[cfg(test)]

@@ -16,10 +16,12 @@ pub(super) const INTERVAL_S: f64 = 0.1;
 /// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
 const REACH_MAX_M: f64 = 1e6;
 
-/// Stamp (s) and pose of every sweep of a source.
+/// Stamp and pose of every sweep of a source.
 #[derive(Clone, Debug, Default)]
-pub(super) struct PoseTrack {
+pub struct PoseTrack {
+    /// s, rising.
     pub stamps_s: Vec<f64>,
+    /// `world_from_vehicle` at the stamps.
     pub poses: Vec<Pose>,
 }
 

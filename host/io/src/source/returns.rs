@@ -17,9 +17,12 @@ use std::path::Path;
 
 use raywake_core::sweep::Point;
 
-use super::bin::SIZE_MAX;
 use super::text;
 use crate::Error;
+
+/// Largest file that is read, bytes: 16 million returns of a `.bin`, a hundred times what a sweep
+/// has.
+const SIZE_MAX: u64 = 256 << 20;
 
 /// Seconds that no date has reached: times beyond are ns.
 const SECONDS_MAX: f64 = 1e12;

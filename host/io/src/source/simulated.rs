@@ -1,18 +1,15 @@
 //! A simulated drive as a recording, with its truth.
 
-use raywake_core::pose::Pose;
-use raywake_core::sweep::Rig;
 use raywake_sim::{Drive, Options, Truth, stamp_s};
 
-use super::{Source, SourceGaps, SweepData};
+use super::{Overview, PoseTrack, Source, SourceGaps, SweepData};
 use crate::Error;
 
 /// A drive through a street that a seed draws.
 pub struct Simulated {
+    overview: Overview,
     drive: Drive,
-    rig: Rig,
     seed: u64,
-    notes: Vec<String>,
     /// Truth of the last two sweeps read: index and truth of every return.
     truth: [(usize, Vec<Truth>); 2],
 }
@@ -21,9 +18,17 @@ impl Simulated {
     /// A drive of some sweeps, at least one.
     pub fn new(seed: u64, sweeps: usize) -> Simulated {
         let drive = Drive::new(seed, Options { sweeps: sweeps.max(1), ..Options::default() });
-        let rig = drive.rig();
+        let stamps_s: Vec<f64> = (0..drive.sweeps()).map(stamp_s).collect();
+        let poses = stamps_s.iter().map(|t| drive.world_from_vehicle(*t)).collect();
+        let overview = Overview {
+            name: "simulated".into(),
+            rig: drive.rig(),
+            frames: (0..drive.sweeps() as u64).collect(),
+            track: PoseTrack { stamps_s, poses },
+            notes: Vec::new(),
+        };
         let none = || (usize::MAX, Vec::new());
-        Simulated { drive, rig, seed, notes: Vec::new(), truth: [none(), none()] }
+        Simulated { overview, drive, seed, truth: [none(), none()] }
     }
 
     /// The simulator.
@@ -39,52 +44,25 @@ impl Simulated {
 }
 
 impl Source for Simulated {
-    fn name(&self) -> &str {
-        "simulated"
-    }
-
-    fn rig(&self) -> &Rig {
-        &self.rig
-    }
-
-    fn len(&self) -> usize {
-        self.drive.sweeps()
+    fn overview(&self) -> &Overview {
+        &self.overview
     }
 
     fn describe(&self) -> String {
-        let (sweeps, span_s) = (self.len(), stamp_s(self.len() - 1));
-        format!("simulated street, seed {}: {sweeps} sweeps, {span_s:.1} s, exact poses", self.seed)
-    }
-
-    fn frame(&self, index: usize) -> u64 {
-        index as u64
-    }
-
-    fn stamp_s(&self, index: usize) -> f64 {
-        stamp_s(index)
-    }
-
-    fn pose(&self, index: usize) -> Pose {
-        self.drive.world_from_vehicle(self.stamp_s(index))
+        let (seed, length) = (self.seed, self.overview.length());
+        format!("simulated street, seed {seed}: {length}, exact poses")
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         let sweep = self.drive.sweep(index);
-        *into = SweepData {
-            frame: index as u64,
-            stamp_s: sweep.stamp_s,
-            points: sweep.points,
-            world_from_vehicle: sweep.world_from_vehicle,
-            twist: sweep.twist,
-            dropped: SourceGaps::default(),
-        };
+        self.overview.begin(index, into);
+        // Exact, where that of a track is made of differences.
+        into.twist = sweep.twist;
+        into.points = sweep.points;
+        into.dropped = SourceGaps::default();
         self.truth.swap(0, 1);
         self.truth[1] = (index, sweep.truth);
         Ok(())
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }
 
