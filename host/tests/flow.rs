@@ -265,9 +265,7 @@ fn tables_in_and_out() {
     let cloud = first_cloud();
     let a = t.path().join("a.feather");
     let mut table = Sink::default();
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.f32s(name, &cloud, |p| p[axis]);
-    }
+    table.array(["x", "y", "z"], &cloud, |p| *p);
     table.write(&a, &[]).unwrap();
     let b = t.write("b.ply", ply(&positions(&sweeps().0[1])));
     let [plain, out] = ["f.bin", "f.feather"].map(|name| t.path().join(name));

@@ -24,7 +24,6 @@ pub struct PointRow {
     pub motion: [f32; 3],
     /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
-    /// Where the motion comes from.
     pub origin: Origin,
 }
 
@@ -88,17 +87,12 @@ impl Form {
 
 fn table(rows: &[PointRow]) -> TableWriter {
     let mut t = TableWriter::default();
-    let mut triple = |names: [&str; 3], of: fn(&PointRow) -> [f32; 3]| {
-        for (n, name) in names.iter().enumerate() {
-            t.f32s(name, rows, |r| of(r)[n]);
-        }
-    };
-    triple(["x_m", "y_m", "z_m"], |r| r.position);
-    triple(["flow_x_m", "flow_y_m", "flow_z_m"], |r| r.flow);
-    triple(["motion_x_m", "motion_y_m", "motion_z_m"], |r| r.motion);
-    triple(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], |r| r.covariance);
-    t.bools("foreground", rows, |r| r.origin != Origin::Background);
-    t.bools("valid", rows, PointRow::valid);
+    t.array(["x_m", "y_m", "z_m"], rows, |r| r.position);
+    t.array(["flow_x_m", "flow_y_m", "flow_z_m"], rows, |r| r.flow);
+    t.array(["motion_x_m", "motion_y_m", "motion_z_m"], rows, |r| r.motion);
+    t.array(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], rows, |r| r.covariance);
+    t.column("foreground", rows, |r| r.origin != Origin::Background);
+    t.column("valid", rows, PointRow::valid);
     t
 }
 

@@ -76,21 +76,24 @@ impl Files {
     pub fn finish(self) -> Result<(), Error> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let mut t = TableWriter::default();
-        t.u32s("track", &self.rows, |r| r.track);
-        t.f64s("time_s", &self.rows, |r| r.filter.time_s);
+        t.column("track", &self.rows, |r| r.track);
+        t.column("time_s", &self.rows, |r| r.filter.time_s);
         let mut states = |prefix: &str, of: fn(&TrackRow) -> &ObjectState| {
-            for (a, axis) in ["x_m", "y_m", "z_m"].iter().enumerate() {
-                t.f64s(&format!("{prefix}{axis}"), &self.rows, |r| of(r).position[a]);
-            }
-            t.f64s(&format!("{prefix}heading_rad"), &self.rows, |r| of(r).heading);
-            t.f64s(&format!("{prefix}speed_mps"), &self.rows, |r| of(r).speed);
-            t.f64s(&format!("{prefix}climb_mps"), &self.rows, |r| of(r).climb);
-            t.f64s(&format!("{prefix}turn_rate_radps"), &self.rows, |r| of(r).turn_rate);
+            let mut add = |name: &str, value: fn(&ObjectState) -> f64| {
+                t.column(&format!("{prefix}{name}"), &self.rows, |r| value(of(r)));
+            };
+            add("x_m", |s| s.position[0]);
+            add("y_m", |s| s.position[1]);
+            add("z_m", |s| s.position[2]);
+            add("heading_rad", |s| s.heading);
+            add("speed_mps", |s| s.speed);
+            add("climb_mps", |s| s.climb);
+            add("turn_rate_radps", |s| s.turn_rate);
         };
         states("ekf_", |r| &r.filter);
         states("", |r| &r.estimate);
         states("lag_", |r| &r.lag);
-        t.f64s("lag_time_s", &self.rows, |r| r.lag.time_s);
+        t.column("lag_time_s", &self.rows, |r| r.lag.time_s);
         t.write(&folder.join("tracks.feather"), &[])
     }
 }

@@ -11,7 +11,7 @@ use super::layout::{self, frame_name};
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use raywake_io::Error;
-use raywake_io::sink::table::{TableWriter, Values};
+use raywake_io::sink::table::TableWriter;
 use raywake_io::source::feather;
 use raywake_sim::{Class, Clutter, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
@@ -153,13 +153,11 @@ pub(super) fn of_objects(
 /// Writes the truth of a sweep's returns.
 pub fn write_points(path: &Path, rows: &[PointTruth]) -> Result<(), Error> {
     let mut t = TableWriter::compressed();
-    t.f32s("offset_s", rows, |r| r.offset_s);
-    t.push("sensor", Values::U8(rows.iter().map(|r| r.sensor).collect()));
-    t.u32s("object", rows, |r| r.object);
-    t.push("class", Values::U8(rows.iter().map(|r| r.class as u8).collect()));
-    for (axis, name) in ["flow_x", "flow_y", "flow_z"].into_iter().enumerate() {
-        t.f32s(name, rows, |r| r.flow[axis]);
-    }
+    t.column("offset_s", rows, |r| r.offset_s);
+    t.column("sensor", rows, |r| r.sensor);
+    t.column("object", rows, |r| r.object);
+    t.column("class", rows, |r| r.class as u8);
+    t.array(["flow_x", "flow_y", "flow_z"], rows, |r| r.flow);
     t.write(path, &[])
 }
 
@@ -206,13 +204,10 @@ fn numbers(o: &ObjectTruth) -> [f64; 14] {
 /// Writes the truth of objects.
 pub fn write_objects(path: &Path, rows: &[ObjectTruth]) -> Result<(), Error> {
     let mut t = TableWriter::compressed();
-    t.push("frame", Values::U64(rows.iter().map(|o| o.frame).collect()));
-    t.u32s("id", rows, |o| o.id);
-    let class = |o: &ObjectTruth| class_name(o.class).to_owned();
-    t.push("class", Values::Text(rows.iter().map(class).collect()));
-    for (n, name) in NUMBERS.into_iter().enumerate() {
-        t.f64s(name, rows, |o| numbers(o)[n]);
-    }
+    t.column("frame", rows, |o| o.frame);
+    t.column("id", rows, |o| o.id);
+    t.column("class", rows, |o| class_name(o.class).to_owned());
+    t.array(NUMBERS, rows, numbers);
     t.write(path, &[])
 }
 

@@ -7,7 +7,7 @@ use raywake_core::output::{Origin, PointFlow};
 use raywake_core::pose::Pose;
 
 use super::atomic;
-use super::table::{TableWriter, Values};
+use super::table::TableWriter;
 use crate::Error;
 
 /// Writes `<out>/<log>/<timestamp_ns>.feather`: one row per return of the pair's first sweep, in
@@ -32,13 +32,9 @@ pub fn export(
     let folder = out.join(log);
     atomic::create_folder(&folder)?;
     let path = folder.join(format!("{timestamp_ns}.feather"));
-    let motion: Vec<[f32; 3]> = flows.iter().map(|f| displacement(f, first, dt_s)).collect();
     let mut table = TableWriter::default();
-    for (axis, name) in ["flow_tx_m", "flow_ty_m", "flow_tz_m"].iter().enumerate() {
-        table.f32s(name, &motion, |m| m[axis]);
-    }
-    let valid = flows.iter().map(|f| f.origin != Origin::Unmatched).collect();
-    table.push("is_valid", Values::Bool(valid));
+    table.array(["flow_tx_m", "flow_ty_m", "flow_tz_m"], flows, |f| displacement(f, first, dt_s));
+    table.column("is_valid", flows, |f| f.origin != Origin::Unmatched);
     table.write(&path, &[])?;
     Ok(path)
 }

@@ -14,25 +14,8 @@ use super::Meta;
 use super::table::TableWriter;
 use crate::Error;
 
-/// Names and places of the 15 upper entries of a tracklet's covariance; units are products of m, m,
-/// rad, m/s and rad/s.
-const COVARIANCE: [(&str, usize, usize); 15] = [
-    ("cov_x_x", 0, 0),
-    ("cov_x_y", 0, 1),
-    ("cov_x_heading", 0, 2),
-    ("cov_x_speed", 0, 3),
-    ("cov_x_turn", 0, 4),
-    ("cov_y_y", 1, 1),
-    ("cov_y_heading", 1, 2),
-    ("cov_y_speed", 1, 3),
-    ("cov_y_turn", 1, 4),
-    ("cov_heading_heading", 2, 2),
-    ("cov_heading_speed", 2, 3),
-    ("cov_heading_turn", 2, 4),
-    ("cov_speed_speed", 3, 3),
-    ("cov_speed_turn", 3, 4),
-    ("cov_turn_turn", 4, 4),
-];
+/// Elements of a tracklet's state: m, m, rad, m/s and rad/s.
+const STATE: [&str; 5] = ["x", "y", "heading", "speed", "turn"];
 
 /// Writes the flow of columns, one row each.
 ///
@@ -45,31 +28,20 @@ const COVARIANCE: [(&str, usize, usize); 15] = [
 /// (with a match of its own or part of a thing that moves) bool.
 pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
     let mut t = TableWriter::default();
-    t.i32s("cell_i", columns, |c| c.cell[0]);
-    t.i32s("cell_j", columns, |c| c.cell[1]);
-    t.f64s("x_world_m", columns, |c| c.position_world_m[0]);
-    t.f64s("y_world_m", columns, |c| c.position_world_m[1]);
-    t.f32s("x_m", columns, |c| c.position_vehicle_m[0]);
-    t.f32s("y_m", columns, |c| c.position_vehicle_m[1]);
-    t.f32s("vx_world_mps", columns, |c| c.velocity_world_mps[0]);
-    t.f32s("vy_world_mps", columns, |c| c.velocity_world_mps[1]);
-    t.f32s("vx_ego_mps", columns, |c| c.velocity_ego_mps[0]);
-    t.f32s("vy_ego_mps", columns, |c| c.velocity_ego_mps[1]);
-    t.f32s("cov_xx", columns, |c| c.covariance[0]);
-    t.f32s("cov_xy", columns, |c| c.covariance[1]);
-    t.f32s("cov_yy", columns, |c| c.covariance[2]);
-    t.i32s("displacement_i", columns, |c| c.displacement_cells[0]);
-    t.i32s("displacement_j", columns, |c| c.displacement_cells[1]);
-    t.f32s("dx_world_m", columns, |c| c.displacement_m[0]);
-    t.f32s("dy_world_m", columns, |c| c.displacement_m[1]);
-    t.f32s("cov_dx_dx", columns, |c| c.displacement_covariance[0]);
-    t.f32s("cov_dx_dy", columns, |c| c.displacement_covariance[1]);
-    t.f32s("cov_dy_dy", columns, |c| c.displacement_covariance[2]);
-    t.i32s("energy_millinats", columns, |c| c.energy);
-    t.u32s("age", columns, |c| c.age);
-    t.f32s("p_moves", columns, |c| c.probability);
-    t.bools("foreground", columns, |c| c.origin != Origin::Background);
-    t.bools("valid", columns, |c| c.origin >= Origin::Matched);
+    t.array(["cell_i", "cell_j"], columns, |c| c.cell);
+    t.array(["x_world_m", "y_world_m"], columns, |c| c.position_world_m);
+    t.array(["x_m", "y_m"], columns, |c| c.position_vehicle_m);
+    t.array(["vx_world_mps", "vy_world_mps"], columns, |c| c.velocity_world_mps);
+    t.array(["vx_ego_mps", "vy_ego_mps"], columns, |c| c.velocity_ego_mps);
+    t.array(["cov_xx", "cov_xy", "cov_yy"], columns, |c| c.covariance);
+    t.array(["displacement_i", "displacement_j"], columns, |c| c.displacement_cells);
+    t.array(["dx_world_m", "dy_world_m"], columns, |c| c.displacement_m);
+    t.array(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], columns, |c| c.displacement_covariance);
+    t.column("energy_millinats", columns, |c| c.energy);
+    t.column("age", columns, |c| c.age);
+    t.column("p_moves", columns, |c| c.probability);
+    t.column("foreground", columns, |c| c.origin != Origin::Background);
+    t.column("valid", columns, |c| c.origin >= Origin::Matched);
     t.write(path, meta)
 }
 
@@ -92,21 +64,14 @@ pub fn write_points(
         return Err(Error::Usage(format!("{}: {lengths}", path.display())));
     }
     let mut t = TableWriter::default();
-    t.f32s("x_m", points, |p| p.position[0]);
-    t.f32s("y_m", points, |p| p.position[1]);
-    t.f32s("z_m", points, |p| p.position[2]);
-    t.f32s("vx_world_mps", flows, |f| f.velocity_world_mps[0]);
-    t.f32s("vy_world_mps", flows, |f| f.velocity_world_mps[1]);
-    t.f32s("vx_ego_mps", flows, |f| f.velocity_ego_mps[0]);
-    t.f32s("vy_ego_mps", flows, |f| f.velocity_ego_mps[1]);
-    t.f32s("vz_ego_mps", flows, |f| f.velocity_ego_mps[2]);
-    t.f32s("cov_xx", flows, |f| f.covariance[0]);
-    t.f32s("cov_xy", flows, |f| f.covariance[1]);
-    t.f32s("cov_yy", flows, |f| f.covariance[2]);
-    t.u32s("age", flows, |f| f.age);
-    t.f32s("p_moves", flows, |f| f.probability);
-    t.bools("foreground", flows, |f| f.origin != Origin::Background);
-    t.bools("valid", flows, |f| f.origin >= Origin::Matched);
+    t.array(["x_m", "y_m", "z_m"], points, |p| p.position);
+    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
+    t.array(["vx_ego_mps", "vy_ego_mps", "vz_ego_mps"], flows, |f| f.velocity_ego_mps);
+    t.array(["cov_xx", "cov_xy", "cov_yy"], flows, |f| f.covariance);
+    t.column("age", flows, |f| f.age);
+    t.column("p_moves", flows, |f| f.probability);
+    t.column("foreground", flows, |f| f.origin != Origin::Background);
+    t.column("valid", flows, |f| f.origin >= Origin::Matched);
     t.write(path, meta)
 }
 
@@ -122,24 +87,22 @@ pub fn write_tracklets(
     meta: Meta<'_>,
 ) -> Result<(), Error> {
     let mut t = TableWriter::default();
-    t.i32s("cell_i", tracklets, |s| s.cell[0]);
-    t.i32s("cell_j", tracklets, |s| s.cell[1]);
-    t.f64s("x_world_m", tracklets, |s| s.position_world_m[0]);
-    t.f64s("y_world_m", tracklets, |s| s.position_world_m[1]);
-    t.f32s("x_m", tracklets, |s| s.position_vehicle_m[0]);
-    t.f32s("y_m", tracklets, |s| s.position_vehicle_m[1]);
-    t.f32s("heading_world_rad", tracklets, |s| s.heading_rad);
-    t.f32s("speed_mps", tracklets, |s| s.speed_mps);
-    t.f32s("turn_rate_radps", tracklets, |s| s.turn_rate_radps);
-    t.f32s("vx_world_mps", tracklets, |s| s.velocity_world_mps[0]);
-    t.f32s("vy_world_mps", tracklets, |s| s.velocity_world_mps[1]);
-    t.f32s("vx_ego_mps", tracklets, |s| s.velocity_ego_mps[0]);
-    t.f32s("vy_ego_mps", tracklets, |s| s.velocity_ego_mps[1]);
-    for (name, row, column) in COVARIANCE {
-        t.f32s(name, tracklets, |s| s.covariance[row][column]);
+    t.array(["cell_i", "cell_j"], tracklets, |s| s.cell);
+    t.array(["x_world_m", "y_world_m"], tracklets, |s| s.position_world_m);
+    t.array(["x_m", "y_m"], tracklets, |s| s.position_vehicle_m);
+    t.column("heading_world_rad", tracklets, |s| s.heading_rad);
+    t.column("speed_mps", tracklets, |s| s.speed_mps);
+    t.column("turn_rate_radps", tracklets, |s| s.turn_rate_radps);
+    t.array(["vx_world_mps", "vy_world_mps"], tracklets, |s| s.velocity_world_mps);
+    t.array(["vx_ego_mps", "vy_ego_mps"], tracklets, |s| s.velocity_ego_mps);
+    for row in 0..STATE.len() {
+        for column in row..STATE.len() {
+            let name = format!("cov_{}_{}", STATE[row], STATE[column]);
+            t.column(&name, tracklets, |s| s.covariance[row][column]);
+        }
     }
-    t.u32s("age", tracklets, |s| s.age);
-    t.f32s("p_moves", tracklets, |s| s.probability);
+    t.column("age", tracklets, |s| s.age);
+    t.column("p_moves", tracklets, |s| s.probability);
     t.write(path, meta)
 }
 
@@ -166,10 +129,8 @@ pub fn write_map(
     meta: Meta<'_>,
 ) -> Result<(), Error> {
     let mut t = TableWriter::default();
-    for (axis, name) in ["i", "j", "k"].iter().enumerate() {
-        t.i32s(name, voxels, |v| v.index[axis]);
-    }
-    t.f32s("log_odds", voxels, |v| v.log_odds_tenths as f32 / 10.0);
+    t.array(["i", "j", "k"], voxels, |v| v.index);
+    t.column("log_odds", voxels, |v| v.log_odds_tenths as f32 / 10.0);
     let place = [
         ("origin_x_m", origin_m[0].to_string()),
         ("origin_y_m", origin_m[1].to_string()),

@@ -5,25 +5,22 @@ use std::path::Path;
 use super::Meta;
 use crate::Error;
 
-/// Values of one column.
-pub enum Values {
-    /// float32.
-    F32(Vec<f32>),
-    /// float64.
-    F64(Vec<f64>),
-    /// int32.
-    I32(Vec<i32>),
-    /// uint8.
-    U8(Vec<u8>),
-    /// uint32.
-    U32(Vec<u32>),
-    /// uint64.
-    U64(Vec<u64>),
-    /// bool.
-    Bool(Vec<bool>),
-    /// utf8.
-    Text(Vec<String>),
+macro_rules! values {
+    ($($kind:ident $value:ty),*) => {
+        /// Values of one column, by their type in the file.
+        pub enum Values {
+            $(#[doc = stringify!($value)] $kind(Vec<$value>),)*
+        }
+
+        $(impl From<Vec<$value>> for Values {
+            fn from(values: Vec<$value>) -> Values {
+                Values::$kind(values)
+            }
+        })*
+    };
 }
+
+values!(F32 f32, F64 f64, I32 i32, U8 u8, U32 u32, U64 u64, Bool bool, Text String);
 
 /// A table under construction.
 #[derive(Default)]
@@ -39,34 +36,27 @@ impl TableWriter {
         TableWriter { compressed: true, ..TableWriter::default() }
     }
 
-    /// Adds a column; all must be of the same length.
-    pub fn push(&mut self, name: &str, column: Values) {
-        self.columns.push((name.to_owned(), column));
+    /// Adds a column of a value of every row; all columns must be of the same length.
+    pub fn column<R, V>(&mut self, name: &str, rows: &[R], value: impl Fn(&R) -> V)
+    where
+        Values: From<Vec<V>>,
+    {
+        let values: Vec<V> = rows.iter().map(value).collect();
+        self.columns.push((name.to_owned(), values.into()));
     }
 
-    /// Adds a column of float32 made of every row.
-    pub fn f32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f32) {
-        self.push(name, Values::F32(rows.iter().map(value).collect()));
-    }
-
-    /// Adds a column of float64 made of every row.
-    pub fn f64s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> f64) {
-        self.push(name, Values::F64(rows.iter().map(value).collect()));
-    }
-
-    /// Adds a column of int32 made of every row.
-    pub fn i32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> i32) {
-        self.push(name, Values::I32(rows.iter().map(value).collect()));
-    }
-
-    /// Adds a column of uint32 made of every row.
-    pub fn u32s<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> u32) {
-        self.push(name, Values::U32(rows.iter().map(value).collect()));
-    }
-
-    /// Adds a column of booleans made of every row.
-    pub fn bools<T>(&mut self, name: &str, rows: &[T], value: impl Fn(&T) -> bool) {
-        self.push(name, Values::Bool(rows.iter().map(value).collect()));
+    /// Adds a column for each element of an array of every row.
+    pub fn array<R, V: Copy, const N: usize>(
+        &mut self,
+        names: [&str; N],
+        rows: &[R],
+        value: impl Fn(&R) -> [V; N],
+    ) where
+        Values: From<Vec<V>>,
+    {
+        for (n, name) in names.iter().enumerate() {
+            self.column(name, rows, |row| value(row)[n]);
+        }
     }
 
     /// Writes the table, uncompressed unless it was made so: a sweep's worth takes a millisecond
