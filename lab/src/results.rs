@@ -1,6 +1,6 @@
 //! `raywake-lab results`: `RESULTS.md` from the results of evaluations.
 
-use crate::report::Results;
+use crate::report::{COMMAND, Results};
 use raywake_io::Error;
 use std::path::{Path, PathBuf};
 
@@ -66,33 +66,6 @@ fn section(results: &Results) -> String {
         }
     }
     out
-}
-
-/// Name of the fact that tells the command.
-pub(crate) const COMMAND: &str = "Command";
-
-/// The command line of this process; of many arguments in a row, drives that is, the first and
-/// last.
-pub(crate) fn command() -> String {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mut out = String::from("raywake-lab");
-    for run in arguments.chunk_by(|_, next| !next.starts_with('-')) {
-        match run {
-            [first, .., last] if run.len() > 8 => {
-                out += &format!(" {first} {} ... {last}", run[1]);
-            }
-            _ => run.iter().for_each(|argument| out += &format!(" {argument}")),
-        }
-    }
-    out
-}
-
-/// Cores and model of this machine's processor, where Linux tells.
-pub(crate) fn machine() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    format!("{cores} cores of {}", model.map_or("an unknown processor", |(_, name)| name))
 }
 
 #[cfg(test)]

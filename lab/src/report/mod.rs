@@ -9,6 +9,7 @@ mod chart;
 mod clouds;
 mod encode;
 mod html;
+mod measured_by;
 mod raster;
 mod table;
 
@@ -20,9 +21,9 @@ pub use chart::{
     Axis, Bar, BarSeries, Bars, Chart, Guide, Histogram, Lines, Mark, Plot, Series, Style,
 };
 pub use clouds::{Cloud, clouds};
-pub use table::{Cell, Line, Shown, Table, TableRow};
+pub use measured_by::COMMAND;
+pub use table::{Cell, Shown, Table, TableRow};
 
-use crate::results;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use serde::{Deserialize, Serialize};
@@ -59,7 +60,6 @@ pub struct Results {
 }
 
 impl Results {
-    /// Prints the tables, and where the report is.
     pub fn print(&self, folder: &Path) {
         self.tables.iter().for_each(|table| println!("{}", table.text()));
         println!("report: {}", folder.join("report.html").display());
@@ -82,14 +82,11 @@ enum Element {
     Picture(Picture),
 }
 
-/// A picture.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
-    /// What one sees.
     pub caption: String,
-    /// A PNG file.
     pub png: Vec<u8>,
 }
 
@@ -110,8 +107,8 @@ impl Report {
             subtitle: subtitle.into(),
             headlines: Vec::new(),
             facts: vec![
-                [results::COMMAND.into(), results::command()],
-                ["Machine".into(), results::machine()],
+                [COMMAND.into(), measured_by::command()],
+                ["Machine".into(), measured_by::machine()],
             ],
             sections: Vec::new(),
         }
@@ -130,7 +127,6 @@ impl Report {
         self
     }
 
-    /// Begins a section and returns it.
     pub fn section(&mut self, title: &str) -> &mut Section {
         self.sections.push(Section { title: title.into(), elements: Vec::new() });
         let last = self.sections.len() - 1;
@@ -157,7 +153,6 @@ impl Report {
         Ok(results)
     }
 
-    /// Its facts and tables.
     fn results(&self) -> Results {
         let elements = self.sections.iter().flat_map(|s| &s.elements);
         let tables = elements.filter_map(|element| match element {
@@ -214,13 +209,11 @@ impl Section {
         self
     }
 
-    /// A chart.
     pub fn chart(&mut self, chart: Chart) -> &mut Section {
         self.elements.push(Element::Chart(chart));
         self
     }
 
-    /// A picture.
     pub fn picture(&mut self, picture: Picture) -> &mut Section {
         self.elements.push(Element::Picture(picture));
         self

@@ -8,25 +8,32 @@ use serde::{Deserialize, Serialize};
 const NOTHING: &str = "–";
 
 /// A table with a name for its file.
-#[derive(Clone, Debug)]
-pub struct Table {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table<C = Cell> {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
-    /// What it tells.
     pub caption: String,
     /// Names of the columns with their units.
     pub columns: Vec<String>,
     /// As many cells each as there are columns.
-    pub rows: Vec<TableRow>,
+    pub rows: Vec<TableRow<C>>,
     /// Below the table.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
 }
 
-/// A row.
-#[derive(Clone, Debug)]
-pub struct TableRow {
-    cells: Vec<Cell>,
-    reference: bool,
+/// A table whose cells are text, as it stands on a page and in `results.json`.
+pub type Shown = Table<String>;
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableRow<C = Cell> {
+    /// One for each column.
+    pub cells: Vec<C>,
+    /// Whether these are somebody else's figures, to compare with; they step back.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub reference: bool,
 }
 
 impl TableRow {
@@ -35,18 +42,15 @@ impl TableRow {
         TableRow { cells: cells.into_iter().collect(), reference: false }
     }
 
-    /// Figures of somebody else's, to compare with; they step back.
+    /// Figures of somebody else's.
     pub fn reference(cells: impl IntoIterator<Item = Cell>) -> TableRow {
         TableRow { reference: true, ..TableRow::new(cells) }
     }
 }
 
-/// A cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// Words.
     Text(String),
-    /// How many.
     Count(u64),
     /// A number and the decimals that are shown of it; the CSV has all. NaN is shown as a dash.
     Number(f64, usize),
@@ -134,14 +138,13 @@ impl Table {
         encode::csv(&rows)
     }
 
-    /// For a screen.
     pub fn text(&self) -> String {
         self.shown().text()
     }
 
     /// With every cell as the text that is shown of it.
     pub fn shown(&self) -> Shown {
-        let row = |r: &TableRow| Line {
+        let row = |r: &TableRow| TableRow {
             cells: r.cells.iter().map(Cell::shown).collect(),
             reference: r.reference,
         };
@@ -155,38 +158,10 @@ impl Table {
     }
 }
 
-/// A table whose cells are text, as it stands on a page and in `results.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shown {
-    /// As of [`Table`].
-    pub id: String,
-    /// What it tells.
-    pub caption: String,
-    /// Names of the columns with their units.
-    pub columns: Vec<String>,
-    /// As many cells each as there are columns.
-    pub rows: Vec<Line>,
-    /// Below the table.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<String>,
-}
-
-/// A row of text.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Line {
-    /// One for each column.
-    pub cells: Vec<String>,
-    /// Whether these are somebody else's figures, to compare with.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub reference: bool,
-}
-
 impl Shown {
     /// Whether a column, never the first, holds numbers: those are set flush right.
     fn is_number(&self, column: usize) -> bool {
-        let number = |line: &Line| {
+        let number = |line: &TableRow<String>| {
             let text = line.cells[column].trim_start_matches('\u{2212}');
             text == NOTHING || text == "inf" || text.starts_with(|c: char| c.is_ascii_digit())
         };
