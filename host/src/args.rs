@@ -1,8 +1,5 @@
 //! The command line; the help text of a field is its documentation.
 
-// Flattened groups and plain choices have none.
-#![allow(missing_docs)]
-
 mod flow;
 mod sweeps;
 mod track;
@@ -35,12 +32,10 @@ Exit codes:
 #[derive(Debug, Parser)]
 #[command(name = "raywake", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub struct Args {
-    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// A command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Estimate the scene flow of a recorded drive
@@ -61,7 +56,6 @@ pub enum Command {
     Devices,
 }
 
-/// `raywake run`.
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
     /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
@@ -83,7 +77,6 @@ pub struct RunArgs {
     pub part: Selection,
 }
 
-/// How to read a recording.
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct Recording {
@@ -105,7 +98,6 @@ pub struct Recording {
     pub ground: Option<f64>,
 }
 
-/// The profile.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Profile")]
 pub struct ProfileChoice {
@@ -123,7 +115,6 @@ pub struct ProfileChoice {
     pub set: Vec<String>,
 }
 
-/// Trained weights.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Model weights")]
 pub struct Learned {
@@ -154,7 +145,6 @@ pub enum Validate {
     Gpu,
 }
 
-/// The backend.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Backend")]
 pub struct BackendChoice {
@@ -172,7 +162,6 @@ pub struct BackendChoice {
     pub validation: Option<Validate>,
 }
 
-/// The results.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Results {
@@ -210,7 +199,6 @@ pub enum Export {
     Argoverse,
 }
 
-/// `raywake map`.
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
     /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
@@ -232,7 +220,6 @@ pub struct MapArgs {
     pub part: Selection,
 }
 
-/// Selection of a recording.
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Sweeps")]
 pub struct Selection {
@@ -244,7 +231,6 @@ pub struct Selection {
     pub sweeps: Option<SweepRange>,
 }
 
-/// `raywake demo`.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// Output folder
@@ -257,7 +243,6 @@ pub struct DemoArgs {
     pub quiet: bool,
 }
 
-/// `raywake budget`.
 #[derive(Debug, clap::Args)]
 pub struct BudgetArgs {
     #[command(flatten)]

@@ -66,12 +66,10 @@ fn profiles(choice: &args::ProfileChoice) -> Result<Vec<Profile>, Error> {
     }
 }
 
-/// Whether a profile is the sparse map's.
 fn is_map(profile: &Profile) -> bool {
     *profile == Profile::map()
 }
 
-/// The buffers and programs of what a profile is for.
 fn schedule(profile: &Profile) -> Schedule {
     Schedule::new(if is_map(profile) { MAP_PROGRAMS } else { FLOW_PROGRAMS }, profile)
 }
@@ -91,11 +89,8 @@ pub fn device_bytes(profile: &Profile) -> u64 {
 /// A part of the host's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// What it is.
     pub name: &'static str,
-    /// The type it is made of.
     pub kind: &'static str,
-    /// Its size.
     pub bytes: u64,
 }
 

@@ -14,7 +14,6 @@ use raywake_io::Error;
 
 /// The pipeline on a backend, everything allocated.
 pub struct Chosen {
-    /// The pipeline.
     pub drive: Drive,
     /// Where the background filter comes from.
     pub filter: String,
@@ -92,21 +91,18 @@ fn options(choice: &BackendChoice) -> Options {
 /// The table of Vulkan devices, or why there is none.
 pub fn list_devices() -> Result<String, RunError> {
     match devices() {
-        Ok(list) => Ok(table(&list)),
-        Err(GpuError::NoLoader) => {
-            Ok("No Vulkan loader found: the scalar backend will be used.\n".into())
-        }
-        Err(GpuError::NoDevice) => {
-            Ok("No Vulkan device found: the scalar backend will be used.\n".into())
-        }
+        Ok(list) if !list.is_empty() => Ok(table(&list)),
+        Ok(_) | Err(GpuError::NoDevice) => Ok(without("device")),
+        Err(GpuError::NoLoader) => Ok(without("loader")),
         Err(e) => Err(RunError::Device(e)),
     }
 }
 
+fn without(what: &str) -> String {
+    format!("No Vulkan {what} found: the scalar backend will be used.\n")
+}
+
 fn table(list: &[DeviceInfo]) -> String {
-    if list.is_empty() {
-        return "No Vulkan device found: the scalar backend will be used.\n".into();
-    }
     let head = ["index", "name", "kind", "Vulkan", "driver", "usable"].map(String::from);
     let rows: Vec<[String; 6]> = std::iter::once(head).chain(list.iter().map(row)).collect();
     let width = |n: usize| rows.iter().map(|r| r[n].chars().count()).max().unwrap_or(0);

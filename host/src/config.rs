@@ -17,14 +17,11 @@ const OBJECTS: &str = "objects";
 
 /// All that can be set.
 pub struct Settings {
-    /// The flow.
     pub profile: Profile,
-    /// Tracks of objects.
     pub objects: TrackingParams,
 }
 
 impl Settings {
-    /// A profile, with the defaults of tracking.
     pub fn new(profile: Profile) -> Settings {
         Settings { profile, objects: TrackingParams::DEFAULT }
     }
@@ -117,7 +114,6 @@ fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Res
     }
 }
 
-/// Settings from the text of a file.
 fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
     let line = |at: usize| format!("line {}", text[..at.min(text.len())].matches('\n').count() + 1);
     let table = DeTable::parse(text).map_err(|e| {

@@ -62,6 +62,14 @@ impl Spread {
             max,
         })
     }
+
+    /// Of times in ms, with so many decimals, for people.
+    pub fn line(&self, decimals: usize) -> String {
+        let Spread { median, sd, p99, max, .. } = self;
+        format!(
+            "{median:.decimals$} ms median, {sd:.decimals$} sd, {p99:.decimals$} p99, {max:.decimals$} max"
+        )
+    }
 }
 
 #[cfg(test)]

@@ -23,32 +23,23 @@ use raywake_io::Error;
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::SweepData;
 
-/// Which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
     /// Feather files of columns and tracklets.
     pub columns: bool,
     /// Feather files of returns.
     pub points: bool,
-    /// Pictures.
     pub png: Option<PictureFrame>,
     /// Submission files of Argoverse 2.
     pub argoverse: bool,
 }
 
-/// Where files go.
 pub struct Outputs {
-    folders: Option<Folders>,
+    root: Option<PathBuf>,
+    kinds: Kinds,
     log: String,
     profile: Profile,
     pictures: Option<(Pictures, PictureFrame)>,
-}
-
-struct Folders {
-    columns: Option<PathBuf>,
-    tracklets: Option<PathBuf>,
-    points: Option<PathBuf>,
-    argoverse: Option<PathBuf>,
 }
 
 impl Kinds {
@@ -62,13 +53,17 @@ impl Kinds {
         }
     }
 
-    /// Fails where this build lacks a feature that the files need.
-    fn check(&self) -> Result<(), Error> {
+    /// Creates the folders. Fails where this build lacks a feature that the files need.
+    fn create_folders(&self, root: &Path) -> Result<(), Error> {
         if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
             let what = "--out needs the feature `arrow`, which is not compiled in";
             return Err(Error::Unsupported(what.into()));
         }
-        Ok(())
+        atomic::create_folder(root)?;
+        let (columns, points) = (self.columns, self.points);
+        let all = [("columns", columns), ("tracklets", columns), ("points", points)];
+        let all = all.into_iter().chain([("argoverse", self.argoverse)]);
+        all.filter(|f| f.1).try_for_each(|(name, _)| atomic::create_folder(&root.join(name)))
     }
 }
 
@@ -81,36 +76,36 @@ impl Outputs {
         log: &str,
         profile: &Profile,
     ) -> Result<Outputs, Error> {
-        let folders = root.map(|root| Folders::create(root, kinds)).transpose()?;
+        root.map_or(Ok(()), |root| kinds.create_folders(root))?;
         let pictures = match root.zip(kinds.png) {
             Some((root, frame)) => Some((Pictures::folder(&root.join("png"), log)?, frame)),
             None => None,
         };
-        Ok(Outputs { folders, log: log.to_string(), profile: profile.clone(), pictures })
+        let (log, profile) = (log.to_string(), profile.clone());
+        Ok(Outputs { root: root.map(Path::to_path_buf), kinds, log, profile, pictures })
     }
 
-    /// Writes what a pair of sweeps yields for its first sweep.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
-        let Some(folders) = &self.folders else { return Ok(()) };
+        let Some(root) = &self.root else { return Ok(()) };
         let meta = meta(first, flows.dt_s);
-        if let Some(folder) = &folders.columns {
-            feather::write_columns(&named(folder, first, "feather"), flows.columns, &meta)?;
+        if self.kinds.columns {
+            feather::write_columns(&named(root, "columns", first), flows.columns, &meta)?;
         }
-        if let Some(folder) = &folders.points {
+        if self.kinds.points {
             // The pipeline has no flow for returns over its capacity.
             let points = &first.points[..flows.points.len().min(first.points.len())];
-            feather::write_points(&named(folder, first, "feather"), points, flows.points, &meta)?;
+            feather::write_points(&named(root, "points", first), points, flows.points, &meta)?;
         }
         if let Some((pictures, frame)) = &mut self.pictures {
             let (columns, profile, frame) = (flows.columns, &self.profile, *frame);
             pictures.write(first, &Subject::Flow { columns, profile, frame })?;
         }
-        if let Some(folder) = &folders.argoverse {
+        if self.kinds.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);
             // Graders want a row for every return, those over the capacity too.
             let mut rows = flows.points.to_vec();
             rows.resize(first.points.len().max(rows.len()), PointFlow::default());
-            argoverse::export(folder, &self.log, first.frame, &rows, pose, dt)?;
+            argoverse::export(&root.join("argoverse"), &self.log, first.frame, &rows, pose, dt)?;
         }
         Ok(())
     }
@@ -122,36 +117,19 @@ impl Outputs {
         tracklets: &[TrackletState],
         dt_s: f64,
     ) -> Result<(), Error> {
-        match self.folders.as_ref().and_then(|f| f.tracklets.as_ref()) {
-            Some(folder) => {
-                let path = named(folder, second, "feather");
+        match &self.root {
+            Some(root) if self.kinds.columns => {
+                let path = named(root, "tracklets", second);
                 feather::write_tracklets(&path, tracklets, &meta(second, dt_s))
             }
-            None => Ok(()),
+            _ => Ok(()),
         }
     }
 }
 
-impl Folders {
-    fn create(root: &Path, kinds: Kinds) -> Result<Folders, Error> {
-        kinds.check()?;
-        atomic::create_folder(root)?;
-        let folder = |name: &str, wanted: bool| {
-            let path = root.join(name);
-            wanted.then(|| atomic::create_folder(&path).map(|()| path)).transpose()
-        };
-        Ok(Folders {
-            columns: folder("columns", kinds.columns)?,
-            tracklets: folder("tracklets", kinds.columns)?,
-            points: folder("points", kinds.points)?,
-            argoverse: folder("argoverse", kinds.argoverse)?,
-        })
-    }
-}
-
 /// A sweep's file. Ten digits, so that names sort as frames do.
-fn named(folder: &Path, sweep: &SweepData, extension: &str) -> PathBuf {
-    folder.join(format!("{:010}.{extension}", sweep.frame))
+fn named(root: &Path, kind: &str, sweep: &SweepData) -> PathBuf {
+    root.join(format!("{kind}/{:010}.feather", sweep.frame))
 }
 
 fn meta(sweep: &SweepData, dt_s: f64) -> [(&'static str, String); 3] {

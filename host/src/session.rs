@@ -13,18 +13,14 @@ use crate::progress::Progress;
 
 /// A sweep that has just been read.
 pub struct Visit<'a> {
-    /// Its index in the recording.
     pub index: usize,
-    /// The sweep.
     pub now: &'a SweepData,
     /// The sweep visited before it, if any.
     pub before: Option<&'a SweepData>,
-    /// How long reading it took, ms.
     pub read_ms: f64,
 }
 
-/// How a session ended.
-pub struct End {
+pub struct SessionEnd {
     /// A signal came before the last sweep.
     pub interrupted: bool,
     /// The last sweep visited, as it was read.
@@ -41,14 +37,14 @@ pub fn each_sweep<S: Source + ?Sized>(
     sweeps: Range<usize>,
     quiet: bool,
     mut visit: impl FnMut(&S, &Visit) -> Result<(), RunError>,
-) -> Result<End, RunError> {
+) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
     let mut progress = Progress::new(sweeps.len(), quiet);
     for (done, index) in sweeps.enumerate() {
         if interrupted() {
             progress.finish();
-            return Ok(End { interrupted: true, last });
+            return Ok(SessionEnd { interrupted: true, last });
         }
         let clock = Instant::now();
         source.read(index, &mut now)?;
@@ -58,5 +54,5 @@ pub fn each_sweep<S: Source + ?Sized>(
         progress.update(done + 1);
     }
     progress.finish();
-    Ok(End { interrupted: false, last })
+    Ok(SessionEnd { interrupted: false, last })
 }

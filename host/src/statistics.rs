@@ -23,7 +23,6 @@ pub const BUDGET_MS: f64 = 100.0;
 /// A sweep that had no usable predecessor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResetAt {
-    /// Index of the sweep in the recording.
     pub sweep: usize,
     /// Frame number or timestamp of the sweep.
     pub frame: u64,
@@ -92,15 +91,6 @@ impl fmt::Display for Dropped {
     }
 }
 
-/// Times of one stage.
-#[derive(Clone, Debug)]
-pub struct StageTimes {
-    /// Its name.
-    pub name: &'static str,
-    /// One value per pair of sweeps, ms.
-    pub milliseconds: Vec<f64>,
-}
-
 /// Everything counted and timed. Times are of sweeps that complete a pair; a sweep after a reset,
 /// the first one too, yields no flow and counts for no time.
 #[derive(Debug, Default)]
@@ -119,13 +109,11 @@ pub struct Statistics {
     pub foreground: u64,
     /// Valid flows of all pairs.
     pub valid: u64,
-    /// Times by stage, in the order of the first pair.
-    pub stages: Vec<StageTimes>,
+    /// Times by stage, in the order of the first pair: name and, for every pair, ms.
+    pub stages: Vec<(&'static str, Vec<f64>)>,
     /// Sums of the stages of each pair, ms.
     pub totals: Vec<f64>,
-    /// Time to read sweeps, ms.
     pub read_ms: f64,
-    /// Time to write results, ms.
     pub write_ms: f64,
     /// Left out.
     pub dropped: Dropped,
@@ -135,7 +123,6 @@ pub struct Statistics {
     pub ages_at_end: [u64; AGES.len()],
     /// Tracklets after every sweep that completed a pair.
     pub ages_sum: [u64; AGES.len()],
-    /// Resets.
     pub resets: Vec<ResetAt>,
     /// Of all results, see [`Statistics::tracklets`].
     pub digest: Digest,
@@ -176,9 +163,9 @@ impl Statistics {
         let mut total = 0.0;
         for (name, ms) in laps.stages() {
             total += ms;
-            match self.stages.iter_mut().find(|s| s.name == name) {
-                Some(stage) => stage.milliseconds.push(ms),
-                None => self.stages.push(StageTimes { name, milliseconds: vec![ms] }),
+            match self.stages.iter_mut().find(|s| s.0 == name) {
+                Some((_, times)) => times.push(ms),
+                None => self.stages.push((name, vec![ms])),
             }
         }
         self.totals.push(total);

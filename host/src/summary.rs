@@ -8,10 +8,7 @@ use crate::statistics::{AGES, Dropped, ResetAt, Statistics};
 
 /// Entries of a JSON object in the order given.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ordered<T>(
-    /// Names and values.
-    pub Vec<(&'static str, T)>,
-);
+pub struct Ordered<T>(pub Vec<(&'static str, T)>);
 
 impl<T: Serialize> Serialize for Ordered<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -36,7 +33,6 @@ pub struct Aged {
 /// for the rest; times are of sweeps that complete a pair, without reading and writing files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
-    /// What was run.
     #[serde(flatten)]
     pub facts: Facts,
     /// Sweeps done.
@@ -57,7 +53,6 @@ pub struct RunSummary {
     pub points: f64,
     /// Mean distinct rays.
     pub distinct_rays: f64,
-    /// Time of every stage, ms.
     pub stage_ms: Ordered<Spread>,
     /// Time of all stages, ms; null without a pair.
     pub total_ms: Option<Spread>,
@@ -67,7 +62,6 @@ pub struct RunSummary {
     pub read_ms: f64,
     /// Mean time to write a sweep's results, ms.
     pub write_ms: f64,
-    /// Left out.
     pub dropped: Dropped,
     /// Tracklets born and ended.
     #[serde(serialize_with = "by_name")]
@@ -83,7 +77,6 @@ pub struct RunSummary {
 pub struct Facts {
     /// Version of this program.
     pub version: &'static str,
-    /// Name of the recording.
     pub source: String,
     /// Name of the profile.
     pub profile: String,
@@ -112,8 +105,7 @@ impl RunSummary {
     /// Puts the figures together.
     pub fn new(facts: Facts, s: &Statistics) -> RunSummary {
         let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
-        let spreads =
-            s.stages.iter().filter_map(|t| Some((t.name, Spread::of(&t.milliseconds)?))).collect();
+        let spreads = s.stages.iter().filter_map(|(name, ms)| Some((*name, Spread::of(ms)?)));
         let ages = AGES.iter().zip(s.ages_at_end.iter().zip(s.ages_sum));
         let ages =
             ages.map(|((name, _), (&end, sum))| (*name, Aged { end, mean: per(sum, s.pairs) }));
@@ -128,7 +120,7 @@ impl RunSummary {
             solid_columns: per(s.solid, s.pairs),
             points: per(s.points, s.sweeps),
             distinct_rays: per(s.rays, s.sweeps),
-            stage_ms: Ordered(spreads),
+            stage_ms: Ordered(spreads.collect()),
             total_ms: Spread::of(&s.totals),
             share_under_100_ms: s.share_in_time(),
             read_ms: s.read_ms / s.sweeps.max(1) as f64,

@@ -45,7 +45,6 @@ impl WeightFiles {
         })
     }
 
-    /// Whether there is a background filter.
     pub fn has_filter(&self) -> bool {
         self.filter.is_some()
     }

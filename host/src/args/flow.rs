@@ -28,7 +28,6 @@ float32 per row. The metadata of the feather file has dt_s, ground_m and a_from_
 motion (a row-major 3x4 matrix: the pose of B's frame in A's).
 Points outside the profile's window, and points of A after the first";
 
-/// `raywake flow`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct FlowArgs {

@@ -7,7 +7,6 @@ use raywake_io::Error;
 /// A half-open range of sweeps as typed: either end may be missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SweepRange {
-    /// First sweep.
     pub from: usize,
     /// Sweep after the last one.
     pub to: Option<usize>,

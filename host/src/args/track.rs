@@ -24,7 +24,6 @@ Files of --out DIR:
                      of the track)
     summary.json     statistics of the run";
 
-/// `raywake track`.
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct TrackArgs {
@@ -64,7 +63,6 @@ pub struct TrackArgs {
     pub part: Selection,
 }
 
-/// Detection and association.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FrontEndKind {
     /// Height variance in cells of a ground grid; association by position

@@ -43,12 +43,10 @@ impl Device {
         self.executor.census()
     }
 
-    /// Messages of the validation layer.
     pub fn messages(&self) -> Vec<String> {
         self.executor.message_texts()
     }
 
-    /// The device's name.
     pub fn name(&self) -> &str {
         &self.executor.info().name
     }

@@ -162,7 +162,6 @@ fn sizes<'a>(profiles: &[&'a Profile]) -> Vec<Sizes<'a>> {
     all
 }
 
-/// One cell for each size.
 fn cells(sizes: &[Sizes], cell: impl Fn(&Sizes) -> String) -> String {
     sizes.iter().map(cell).collect::<Vec<_>>().join(" | ")
 }

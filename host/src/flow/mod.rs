@@ -85,7 +85,6 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     Ok(say(&format!("times      {}\n", times.join(", ")))?)
 }
 
-/// From which cloud to which.
 fn title(args: &args::FlowArgs) -> String {
     let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
     format!("from {} to {}", name(&args.first), name(&args.second))

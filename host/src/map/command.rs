@@ -56,7 +56,6 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     Ok(!end.interrupted)
 }
 
-/// What is counted over all maps.
 #[derive(Default)]
 struct MapTally {
     digest: Digest,
@@ -96,14 +95,11 @@ impl MapTally {
         let count = self.milliseconds.len();
         format!(
             "{count} sweeps, {} voxels per sweep\n\
-             map        {:.1} ms median, {:.1} sd, {:.1} p99, {:.1} max\n\
+             map        {}\n\
              dropped    {}\n\
              digest     {:016x}\n",
             self.voxels / count,
-            t.median,
-            t.sd,
-            t.p99,
-            t.max,
+            t.line(1),
             self.dropped,
             self.digest.value()
         )

@@ -73,7 +73,6 @@ pub(super) fn along_vehicle(world_from_vehicle: &Pose, [x, y]: [f64; 2]) -> [f32
     [along.x as f32, along.y as f32]
 }
 
-/// Places of returns.
 pub(super) fn places(sweep: &SweepData) -> Vec<[f32; 3]> {
     sweep.points.iter().map(|p| p.position).collect()
 }

@@ -16,23 +16,15 @@ use crate::statistics::Dropped;
 use raywake_io::Error;
 use raywake_io::source::SweepData;
 
-/// Tracks that the report lists.
 const LISTED: usize = 20;
 
-/// Counts over all sweeps, but those of dropped returns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts(TrackingCounts);
-
-impl Serialize for Counts {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.named())
-    }
+fn by_name<S: Serializer>(counts: &TrackingCounts, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(counts.named())
 }
 
 /// A track at its end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// Its number.
     pub track: u32,
     /// Time of its first centroid, s.
     pub from_s: f64,
@@ -40,7 +32,6 @@ pub struct Line {
     pub for_s: f64,
     /// Centroids observed.
     pub updates: u32,
-    /// Returns seen.
     pub returns: u64,
     /// From the first place of the estimate to the last, m.
     pub moved_m: f64,
@@ -48,14 +39,12 @@ pub struct Line {
     pub speed_mps: f64,
     /// Mean distance of a return from the model, m.
     pub residual_m: f64,
-    /// Iterations of the estimate.
     pub iterations: usize,
 }
 
 /// What is counted as a run goes on.
 #[derive(Default)]
 pub struct Report {
-    /// Counts.
     pub counts: TrackingCounts,
     dropped: Dropped,
     sweeps: u64,
@@ -132,7 +121,7 @@ impl Report {
             digest: format!("{:016x}", self.digest.value()),
             step_ms: Spread::of(&self.steps),
             estimate_ms: Spread::of(&self.estimates),
-            tally: Counts(self.counts),
+            tally: self.counts,
             dropped: self.dropped,
             tracks: self.lines,
         }
@@ -144,7 +133,6 @@ impl Report {
 pub struct TrackSummary {
     /// Version of this program.
     pub version: &'static str,
-    /// Name of the recording.
     pub source: String,
     /// `variance` or `flow`.
     pub front_end: &'static str,
@@ -159,8 +147,9 @@ pub struct TrackSummary {
     pub step_ms: Option<Spread>,
     /// Time of the estimate of a track at its end, ms; null without a track.
     pub estimate_ms: Option<Spread>,
-    /// Counts over all sweeps.
-    pub tally: Counts,
+    /// Counts over all sweeps, but those of dropped returns.
+    #[serde(serialize_with = "by_name")]
+    pub tally: TrackingCounts,
     /// Left out.
     pub dropped: Dropped,
     /// Every track that was seen often enough, in the order of their ends.
@@ -178,7 +167,7 @@ impl TrackSummary {
 
     fn print(&self, out: &mut String) -> std::fmt::Result {
         let end = if self.interrupted { ", INTERRUPTED" } else { "" };
-        let brief = self.tally.0.ended.saturating_sub(self.tracks.len() as u64);
+        let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
         writeln!(
             out,
             "\n{} sweeps, {} tracks ({brief} shorter ones omitted){end}",
@@ -188,14 +177,10 @@ impl TrackSummary {
         self.longest(out)?;
         for (what, spread) in [("sweep", &self.step_ms), ("estimate", &self.estimate_ms)] {
             if let Some(t) = spread {
-                writeln!(
-                    out,
-                    "{what:10} {:.2} ms median, {:.2} sd, {:.2} p99, {:.2} max",
-                    t.median, t.sd, t.p99, t.max
-                )?;
+                writeln!(out, "{what:10} {}", t.line(2))?;
             }
         }
-        let t = &self.tally.0;
+        let t = &self.tally;
         writeln!(
             out,
             "segments   {} candidates, {} too small, {} too large",
