@@ -4,7 +4,6 @@ use raywake::order_statistics::quantiles;
 use raywake_core::pose::Pose;
 use std::fmt::{self, Write};
 
-/// Names and units of the rows.
 const ROWS: [&str; 8] =
     ["x m", "y m", "z m", "translation m", "roll deg", "pitch deg", "yaw deg", "rotation deg"];
 

@@ -68,7 +68,6 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A drive matched.
 struct Chain {
     /// `world_from_vehicle` of every sweep.
     poses: Vec<Pose>,

@@ -47,7 +47,6 @@ fn at_stamp(points: &[TimedPoint], twist: Twist) -> impl Iterator<Item = DVec3> 
 }
 
 impl Matcher {
-    /// For the sweeps of a rig.
     pub fn new(rig: &Rig) -> Matcher {
         Matcher {
             rig: rig.clone(),

@@ -2,21 +2,17 @@
 
 use super::{AccuracyTable, BucketedEpe, Pair, Rules, ScoreError, ThreeWayEpe};
 
-/// The metrics of one estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grades {
-    /// Bucket-normalised error.
     pub bucketed: BucketedEpe,
     /// Three-way error.
     pub three_way: ThreeWayEpe,
     /// Accuracies and outliers, without the vehicle's motion.
     pub over_ground: AccuracyTable,
-    /// The same with it.
     pub with_ego_motion: AccuracyTable,
 }
 
 impl Grades {
-    /// Counts a pair.
     pub fn add(
         &mut self,
         pair: &Pair,

@@ -19,15 +19,12 @@ pub struct TruePoint {
     /// Motion to the second sweep along the axes of the same frame, m, the vehicle's own
     /// removed: what stands has none.
     pub flow_m: [f32; 3],
-    /// What it belongs to.
     pub category: Category,
-    /// Whether the truth is known.
     pub valid: bool,
     /// Whether it belongs to the ground.
     pub ground: bool,
 }
 
-/// A pair of sweeps with its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
     /// All returns of the first sweep.
@@ -57,7 +54,6 @@ impl Rules {
 /// A return that counts, with its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
-    /// What it belongs to.
     pub category: Category,
     /// Within [`NEAR_M`] of the vehicle at the second sweep (itself as at the first).
     pub near: bool,
@@ -67,7 +63,6 @@ pub struct Scored {
     pub error_m: f32,
     /// [`TruePoint::position_m`].
     pub position_m: [f32; 3],
-    /// True motion, m.
     pub truth_m: [f32; 3],
     /// Estimated motion in the same terms, m.
     pub estimate_m: [f32; 3],
@@ -77,22 +72,11 @@ pub struct Scored {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScoreError {
     /// There is not one estimate per return.
-    Rows {
-        /// Returns of the sweep.
-        points: usize,
-        /// Rows of the estimate.
-        estimates: usize,
-    },
+    Rows { points: usize, estimates: usize },
     /// The truth is NaN or infinite (or its square is) where it counts.
-    Truth {
-        /// Row, from 0.
-        row: usize,
-    },
+    Truth { row: usize },
     /// The estimate is, where it counts.
-    Estimate {
-        /// Row, from 0.
-        row: usize,
-    },
+    Estimate { row: usize },
 }
 
 impl fmt::Display for ScoreError {

@@ -13,7 +13,6 @@ struct Numbers {
     tables: usize,
 }
 
-/// The whole page.
 pub(super) fn page(report: &Report) -> String {
     let title = xml(&report.title);
     let mut out = format!(

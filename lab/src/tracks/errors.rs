@@ -54,7 +54,6 @@ impl Alignment {
 /// Sums of squared errors of one track or of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// Moments.
     pub count: usize,
     /// Along x and y, m².
     pub ground: f64,

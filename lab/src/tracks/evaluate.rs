@@ -66,7 +66,6 @@ pub const MAIN: usize = 5;
 /// How one tracker did on one object.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// Against what is known.
     pub errors: Errors,
     /// Of the whole cloud, nats.
     pub entropy: f64,
@@ -74,7 +73,6 @@ pub struct Score {
     pub extent: [f64; 3],
     /// At the start and after each iteration; empty for the baseline.
     pub costs: Vec<Cost>,
-    /// Why it stopped.
     pub stop: Termination,
     /// Time of the estimate, or of all of them where there is one a batch, s; 0 for the baseline.
     pub seconds: f64,
@@ -85,15 +83,12 @@ pub struct Score {
 pub struct Outcome {
     /// Drive and number.
     pub name: String,
-    /// What it is.
     pub kind: Kind,
     /// Length, width and height of its box, m.
     pub size: [f64; 3],
     /// Whether it stands.
     pub stationary: bool,
-    /// Its returns.
     pub returns: usize,
-    /// Seen for so long, s.
     pub span_s: f64,
     /// Mean range of its returns, m.
     pub range_m: f64,
@@ -109,14 +104,12 @@ pub struct Outcome {
 
 /// What a tracker did.
 pub struct Run {
-    /// What it makes of the object.
     pub track: Track,
     costs: Vec<Cost>,
     stop: Termination,
     seconds: f64,
 }
 
-/// Runs a tracker.
 pub fn track(
     object: &Object,
     history: &[ObjectState],

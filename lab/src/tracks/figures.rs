@@ -60,7 +60,6 @@ fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 
     methods.map(|(name, method)| (name, track(object, &history, &method, estimator).track))
 }
 
-/// A number of a moment.
 type Quantity = fn(&Moment) -> f64;
 
 /// Figure 2.7: speed and heading of an object.

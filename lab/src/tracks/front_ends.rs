@@ -31,11 +31,8 @@ const OWNED_S: f64 = 1.0;
 
 /// What a front end needs.
 pub struct Settings<'a> {
-    /// Of the flow.
     pub profile: &'a ProfileChoice,
-    /// Of the flow.
     pub learned: &'a Learned,
-    /// Of the flow.
     pub backend: &'a BackendChoice,
 }
 
@@ -97,7 +94,6 @@ impl Found {
     }
 }
 
-/// All tracks of a drive.
 fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, RunError> {
     let mut source = source::open(path, &OpenOptions::default())?;
     let tracking = config::settings(settings.profile)?;

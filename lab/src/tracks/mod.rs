@@ -64,7 +64,6 @@ pub struct Args {
     backend: BackendChoice,
 }
 
-/// Objects of a set that is evaluated.
 struct Objects {
     id: &'static str,
     name: &'static str,

@@ -11,7 +11,6 @@ use std::ops::Range;
 pub struct Object {
     /// Drive and number.
     pub name: String,
-    /// What it is.
     pub kind: Kind,
     /// Length, width and height of its box, m.
     pub size: [f64; 3],
@@ -139,12 +138,10 @@ pub fn moment_at(history: &[Moment], time_s: f64) -> Moment {
 }
 
 impl Object {
-    /// Its returns by batches.
     pub fn batches(&self) -> impl Iterator<Item = &[ObjectReturn]> {
         self.batches.iter().map(|b| &self.returns[b.clone()])
     }
 
-    /// How long it is seen, s.
     pub fn span_s(&self) -> f64 {
         match (self.returns.first(), self.returns.last()) {
             (Some(a), Some(b)) => f64::from(b.time_s) - f64::from(a.time_s),

@@ -104,7 +104,6 @@ pub fn rule() -> String {
     )
 }
 
-/// The kind of a class.
 fn of_class(class: raywake_sim::Class) -> Kind {
     kind(class_name(class)).unwrap_or(Kind::Other)
 }
@@ -207,7 +206,6 @@ fn batch(time_s: f64) -> usize {
     (time_s / PERIOD_S + 0.5).max(0.0) as usize
 }
 
-/// Returns by batches.
 fn batches(returns: &[Seen]) -> Vec<Range<usize>> {
     let mut batches = Vec::new();
     for same in returns.chunk_by(|a, b| batch(a.time_s) == batch(b.time_s)) {

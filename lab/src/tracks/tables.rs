@@ -26,13 +26,11 @@ const PRINTED_ENTROPY: [(&str, [f64; 3]); 2] = [
     ("dissertation, dynamic", [f64::NAN, 2.860, 2.756]),
 ];
 
-/// Objects of one set.
 pub struct Set {
     /// Part of the tables' names.
     pub id: String,
     /// As in "simulated, stationary".
     pub name: String,
-    /// All objects.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -275,7 +273,6 @@ pub fn extents(sets: &[Set]) -> Table {
     table("extents".into(), caption.into(), columns, rows)
 }
 
-/// The tracks on which ours is worst.
 pub fn worst(set: &Set) -> Table {
     let position = |o: &Outcome, n: usize| o.scores[n].errors.rmse().position;
     let mut all: Vec<&Outcome> = set.outcomes.iter().collect();

@@ -18,10 +18,8 @@ pub fn features(source: Column, target: Column) -> [u8; WIDTH] {
     std::array::from_fn(|n| (masks[n / LEVELS] >> (n % LEVELS) & 1) as u8)
 }
 
-/// One pair of columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// What the classifier sees.
     pub features: [u8; WIDTH],
     /// Whether the one went to where the other is.
     pub same: bool,

@@ -12,7 +12,6 @@ use raywake_io::source::SweepData;
 pub struct Seen {
     /// The same for the same object in every sweep of the drive.
     pub id: usize,
-    /// What it is.
     pub kind: Kind,
     /// Its box's frame: centre, x forward, y left, z up.
     pub vehicle_from_box: Pose,
@@ -20,12 +19,10 @@ pub struct Seen {
     pub size: [f64; 3],
 }
 
-/// A sweep and what is known of it.
 #[derive(Default)]
 pub struct LabelledSweep {
     /// Returns, pose and times.
     pub data: SweepData,
-    /// Labelled objects.
     pub objects: Vec<Seen>,
     /// What every return comes from: an index of `objects`, or [`raywake_core::record::NONE`] for
     /// the background. Empty where only the boxes tell.
@@ -33,18 +30,15 @@ pub struct LabelledSweep {
 }
 
 impl LabelledSweep {
-    /// Pose of an object's box in the world.
     pub fn world_from_box(&self, seen: &Seen) -> Pose {
         self.data.world_from_vehicle * seen.vehicle_from_box
     }
 }
 
-/// A drive with labels.
 pub trait Labelled {
     /// Sensors, timing and frame of the vehicle.
     fn rig(&self) -> &Rig;
 
-    /// Number of sweeps.
     fn len(&self) -> usize;
 
     /// Reads a sweep; what `into` held is replaced.

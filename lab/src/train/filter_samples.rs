@@ -11,10 +11,8 @@ use raywake_sim::Rng;
 /// Share of the background columns that is kept.
 pub const BACKGROUND_KEPT: f64 = 0.2;
 
-/// One column.
 #[derive(Clone, Copy)]
 pub struct Sample {
-    /// What the classifier sees.
     pub features: Features,
     /// What it belongs to, whether that moves or not; `None`: to the background.
     pub kind: Option<Kind>,
@@ -27,7 +25,6 @@ impl Sample {
     }
 }
 
-/// Samples of one sweep of a drive.
 pub fn of_sweep(
     grid: &mut Grid,
     drive: &mut dyn Labelled,

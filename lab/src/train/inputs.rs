@@ -43,7 +43,6 @@ enum Material {
     Recorded(PathBuf),
 }
 
-/// A drive, and what it is for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planned {
     material: Material,
@@ -55,7 +54,6 @@ pub struct Planned {
 pub struct Visit<'a> {
     /// For its sweeps; its lattice lies anywhere.
     pub grid: &'a mut Grid,
-    /// The drive.
     pub drive: &'a mut dyn Labelled,
     /// Sweeps to use.
     pub sweeps: Vec<usize>,

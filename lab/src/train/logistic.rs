@@ -9,7 +9,6 @@ pub struct Data<T = u8> {
     pub width: usize,
     /// Rows, one behind the other.
     pub rows: Vec<T>,
-    /// Label of every row.
     pub labels: Vec<bool>,
     /// Weight of every row; they are to sum up to about 1.
     pub weights: Vec<f32>,
@@ -57,7 +56,6 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
         sum + weights[row.len()]
     }
 
-    /// The loss at some weights.
     pub fn loss(&self, weights: &[f64]) -> f64 {
         self.slope(weights, false).loss
     }

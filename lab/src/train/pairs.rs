@@ -29,9 +29,7 @@ pub struct Match {
 pub struct Pair {
     /// Sizes of the window and its shift.
     pub step: SweepUniform,
-    /// First sweep.
     pub before: Vec<Column>,
-    /// Second sweep.
     pub now: Vec<Column>,
     /// Solid columns of objects.
     pub matches: Vec<Match>,

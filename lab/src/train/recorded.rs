@@ -8,7 +8,6 @@ use raywake_io::Error;
 use raywake_io::source::{OpenOptions, Source, open};
 use std::path::Path;
 
-/// A recorded drive.
 pub struct Recorded {
     source: Box<dyn Source>,
     labels: Labels,

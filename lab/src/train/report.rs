@@ -43,7 +43,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts labels.
     pub fn of(labels: impl Iterator<Item = bool>) -> Counts {
         labels.fold(Counts { positive: 0, negative: 0 }, |c, positive| Counts {
             positive: c.positive + positive as usize,

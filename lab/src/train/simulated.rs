@@ -10,7 +10,6 @@ use raywake_io::Error;
 use raywake_io::source::{SourceGaps, SweepData};
 use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
 
-/// A drive of the simulator.
 pub struct Simulated {
     drive: Drive,
     rig: Rig,

@@ -6,7 +6,6 @@ use std::ops::Range;
 /// Shortest axis and largest value: plotters looks for labels without end beyond these.
 const SPAN: [f64; 2] = [1e-9, 1e12];
 
-/// One axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Quantity and unit, as in "error, m".
@@ -21,7 +20,6 @@ impl Axis {
         Axis { label: label.into(), range: None }
     }
 
-    /// The same from `low` to `high`.
     pub fn range(self, low: f64, high: f64) -> Axis {
         Axis { range: Some([low, high]), ..self }
     }
@@ -54,7 +52,6 @@ pub(super) fn linear_label(ends: Range<f64>) -> impl Fn(&f64) -> String {
     move |v| fixed(*v, decimals as usize)
 }
 
-/// Labels of logarithmic axes.
 pub(super) fn log_label(v: &f64) -> String {
     if (1e-4..1e7).contains(v) { short(*v) } else { format!("{v:.0e}") }
 }

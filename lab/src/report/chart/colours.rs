@@ -3,11 +3,9 @@
 
 use plotters::style::RGBColor;
 
-/// Text.
 pub(super) const INK: RGBColor = rgb(0x1f2430);
 /// Text that steps back, and reference values.
 pub(super) const MUTED: RGBColor = rgb(0x667085);
-/// Grid lines.
 pub(super) const GRID: RGBColor = rgb(0xe4e7ec);
 /// Lines at zero.
 pub(super) const AXIS: RGBColor = rgb(0x98a2b3);

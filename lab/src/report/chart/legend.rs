@@ -9,7 +9,6 @@ use plotters::style::{Color, RGBColor};
 const ROW: f64 = 21.0;
 const SWATCH: f64 = 22.0;
 
-/// A name and what stands for it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Entry {
     pub name: String,
