@@ -95,10 +95,9 @@ pub fn write_tracklets(
     t.column("turn_rate_radps", tracklets, |s| s.turn_rate_radps);
     t.array(["vx_world_mps", "vy_world_mps"], tracklets, |s| s.velocity_world_mps);
     t.array(["vx_ego_mps", "vy_ego_mps"], tracklets, |s| s.velocity_ego_mps);
-    for row in 0..STATE.len() {
-        for column in row..STATE.len() {
-            let name = format!("cov_{}_{}", STATE[row], STATE[column]);
-            t.column(&name, tracklets, |s| s.covariance[row][column]);
+    for (row, of) in STATE.iter().enumerate() {
+        for (column, with) in STATE.iter().enumerate().skip(row) {
+            t.column(&format!("cov_{of}_{with}"), tracklets, |s| s.covariance[row][column]);
         }
     }
     t.column("age", tracklets, |s| s.age);
