@@ -181,12 +181,8 @@ impl<'a> SweepPair<'a> {
                 self.set_relative(at, flow);
             }
             Frame::Sensor => {
-                // The tracklet has gone over to the second sweep's axes.
-                let turned_back = |t: &Tracklet| {
-                    let (velocity, covariance) = t.ekf.velocity();
-                    turn(self.turned_rad, velocity, covariance)
-                };
-                self.set_over_ground(at, tracklet.map_or(of_pair, turned_back), flow);
+                let motion = tracklet.map_or(of_pair, |t| self.velocity_at_first(t));
+                self.set_over_ground(at, motion, flow);
             }
         }
     }
@@ -203,6 +199,12 @@ impl<'a> SweepPair<'a> {
         despite(&mut flow.displacement_covariance, &mut flow.displacement_m);
         despite(&mut flow.covariance, &mut flow.velocity_world_mps);
         self.set_relative(at, flow);
+    }
+
+    /// Velocity of a tracklet, which has gone over to the second sweep's axes, along the first's.
+    fn velocity_at_first(&self, t: &Tracklet) -> ([f32; 2], [f32; 3]) {
+        let (velocity, covariance) = t.ekf.velocity();
+        turn(self.turned_rad, velocity, covariance)
     }
 
     /// What goes over ground with a column's displacement and velocity (and its covariance) along

@@ -8,7 +8,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 /// A rigid transform, `p_target = rotation * p_source + translation`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Unit quaternion.
     pub rotation: DQuat,
@@ -27,6 +27,9 @@ pub enum PoseError {
 
 /// Largest deviation of `R^T R` from the identity that is still read as a rounded rotation.
 const RIGID_TOLERANCE: f64 = 1e-3;
+
+/// Angles below this are taken to their limit at zero, rad.
+const TINY: f64 = 1e-12;
 
 impl Pose {
     /// The pose that moves nothing.
@@ -89,7 +92,7 @@ impl Pose {
         let v = DVec3::new(q.x, q.y, q.z);
         let s = libm::sqrt(v.dot(v));
         // 2 atan2(|v|, w) / |v| tends to 2 at the identity.
-        let k = if s > 1e-12 { 2.0 * libm::atan2(s, q.w) / s } else { 2.0 };
+        let k = if s > TINY { 2.0 * libm::atan2(s, q.w) / s } else { 2.0 };
         Twist { linear: self.translation / dt_s, angular: v * (k / dt_s) }
     }
 }
@@ -105,7 +108,7 @@ impl core::ops::Mul for Pose {
 }
 
 /// Velocity of the vehicle over one sweep, in the vehicle frame at the sweep's stamp.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
     /// m/s.
     pub linear: DVec3,
@@ -123,7 +126,7 @@ impl Twist {
         let w = self.angular * dt_s;
         let angle = libm::sqrt(w.dot(w));
         // sin(a/2)/a tends to 1/2 at zero.
-        let k = if angle > 1e-12 { libm::sin(0.5 * angle) / angle } else { 0.5 };
+        let k = if angle > TINY { libm::sin(0.5 * angle) / angle } else { 0.5 };
         let rotation = DQuat::from_xyzw(w.x * k, w.y * k, w.z * k, libm::cos(0.5 * angle));
         Pose::new(rotation, self.linear * dt_s)
     }

@@ -52,8 +52,9 @@ pub use program::{Runner, StageOp, StageProgram, needed, run, walk};
 use crate::params::*;
 use crate::record::{Column, Flow, MinCost, NO_END, NONE, Proposal, Ray, SweepUniform, VALID};
 use background_filter::{FILTER_TABLE, TABLE_WORDS};
-use declare::{argument, buffers, constants, passed, stage, words_of};
+use declare::{argument, buffers, constants, passed, stage};
 use occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
+use program::words_of;
 
 use crate::map::Update;
 

@@ -13,6 +13,9 @@ pub const BASES_MAX: usize = 64;
 /// Shortest domain, s: so that returns of one instant have a basis.
 pub const DOMAIN_MIN_S: f64 = 0.1;
 
+/// A domain this little longer than a whole number of spacings has as many.
+const ROUNDING: f64 = 1e-9;
+
 /// Uniform knots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Knots {
@@ -52,7 +55,7 @@ impl Knots {
     /// most [`BASES_MAX`].
     pub fn over(start: f64, end: f64, every: f64) -> Knots {
         let domain = (end - start).max(DOMAIN_MIN_S);
-        let wanted = libm::ceil(domain / every - 1e-9);
+        let wanted = libm::ceil(domain / every - ROUNDING);
         let bases = wanted.clamp(SUPPORT as f64, BASES_MAX as f64);
         let pieces = bases as usize - DEGREE;
         Knots { start, spacing: domain / pieces as f64, pieces }

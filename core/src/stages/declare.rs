@@ -4,7 +4,7 @@
 //! `memory-layout.md`, the bindings and struct wrappers of the kernels, the device's schedule and
 //! the names in every table of times come from it.
 
-use super::{Buffer, Runner, StageProgram, Storage, needed};
+use super::{Buffer, Storage};
 use crate::params::Profile;
 
 /// An argument of a stage as the kernel binds it.
@@ -244,19 +244,6 @@ macro_rules! buffers {
             }
         }
     };
-}
-
-impl Storage<'_> {
-    /// 32-bit words that the buffers of some programs take.
-    pub fn words(programs: &[StageProgram], profile: &Profile) -> usize {
-        Buffer::ALL.iter().map(|b| words_of(*b, programs, profile)).sum()
-    }
-}
-
-/// Words of a buffer in the scalar backend's storage; the uniform is a field of its own.
-pub(super) fn words_of(buffer: Buffer, programs: &[StageProgram], profile: &Profile) -> usize {
-    let stored = buffer != Buffer::sweep && needed(programs, Runner::Scalar, buffer);
-    if stored { buffer.row().bytes(profile).div_ceil(4) } else { 0 }
 }
 
 /// A stage: `stage!(NAME in MODULE, (ARGUMENTS), GROUPS)`. Its twin is the function of that name in

@@ -66,12 +66,15 @@ pub fn load(
         return Err(WeightsError::Range);
     }
     for (score, cost) in (scores.min..).zip(costs) {
-        let x = score as f64 / file.scale as f64;
-        // -log sigmoid(x) = log(1 + exp(-x))
-        let nats = libm::log1p(libm::exp(-x));
-        *cost = (libm::floor(nats * MILLINATS + 0.5) as u32).min(COST_MAX);
+        *cost = cost_of(score as f64 / file.scale as f64);
     }
     Ok(scores)
+}
+
+/// -log sigmoid(x) = log(1 + exp(-x)), rounded.
+fn cost_of(x: f64) -> u32 {
+    let nats = libm::log1p(libm::exp(-x));
+    (libm::floor(nats * MILLINATS + 0.5) as u32).min(COST_MAX)
 }
 
 /// Parts of a nat that costs count.

@@ -1,6 +1,7 @@
 //! Stages in the order they run: the programs, and the walk through them.
 
 use super::{Buffer, Stage, Storage};
+use crate::params::Profile;
 
 /// A step of a program.
 #[derive(Clone, Copy, Debug)]
@@ -92,4 +93,17 @@ pub fn needed(programs: &[StageProgram], runner: Runner, buffer: Buffer) -> bool
         walk(program.ops, runner, 1, &mut |op| found |= op.touches(buffer));
     }
     found
+}
+
+impl Storage<'_> {
+    /// 32-bit words that the buffers of some programs take.
+    pub fn words(programs: &[StageProgram], profile: &Profile) -> usize {
+        Buffer::ALL.iter().map(|b| words_of(*b, programs, profile)).sum()
+    }
+}
+
+/// Words of a buffer in the scalar backend's storage; the uniform is a field of its own.
+pub(super) fn words_of(buffer: Buffer, programs: &[StageProgram], profile: &Profile) -> usize {
+    let stored = buffer != Buffer::sweep && needed(programs, Runner::Scalar, buffer);
+    if stored { buffer.row().bytes(profile).div_ceil(4) } else { 0 }
 }

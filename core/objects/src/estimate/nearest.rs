@@ -5,6 +5,13 @@ const SIDE: usize = 64;
 /// Points for each cell: few, as they lie along an outline.
 const POINTS_PER_CELL: f32 = 0.5;
 
+/// Shortest edge of a cell, m.
+const CELL_MIN_M: f32 = 0.01;
+/// A reach is looked through so much farther, and by so many metres: rounding moves distances and
+/// cells by less.
+const WIDER: f32 = 1.0001;
+const WIDER_M: f32 = 1e-5;
+
 /// Points ordered by the cell they lie in.
 pub(super) struct NearestGrid<const N: usize> {
     low: [f32; 2],
@@ -48,7 +55,7 @@ impl<const N: usize> NearestGrid<N> {
         let extent = [high[0] - low[0], high[1] - low[1]];
         let by_count = libm::sqrtf(extent[0] * extent[1] * POINTS_PER_CELL / points.len() as f32);
         let by_side = extent[0].max(extent[1]) / (SIDE - 1) as f32;
-        self.cell_m = by_count.max(by_side).max(0.01);
+        self.cell_m = by_count.max(by_side).max(CELL_MIN_M);
         self.per_m = 1.0 / self.cell_m;
         self.low = low;
         self.size = extent.map(|extent| ((extent * self.per_m) as usize + 1).min(SIDE));
@@ -94,8 +101,7 @@ impl<const N: usize> NearestGrid<N> {
         let mut reach = libm::sqrtf(guess).min(self.cell_m);
         let whole = (self.cell_m * (2 * SIDE) as f32 + reach + self.outside(at)).min(f32::MAX);
         loop {
-            // A little wider than the reach, for what rounding does to distances and cells.
-            let wide = reach * 1.0001 + 1e-5;
+            let wide = reach * WIDER + WIDER_M;
             let left = self.coordinate(0, at[0] - wide);
             let right = self.coordinate(0, at[0] + wide);
             let below = self.coordinate(1, at[1] - wide);
@@ -116,7 +122,7 @@ impl<const N: usize> NearestGrid<N> {
             // The nearest of all is no further than the best of these.
             reach = if best < f32::MAX { libm::sqrtf(best) } else { 2.0 * reach };
             if best < f32::MAX {
-                reach *= 1.0001;
+                reach *= WIDER;
             }
         }
     }
