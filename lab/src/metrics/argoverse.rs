@@ -92,7 +92,7 @@ impl Log {
         let path = &self.truth[&sweep];
         let table = FeatherTable::read(path, &[&FLOW[..], &["is_valid", "classes_0"]].concat())?;
         let flow = read_flow(&table)?;
-        same_rows(path, flow.len(), first)?;
+        same_rows(path, flow.len(), first.points.len())?;
         let valid = table.booleans("is_valid")?;
         let classes = table.integers("classes_0")?;
         let mut points = Vec::with_capacity(flow.len());
@@ -143,7 +143,7 @@ impl Estimate {
 pub fn read_estimate(path: &Path, pair: &Pair) -> Result<Estimate, Error> {
     let table = FeatherTable::read(path, &[&FLOW[..], &["is_valid"]].concat())?;
     let (flow_m, valid) = (read_flow(&table)?, table.booleans("is_valid")?);
-    rows(path, flow_m.len(), pair.points.len())?;
+    same_rows(path, flow_m.len(), pair.points.len())?;
     Ok(Estimate { flow_m, valid })
 }
 
@@ -153,15 +153,10 @@ fn position(p: [f32; 3]) -> DVec3 {
 
 /// The flow of every row in f32, which is what files hold.
 fn read_flow(table: &FeatherTable) -> Result<Vec<[f32; 3]>, Error> {
-    let [x, y, z] = [table.floats(FLOW[0])?, table.floats(FLOW[1])?, table.floats(FLOW[2])?];
-    Ok((0..table.rows()).map(|row| [x[row] as f32, y[row] as f32, z[row] as f32]).collect())
+    table.vectors(FLOW)
 }
 
-fn same_rows(path: &Path, found: usize, sweep: &SweepData) -> Result<(), Error> {
-    rows(path, found, sweep.points.len())
-}
-
-fn rows(path: &Path, found: usize, points: usize) -> Result<(), Error> {
+fn same_rows(path: &Path, found: usize, points: usize) -> Result<(), Error> {
     if found == points {
         return Ok(());
     }

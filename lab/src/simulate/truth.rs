@@ -169,11 +169,10 @@ pub fn read_points(path: &Path) -> Result<Vec<PointTruth>, Error> {
     let t = feather::FeatherTable::read(path, &names)?;
     let (offsets, sensors) = (t.floats("offset_s")?, t.integers("sensor")?);
     let (objects, classes) = (t.integers("object")?, t.integers("class")?);
-    let flow = [t.floats("flow_x")?, t.floats("flow_y")?, t.floats("flow_z")?];
+    let flow = t.vectors(["flow_x", "flow_y", "flow_z"])?;
     let row = |n: usize| {
         let bad = |what: &str| Error::input(path, format!("row {n}"), what);
-        let flow = [0, 1, 2].map(|axis| flow[axis][n] as f32);
-        if !(offsets[n].is_finite() && flow.iter().all(|v| v.is_finite())) {
+        if !(offsets[n].is_finite() && flow[n].iter().all(|v| v.is_finite())) {
             return Err(bad("a number is null or not finite"));
         }
         let class = usize::try_from(classes[n]).ok().and_then(|c| CLASSES.get(c));
@@ -182,7 +181,7 @@ pub fn read_points(path: &Path) -> Result<Vec<PointTruth>, Error> {
             sensor: sensors[n].try_into().map_err(|_| bad("`sensor` is out of range"))?,
             object: objects[n].try_into().map_err(|_| bad("`object` is out of range"))?,
             class: *class.ok_or_else(|| bad("no such class"))?,
-            flow,
+            flow: flow[n],
         })
     };
     (0..t.rows()).map(row).collect()

@@ -1,5 +1,6 @@
 //! Files that are whole or absent.
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -37,9 +38,7 @@ fn partial_path(path: &Path) -> Result<PathBuf, Error> {
     let name = path.file_name().ok_or_else(|| {
         Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "is not a file name"))
     })?;
-    let mut partial = std::ffi::OsString::from(".");
-    partial.push(name);
-    partial.push(".partial");
+    let partial = [OsStr::new("."), name, OsStr::new(".partial")].join(OsStr::new(""));
     Ok(path.with_file_name(partial))
 }
 

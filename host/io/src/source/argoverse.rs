@@ -102,7 +102,7 @@ impl Argoverse {
         let path = &self.files[index];
         into.points.clear();
         let table = FeatherTable::read(path, &COLUMNS)?;
-        let (x, y, z) = (table.floats("x")?, table.floats("y")?, table.floats("z")?);
+        let positions = table.vectors(["x", "y", "z"])?;
         let intensity = table.integers("intensity")?;
         let offsets = table.integers("offset_ns")?;
         let lasers = table.integers("laser_number")?;
@@ -112,7 +112,7 @@ impl Argoverse {
             return Err(Error::input(path, format!("row {row}"), what));
         }
         into.points.extend((0..table.rows()).map(|i| Point {
-            position: [x[i] as f32, y[i] as f32, z[i] as f32],
+            position: positions[i],
             intensity: intensity[i] as f32 / 255.0,
             offset_s: (offsets[i] as f64 * 1e-9) as f32,
             sensor: u32::from(lasers[i] >= LASERS) ^ self.low_lasers,

@@ -21,6 +21,14 @@ pub(super) struct Clouds {
     pub sidecars: Option<Sidecars>,
 }
 
+impl Clouds {
+    /// Sweeps that frame numbers say are missing before one.
+    fn missing_before(&self, index: usize) -> u64 {
+        let frames = &self.overview.frames;
+        index.checked_sub(1).map_or(0, |before| frames[index] - frames[before] - 1)
+    }
+}
+
 impl Source for Clouds {
     fn overview(&self) -> &Overview {
         &self.overview
@@ -32,8 +40,7 @@ impl Source for Clouds {
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         self.overview.begin(index, into);
-        let expected = index.checked_sub(1).map_or(into.frame, |i| self.overview.frames[i] + 1);
-        into.dropped = SourceGaps { sweeps_before: into.frame - expected, null_rows: 0 };
+        into.dropped = SourceGaps { sweeps_before: self.missing_before(index), null_rows: 0 };
         let path = &self.files[index];
         read_cloud(path, &mut into.points)?;
         let Some(sidecars) = &self.sidecars else { return Ok(()) };
@@ -63,11 +70,8 @@ pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
 #[cfg(feature = "arrow")]
 fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
     let table = super::feather::FeatherTable::read(path, &["x", "y", "z"])?;
-    let [x, y, z] = [table.floats("x")?, table.floats("y")?, table.floats("z")?];
-    points.extend((0..table.rows()).map(|row| Point {
-        position: [x[row] as f32, y[row] as f32, z[row] as f32],
-        ..Point::default()
-    }));
+    let positions = table.vectors(["x", "y", "z"])?.into_iter();
+    points.extend(positions.map(|position| Point { position, ..Point::default() }));
     Ok(())
 }
 

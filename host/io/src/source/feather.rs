@@ -67,6 +67,12 @@ impl FeatherTable {
         .map(|values| values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
     }
 
+    /// Three columns of floats, by row.
+    pub fn vectors(&self, [x, y, z]: [&str; 3]) -> Result<Vec<[f32; 3]>, Error> {
+        let [x, y, z] = [self.floats(x)?, self.floats(y)?, self.floats(z)?];
+        Ok((0..self.rows()).map(|row| [x[row], y[row], z[row]].map(|v| v as f32)).collect())
+    }
+
     /// A column of integers (u8, i8, i32, u32, i64, u64). Fails at a null or a value beyond i64.
     pub fn integers(&self, name: &str) -> Result<Vec<i64>, Error> {
         let values = self.gather(name, "integers", |column, out| {
@@ -86,12 +92,10 @@ impl FeatherTable {
 
     /// A column of booleans. Fails at a null.
     pub fn booleans(&self, name: &str) -> Result<Vec<bool>, Error> {
-        let values = self.gather(name, "booleans", |column, out: &mut Vec<Option<bool>>| {
-            let boolean = column.data_type() == &DataType::Boolean;
-            if boolean {
-                out.extend(column.as_boolean().iter());
-            }
-            boolean
+        let values = self.gather(name, "booleans", |column, out| {
+            let booleans = column.as_boolean_opt();
+            booleans.iter().for_each(|values| out.extend(values.iter()));
+            booleans.is_some()
         })?;
         self.filled(name, values)
     }

@@ -47,7 +47,7 @@ pub use poses::{PoseTrack, pose_row, read_pose};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again, so that its memory is reused.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct SweepData {
     /// Number of the sweep's file: frame number, or timestamp in ns for Argoverse 2.
     pub frame: u64,
@@ -61,19 +61,6 @@ pub struct SweepData {
     pub twist: Twist,
     /// What the source lacks at this sweep.
     pub dropped: SourceGaps,
-}
-
-impl Default for SweepData {
-    fn default() -> SweepData {
-        SweepData {
-            frame: 0,
-            stamp_s: 0.0,
-            points: Vec::new(),
-            world_from_vehicle: Pose::IDENTITY,
-            twist: Twist::ZERO,
-            dropped: SourceGaps::default(),
-        }
-    }
 }
 
 impl SweepData {

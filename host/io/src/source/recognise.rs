@@ -1,6 +1,7 @@
 //! Which format a folder holds.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::Format;
@@ -79,10 +80,8 @@ pub(super) fn extensions(path: &Path) -> Result<impl Iterator<Item = &'static st
 /// Entries of a folder, sorted by name.
 pub(super) fn entries(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let listed = fs::read_dir(path).map_err(Error::reading(path))?;
-    let mut entries = Vec::new();
-    for entry in listed {
-        entries.push(entry.map_err(Error::reading(path))?.path());
-    }
+    let of = |entry: io::Result<fs::DirEntry>| Ok(entry.map_err(Error::reading(path))?.path());
+    let mut entries: Vec<PathBuf> = listed.map(of).collect::<Result<_, Error>>()?;
     entries.sort();
     Ok(entries)
 }

@@ -18,13 +18,11 @@ pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// The numbers of one line, whatever their count.
 pub fn numbers(path: &Path, line: usize, text: &str) -> Result<Vec<f64>, Error> {
-    text.split_ascii_whitespace()
-        .map(|word| {
-            word.parse().map_err(|_| {
-                Error::input(path, format!("line {line}"), format!("`{word}` is not a number"))
-            })
-        })
-        .collect()
+    let wrong = |word: &str| {
+        Error::input(path, format!("line {line}"), format!("`{word}` is not a number"))
+    };
+    let number = |word: &str| word.parse().map_err(|_| wrong(word));
+    text.split_ascii_whitespace().map(number).collect()
 }
 
 /// Exactly `N` numbers from one line.
