@@ -66,11 +66,7 @@ pub struct RunArgs {
     #[command(flatten)]
     pub recording: Recording,
     #[command(flatten)]
-    pub profile: ProfileChoice,
-    #[command(flatten)]
-    pub learned: Learned,
-    #[command(flatten)]
-    pub backend: BackendChoice,
+    pub flow: FlowChoice,
     #[command(flatten)]
     pub results: Results,
     #[command(flatten)]
@@ -96,6 +92,17 @@ pub struct Recording {
     /// Ground height in the vehicle frame, m (KITTI: -1.73)
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
+}
+
+/// What the flow is computed with.
+#[derive(Debug, clap::Args)]
+pub struct FlowChoice {
+    #[command(flatten)]
+    pub profile: ProfileChoice,
+    #[command(flatten)]
+    pub learned: Learned,
+    #[command(flatten)]
+    pub backend: BackendChoice,
 }
 
 #[derive(Debug, Default, clap::Args)]

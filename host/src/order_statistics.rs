@@ -65,10 +65,9 @@ impl Spread {
 
     /// Of times in ms, with so many decimals, for people.
     pub fn line(&self, decimals: usize) -> String {
-        let Spread { median, sd, p99, max, .. } = self;
-        format!(
-            "{median:.decimals$} ms median, {sd:.decimals$} sd, {p99:.decimals$} p99, {max:.decimals$} max"
-        )
+        let shown = [self.median, self.sd, self.p99, self.max].map(|v| format!("{v:.decimals$}"));
+        let [median, sd, p99, max] = shown;
+        format!("{median} ms median, {sd} sd, {p99} p99, {max} max")
     }
 }
 

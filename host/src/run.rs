@@ -11,16 +11,16 @@ use raywake_io::source;
 
 /// Estimates the flow of a recorded drive.
 pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
-    let mut profile = config::profile(&args.profile)?;
+    let mut profile = config::profile(&args.flow.profile)?;
     // Asked for by name, it is wanted under every profile.
     profile.deskew |= args.recording.deskew == Some(true);
-    let weights = WeightFiles::read(&args.learned, &profile)?;
+    let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
     let plan = RunPlan {
         sweeps: args.part.range(source.len())?,
         profile,
         weights,
-        backend: &args.backend,
+        backend: &args.flow.backend,
         out: args.results.out.clone(),
         kinds: Kinds::of(&args.results),
         summary: args.results.summary.clone(),

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use raywake_core::params::POINTS_MAX;
 
-use super::{BackendChoice, Learned, ProfileChoice, seconds};
+use super::{FlowChoice, seconds};
 
 const ABOUT: &str = "\
 Scene flow from cloud A to cloud B; no poses needed
@@ -61,11 +61,7 @@ pub struct FlowArgs {
     #[arg(long, value_name = "FILE")]
     pub pose: Option<PathBuf>,
     #[command(flatten)]
-    pub profile: ProfileChoice,
-    #[command(flatten)]
-    pub learned: Learned,
-    #[command(flatten)]
-    pub backend: BackendChoice,
+    pub flow: FlowChoice,
 }
 
 /// The end of `--help`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{BackendChoice, Learned, ProfileChoice, Recording, Selection};
+use super::{FlowChoice, Recording, Selection};
 
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
@@ -54,11 +54,7 @@ pub struct TrackArgs {
     #[command(flatten)]
     pub recording: Recording,
     #[command(flatten)]
-    pub profile: ProfileChoice,
-    #[command(flatten)]
-    pub learned: Learned,
-    #[command(flatten)]
-    pub backend: BackendChoice,
+    pub flow: FlowChoice,
     #[command(flatten)]
     pub part: Selection,
 }

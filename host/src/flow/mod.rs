@@ -39,8 +39,8 @@ const MOVING_MPS: f64 = 0.5;
 /// Reads, registers, finds the flow and writes it.
 pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
-    let profile = config::profile(&args.profile)?;
-    let weights = WeightFiles::read(&args.learned, &profile)?;
+    let profile = config::profile(&args.flow.profile)?;
+    let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
     let beside = |file: &Option<PathBuf>| file.clone().unwrap_or(args.out.with_extension("png"));
     let mut png =
@@ -149,7 +149,7 @@ fn points(
     [first, second]: [&SweepData; 2],
     png: &mut Option<Pictures>,
 ) -> Result<(Vec<PointFlow>, Dropped), RunError> {
-    let chosen = choose::drive(&args.backend, weights, profile, rig)?;
+    let chosen = choose::drive(&args.flow.backend, weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
     let mut drive = chosen.drive;
     let mut returns = drive.step(&first.sweep(), &[])?.output.dropped;

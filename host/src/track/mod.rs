@@ -29,7 +29,7 @@ pub use tracker::{Ended, Tracker};
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
 /// the sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
-    let mut settings = config::settings(&args.profile)?;
+    let mut settings = config::settings(&args.flow.profile)?;
     settings.profile.deskew |= args.recording.deskew == Some(true);
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
@@ -87,8 +87,8 @@ fn draw(
 
 /// The flow, for the front end that takes it.
 fn flow(args: &args::TrackArgs, profile: &Profile, rig: &Rig) -> Result<Drive, RunError> {
-    let weights = WeightFiles::read(&args.learned, profile)?;
-    let chosen = choose::drive(&args.backend, &weights, profile, rig)?;
+    let weights = WeightFiles::read(&args.flow.learned, profile)?;
+    let chosen = choose::drive(&args.flow.backend, &weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
     Ok(chosen.drive)
 }

@@ -3,7 +3,6 @@
 use super::Category;
 use glam::DVec3;
 use raywake_core::pose::Pose;
-use std::fmt;
 
 /// Chebyshev distance (larger of |x| and |y|) below which a return is near, m.
 pub const NEAR_M: f64 = 35.0;
@@ -69,31 +68,18 @@ pub struct Scored {
 }
 
 /// Why an estimate cannot be scored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScoreError {
     /// There is not one estimate per return.
+    #[error("{estimates} rows, but the sweep has {points} returns")]
     Rows { points: usize, estimates: usize },
-    /// The truth is NaN or infinite (or its square is) where it counts.
+    /// The truth is NaN or infinite (or its square is) where it counts, in this row from 0.
+    #[error("row {row}: the true flow is not finite")]
     Truth { row: usize },
     /// The estimate is, where it counts.
+    #[error("row {row}: the estimated flow is not finite")]
     Estimate { row: usize },
 }
-
-impl fmt::Display for ScoreError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            ScoreError::Rows { points, estimates } => {
-                write!(f, "{estimates} rows, but the sweep has {points} returns")
-            }
-            ScoreError::Truth { row } => write!(f, "row {row}: the true flow is not finite"),
-            ScoreError::Estimate { row } => {
-                write!(f, "row {row}: the estimated flow is not finite")
-            }
-        }
-    }
-}
-
-impl std::error::Error for ScoreError {}
 
 impl Pair {
     /// The returns that count, in the order of the sweep, with `estimates` (m, in the terms of

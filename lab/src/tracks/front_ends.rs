@@ -5,7 +5,7 @@ use super::evaluate::{Outcome, evaluate};
 use super::object::{Moment, Object, moment_at};
 use super::recorded::Recorded;
 use glam::DVec3;
-use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
+use raywake::args::{FlowChoice, FrontEndKind};
 use raywake::choose;
 use raywake::config;
 use raywake::error::RunError;
@@ -28,13 +28,6 @@ const OBSERVATIONS: usize = 10;
 
 /// An object is someone else's where most of a track's returns within such a time are, s.
 const OWNED_S: f64 = 1.0;
-
-/// What a front end needs.
-pub struct Settings<'a> {
-    pub profile: &'a ProfileChoice,
-    pub learned: &'a Learned,
-    pub backend: &'a BackendChoice,
-}
 
 /// What one front end finds of the labelled objects of some drives.
 #[derive(Clone, Debug, Default)]
@@ -60,10 +53,10 @@ impl Found {
         path: &Path,
         kind: FrontEndKind,
         labelled: &Recorded,
-        settings: &Settings,
+        flow: &FlowChoice,
         jobs: usize,
     ) -> Result<(), RunError> {
-        let tracks = follow(path, kind, settings)?;
+        let tracks = follow(path, kind, flow)?;
         let objects: Vec<&Object> = labelled.stationary.iter().chain(&labelled.moving).collect();
         let mut longest: Vec<Option<&Track>> = vec![None; objects.len()];
         self.objects[0] += objects.len();
@@ -94,15 +87,15 @@ impl Found {
     }
 }
 
-fn follow(path: &Path, kind: FrontEndKind, settings: &Settings) -> Result<Vec<Track>, RunError> {
+fn follow(path: &Path, kind: FrontEndKind, flow: &FlowChoice) -> Result<Vec<Track>, RunError> {
     let mut source = source::open(path, &OpenOptions::default())?;
-    let tracking = config::settings(settings.profile)?;
+    let tracking = config::settings(&flow.profile)?;
     let profile = &tracking.profile;
     let drive = match kind {
         FrontEndKind::Variance => None,
         FrontEndKind::Flow => {
-            let weights = WeightFiles::read(settings.learned, profile)?;
-            Some(choose::drive(settings.backend, &weights, profile, source.rig())?.drive)
+            let weights = WeightFiles::read(&flow.learned, profile)?;
+            Some(choose::drive(&flow.backend, &weights, profile, source.rig())?.drive)
         }
     };
     let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);

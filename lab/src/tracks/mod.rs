@@ -24,9 +24,9 @@ use crate::labels::Kind;
 use crate::report::{Report, Results, Table};
 use errors::Errors;
 use evaluate::{OURS, evaluate, histories};
-use front_ends::{Found, Settings};
+use front_ends::Found;
 use object::Object;
-use raywake::args::{BackendChoice, FrontEndKind, Learned, ProfileChoice};
+use raywake::args::{FlowChoice, FrontEndKind};
 use raywake::error::RunError;
 use raywake_io::Error;
 use raywake_objects::estimate::Estimator;
@@ -57,11 +57,7 @@ pub struct Args {
     #[arg(default_value = "variance,flow")]
     front_ends: Vec<FrontEndKind>,
     #[command(flatten)]
-    profile: ProfileChoice,
-    #[command(flatten)]
-    learned: Learned,
-    #[command(flatten)]
-    backend: BackendChoice,
+    flow: FlowChoice,
 }
 
 struct Objects {
@@ -128,13 +124,11 @@ fn found(
     drives: &[Recorded],
     jobs: usize,
 ) -> Result<Vec<(&'static str, Found)>, RunError> {
-    let settings =
-        Settings { profile: &args.profile, learned: &args.learned, backend: &args.backend };
     let mut all = Vec::new();
     for &kind in args.front_ends.iter().filter(|_| !drives.is_empty()) {
         let (begin, mut found) = (Instant::now(), Found::default());
         for (path, labelled) in args.drives.iter().zip(drives) {
-            found.add(path, kind, labelled, &settings, jobs)?;
+            found.add(path, kind, labelled, &args.flow, jobs)?;
         }
         let name = match kind {
             FrontEndKind::Variance => "variance of height",
