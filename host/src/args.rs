@@ -1,5 +1,8 @@
 //! The command line; the help text of a field is its documentation.
 
+// Flattened groups and plain choices have none.
+#![allow(missing_docs)]
+
 mod flow;
 mod sweeps;
 mod track;

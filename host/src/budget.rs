@@ -89,8 +89,11 @@ pub fn device_bytes(profile: &Profile) -> u64 {
 /// A part of the host's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
+    /// What it is.
     pub name: &'static str,
+    /// The type it is made of.
     pub kind: &'static str,
+    /// Its size.
     pub bytes: u64,
 }
 

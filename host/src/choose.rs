@@ -14,6 +14,7 @@ use raywake_io::Error;
 
 /// The pipeline on a backend, everything allocated.
 pub struct Chosen {
+    /// The pipeline.
     pub drive: Drive,
     /// Where the background filter comes from.
     pub filter: String,

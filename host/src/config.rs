@@ -17,11 +17,14 @@ const OBJECTS: &str = "objects";
 
 /// All that can be set.
 pub struct Settings {
+    /// The flow.
     pub profile: Profile,
+    /// Tracks of objects.
     pub objects: TrackingParams,
 }
 
 impl Settings {
+    /// A profile, with the defaults of tracking.
     pub fn new(profile: Profile) -> Settings {
         Settings { profile, objects: TrackingParams::DEFAULT }
     }

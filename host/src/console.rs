@@ -7,6 +7,7 @@ use raywake_io::Error;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
+/// Whether a signal came.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }

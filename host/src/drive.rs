@@ -29,12 +29,14 @@ struct Parts {
 
 /// What one sweep yields, and how long it took.
 pub struct Stepped<'a> {
+    /// What comes out.
     pub output: output::SweepOutput<'a>,
     /// Time of every stage.
     pub laps: Laps,
 }
 
 impl Drive {
+    /// Allocates for a checked profile.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
         let parts = Parts {
             setup: Setup {
@@ -60,6 +62,7 @@ impl Drive {
             + POINTS_MAX * size_of::<PointFlow>()
     }
 
+    /// The backend.
     pub fn backend(&self) -> &Backend {
         &self.parts.backend
     }

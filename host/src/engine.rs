@@ -39,6 +39,7 @@ pub struct RunPlan<'a> {
     pub sweeps: Range<usize>,
     /// Folder for results.
     pub out: Option<PathBuf>,
+    /// Which.
     pub kinds: Kinds,
     /// File for the figures; in `out` where none is named.
     pub summary: Option<PathBuf>,
@@ -52,12 +53,15 @@ pub struct Pair<'a> {
     pub index: usize,
     /// The first sweep, whose flow it is.
     pub first: &'a SweepData,
+    /// The second sweep.
     pub second: &'a SweepData,
+    /// Flow of the first sweep.
     pub flows: &'a PairFlows<'a>,
     /// Time of every stage.
     pub laps: &'a Laps,
 }
 
+/// Sees every pair.
 pub type Observer<'a, S> = &'a mut dyn FnMut(&S, &Pair);
 
 /// Runs to the end, or to a signal: then the sweep in hand is finished and the summary says so.

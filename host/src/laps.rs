@@ -32,6 +32,7 @@ impl Laps {
         }
     }
 
+    /// Names and milliseconds.
     pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         self.names[..self.count].iter().copied().zip(self.milliseconds)
     }

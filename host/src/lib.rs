@@ -1,4 +1,5 @@
 #![forbid(unsafe_code)]
+#![deny(missing_docs)]
 //! The onboard program: sweeps and poses in, temporal scene flow out.
 //!
 //! Commands over three libraries: `raywake-core` and its kernels (chapter 3 of the dissertation),

@@ -23,17 +23,20 @@ use raywake_io::Error;
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::SweepData;
 
+/// Which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
     /// Feather files of columns and tracklets.
     pub columns: bool,
     /// Feather files of returns.
     pub points: bool,
+    /// Pictures.
     pub png: Option<PictureFrame>,
     /// Submission files of Argoverse 2.
     pub argoverse: bool,
 }
 
+/// Where files go.
 pub struct Outputs {
     root: Option<PathBuf>,
     kinds: Kinds,
@@ -85,6 +88,7 @@ impl Outputs {
         Ok(Outputs { root: root.map(Path::to_path_buf), kinds, log, profile, pictures })
     }
 
+    /// Writes what a pair of sweeps yields for its first sweep.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
         let Some(root) = &self.root else { return Ok(()) };
         let meta = meta(first, flows.dt_s);

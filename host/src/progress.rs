@@ -42,6 +42,7 @@ impl Progress {
         let _ = stderr().flush();
     }
 
+    /// Clears the line.
     pub fn finish(&self) {
         if self.terminal && self.shown.is_some() {
             let _ = write!(stderr(), "\r\x1b[K");

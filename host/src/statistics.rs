@@ -23,6 +23,7 @@ pub const BUDGET_MS: f64 = 100.0;
 /// A sweep that had no usable predecessor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResetAt {
+    /// Index of the sweep in the recording.
     pub sweep: usize,
     /// Frame number or timestamp of the sweep.
     pub frame: u64,
@@ -113,7 +114,9 @@ pub struct Statistics {
     pub stages: Vec<(&'static str, Vec<f64>)>,
     /// Sums of the stages of each pair, ms.
     pub totals: Vec<f64>,
+    /// Time to read sweeps, ms.
     pub read_ms: f64,
+    /// Time to write results, ms.
     pub write_ms: f64,
     /// Left out.
     pub dropped: Dropped,
@@ -123,6 +126,7 @@ pub struct Statistics {
     pub ages_at_end: [u64; AGES.len()],
     /// Tracklets after every sweep that completed a pair.
     pub ages_sum: [u64; AGES.len()],
+    /// Resets.
     pub resets: Vec<ResetAt>,
     /// Of all results, see [`Statistics::tracklets`].
     pub digest: Digest,

@@ -33,6 +33,7 @@ pub struct Aged {
 /// for the rest; times are of sweeps that complete a pair, without reading and writing files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
+    /// What was run.
     #[serde(flatten)]
     pub facts: Facts,
     /// Sweeps done.
@@ -53,6 +54,7 @@ pub struct RunSummary {
     pub points: f64,
     /// Mean distinct rays.
     pub distinct_rays: f64,
+    /// Time of every stage, ms.
     pub stage_ms: Ordered<Spread>,
     /// Time of all stages, ms; null without a pair.
     pub total_ms: Option<Spread>,
@@ -62,6 +64,7 @@ pub struct RunSummary {
     pub read_ms: f64,
     /// Mean time to write a sweep's results, ms.
     pub write_ms: f64,
+    /// Left out.
     pub dropped: Dropped,
     /// Tracklets born and ended.
     #[serde(serialize_with = "by_name")]
@@ -77,6 +80,7 @@ pub struct RunSummary {
 pub struct Facts {
     /// Version of this program.
     pub version: &'static str,
+    /// Name of the recording.
     pub source: String,
     /// Name of the profile.
     pub profile: String,

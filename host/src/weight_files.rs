@@ -45,6 +45,7 @@ impl WeightFiles {
         })
     }
 
+    /// Whether there is a background filter.
     pub fn has_filter(&self) -> bool {
         self.filter.is_some()
     }

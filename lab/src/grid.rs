@@ -21,6 +21,7 @@ pub struct Grid {
     words: Vec<u32>,
     /// Sizes of the window.
     pub step: SweepUniform,
+    /// Columns of the window.
     pub columns: Vec<Column>,
     /// Column of every point of the sweep, [`raywake_core::record::NONE`] where it has none.
     pub of_point: Vec<u32>,
@@ -79,10 +80,12 @@ impl Grid {
         window
     }
 
+    /// Indices of the solid columns.
     pub fn solid(&self) -> impl Iterator<Item = usize> + use<'_> {
         self.columns.iter().enumerate().filter(|(_, c)| c[1] != 0).map(|(n, _)| n)
     }
 
+    /// Edge of a voxel, m.
     pub fn voxel_m(&self) -> f64 {
         self.profile.voxel_m
     }

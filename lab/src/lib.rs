@@ -1,4 +1,5 @@
 #![forbid(unsafe_code)]
+#![deny(missing_docs)]
 //! Everything off-board: simulated drives, training of the learned numbers, and evaluation.
 
 mod curve;

@@ -43,10 +43,12 @@ impl Device {
         self.executor.census()
     }
 
+    /// Messages of the validation layer.
     pub fn messages(&self) -> Vec<String> {
         self.executor.message_texts()
     }
 
+    /// The device's name.
     pub fn name(&self) -> &str {
         &self.executor.info().name
     }

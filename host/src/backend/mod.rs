@@ -11,9 +11,12 @@ use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
 use raywake_gpu::{Census, GpuError};
 
+/// What is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LearnedPart {
+    /// The background filter.
     Filter,
+    /// The occupancy constancy.
     Constancy,
 }
 
@@ -26,6 +29,7 @@ pub enum LearnedPart {
 pub struct TablesError {
     /// Which file.
     pub of: LearnedPart,
+    /// What is wrong with it.
     pub why: WeightsError,
 }
 
@@ -36,6 +40,7 @@ pub struct Tables {
     pub filter: Vec<i32>,
     /// See [`occupancy_constancy::load`].
     pub constancy: Vec<i32>,
+    /// Its costs.
     pub costs: Vec<u32>,
     /// Its range of scores.
     pub scores: Scores,
@@ -116,6 +121,7 @@ impl Perceive for Backend {
 }
 
 impl Backend {
+    /// The scalar backend for a profile.
     pub fn scalar(profile: &Profile, tables: &Tables) -> Backend {
         let words = vec![0; Scalar::words(profile)];
         let tables = perceive::LearnedTables {
@@ -134,6 +140,7 @@ impl Backend {
         }
     }
 
+    /// The device's name.
     pub fn device(&self) -> &str {
         match self {
             Backend::Scalar(_) => "CPU",

@@ -28,6 +28,7 @@ const COLUMNS: &str = "\
 |---|---|---|---|---|---|
 ";
 
+/// The text of `PARAMETERS.md`.
 pub fn parameters() -> String {
     let mut text = HEAD.to_string();
     let profiles = shipped();

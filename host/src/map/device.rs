@@ -22,12 +22,14 @@ pub struct DeviceMap {
 }
 
 impl DeviceMap {
+    /// Allocates and records for a profile.
     pub fn new(profile: &Profile, options: &Options) -> Result<DeviceMap, GpuError> {
         let schedule = Schedule::new(MAP_PROGRAMS, profile);
         let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
         Ok(DeviceMap { executor, schedule, bands: Bands::new(Mapper::keys(profile)) })
     }
 
+    /// The device's name.
     pub fn name(&self) -> &str {
         &self.executor.info().name
     }
@@ -39,6 +41,7 @@ impl DeviceMap {
         (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
     }
 
+    /// Maps the sweep.
     pub fn map(
         &mut self,
         sweep: &SweepUniform,

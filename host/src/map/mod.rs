@@ -24,6 +24,7 @@ pub enum MapBackend {
 }
 
 impl MapBackend {
+    /// The device's name.
     pub fn name(&self) -> &str {
         match self {
             MapBackend::Scalar(_) => "CPU, one thread",
@@ -68,7 +69,9 @@ pub struct Mapper {
 pub struct Mapped {
     /// The window: keys count from its corner.
     pub window: Window,
+    /// Returns left out.
     pub dropped: DroppedReturns,
+    /// Rays.
     pub rays: usize,
 }
 
@@ -85,6 +88,7 @@ impl Mapper {
         }
     }
 
+    /// Number of keys of a profile.
     pub fn keys(profile: &Profile) -> u32 {
         profile.side * profile.side * profile.levels
     }
@@ -113,6 +117,7 @@ impl Mapper {
         Ok(Mapped { window, dropped, rays: count })
     }
 
+    /// Lattice indices of a key.
     pub fn cell(&self, mapped: &Mapped, key: u32) -> [i32; 3] {
         let (side, levels) = (self.profile.side, self.profile.levels);
         let local = [key / levels / side, key / levels % side, key % levels];

@@ -7,6 +7,7 @@ use raywake_core::stages::{MAP_PROGRAMS, Storage};
 
 use super::Mapper;
 
+/// Memory and bands.
 pub struct ScalarMap {
     words: Vec<u32>,
     profile: Profile,
@@ -14,6 +15,7 @@ pub struct ScalarMap {
 }
 
 impl ScalarMap {
+    /// Allocates for a profile.
     pub fn new(profile: &Profile) -> ScalarMap {
         let words = vec![0; Storage::words(MAP_PROGRAMS, profile)];
         ScalarMap { words, profile: profile.clone(), bands: Bands::new(Mapper::keys(profile)) }
@@ -25,6 +27,7 @@ impl ScalarMap {
         (storage.rays, storage.origins)
     }
 
+    /// Maps the sweep.
     pub fn map(&mut self, sweep: &SweepUniform, put: &mut dyn FnMut(&[Update])) {
         let mut storage = Storage::over(&mut self.words, MAP_PROGRAMS, &self.profile);
         storage.sweep = *sweep;

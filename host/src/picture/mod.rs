@@ -28,9 +28,11 @@ use crate::args::PictureFrame;
 pub enum Subject<'a> {
     /// The flow of the sweep's columns.
     Flow {
+        /// Its columns.
         columns: &'a [ColumnFlow],
         /// Gives the window.
         profile: &'a Profile,
+        /// Which velocity is drawn.
         frame: PictureFrame,
     },
     /// The sweep's sparse map, in place of its returns.
@@ -39,12 +41,14 @@ pub enum Subject<'a> {
         voxels: &'a [Voxel],
         /// Corner of the voxel (0, 0, 0) in the world, m.
         origin_m: [f64; 3],
+        /// Edge of a voxel, m.
         voxel_m: f64,
     },
     /// The tracks after the sweep; those that are not live are left out.
     Tracks(&'a [Track]),
 }
 
+/// The pictures of a recording.
 pub struct Pictures {
     path: PathBuf,
     /// Whether `path` is the one picture's file.

@@ -133,6 +133,7 @@ impl Report {
 pub struct TrackSummary {
     /// Version of this program.
     pub version: &'static str,
+    /// Name of the recording.
     pub source: String,
     /// `variance` or `flow`.
     pub front_end: &'static str,

@@ -231,7 +231,9 @@ impl Tracker {
     }
 }
 
+/// A track at its end.
 pub struct Ended<'a> {
+    /// The track.
     pub track: &'a Track,
     /// With its trajectory and shape.
     pub estimator: &'a Estimator,

@@ -34,6 +34,7 @@ pub enum PointMotion {
     Moving,
     /// Less: parked where they are objects.
     Standing,
+    /// Either.
     Any,
 }
 
@@ -68,6 +69,7 @@ pub struct AccuracyTable {
 /// The figures; all but the count are NaN where there is nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
+    /// Number of returns.
     pub count: u64,
     /// Mean endpoint error (EPE3D), m.
     pub epe_m: f64,

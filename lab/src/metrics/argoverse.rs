@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 /// Columns of the flow.
 const FLOW: [&str; 3] = ["flow_tx_m", "flow_ty_m", "flow_tz_m"];
 
+/// A log and where its truth is.
 pub struct Log {
     source: Box<dyn Source>,
     name: String,

@@ -21,8 +21,10 @@ pub struct BucketedEpe {
     table: SpeedTable,
 }
 
+/// A class's figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassError {
+    /// Which.
     pub class: Class,
     /// Mean error of what moves less than 0.04 m, m; NaN where there is none.
     pub static_epe_m: f64,
@@ -32,6 +34,7 @@ pub struct ClassError {
     pub buckets: Vec<Bucket>,
 }
 
+/// The figures of all classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BucketedErrors {
     /// In the order of [`Class::ALL`].
@@ -72,6 +75,7 @@ impl BucketedEpe {
         self.buckets(|c| c == category, range)
     }
 
+    /// The figures so far.
     pub fn errors(&self, range: Range) -> BucketedErrors {
         let classes = Class::ALL.map(|class| {
             let buckets = self.buckets(|c| c.class() == Some(class), range);

@@ -57,6 +57,7 @@ impl Category {
         (-1..NAMES.len() as i64).contains(&number).then(|| Category((number + 1) as u8))
     }
 
+    /// The category with this name.
     pub fn from_name(name: &str) -> Option<Category> {
         Category::all().find(|c| c.name() == name)
     }

@@ -52,6 +52,7 @@ enum From {
 /// Makes an estimate of a pair out of its truth.
 type Reference = fn(&Pair) -> Vec<[f32; 3]>;
 
+/// Grades and prints.
 pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let mut log = Log::open(&args.log, args.truth.as_deref(), !args.with_ground)?;
     let rules = Rules { ground: args.with_ground, ..Rules::OFFICIAL };

@@ -18,12 +18,15 @@ pub struct TruePoint {
     /// Motion to the second sweep along the axes of the same frame, m, the vehicle's own
     /// removed: what stands has none.
     pub flow_m: [f32; 3],
+    /// What it belongs to.
     pub category: Category,
+    /// Whether the truth is known.
     pub valid: bool,
     /// Whether it belongs to the ground.
     pub ground: bool,
 }
 
+/// A pair of sweeps with its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
     /// All returns of the first sweep.
@@ -53,6 +56,7 @@ impl Rules {
 /// A return that counts, with its estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scored {
+    /// What it belongs to.
     pub category: Category,
     /// Within [`NEAR_M`] of the vehicle at the second sweep (itself as at the first).
     pub near: bool,
@@ -62,6 +66,7 @@ pub struct Scored {
     pub error_m: f32,
     /// [`TruePoint::position_m`].
     pub position_m: [f32; 3],
+    /// True motion, m.
     pub truth_m: [f32; 3],
     /// Estimated motion in the same terms, m.
     pub estimate_m: [f32; 3],
@@ -72,13 +77,24 @@ pub struct Scored {
 pub enum ScoreError {
     /// There is not one estimate per return.
     #[error("{estimates} rows, but the sweep has {points} returns")]
-    Rows { points: usize, estimates: usize },
+    Rows {
+        /// Returns of the sweep.
+        points: usize,
+        /// Rows of the estimate.
+        estimates: usize,
+    },
     /// The truth is NaN or infinite (or its square is) where it counts, in this row from 0.
     #[error("row {row}: the true flow is not finite")]
-    Truth { row: usize },
+    Truth {
+        /// Row, from 0.
+        row: usize,
+    },
     /// The estimate is, where it counts.
     #[error("row {row}: the estimated flow is not finite")]
-    Estimate { row: usize },
+    Estimate {
+        /// Row, from 0.
+        row: usize,
+    },
 }
 
 impl Pair {

@@ -36,6 +36,7 @@ pub struct Bucket {
     pub from_m: f64,
     /// Speed it ends below, m per pair; infinite for the last.
     pub to_m: f64,
+    /// Number of returns.
     pub count: u64,
     /// Mean error (endpoint error, EPE), m.
     pub epe_m: f64,
@@ -69,6 +70,7 @@ impl SpeedTable {
         SpeedTable { edges_m, cells }
     }
 
+    /// Number of buckets.
     pub fn buckets(&self) -> usize {
         self.edges_m.len()
     }

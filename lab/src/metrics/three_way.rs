@@ -53,6 +53,7 @@ impl ThreeWayEpe {
         [0, 1].map(|i| self.table.bucket(|c| c == category, range, i))
     }
 
+    /// The figures so far.
     pub fn errors(&self, range: Range) -> ThreeWayErrors {
         let background = |c: Category| c.class() == Some(Class::Background);
         let foreground = |c: Category| c.class().is_some_and(|class| class != Class::Background);

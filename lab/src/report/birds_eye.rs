@@ -22,12 +22,15 @@ const ERRORS: &[Colour] = &[[0, 158, 115], [240, 214, 60], [226, 106, 20], [140,
 pub struct Panel {
     /// Above it.
     pub title: String,
+    /// Returns.
     pub points: Vec<[f32; 3]>,
+    /// Labelled boxes.
     pub outlines: Vec<Outline>,
     /// Columns with what is known of their motion.
     pub columns: Vec<Column>,
 }
 
+/// A labelled box.
 #[derive(Clone, Copy, Debug)]
 pub struct Outline {
     /// `vehicle_from_box`, the box's frame in its centre, x forward.
@@ -38,6 +41,7 @@ pub struct Outline {
     pub kind: Kind,
 }
 
+/// A column of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// Its centre, m.

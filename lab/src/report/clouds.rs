@@ -20,6 +20,7 @@ const MARGIN_M: f64 = 0.3;
 /// From first to last: blue over green to yellow, ever lighter.
 const TIMES: &[Colour] = &[[53, 42, 135], [15, 118, 200], [55, 184, 157], [250, 220, 30]];
 
+/// A cloud with a title.
 #[derive(Clone, Debug)]
 pub struct Cloud {
     /// Above it.

@@ -60,6 +60,7 @@ pub struct Results {
 }
 
 impl Results {
+    /// Prints the tables, and where the report is.
     pub fn print(&self, folder: &Path) {
         self.tables.iter().for_each(|table| println!("{}", table.text()));
         println!("report: {}", folder.join("report.html").display());
@@ -82,11 +83,14 @@ enum Element {
     Picture(Picture),
 }
 
+/// A picture.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
+    /// What one sees.
     pub caption: String,
+    /// A PNG file.
     pub png: Vec<u8>,
 }
 
@@ -127,6 +131,7 @@ impl Report {
         self
     }
 
+    /// Begins a section and returns it.
     pub fn section(&mut self, title: &str) -> &mut Section {
         self.sections.push(Section { title: title.into(), elements: Vec::new() });
         let last = self.sections.len() - 1;
@@ -209,11 +214,13 @@ impl Section {
         self
     }
 
+    /// A chart.
     pub fn chart(&mut self, chart: Chart) -> &mut Section {
         self.elements.push(Element::Chart(chart));
         self
     }
 
+    /// A picture.
     pub fn picture(&mut self, picture: Picture) -> &mut Section {
         self.elements.push(Element::Picture(picture));
         self

@@ -13,6 +13,7 @@ const NOTHING: &str = "–";
 pub struct Table<C = Cell> {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
+    /// What it tells.
     pub caption: String,
     /// Names of the columns with their units.
     pub columns: Vec<String>,
@@ -26,6 +27,7 @@ pub struct Table<C = Cell> {
 /// A table whose cells are text, as it stands on a page and in `results.json`.
 pub type Shown = Table<String>;
 
+/// Figures of ours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableRow<C = Cell> {
@@ -48,9 +50,12 @@ impl TableRow {
     }
 }
 
+/// A cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
+    /// Words.
     Text(String),
+    /// How many.
     Count(u64),
     /// A number and the decimals that are shown of it; the CSV has all. NaN is shown as a dash.
     Number(f64, usize),
@@ -138,6 +143,7 @@ impl Table {
         encode::csv(&rows)
     }
 
+    /// For a screen.
     pub fn text(&self) -> String {
         self.shown().text()
     }

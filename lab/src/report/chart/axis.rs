@@ -6,6 +6,7 @@ use std::ops::Range;
 /// Shortest axis and largest value: plotters looks for labels without end beyond these.
 const SPAN: [f64; 2] = [1e-9, 1e12];
 
+/// One axis of a plot.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Quantity and unit, as in "error, m".
@@ -20,6 +21,7 @@ impl Axis {
         Axis { label: label.into(), range: None }
     }
 
+    /// The same from `low` to `high`.
     pub fn range(self, low: f64, high: f64) -> Axis {
         Axis { range: Some([low, high]), ..self }
     }

@@ -23,9 +23,11 @@ pub struct Bars {
     pub x: Axis,
     /// From the top down.
     pub categories: Vec<String>,
+    /// What is compared in each.
     pub series: Vec<BarSeries>,
 }
 
+/// Bars of one colour.
 #[derive(Clone, Debug)]
 pub struct BarSeries {
     /// In the legend.
@@ -36,8 +38,10 @@ pub struct BarSeries {
     pub bars: Vec<Option<Bar>>,
 }
 
+/// One bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bar {
+    /// Its length.
     pub value: f64,
     /// A thin line from and to, such as a confidence interval or median to p99.
     pub spread: Option<[f64; 2]>,

@@ -22,6 +22,7 @@ pub struct Lines {
     pub x: Axis,
     /// Up.
     pub y: Axis,
+    /// What is drawn.
     pub series: Vec<Series>,
     /// Dashed lines to compare with.
     pub guides: Vec<Guide>,
@@ -31,21 +32,25 @@ pub struct Lines {
     pub log_y: bool,
 }
 
+/// One curve.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// In the legend; give n here.
     pub name: String,
     /// x and y; a point that cannot be drawn interrupts the curve.
     pub points: Vec<[f64; 2]>,
+    /// How it is drawn.
     pub style: Style,
     /// Places upon it worth a word, such as operating points.
     pub marks: Vec<Mark>,
 }
 
+/// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Style {
     /// Straight from point to point.
     Line,
+    /// A dot each.
     Dots,
 }
 
@@ -195,6 +200,7 @@ impl Lines {
 }
 
 impl Series {
+    /// A curve.
     pub fn line(name: &str, points: Vec<[f64; 2]>) -> Series {
         Series { name: name.into(), points, style: Style::Line, marks: Vec::new() }
     }

@@ -83,6 +83,7 @@ pub struct Chart {
     parts: Vec<(String, Plot)>,
 }
 
+/// What a chart shows.
 #[derive(Clone, Debug)]
 pub enum Plot {
     /// Curves or dots over two axes.
@@ -94,6 +95,7 @@ pub enum Plot {
 }
 
 impl Chart {
+    /// A single plot.
     pub fn new(id: &str, caption: &str, plot: Plot) -> Chart {
         Chart::small_multiples(id, caption, vec![(String::new(), plot)])
     }
