@@ -187,8 +187,8 @@ impl<'a> SweepPair<'a> {
         }
     }
 
-    /// Puts out an observed column as static, though it may not be: it then moves on with
-    /// [`ColumnFlow::probability`] as was found.
+    /// Puts out an observed column as static. It may move all the same as was found, with
+    /// [`ColumnFlow::probability`]; its covariances say so.
     pub fn set_static(&self, at: DVec3, flow: &mut ColumnFlow) {
         let p = flow.probability;
         let despite = |covariance: &mut [f32; 3], by: &mut [f32; 2]| {

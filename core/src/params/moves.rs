@@ -1,7 +1,9 @@
 //! Parameters of whether a column moves: see [`crate::refinement::cues`].
 
 /// Where the weights come from.
-const FITTED: &str = "Fitted by `raywake-lab train moves`, see [`crate::refinement::cues`].";
+const FITTED: &str = "Fitted by `raywake-lab train moves` on twelve simulated drives (`raywake-lab \
+                      sim --drives 3 --sweeps 30 --seed 4100`, each rig): Brier score 0.032 on \
+                      what was held out.";
 
 crate::params! {
     /// How cues become P(moves): logistic regression, one weight a cue.
@@ -9,8 +11,8 @@ crate::params! {
     pub struct MovesParams {
         /// What is put out as moving has at least this P(moves).
         pub moves_min: f32 = 0.3, "", (0 to 1),
-            "Columns true / false / missed of `kitti_raw_0005`: 5,963 / 1,513 / 471; at 0 6,025 / \
-             1,728 / 409, at 0.5 5,866 / 1,449 / 568.";
+            "Columns true / false / missed of `kitti_raw_0005`: 5,956 / 1,511 / 478; at 0 6,025 / \
+             1,728 / 409, at 0.5 5,849 / 1,442 / 585.";
         /// Logit without any cue.
         pub moves_bias: f32 = -4.82, "nat", (-100 to 100), FITTED;
         /// Weight of the evidence beyond what the hypothesis test asked for.

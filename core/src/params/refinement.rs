@@ -96,7 +96,8 @@ crate::params! {
         /// Share of a cluster's columns whose tracklets must have moved for it to need only so
         /// much; of fewer it needs more in proportion: a car's tracklets touch the road.
         pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
-            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952.";
+            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before what \
+             stands below a mover was its footprint).";
         /// From this length on a cluster that moved needs less, in inverse proportion: its sides
         /// slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
@@ -130,8 +131,9 @@ crate::params! {
         pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;
         /// How far the ground that a moving cluster stands on reaches beyond its returns.
         pub footprint_margin_m: f64 = 0.1, "m", (0 to 5),
-            "Labelled boxes hold 589 of its columns and 65 others on `kitti_raw_0005`; 467 and 12 \
-             at 0 m, 702 and 293 at 0.2 m.";
+            "Of the matched columns of ground beside movers on `kitti_raw_0005`, labelled boxes \
+             hold 589 so near to the returns registered and 65 are others; 467 and 12 at 0 m, 702 \
+             and 293 at 0.2 m.";
 
         /// Standard deviation of the displacement of what is static and fits perfectly.
         pub static_sigma_m: f64 = 0.0075, "m", (0.0001 to 10), CALIBRATED;

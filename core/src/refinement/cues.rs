@@ -9,14 +9,46 @@ use crate::params::MovesParams;
 /// The largest margin that counts: with more, it is plain.
 const MARGIN_MAX: f32 = 0.5;
 
-crate::cues! {
+/// Declares cues, each with the parameter that weighs it.
+macro_rules! cues {
+    (
+        $(#[$doc:meta])* pub struct $name:ident {
+            $($(#[$field_doc:meta])* pub $field:ident: $weight:ident,)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $name {
+            $($(#[$field_doc])* pub $field: f32,)*
+        }
+
+        impl $name {
+            /// Nothing told.
+            pub const NONE: $name = $name { $($field: 0.0),* };
+
+            /// Names of the parameters that weigh them, in order.
+            pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
+
+            /// Their values, in order.
+            pub fn values(&self) -> [f32; $name::WEIGHTS.len()] {
+                [$(self.$field),*]
+            }
+
+            fn logit(&self, params: &MovesParams) -> f32 {
+                params.moves_bias $(+ params.$weight * self.$field)*
+            }
+        }
+    };
+}
+
+cues! {
     /// What tells whether a column moves.
     pub struct Cues {
         /// Evidence of the cluster's motion beyond what the test asked for, at most 0.5.
         pub margin: moves_margin,
         /// Share of the cluster's columns whose tracklets moved, of the quorum.
         pub share: moves_share,
-        /// Mean truncated residual of the motion, 0 to 1.
+        /// Mean truncated residual of the motion, of rest where none was tried, 0 to 1.
         pub residual: moves_residual,
         /// Logarithm of the number of returns that were registered.
         pub returns: moves_returns,
@@ -92,39 +124,6 @@ impl Prior {
             certainty: certainty / f32::max(moving, 1.0),
         }
     }
-}
-
-/// Declares cues, each with the parameter that weighs it.
-#[macro_export]
-macro_rules! cues {
-    (
-        $(#[$doc:meta])* pub struct $name:ident {
-            $($(#[$field_doc:meta])* pub $field:ident: $weight:ident,)*
-        }
-    ) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq)]
-        pub struct $name {
-            $($(#[$field_doc])* pub $field: f32,)*
-        }
-
-        impl $name {
-            /// Nothing told.
-            pub const NONE: $name = $name { $($field: 0.0),* };
-
-            /// Names of the parameters that weigh them, in order.
-            pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
-
-            /// Their values, in order.
-            pub fn values(&self) -> [f32; $name::WEIGHTS.len()] {
-                [$(self.$field),*]
-            }
-
-            fn logit(&self, params: &MovesParams) -> f32 {
-                params.moves_bias $(+ params.$weight * self.$field)*
-            }
-        }
-    };
 }
 
 #[cfg(test)]

@@ -45,7 +45,7 @@ impl Observations {
                 Some(cues) => cues.probability(&profile.moves),
                 None => (moved != [0.0; 2]) as u8 as f32,
             };
-            let cues = cues.unwrap_or_default();
+            let cues = cues.unwrap_or(Cues::NONE);
             let column = column as u32;
             let o = Observation { column, moved, covariance, cues, probability, slot: NONE };
             self.beyond_capacity += self.all.push(o).is_err() as usize;
