@@ -96,8 +96,8 @@ crate::params! {
         /// Share of a cluster's columns whose tracklets must have moved for it to need only so
         /// much; of fewer it needs more in proportion: a car's tracklets touch the road.
         pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
-            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before what \
-             stands below was its footprint).";
+            "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before \
+             what stands below was its footprint).";
         /// From this length on a cluster that moved needs less, in inverse proportion: its sides
         /// slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
