@@ -2,14 +2,49 @@
 
 use crate::sweep::{Point, Rig};
 
+/// What a return is, before it is placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Of something around the vehicle.
+    Valid,
+    /// On the own vehicle.
+    OwnVehicle,
+    /// With a NaN or an infinity.
+    NotFinite,
+    /// At exactly (0, 0, 0): a sensor's way to say that nothing came back.
+    NoEcho,
+    /// Of a sensor the rig does not have.
+    UnknownSensor,
+}
+
+impl Kind {
+    /// Of a return.
+    #[inline]
+    pub fn of(rig: &Rig, point: &Point) -> Kind {
+        let p = point.position;
+        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
+            Kind::NotFinite
+        } else if p == [0.0; 3] {
+            Kind::NoEcho
+        } else if point.sensor as usize >= rig.sensors.len() {
+            Kind::UnknownSensor
+        } else if rig.is_own_vehicle(p) {
+            Kind::OwnVehicle
+        } else {
+            Kind::Valid
+        }
+    }
+}
+
 /// How many returns were left out, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DroppedReturns {
-    /// Returns after the first [`POINTS_MAX`](crate::params::POINTS_MAX).
+    /// Returns that a sweep had beyond [`returns_max`](crate::params::Profile::returns_max): it was
+    /// thinned evenly.
     pub over_capacity: u64,
     /// Returns with a NaN or an infinity.
     pub not_finite: u64,
-    /// Returns at exactly (0, 0, 0): a sensor's way to say that nothing came back.
+    /// Returns at exactly (0, 0, 0).
     pub no_return: u64,
     /// Returns more than [`EXTENT_VOXELS`](crate::params::EXTENT_VOXELS) voxels from the window's
     /// corner along an axis.
@@ -45,20 +80,14 @@ impl DroppedReturns {
     /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and
     /// counted, where the return is not valid.
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
-        let p = point.position;
-        if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
-            self.not_finite += 1;
-            return None;
+        match Kind::of(rig, point) {
+            Kind::Valid => return Some(false),
+            Kind::OwnVehicle => return Some(true),
+            Kind::NotFinite => self.not_finite += 1,
+            Kind::NoEcho => self.no_return += 1,
+            Kind::UnknownSensor => self.unknown_sensor += 1,
         }
-        if p == [0.0; 3] {
-            self.no_return += 1;
-            return None;
-        }
-        if point.sensor as usize >= rig.sensors.len() {
-            self.unknown_sensor += 1;
-            return None;
-        }
-        Some(rig.is_own_vehicle(p))
+        None
     }
 
     /// Every count with the name of its field and a name for people.

@@ -10,9 +10,10 @@
 use crate::continuity::Reset;
 use crate::motion_compensation::{EgoMotion, turn};
 use crate::output::ColumnFlow;
-use crate::params::{ANCHOR_ABOVE_GROUND_M, Frame, POINTS_MAX, Profile};
+use crate::params::{ANCHOR_ABOVE_GROUND_M, Frame, Profile};
 use crate::pose::{Pose, Twist};
 use crate::sweep::{Rig, Sweep};
+use crate::thinning::Thinning;
 use crate::tracklet::{Observation, Tracklet};
 use glam::DVec3;
 
@@ -76,7 +77,7 @@ pub(crate) struct Side {
     pub pose: Pose,
     pub twist: Twist,
     pub stamp_s: f64,
-    pub points: usize,
+    pub points: Thinning,
 }
 
 /// Where a sweep lies.
@@ -128,7 +129,7 @@ impl Sides {
         self.before = self.before.filter(|_| reset.is_none());
         let window = place(profile, rig, &pose, self.lattice_origin);
         self.lattice_origin.get_or_insert(window.lattice_origin);
-        let points = sweep.points.len().min(POINTS_MAX);
+        let points = Thinning::new(sweep.points.len(), profile.returns());
         let (stamp_s, twist) = (sweep.stamp_s, sweep.twist);
         self.current = Some(Side { window, pose, twist, stamp_s, points });
         let before = self.before.as_ref().map(|b| &b.window);

@@ -23,7 +23,7 @@
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
 //! - The sparse map of appendix B: [`map`].
 //! - Around them: [`mod@params`], [`weights`], [`team`] (threads), [`digest`], [`mod@counters`],
-//!   [`dropped`], [`ground`], [`groups`], [`pose`], [`ctrv`].
+//!   [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`], [`ctrv`].
 
 pub mod continuity;
 pub mod counters;
@@ -50,6 +50,7 @@ pub mod returns;
 pub mod stages;
 pub mod sweep;
 pub mod team;
+pub mod thinning;
 pub mod tracklet;
 mod velocities;
 pub mod weights;

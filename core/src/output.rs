@@ -7,6 +7,7 @@
 use crate::continuity::Reset;
 use crate::dropped::DroppedReturns;
 use crate::refinement::cues::Cues;
+use crate::thinning::Thinning;
 use crate::tracklet::TrackletTurnover;
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
@@ -14,8 +15,8 @@ use crate::tracklet::TrackletTurnover;
 pub struct PairFlows<'a> {
     /// Solid columns of the first sweep.
     pub columns: &'a [ColumnFlow],
-    /// Points of the first sweep, in the source's order.
-    pub points: &'a [PointFlow],
+    /// Returns of the first sweep.
+    pub points: PointFlows<'a>,
     /// Time between the sweeps, s.
     pub dt_s: f64,
     /// What happened to tracklets.
@@ -25,6 +26,37 @@ pub struct PairFlows<'a> {
     /// Solid columns beyond the capacity for foreground, which count as background, and those
     /// beyond as many that moved, which count as unmatched.
     pub foreground_dropped: usize,
+}
+
+/// Flow of every return of a sweep, in the source's order.
+#[derive(Clone, Copy, Debug)]
+pub struct PointFlows<'a> {
+    taken: &'a [PointFlow],
+    thinning: Thinning,
+}
+
+impl<'a> PointFlows<'a> {
+    /// Of those that were taken.
+    pub fn new(taken: &'a [PointFlow], thinning: Thinning) -> PointFlows<'a> {
+        PointFlows { taken, thinning }
+    }
+
+    /// Returns of the sweep.
+    pub fn count(self) -> usize {
+        self.thinning.of()
+    }
+
+    /// That of a return of the sweep.
+    #[inline]
+    pub fn get(self, index: usize) -> Option<PointFlow> {
+        let one = || self.taken.get(self.thinning.rank(index)?).copied();
+        (index < self.count()).then(|| one().unwrap_or(PointFlow::OVER_CAPACITY))
+    }
+
+    /// Those of all returns.
+    pub fn iter(self) -> impl ExactSizeIterator<Item = PointFlow> + 'a {
+        (0..self.count()).map(move |n| self.get(n).unwrap_or(PointFlow::OVER_CAPACITY))
+    }
 }
 
 /// What one sweep yields. Borrowed from the caller's [`Output`].
@@ -48,7 +80,7 @@ pub struct SweepOutput<'a> {
 pub struct Output<'a> {
     /// [`crate::params::COLUMNS_MAX`] elements, or as many as the profile has columns.
     pub columns: &'a mut [ColumnFlow],
-    /// [`crate::params::POINTS_MAX`] elements.
+    /// As many as the profile takes returns.
     pub points: &'a mut [PointFlow],
 }
 
@@ -105,6 +137,57 @@ pub struct ColumnFlow {
     pub cues: Cues,
 }
 
+/// What became of a return.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Status {
+    /// Stands.
+    #[default]
+    Static = 0,
+    /// Moves with its velocity.
+    Moving = 1,
+    /// Foreground for which no match was found: put out as static.
+    Unmatched = 2,
+    /// Outside the window of the flow: put out as static.
+    OutsideWindow = 3,
+    /// Left out of a sweep that has more than are taken; nothing is known of it.
+    OverCapacity = 4,
+    /// On the own vehicle.
+    OwnVehicle = 5,
+    /// No return: at exactly (0, 0, 0).
+    NoEcho = 6,
+    /// Not finite, or of a sensor that the rig does not have.
+    Invalid = 7,
+}
+
+impl Status {
+    /// All, in the order of their numbers.
+    pub const ALL: [Status; 8] = [
+        Status::Static,
+        Status::Moving,
+        Status::Unmatched,
+        Status::OutsideWindow,
+        Status::OverCapacity,
+        Status::OwnVehicle,
+        Status::NoEcho,
+        Status::Invalid,
+    ];
+
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Status::Static => "static",
+            Status::Moving => "moving",
+            Status::Unmatched => "unmatched",
+            Status::OutsideWindow => "outside window",
+            Status::OverCapacity => "over capacity",
+            Status::OwnVehicle => "own vehicle",
+            Status::NoEcho => "no echo",
+            Status::Invalid => "invalid",
+        }
+    }
+}
+
 /// Flow of one return of the pair's first sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PointFlow {
@@ -119,8 +202,23 @@ pub struct PointFlow {
     pub age: u32,
     /// Where the flow comes from; returns outside the window are background.
     pub origin: Origin,
+    /// What became of it.
+    pub status: Status,
     /// P(moves), that of its column.
     pub probability: f32,
+}
+
+impl PointFlow {
+    /// Of a return that was not taken.
+    pub const OVER_CAPACITY: PointFlow = PointFlow {
+        velocity_world_mps: [0.0; 2],
+        velocity_ego_mps: [0.0; 3],
+        covariance: [0.0; 3],
+        age: 0,
+        origin: Origin::Background,
+        status: Status::OverCapacity,
+        probability: 0.0,
+    };
 }
 
 /// A flow tracklet after the step (section 3.6), at the time of the pair's second sweep.

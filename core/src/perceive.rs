@@ -82,7 +82,7 @@ pub trait Perceive {
     /// Why it may fail.
     type Error;
 
-    /// Where the rays and the voxels of their origins go: [`crate::params::POINTS_MAX`] and
+    /// Where the rays and the voxels of their origins go: [`crate::params::Profile::returns`] and
     /// [`crate::params::ORIGINS_MAX`] elements, perhaps memory of a device that is slow to read.
     fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]);
 

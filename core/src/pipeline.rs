@@ -84,6 +84,7 @@ impl Pipeline {
             timer.lap("track");
             let found = Found {
                 pair: &pair,
+                rig: &setup.rig,
                 sweep: &sent.uniform,
                 perceived: &perceived,
                 observations: &self.observations,

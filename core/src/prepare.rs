@@ -5,13 +5,14 @@
 
 use crate::dropped::DroppedReturns;
 use crate::frame::{Window, central};
-use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, POINTS_MAX, Profile, SLOTS};
+use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, Profile, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
 use crate::return_clock::{ReturnClock, slot_of};
 use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, SENSORS_MAX, Sweep, Timing};
 use crate::team::Team;
+use crate::thinning::TakenPoints;
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
@@ -70,17 +71,18 @@ impl Preparation {
         out: RayBuffers,
     ) -> (usize, DroppedReturns) {
         let RayBuffers { rays, origins, columns, placed } = out;
-        assert!(rays.len() == POINTS_MAX && columns.len() == POINTS_MAX);
-        let Placement { rig, sweep, .. } = *placement;
+        let Placement { profile, rig, sweep, .. } = *placement;
+        let points = TakenPoints::new(sweep.points, profile.returns());
+        let count = points.count();
+        assert!(rays.len() >= count && columns.len() >= count);
         let caster = Caster::new(&self.clock, placement, origins);
         // Two parts, the rays of the second behind those that the first may have.
-        let taken = sweep.points.len().min(POINTS_MAX);
-        let (first, second) = sweep.points[..taken].split_at(taken / 2);
-        let admitted =
-            first.iter().filter(|p| DroppedReturns::default().admit(rig, p).is_some()).count();
+        let [first, second] = [points.range(0..count / 2), points.range(count / 2..count)];
+        let is_ray = |p: &&Point| DroppedReturns::default().admit(rig, p).is_some();
+        let admitted = points.range(0..count / 2).filter(is_ray).count();
         let (of_first, of_second) = rays.split_at_mut(admitted);
-        let (columns, more_columns) = columns.split_at_mut(first.len());
-        let (placed, more_placed) = placed.split_at_mut(first.len().min(placed.len()));
+        let (columns, more_columns) = columns.split_at_mut(count / 2);
+        let (placed, more_placed) = placed.split_at_mut((count / 2).min(placed.len()));
         let mut found = [(0, DroppedReturns::default()); 2];
         let [one, other] = &mut found;
         team.join(
@@ -89,7 +91,7 @@ impl Preparation {
         );
         let [(count, mut dropped), (more, more_dropped)] = found;
         dropped += more_dropped;
-        dropped.over_capacity = (sweep.points.len() - taken) as u64;
+        dropped.over_capacity = points.left_out() as u64;
         if count < admitted {
             // Seldom: `rays` may be memory of a device, slow to read.
             rays.copy_within(admitted..admitted + more, count);
@@ -113,11 +115,11 @@ pub struct Placement<'a> {
 
 /// Room for the rays of a sweep, the caller's.
 pub struct RayBuffers<'a> {
-    /// [`POINTS_MAX`] elements, perhaps memory of a device that is slow to read.
+    /// An element for every return taken, perhaps memory of a device that is slow to read.
     pub rays: &'a mut [Ray],
     /// [`ORIGINS_MAX`] elements; the voxels of the ray origins.
     pub origins: &'a mut [[i32; 4]],
-    /// [`POINTS_MAX`] elements; the column each return lies in, or [`NONE`].
+    /// As many; the column each return lies in, or [`NONE`].
     pub columns: &'a mut [u32],
     /// Where and when each return was, as far as there is room.
     pub placed: &'a mut [Placed],
@@ -169,16 +171,16 @@ impl<'a> Caster<'a> {
     }
 
     /// Rays of some returns, their columns and places; returns how many rays there are.
-    fn cast_all(
+    fn cast_all<'p>(
         &self,
-        points: &[Point],
+        points: impl Iterator<Item = &'p Point>,
         rays: &mut [Ray],
         columns: &mut [u32],
         placed: &mut [Placed],
     ) -> (usize, DroppedReturns) {
         let mut dropped = DroppedReturns::default();
         let mut count = 0;
-        for (n, (point, column)) in points.iter().zip(columns).enumerate() {
+        for (n, (point, column)) in points.zip(columns).enumerate() {
             let cast = self.cast(point, &mut dropped);
             *column = cast.map_or(NONE, |c| c.column);
             if let Some(placed) = placed.get_mut(n) {

@@ -8,6 +8,7 @@ use crate::record::{NONE, Ray, SweepUniform};
 use crate::refinement::{Refinement, SweepReturns};
 use crate::sweep::{Placed, Sweep};
 use crate::team::Team;
+use crate::thinning::TakenPoints;
 
 /// Where the returns of the last two sweeps are.
 pub(crate) struct Returns {
@@ -77,7 +78,8 @@ impl Returns {
         if profile.refinement_sweeps == 0 {
             return 0;
         }
-        let taken = sweep.points.len().min(POINTS_MAX);
+        let points = TakenPoints::new(sweep.points, profile.returns());
+        let taken = points.count();
         let side = profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
         let columns = &mut self.column[0][..taken];
@@ -91,14 +93,15 @@ impl Returns {
         let returns = SweepReturns {
             corner,
             stamp_s: sweep.stamp_s,
-            points: &sweep.points[..taken],
+            points,
             placed: &self.placed[..taken],
             columns,
         };
         refinement.insert_cloud(profile, returns, &mut self.is_apart[0][..taken])
     }
 
-    /// Column of the returns of the sweep before from index `from` on, and whether they are apart.
+    /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are
+    /// apart.
     pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
         self.column[1][from..].iter().copied().zip(self.is_apart[1][from..].iter().copied())
     }

@@ -61,12 +61,12 @@ use crate::map::Update;
 buffers! {
     uniform sweep: SweepUniform, "sizes, shift and costs of the sweep";
     origins: [i32; 4] [|_| ORIGINS_MAX] "voxels of the ray origins";
-    rays: Ray [|_| POINTS_MAX] "rays of the sweep";
+    rays: Ray [Profile::returns] "rays of the sweep";
     filter_table: i32 [|_| TABLE_WORDS] "background filter by mask byte";
     constancy_weights: i32 [|_| WEIGHT_WORDS] "constancy weights by level";
     constancy_costs: u32 [|_| SCORES_MAX] "cost of each score, 1/1000 nat";
     slots: [u32; 2] [|_| MERGE_SLOTS] "distinct rays: 1 + index of one, and how many";
-    distinct: u32 [|_| POINTS_MAX] "used slots";
+    distinct: u32 [Profile::returns] "used slots";
     counters: u32 [|_| COUNTERS] "counts and indirect group counts";
     log_odds: i32 [Profile::voxels] "log-odds of every voxel, tenths";
     columns_now: Column [Profile::columns] "columns of this sweep";
@@ -82,8 +82,8 @@ buffers! {
     target_index: u32 [Profile::columns] "foreground index of the winner at every target";
     proposal: Proposal [|_| FOREGROUND_MAX] "flow and energy each foreground column proposes";
     min_cost: MinCost [|_| FOREGROUND_MAX] "least energy of a foreground column, and where";
-    counts: u32 [|_| POINTS_MAX] "updates of each distinct ray in the band";
-    offsets: u32 [|_| POINTS_MAX] "where its updates start";
+    counts: u32 [Profile::returns] "updates of each distinct ray in the band";
+    offsets: u32 [Profile::returns] "where its updates start";
     count_tiles: u32 [|_| TILE + 1] "tiles of their prefix sum, updates of the band";
     updates: Update [|_| BAND_UPDATES] "updates (key, log-odds), then sorted";
     scratch: Update [|_| BAND_UPDATES] "the other side of a radix pass, then voxels";
@@ -150,7 +150,7 @@ pub const LOAD: &[StageOp] = &[
 const RAY_MERGE: &Stage = stage!(
     ray_merge in grid::ray_merge,
     (sweep, rays, mut atomic slots, mut distinct, mut atomic counters),
-    Threads(|_| POINTS_MAX)
+    Threads(Profile::returns)
 );
 
 /// Group counts of the indirect dispatches.
@@ -288,9 +288,9 @@ pub const MAP_COUNT: &[StageOp] = &[
     Run(stage!(
         count in map::emit,
         (sweep, origins, rays, slots, list distinct, mut counts),
-        Threads(|_| POINTS_MAX)
+        Threads(Profile::returns)
     )),
-    Run(prefix_sum!(counts, count_tiles, offsets, |_| POINTS_MAX)),
+    Run(prefix_sum!(counts, count_tiles, offsets, Profile::returns)),
     ReadBack(Buffer::count_tiles),
 ];
 
@@ -300,7 +300,7 @@ pub const MAP_BAND: &[StageOp] = &[
     Run(stage!(
         emit in map::emit,
         (sweep, origins, rays, slots, list distinct, offsets, mut updates),
-        Threads(|_| POINTS_MAX)
+        Threads(Profile::returns)
     )),
     Fused(
         stage!(radix_sort in map::radix_sort, (count_tiles, mut updates, mut scratch), []),

@@ -1,14 +1,16 @@
 //! Out: a velocity for every column and every return (section 3.7).
 
 use crate::frame::{SweepPair, centre_of};
-use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow};
+use crate::dropped::Kind;
+use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow, PointFlows, Status};
 use crate::params::COLUMNS_MAX;
 use crate::perceive::Perceived;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::returns::Returns;
-use crate::sweep::Point;
+use crate::sweep::{Point, Rig};
 use crate::team::Team;
+use crate::thinning::TakenPoints;
 use crate::tracklet::observe::Observations;
 use crate::tracklet::{TrackletTurnover, Tracklets};
 use glam::DVec3;
@@ -26,6 +28,7 @@ impl FlowOfColumn {
 /// All that is known of a pair of sweeps.
 pub(crate) struct Found<'a> {
     pub pair: &'a SweepPair<'a>,
+    pub rig: &'a Rig,
     pub sweep: &'a SweepUniform,
     pub perceived: &'a Perceived<'a>,
     pub observations: &'a Observations,
@@ -46,11 +49,13 @@ impl Found<'_> {
     ) -> PairFlows<'o> {
         let (count, valid) = self.columns(index, out.columns);
         let columns = &out.columns[..count];
-        self.points(team, points, columns, index, out.points);
+        let thinning = self.pair.before.points;
+        let points = TakenPoints::new(points, thinning.taken());
+        self.points(team, points, columns, index, &mut out.points[..points.count()]);
         let beyond = self.perceived.marked - self.perceived.foreground.len();
         PairFlows {
             columns,
-            points: &out.points[..self.pair.before.points],
+            points: PointFlows::new(&out.points[..points.count()], thinning),
             dt_s: self.pair.dt_s,
             turnover,
             valid,
@@ -127,24 +132,25 @@ impl Found<'_> {
         true
     }
 
-    /// Writes one record per return of the first sweep, in its order.
+    /// Writes one record per return taken of the first sweep, in its order.
     fn points(
         &self,
         team: &impl Team,
-        points: &[Point],
+        points: TakenPoints,
         columns: &[ColumnFlow],
         index: &FlowOfColumn,
         out: &mut [PointFlow],
     ) {
-        let half = points.len().min(out.len()) / 2;
+        let half = out.len() / 2;
         let (first, second) = out.split_at_mut(half);
-        let part = |from: usize, points: &[Point], out: &mut [PointFlow]| {
+        let part = |from: usize, out: &mut [PointFlow]| {
             let places = self.returns.before(from);
+            let points = points.range(from..from + out.len());
             for (((column, is_apart), point), out) in places.zip(points).zip(out) {
                 *out = self.point(column, is_apart, point, columns, index);
             }
         };
-        team.join(|| part(0, &points[..half], first), || part(half, &points[half..], second));
+        team.join(|| part(0, first), || part(half, second));
     }
 
     /// A return moves with its column; outside the window, and where nothing is solid, with the
@@ -177,10 +183,30 @@ impl Found<'_> {
                 }
             }
         }
+        out.status = self.status(column, point, &out);
         let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });
         out.velocity_ego_mps =
             self.pair.ego.ego_from_world(DVec3::new(x, y, z), out.velocity_world_mps);
         out
+    }
+
+    /// What became of a return with this flow.
+    fn status(&self, column: u32, point: &Point, flow: &PointFlow) -> Status {
+        match Kind::of(self.rig, point) {
+            Kind::Valid if column == NONE => Status::OutsideWindow,
+            Kind::Valid if flow.origin == Origin::Unmatched => Status::Unmatched,
+            Kind::Valid if self.is_moving(flow) => Status::Moving,
+            Kind::Valid => Status::Static,
+            Kind::OwnVehicle => Status::OwnVehicle,
+            Kind::NoEcho => Status::NoEcho,
+            Kind::NotFinite | Kind::UnknownSensor => Status::Invalid,
+        }
+    }
+
+    /// Whether it is put out as moving. Whole cells, followed by a filter, are never quite at rest.
+    fn is_moving(&self, flow: &PointFlow) -> bool {
+        flow.probability >= self.pair.profile.moves.moves_min
+            && flow.velocity_world_mps != [0.0; 2]
     }
 
     /// Where the record is of a column of the window before; beyond all records where there is

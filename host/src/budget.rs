@@ -5,7 +5,7 @@ mod parameters;
 mod traffic;
 
 use raywake_core::map::Bands;
-use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::params::Profile;
 use raywake_core::pipeline::Pipeline;
 use raywake_core::refinement::Refinement;
 use raywake_core::stages::{FLOW_PROGRAMS, MAP_PROGRAMS};
@@ -123,7 +123,7 @@ fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
             "ColumnFlow, PointFlow",
             Drive::bytes(profile) - pipeline,
         ),
-        part("two sweeps at capacity", "Point", 2 * POINTS_MAX * size_of::<Point>()),
+        part("two sweeps at capacity", "Point", 2 * profile.returns() * size_of::<Point>()),
         part("learned tables", "Tables", 4 * words),
     ];
     if scalar {
@@ -137,8 +137,8 @@ fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     let mut parts = vec![
         part("mapper", "Mapper", size_of::<Mapper>()),
         part("bands", "Bands", size_of::<Bands>()),
-        part("columns of the rays", "u32", POINTS_MAX * size_of::<u32>()),
-        part("one sweep at capacity", "Point", POINTS_MAX * size_of::<Point>()),
+        part("columns of the rays", "u32", profile.returns() * size_of::<u32>()),
+        part("one sweep at capacity", "Point", profile.returns() * size_of::<Point>()),
     ];
     if scalar {
         let most = Mapper::bytes(profile);

@@ -2,7 +2,7 @@
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::{self, ColumnFlow, Output, PointFlow, TrackletState};
-use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::params::Profile;
 use raywake_core::perceive::Machine;
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
@@ -50,7 +50,7 @@ impl Drive {
             pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()),
             backend,
             columns: vec![ColumnFlow::default(); profile.columns()],
-            points: vec![PointFlow::default(); POINTS_MAX],
+            points: vec![PointFlow::default(); profile.returns()],
         };
         Drive { parts: Sealed::new("sweep", parts) }
     }
@@ -59,7 +59,7 @@ impl Drive {
     pub fn bytes(profile: &Profile) -> usize {
         size_of::<Pipeline>()
             + profile.columns() * size_of::<ColumnFlow>()
-            + POINTS_MAX * size_of::<PointFlow>()
+            + profile.returns() * size_of::<PointFlow>()
     }
 
     /// The backend.

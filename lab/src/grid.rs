@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 use raywake_core::frame::{Window, central, place};
-use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::params::Profile;
 use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
-use raywake_core::record::{Column, SweepUniform};
+use raywake_core::record::{Column, NONE, SweepUniform};
 use raywake_core::stages::{GRID, StageProgram, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
+use raywake_core::thinning::Thinning;
 
 /// All that a grid runs, and so all that its storage holds.
 const GRID_ALONE: &[StageProgram] = &[StageProgram { name: "grid", ops: GRID }];
@@ -23,7 +24,9 @@ pub struct Grid {
     pub step: SweepUniform,
     /// Columns of the window.
     pub columns: Vec<Column>,
-    /// Column of every point of the sweep, [`raywake_core::record::NONE`] where it has none.
+    /// Column of every point that was taken.
+    of_taken: Vec<u32>,
+    /// Column of every point of the sweep, [`NONE`] where it has none or was not taken.
     pub of_point: Vec<u32>,
 }
 
@@ -37,7 +40,8 @@ impl Grid {
             words: vec![0; Storage::words(GRID_ALONE, &profile)],
             step: uniform_of(&profile, 0),
             columns: vec![[0; 2]; profile.columns()],
-            of_point: vec![0; POINTS_MAX],
+            of_taken: vec![0; profile.returns()],
+            of_point: Vec::new(),
             profile,
         }
     }
@@ -69,11 +73,16 @@ impl Grid {
             RayBuffers {
                 rays: storage.rays,
                 origins: storage.origins,
-                columns: &mut self.of_point,
+                columns: &mut self.of_taken,
                 placed: &mut [],
             },
         );
         self.step.rays = count as i32;
+        let of_taken = &self.of_taken;
+        let thinning = Thinning::new(sweep.points.len(), self.profile.returns());
+        let column = |index| thinning.rank(index).map_or(NONE, |n| of_taken[n]);
+        self.of_point.clear();
+        self.of_point.extend((0..thinning.of()).map(column));
         storage.sweep = self.step;
         run(GRID, &mut storage, 0, &mut |_| ());
         self.columns.copy_from_slice(storage.columns_now);

@@ -1,8 +1,8 @@
 //! Ceilings that size storage, and the constants of the wire format shared with the kernels.
 
-/// Returns of one sweep; further ones, in the source's order, are dropped and counted.
-/// (The dissertation's n_max is 150,000; no labelled KITTI sweep has more than 124,123.)
-pub const POINTS_MAX: usize = 131_072;
+/// Returns of one sweep that any profile may take: those of four HDL-32E at their full rate, or of
+/// an OS1-128 at 2048 x 10. (The dissertation's n_max is 150,000.)
+pub const POINTS_MAX: usize = 262_144;
 /// Levels of a column: free and occupied masks share one 32-bit word. No profile needs more.
 /// Compared with 32 levels this halves the memory traffic, and a pair of columns is scored with
 /// four byte lookups (scalar) or 32 masked additions (kernel).

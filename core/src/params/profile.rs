@@ -2,7 +2,7 @@
 
 use super::{
     COLUMNS_MAX, COST_UNKNOWN, GroundParams, Kind, LEVELS_MAX, MovesParams, Parameters,
-    ProfileError, RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
+    POINTS_MAX, ProfileError, RANGE_STEPS_MAX, RefinementParams, TrackletParams, Value,
 };
 use crate::continuity::ContinuityLimits;
 use heapless::String;
@@ -45,6 +45,9 @@ crate::params! {
         pub voxel_m: f64 = 0.30, "m", (0.05 to 2.0),
             "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: \
              3.3 cm mean error of what moves against 4.0 cm (`raywake-lab ablate`).";
+        /// Returns taken of a sweep; of one that has more, so many, spread evenly over it.
+        pub returns_max: u32 = POINTS_MAX as u32, "returns", (1 to 262144),
+            "Four HDL-32E at their full rate, or an OS1-128 at 2048 x 10.";
         /// Greatest range of a return, counted in voxels along the ray's longest axis as the update
         /// list of B.2.1 does; at most 2,000 voxels.
         pub range_m: f64 = 100.0, "m", (above 0), "Dissertation, table B.1 (m_r).";
@@ -151,6 +154,11 @@ impl Profile {
             "limits" => &mut self.limits,
             _ => self,
         }
+    }
+
+    /// Returns taken of a sweep at most.
+    pub fn returns(&self) -> usize {
+        self.returns_max as usize
     }
 
     /// Columns of the window.

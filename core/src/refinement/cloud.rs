@@ -11,7 +11,8 @@ use crate::params::{
     SUBVOXELS_MAX,
 };
 use crate::record::NONE;
-use crate::sweep::{Placed, Point, SENSORS_MAX};
+use crate::sweep::{Placed, SENSORS_MAX};
+use crate::thinning::TakenPoints;
 use core::ops::Range;
 
 /// Words of a mask of the sub-voxels of a column.
@@ -25,7 +26,7 @@ pub struct SweepReturns<'a> {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
-    pub points: &'a [Point],
+    pub points: TakenPoints<'a>,
     /// Their places in the window, voxels.
     pub placed: &'a [Placed],
     /// Their columns, or [`NONE`].
@@ -131,7 +132,7 @@ impl Cloud {
             if (scaled.height_min..scaled.height_max).contains(&height) {
                 self.start[column as usize + 1] += 1;
                 listed[count] = n as u32;
-                sensors |= 1 << points[n].sensor;
+                sensors |= 1 << points.get(n).sensor;
                 count += 1;
             }
         }
@@ -160,7 +161,7 @@ impl Cloud {
     ) -> usize {
         // By column they are looked up far apart: only where there are several.
         let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
-        let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points[n as usize].sensor);
+        let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points.get(n as usize).sensor);
         // Each start has become its end; what is kept is written from the front again.
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);

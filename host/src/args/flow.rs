@@ -23,10 +23,12 @@ Columns of --out FILE.feather, one row per point of A in file order, including i
     cov_dx_dx cov_dx_dy cov_dy_dy    covariance of the motion, m^2; 0 where unmatched
     foreground                       may move: not rejected by the background filter
     valid                            matched, or part of a moving cluster
+    status                           what became of the point, by number: static, moving, unmatched,
+                                     outside window, over capacity, own vehicle, no echo, invalid
 Flow and motion are NaN where a coordinate is. FILE.bin has flow and motion only: 6 little-endian
 float32 per row. The metadata of the feather file has dt_s, ground_m and a_from_b, the estimated
 motion (a row-major 3x4 matrix: the pose of B's frame in A's).
-Points outside the profile's window, and points of A after the first";
+Only points that move have a motion. Of a cloud of more points than";
 
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
@@ -66,7 +68,7 @@ pub struct FlowArgs {
 
 /// The end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
-    format!("{FILES} {POINTS_MAX}, are reported as static.\n\n{exit_codes}")
+    format!("{FILES} {POINTS_MAX} as many are taken, evenly spread.\n\n{exit_codes}")
 }
 
 /// Three finite numbers with commas between them.

@@ -166,8 +166,7 @@ fn points(
         let (columns, frame) = (flows.columns, PictureFrame::World);
         pictures.write(first, &Subject::Flow { columns, profile, frame })?;
     }
-    let mut flows = stepped.output.flows.map_or_else(Vec::new, |flows| flows.points.to_vec());
-    flows.resize(first.points.len(), PointFlow::default());
+    let flows = stepped.output.flows.map_or_else(Vec::new, |f| f.points.iter().collect());
     Ok((flows, Dropped { returns, ..Dropped::default() }))
 }
 

@@ -4,12 +4,13 @@ use std::io::Write;
 use std::path::Path;
 
 use glam::Vec3;
-use raywake_core::output::{Origin, PointFlow};
+use raywake_core::output::{Origin, PointFlow, Status};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
 use raywake_io::Error;
 use raywake_io::sink::argoverse::displacement;
+use raywake_io::sink::feather::status_names;
 use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{Meta, atomic};
 
@@ -25,6 +26,7 @@ pub struct PointRow {
     /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
     pub origin: Origin,
+    pub status: Status,
 }
 
 impl PointRow {
@@ -41,6 +43,7 @@ impl PointRow {
             motion,
             covariance: flow.covariance.map(|v| v * (dt_s * dt_s) as f32),
             origin: flow.origin,
+            status: flow.status,
         }
     }
 
@@ -76,7 +79,7 @@ impl Form {
     /// Writes the rows, whole or not at all; `meta` goes to a table's metadata.
     pub fn write(self, path: &Path, rows: &[PointRow], meta: Meta<'_>) -> Result<(), Error> {
         match self {
-            Form::Feather => table(rows).write(path, meta),
+            Form::Feather => table(rows).write(path, &[meta, &[status_names()]].concat()),
             Form::Bin => atomic::write(path, |out| {
                 let numbers = rows.iter().flat_map(|r| [r.flow, r.motion]).flatten();
                 numbers.into_iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))
@@ -93,6 +96,7 @@ fn table(rows: &[PointRow]) -> TableWriter {
     t.array(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], rows, |r| r.covariance);
     t.column("foreground", rows, |r| r.origin != Origin::Background);
     t.column("valid", rows, PointRow::valid);
+    t.column("status", rows, |r| r.status as u8);
     t
 }
 

@@ -7,7 +7,7 @@ pub mod scalar;
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::frame::{Window, place};
 use raywake_core::map::Update;
-use raywake_core::params::{POINTS_MAX, Profile};
+use raywake_core::params::Profile;
 use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::{NONE, Ray, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
@@ -79,11 +79,11 @@ impl Mapper {
     /// A mapper for a profile that passed [`Profile::check`].
     pub fn new(profile: Profile, rig: Rig, backend: MapBackend) -> Mapper {
         Mapper {
+            columns: vec![NONE; profile.returns()],
             profile,
             rig,
             preparation: Preparation::new(),
             lattice_origin: None,
-            columns: vec![NONE; POINTS_MAX],
             backend,
         }
     }

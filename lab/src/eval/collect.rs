@@ -45,7 +45,7 @@ impl PairData {
             then: pair.second.world_from_vehicle,
             dt_s: pair.flows.dt_s,
             columns: pair.flows.columns.to_vec(),
-            points: pair.flows.points.to_vec(),
+            points: pair.flows.points.iter().collect(),
         }
     }
 

@@ -3,11 +3,12 @@
 use super::{CELL_M, FrontEndParams, SIDE};
 use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
-use raywake_core::output::{Origin, PointFlow};
+use raywake_core::output::{Origin, PointFlow, PointFlows, Status};
 use raywake_core::params::{POINTS_MAX, SLOTS};
 use raywake_core::pose::Pose;
 use raywake_core::return_clock::{ReturnClock, slot_of};
 use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
+use raywake_core::thinning::TakenPoints;
 
 /// A return in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,8 +38,8 @@ impl BatchReturn {
 /// The flow of a sweep's returns.
 #[derive(Clone, Copy, Debug)]
 pub struct Flows<'a> {
-    /// Of every return, in the sweep's order.
-    pub of: &'a [PointFlow],
+    /// Of every return.
+    pub of: PointFlows<'a>,
     /// Returns farther from the vehicle lie outside the flow's window, m.
     pub reach_m: f64,
 }
@@ -47,7 +48,9 @@ impl Flows<'_> {
     /// Velocity of a return `away` (m) from the vehicle, m/s.
     fn velocity(&self, n: usize, away: [f64; 2], sigma_max_mps: f32) -> Option<[f32; 2]> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
-        let flow = self.of.get(n).filter(|f| inside && f.origin != Origin::Unmatched)?;
+        let untold =
+            |f: &PointFlow| f.origin == Origin::Unmatched || f.status == Status::OverCapacity;
+        let flow = self.of.get(n).filter(|f| inside && !untold(f))?;
         let sum = flow.covariance[0] + flow.covariance[2];
         let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
         certain.then_some(flow.velocity_world_mps)
@@ -120,7 +123,10 @@ impl Batch {
         let edge = SIDE as f32 * CELL_M;
         let vehicle = under - self.corner;
         let clock = self.clock.get_or_insert_with(ReturnClock::new);
-        for (n, point) in sweep.points.iter().enumerate() {
+        let room = self.returns.capacity() - self.returns.len();
+        let points = TakenPoints::new(sweep.points, room);
+        self.dropped.over_capacity += points.left_out() as u64;
+        for (n, point) in points.indexed() {
             match self.dropped.admit(rig, point) {
                 Some(false) => {}
                 Some(true) => {
@@ -141,7 +147,8 @@ impl Batch {
             let velocity = flows.as_ref().and_then(|f| f.velocity(n, away, sigma_max_mps));
             let time_s = (after_s + offset_s) as f32;
             let one = BatchReturn { time_s, velocity, ..placed };
-            self.dropped.over_capacity += self.returns.push(one).is_err() as u64;
+            // There is room for all that are taken.
+            let _ = self.returns.push(one);
         }
     }
 }

@@ -6,7 +6,7 @@ use super::scene::{PARAMS, Run, Thing, ground, rig, seen};
 use super::*;
 use crate::centroid_ekf::CentroidEkf;
 use glam::DVec3;
-use raywake_core::output::PointFlow;
+use raywake_core::output::{PointFlow, PointFlows};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
 use std::vec;
@@ -189,7 +189,9 @@ fn the_flow_tells_neighbours_apart() {
             flows.resize(alone, PointFlow::default());
             let moving = PointFlow { velocity_world_mps: of_person, ..PointFlow::default() };
             flows.resize(points.len(), moving);
-            run.take(stamp_s, &points, Some(Flows { of: &flows, reach_m: 40.0 }));
+            let all = Thinning::new(points.len(), points.len());
+            let of = PointFlows::new(&flows, all);
+            run.take(stamp_s, &points, Some(Flows { of, reach_m: 40.0 }));
             born += run.step().born;
         }
         let mut speeds: Vec<f64> =
@@ -240,11 +242,11 @@ fn beyond_a_capacity_all_is_counted() {
     }
     // Returns.
     let mut run = Run::new(1, 8);
-    let many = vec![Point { position: [5.0, 5.0, 1.0], ..Point::default() }; 70_000];
+    let many = vec![Point { position: [5.0, 5.0, 1.0], ..Point::default() }; 140_000];
     run.take(0.0, &many, None);
     run.take(0.0, &many, None);
     let counts = run.step();
-    assert_eq!(counts.dropped.over_capacity, 140_000 - raywake_core::params::POINTS_MAX as u64);
+    assert_eq!(counts.dropped.over_capacity, 280_000 - raywake_core::params::POINTS_MAX as u64);
 }
 
 #[test]

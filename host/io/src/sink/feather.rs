@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
+use raywake_core::output::{ColumnFlow, Origin, PointFlow, Status, TrackletState};
 use raywake_core::sweep::Point;
 
 use super::Meta;
@@ -49,7 +49,8 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 ///
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
 /// cov_yy` of the world velocity float32; `age` uint32; `p_moves` float32; `foreground`, `valid`
-/// bool.
+/// bool; `status` uint8, what became of the return: the numbers of
+/// [`raywake_core::output::Status`], whose names are in the metadata.
 ///
 /// `points` and `flows` are of the same sweep; fails with [`Error::Usage`] where their lengths
 /// differ.
@@ -72,7 +73,13 @@ pub fn write_points(
     t.column("p_moves", flows, |f| f.probability);
     t.column("foreground", flows, |f| f.origin != Origin::Background);
     t.column("valid", flows, |f| f.origin >= Origin::Matched);
-    t.write(path, meta)
+    t.column("status", flows, |f| f.status as u8);
+    t.write(path, &[meta, &[status_names()]].concat())
+}
+
+/// `status`: the name of every number, separated by commas.
+pub fn status_names() -> (&'static str, String) {
+    ("status", Status::ALL.map(Status::name).join(","))
 }
 
 /// Writes tracklets, one row each.
