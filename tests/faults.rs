@@ -70,7 +70,7 @@ fn a_backend_that_cannot_be_set_up_in_time() {
 
 /// A window so wide and so many rounds that a sweep of a street takes long, and its set-up.
 fn slow() -> Setup {
-    Setup::new(Profile { side: 255, em_rounds: 100, ..Profile::wide() }, None)
+    Setup::new(Profile { side: 337, em_rounds: 100, ..Profile::wide() }, None)
 }
 
 /// How long set-up without rays takes, kernels compiled; none without a software device.

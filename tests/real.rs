@@ -34,7 +34,7 @@ fn run(setup: &Setup, backend: raywake::backend::Backend, source: &mut dyn Sourc
         if let Some(flows) = stepped.output.flows {
             flows.columns.iter().for_each(|c| digest.column(c));
             run.valid.push(flows.valid);
-            run.points += flows.points.len();
+            run.points += flows.points.count();
         }
         drive.tracklets().for_each(|t| digest.tracklet(&t));
         std::mem::swap(&mut now, &mut before);

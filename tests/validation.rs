@@ -40,7 +40,7 @@ fn no_access_out_of_bounds_is_found() {
 
 #[test]
 fn no_access_out_of_bounds_is_found_in_the_largest_window() {
-    check(Profile { side: 255, ..Profile::wide() }, Validation::GpuAssisted);
+    check(Profile { side: 337, ..Profile::wide() }, Validation::GpuAssisted);
 }
 
 /// What newer versions say of strides that naga puts on arrays in workgroup memory: harmless.

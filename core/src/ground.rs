@@ -4,12 +4,12 @@
 //! returns mirrored by glass or puddles come from below, but seldom together. Parameters are in
 //! metres, places and heights in the caller's unit, the edge of a column.
 
-use crate::params::{COLUMNS_MAX, GroundParams};
+use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 
 /// Least number of columns along an edge of a cell: bounds the number of cells.
 const CELL_COLUMNS_MIN: usize = 4;
 /// Cells along an axis at most.
-const CELLS_SIDE_MAX: usize = 256usize.div_ceil(CELL_COLUMNS_MIN);
+const CELLS_SIDE_MAX: usize = SIDE_MAX.div_ceil(CELL_COLUMNS_MIN);
 const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
 /// Height of the ground in cells of several columns.
@@ -59,7 +59,7 @@ impl GroundGrid {
         }
     }
 
-    /// Estimates the ground of a window of `side` columns along an axis (at most 256), whose edges
+    /// Estimates the ground of a window of `side` columns along an axis (at most [`SIDE_MAX`]), whose edges
     /// measure `column_m`. `returns` are given by column and place, `under` is the place of the
     /// ground beneath the vehicle.
     pub fn estimate(

@@ -24,7 +24,8 @@ pub struct PairFlows<'a> {
     /// Matched columns.
     pub valid: usize,
     /// Solid columns beyond the capacity for foreground, which count as background, and those
-    /// beyond as many that moved, which count as unmatched.
+    /// beyond as many that moved, which count as unmatched; columns of clusters and columns that
+    /// there is no room for.
     pub foreground_dropped: usize,
 }
 
@@ -78,7 +79,7 @@ pub struct SweepOutput<'a> {
 
 /// Room for what a step puts out, the caller's.
 pub struct Output<'a> {
-    /// [`crate::params::COLUMNS_MAX`] elements, or as many as the profile has columns.
+    /// [`crate::params::SOLID_MAX`] elements, or as many as the profile has columns.
     pub columns: &'a mut [ColumnFlow],
     /// As many as the profile takes returns.
     pub points: &'a mut [PointFlow],

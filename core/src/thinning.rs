@@ -29,7 +29,11 @@ impl Thinning {
     #[inline]
     pub fn index(self, n: usize) -> usize {
         // 64 bits: a sweep may have as many returns as a 32-bit machine has memory for.
-        if self.of == self.taken { n } else { (n as u64 * self.of as u64 / self.taken as u64) as usize }
+        if self.of == self.taken {
+            n
+        } else {
+            (n as u64 * self.of as u64 / self.taken as u64) as usize
+        }
     }
 
     /// Where among those taken a return of the sweep is, if it is.

@@ -1,7 +1,7 @@
 //! Out: a velocity for every column and every return (section 3.7).
 
-use crate::frame::{SweepPair, centre_of};
 use crate::dropped::Kind;
+use crate::frame::{SweepPair, centre_of};
 use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow, PointFlows, Status};
 use crate::params::COLUMNS_MAX;
 use crate::perceive::Perceived;
@@ -47,29 +47,30 @@ impl Found<'_> {
         index: &mut FlowOfColumn,
         out: Output<'o>,
     ) -> PairFlows<'o> {
-        let (count, valid) = self.columns(index, out.columns);
+        let (count, valid, unlisted) = self.columns(index, out.columns);
         let columns = &out.columns[..count];
         let thinning = self.pair.before.points;
         let points = TakenPoints::new(points, thinning.taken());
         self.points(team, points, columns, index, &mut out.points[..points.count()]);
         let beyond = self.perceived.marked - self.perceived.foreground.len();
+        let observed = self.observations.beyond_capacity + self.refinement.beyond_capacity();
         PairFlows {
             columns,
             points: PointFlows::new(&out.points[..points.count()], thinning),
             dt_s: self.pair.dt_s,
             turnover,
             valid,
-            foreground_dropped: beyond + self.observations.beyond_capacity,
+            foreground_dropped: beyond + observed + unlisted,
         }
     }
 
-    /// Writes one record per solid column of the first sweep; returns how many, and how many of
-    /// them are matched.
-    fn columns(&self, index: &mut FlowOfColumn, out: &mut [ColumnFlow]) -> (usize, usize) {
+    /// Writes one record per solid column of the first sweep; returns how many, how many of them
+    /// are matched, and how many there was no room for.
+    fn columns(&self, index: &mut FlowOfColumn, out: &mut [ColumnFlow]) -> (usize, usize, usize) {
         let vehicle_from_grid = self.pair.vehicle_from_grid();
         let mut foreground = self.perceived.foreground.iter().enumerate().peekable();
         let mut observed = self.observations.all.iter().peekable();
-        let (mut count, mut valid) = (0, 0);
+        let (mut count, mut valid, mut beyond) = (0, 0, 0);
         for (column, record) in self.perceived.columns_before.iter().enumerate() {
             let rank = foreground.next_if(|(_, c)| **c as usize == column).map(|(n, _)| n);
             index.0[column] = NONE;
@@ -94,11 +95,16 @@ impl Found<'_> {
             } else {
                 self.pair.set_relative(at, &mut flow);
             }
-            index.0[column] = count as u32;
-            out[count] = flow;
-            count += 1;
+            match out.get_mut(count) {
+                Some(out) => {
+                    *out = flow;
+                    index.0[column] = count as u32;
+                    count += 1;
+                }
+                None => beyond += 1,
+            }
         }
-        (count, valid)
+        (count, valid, beyond)
     }
 
     /// Whether what moves with a probability is put out so. Whole cells have no other evidence.
@@ -205,8 +211,7 @@ impl Found<'_> {
 
     /// Whether it is put out as moving. Whole cells, followed by a filter, are never quite at rest.
     fn is_moving(&self, flow: &PointFlow) -> bool {
-        flow.probability >= self.pair.profile.moves.moves_min
-            && flow.velocity_world_mps != [0.0; 2]
+        flow.probability >= self.pair.profile.moves.moves_min && flow.velocity_world_mps != [0.0; 2]
     }
 
     /// Where the record is of a column of the window before; beyond all records where there is

@@ -2,7 +2,7 @@
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::{self, ColumnFlow, Output, PointFlow, TrackletState};
-use raywake_core::params::Profile;
+use raywake_core::params::{Profile, SOLID_MAX};
 use raywake_core::perceive::Machine;
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
@@ -27,6 +27,11 @@ struct Parts {
     points: Vec<PointFlow>,
 }
 
+/// Room for columns that are put out.
+fn solid(profile: &Profile) -> usize {
+    profile.columns().min(SOLID_MAX)
+}
+
 /// What one sweep yields, and how long it took.
 pub struct Stepped<'a> {
     /// What comes out.
@@ -49,7 +54,7 @@ impl Drive {
             // A constant is written to its place: by way of the stack it would need 30 MiB of it.
             pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()),
             backend,
-            columns: vec![ColumnFlow::default(); profile.columns()],
+            columns: vec![ColumnFlow::default(); solid(profile)],
             points: vec![PointFlow::default(); profile.returns()],
         };
         Drive { parts: Sealed::new("sweep", parts) }
@@ -58,7 +63,7 @@ impl Drive {
     /// Bytes of host memory held for a profile, the backend's apart.
     pub fn bytes(profile: &Profile) -> usize {
         size_of::<Pipeline>()
-            + profile.columns() * size_of::<ColumnFlow>()
+            + solid(profile) * size_of::<ColumnFlow>()
             + profile.returns() * size_of::<PointFlow>()
     }
 

@@ -106,7 +106,8 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
         let flows = stepped.unwrap_or_else(|e| panic!("{e}")).flows;
         let mut stages = witness.stages;
         if let Some(flows) = flows {
-            (stages.columns, stages.points) = (flows.columns.to_vec(), flows.points.iter().collect());
+            (stages.columns, stages.points) =
+                (flows.columns.to_vec(), flows.points.iter().collect());
         }
         stages.tracklets = self.pipeline.tracklets(&self.setup.profile).collect();
         stages

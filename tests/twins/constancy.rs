@@ -136,6 +136,6 @@ fn windows_of_every_kind() {
     check_window("the dearest", 31, &all, &vec![COST_MAX as u16; 961 * ROW]);
     let some: Vec<u32> = (0..167 * 167).filter(|n| n % 7 < 2 || n % 167 < 3).collect();
     check_window("some", 167, &some, &costs(some.len()));
-    let most: Vec<u32> = (0..255 * 255).filter(|n| n % 5 != 0).take(FOREGROUND_MAX).collect();
-    check_window("capacity", 255, &most, &costs(FOREGROUND_MAX));
+    let most: Vec<u32> = (0..337 * 337).filter(|n| n % 5 != 0).take(FOREGROUND_MAX).collect();
+    check_window("capacity", 337, &most, &costs(FOREGROUND_MAX));
 }

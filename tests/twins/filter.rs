@@ -38,7 +38,7 @@ fn check(case: &str, step: &SweepUniform, table: &[i32], before: &[Column]) -> u
 
 #[test]
 fn filters_of_every_kind() {
-    let sides = [1, 3, 7, 8, 9, 31, 167, 255];
+    let sides = [1, 3, 7, 8, 9, 31, 167, 337];
     assert!(sides.contains(&8) && ROW_WORKGROUP == 8 * 8);
     let mut random = Random::new(5);
     for levels in [14, 16] {

@@ -48,7 +48,7 @@ fn around(size: usize) -> [usize; 5] {
 /// which origin it has.
 #[allow(clippy::type_complexity)]
 fn extremes() -> (SweepUniform, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7]) {
-    let step = SweepUniform { range_steps: 2000, ..window(255, 16) };
+    let step = SweepUniform { range_steps: 2000, ..window(337, 16) };
     let e = EXTENT_VOXELS;
     let ends = [
         ("onto itself", [127, 127, 8], 0),

@@ -12,7 +12,7 @@ use super::{POISON, window, words};
 pub const KERNELS: &[&Kernel] = &[&COLUMNS, &SHIFT];
 
 /// Sides whose squares lie around a workgroup, and the largest.
-const SIDES: [i32; 5] = [1, 15, 16, 17, 255];
+const SIDES: [i32; 5] = [1, 15, 16, 17, 337];
 
 fn check_columns(step: &SweepUniform, log_odds: Vec<i32>) {
     let count = (step.side * step.side) as usize;

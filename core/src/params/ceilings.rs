@@ -7,8 +7,16 @@ pub const POINTS_MAX: usize = 262_144;
 /// Compared with 32 levels this halves the memory traffic, and a pair of columns is scored with
 /// four byte lookups (scalar) or 32 masked additions (kernel).
 pub const LEVELS_MAX: usize = 16;
-/// Columns of the flow window: 256 x 256 cells, 76.8 m at 0.30 m.
-pub const COLUMNS_MAX: usize = 65_536;
+/// Columns of the flow window along an axis: 101 m at 0.30 m.
+pub const SIDE_MAX: usize = 337;
+/// Columns of the flow window.
+pub const COLUMNS_MAX: usize = (SIDE_MAX * SIDE_MAX).next_multiple_of(TILE);
+/// Solid columns of one sweep that flow is put out of; further ones, in column order, are left out
+/// and counted. The busiest sweep seen has 8,795 in a window of 50 m.
+pub const SOLID_MAX: usize = 32_768;
+/// Clusters of one sweep, whole and in parts; columns of further ones are taken to stand, and
+/// counted. As many as columns that flow is put out of: most clusters have several.
+pub const CLUSTERS_MAX: usize = SOLID_MAX;
 /// Foreground columns of one sweep; further ones, in column order, are dropped and counted.
 /// The busiest sweep seen has 8,795 solid columns in a 50 m window.
 pub const FOREGROUND_MAX: usize = 12_288;

@@ -38,7 +38,7 @@ struct Out {
 fn run(profile: &Profile, rig: &Rig, pose: Pose, twist: Twist, points: &[Point]) -> Out {
     let window = place(profile, rig, &pose, Some(DVec3::ZERO));
     let sweep = Sweep { stamp_s: 0.0, points, world_from_vehicle: pose, twist };
-    let (mut rays, mut columns) = (vec![[0; 2]; POINTS_MAX], vec![0; POINTS_MAX]);
+    let (mut rays, mut columns) = (vec![[0; 2]; profile.returns()], vec![0; profile.returns()]);
     let mut origins = vec![[0; 4]; ORIGINS_MAX];
     let mut placed = vec![Placed::default(); points.len()];
     let (count, dropped) = Preparation::new().prepare(
@@ -59,7 +59,7 @@ fn run(profile: &Profile, rig: &Rig, pose: Pose, twist: Twist, points: &[Point])
 #[test]
 fn every_bad_return_is_counted() {
     let profile = Profile::hdl64();
-    let mut points = vec![
+    let points = vec![
         at(f32::NAN, 0.0, 0.0),
         at(0.0, f32::INFINITY, 0.0),
         at(0.0, 0.0, 0.0),
@@ -76,9 +76,17 @@ fn every_bad_return_is_counted() {
     assert_eq!(out.rays.len(), 2);
     assert_eq!(out.rays[0][1] & NO_END, NO_END);
     assert_eq!(out.columns.iter().filter(|c| **c != NONE).count(), 1);
-    points.resize(POINTS_MAX + 5, at(10.0, 0.0, 0.0));
+}
+
+#[test]
+fn a_sweep_beyond_the_capacity_is_thinned_evenly() {
+    let profile = Profile { returns_max: 100, ..Profile::hdl64() };
+    let points: Vec<Point> = (0..150).map(|n| at(1.0 + 0.1 * n as f32, 6.0, 0.0)).collect();
     let out = run(&profile, &rig(Timing::AtStamp), Pose::IDENTITY, Twist::ZERO, &points);
-    assert_eq!(out.dropped.over_capacity, 5);
+    assert_eq!((out.dropped.over_capacity, out.rays.len()), (50, 100));
+    // The first and the last lie two thirds of a return from the sweep's ends at most.
+    let [first, last] = [out.placed[0], out.placed[99]].map(|p| p.at[0]);
+    assert!((last - first - 148.0 * 0.1 / 0.3).abs() < 0.5, "{first} {last}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::hypothesis::{self, Hypothesis, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
 use super::segments::Segments;
-use crate::params::COLUMNS_MAX;
+use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill};
 
@@ -19,9 +19,11 @@ pub struct Clusters {
     segments: Segments,
     /// Cluster of each column of the first sweep's window.
     of_column: [u32; COLUMNS_MAX],
-    found: heapless::Vec<Hypothesis, COLUMNS_MAX>,
+    found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
     /// By how much the returns of each column fit rest worse than its cluster's motion.
     misfit: [f32; COLUMNS_MAX],
+    /// Columns of those that there was no room for.
+    pub beyond: usize,
     /// Columns that may be part of something that moves, a bit each.
     suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
@@ -33,12 +35,14 @@ impl Clusters {
             of_column: [0; COLUMNS_MAX],
             found: heapless::Vec::new(),
             misfit: [0.0; COLUMNS_MAX],
+            beyond: 0,
             suspects: [0; COLUMNS_MAX.div_ceil(64)],
         }
     }
 
     pub fn clear(&mut self) {
         self.found.clear();
+        self.beyond = 0;
         self.of_column.fill(NONE);
     }
 
@@ -101,8 +105,9 @@ impl Clusters {
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
         let before = self.found.len();
-        // Parts are of what is static, and few: there is room.
-        let all = (before + self.segments.len()).min(COLUMNS_MAX);
+        let all = (before + self.segments.len()).min(CLUSTERS_MAX);
+        let beyond = all - before..self.segments.len();
+        self.beyond += beyond.map(|n| self.segments.columns(n).len()).sum::<usize>();
         let _ = self.found.resize(all, Hypothesis::default());
         fill(team, 0, &mut self.found[before..], &|n| {
             let cluster = Cluster::new(scans, self.segments.columns(n));

@@ -146,6 +146,11 @@ impl Refinement {
         self.clusters.find(team, scans, flow, predicted);
     }
 
+    /// Columns of clusters that there was no room for: they are taken to stand.
+    pub(crate) fn beyond_capacity(&self) -> usize {
+        self.clusters.beyond
+    }
+
     /// How a column of the first sweep's window moved, as part of a cluster that does.
     pub(crate) fn at(&self, column: u32) -> Option<Refined> {
         let cluster = self.clusters.of(column as usize).filter(|f| f.is_dynamic)?;

@@ -2,7 +2,6 @@
 
 use super::batch::{BatchReturn, cell};
 use super::{CELLS, FrontEndParams, SIDE};
-use raywake_core::params::COLUMNS_MAX;
 use raywake_core::record::NONE;
 
 /// Chunks of a batch; returns that would need more are dropped and counted.
@@ -70,17 +69,17 @@ pub(super) struct Chunk {
 /// The chunks of a batch.
 pub(super) struct Chunks {
     /// First chunk of every cell, or [`NONE`].
-    heads: [u32; COLUMNS_MAX],
+    heads: [u32; CELLS],
     all: heapless::Vec<Chunk, CHUNKS_MAX>,
 }
 
 impl Chunks {
     pub const fn new() -> Chunks {
-        Chunks { heads: [0; COLUMNS_MAX], all: heapless::Vec::new() }
+        Chunks { heads: [0; CELLS], all: heapless::Vec::new() }
     }
 
     pub fn clear(&mut self) {
-        self.heads[..CELLS].fill(NONE);
+        self.heads.fill(NONE);
         self.all.clear();
     }
 

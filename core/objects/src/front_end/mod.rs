@@ -41,7 +41,7 @@ use crate::panorama::Panorama;
 use association::Association;
 use batch::{Batch, BatchReturn};
 use object_returns::ObjectReturns;
-use raywake_core::params::COLUMNS_MAX;
+use raywake_core::params::SIDE_MAX;
 use raywake_core::sweep::{Rig, Sweep};
 use segments::Segmentation;
 
@@ -55,7 +55,7 @@ pub const CELL_M: f32 = 0.4;
 pub const SIDE: usize = 255;
 const CELLS: usize = SIDE * SIDE;
 
-const _: () = assert!(CELLS <= COLUMNS_MAX);
+const _: () = assert!(SIDE <= SIDE_MAX);
 
 /// The front end's state between steps; the tracks are the caller's. Large: keep it in a box.
 pub struct FrontEnd {

@@ -3,7 +3,7 @@
 use super::batch::{Batch, BatchReturn};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
 use raywake_core::ground::GroundGrid;
-use raywake_core::params::{COLUMNS_MAX, GroundParams, POINTS_MAX};
+use raywake_core::params::{GroundParams, POINTS_MAX};
 
 /// Ground in cells of five columns.
 const GROUND: GroundParams =
@@ -57,8 +57,8 @@ impl HeightVariance {
 pub(super) struct ObjectReturns {
     ground: GroundGrid,
     /// Of the ground above the batch's corner, m; infinite where unknown.
-    height: [f32; COLUMNS_MAX],
-    variance: [HeightVariance; COLUMNS_MAX],
+    height: [f32; CELLS],
+    variance: [HeightVariance; CELLS],
     is_object: [bool; POINTS_MAX],
 }
 
@@ -66,8 +66,8 @@ impl ObjectReturns {
     pub const fn new() -> ObjectReturns {
         ObjectReturns {
             ground: GroundGrid::new(),
-            height: [0.0; COLUMNS_MAX],
-            variance: [HeightVariance::NONE; COLUMNS_MAX],
+            height: [0.0; CELLS],
+            variance: [HeightVariance::NONE; CELLS],
             is_object: [false; POINTS_MAX],
         }
     }
@@ -77,7 +77,7 @@ impl ObjectReturns {
     /// as far as the ground is known.
     pub fn find(&mut self, params: &FrontEndParams, batch: &Batch, map: Option<&GroundMap>) {
         self.find_ground(batch, map);
-        self.variance[..CELLS].fill(HeightVariance::NONE);
+        self.variance.fill(HeightVariance::NONE);
         for one in &batch.returns {
             let cell = one.cell();
             if self.above(cell, one).is_none_or(|h| h < params.overhead_m) {

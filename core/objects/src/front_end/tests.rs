@@ -9,6 +9,7 @@ use glam::DVec3;
 use raywake_core::output::{PointFlow, PointFlows};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
+use raywake_core::thinning::Thinning;
 use std::vec;
 use std::vec::Vec;
 

@@ -10,6 +10,7 @@ use crate::random::Random;
 use crate::record::{Column, NONE, Proposal, pack_flow};
 use crate::sweep::{Placed, Point};
 use crate::team::Alone;
+use crate::thinning::TakenPoints;
 use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
@@ -65,7 +66,7 @@ impl Returns {
         let (mut apart, mut scratch) = (vec![false; self.points.len()], Box::new(Scratch::new()));
         let Returns { points, placed, columns } = self;
         let (corner, stamp_s) = ([0; 3], 0.0);
-        let returns = SweepReturns { corner, stamp_s, points, placed, columns };
+        let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
         (cloud.fill(&profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
     }
 
@@ -131,8 +132,12 @@ fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, 
     let Returns { points, placed, columns } = returns;
     let (corner, stamp_s) = ([0; 3], n as f64 * 0.1);
     let mut apart = vec![false; points.len()];
-    let returns = SweepReturns { corner, stamp_s, points, placed, columns };
+    let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
     refinement.insert_cloud(profile, returns, &mut apart);
+}
+
+fn all(points: &[Point]) -> TakenPoints<'_> {
+    TakenPoints::new(points, points.len())
 }
 
 fn no_flow() -> Vec<Flow> {

@@ -1,0 +1,174 @@
+//! Sweeps that a street does not make: too many returns, all in one place, without ground, of
+//! ground alone, along walls, in a crowd. Bounded and counted, and what stands, stands.
+
+#![forbid(unsafe_code)]
+
+use glam::DVec3;
+use raywake_core::output::{PointFlow, Status};
+use raywake_core::params::Profile;
+use raywake_core::pose::Pose;
+use raywake_core::stages::background_filter;
+use raywake_core::sweep::Point;
+use raywake_sim::{Class, Drive, Options, Path, Scene, Shape, SimSweep, State, Surface, models};
+use raywake_tests::drives::{Setup, sweep};
+
+/// Returns by what became of them, and what of them moves.
+#[derive(Debug, Default)]
+struct Tally {
+    returns: usize,
+    /// Put out as moving: of what stands, and of what moves.
+    moving: [usize; 2],
+    /// Of what moves.
+    of_movers: usize,
+    of_status: [usize; Status::ALL.len()],
+    over_capacity: u64,
+}
+
+impl Tally {
+    fn add(&mut self, flow: &PointFlow, moves: bool) {
+        self.returns += 1;
+        self.of_movers += usize::from(moves);
+        self.of_status[flow.status as usize] += 1;
+        self.moving[usize::from(moves)] += usize::from(flow.status == Status::Moving);
+    }
+
+    fn of(&self, status: Status) -> usize {
+        self.of_status[status as usize]
+    }
+}
+
+/// Runs sweeps, each as `edit` leaves it.
+fn run(profile: Profile, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
+    let setup = Setup::new(profile, Some(background_filter::SHIPPED.into()));
+    let mut pipeline = setup.drive(setup.scalar());
+    let (mut tally, mut before) = (Tally::default(), SimSweep::clone(&drive.sweep(0)));
+    before.points.clear();
+    for index in 0..drive.sweeps() {
+        let mut now = drive.sweep(index);
+        edit(&mut now);
+        let stepped = pipeline.step(&sweep(&now), &before.points);
+        let output = stepped.unwrap_or_else(|e| panic!("{e}")).output;
+        tally.over_capacity += output.dropped.over_capacity;
+        if let Some(flows) = output.flows {
+            assert_eq!(flows.points.count(), before.points.len());
+            for (n, flow) in flows.points.iter().enumerate() {
+                let moves = before.truth.get(n).is_some_and(|t| t.velocity_world != [0.0; 3]);
+                tally.add(&flow, moves);
+            }
+        }
+        before = now;
+    }
+    tally
+}
+
+fn along(x: f64, y: f64, speed: f64) -> Path {
+    Path::from(State { x, y, yaw: 0.0, speed })
+}
+
+fn through(scene: Scene, speed: f64) -> Drive {
+    Drive::through(scene, along(-20.0, 0.0, speed), 1, Options { sweeps: 12, ..Options::default() })
+}
+
+fn block(scene: &mut Scene, size: [f64; 3], at: [f64; 3]) {
+    let [length, width, height] = size;
+    let pose = Pose { translation: DVec3::from_array(at), ..Pose::IDENTITY };
+    let shape = Shape::cuboid(length, width, height);
+    scene.put(Class::Building, shape, pose, Surface::matt(0.4));
+}
+
+/// Keeps those returns of a sweep of which `keep` holds.
+fn keep(sweep: &mut SimSweep, keep: impl Fn(Class) -> bool) {
+    let mut kept = sweep.truth.iter().map(|t| keep(t.class));
+    sweep.points.retain(|_| kept.next().unwrap_or(false));
+    sweep.truth.retain(|t| keep(t.class));
+}
+
+/// A street where only the vehicle moves.
+fn still_street() -> Drive {
+    let mut scene = Scene::street(5);
+    scene.objects.retain(|o| o.is_still());
+    let path = Path::from(State { x: -20.0, y: -1.75, yaw: 0.0, speed: 8.0 });
+    Drive::through(scene, path, 5, Options { sweeps: 12, ..Options::default() })
+}
+
+#[test]
+fn a_sweep_with_twice_the_capacity_is_thinned_and_says_so() {
+    let drive = still_street();
+    let most = drive.sweep(0).points.len() as u32 / 2;
+    let thinned = run(Profile { returns_max: most, ..Profile::hdl64() }, &drive, |_| ());
+    let left_out = thinned.of(Status::OverCapacity);
+    assert!((0.4..0.6).contains(&(left_out as f64 / thinned.returns as f64)), "{thinned:?}");
+    assert!(thinned.over_capacity as usize >= left_out, "{thinned:?}");
+    let whole = run(Profile::hdl64(), &drive, |_| ());
+    assert_eq!((whole.of(Status::OverCapacity), whole.over_capacity), (0, 0));
+    // A still street: of either next to nothing moves.
+    for tally in [&thinned, &whole] {
+        assert!(tally.moving[0] * 2000 < tally.returns, "{tally:?}");
+    }
+}
+
+#[test]
+fn all_returns_in_one_column() {
+    let drive = through(Scene::empty(), 8.0);
+    let tally = run(Profile::hdl64(), &drive, |sweep| {
+        let place = sweep.world_from_vehicle.inverse().transform(DVec3::new(4.0, 3.0, 0.0));
+        let at = place.as_vec3().to_array();
+        sweep.points = (0..200_000)
+            .map(|n| Point {
+                position: [at[0], at[1], at[2] + n as f32 * 5e-6],
+                ..Point::default()
+            })
+            .collect();
+        sweep.truth.clear();
+    });
+    assert!(tally.returns == 11 * 200_000 && tally.moving == [0, 0], "{tally:?}");
+}
+
+#[test]
+fn a_still_street_without_its_ground_stands_as_well_as_with_it() {
+    let whole = run(Profile::hdl64(), &still_street(), |_| ());
+    let tally = run(Profile::hdl64(), &still_street(), |s| keep(s, |c| c != Class::Ground));
+    println!("{whole:?}");
+    assert!(tally.returns > 100_000 && tally.moving[0] <= whole.moving[0], "{tally:?}");
+}
+
+#[test]
+fn ground_alone_stands() {
+    let tally = run(Profile::hdl64(), &still_street(), |s| keep(s, |c| c == Class::Ground));
+    assert!(tally.returns > 100_000 && tally.moving[0] == 0, "{tally:?}");
+}
+
+/// Nothing tells how fast one drives along it: it must not tell that it moves either.
+#[test]
+fn a_wall_and_a_tunnel_stand() {
+    let mut wall = Scene::empty();
+    block(&mut wall, [400.0, 1.0, 12.0], [0.0, 3.0, 0.0]);
+    let mut tunnel = wall.clone();
+    block(&mut tunnel, [400.0, 1.0, 12.0], [0.0, -5.0, 0.0]);
+    block(&mut tunnel, [400.0, 10.0, 1.0], [0.0, -1.0, 5.0]);
+    for scene in [wall, tunnel] {
+        let tally = run(Profile::hdl64(), &through(scene, 20.0), |_| ());
+        assert!(tally.returns > 100_000 && tally.moving[0] == 0, "{tally:?}");
+    }
+}
+
+/// People all around walk with the vehicle; the houses beside them do not.
+#[test]
+fn in_a_crowd_people_move_and_houses_stand() {
+    let mut scene = Scene::empty();
+    for side in [-14.0, 14.0] {
+        block(&mut scene, [120.0, 2.0, 8.0], [0.0, side, 0.0]);
+    }
+    for n in 0..60 {
+        let (row, column) = (f64::from(n / 10), f64::from(n % 10));
+        let [x, y] = [-30.0 + 2.5 * column, -7.5 + 3.0 * row];
+        // Not where the vehicle is.
+        if (x + 20.0).abs() > 4.0 || y.abs() > 2.0 {
+            scene.add(models::pedestrian, along(x, y + 0.3 * column, 1.5), n as u64);
+        }
+    }
+    let tally = run(Profile::hdl64(), &through(scene, 1.5), |_| ());
+    assert!(tally.moving[1] * 2 > tally.of_movers, "{tally:?}");
+    let still = tally.returns - tally.of_movers;
+    assert!(tally.moving[0] * 100 < still, "{tally:?}");
+}
