@@ -237,7 +237,7 @@ mod tests {
         let e = parsed("[tracklet]\ngate = 3\n").unwrap_err();
         assert!(e.contains("line 2") && e.contains("`gate`"), "{e}");
         assert!(parsed("side = -1").unwrap_err().contains("line 1"));
-        assert!(parsed("side = 257").unwrap_err().contains("key `side`: must be 31 to 255"));
+        assert!(parsed("side = 339").unwrap_err().contains("key `side`: must be 31 to 337"));
         assert!(parsed("voxel_m = nan").unwrap_err().contains("`voxel_m`"));
         assert!(parsed("range_m = inf").unwrap_err().contains("`range_m`"));
         assert!(parsed("[tracklet]\ngate_d2 = 1e300").unwrap_err().contains("`gate_d2`"));
@@ -266,7 +266,7 @@ mod tests {
             ("sied=3", "no parameter `sied`"),
             ("limits.side=3", "in `limits`"),
             ("side=1.5", "whole number"),
-            ("side=9", "`side` must be 31 to 255"),
+            ("side=9", "`side` must be 31 to 337"),
             ("side=100", "`side` must be odd"),
             ("gap_s=x", "`gap_s` must be a number"),
         ] {

@@ -91,7 +91,7 @@ fn mistakes_in_profiles() {
         raywake(&["run", data.to_str().unwrap(), "--config", config.to_str().unwrap()])
     };
     with("side = 61\nsied = 3\n").failed(3, &["p.toml", "line 2", "`sied`"]);
-    with("side = 257\n").failed(3, &["p.toml", "`side`", "255"]);
+    with("side = 339\n").failed(3, &["p.toml", "`side`", "337"]);
     with("levels = 12\n").failed(2, &["12 levels", "--filter"]);
     let data = data.to_str().unwrap();
     raywake(&["run", data, "--profile", "nosuch"]).failed(2, &["`nosuch`", "hdl64"]);
