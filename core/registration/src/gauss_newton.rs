@@ -30,25 +30,48 @@ impl Correspondence {
 pub struct GaussNewtonStep {
     /// To be applied after the current pose.
     pub motion: Pose,
-    /// Length of the step, m: translation, and rotation times the spread of the points.
-    pub length_m: f64,
+    /// Root mean square of what the step changes the residuals by, m.
+    pub change_m: f64,
     /// Least eigenvalue of the normal matrix, for weights that sum to one and rotations in units of
     /// the points' spread: at most 1/3, and zero where some motion changes no residual.
     pub least_eigenvalue: f64,
-    /// Independent motions that the correspondences do not determine; the step has no part of
-    /// them.
-    pub unobserved: usize,
+    /// Motions that the correspondences do not determine; the step undoes what was done of them.
+    pub unobserved: Unobserved,
+}
+
+/// Number of independent motions that no residual tells of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unobserved {
+    /// Mostly along the ground or a turn on it: x, y, yaw.
+    pub planar: usize,
+    /// Mostly height, roll or pitch, of which a vehicle does little within a sweep.
+    pub upright: usize,
+}
+
+impl Unobserved {
+    /// Nothing is known.
+    pub const ALL: Unobserved = Unobserved { planar: 3, upright: 3 };
+
+    /// Of both kinds.
+    pub fn count(&self) -> usize {
+        self.planar + self.upright
+    }
 }
 
 /// Points closer together than this have no direction, m.
 const SPREAD_MIN_M: f64 = 1e-9;
 
-/// The step that minimises the weighted squares of the linearised residuals. Motions whose
-/// eigenvalue is not above `observable` are left out. `None` where the weights sum to nothing.
+/// The step that minimises the weighted squares of the linearised residuals. In motions whose
+/// eigenvalue is not above `observable` it undoes what `done`, the motion of all steps before it,
+/// has of them. `None` where the weights sum to nothing.
 ///
 /// Unknowns are a rotation (times the spread) about the points' centre, then a translation, so that
 /// all six are lengths and the two do not mix.
-pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<GaussNewtonStep> {
+pub fn solve(
+    correspondences: &[Correspondence],
+    done: &Pose,
+    observable: f64,
+) -> Option<GaussNewtonStep> {
     let total: f64 = correspondences.iter().map(|c| c.weight).sum();
     if total.is_nan() || total <= 0.0 {
         return None;
@@ -62,11 +85,12 @@ pub fn solve(correspondences: &[Correspondence], observable: f64) -> Option<Gaus
         right.axpy(-weight * correspondence.residual(), &row, 1.0);
     }
     let eigen = SymmetricEigen::new(matrix);
-    let (x, unobserved) = observed(&eigen, &right, observable);
+    let done = about_inverse(done, centre, spread);
+    let (x, unobserved) = observed(&eigen, &right, &done, observable);
     let (turn, shift) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]));
     Some(GaussNewtonStep {
         motion: about(centre, turn / spread, shift),
-        length_m: turn.length() + shift.length(),
+        change_m: libm::sqrt(x.dot(&(matrix * x)).max(0.0)),
         least_eigenvalue: eigen.eigenvalues.min().max(0.0),
         unobserved,
     })
@@ -80,19 +104,25 @@ fn centre_and_spread(correspondences: &[Correspondence], total: f64) -> (DVec3, 
     (centre, spread.max(SPREAD_MIN_M))
 }
 
-/// The solution in the eigenvectors whose eigenvalue is above `observable`, and how many there are
-/// besides.
+/// The solution in the eigenvectors whose eigenvalue is above `observable`, the way back in the
+/// others, and what these are.
 fn observed(
     eigen: &SymmetricEigen<f64, U6>,
     right: &Vector6<f64>,
+    done: &Vector6<f64>,
     observable: f64,
-) -> (Vector6<f64>, usize) {
-    let (mut x, mut unobserved) = (Vector6::zeros(), 0);
+) -> (Vector6<f64>, Unobserved) {
+    let (mut x, mut unobserved) = (Vector6::zeros(), Unobserved::default());
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if *value > observable {
             x.axpy(vector.dot(right) / value, &vector, 1.0);
-        } else {
-            unobserved += 1;
+            continue;
+        }
+        x.axpy(-vector.dot(done), &vector, 1.0);
+        let planar: f64 = vector.fixed_rows::<3>(2).norm_squared();
+        match planar > 0.5 {
+            true => unobserved.planar += 1,
+            false => unobserved.upright += 1,
         }
     }
     (x, unobserved)
@@ -109,6 +139,13 @@ fn about(centre: DVec3, turn: DVec3, shift: DVec3) -> Pose {
     let rotation = Twist { linear: DVec3::ZERO, angular: turn }.over(1.0).rotation;
     let fixed = centre - DMat3::from_quat(rotation) * centre;
     Pose { rotation, translation: fixed + shift }
+}
+
+/// The unknowns of a motion that has led to where the centre is now.
+fn about_inverse(motion: &Pose, centre: DVec3, spread: f64) -> Vector6<f64> {
+    let turn = motion.twist(1.0).angular * spread;
+    let shift = centre - motion.inverse().transform(centre);
+    Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
 }
 
 #[cfg(test)]
@@ -163,12 +200,15 @@ mod tests {
                 Correspondence { point, on, normal: DVec3::Z, weight: 1.0 }
             })
             .collect();
-        let step = solve(&plane, 1e-3).unwrap();
-        assert!(step.unobserved == 3 && step.least_eigenvalue < 1e-12);
+        let step = solve(&plane, &Pose::IDENTITY, 1e-3).unwrap();
+        assert!(
+            step.unobserved == Unobserved { planar: 3, upright: 0 }
+                && step.least_eigenvalue < 1e-12
+        );
         let moved = step.motion.translation - DVec3::new(0.0, 0.0, -0.3);
         assert!(moved.length() < 1e-9 && step.motion.rotation.xyz().length() < 1e-9);
-        assert!(solve(&[], 1e-3).is_none());
+        assert!(solve(&[], &Pose::IDENTITY, 1e-3).is_none());
         let weightless = [Correspondence { weight: 0.0, ..plane[0] }];
-        assert!(solve(&weightless, 1e-3).is_none());
+        assert!(solve(&weightless, &Pose::IDENTITY, 1e-3).is_none());
     }
 }

@@ -5,7 +5,7 @@
 //! the motion. Kernel and search radius shrink in three levels, so that it can start far off.
 
 use crate::cloud::OrientedCloud;
-use crate::gauss_newton::{Correspondence, solve};
+use crate::gauss_newton::{Correspondence, Unobserved, solve};
 use crate::tree;
 use raywake_core::pose::Pose;
 
@@ -51,9 +51,9 @@ pub struct Registration {
     /// Least eigenvalue of the normal matrix (dimensionless, at most 1/3): zero where some motion
     /// changes no residual.
     pub least_eigenvalue: f64,
-    /// Independent motions that the clouds do not determine (a plane leaves three): in those the
-    /// pose keeps what the initial one has.
-    pub unobserved: usize,
+    /// Motions that the clouds do not determine (a plane leaves three): in those the pose keeps
+    /// what the initial one has.
+    pub unobserved: Unobserved,
 }
 
 impl Registration {
@@ -66,14 +66,16 @@ impl Registration {
             inliers: 0,
             overlap: 0.0,
             least_eigenvalue: 0.0,
-            unobserved: 6,
+            unobserved: Unobserved::ALL,
         }
     }
 }
 
 /// Fewest correspondences that determine a motion.
 const CORRESPONDENCES_MIN: usize = 30;
-/// A step shorter than this ends a level, m.
+/// A step that changes the residuals by less than this ends a level, m (root mean square). The pose
+/// itself may go on: where little tells of a motion, as of height without ground, neighbours that
+/// change sides move it to and fro for ever.
 const SETTLED_M: f64 = 2e-4;
 /// Motions with a smaller eigenvalue are not told apart from noise of the normals.
 pub(crate) const OBSERVABLE: f64 = 2e-3;
@@ -122,14 +124,14 @@ pub fn register(
         let mut matched = 0;
         for _ in 0..options.iterations {
             matched = match_points(source, target, &result.pose, &level, correspondences);
-            if !result.advance(&correspondences[..matched]) {
+            if !result.advance(&correspondences[..matched], &initial) {
                 break;
             }
         }
         let tried = source.flat_count().div_ceil(level.stride);
         result.judge(&correspondences[..matched], tried, level.kernel_m);
     }
-    result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobserved < 6;
+    result.converged &= result.inliers >= CORRESPONDENCES_MIN && result.unobserved.count() < 6;
     result
 }
 
@@ -167,16 +169,17 @@ fn geman_mcclure(ratio: f64) -> f64 {
 
 impl Registration {
     /// One step. Returns whether another one may follow.
-    fn advance(&mut self, correspondences: &[Correspondence]) -> bool {
+    fn advance(&mut self, correspondences: &[Correspondence], initial: &Pose) -> bool {
         if correspondences.len() < CORRESPONDENCES_MIN {
             return false;
         }
-        let Some(step) = solve(correspondences, OBSERVABLE) else { return false };
+        let done = self.pose * initial.inverse();
+        let Some(step) = solve(correspondences, &done, OBSERVABLE) else { return false };
         self.pose = step.motion * self.pose;
         self.iterations += 1;
         self.least_eigenvalue = step.least_eigenvalue;
         self.unobserved = step.unobserved;
-        self.converged = step.length_m < SETTLED_M;
+        self.converged = step.change_m < SETTLED_M;
         !self.converged
     }
 

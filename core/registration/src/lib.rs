@@ -31,7 +31,7 @@ mod point;
 mod tree;
 
 pub use cloud::OrientedCloud;
-pub use gauss_newton::Correspondence;
+pub use gauss_newton::{Correspondence, Unobserved};
 pub use icp::{CORRESPONDENCES, IcpOptions, Registration, register};
 pub use multi_start::register_multi_start;
 pub use point::OrientedPoint;

@@ -43,6 +43,11 @@ fn refusal(best: &Registration) -> String {
         r if r.overlap < OVERLAP_MIN => {
             format!("the clouds overlap by {share:.0} % at most")
         }
+        r if r.unobserved.planar > 0 => format!(
+            "what they show, as one wall, a tunnel or bare ground does, leaves {} of the 3 motions \
+             on the ground undetermined",
+            r.unobserved.planar
+        ),
         r => format!("no convergence in {} iterations", r.iterations),
     };
     format!(
@@ -60,10 +65,10 @@ fn report(r: &Registration) -> String {
         100.0 * r.rms_m,
         r.iterations,
     );
-    if r.unobserved > 0 {
+    if r.unobserved.upright > 0 {
         text += &format!(
-            "note: {} of 6 degrees of freedom are not observable; no motion is assumed in these\n",
-            r.unobserved
+            "note: {} of height, roll and pitch not observable; no motion is assumed there\n",
+            r.unobserved.upright
         );
     }
     text

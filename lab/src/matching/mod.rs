@@ -133,7 +133,7 @@ impl Chain {
             differences.table(found, given)?,
             count(&|m| m.registration.converged),
             self.matched.len(),
-            count(&|m| m.registration.unobserved > 0),
+            count(&|m| m.registration.unobserved.count() > 0),
             least,
             rms[0],
             rms[1],

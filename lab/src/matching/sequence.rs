@@ -197,7 +197,7 @@ mod tests {
                 let (metres, degrees) =
                     (apart.linear.length(), apart.angular.length().to_degrees());
                 println!("pair {index}, start {n}: {metres:.4} m, {degrees:.4} deg, {found:?}");
-                assert!(found.registration.converged && found.registration.unobserved == 0);
+                assert!(found.registration.converged && found.registration.unobserved.count() == 0);
                 assert!(metres < 0.02 && degrees < 0.08, "pair {index}, start {n}");
             }
         }
