@@ -98,6 +98,11 @@ crate::params! {
         pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
             "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before \
              what stands below was its footprint).";
+        /// A cluster stands if something was hit in more than this share of looks at its voxels
+        /// in sweeps in which, by its motion, it was not there yet.
+        pub worn_max: f32 = 0.5, "", (0 to 1),
+            "Of simulated columns that move 2 % are of such clusters, of those that stand far from \
+             any a quarter.";
         /// From this length on a cluster that moved needs less, in inverse proportion: its sides
         /// slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;

@@ -220,14 +220,21 @@ impl Cloud {
         self.levels[column]
     }
 
+    /// The same of all columns.
+    pub fn all_levels(&self) -> &[u32] {
+        &self.levels
+    }
+
+    /// The column of a place, if that lies in the window.
+    pub fn column_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let side = self.side as f32;
+        let inside = x >= 0.0 && x < side && y >= 0.0 && y < side;
+        inside.then(|| x as usize * self.side + y as usize)
+    }
+
     /// Whether something was hit in the voxel of a place.
     pub fn is_hit(&self, at: [f32; 3]) -> bool {
-        let side = self.side as f32;
-        let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
-        if !inside {
-            return false;
-        }
-        let column = at[0] as usize * self.side + at[1] as usize;
+        let Some(column) = self.column_at([at[0], at[1]]) else { return false };
         let height = self.ground.above(column, at[2]);
         let in_levels = (0.0..CLUSTER_LEVELS_MAX as f32).contains(&height);
         in_levels && self.levels[column] >> height as u32 & 1 != 0

@@ -3,6 +3,7 @@
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::cues::{Cues, Prediction};
+use super::history::{Arrival, History};
 use super::hypothesis::{self, Hypothesis, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
@@ -69,6 +70,7 @@ impl Clusters {
         &mut self,
         team: &impl Team,
         scans: Scans,
+        history: &History,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
@@ -85,8 +87,13 @@ impl Clusters {
         let whole = self.found.len();
         self.test_segments(team, scans, flow, predicted);
         self.keep_moving_parts(scans, whole);
+        self.look_back(scans, history);
+        for found in &mut self.found {
+            found.is_dynamic &= found.cues.worn <= scans.scaled.params.worn_max;
+        }
         self.take_along(scans);
         self.cover_ground(scans);
+        self.look_back(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
         fill(team, 0, &mut self.misfit[..scans.first.side * scans.first.side], &|c| {
             let found = found.get(of_column[c] as usize);
@@ -172,6 +179,17 @@ impl Clusters {
             if let Some(with) = self.joined(&cluster, &near, visited) {
                 columns.iter().for_each(|c| self.of_column[*c as usize] = with);
             }
+        }
+    }
+
+    /// Finds what was hit before where moving clusters came to.
+    fn look_back(&mut self, scans: Scans, history: &History) {
+        let (of_column, found) = (&self.of_column, &mut self.found);
+        found.iter_mut().for_each(|f| f.arrival = Arrival::default());
+        history.find(scans.first, scans.span_s, of_column, found);
+        for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
+            found.cues.worn = found.arrival.worn();
+            found.cues.fresh = found.arrival.fresh();
         }
     }
 

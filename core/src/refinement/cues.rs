@@ -54,6 +54,11 @@ cues! {
         pub returns: moves_returns,
         /// Mean logarithm of 1 + speed over its standard deviation, of the tracklets that moved.
         pub certainty: moves_certainty,
+        /// Of looks at the cluster's voxels in sweeps in which, by its motion, it was not there yet,
+        /// the share that found something there.
+        pub worn: moves_worn,
+        /// The share that found nothing.
+        pub fresh: moves_fresh,
         /// By how much the column's own returns fit rest worse than the motion, -1 to 1.
         pub misfit: moves_misfit,
     }
@@ -68,6 +73,8 @@ impl Cues {
             residual,
             returns: libm::logf(returns.max(1) as f32),
             certainty: prior.certainty,
+            worn: 0.0,
+            fresh: 0.0,
             misfit: 0.0,
         }
     }
@@ -169,6 +176,8 @@ mod tests {
                 &mut cues.residual,
                 &mut cues.returns,
                 &mut cues.certainty,
+                &mut cues.worn,
+                &mut cues.fresh,
                 &mut cues.misfit,
             ];
             *all.into_iter().nth(n).unwrap() = 1.0;

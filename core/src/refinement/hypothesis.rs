@@ -9,6 +9,7 @@
 use super::cluster::{Cluster, VisitedColumns};
 use super::cues::{Cues, Prediction, Prior};
 use super::footprint::Footprint;
+use super::history::Arrival;
 use super::motion::Motion;
 use super::scaled::Scaled;
 use super::search::search;
@@ -41,6 +42,8 @@ pub struct Hypothesis {
     pub parent: u32,
     /// What tells whether it moves; those of its columns are missing.
     pub cues: Cues,
+    /// What was there before it came, where it is dynamic.
+    pub arrival: Arrival,
     /// The ground it stands on, where it is dynamic.
     pub footprint: Footprint,
 }

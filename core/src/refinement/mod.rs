@@ -20,7 +20,8 @@
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
 //!    that found no match, and the ground below it ([`footprint`]). Covariances are inflated by the
 //!    residual ([`refined`]).
-//! 7. Cues tell how likely it is that a column moves ([`cues`]).
+//! 7. Cues tell how likely it is that a column moves ([`cues`]), among them what was hit before at
+//!    the places it came to ([`history`]).
 //!
 //! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres;
 //! inside, lengths are in voxels ([`scaled`]).
@@ -31,6 +32,7 @@ mod cluster;
 mod clusters;
 pub mod cues;
 mod footprint;
+mod history;
 mod hypothesis;
 mod motion;
 mod places;
@@ -53,6 +55,7 @@ pub(crate) use cloud::SweepReturns;
 use cloud::{Cloud, Scratch};
 use clusters::Clusters;
 pub(crate) use cues::Prediction;
+use history::History;
 use motion::TARGETS_MAX;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
@@ -66,6 +69,7 @@ pub struct Refinement {
     held: usize,
     /// Where the newest is.
     newest: usize,
+    history: History,
     scratch: Scratch,
     clusters: Clusters,
 }
@@ -82,6 +86,7 @@ impl Refinement {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             held: 0,
             newest: 0,
+            history: History::new(),
             scratch: Scratch::new(),
             clusters: Clusters::new(),
         }
@@ -90,6 +95,7 @@ impl Refinement {
     /// Forgets all sweeps.
     pub(crate) fn clear(&mut self) {
         self.held = 0;
+        self.history.clear();
     }
 
     /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or
@@ -143,7 +149,8 @@ impl Refinement {
             });
         }
         let scans = Scans { scaled, first, targets: &targets, before, now, span_s };
-        self.clusters.find(team, scans, flow, predicted);
+        self.clusters.find(team, scans, &self.history, flow, predicted);
+        self.history.push(&self.clouds[index(newest, 1)]);
     }
 
     /// Columns of clusters that there was no room for: they are taken to stand.

@@ -112,8 +112,9 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
-    /// Rows of the first sweep's solid columns. They belong to what their returns hit where there
-    /// is exact truth of these, else to the box that their centre lies in.
+    /// Rows of the first sweep's solid columns. Where there is exact truth of returns, they belong
+    /// to what those above the ground hit; without such, and without such truth, to the box that
+    /// their centre lies in.
     pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
         let columns = self.grid.columns.len();
@@ -130,11 +131,8 @@ impl<'a> Collector<'a> {
                 let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
                 (i * step.side + j) as usize
             };
-            let owner = match &owners {
-                Some(owners) => {
-                    let id = Some(owners[column(&window)]);
-                    present.iter().find(|p| p.id == id)
-                }
+            let owner = match owners.as_ref().and_then(|owners| owners[column(&window)]) {
+                Some(id) => present.iter().find(|p| p.id == Some(id)),
                 None => present.iter().find(|p| p.footprint.holds(flat(flow), self.margin_m)),
             };
             let (here, column) = (column(&window), column(&next));
@@ -211,6 +209,8 @@ impl<'a> Collector<'a> {
             residual: flow.cues.residual,
             returns: flow.cues.returns,
             certainty: flow.cues.certainty,
+            worn: flow.cues.worn,
+            fresh: flow.cues.fresh,
             misfit: flow.cues.misfit,
         }
     }

@@ -238,10 +238,10 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
     let section = report.section("What is counted");
     section.text(&format!(
         "Where the truth of every return is known, in simulated drives, a column belongs to what \
-         most of its returns above the ground hit, and to the background where it has none: \
-         ground seen beneath a truck is not the truck. In the others it belongs to the first \
-         labelled box, in the order of the labels, that its centre lies in, seen from above, with \
-         a margin of {} m. {tracks} labelled objects have {boxes} boxes.\n\n\
+         most of its returns above the ground hit. Where it has none, and in the other drives, it \
+         belongs to the first labelled box, in the order of the labels, that its centre lies in, \
+         seen from above, with a margin of {} m: the road below a car is in the car's column. \
+         {tracks} labelled objects have {boxes} boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
          labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the \
          others, all around. {} columns do not.\n\n\

@@ -31,19 +31,19 @@ impl Exact {
 }
 
 /// What every column belongs to: the object that most of its returns above the ground hit, the
-/// first id where some have as many; 0 where it has none, or where more hit the background.
+/// first id where some have as many; 0 where more hit the background, nothing where it has none.
 /// `of_point` has the column of every return.
-pub fn owners(of_point: &[u32], returns: &[PointTruth], columns: usize) -> Vec<u32> {
+pub fn owners(of_point: &[u32], returns: &[PointTruth], columns: usize) -> Vec<Option<u32>> {
     let hits =
         of_point.iter().zip(returns).filter(|(c, t)| **c != NONE && t.class != Class::Ground);
     let mut hits: Vec<(u32, u32)> = hits.map(|(&column, t)| (column, t.object)).collect();
     hits.sort_unstable();
-    let (mut owners, mut most) = (vec![0; columns], vec![0; columns]);
+    let (mut owners, mut most) = (vec![None; columns], vec![0; columns]);
     for same in hits.chunk_by(|a, b| a == b) {
         let (column, object) = (same[0].0 as usize, same[0].1);
         // The background comes first, and gives way to an object with as many.
-        if same.len() > most[column] || same.len() == most[column] && owners[column] == 0 {
-            (owners[column], most[column]) = (object, same.len());
+        if same.len() > most[column] || same.len() == most[column] && owners[column] == Some(0) {
+            (owners[column], most[column]) = (Some(object), same.len());
         }
     }
     owners
@@ -65,20 +65,20 @@ mod tests {
         let (ground, wall) = (of(0, Class::Ground), of(0, Class::Building));
         let [truck, car] = [of(7, Class::Truck), of(3, Class::Car)];
         let columns = [
-            (0, vec![]),
-            (0, vec![ground, ground]),
-            (7, vec![ground, truck, ground, ground]),
-            (0, vec![wall, truck, wall]),
-            (7, vec![wall, truck]),
-            (7, vec![car, truck, wall, truck]),
-            (3, vec![truck, car, ground]),
+            (None, vec![]),
+            (None, vec![ground, ground]),
+            (Some(7), vec![ground, truck, ground, ground]),
+            (Some(0), vec![wall, truck, wall]),
+            (Some(7), vec![wall, truck]),
+            (Some(7), vec![car, truck, wall, truck]),
+            (Some(3), vec![truck, car, ground]),
         ];
         let returns = columns.iter().enumerate();
         let returns = returns.flat_map(|(n, (_, all))| all.iter().map(move |t| (n as u32, *t)));
         // As they come, with some outside the window.
         let (of_point, truth): (Vec<u32>, Vec<PointTruth>) =
             returns.rev().chain([(NONE, car), (NONE, wall)]).unzip();
-        let expected: Vec<u32> = columns.iter().map(|c| c.0).collect();
+        let expected: Vec<Option<u32>> = columns.iter().map(|c| c.0).collect();
         assert_eq!(owners(&of_point, &truth, columns.len()), expected);
     }
 }

@@ -184,7 +184,7 @@ row! {
     dt: f32,
     /// P(moves).
     probability: f32,
-    /// See [`raywake_core::refinement::cues::Cues`], which these six are.
+    /// See [`raywake_core::refinement::cues::Cues`], which these are.
     margin: f32,
     /// See `margin`.
     share: f32,
@@ -194,6 +194,10 @@ row! {
     returns: f32,
     /// See `margin`.
     certainty: f32,
+    /// See `margin`.
+    worn: f32,
+    /// See `margin`.
+    fresh: f32,
     /// See `margin`.
     misfit: f32,
 }
@@ -233,8 +237,8 @@ impl Row {
 
     /// What its P(moves) was told by.
     pub fn cues(&self) -> Cues {
-        let Row { margin, share, residual, returns, certainty, misfit, .. } = *self;
-        Cues { margin, share, residual, returns, certainty, misfit }
+        let Row { margin, share, residual, returns, certainty, worn, fresh, misfit, .. } = *self;
+        Cues { margin, share, residual, returns, certainty, worn, fresh, misfit }
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.

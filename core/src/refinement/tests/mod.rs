@@ -2,6 +2,7 @@
 
 extern crate std;
 mod cloud;
+mod history;
 mod motion;
 mod odd;
 

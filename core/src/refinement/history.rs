@@ -1,0 +1,116 @@
+//! Where something was hit in earlier sweeps: what moves comes to where nothing stood.
+//!
+//! Registration looks at three sweeps. What stands may be seen so differently from one to the next
+//! that a motion explains it better; but its places were hit long before the motion would have
+//! brought it there.
+
+use super::cloud::Cloud;
+use super::hypothesis::Hypothesis;
+use crate::params::{CLUSTER_LEVELS_MAX, COLUMNS_MAX};
+use crate::record::NONE;
+
+/// Sweeps before the pair's first that are remembered: of 0.6 s at 10 Hz. The vehicle ahead was
+/// where one is now a second ago, if it keeps its distance.
+const HISTORY: usize = 6;
+/// Looks at a voxel that count as having found nothing, so that few do not tell much.
+const LOOKS: f32 = 8.0;
+
+const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
+
+/// What a cluster's voxels were in sweeps in which, by its motion, it was not there yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Arrival {
+    looks: u32,
+    hits: u32,
+}
+
+impl Arrival {
+    /// Share of looks that found something: 0 to 1, below 0.5 if there were few.
+    pub fn worn(&self) -> f32 {
+        self.hits as f32 / (self.looks as f32 + LOOKS)
+    }
+
+    /// The same of looks that found nothing.
+    pub fn fresh(&self) -> f32 {
+        (self.looks - self.hits) as f32 / (self.looks as f32 + LOOKS)
+    }
+}
+
+/// One earlier sweep.
+struct Past {
+    /// Lattice index of the window's first voxel.
+    corner: [i32; 3],
+    stamp_s: f64,
+    levels: [u32; COLUMNS_MAX],
+}
+
+/// The sweeps before the pair's first.
+pub struct History {
+    sweeps: [Past; HISTORY],
+    /// Sweeps remembered.
+    held: usize,
+    /// Where the next one goes.
+    next: usize,
+}
+
+impl History {
+    pub const fn new() -> History {
+        History {
+            sweeps: [const { Past { corner: [0; 3], stamp_s: 0.0, levels: [0; COLUMNS_MAX] } };
+                HISTORY],
+            held: 0,
+            next: 0,
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.held = 0;
+    }
+
+    /// Remembers a sweep instead of the oldest.
+    pub fn push(&mut self, cloud: &Cloud) {
+        let columns = cloud.side * cloud.side;
+        let past = &mut self.sweeps[self.next];
+        (past.corner, past.stamp_s) = (cloud.corner, cloud.stamp_s);
+        past.levels[..columns].copy_from_slice(&cloud.all_levels()[..columns]);
+        self.next = (self.next + 1) % HISTORY;
+        self.held = (self.held + 1).min(HISTORY);
+    }
+
+    /// What the columns of moving clusters, those of the pair's first sweep, were before; the pair
+    /// spans `span_s`.
+    pub fn find(&self, first: &Cloud, span_s: f64, of_column: &[u32], found: &mut [Hypothesis]) {
+        for (c, &n) in of_column[..first.side * first.side].iter().enumerate() {
+            let levels = first.levels(c);
+            if n == NONE || levels == 0 {
+                continue;
+            }
+            let Some(one) = found.get_mut(n as usize).filter(|f| f.is_dynamic) else { continue };
+            let at = [c / first.side, c % first.side];
+            let by = one.motion.of(at.map(|c| c as f32 + 0.5));
+            for past in &self.sweeps[..self.held] {
+                let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
+                // What was here then is now, if it is of this cluster, that much farther on.
+                let on = [0, 1].map(|a| at[a] as f32 + 0.5 + spans * by[a]);
+                if first.column_at(on).is_some_and(|on| of_column[on] == n) {
+                    continue;
+                }
+                let Some(were) = past.around(first, at) else { continue };
+                one.arrival.looks += levels.count_ones();
+                one.arrival.hits += (levels & were).count_ones();
+            }
+        }
+    }
+}
+
+impl Past {
+    /// Levels hit in a column of a later sweep's window, a level farther up and down, because the
+    /// ground is estimated anew in every sweep; nothing where the column lay outside.
+    fn around(&self, later: &Cloud, at: [usize; 2]) -> Option<u32> {
+        let here = |a: usize| at[a] as i32 + later.corner[a] - self.corner[a];
+        let [i, j] = [here(0), here(1)];
+        let inside = (0..later.side as i32).contains(&i) && (0..later.side as i32).contains(&j);
+        let levels = inside.then(|| self.levels[i as usize * later.side + j as usize])?;
+        Some(levels | levels << 1 | levels >> 1)
+    }
+}
