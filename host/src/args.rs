@@ -8,14 +8,14 @@ mod sweeps;
 mod track;
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use raywake_io::Error;
-use raywake_io::source::{Format, OpenOptions, PosesFrame};
+use raywake_io::source::{Format, OpenOptions, PosesFrame, Unlocated};
 
 pub use flow::FlowArgs;
 pub use sweeps::SweepRange;
@@ -50,6 +50,9 @@ pub enum Command {
     Track(Box<TrackArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
     Map(Box<MapArgs>),
+    /// Find the poses of a recording by registration of its sweeps
+    #[command(after_help = EXIT_CODES)]
+    Odometry(OdometryArgs),
     /// Run on a small simulated drive and compare with ground truth
     #[cfg(feature = "demo")]
     Demo(DemoArgs),
@@ -77,17 +80,42 @@ pub struct RunArgs {
 }
 
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Recording")]
-pub struct Recording {
-    /// Recording format [default: detected]
-    #[arg(long)]
-    pub format: Option<Format>,
-    /// Poses, 12 numbers (a 3x4 matrix) per line, one line per sweep
+pub struct OdometryArgs {
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
+    pub data: PathBuf,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Poses to write, for `--poses` (KITTI odometry: with `--poses-frame vehicle`): 12 numbers (a
+    /// 3x4 matrix) per line, one line per sweep; the world is the vehicle's frame at the first
     #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub kind: RecordingKind,
+    #[command(flatten)]
+    pub part: Selection,
+}
+
+#[derive(Debug, clap::Args)]
+pub struct Recording {
+    #[command(flatten)]
+    pub kind: RecordingKind,
+    /// Poses, 12 numbers (a 3x4 matrix) per line, one line per sweep; or `register` to find them by
+    /// registration [default: those of the recording; without, by registration]
+    #[arg(long, value_name = "FILE|register")]
     pub poses: Option<PathBuf>,
     /// Frame the poses refer to
     #[arg(long, value_name = "FRAME")]
     pub poses_frame: Option<PosesFrame>,
+}
+
+/// What a recording is.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Recording")]
+pub struct RecordingKind {
+    /// Recording format [default: detected]
+    #[arg(long)]
+    pub format: Option<Format>,
     /// Whether sweeps still contain motion distortion
     #[arg(long, value_name = "on|off", hide_possible_values = true)]
     #[arg(value_parser = BoolishValueParser::new())]
@@ -277,12 +305,24 @@ impl Selection {
 impl Recording {
     /// For [`raywake_io::source::open`].
     pub fn options(&self) -> OpenOptions {
+        let register = self.poses.as_deref() == Some(Path::new("register"));
+        OpenOptions {
+            poses: self.poses.clone().filter(|_| !register),
+            poses_frame: self.poses_frame,
+            unlocated: if register { Unlocated::Always } else { Unlocated::Accept },
+            ..self.kind.options()
+        }
+    }
+}
+
+impl RecordingKind {
+    /// The same, without poses.
+    pub fn options(&self) -> OpenOptions {
         OpenOptions {
             format: self.format,
-            poses: self.poses.clone(),
-            poses_frame: self.poses_frame,
             deskew: self.deskew,
             ground_m: self.ground,
+            ..OpenOptions::default()
         }
     }
 }

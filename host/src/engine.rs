@@ -98,6 +98,7 @@ pub fn execute<S: Source + ?Sized>(
         threads: team::threads(),
         filter: chosen.filter,
         interrupted: end.interrupted,
+        registration: end.located,
         device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
         host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_))),
         vulkan_allocations: census.memory_allocations,

@@ -10,8 +10,9 @@
 //! | [`args`] | the command line |
 //! | [`config`], [`weight_files`], [`choose`] | profile, model weights and backend it asks for |
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
-//! | [`track`], [`map`], `flow`, [`budget`] | the other commands |
+//! | [`track`], [`map`], `flow`, `odometry`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
+//! | [`locate`] | sweeps without poses, by registration |
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
 //! | [`outputs`], [`summary`], `figures` | files of a run, its figures, and where these go |
 //! | [`statistics`], [`order_statistics`], [`laps`] | what is counted and timed |
@@ -32,7 +33,9 @@ pub mod error;
 mod figures;
 mod flow;
 pub mod laps;
+pub mod locate;
 pub mod map;
+mod odometry;
 pub mod order_statistics;
 pub mod outputs;
 pub mod picture;
@@ -56,6 +59,7 @@ pub fn execute(command: Command) -> Result<bool, RunError> {
         Command::Flow(args) => flow::flow(&args).map(|()| true),
         Command::Track(args) => track::track(&args),
         Command::Map(args) => map::command::map(&args),
+        Command::Odometry(args) => odometry::odometry(&args),
         #[cfg(feature = "demo")]
         Command::Demo(args) => Ok(!demo::demo(&args)?.facts.interrupted),
         Command::Budget(args) => budget::budget(&args).map(|()| true),

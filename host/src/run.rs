@@ -13,7 +13,7 @@ use raywake_io::source;
 pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
     let mut profile = config::profile(&args.flow.profile)?;
     // Asked for by name, it is wanted under every profile.
-    profile.deskew |= args.recording.deskew == Some(true);
+    profile.deskew |= args.recording.kind.deskew == Some(true);
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
     let plan = RunPlan {

@@ -1,14 +1,15 @@
-//! The run loop of `run`, `track` and `map`: the sweeps of a recording, one by one, until the last
-//! one or a signal.
+//! The run loop of `run`, `track`, `map` and `odometry`: the sweeps of a recording, one by one, until
+//! the last one or a signal. Where the recording has no poses, each is located by registration.
 
 use std::ops::Range;
 use std::time::Instant;
 
 use raywake_io::source::{Source, SweepData};
 
-use crate::console::{interrupted, listen};
+use crate::console::{interrupted, listen, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
+use crate::locate::{Located, Locator};
 use crate::progress::Progress;
 
 /// A sweep that has just been read.
@@ -23,15 +24,17 @@ pub struct Visit<'a> {
 pub struct SessionEnd {
     /// A signal came before the last sweep.
     pub interrupted: bool,
-    /// The last sweep visited, as it was read.
+    /// The last sweep visited.
     pub last: SweepData,
+    /// How sweeps were located, where the source has no poses.
+    pub located: Option<Located>,
 }
 
 /// Reads the sweeps in order and hands each to `visit`. After a signal the sweep in hand is
 /// finished and no further one is read.
 ///
 /// # Errors
-/// What the source or `visit` returns, at once.
+/// What the source or `visit` returns, at once; [`RunError::Allocation`] of registration.
 pub fn each_sweep<S: Source + ?Sized>(
     source: &mut S,
     sweeps: Range<usize>,
@@ -40,19 +43,28 @@ pub fn each_sweep<S: Source + ?Sized>(
 ) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
+    let mut locator = (!source.is_located()).then(Locator::new);
     let mut progress = Progress::new(sweeps.len(), quiet);
+    let mut stopped = false;
     for (done, index) in sweeps.enumerate() {
-        if interrupted() {
-            progress.finish();
-            return Ok(SessionEnd { interrupted: true, last });
+        stopped = interrupted();
+        if stopped {
+            break;
         }
         let clock = Instant::now();
         source.read(index, &mut now)?;
         let read_ms = milliseconds(clock);
+        if let Some(locator) = &mut locator {
+            locator.locate(source.rig(), &mut now)?;
+        }
         visit(source, &Visit { index, now: &now, before: (done > 0).then_some(&last), read_ms })?;
         std::mem::swap(&mut now, &mut last);
         progress.update(done + 1);
     }
     progress.finish();
-    Ok(SessionEnd { interrupted: false, last })
+    let located = locator.map(|locator| locator.located());
+    if let Some(located) = &located {
+        say(quiet, &located.line())?;
+    }
+    Ok(SessionEnd { interrupted: stopped, last, located })
 }

@@ -20,7 +20,7 @@ enum Command {
     Ablate(Box<eval::ablate::Args>),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
-    /// Ego motion of a drive by scan matching, against the drive's own poses.
+    /// Poses by registration of a drive's sweeps, against its own.
     Match(matching::Args),
     /// Write RESULTS.md from the results of evaluations.
     Results(results::Args),

@@ -3,20 +3,15 @@
 //! The normal of a point is the direction in which its nearest neighbours vary least (principal
 //! components: Hoppe et al. 1992), and there is none where these are not flat.
 
+use crate::moments::Moments;
 use crate::point::OrientedPoint;
 use crate::{compact, tree};
 use core::ops::RangeInclusive;
 use glam::DVec3;
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Neighbours that give a normal, and the distance of the farthest, m. Not measured on their own.
 const NEIGHBOURS: RangeInclusive<usize> = 5..=12;
 const NEIGHBOUR_M: f64 = 1.5;
-/// A patch is flat where its least variance is below this share of the middle one.
-const FLAT: f64 = 0.1;
-/// A patch is not a line where its middle variance is above this share of the largest one. Along a
-/// line, as a single beam leaves it on the ground, the normal is arbitrary.
-const WIDE: f64 = 0.05;
 /// Coordinates beyond this are not measurements, m; their squares stay finite.
 const REACH_M: f64 = 1e4;
 
@@ -61,23 +56,9 @@ fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
         return DVec3::ZERO;
     }
     // Relative to the place, so that the difference of squares loses nothing.
-    let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
-    for (_, index) in &near {
-        let offset = Vector3::from((points[*index].position - at).to_array());
-        sum += offset;
-        squares += offset * offset.transpose();
-    }
-    let mean = sum / near.len() as f64;
-    let covariance = squares / near.len() as f64 - mean * mean.transpose();
-    let eigen = SymmetricEigen::new(covariance);
-    let mut order = [0, 1, 2];
-    order.sort_unstable_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
-    let [least, middle, largest] = order.map(|n| eigen.eigenvalues[n]);
-    if least < FLAT * middle && middle > WIDE * largest {
-        let [x, y, z] = [0, 1, 2].map(|row| eigen.eigenvectors[(row, order[0])]);
-        return DVec3::new(x, y, z).normalize_or_zero();
-    }
-    DVec3::ZERO
+    let mut moments = Moments::NONE;
+    near.iter().for_each(|(_, index)| moments.add(points[*index].position - at));
+    moments.normal()
 }
 
 #[cfg(test)]

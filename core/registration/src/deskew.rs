@@ -31,6 +31,21 @@ impl From<DVec3> for TimedPoint {
 }
 
 impl TimedPoint {
+    /// A return, at the time that the rig tells.
+    pub(crate) fn of(point: &Point, rig: &Rig) -> TimedPoint {
+        let moves = rig.distorted && rig.timing != Timing::AtStamp;
+        let time_s = if moves { time_s(rig, point) } else { 0.0 };
+        TimedPoint { time_s, ..at(point).into() }
+    }
+
+    /// Whether a return is one of the surroundings: finite, within range and not on the own vehicle.
+    pub(crate) fn is_usable(point: &Point, rig: &Rig) -> bool {
+        // A distance that is not finite is not within range.
+        (RANGE_M[0]..RANGE_M[1]).contains(&at(point).length())
+            && point.offset_s.is_finite()
+            && !rig.is_own_vehicle(point.position)
+    }
+
     /// Where the point was at the stamp, for a vehicle with this motion, m.
     pub fn at_stamp(&self, twist: &Twist) -> DVec3 {
         if self.time_s == 0.0 {
@@ -49,13 +64,8 @@ pub fn thin_sweep<'a>(
     rig: &Rig,
     storage: &'a mut [TimedPoint],
 ) -> &'a mut [TimedPoint] {
-    let moves = rig.distorted && rig.timing != Timing::AtStamp;
-    let mut count = 0;
-    for (slot, point) in storage.iter_mut().zip(points.iter().filter(|p| usable(p, rig))) {
-        let time_s = if moves { time_s(rig, point) } else { 0.0 };
-        *slot = TimedPoint { time_s, ..at(point).into() };
-        count += 1;
-    }
+    let usable = points.iter().filter(|p| TimedPoint::is_usable(p, rig));
+    let count = storage.iter_mut().zip(usable).map(|(slot, p)| *slot = TimedPoint::of(p, rig)).count();
     thin(&mut storage[..count], VOXEL_M)
 }
 
@@ -87,15 +97,6 @@ pub fn span_s(rig: &Rig) -> Option<f64> {
 
 fn at(point: &Point) -> DVec3 {
     DVec3::from_array(point.position.map(f64::from))
-}
-
-fn usable(point: &Point, rig: &Rig) -> bool {
-    let p = point.position;
-    let own = rig.own_vehicle.is_some_and(|[low, high]| {
-        p[0] > low[0] && p[0] < high[0] && p[1] > low[1] && p[1] < high[1]
-    });
-    // A distance that is not finite is not within range.
-    (RANGE_M[0]..RANGE_M[1]).contains(&at(point).length()) && point.offset_s.is_finite() && !own
 }
 
 /// Time of a return after the stamp, s; [`Timing`] says how it is known. In contrast to the grid's

@@ -57,7 +57,7 @@ pub struct Registration {
 }
 
 impl Registration {
-    fn unmatched(pose: Pose) -> Registration {
+    pub(crate) fn unmatched(pose: Pose) -> Registration {
         Registration {
             pose,
             converged: false,
@@ -72,7 +72,7 @@ impl Registration {
 }
 
 /// Fewest correspondences that determine a motion.
-const CORRESPONDENCES_MIN: usize = 30;
+pub(crate) const CORRESPONDENCES_MIN: usize = 30;
 /// A step that changes the residuals by less than this ends a level, m (root mean square). The pose
 /// itself may go on: where little tells of a motion, as of height without ground, neighbours that
 /// change sides move it to and fro for ever.
@@ -162,14 +162,14 @@ fn match_points(
 }
 
 /// Weight of a residual in units of the kernel's width (Geman and McClure 1985).
-fn geman_mcclure(ratio: f64) -> f64 {
+pub(crate) fn geman_mcclure(ratio: f64) -> f64 {
     let q = 1.0 + ratio * ratio;
     1.0 / (q * q)
 }
 
 impl Registration {
     /// One step. Returns whether another one may follow.
-    fn advance(&mut self, correspondences: &[Correspondence], initial: &Pose) -> bool {
+    pub(crate) fn advance(&mut self, correspondences: &[Correspondence], initial: &Pose) -> bool {
         if correspondences.len() < CORRESPONDENCES_MIN {
             return false;
         }
@@ -184,7 +184,7 @@ impl Registration {
     }
 
     /// Counts the inliers, also as a share of the points tried, and how far they are off.
-    fn judge(&mut self, correspondences: &[Correspondence], tried: usize, kernel_m: f64) {
+    pub(crate) fn judge(&mut self, correspondences: &[Correspondence], tried: usize, kernel_m: f64) {
         let squares = correspondences.iter().map(|c| c.residual() * c.residual());
         let inliers = squares.filter(|r2| *r2 < kernel_m * kernel_m);
         let (count, sum) = inliers.fold((0, 0.0), |(n, sum), r2| (n + 1, sum + r2));

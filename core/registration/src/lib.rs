@@ -13,6 +13,7 @@
 //! | [`cloud`] | points in the order of a k-d tree, with normals |
 //! | [`icp`] | point-to-plane ICP from one initial pose |
 //! | [`multi_start`] | ICP from several initial poses; when a result is accepted |
+//! | [`odometry`] | the way of a vehicle from its sweeps alone |
 //! | [`ground`] | height of the ground around the sensor |
 //!
 //! Nothing is allocated: all storage is slices that the caller owns. Nothing is random and nothing
@@ -26,7 +27,9 @@ pub mod deskew;
 mod gauss_newton;
 pub mod ground;
 pub mod icp;
+mod moments;
 pub mod multi_start;
+pub mod odometry;
 mod point;
 mod tree;
 
@@ -34,6 +37,7 @@ pub use cloud::OrientedCloud;
 pub use gauss_newton::{Correspondence, Unobserved};
 pub use icp::{CORRESPONDENCES, IcpOptions, Registration, register};
 pub use multi_start::register_multi_start;
+pub use odometry::Odometry;
 pub use point::OrientedPoint;
 
 /// Moves the items to keep to the front, in their order. Returns their number.

@@ -30,7 +30,7 @@ pub use tracker::{Ended, Tracker};
 /// the sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut settings = config::settings(&args.flow.profile)?;
-    settings.profile.deskew |= args.recording.deskew == Some(true);
+    settings.profile.deskew |= args.recording.kind.deskew == Some(true);
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;

@@ -148,6 +148,10 @@ pub fn evaluate(
 ) -> Result<(Facts, bool), RunError> {
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
+    if !source.is_located() {
+        let what = "labels are placed by poses: find them with `raywake odometry`, then --poses FILE";
+        return Err(Error::input(path, "", what).into());
+    }
     let files = Files::of(out, name);
     let semantic = Semantic::of(path, source.as_ref());
     let labels = labels(path, source.as_ref(), semantic.is_some())?;

@@ -26,6 +26,18 @@ impl Differences {
         self.path_m += given.translation.length();
     }
 
+    /// Length of the way by the given steps, m.
+    #[cfg(test)]
+    pub fn path_m(&self) -> f64 {
+        self.path_m
+    }
+
+    /// The largest difference of a step, m.
+    #[cfg(test)]
+    pub fn worst_m(&self) -> f64 {
+        self.rows[3].iter().copied().fold(0.0, f64::max)
+    }
+
     /// The table, and how far apart the drives end.
     pub fn table(&self, found: &Pose, given: &Pose) -> Result<String, fmt::Error> {
         let mut text = String::new();

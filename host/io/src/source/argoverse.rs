@@ -13,7 +13,8 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use super::feather::FeatherTable;
 use super::poses::{PoseTrack, check_rising};
 use super::recognise::numbered;
-use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, apply, folder_name};
+use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
+use super::{apply, folder_name};
 use crate::Error;
 
 /// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners turn once in
@@ -64,7 +65,11 @@ impl Argoverse {
             return Err(Error::input(&clouds, "", "a sweep's name is not a timestamp"));
         }
         let mut notes = Vec::new();
-        let track = read_track(&root.join("city_SE3_egovehicle.feather"), &files, &mut notes)?;
+        let path = root.join("city_SE3_egovehicle.feather");
+        let mut track = read_track(&path, &files, &mut notes)?;
+        if options.unlocated == Unlocated::Always {
+            track.poses.clear();
+        }
         check_rising(&track.stamps_s, &clouds, |i| format!("sweep {i}"))?;
         let scanners = read_scanners(&root.join("calibration/egovehicle_SE3_sensor.feather"))?;
         let mut rig = Rig {

@@ -11,7 +11,7 @@ use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::{SPAN_MAX_S, Sidecars};
-use super::{OpenOptions, Overview, PosesFrame, apply, folder_name, oxts};
+use super::{OpenOptions, Overview, PosesFrame, Unlocated, apply, folder_name, oxts};
 use crate::Error;
 
 /// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
@@ -36,9 +36,10 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Er
     opening.read_times(&["times.txt", "velodyne_points/timestamps.txt", "oxts/timestamps.txt"])?;
     let own = drive.join("poses.txt");
     match options.poses.as_ref().or(Some(&own).filter(|p| p.is_file())) {
+        _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
         None if drive.join("oxts/data").is_dir() => opening.read_oxts()?,
-        None => return Err(no_poses(drive, "neither `poses.txt` nor `oxts/data`")),
+        None => opening.go_without_poses(options, "neither `poses.txt` nor `oxts/data`")?,
     }
     opening.sidecars = Sidecars::open(&drive.join("velodyne_points"))?;
     Ok(opening.finish(options))
@@ -51,13 +52,15 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Cl
     opening.read_times(&["times.txt"])?;
     let apart = format!("../../poses/{}.txt", folder_name(sequence));
     let own = [sequence.join("poses.txt"), sequence.join(apart)];
-    let path = options.poses.as_ref().or(own.iter().find(|p| p.is_file()));
-    let path = path.ok_or_else(|| no_poses(sequence, "no `poses.txt`"))?;
-    opening.read_poses(path, options, PosesFrame::Camera)?;
+    match options.poses.as_ref().or(own.iter().find(|p| p.is_file())) {
+        _ if options.unlocated == Unlocated::Always => {}
+        Some(path) => opening.read_poses(path, options, PosesFrame::Camera)?,
+        None => opening.go_without_poses(options, "no `poses.txt`")?,
+    }
     Ok(opening.finish(options))
 }
 
-/// A folder of clouds of one kind; the option `poses` is needed.
+/// A folder of clouds of one kind; the option `poses` alone tells where they were made.
 pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
     let mut kinds = extensions(folder)?;
     let kind = kinds.next().unwrap_or("bin");
@@ -67,8 +70,11 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     }
     let mut opening = Opening::new(folder, folder, kind, "folder of clouds")?;
     opening.read_times(&["times.txt"])?;
-    let path = options.poses.as_ref().ok_or_else(|| no_poses(folder, "point clouds only"))?;
-    opening.read_poses(path, options, PosesFrame::Vehicle)?;
+    match &options.poses {
+        _ if options.unlocated == Unlocated::Always => {}
+        Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
+        None => opening.go_without_poses(options, "point clouds only")?,
+    }
     opening.span = opening.find_span()?;
     let spins = match opening.span {
         Some(_) => "",
@@ -79,12 +85,6 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     );
     opening.notes.push(note);
     Ok(opening.finish(options))
-}
-
-/// The error of a recording whose motion is unknown.
-fn no_poses(path: &Path, found: &str) -> Error {
-    let what = format!("{found}: poses are needed, give a file with --poses");
-    Error::input(path, "", what)
 }
 
 /// A recording while it is being opened.
@@ -120,7 +120,7 @@ impl Opening {
         Ok(Opening {
             root,
             kind,
-            poses_from: String::new(),
+            poses_from: "registration".into(),
             files,
             track,
             timed: false,
@@ -164,6 +164,17 @@ impl Opening {
         self.track.poses = rows;
         self.poses_from = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok(())
+    }
+
+    /// Leaves the poses unknown, or fails where they are needed.
+    fn go_without_poses(&self, options: &OpenOptions, found: &str) -> Result<(), Error> {
+        match options.unlocated {
+            Unlocated::Refuse => {
+                let what = format!("{found}: poses are needed, give a file with --poses");
+                Err(Error::input(&self.root, "", what))
+            }
+            Unlocated::Accept | Unlocated::Always => Ok(()),
+        }
     }
 
     /// Poses from `oxts/data`, by frame number; sweeps without a packet are left out. The world is

@@ -92,7 +92,7 @@ pub struct Overview {
     pub rig: Rig,
     /// File number (or timestamp in ns) of every sweep; at least one.
     pub frames: Vec<u64>,
-    /// Stamp and pose of every sweep.
+    /// Stamp of every sweep, and pose where poses are known.
     pub track: PoseTrack,
     /// What the user should know: assumptions, gaps in frame numbers.
     pub notes: Vec<String>,
@@ -104,8 +104,9 @@ impl Overview {
     fn begin(&self, index: usize, sweep: &mut SweepData) {
         sweep.frame = self.frames[index];
         sweep.stamp_s = self.track.stamps_s[index];
-        sweep.world_from_vehicle = self.track.poses[index];
-        sweep.twist = self.track.twist(index);
+        let known = self.track.poses.get(index);
+        sweep.world_from_vehicle = known.copied().unwrap_or(Pose::IDENTITY);
+        sweep.twist = known.map_or(Twist::ZERO, |_| self.track.twist(index));
     }
 
     /// Number of sweeps and time from the first to the last, for people.
@@ -157,7 +158,12 @@ pub trait Source {
         self.overview().track.stamps_s[index]
     }
 
-    /// `world_from_vehicle` at the stamp of a sweep.
+    /// Whether poses are known. Otherwise sweeps are read with the identity.
+    fn is_located(&self) -> bool {
+        !self.overview().track.poses.is_empty()
+    }
+
+    /// `world_from_vehicle` at the stamp of a sweep of a source that is located.
     fn pose(&self, index: usize) -> Pose {
         self.overview().track.poses[index]
     }
@@ -193,6 +199,18 @@ pub enum PosesFrame {
     Vehicle,
 }
 
+/// Whether a recording may be opened without poses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unlocated {
+    /// It fails to open.
+    #[default]
+    Refuse,
+    /// Where it has none.
+    Accept,
+    /// Those that it has are left out.
+    Always,
+}
+
 /// What the user says about a recording instead of what its folder tells.
 #[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
@@ -200,6 +218,8 @@ pub struct OpenOptions {
     pub format: Option<Format>,
     /// File of 3x4 poses, one row per sweep.
     pub poses: Option<PathBuf>,
+    /// Whether poses are needed at all.
+    pub unlocated: Unlocated,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
     /// Overrides [`Rig::distorted`].
@@ -210,7 +230,7 @@ pub struct OpenOptions {
 
 /// Opens the recording at `path`, or the only one in a folder below it.
 ///
-/// Fails where no known format is recognised, where poses, times or calibration are missing, do
+/// Fails where no known format is recognised, where poses (unless it may come without), times or calibration are missing, do
 /// not fit the sweeps or make no sense, and where this build cannot read the format.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     if options.ground_m.is_some_and(|g| !g.is_finite()) {

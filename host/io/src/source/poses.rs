@@ -21,7 +21,7 @@ const REACH_MAX_M: f64 = 1e6;
 pub struct PoseTrack {
     /// s, rising.
     pub stamps_s: Vec<f64>,
-    /// `world_from_vehicle` at the stamps.
+    /// `world_from_vehicle` at the stamps; none where the poses are unknown.
     pub poses: Vec<Pose>,
 }
 

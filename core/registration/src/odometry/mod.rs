@@ -1,0 +1,224 @@
+//! The way of a vehicle from its sweeps alone: each is registered with a local map of those before
+//! it (as in KISS-ICP, Vizzo et al. 2023, but from points to planes).
+//!
+//! A sweep is expected where an even motion leads. While it is registered, its returns are moved to
+//! the stamp by the motion found so far. Then it becomes part of the map. The motion at the start is
+//! unknown: of several, the one that lays the second sweep best onto the first is taken.
+
+mod surfels;
+mod thinned;
+mod voxel;
+
+use crate::deskew::{TimedPoint, span_s};
+use crate::gauss_newton::Correspondence;
+use crate::icp::{CORRESPONDENCES_MIN, Registration, geman_mcclure};
+use raywake_core::pose::{Pose, Twist};
+use raywake_core::sweep::{Point, Rig};
+use surfels::Surfels;
+use thinned::Thinned;
+
+/// Returns of a sweep that are matched, at most.
+const MATCHED_MAX: usize = 3000;
+/// Widths of the kernel, m, from coarse to fine; the first ones are for unknown motions alone.
+const KERNELS_M: [f64; 3] = [1.0, 0.4, 0.1];
+/// Of them, where the motion is expected.
+const EXPECTED_FROM: usize = 1;
+/// Steps with each kernel at most.
+const STEPS: usize = 15;
+/// Least share of the matched returns that lie on the map's planes where the sweep is located.
+const OVERLAP_MIN: f64 = 0.35;
+/// Speeds ahead that are tried where the motion is unknown, m/s.
+const SPEEDS_MPS: [f64; 4] = [0.0, 10.0, 20.0, 30.0];
+/// Times that the map of one sweep is made anew with the motion found.
+const ROUNDS: usize = 2;
+
+/// How a sweep was located.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Locating {
+    /// It is the first one.
+    Start,
+    /// By registration.
+    Registered,
+    /// What it shows does not determine all of its motion on the ground: the rest was taken from the
+    /// motion before.
+    Degenerate,
+    /// It fits nothing known: its pose is expected from the motion before, and a new map begins.
+    Lost,
+}
+
+/// Where a sweep was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Located {
+    /// `world_from_vehicle` at the stamp; the world is the vehicle's frame at the first sweep.
+    pub world_from_vehicle: Pose,
+    /// Velocity at the stamp.
+    pub twist: Twist,
+    /// Whence.
+    pub locating: Locating,
+}
+
+/// The map, and the motion so far.
+pub struct Odometry {
+    map: Surfels,
+    /// Every other sweep: the last one counted and the one before it.
+    sweeps: [Thinned; 2],
+    correspondences: [Correspondence; MATCHED_MAX],
+    /// Sweeps so far.
+    count: u32,
+    stamp_s: f64,
+    pose: Pose,
+    twist: Twist,
+}
+
+impl Odometry {
+    /// Before the first sweep.
+    pub const fn new() -> Odometry {
+        const NOTHING: Correspondence = Correspondence::NONE;
+        Odometry {
+            map: Surfels::new(),
+            sweeps: [const { Thinned::new() }; 2],
+            correspondences: [NOTHING; MATCHED_MAX],
+            count: 0,
+            stamp_s: 0.0,
+            pose: Pose::IDENTITY,
+            twist: Twist::ZERO,
+        }
+    }
+
+    /// Locates the next sweep.
+    pub fn locate(&mut self, stamp_s: f64, points: &[Point], rig: &Rig) -> Located {
+        self.count += 1;
+        self.sweeps[self.count as usize % 2].fill(points, rig);
+        let dt_s = duration_s(rig, stamp_s - self.stamp_s);
+        self.stamp_s = stamp_s;
+        let locating = match self.count {
+            1 => Locating::Start,
+            2 => self.start(dt_s),
+            _ => self.follow(dt_s),
+        };
+        let motion = self.twist;
+        self.put(self.count, &motion);
+        Located { world_from_vehicle: self.pose, twist: self.twist, locating }
+    }
+
+    /// Registers the sweep with the map; where that fails, with the sweep before.
+    fn follow(&mut self, dt_s: f64) -> Locating {
+        let initial = self.pose * self.twist.over(dt_s);
+        let found = self.register(initial, dt_s, &KERNELS_M[EXPECTED_FROM..]);
+        if is_located(&found) {
+            return self.go(&found, dt_s);
+        }
+        self.start(dt_s)
+    }
+
+    /// Tries motions for the sweep and the one before it.
+    fn start(&mut self, dt_s: f64) -> Locating {
+        let expected = self.twist;
+        let ahead = SPEEDS_MPS.map(|x| Twist { linear: glam::DVec3::X * x, ..Twist::ZERO });
+        let mut best: Option<(Registration, Twist)> = None;
+        for motion in [expected].into_iter().chain(ahead) {
+            let found = self.pair(motion, dt_s);
+            if best.is_none_or(|(other, _)| found.0.overlap > other.overlap) {
+                best = Some(found);
+            }
+        }
+        let (found, before) = best.expect("several were tried");
+        self.map_of_before(&before);
+        if is_located(&found) {
+            return self.go(&found, dt_s);
+        }
+        self.map.clear();
+        self.pose = self.pose * expected.over(dt_s);
+        Locating::Lost
+    }
+
+    /// Registers the sweep with the one before it alone, both moved evenly, first as told and then
+    /// as found; and the motion that the one before was moved by.
+    fn pair(&mut self, motion: Twist, dt_s: f64) -> (Registration, Twist) {
+        let mut motion = motion;
+        self.map_of_before(&motion);
+        let mut found = self.register(self.pose * motion.over(dt_s), dt_s, &KERNELS_M);
+        for _ in 1..ROUNDS {
+            motion = (self.pose.inverse() * found.pose).twist(dt_s);
+            self.map_of_before(&motion);
+            found = self.register(found.pose, dt_s, &KERNELS_M[EXPECTED_FROM..]);
+        }
+        (found, motion)
+    }
+
+    /// A map of nothing but the sweep before, whose vehicle had a motion.
+    fn map_of_before(&mut self, motion: &Twist) {
+        self.map.clear();
+        self.put(self.count - 1, motion);
+    }
+
+    /// Puts a sweep into the map: the last one, or the one before it, at the pose known last.
+    fn put(&mut self, sweep: u32, motion: &Twist) {
+        for point in self.sweeps[sweep as usize % 2].points() {
+            self.map.add(self.pose.transform(point.at_stamp(motion)), sweep);
+        }
+    }
+
+    /// Takes over what was found.
+    fn go(&mut self, found: &Registration, dt_s: f64) -> Locating {
+        self.twist = at_now(&(self.pose.inverse() * found.pose), dt_s);
+        self.pose = found.pose;
+        if found.unobserved.planar > 0 { Locating::Degenerate } else { Locating::Registered }
+    }
+
+    /// The pose that lays the sweep onto the map, started at `initial`.
+    fn register(&mut self, initial: Pose, dt_s: f64, kernels_m: &[f64]) -> Registration {
+        let points = self.sweeps[self.count as usize % 2].points();
+        let stride = points.len().div_ceil(MATCHED_MAX).max(1);
+        let tried = points.len().div_ceil(stride);
+        let mut found = Registration::unmatched(initial);
+        for &kernel_m in kernels_m {
+            found.converged = false;
+            let mut count = 0;
+            for _ in 0..STEPS {
+                let twist = at_now(&(self.pose.inverse() * found.pose), dt_s);
+                let all = points.iter().step_by(stride);
+                let (motion, into) = ((&found.pose, &twist), &mut self.correspondences);
+                count = matched(all, &mut self.map, motion, kernel_m, into);
+                if !found.advance(&self.correspondences[..count], &initial) {
+                    break;
+                }
+            }
+            found.judge(&self.correspondences[..count], tried, kernel_m);
+        }
+        found
+    }
+}
+
+/// Correspondences of points of a sweep with a map; returns their number.
+fn matched<'a>(
+    points: impl Iterator<Item = &'a TimedPoint>,
+    map: &mut Surfels,
+    (pose, twist): (&Pose, &Twist),
+    kernel_m: f64,
+    into: &mut [Correspondence],
+) -> usize {
+    let found = points.filter_map(|p| {
+        let mut found = map.plane(pose.transform(p.at_stamp(twist)))?;
+        found.weight = geman_mcclure(found.residual() / kernel_m);
+        Some(found)
+    });
+    into.iter_mut().zip(found).map(|(slot, found)| *slot = found).count()
+}
+
+fn is_located(found: &Registration) -> bool {
+    found.overlap >= OVERLAP_MIN && found.inliers >= CORRESPONDENCES_MIN
+}
+
+/// The even motion that led here in `dt_s`, along the axes that the vehicle has now.
+fn at_now(before_from_now: &Pose, dt_s: f64) -> Twist {
+    before_from_now.inverse().twist(-dt_s)
+}
+
+/// Time between two stamps: whole turns where the sensor spins, as stamps are often coarser.
+fn duration_s(rig: &Rig, between_s: f64) -> f64 {
+    match span_s(rig) {
+        Some(turn_s) if turn_s > 0.0 => libm::round(between_s / turn_s).max(1.0) * turn_s,
+        _ => between_s,
+    }
+}

@@ -1,0 +1,142 @@
+//! The local map: planes of cells of three sizes (a normal distributions transform, Magnusson
+//! 2009), in a table that forgets what was not seen for longest.
+
+use super::voxel::{hash, index_of};
+use crate::gauss_newton::Correspondence;
+use crate::moments::Moments;
+use glam::DVec3;
+
+/// Sides of the cells, m, from fine to coarse: a fine one tells more exactly where a surface is, a
+/// coarse one has enough returns of what is far, and reaches farther.
+pub const SIDES_M: [f64; 3] = [0.5, 1.0, 2.0];
+/// Cells of all sizes.
+const CELLS: usize = 1 << 17;
+/// Cells that may stand in each other's place.
+const PROBES: usize = 8;
+/// Returns of a cell from which on a normal is looked for.
+const COUNT_MIN: f64 = 6.0;
+/// At this many returns the older ones count half: a cell follows what the pose drifts.
+const COUNT_MAX: f64 = 120.0;
+/// A plane is found anew when a cell has this many times its returns.
+const GROWTH: f64 = 1.3;
+
+/// Which cell, and when it was hit: apart from what it holds, as most of a search reads no more.
+#[derive(Clone, Copy)]
+struct Key {
+    index: [i32; 3],
+    level: u8,
+    /// Sweep that hit it last; 0 in an empty one.
+    seen: u32,
+}
+
+impl Key {
+    const NONE: Key = Key { index: [0; 3], level: 0, seen: 0 };
+
+    fn is(&self, level: u8, index: [i32; 3]) -> bool {
+        self.seen > 0 && self.level == level && self.index == index
+    }
+
+    fn corner(&self) -> DVec3 {
+        let [x, y, z] = self.index.map(f64::from);
+        DVec3::new(x, y, z) * SIDES_M[self.level as usize]
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Cell {
+    /// Of its returns, relative to its corner.
+    moments: Moments,
+    /// Returns that the normal was found from.
+    planned: f64,
+    /// Zero where there is no plane.
+    normal: DVec3,
+}
+
+impl Cell {
+    const EMPTY: Cell = Cell { moments: Moments::NONE, planned: 0.0, normal: DVec3::ZERO };
+
+    /// A point of the plane, from the corner, and its normal.
+    fn plane(&mut self) -> Option<(DVec3, DVec3)> {
+        if self.moments.count < COUNT_MIN {
+            return None;
+        }
+        if self.moments.count >= GROWTH * self.planned {
+            self.planned = self.moments.count;
+            self.normal = self.moments.normal();
+        }
+        (self.normal != DVec3::ZERO).then(|| (self.moments.mean(), self.normal))
+    }
+
+    fn add(&mut self, offset: DVec3) {
+        self.moments.add(offset);
+        if self.moments.count > COUNT_MAX {
+            self.moments.halve();
+            self.planned = 0.0;
+        }
+    }
+}
+
+/// The cells.
+pub struct Surfels {
+    keys: [Key; CELLS],
+    cells: [Cell; CELLS],
+}
+
+impl Surfels {
+    /// An empty map.
+    pub const fn new() -> Surfels {
+        Surfels { keys: [Key::NONE; CELLS], cells: [Cell::EMPTY; CELLS] }
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.keys.fill(Key::NONE);
+    }
+
+    /// Adds a return of a sweep (counted from 1) to its cells.
+    pub fn add(&mut self, at: DVec3, sweep: u32) {
+        for level in 0..SIDES_M.len() as u8 {
+            let index = index_of(at, SIDES_M[level as usize]);
+            let slot = self.slot(level, index);
+            let key = &mut self.keys[slot];
+            if !key.is(level, index) {
+                *key = Key { index, level, ..Key::NONE };
+                self.cells[slot] = Cell::EMPTY;
+            }
+            key.seen = sweep;
+            self.cells[slot].add(at - key.corner());
+        }
+    }
+
+    /// The finest plane at a place.
+    pub fn plane(&mut self, at: DVec3) -> Option<Correspondence> {
+        for level in 0..SIDES_M.len() as u8 {
+            let index = index_of(at, SIDES_M[level as usize]);
+            let slot = self.slot(level, index);
+            let key = &self.keys[slot];
+            if key.is(level, index)
+                && let Some((on, normal)) = self.cells[slot].plane()
+            {
+                return Some(Correspondence { point: at, on: key.corner() + on, normal, weight: 1.0 });
+            }
+        }
+        None
+    }
+
+    /// Where a cell is, or may be put: a free place, or that of the cell unseen for longest.
+    fn slot(&self, level: u8, index: [i32; 3]) -> usize {
+        let first = hash(index).wrapping_add(u32::from(level) << 13) as usize;
+        let mut stalest = first % CELLS;
+        for probe in 0..PROBES {
+            let slot = (first + probe) % CELLS;
+            let key = &self.keys[slot];
+            if key.seen == 0 || key.is(level, index) {
+                return slot;
+            }
+            if key.seen < self.keys[stalest].seen {
+                stalest = slot;
+            }
+        }
+        stalest
+    }
+}

@@ -1,0 +1,25 @@
+//! Cubes of space by their indices.
+
+use glam::DVec3;
+
+/// Index of the cube of a side that holds a place near enough to the origin.
+#[inline]
+pub fn index_of(at: DVec3, side_m: f64) -> [i32; 3] {
+    (at / side_m).to_array().map(floor)
+}
+
+/// Rounded down. Without a function of `libm`: this is most of what thinning does.
+#[inline]
+fn floor(v: f64) -> i32 {
+    let towards_zero = v as i32;
+    towards_zero - i32::from(v < f64::from(towards_zero))
+}
+
+/// Spreads indices over 32 bits: multiples of large odd numbers (Teschner et al. 2003).
+#[inline]
+pub fn hash([x, y, z]: [i32; 3]) -> u32 {
+    let mixed = (x as u32).wrapping_mul(73_856_093)
+        ^ (y as u32).wrapping_mul(19_349_663)
+        ^ (z as u32).wrapping_mul(83_492_791);
+    mixed ^ (mixed >> 15)
+}

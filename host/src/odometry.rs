@@ -1,0 +1,30 @@
+//! `raywake odometry`: the poses of a recording, from its sweeps alone.
+
+use std::io::Write;
+
+use raywake_io::sink::atomic;
+use raywake_io::source::{self, Unlocated, pose_row};
+
+use crate::args;
+use crate::console::{note, say};
+use crate::error::RunError;
+use crate::session::each_sweep;
+
+/// Locates all sweeps and writes their poses. Returns whether it got to the end: a signal ends it
+/// after the sweep in hand, and the poses so far are written.
+pub fn odometry(args: &args::OdometryArgs) -> Result<bool, RunError> {
+    let options = source::OpenOptions { unlocated: Unlocated::Always, ..args.kind.options() };
+    let mut source = source::open(&args.data, &options)?;
+    let sweeps = args.part.range(source.len())?;
+    say(args.quiet, &format!("{}\n", source.describe()))?;
+    note(args.quiet, source.notes())?;
+    let mut poses = Vec::with_capacity(sweeps.len());
+    let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
+        poses.push(visit.now.world_from_vehicle);
+        Ok(())
+    })?;
+    atomic::write(&args.out, |to| {
+        poses.iter().try_for_each(|pose| writeln!(to, "{}", pose_row(pose)))
+    })?;
+    Ok(!end.interrupted)
+}
