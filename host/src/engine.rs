@@ -18,6 +18,7 @@ use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::laps::{Laps, milliseconds};
+use crate::locate::Locator;
 use crate::outputs::{Kinds, Outputs};
 use crate::report;
 use crate::session::{Visit, each_sweep};
@@ -100,7 +101,8 @@ pub fn execute<S: Source + ?Sized>(
         interrupted: end.interrupted,
         registration: end.located,
         device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
-        host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_))),
+        host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_)))
+            + end.located.map_or(0, |_| Locator::BYTES),
         vulkan_allocations: census.memory_allocations,
         validation_messages: plan.backend.validation.map(|_| backend.messages()),
     };

@@ -9,6 +9,7 @@ use raywake_registration::Odometry;
 use raywake_registration::odometry::Locating;
 use serde::Serialize;
 
+use crate::console::bytes;
 use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
@@ -35,6 +36,9 @@ pub struct Located {
 }
 
 impl Locator {
+    /// Bytes that registration works in.
+    pub const BYTES: u64 = size_of::<Odometry>() as u64;
+
     /// Allocates all it needs.
     pub fn new() -> Locator {
         let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
@@ -79,7 +83,8 @@ impl Located {
         let Located { registered, degenerate, lost, ms } = self;
         let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
         format!(
-            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}\n"
+            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; {}\n",
+            bytes(Locator::BYTES)
         )
     }
 }

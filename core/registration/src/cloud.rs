@@ -58,7 +58,7 @@ fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
     // Relative to the place, so that the difference of squares loses nothing.
     let mut moments = Moments::NONE;
     near.iter().for_each(|(_, index)| moments.add(points[*index].position - at));
-    moments.normal()
+    moments.normal().map_or(DVec3::ZERO, |(normal, _)| normal)
 }
 
 #[cfg(test)]

@@ -65,7 +65,8 @@ pub fn thin_sweep<'a>(
     storage: &'a mut [TimedPoint],
 ) -> &'a mut [TimedPoint] {
     let usable = points.iter().filter(|p| TimedPoint::is_usable(p, rig));
-    let count = storage.iter_mut().zip(usable).map(|(slot, p)| *slot = TimedPoint::of(p, rig)).count();
+    let count =
+        storage.iter_mut().zip(usable).map(|(slot, p)| *slot = TimedPoint::of(p, rig)).count();
     thin(&mut storage[..count], VOXEL_M)
 }
 

@@ -20,12 +20,8 @@ pub struct Correspondence {
 
 impl Correspondence {
     /// One that asks for nothing.
-    pub const NONE: Correspondence = Correspondence {
-        point: DVec3::ZERO,
-        on: DVec3::ZERO,
-        normal: DVec3::ZERO,
-        weight: 0.0,
-    };
+    pub const NONE: Correspondence =
+        Correspondence { point: DVec3::ZERO, on: DVec3::ZERO, normal: DVec3::ZERO, weight: 0.0 };
 
     /// Distance of the point from the plane, m, with the sign of the normal.
     pub fn residual(&self) -> f64 {

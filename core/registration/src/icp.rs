@@ -184,7 +184,12 @@ impl Registration {
     }
 
     /// Counts the inliers, also as a share of the points tried, and how far they are off.
-    pub(crate) fn judge(&mut self, correspondences: &[Correspondence], tried: usize, kernel_m: f64) {
+    pub(crate) fn judge(
+        &mut self,
+        correspondences: &[Correspondence],
+        tried: usize,
+        kernel_m: f64,
+    ) {
         let squares = correspondences.iter().map(|c| c.residual() * c.residual());
         let inliers = squares.filter(|r2| *r2 < kernel_m * kernel_m);
         let (count, sum) = inliers.fold((0, 0.0), |(n, sum), r2| (n + 1, sum + r2));

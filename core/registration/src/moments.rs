@@ -47,9 +47,9 @@ impl Moments {
         self.sum / self.count
     }
 
-    /// Unit normal of the plane of the points (principal components: Hoppe et al. 1992), or zero
-    /// where they lie on none.
-    pub fn normal(&self) -> DVec3 {
+    /// Unit normal of the plane of the points (principal components: Hoppe et al. 1992), and the
+    /// variance of its direction (rad^2); nothing where they lie on none.
+    pub fn normal(&self) -> Option<(DVec3, f64)> {
         let m = self.mean();
         let [xx, yy, zz] = (self.squares / self.count - m * m).to_array();
         let cross = DVec3::new(m.y * m.z, m.z * m.x, m.x * m.y);
@@ -61,8 +61,9 @@ impl Moments {
         let [least, middle, largest] = order.map(|n| eigen.eigenvalues[n]);
         if least < FLAT * middle && middle > WIDE * largest {
             let [x, y, z] = [0, 1, 2].map(|row| eigen.eigenvectors[(row, order[0])]);
-            return DVec3::new(x, y, z).normalize_or_zero();
+            let normal = DVec3::new(x, y, z).try_normalize()?;
+            return Some((normal, least.max(0.0) / (middle * self.count)));
         }
-        DVec3::ZERO
+        None
     }
 }

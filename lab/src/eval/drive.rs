@@ -149,7 +149,8 @@ pub fn evaluate(
     let begin = Instant::now();
     let mut source = source::open(path, &settings.open)?;
     if !source.is_located() {
-        let what = "labels are placed by poses: find them with `raywake odometry`, then --poses FILE";
+        let what =
+            "labels are placed by poses: find them with `raywake odometry`, then --poses FILE";
         return Err(Error::input(path, "", what).into());
     }
     let files = Files::of(out, name);

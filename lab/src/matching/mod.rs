@@ -34,7 +34,9 @@ const SIMULATED_SWEEPS: u32 = 30;
 /// Locates and compares.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     let mut source: Box<dyn Source> = match (&args.drive, args.simulated) {
-        (Some(drive), _) => open(drive, &OpenOptions { deskew: args.deskew, ..Default::default() })?,
+        (Some(drive), _) => {
+            open(drive, &OpenOptions { deskew: args.deskew, ..Default::default() })?
+        }
         (None, seed) => {
             let sweeps = args.count.unwrap_or(SIMULATED_SWEEPS);
             Box::new(Simulated::new(seed.unwrap_or_default(), sweeps as usize))

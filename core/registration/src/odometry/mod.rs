@@ -12,25 +12,33 @@ mod voxel;
 use crate::deskew::{TimedPoint, span_s};
 use crate::gauss_newton::Correspondence;
 use crate::icp::{CORRESPONDENCES_MIN, Registration, geman_mcclure};
+use glam::DVec3;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
 use surfels::Surfels;
 use thinned::Thinned;
 
-/// Returns of a sweep that are matched, at most.
+/// Returns of a sweep that are matched, at most: evenly chosen. Not measured on its own.
 const MATCHED_MAX: usize = 3000;
-/// Widths of the kernel, m, from coarse to fine; the first ones are for unknown motions alone.
+/// Fewer returns, one a voxel, are no sweep.
+const RETURNS_MIN: usize = 100;
+/// Widths of the kernel, m, from coarse to fine; the first one is for unknown motions alone. Not
+/// measured on their own.
 const KERNELS_M: [f64; 3] = [1.0, 0.4, 0.1];
 /// Of them, where the motion is expected.
 const EXPECTED_FROM: usize = 1;
-/// Steps with each kernel at most.
+/// Steps with each kernel at most; 2 to 5 are usual.
 const STEPS: usize = 15;
-/// Least share of the matched returns that lie on the map's planes where the sweep is located.
-const OVERLAP_MIN: f64 = 0.35;
-/// Speeds ahead that are tried where the motion is unknown, m/s.
+/// Least share of the matched returns that lie on the map's planes where the sweep is located: of
+/// neighbours it is 0.8 or more (KITTI, simulated drives).
+const AGREE_MIN: f64 = 0.6;
+/// Speeds ahead that are tried where the motion is unknown, m/s. Each reaches 10 m/s to both sides
+/// where anything stands beside the way.
 const SPEEDS_MPS: [f64; 4] = [0.0, 10.0, 20.0, 30.0];
-/// Times that the map of one sweep is made anew with the motion found.
+/// Times that a sweep and the one before it are registered, each moved by the motion found before.
 const ROUNDS: usize = 2;
+/// Stamps this close to whole turns of the sensor are of a coarser clock, turns.
+const WHOLE: f64 = 0.2;
 
 /// How a sweep was located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,14 +78,19 @@ pub struct Odometry {
     twist: Twist,
 }
 
+impl Default for Odometry {
+    fn default() -> Odometry {
+        Odometry::new()
+    }
+}
+
 impl Odometry {
     /// Before the first sweep.
     pub const fn new() -> Odometry {
-        const NOTHING: Correspondence = Correspondence::NONE;
         Odometry {
             map: Surfels::new(),
             sweeps: [const { Thinned::new() }; 2],
-            correspondences: [NOTHING; MATCHED_MAX],
+            correspondences: [Correspondence::NONE; MATCHED_MAX],
             count: 0,
             stamp_s: 0.0,
             pose: Pose::IDENTITY,
@@ -93,12 +106,24 @@ impl Odometry {
         self.stamp_s = stamp_s;
         let locating = match self.count {
             1 => Locating::Start,
+            _ if self.points().len() < RETURNS_MIN => self.miss(dt_s),
             2 => self.start(dt_s),
             _ => self.follow(dt_s),
         };
         let motion = self.twist;
         self.put(self.count, &motion);
         Located { world_from_vehicle: self.pose, twist: self.twist, locating }
+    }
+
+    /// Returns of the sweep, one a voxel.
+    fn points(&self) -> &[TimedPoint] {
+        self.sweeps[self.count as usize % 2].points()
+    }
+
+    /// Goes on evenly.
+    fn miss(&mut self, dt_s: f64) -> Locating {
+        self.pose = self.pose * self.twist.over(dt_s);
+        Locating::Lost
     }
 
     /// Registers the sweep with the map; where that fails, with the sweep before.
@@ -114,11 +139,12 @@ impl Odometry {
     /// Tries motions for the sweep and the one before it.
     fn start(&mut self, dt_s: f64) -> Locating {
         let expected = self.twist;
-        let ahead = SPEEDS_MPS.map(|x| Twist { linear: glam::DVec3::X * x, ..Twist::ZERO });
+        let ahead = SPEEDS_MPS.map(|x| Twist { linear: DVec3::X * x, ..Twist::ZERO });
+        let rank = |r: &Registration| (is_located(r), r.unobserved.planar == 0, r.inliers);
         let mut best: Option<(Registration, Twist)> = None;
         for motion in [expected].into_iter().chain(ahead) {
             let found = self.pair(motion, dt_s);
-            if best.is_none_or(|(other, _)| found.0.overlap > other.overlap) {
+            if best.is_none_or(|(other, _)| rank(&found.0) > rank(&other)) {
                 best = Some(found);
             }
         }
@@ -128,8 +154,7 @@ impl Odometry {
             return self.go(&found, dt_s);
         }
         self.map.clear();
-        self.pose = self.pose * expected.over(dt_s);
-        Locating::Lost
+        self.miss(dt_s)
     }
 
     /// Registers the sweep with the one before it alone, both moved evenly, first as told and then
@@ -170,7 +195,6 @@ impl Odometry {
     fn register(&mut self, initial: Pose, dt_s: f64, kernels_m: &[f64]) -> Registration {
         let points = self.sweeps[self.count as usize % 2].points();
         let stride = points.len().div_ceil(MATCHED_MAX).max(1);
-        let tried = points.len().div_ceil(stride);
         let mut found = Registration::unmatched(initial);
         for &kernel_m in kernels_m {
             found.converged = false;
@@ -184,7 +208,7 @@ impl Odometry {
                     break;
                 }
             }
-            found.judge(&self.correspondences[..count], tried, kernel_m);
+            found.judge(&self.correspondences[..count], count, kernel_m);
         }
         found
     }
@@ -207,7 +231,7 @@ fn matched<'a>(
 }
 
 fn is_located(found: &Registration) -> bool {
-    found.overlap >= OVERLAP_MIN && found.inliers >= CORRESPONDENCES_MIN
+    found.overlap >= AGREE_MIN && found.inliers >= CORRESPONDENCES_MIN
 }
 
 /// The even motion that led here in `dt_s`, along the axes that the vehicle has now.
@@ -215,10 +239,13 @@ fn at_now(before_from_now: &Pose, dt_s: f64) -> Twist {
     before_from_now.inverse().twist(-dt_s)
 }
 
-/// Time between two stamps: whole turns where the sensor spins, as stamps are often coarser.
+/// Time between two stamps: whole turns where it is about that, as stamps are often coarser.
 fn duration_s(rig: &Rig, between_s: f64) -> f64 {
-    match span_s(rig) {
-        Some(turn_s) if turn_s > 0.0 => libm::round(between_s / turn_s).max(1.0) * turn_s,
-        _ => between_s,
-    }
+    let turn_s = span_s(rig).filter(|turn_s| *turn_s > 0.0).unwrap_or(between_s);
+    let turns = between_s / turn_s;
+    let whole = libm::round(turns);
+    if whole > 0.0 && (turns - whole).abs() < WHOLE { whole * turn_s } else { between_s }
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,6 +17,9 @@ const PROBES: usize = 8;
 const COUNT_MIN: f64 = 6.0;
 /// At this many returns the older ones count half: a cell follows what the pose drifts.
 const COUNT_MAX: f64 = 120.0;
+/// Normals whose direction has a larger variance do not count, rad^2 (2 degrees). In a tunnel they
+/// would pass for something that tells how far the vehicle has gone.
+const UNSURE: f64 = 1.2e-3;
 /// A plane is found anew when a cell has this many times its returns.
 const GROWTH: f64 = 1.3;
 
@@ -62,7 +65,8 @@ impl Cell {
         }
         if self.moments.count >= GROWTH * self.planned {
             self.planned = self.moments.count;
-            self.normal = self.moments.normal();
+            let known = self.moments.normal().filter(|(_, variance)| *variance < UNSURE);
+            self.normal = known.map_or(DVec3::ZERO, |(normal, _)| normal);
         }
         (self.normal != DVec3::ZERO).then(|| (self.moments.mean(), self.normal))
     }
@@ -117,7 +121,12 @@ impl Surfels {
             if key.is(level, index)
                 && let Some((on, normal)) = self.cells[slot].plane()
             {
-                return Some(Correspondence { point: at, on: key.corner() + on, normal, weight: 1.0 });
+                return Some(Correspondence {
+                    point: at,
+                    on: key.corner() + on,
+                    normal,
+                    weight: 1.0,
+                });
             }
         }
         None

@@ -1,0 +1,110 @@
+//! Drives whose motion is known.
+
+use super::*;
+use core::f64::consts::TAU;
+use raywake_core::sweep::Timing;
+use raywake_sim::{Drive, Ego, Options as Sim, Rng, SimSweep};
+use std::boxed::Box;
+use std::vec;
+use std::vec::Vec;
+
+/// An odometry on the heap, of which no copy lies on the stack.
+fn odometry() -> Box<Odometry> {
+    std::thread::Builder::new()
+        .stack_size(256 << 20)
+        .spawn(|| Box::new(Odometry::new()))
+        .unwrap()
+        .join()
+        .unwrap()
+}
+
+fn located(rig: &Rig, sweeps: &[SimSweep]) -> Vec<Located> {
+    let mut odometry = odometry();
+    sweeps.iter().map(|s| odometry.locate(s.stamp_s, &s.points, rig)).collect()
+}
+
+fn way(sweep: &SimSweep, since: &SimSweep) -> Pose {
+    since.world_from_vehicle.inverse() * sweep.world_from_vehicle
+}
+
+fn drive(seed: u64, ego: Ego, sweeps: usize) -> Drive {
+    Drive::new(seed, Sim { sweeps, ego, ..Sim::default() })
+}
+
+#[test]
+fn simulated_drives_from_nothing() {
+    let turn = Ego::Turn { left: true, speed: 5.0 };
+    for (seed, ego, count) in [(4, Ego::Straight { speed: 11.0 }, 10), (5, turn, 25)] {
+        let drive = drive(seed, ego, count);
+        let rig = drive.rig();
+        let sweeps: Vec<SimSweep> = drive.into_iter().collect();
+        let found = located(&rig, &sweeps);
+        assert_eq!(found[0].locating, Locating::Start);
+        assert!(found[1..].iter().all(|l| l.locating == Locating::Registered), "{found:?}");
+        let (end, last) = (found[count - 1], &sweeps[count - 1]);
+        let truth = way(last, &sweeps[0]);
+        let off = (truth.inverse() * end.world_from_vehicle).twist(1.0);
+        let (metres, metres_away) = (off.linear.length(), truth.translation.length());
+        assert!(metres < 0.003 * metres_away, "{metres} of {metres_away} m");
+        assert!(off.angular.length() < 3e-3, "{off:?}");
+        assert!((end.twist.linear - last.twist.linear).length() < 0.3, "{:?}", end.twist);
+        if count == 10 {
+            assert_eq!(found, located(&rig, &sweeps));
+        }
+    }
+}
+
+/// Sweeps that are missing or empty on the way: it goes on evenly, and finds its way again.
+#[test]
+fn gaps() {
+    let drive = drive(4, Ego::Straight { speed: 11.0 }, 9);
+    let rig = drive.rig();
+    let mut sweeps: Vec<SimSweep> = drive.into_iter().collect();
+    let bad = Point { position: [f32::NAN; 3], ..Point::default() };
+    sweeps[5].points.fill(bad);
+    sweeps.remove(3);
+    let found = located(&rig, &sweeps);
+    let lost: Vec<usize> = (1..8).filter(|n| found[*n].locating != Locating::Registered).collect();
+    assert_eq!((lost, found[4].locating), (vec![4], Locating::Lost), "{found:?}");
+    for (sweep, found) in sweeps.iter().zip(&found) {
+        let off = way(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
+        assert!(off.translation.length() < 0.05, "{off:?}");
+    }
+}
+
+#[test]
+fn a_tunnel_does_not_tell_how_far() {
+    let mut rng = Rng::new(9);
+    let mut sweep = || -> Vec<Point> {
+        let mut at = || {
+            let (along, angle) = (rng.range(-40.0, 40.0), rng.range(0.0, TAU));
+            let radius = 5.0 + 0.02 * rng.bell();
+            [along, radius * libm::cos(angle), 2.0 + radius * libm::sin(angle)].map(|v| v as f32)
+        };
+        (0..40_000).map(|_| Point { position: at(), ..Point::default() }).collect()
+    };
+    let rig = Rig {
+        sensors: [Pose::IDENTITY].into_iter().collect(),
+        timing: Timing::AtStamp,
+        distorted: false,
+        ground_m: -1.7,
+        own_vehicle: None,
+    };
+    let mut odometry = odometry();
+    for n in 0..4 {
+        let found = odometry.locate(0.1 * f64::from(n), &sweep(), &rig);
+        let expected = if n == 0 { Locating::Start } else { Locating::Degenerate };
+        assert_eq!(found.locating, expected, "{found:?}");
+    }
+}
+
+#[test]
+fn nothing_at_all() {
+    let mut odometry = odometry();
+    let rig = drive(1, Ego::Standing, 1).rig();
+    for n in 0..3 {
+        let found = odometry.locate(0.1 * f64::from(n), &[], &rig);
+        let expected = if n == 0 { Locating::Start } else { Locating::Lost };
+        assert_eq!((found.locating, found.world_from_vehicle), (expected, Pose::IDENTITY));
+    }
+}
