@@ -23,7 +23,7 @@ pub struct Locator {
 
 /// How sweeps were located.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Located {
+pub struct LocatedSweeps {
     /// Sweeps whose motion was found.
     pub registered: u64,
     /// Sweeps that show too little, as a wall or a tunnel does: a part of their motion is that of
@@ -35,12 +35,9 @@ pub struct Located {
     pub ms: Option<Spread>,
 }
 
-impl Locator {
-    /// Bytes that registration works in.
-    pub const BYTES: u64 = size_of::<Odometry>() as u64;
-
+impl Default for Locator {
     /// Allocates all it needs.
-    pub fn new() -> Locator {
+    fn default() -> Locator {
         let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
         Locator {
             odometry: Sealed::new("registration", odometry),
@@ -48,6 +45,11 @@ impl Locator {
             times_ms: Vec::new(),
         }
     }
+}
+
+impl Locator {
+    /// Bytes that registration works in.
+    pub const BYTES: u64 = size_of::<Odometry>() as u64;
 
     /// Gives a sweep that follows those before its pose and twist.
     ///
@@ -66,9 +68,9 @@ impl Locator {
     }
 
     /// How it went.
-    pub fn located(&self) -> Located {
+    pub fn located(&self) -> LocatedSweeps {
         let count = |locating: Locating| self.counts[locating as usize];
-        Located {
+        LocatedSweeps {
             registered: count(Locating::Registered),
             degenerate: count(Locating::Degenerate),
             lost: count(Locating::Lost),
@@ -77,13 +79,14 @@ impl Locator {
     }
 }
 
-impl Located {
+impl LocatedSweeps {
     /// A line for people.
     pub fn line(&self) -> String {
-        let Located { registered, degenerate, lost, ms } = self;
+        let LocatedSweeps { registered, degenerate, lost, ms } = self;
         let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
         format!(
-            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; {}\n",
+            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \
+             {}\n",
             bytes(Locator::BYTES)
         )
     }

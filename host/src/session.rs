@@ -1,5 +1,6 @@
-//! The run loop of `run`, `track`, `map` and `odometry`: the sweeps of a recording, one by one, until
-//! the last one or a signal. Where the recording has no poses, each is located by registration.
+//! The run loop of `run`, `track`, `map` and `odometry`: the sweeps of a recording, one by one,
+//! until the last one or a signal. Where the recording has no poses, each is located by
+//! registration.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -9,7 +10,7 @@ use raywake_io::source::{Source, SweepData};
 use crate::console::{interrupted, listen, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
-use crate::locate::{Located, Locator};
+use crate::locate::{LocatedSweeps, Locator};
 use crate::progress::Progress;
 
 /// A sweep that has just been read.
@@ -27,7 +28,7 @@ pub struct SessionEnd {
     /// The last sweep visited.
     pub last: SweepData,
     /// How sweeps were located, where the source has no poses.
-    pub located: Option<Located>,
+    pub located: Option<LocatedSweeps>,
 }
 
 /// Reads the sweeps in order and hands each to `visit`. After a signal the sweep in hand is
@@ -43,7 +44,7 @@ pub fn each_sweep<S: Source + ?Sized>(
 ) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
-    let mut locator = (!source.is_located()).then(Locator::new);
+    let mut locator = (!source.is_located()).then(Locator::default);
     let mut progress = Progress::new(sweeps.len(), quiet);
     let mut stopped = false;
     for (done, index) in sweeps.enumerate() {

@@ -3,7 +3,7 @@
 use raywake_core::tracklet::TrackletTurnover;
 use serde::{Serialize, Serializer};
 
-use crate::locate::Located;
+use crate::locate::LocatedSweeps;
 use crate::order_statistics::Spread;
 use crate::statistics::{AGES, Dropped, ResetAt, Statistics};
 
@@ -97,7 +97,7 @@ pub struct Facts {
     pub interrupted: bool,
     /// How sweeps were located, where the recording came without poses.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub registration: Option<Located>,
+    pub registration: Option<LocatedSweeps>,
     /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
     pub device_bytes: u64,
     /// Bytes of host memory held throughout.

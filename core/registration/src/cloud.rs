@@ -3,7 +3,7 @@
 //! The normal of a point is the direction in which its nearest neighbours vary least (principal
 //! components: Hoppe et al. 1992), and there is none where these are not flat.
 
-use crate::moments::Moments;
+use crate::moments::PointMoments;
 use crate::point::OrientedPoint;
 use crate::{compact, tree};
 use core::ops::RangeInclusive;
@@ -56,7 +56,7 @@ fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
         return DVec3::ZERO;
     }
     // Relative to the place, so that the difference of squares loses nothing.
-    let mut moments = Moments::NONE;
+    let mut moments = PointMoments::NONE;
     near.iter().for_each(|(_, index)| moments.add(points[*index].position - at));
     moments.normal().map_or(DVec3::ZERO, |(normal, _)| normal)
 }

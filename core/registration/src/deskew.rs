@@ -38,7 +38,7 @@ impl TimedPoint {
         TimedPoint { time_s, ..at(point).into() }
     }
 
-    /// Whether a return is one of the surroundings: finite, within range and not on the own vehicle.
+    /// Whether a return is finite, within range and not on the own vehicle.
     pub(crate) fn is_usable(point: &Point, rig: &Rig) -> bool {
         // A distance that is not finite is not within range.
         (RANGE_M[0]..RANGE_M[1]).contains(&at(point).length())

@@ -1,4 +1,4 @@
-//! Moments of points, and the plane they lie on.
+//! PointMoments of points, and the plane they lie on.
 
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -11,7 +11,7 @@ const WIDE: f64 = 0.05;
 
 /// Number, sum and squares of points near the origin.
 #[derive(Clone, Copy, Debug)]
-pub struct Moments {
+pub struct PointMoments {
     /// Points; halves may remain of old ones.
     pub count: f64,
     sum: DVec3,
@@ -21,10 +21,10 @@ pub struct Moments {
     products: DVec3,
 }
 
-impl Moments {
+impl PointMoments {
     /// Of no points.
-    pub const NONE: Moments =
-        Moments { count: 0.0, sum: DVec3::ZERO, squares: DVec3::ZERO, products: DVec3::ZERO };
+    pub const NONE: PointMoments =
+        PointMoments { count: 0.0, sum: DVec3::ZERO, squares: DVec3::ZERO, products: DVec3::ZERO };
 
     /// Adds a point.
     pub fn add(&mut self, p: DVec3) {

@@ -4,7 +4,7 @@ mod differences;
 
 use differences::Differences;
 use raywake::error::RunError;
-use raywake::locate::{Located, Locator};
+use raywake::locate::{LocatedSweeps, Locator};
 use raywake_core::pose::Pose;
 use raywake_io::source::simulated::Simulated;
 use raywake_io::source::{OpenOptions, Source, SweepData, open};
@@ -54,11 +54,11 @@ struct Found {
     differences: Differences,
     /// The last pose as found and as given, since the first sweep.
     last: [Pose; 2],
-    located: Located,
+    located: LocatedSweeps,
 }
 
 fn located(source: &mut dyn Source, count: usize) -> Result<Found, RunError> {
-    let mut locator = Locator::new();
+    let mut locator = Locator::default();
     let mut sweep = SweepData::default();
     let mut differences = Differences::default();
     let mut last = [Pose::IDENTITY; 2];

@@ -2,8 +2,11 @@
 //! it (as in KISS-ICP, Vizzo et al. 2023, but from points to planes).
 //!
 //! A sweep is expected where an even motion leads. While it is registered, its returns are moved to
-//! the stamp by the motion found so far. Then it becomes part of the map. The motion at the start is
-//! unknown: of several, the one that lays the second sweep best onto the first is taken.
+//! the stamp by the motion found so far. Then it becomes part of the map.
+//!
+//! The motion at the start is unknown: of several, the one that lays the second sweep best onto the
+//! first is taken. Between guard rails, among traffic as fast as the vehicle, that may be the wrong
+//! one: 20 m/s and more are then taken for standing still.
 
 mod surfels;
 mod thinned;
@@ -16,7 +19,7 @@ use glam::DVec3;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
 use surfels::Surfels;
-use thinned::Thinned;
+use thinned::ThinnedSweep;
 
 /// Returns of a sweep that are matched, at most: evenly chosen. Not measured on its own.
 const MATCHED_MAX: usize = 3000;
@@ -47,8 +50,8 @@ pub enum Locating {
     Start,
     /// By registration.
     Registered,
-    /// What it shows does not determine all of its motion on the ground: the rest was taken from the
-    /// motion before.
+    /// What it shows does not determine all of its motion on the ground: the rest was taken from
+    /// the motion before.
     Degenerate,
     /// It fits nothing known: its pose is expected from the motion before, and a new map begins.
     Lost,
@@ -69,7 +72,7 @@ pub struct Located {
 pub struct Odometry {
     map: Surfels,
     /// Every other sweep: the last one counted and the one before it.
-    sweeps: [Thinned; 2],
+    sweeps: [ThinnedSweep; 2],
     correspondences: [Correspondence; MATCHED_MAX],
     /// Sweeps so far.
     count: u32,
@@ -89,7 +92,7 @@ impl Odometry {
     pub const fn new() -> Odometry {
         Odometry {
             map: Surfels::new(),
-            sweeps: [const { Thinned::new() }; 2],
+            sweeps: [const { ThinnedSweep::new() }; 2],
             correspondences: [Correspondence::NONE; MATCHED_MAX],
             count: 0,
             stamp_s: 0.0,

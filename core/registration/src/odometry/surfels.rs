@@ -3,7 +3,7 @@
 
 use super::voxel::{hash, index_of};
 use crate::gauss_newton::Correspondence;
-use crate::moments::Moments;
+use crate::moments::PointMoments;
 use glam::DVec3;
 
 /// Sides of the cells, m, from fine to coarse: a fine one tells more exactly where a surface is, a
@@ -46,17 +46,17 @@ impl Key {
 }
 
 #[derive(Clone, Copy)]
-struct Cell {
+struct Surfel {
     /// Of its returns, relative to its corner.
-    moments: Moments,
+    moments: PointMoments,
     /// Returns that the normal was found from.
     planned: f64,
     /// Zero where there is no plane.
     normal: DVec3,
 }
 
-impl Cell {
-    const EMPTY: Cell = Cell { moments: Moments::NONE, planned: 0.0, normal: DVec3::ZERO };
+impl Surfel {
+    const EMPTY: Surfel = Surfel { moments: PointMoments::NONE, planned: 0.0, normal: DVec3::ZERO };
 
     /// A point of the plane, from the corner, and its normal.
     fn plane(&mut self) -> Option<(DVec3, DVec3)> {
@@ -83,13 +83,13 @@ impl Cell {
 /// The cells.
 pub struct Surfels {
     keys: [Key; CELLS],
-    cells: [Cell; CELLS],
+    cells: [Surfel; CELLS],
 }
 
 impl Surfels {
     /// An empty map.
     pub const fn new() -> Surfels {
-        Surfels { keys: [Key::NONE; CELLS], cells: [Cell::EMPTY; CELLS] }
+        Surfels { keys: [Key::NONE; CELLS], cells: [Surfel::EMPTY; CELLS] }
     }
 
     /// Forgets everything.
@@ -105,7 +105,7 @@ impl Surfels {
             let key = &mut self.keys[slot];
             if !key.is(level, index) {
                 *key = Key { index, level, ..Key::NONE };
-                self.cells[slot] = Cell::EMPTY;
+                self.cells[slot] = Surfel::EMPTY;
             }
             key.seen = sweep;
             self.cells[slot].add(at - key.corner());

@@ -14,17 +14,17 @@ const KEPT_MAX: usize = 1 << 16;
 const SLOTS: usize = 2 * KEPT_MAX;
 
 /// One return a voxel, the first of each, in the order of the sweep.
-pub struct Thinned {
+pub struct ThinnedSweep {
     points: Vec<TimedPoint, KEPT_MAX>,
     /// Voxel and filling that a slot was taken by.
     slots: [([i32; 3], u32); SLOTS],
     filling: u32,
 }
 
-impl Thinned {
+impl ThinnedSweep {
     /// No sweep yet.
-    pub const fn new() -> Thinned {
-        Thinned { points: Vec::new(), slots: [([0; 3], 0); SLOTS], filling: 0 }
+    pub const fn new() -> ThinnedSweep {
+        ThinnedSweep { points: Vec::new(), slots: [([0; 3], 0); SLOTS], filling: 0 }
     }
 
     /// Replaces the points by those of a sweep. What is over the capacity is left out.

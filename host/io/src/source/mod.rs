@@ -230,8 +230,9 @@ pub struct OpenOptions {
 
 /// Opens the recording at `path`, or the only one in a folder below it.
 ///
-/// Fails where no known format is recognised, where poses (unless it may come without), times or calibration are missing, do
-/// not fit the sweeps or make no sense, and where this build cannot read the format.
+/// Fails where no known format is recognised, where poses (unless it may come without), times or
+/// calibration are missing, do not fit the sweeps or make no sense, and where this build cannot
+/// read the format.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     if options.ground_m.is_some_and(|g| !g.is_finite()) {
         return Err(Error::Usage("the height of the ground is not finite".into()));

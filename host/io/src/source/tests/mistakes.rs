@@ -1,7 +1,8 @@
 //! Every mistake in a folder is named with its file and place.
 
-use super::super::PosesFrame;
+use super::super::{PosesFrame, Unlocated};
 use super::*;
+use raywake_core::pose::Pose;
 
 #[test]
 fn folders() {
@@ -92,6 +93,23 @@ fn oxts() {
     assert!(refused(t.path()).contains("calib_imu_to_velo.txt: lines `R:` and `T:`"));
     t.write("calib_imu_to_velo.txt", "R: 2 0 0 0 1 0 0 0 1\nT: 0 0 0\n");
     assert!(refused(t.path()).contains("calib_imu_to_velo.txt, line 1: the 3x3 part"));
+}
+
+/// Poses that are left out are not even read.
+#[test]
+fn without_poses() {
+    let t = Temp::new();
+    t.write("velodyne/000000.bin", []);
+    let open = |unlocated| open(t.path(), &OpenOptions { unlocated, ..OpenOptions::default() });
+    assert!(open(Unlocated::Refuse).is_err());
+    for unlocated in [Unlocated::Accept, Unlocated::Always] {
+        let mut source = open(unlocated).unwrap();
+        assert!(!source.is_located() && source.describe().contains("poses from registration"));
+        assert_eq!(read(source.as_mut(), 0).unwrap().world_from_vehicle, Pose::IDENTITY);
+    }
+    t.write("poses.txt", "no pose");
+    assert!(open(Unlocated::Accept).is_err());
+    assert!(!open(Unlocated::Always).unwrap().is_located());
 }
 
 #[test]
