@@ -97,6 +97,7 @@ pub struct OdometryArgs {
 }
 
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Recording")]
 pub struct Recording {
     #[command(flatten)]
     pub kind: RecordingKind,
@@ -107,6 +108,9 @@ pub struct Recording {
     /// Frame the poses refer to
     #[arg(long, value_name = "FRAME")]
     pub poses_frame: Option<PosesFrame>,
+    /// Use the poses even where registration of the first sweeps says that they are poor
+    #[arg(long)]
+    pub trust_poses: bool,
 }
 
 /// What a recording is.
@@ -309,6 +313,7 @@ impl Recording {
         OpenOptions {
             poses: self.poses.clone().filter(|_| !register),
             poses_frame: self.poses_frame,
+            trusted: self.trust_poses,
             unlocated: if register { Unlocated::Always } else { Unlocated::Accept },
             ..self.kind.options()
         }

@@ -1,10 +1,12 @@
-//! Sweeps without poses, located by registration as they come.
+//! Sweeps located by registration as they come: those without poses, and those whose poses are too
+//! poor to tell what moves.
 
 use std::time::Instant;
 
 use raywake_alloc_guard::Sealed;
+use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
-use raywake_io::source::SweepData;
+use raywake_io::source::{Source, SweepData};
 use raywake_registration::Odometry;
 use raywake_registration::odometry::Locating;
 use serde::Serialize;
@@ -14,9 +16,36 @@ use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
 
+/// Steps from sweep to sweep that decide whether poses are of use.
+const CHECKED: u32 = 10;
+/// How far from the vehicle poses and registration are compared, m: there a turn counts, too.
+const AWAY_M: f64 = 20.0;
+/// Poses are replaced where they disagree by more, m (root mean square of steps): three times what
+/// `pose_noise_m` takes them to err. Scan-matched KITTI drives have 0.6 to 1.0 cm, those of an
+/// inertial unit with satellites 2.5 cm and more.
+const DISAGREEMENT_MAX_M: f64 = 0.015;
+
+/// What becomes of poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Use {
+    /// There are none.
+    Find,
+    /// They are compared.
+    Check,
+    /// They are used as they are.
+    Keep,
+    /// Steps are by registration from here on.
+    Replace,
+}
+
 /// Locates one sweep after the other. Nothing is allocated while it does.
 pub struct Locator {
     odometry: Sealed<Box<Odometry>>,
+    poses: Use,
+    /// Poses of the sweep before: as it was handed on, and as found.
+    last: [Pose; 2],
+    /// Of the steps compared: number, and sum of the squares of their difference, m^2.
+    compared: (u32, f64),
     counts: [u64; 4],
     times_ms: Vec<f64>,
 }
@@ -24,6 +53,11 @@ pub struct Locator {
 /// How sweeps were located.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LocatedSweeps {
+    /// Root mean square of the difference between steps by the recording's poses and by
+    /// registration, of places 20 m away, m; null without such poses.
+    pub disagreement_m: Option<f64>,
+    /// Whether the recording's poses were replaced for it.
+    pub replaced: bool,
     /// Sweeps whose motion was found.
     pub registered: u64,
     /// Sweeps that show too little, as a wall or a tunnel does: a part of their motion is that of
@@ -35,42 +69,89 @@ pub struct LocatedSweeps {
     pub ms: Option<Spread>,
 }
 
-impl Default for Locator {
-    /// Allocates all it needs.
-    fn default() -> Locator {
-        let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
-        Locator {
-            odometry: Sealed::new("registration", odometry),
-            counts: [0; 4],
-            times_ms: Vec::new(),
-        }
-    }
-}
-
 impl Locator {
     /// Bytes that registration works in.
     pub const BYTES: u64 = size_of::<Odometry>() as u64;
 
-    /// Gives a sweep that follows those before its pose and twist.
+    /// Allocates all it needs for a source; nothing is needed for poses that are trusted.
+    pub fn of<S: Source + ?Sized>(source: &S) -> Option<Locator> {
+        match source.is_located() {
+            true if source.overview().trusted => None,
+            true => Some(Locator::new(Use::Check)),
+            false => Some(Locator::finding()),
+        }
+    }
+
+    /// For sweeps without poses.
+    pub fn finding() -> Locator {
+        Locator::new(Use::Find)
+    }
+
+    fn new(poses: Use) -> Locator {
+        let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+        Locator {
+            odometry: Sealed::new("registration", odometry),
+            poses,
+            last: [Pose::IDENTITY; 2],
+            compared: (0, 0.0),
+            counts: [0; 4],
+            times_ms: Vec::new(),
+        }
+    }
+
+    /// Gives a sweep that follows those before its pose and twist, unless those that it has are
+    /// kept.
     ///
     /// # Errors
     /// [`RunError::Allocation`].
     pub fn locate(&mut self, rig: &Rig, sweep: &mut SweepData) -> Result<(), RunError> {
+        if self.poses == Use::Keep {
+            return Ok(());
+        }
         let clock = Instant::now();
+        let expected = (self.poses == Use::Check).then_some(sweep.twist);
         let (stamp_s, points) = (sweep.stamp_s, &sweep.points);
-        let found = self
-            .odometry
-            .step(|odometry| Ok::<_, RunError>(odometry.locate(stamp_s, points, rig)))?;
-        self.times_ms.push(milliseconds(clock));
+        let found = self.odometry.step(|odometry| {
+            expected.into_iter().for_each(|twist| odometry.expect(twist));
+            Ok::<_, RunError>(odometry.locate(stamp_s, points, rig))
+        })?;
         self.counts[found.locating as usize] += 1;
-        (sweep.world_from_vehicle, sweep.twist) = (found.world_from_vehicle, found.twist);
+        let step = self.last[1].inverse() * found.world_from_vehicle;
+        match self.poses {
+            Use::Find => place(sweep, found.world_from_vehicle, found.twist),
+            Use::Replace => place(sweep, self.last[0] * step, found.twist),
+            Use::Check if found.locating == Locating::Registered => self.compare(sweep, &step),
+            Use::Check | Use::Keep => {}
+        }
+        self.last = [sweep.world_from_vehicle, found.world_from_vehicle];
+        self.times_ms.push(milliseconds(clock));
         Ok(())
+    }
+
+    /// Compares a step with that of the recording's poses; after enough of them, decides.
+    fn compare(&mut self, sweep: &SweepData, step: &Pose) {
+        let given = self.last[0].inverse() * sweep.world_from_vehicle;
+        let apart = (step.inverse() * given).twist(1.0);
+        let turned_m = AWAY_M * apart.angular.z;
+        self.compared.0 += 1;
+        self.compared.1 += apart.linear.truncate().length_squared() + turned_m * turned_m;
+        if self.compared.0 == CHECKED {
+            let poor = self.disagreement_m().is_some_and(|m| m > DISAGREEMENT_MAX_M);
+            self.poses = if poor { Use::Replace } else { Use::Keep };
+        }
+    }
+
+    fn disagreement_m(&self) -> Option<f64> {
+        let (count, sum) = self.compared;
+        (count > 0).then(|| (sum / f64::from(count)).sqrt())
     }
 
     /// How it went.
     pub fn located(&self) -> LocatedSweeps {
         let count = |locating: Locating| self.counts[locating as usize];
         LocatedSweeps {
+            disagreement_m: self.disagreement_m(),
+            replaced: self.poses == Use::Replace,
             registered: count(Locating::Registered),
             degenerate: count(Locating::Degenerate),
             lost: count(Locating::Lost),
@@ -79,15 +160,35 @@ impl Locator {
     }
 }
 
+fn place(sweep: &mut SweepData, pose: Pose, twist: Twist) {
+    (sweep.world_from_vehicle, sweep.twist) = (pose, twist);
+}
+
 impl LocatedSweeps {
-    /// A line for people.
-    pub fn line(&self) -> String {
-        let LocatedSweeps { registered, degenerate, lost, ms } = self;
-        let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
-        format!(
-            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \
-             {}\n",
-            bytes(Locator::BYTES)
-        )
+    /// Lines for people.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        if let Some(m) = self.disagreement_m {
+            let so = if self.replaced {
+                "too much: registration goes on instead (--trust-poses keeps them)"
+            } else {
+                "they are used"
+            };
+            text += &format!(
+                "poses: of the first {CHECKED} steps they and registration differ by {:.1} cm at \
+                 {AWAY_M:.0} m, {so}\n",
+                100.0 * m
+            );
+        }
+        if self.disagreement_m.is_none() || self.replaced {
+            let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
+            let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
+            text += &format!(
+                "registration: {registered} sweeps located, {degenerate} degenerate, {lost} \
+                 lost{ms}; {}\n",
+                bytes(Locator::BYTES)
+            );
+        }
+        text
     }
 }

@@ -1,6 +1,6 @@
 //! The run loop of `run`, `track`, `map` and `odometry`: the sweeps of a recording, one by one,
-//! until the last one or a signal. Where the recording has no poses, each is located by
-//! registration.
+//! until the last one or a signal. Where the recording has no poses, or poor ones, each is located
+//! by registration.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -27,7 +27,7 @@ pub struct SessionEnd {
     pub interrupted: bool,
     /// The last sweep visited.
     pub last: SweepData,
-    /// How sweeps were located, where the source has no poses.
+    /// How sweeps were located, where the source's poses were not trusted.
     pub located: Option<LocatedSweeps>,
 }
 
@@ -44,7 +44,7 @@ pub fn each_sweep<S: Source + ?Sized>(
 ) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
-    let mut locator = (!source.is_located()).then(Locator::default);
+    let mut locator = Locator::of(source);
     let mut progress = Progress::new(sweeps.len(), quiet);
     let mut stopped = false;
     for (done, index) in sweeps.enumerate() {
@@ -65,7 +65,7 @@ pub fn each_sweep<S: Source + ?Sized>(
     progress.finish();
     let located = locator.map(|locator| locator.located());
     if let Some(located) = &located {
-        say(quiet, &located.line())?;
+        say(quiet, &located.text())?;
     }
     Ok(SessionEnd { interrupted: stopped, last, located })
 }

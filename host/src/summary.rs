@@ -95,7 +95,7 @@ pub struct Facts {
     pub filter: String,
     /// Whether the run was ended by a signal.
     pub interrupted: bool,
-    /// How sweeps were located, where the recording came without poses.
+    /// How sweeps were located, and how poses were checked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub registration: Option<LocatedSweeps>,
     /// Bytes allocated on the device, all heaps; 0 for the scalar backend.

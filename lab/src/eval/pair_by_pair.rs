@@ -23,6 +23,8 @@ impl<'a> PairByPair<'a> {
                 stamps_s: indices().map(|n| source.stamp_s(n)).collect(),
                 poses: indices().map(|n| source.pose(n)).collect(),
             },
+            // Every other step is none.
+            trusted: true,
             notes: source.notes().to_vec(),
         };
         PairByPair { source, overview }

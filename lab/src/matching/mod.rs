@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     println!("{}", source.describe());
     let count = args.count.map_or(source.len(), |n| source.len().min(n as usize));
     let found = located(source.as_mut(), count)?;
-    print!("{}{}", found.differences.table(&found.last[0], &found.last[1])?, found.located.line());
+    print!("{}{}", found.differences.table(&found.last[0], &found.last[1])?, found.located.text());
     Ok(())
 }
 
@@ -58,7 +58,7 @@ struct Found {
 }
 
 fn located(source: &mut dyn Source, count: usize) -> Result<Found, RunError> {
-    let mut locator = Locator::default();
+    let mut locator = Locator::finding();
     let mut sweep = SweepData::default();
     let mut differences = Differences::default();
     let mut last = [Pose::IDENTITY; 2];
@@ -103,7 +103,7 @@ mod tests {
             let mut source = open(&path, &OpenOptions { deskew, ..Default::default() }).unwrap();
             let count = source.len();
             let found = located(source.as_mut(), count).unwrap();
-            println!("{name}: {:.4} of the way off; {}", off(&found), found.located.line());
+            println!("{name}: {:.4} of the way off; {}", off(&found), found.located.text());
             assert_eq!(found.located.registered, count as u64 - 1);
             assert!(off(&found) < 0.01 && found.differences.worst_m() < 0.1);
         }

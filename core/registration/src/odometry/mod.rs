@@ -79,6 +79,8 @@ pub struct Odometry {
     stamp_s: f64,
     pose: Pose,
     twist: Twist,
+    /// Whether the twist is known from elsewhere.
+    told: bool,
 }
 
 impl Default for Odometry {
@@ -98,7 +100,13 @@ impl Odometry {
             stamp_s: 0.0,
             pose: Pose::IDENTITY,
             twist: Twist::ZERO,
+            told: false,
         }
+    }
+
+    /// Tells what motion to expect of the next sweep, along the axes of the vehicle there.
+    pub fn expect(&mut self, twist: Twist) {
+        (self.twist, self.told) = (twist, true);
     }
 
     /// Locates the next sweep.
@@ -142,7 +150,8 @@ impl Odometry {
     /// Tries motions for the sweep and the one before it.
     fn start(&mut self, dt_s: f64) -> Locating {
         let expected = self.twist;
-        let ahead = SPEEDS_MPS.map(|x| Twist { linear: DVec3::X * x, ..Twist::ZERO });
+        let speeds_mps = if self.told { &[][..] } else { &SPEEDS_MPS };
+        let ahead = speeds_mps.iter().map(|x| Twist { linear: DVec3::X * *x, ..Twist::ZERO });
         let rank = |r: &Registration| (is_located(r), r.unobserved.planar == 0, r.inliers);
         let mut best: Option<(Registration, Twist)> = None;
         for motion in [expected].into_iter().chain(ahead) {

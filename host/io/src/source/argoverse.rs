@@ -81,7 +81,8 @@ impl Argoverse {
         };
         apply(options, &mut rig);
         let (frames, files) = files.into_iter().unzip();
-        let overview = Overview { name: folder_name(root), rig, frames, track, notes };
+        let (name, trusted) = (folder_name(root), options.trusted);
+        let overview = Overview { name, rig, frames, track, trusted, notes };
         let mut log = Argoverse { overview, root: root.to_path_buf(), files, low_lasers: 0 };
         log.assign_lasers(&scanners)?;
         Ok(log)

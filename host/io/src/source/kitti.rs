@@ -249,7 +249,14 @@ impl Opening {
         apply(options, &mut rig);
         let name = folder_name(&self.root);
         Clouds {
-            overview: Overview { name, rig, frames, track: self.track, notes: self.notes },
+            overview: Overview {
+                name,
+                rig,
+                frames,
+                track: self.track,
+                trusted: options.trusted,
+                notes: self.notes,
+            },
             kind: format!("{} {}", self.kind, self.root.display()),
             poses_from: self.poses_from,
             files: self.files.into_iter().map(|f| f.1).collect(),

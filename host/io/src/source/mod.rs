@@ -94,6 +94,8 @@ pub struct Overview {
     pub frames: Vec<u64>,
     /// Stamp of every sweep, and pose where poses are known.
     pub track: PoseTrack,
+    /// Whether the poses are to be used without a check.
+    pub trusted: bool,
     /// What the user should know: assumptions, gaps in frame numbers.
     pub notes: Vec<String>,
 }
@@ -220,6 +222,8 @@ pub struct OpenOptions {
     pub poses: Option<PathBuf>,
     /// Whether poses are needed at all.
     pub unlocated: Unlocated,
+    /// See [`Overview::trusted`].
+    pub trusted: bool,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
     /// Overrides [`Rig::distorted`].
