@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use glam::DVec3;
 use raywake_alloc_guard::Sealed;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::Rig;
@@ -25,9 +26,14 @@ const AWAY_M: f64 = 20.0;
 /// inertial unit with satellites 2.5 cm and more.
 const DISAGREEMENT_MAX_M: f64 = 0.015;
 
+/// What errs to and fro are poses, and what slips away is registration, as between guard rails: it
+/// replaces them where all steps together differ by less than this share of the single ones' sum.
+const SLIP_MAX: f64 = 0.3;
+
 /// What becomes of poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Use {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PoseUse {
     /// There are none.
     Find,
     /// They are compared.
@@ -41,13 +47,44 @@ enum Use {
 /// Locates one sweep after the other. Nothing is allocated while it does.
 pub struct Locator {
     odometry: Sealed<Box<Odometry>>,
-    poses: Use,
+    poses: PoseUse,
     /// Poses of the sweep before: as it was handed on, and as found.
     last: [Pose; 2],
-    /// Of the steps compared: number, and sum of the squares of their difference, m^2.
-    compared: (u32, f64),
+    compared: Compared,
     counts: [u64; 4],
     times_ms: Vec<f64>,
+}
+
+/// Differences of steps by poses and by registration: along, across, and of a turn `AWAY_M` away.
+#[derive(Clone, Copy, Default)]
+struct Compared {
+    count: u32,
+    /// m.
+    sum: DVec3,
+    /// m^2.
+    squares: f64,
+}
+
+impl Compared {
+    fn add(&mut self, step: &Pose, given: &Pose) {
+        let apart = (step.inverse() * *given).twist(1.0);
+        let apart = apart.linear.truncate().extend(AWAY_M * apart.angular.z);
+        self.count += 1;
+        self.sum += apart;
+        self.squares += apart.length_squared();
+    }
+
+    /// Root mean square, m.
+    fn rms_m(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.squares / f64::from(self.count)).sqrt())
+    }
+
+    /// Whether registration is to replace the poses.
+    fn poor(&self) -> bool {
+        let rms_m = self.rms_m().unwrap_or(0.0);
+        let slip = self.sum.length() / (f64::from(self.count) * rms_m);
+        rms_m > DISAGREEMENT_MAX_M && slip < SLIP_MAX
+    }
 }
 
 /// How sweeps were located.
@@ -56,8 +93,8 @@ pub struct LocatedSweeps {
     /// Root mean square of the difference between steps by the recording's poses and by
     /// registration, of places 20 m away, m; null without such poses.
     pub disagreement_m: Option<f64>,
-    /// Whether the recording's poses were replaced for it.
-    pub replaced: bool,
+    /// What became of the recording's poses.
+    pub poses: PoseUse,
     /// Sweeps whose motion was found.
     pub registered: u64,
     /// Sweeps that show too little, as a wall or a tunnel does: a part of their motion is that of
@@ -77,23 +114,23 @@ impl Locator {
     pub fn of<S: Source + ?Sized>(source: &S) -> Option<Locator> {
         match source.is_located() {
             true if source.overview().trusted => None,
-            true => Some(Locator::new(Use::Check)),
+            true => Some(Locator::new(PoseUse::Check)),
             false => Some(Locator::finding()),
         }
     }
 
     /// For sweeps without poses.
     pub fn finding() -> Locator {
-        Locator::new(Use::Find)
+        Locator::new(PoseUse::Find)
     }
 
-    fn new(poses: Use) -> Locator {
+    fn new(poses: PoseUse) -> Locator {
         let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
         Locator {
             odometry: Sealed::new("registration", odometry),
             poses,
             last: [Pose::IDENTITY; 2],
-            compared: (0, 0.0),
+            compared: Compared::default(),
             counts: [0; 4],
             times_ms: Vec::new(),
         }
@@ -105,11 +142,11 @@ impl Locator {
     /// # Errors
     /// [`RunError::Allocation`].
     pub fn locate(&mut self, rig: &Rig, sweep: &mut SweepData) -> Result<(), RunError> {
-        if self.poses == Use::Keep {
+        if self.poses == PoseUse::Keep {
             return Ok(());
         }
         let clock = Instant::now();
-        let expected = (self.poses == Use::Check).then_some(sweep.twist);
+        let expected = (self.poses == PoseUse::Check).then_some(sweep.twist);
         let (stamp_s, points) = (sweep.stamp_s, &sweep.points);
         let found = self.odometry.step(|odometry| {
             expected.into_iter().for_each(|twist| odometry.expect(twist));
@@ -118,10 +155,15 @@ impl Locator {
         self.counts[found.locating as usize] += 1;
         let step = self.last[1].inverse() * found.world_from_vehicle;
         match self.poses {
-            Use::Find => place(sweep, found.world_from_vehicle, found.twist),
-            Use::Replace => place(sweep, self.last[0] * step, found.twist),
-            Use::Check if found.locating == Locating::Registered => self.compare(sweep, &step),
-            Use::Check | Use::Keep => {}
+            PoseUse::Find => place(sweep, found.world_from_vehicle, found.twist),
+            PoseUse::Replace => place(sweep, self.last[0] * step, found.twist),
+            PoseUse::Check => match found.locating {
+                Locating::Registered => self.compare(sweep, &step),
+                Locating::Start => {}
+                // Registration that is not sure of itself is no judge of poses.
+                Locating::Degenerate | Locating::Lost => self.poses = PoseUse::Keep,
+            },
+            PoseUse::Keep => {}
         }
         self.last = [sweep.world_from_vehicle, found.world_from_vehicle];
         self.times_ms.push(milliseconds(clock));
@@ -131,27 +173,18 @@ impl Locator {
     /// Compares a step with that of the recording's poses; after enough of them, decides.
     fn compare(&mut self, sweep: &SweepData, step: &Pose) {
         let given = self.last[0].inverse() * sweep.world_from_vehicle;
-        let apart = (step.inverse() * given).twist(1.0);
-        let turned_m = AWAY_M * apart.angular.z;
-        self.compared.0 += 1;
-        self.compared.1 += apart.linear.truncate().length_squared() + turned_m * turned_m;
-        if self.compared.0 == CHECKED {
-            let poor = self.disagreement_m().is_some_and(|m| m > DISAGREEMENT_MAX_M);
-            self.poses = if poor { Use::Replace } else { Use::Keep };
+        self.compared.add(step, &given);
+        if self.compared.count == CHECKED {
+            self.poses = if self.compared.poor() { PoseUse::Replace } else { PoseUse::Keep };
         }
-    }
-
-    fn disagreement_m(&self) -> Option<f64> {
-        let (count, sum) = self.compared;
-        (count > 0).then(|| (sum / f64::from(count)).sqrt())
     }
 
     /// How it went.
     pub fn located(&self) -> LocatedSweeps {
         let count = |locating: Locating| self.counts[locating as usize];
         LocatedSweeps {
-            disagreement_m: self.disagreement_m(),
-            replaced: self.poses == Use::Replace,
+            disagreement_m: self.compared.rms_m(),
+            poses: self.poses,
             registered: count(Locating::Registered),
             degenerate: count(Locating::Degenerate),
             lost: count(Locating::Lost),
@@ -167,28 +200,39 @@ fn place(sweep: &mut SweepData, pose: Pose, twist: Twist) {
 impl LocatedSweeps {
     /// Lines for people.
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        if let Some(m) = self.disagreement_m {
-            let so = if self.replaced {
-                "too much: registration goes on instead (--trust-poses keeps them)"
-            } else {
-                "they are used"
-            };
-            text += &format!(
-                "poses: of the first {CHECKED} steps they and registration differ by {:.1} cm at \
-                 {AWAY_M:.0} m, {so}\n",
-                100.0 * m
-            );
+        match self.poses {
+            PoseUse::Find => self.line(),
+            PoseUse::Replace => format!(
+                "{}too much: registration goes on instead (--trust-poses keeps them)\n{}",
+                self.differences(),
+                self.line()
+            ),
+            _ if self.degenerate + self.lost > 0 => {
+                "poses: used unchecked, as the first sweeps show too little\n".into()
+            }
+            _ if self.disagreement_m > Some(DISAGREEMENT_MAX_M) => format!(
+                "{}all one way: they are used; if they are wrong, --poses register\n",
+                self.differences()
+            ),
+            _ => format!("{}they are used\n", self.differences()),
         }
-        if self.disagreement_m.is_none() || self.replaced {
-            let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
-            let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
-            text += &format!(
-                "registration: {registered} sweeps located, {degenerate} degenerate, {lost} \
-                 lost{ms}; {}\n",
-                bytes(Locator::BYTES)
-            );
-        }
-        text
+    }
+
+    fn differences(&self) -> String {
+        let centimetres = 100.0 * self.disagreement_m.unwrap_or(0.0);
+        format!(
+            "poses: first steps by them and by registration differ by {centimetres:.1} cm at \
+             {AWAY_M:.0} m, "
+        )
+    }
+
+    fn line(&self) -> String {
+        let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
+        let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
+        format!(
+            "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \
+             {}\n",
+            bytes(Locator::BYTES)
+        )
     }
 }

@@ -5,21 +5,22 @@ mod common;
 
 use common::{Outcome, Temp, raywake};
 use raywake_core::pose::Pose;
+use raywake_io::source::pose_row;
 use raywake_sim::{Drive, Ego, Options};
 
 const SWEEPS: usize = 6;
 
-/// A folder of clouds, and the way from the first to the last of them.
-fn recording(t: &Temp) -> Pose {
+/// A folder of clouds, and where they were made since the first of them.
+fn recording(t: &Temp, sweeps: usize) -> Vec<Pose> {
     let ego = Ego::Straight { speed: 9.0 };
-    let drive = Drive::new(3, Options { sweeps: SWEEPS, ego, ..Options::default() });
+    let drive = Drive::new(3, Options { sweeps, ego, ..Options::default() });
     let mut poses = Vec::new();
     for (n, sweep) in drive.into_iter().enumerate() {
         let rows = sweep.points.iter().flat_map(|p| [p.position.as_slice(), &[0.5]].concat());
-        t.write(&format!("clouds/{n}.bin"), rows.flat_map(f32::to_le_bytes).collect::<Vec<_>>());
+        t.write(&format!("clouds/{n:02}.bin"), rows.flat_map(f32::to_le_bytes).collect::<Vec<_>>());
         poses.push(sweep.world_from_vehicle);
     }
-    poses[0].inverse() * poses[SWEEPS - 1]
+    poses.iter().map(|pose| poses[0].inverse() * *pose).collect()
 }
 
 fn digest(o: &Outcome) -> String {
@@ -29,7 +30,7 @@ fn digest(o: &Outcome) -> String {
 #[test]
 fn poses_are_found_and_of_use() {
     let t = Temp::new();
-    let truth = recording(&t);
+    let truth = recording(&t, SWEEPS)[SWEEPS - 1];
     let [clouds, poses] = ["clouds", "poses.txt"].map(|n| t.path().join(n).display().to_string());
     let o = raywake(&["odometry", &clouds, "--out", &poses]);
     o.succeeded();
@@ -48,16 +49,53 @@ fn poses_are_found_and_of_use() {
     assert_eq!(digest(&without), digest(&register));
     let given = run(&["--poses", &poses]);
     given.succeeded();
+    assert!(given.stdout.contains("they are used"), "{}", given.stdout);
     assert!(!given.stdout.contains("registration:"), "{}", given.stdout);
+    let trusted = run(&["--poses", &poses, "--trust-poses"]);
+    assert!(!trusted.stdout.contains("poses:"), "{}", trusted.stdout);
+    assert_eq!(digest(&given), digest(&trusted));
+}
+
+/// Poses that err to and fro by 3 cm are replaced; those that slip are not.
+#[test]
+fn poses_that_are_given() {
+    let t = Temp::new();
+    let truth = recording(&t, 14);
+    let run = |name: &str, off_m: &dyn Fn(usize) -> f64, more: &[&str]| {
+        let off = |n: usize| Pose::planar(off_m(n), 0.0, 0.0, 0.0);
+        let rows: String =
+            (0..14).map(|n| format!("{}\n", pose_row(&(truth[n] * off(n))))).collect();
+        let poses = t.write(name, rows).display().to_string();
+        let clouds = t.path().join("clouds").display().to_string();
+        let all = [&["run", &clouds, "--backend", "scalar", "--poses", &poses], more].concat();
+        let o = raywake(&all);
+        o.succeeded();
+        o
+    };
+    let good = run("good.txt", &|_| 0.0, &[]);
+    assert!(good.stdout.contains("they are used"), "{}", good.stdout);
+    let noisy = |n: usize| if n.is_multiple_of(2) { 0.015 } else { -0.015 };
+    let poor = run("poor.txt", &noisy, &[]);
+    let words = "too much: registration goes on instead";
+    assert!(
+        poor.stdout.contains(words) && poor.stdout.contains("13 sweeps located"),
+        "{}",
+        poor.stdout
+    );
+    let kept = run("poor.txt", &noisy, &["--trust-poses"]);
+    assert!(!kept.stdout.contains("registration"), "{}", kept.stdout);
+    assert_ne!(digest(&poor), digest(&kept));
+    let slipping = run("slipping.txt", &|n| 0.05 * n as f64, &[]);
+    assert!(slipping.stdout.contains("all one way: they are used"), "{}", slipping.stdout);
 }
 
 #[test]
 fn what_cannot_be() {
     let t = Temp::new();
-    recording(&t);
+    recording(&t, 1);
     let [clouds, absent] = ["clouds", "absent"].map(|n| t.path().join(n).display().to_string());
     raywake(&["odometry", &absent, "--out", "poses.txt"]).failed(3, &["absent"]);
-    let below = t.path().join("clouds/0.bin/poses.txt").display().to_string();
+    let below = t.path().join("clouds/00.bin/poses.txt").display().to_string();
     raywake(&["odometry", &clouds, "--out", &below]).failed(4, &["poses.txt"]);
     raywake(&["odometry", &clouds]).failed(2, &["--out"]);
 }
