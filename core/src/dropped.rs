@@ -4,7 +4,7 @@ use crate::sweep::{Point, Rig};
 
 /// What a return is, before it is placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ReturnKind {
     /// Of something around the vehicle.
     Valid,
     /// On the own vehicle.
@@ -17,21 +17,21 @@ pub enum Kind {
     UnknownSensor,
 }
 
-impl Kind {
+impl ReturnKind {
     /// Of a return.
     #[inline]
-    pub fn of(rig: &Rig, point: &Point) -> Kind {
+    pub fn of(rig: &Rig, point: &Point) -> ReturnKind {
         let p = point.position;
         if !p.iter().all(|c| c.is_finite()) || !point.offset_s.is_finite() {
-            Kind::NotFinite
+            ReturnKind::NotFinite
         } else if p == [0.0; 3] {
-            Kind::NoEcho
+            ReturnKind::NoEcho
         } else if point.sensor as usize >= rig.sensors.len() {
-            Kind::UnknownSensor
+            ReturnKind::UnknownSensor
         } else if rig.is_own_vehicle(p) {
-            Kind::OwnVehicle
+            ReturnKind::OwnVehicle
         } else {
-            Kind::Valid
+            ReturnKind::Valid
         }
     }
 }
@@ -80,12 +80,12 @@ impl DroppedReturns {
     /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and
     /// counted, where the return is not valid.
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
-        match Kind::of(rig, point) {
-            Kind::Valid => return Some(false),
-            Kind::OwnVehicle => return Some(true),
-            Kind::NotFinite => self.not_finite += 1,
-            Kind::NoEcho => self.no_return += 1,
-            Kind::UnknownSensor => self.unknown_sensor += 1,
+        match ReturnKind::of(rig, point) {
+            ReturnKind::Valid => return Some(false),
+            ReturnKind::OwnVehicle => return Some(true),
+            ReturnKind::NotFinite => self.not_finite += 1,
+            ReturnKind::NoEcho => self.no_return += 1,
+            ReturnKind::UnknownSensor => self.unknown_sensor += 1,
         }
         None
     }

@@ -59,9 +59,9 @@ impl GroundGrid {
         }
     }
 
-    /// Estimates the ground of a window of `side` columns along an axis (at most [`SIDE_MAX`]), whose edges
-    /// measure `column_m`. `returns` are given by column and place, `under` is the place of the
-    /// ground beneath the vehicle.
+    /// Estimates the ground of a window of `side` columns along an axis (at most [`SIDE_MAX`]),
+    /// whose edges measure `column_m`. `returns` are given by column and place, `under` is the
+    /// place of the ground beneath the vehicle.
     pub fn estimate(
         &mut self,
         params: &GroundParams,

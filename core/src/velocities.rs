@@ -1,6 +1,6 @@
 //! Out: a velocity for every column and every return (section 3.7).
 
-use crate::dropped::Kind;
+use crate::dropped::ReturnKind;
 use crate::frame::{SweepPair, centre_of};
 use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow, PointFlows, Status};
 use crate::params::COLUMNS_MAX;
@@ -198,14 +198,14 @@ impl Found<'_> {
 
     /// What became of a return with this flow.
     fn status(&self, column: u32, point: &Point, flow: &PointFlow) -> Status {
-        match Kind::of(self.rig, point) {
-            Kind::Valid if column == NONE => Status::OutsideWindow,
-            Kind::Valid if flow.origin == Origin::Unmatched => Status::Unmatched,
-            Kind::Valid if self.is_moving(flow) => Status::Moving,
-            Kind::Valid => Status::Static,
-            Kind::OwnVehicle => Status::OwnVehicle,
-            Kind::NoEcho => Status::NoEcho,
-            Kind::NotFinite | Kind::UnknownSensor => Status::Invalid,
+        match ReturnKind::of(self.rig, point) {
+            ReturnKind::Valid if column == NONE => Status::OutsideWindow,
+            ReturnKind::Valid if flow.origin == Origin::Unmatched => Status::Unmatched,
+            ReturnKind::Valid if self.is_moving(flow) => Status::Moving,
+            ReturnKind::Valid => Status::Static,
+            ReturnKind::OwnVehicle => Status::OwnVehicle,
+            ReturnKind::NoEcho => Status::NoEcho,
+            ReturnKind::NotFinite | ReturnKind::UnknownSensor => Status::Invalid,
         }
     }
 

@@ -37,7 +37,8 @@ crate::params! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct Profile {
         /// Columns of the square window along one axis; odd, so that one is the centre.
-        pub side: u32 = 167, "columns", (31 to 337), "±25 m at 0.30 m: dissertation, section 3.8.1.";
+        pub side: u32 = 167, "columns", (31 to 337),
+            "±25 m at 0.30 m: dissertation, section 3.8.1.";
         /// Levels of a column.
         pub levels: u32 = 14, "voxels", (2 to 16),
             "The author's program; the shipped weights are for 14.";

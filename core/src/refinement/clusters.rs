@@ -2,8 +2,8 @@
 //! take along.
 
 use super::cluster::{Cluster, VisitedColumns};
-use super::cues::{Cues, Prediction};
-use super::history::{Arrival, History};
+use super::cues::{Cues, Looks, Prediction};
+use super::history::History;
 use super::hypothesis::{self, Hypothesis, evidence};
 use super::motion::Motion;
 use super::scans::Scans;
@@ -185,11 +185,11 @@ impl Clusters {
     /// Finds what was hit before where moving clusters came to.
     fn look_back(&mut self, scans: Scans, history: &History) {
         let (of_column, found) = (&self.of_column, &mut self.found);
-        found.iter_mut().for_each(|f| f.arrival = Arrival::default());
+        found.iter_mut().for_each(|f| f.looks = Looks::default());
         history.find(scans.first, scans.span_s, of_column, found);
         for found in self.found.iter_mut().filter(|f| f.is_dynamic) {
-            found.cues.worn = found.arrival.worn();
-            found.cues.fresh = found.arrival.fresh();
+            found.cues.worn = found.looks.worn();
+            found.cues.fresh = found.looks.fresh();
         }
     }
 

@@ -9,6 +9,9 @@ use crate::params::MovesParams;
 /// The largest margin that counts: with more, it is plain.
 const MARGIN_MAX: f32 = 0.5;
 
+/// Looks at a voxel that count as having found nothing, so that few do not tell much.
+const FEW_LOOKS: f32 = 8.0;
+
 /// Declares cues, each with the parameter that weighs it.
 macro_rules! cues {
     (
@@ -54,8 +57,8 @@ cues! {
         pub returns: moves_returns,
         /// Mean logarithm of 1 + speed over its standard deviation, of the tracklets that moved.
         pub certainty: moves_certainty,
-        /// Of looks at the cluster's voxels in sweeps in which, by its motion, it was not there yet,
-        /// the share that found something there.
+        /// Of looks at the cluster's voxels in sweeps in which, by its motion, it was not there
+        /// yet, the share that found something.
         pub worn: moves_worn,
         /// The share that found nothing.
         pub fresh: moves_fresh,
@@ -82,6 +85,26 @@ impl Cues {
     /// P(moves).
     pub fn probability(&self, params: &MovesParams) -> f32 {
         1.0 / (1.0 + libm::expf(-self.logit(params)))
+    }
+}
+
+/// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet, and how
+/// many found something.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Looks {
+    pub made: u32,
+    pub hits: u32,
+}
+
+impl Looks {
+    /// Share of looks that found something: 0 to 1, below 0.5 if there were few.
+    pub fn worn(&self) -> f32 {
+        self.hits as f32 / (self.made as f32 + FEW_LOOKS)
+    }
+
+    /// The same of looks that found nothing.
+    pub fn fresh(&self) -> f32 {
+        (self.made - self.hits) as f32 / (self.made as f32 + FEW_LOOKS)
     }
 }
 

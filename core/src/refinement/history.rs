@@ -12,29 +12,8 @@ use crate::record::NONE;
 /// Sweeps before the pair's first that are remembered: of 0.6 s at 10 Hz. The vehicle ahead was
 /// where one is now a second ago, if it keeps its distance.
 const HISTORY: usize = 6;
-/// Looks at a voxel that count as having found nothing, so that few do not tell much.
-const LOOKS: f32 = 8.0;
 
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
-
-/// What a cluster's voxels were in sweeps in which, by its motion, it was not there yet.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Arrival {
-    looks: u32,
-    hits: u32,
-}
-
-impl Arrival {
-    /// Share of looks that found something: 0 to 1, below 0.5 if there were few.
-    pub fn worn(&self) -> f32 {
-        self.hits as f32 / (self.looks as f32 + LOOKS)
-    }
-
-    /// The same of looks that found nothing.
-    pub fn fresh(&self) -> f32 {
-        (self.looks - self.hits) as f32 / (self.looks as f32 + LOOKS)
-    }
-}
 
 /// One earlier sweep.
 struct Past {
@@ -96,8 +75,8 @@ impl History {
                     continue;
                 }
                 let Some(were) = past.around(first, at) else { continue };
-                one.arrival.looks += levels.count_ones();
-                one.arrival.hits += (levels & were).count_ones();
+                one.looks.made += levels.count_ones();
+                one.looks.hits += (levels & were).count_ones();
             }
         }
     }

@@ -7,9 +7,8 @@
 //! and less still if it is long.
 
 use super::cluster::{Cluster, VisitedColumns};
-use super::cues::{Cues, Prediction, Prior};
+use super::cues::{Cues, Looks, Prediction, Prior};
 use super::footprint::Footprint;
-use super::history::Arrival;
 use super::motion::Motion;
 use super::scaled::Scaled;
 use super::search::search;
@@ -43,7 +42,7 @@ pub struct Hypothesis {
     /// What tells whether it moves; those of its columns are missing.
     pub cues: Cues,
     /// What was there before it came, where it is dynamic.
-    pub arrival: Arrival,
+    pub looks: Looks,
     /// The ground it stands on, where it is dynamic.
     pub footprint: Footprint,
 }

@@ -1,7 +1,8 @@
 //! What was there before a cluster came.
 
 use super::*;
-use crate::refinement::history::{Arrival, History};
+use crate::refinement::cues::Looks;
+use crate::refinement::history::History;
 use crate::refinement::hypothesis::Hypothesis;
 use crate::refinement::motion::Motion;
 
@@ -25,7 +26,7 @@ fn cloud(from: i32, corner: i32, n: usize) -> Box<Cloud> {
 }
 
 /// What became of a block that is said to go `by` columns a sweep and was seen at `at(n)`.
-fn arrival(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Arrival {
+fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     for n in 0..SWEEPS {
         history.push(&cloud(at(n as i32), corner(n as i32), n));
@@ -39,31 +40,31 @@ fn arrival(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Arr
     let motion = Motion::around([0.0; 2]).displaced([by, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
     history.find(&first, 0.1, &of_column, &mut found);
-    found[0].arrival
+    found[0].looks
 }
 
 #[test]
 fn what_comes_from_elsewhere_is_fresh_and_what_stands_is_worn() {
     // In front of the block nothing was hit before it came: the first sweep back one column, the
     // second two, from then on all four.
-    let mover = arrival(1.0, |n| 10 + n, |_| 0);
+    let mover = looks(1.0, |n| 10 + n, |_| 0);
     assert_eq!(mover.worn(), 0.0);
-    let looks = 2.0 * (1 + 2 + 3 + 4 + 4) as f32;
-    assert!((mover.fresh() - looks / (looks + 8.0)).abs() < 1e-6, "{}", mover.fresh());
-    let standing = arrival(1.0, |_| 10, |_| 0);
+    let made = 2.0 * (1 + 2 + 3 + 4 + 4) as f32;
+    assert!((mover.fresh() - made / (made + 8.0)).abs() < 1e-6, "{}", mover.fresh());
+    let standing = looks(1.0, |_| 10, |_| 0);
     assert_eq!((standing.worn(), standing.fresh()), (mover.fresh(), 0.0));
 }
 
 #[test]
 fn the_window_goes_along() {
     let moving_window = |n| 2 * n - 5;
-    assert_eq!(arrival(1.0, |n| 15 + n, moving_window), arrival(1.0, |n| 15 + n, |_| 0));
-    assert_eq!(arrival(1.0, |_| 15, moving_window), arrival(1.0, |_| 15, |_| 0));
+    assert_eq!(looks(1.0, |n| 15 + n, moving_window), looks(1.0, |n| 15 + n, |_| 0));
+    assert_eq!(looks(1.0, |_| 15, moving_window), looks(1.0, |_| 15, |_| 0));
 }
 
 #[test]
 fn nothing_is_known_of_what_it_hides_itself_or_of_no_sweep() {
     // Slower than a column in all sweeps: each place may have been its own.
-    assert_eq!(arrival(0.05, |_| 10, |_| 0), Arrival::default());
-    assert_eq!((Arrival::default().worn(), Arrival::default().fresh()), (0.0, 0.0));
+    assert_eq!(looks(0.05, |_| 10, |_| 0), Looks::default());
+    assert_eq!((Looks::default().worn(), Looks::default().fresh()), (0.0, 0.0));
 }
