@@ -220,11 +220,6 @@ impl Cloud {
         self.levels[column]
     }
 
-    /// The same of all columns.
-    pub fn all_levels(&self) -> &[u32] {
-        &self.levels
-    }
-
     /// The column of a place, if that lies in the window.
     pub fn column_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let side = self.side as f32;

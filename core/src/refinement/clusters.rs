@@ -12,6 +12,10 @@ use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill};
 
+/// Share of looks that found nothing from which on a cluster was seen to come: of clusters that
+/// move 0.9 in the median, of those that stand far from any 0.2, of a tenth of them more than 0.75
+/// (simulated drives).
+const FRESH_MIN: f32 = 0.85;
 /// Moving clusters near a fragment that are tried; the first ones are enough.
 const NEIGHBOURS_MAX: usize = 8;
 
@@ -56,6 +60,11 @@ impl Clusters {
     pub fn cues(&self, column: usize) -> Cues {
         let misfit = self.misfit[column];
         self.of(column).map_or(Cues::NONE, |found| Cues { misfit, ..found.cues })
+    }
+
+    /// Whether a column is of a cluster that was seen to come from elsewhere.
+    pub fn came(&self, column: usize) -> bool {
+        self.of(column).is_some_and(|f| f.is_dynamic && f.cues.fresh >= FRESH_MIN)
     }
 
     /// What became of all of them.

@@ -91,8 +91,10 @@ impl Cues {
 /// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet, and how
 /// many found something.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Looks {
+pub struct Looks {
+    /// Voxels times sweeps.
     pub made: u32,
+    /// Those that found something.
     pub hits: u32,
 }
 

@@ -46,12 +46,14 @@ impl History {
         self.held = 0;
     }
 
-    /// Remembers a sweep instead of the oldest.
-    pub fn push(&mut self, cloud: &Cloud) {
+    /// Remembers a sweep instead of the oldest, without the columns of what was seen to come from
+    /// elsewhere: one that follows comes to where the other was.
+    pub fn push(&mut self, cloud: &Cloud, came: impl Fn(usize) -> bool) {
         let columns = cloud.side * cloud.side;
         let past = &mut self.sweeps[self.next];
         (past.corner, past.stamp_s) = (cloud.corner, cloud.stamp_s);
-        past.levels[..columns].copy_from_slice(&cloud.all_levels()[..columns]);
+        let levels = |c| if came(c) { 0 } else { cloud.levels(c) };
+        past.levels[..columns].iter_mut().enumerate().for_each(|(c, past)| *past = levels(c));
         self.next = (self.next + 1) % HISTORY;
         self.held = (self.held + 1).min(HISTORY);
     }

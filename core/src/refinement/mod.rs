@@ -150,7 +150,7 @@ impl Refinement {
         }
         let scans = Scans { scaled, first, targets: &targets, before, now, span_s };
         self.clusters.find(team, scans, &self.history, flow, predicted);
-        self.history.push(&self.clouds[index(newest, 1)]);
+        self.history.push(&self.clouds[index(newest, 1)], |c| self.clusters.came(c));
     }
 
     /// Columns of clusters that there was no room for: they are taken to stand.

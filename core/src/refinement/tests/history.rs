@@ -29,7 +29,7 @@ fn cloud(from: i32, corner: i32, n: usize) -> Box<Cloud> {
 fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     for n in 0..SWEEPS {
-        history.push(&cloud(at(n as i32), corner(n as i32), n));
+        history.push(&cloud(at(n as i32), corner(n as i32), n), |_| false);
     }
     let (last, corner) = (at(SWEEPS as i32), corner(SWEEPS as i32));
     let first = cloud(last, corner, SWEEPS);
@@ -67,4 +67,16 @@ fn nothing_is_known_of_what_it_hides_itself_or_of_no_sweep() {
     // Slower than a column in all sweeps: each place may have been its own.
     assert_eq!(looks(0.05, |_| 10, |_| 0), Looks::default());
     assert_eq!((Looks::default().worn(), Looks::default().fresh()), (0.0, 0.0));
+}
+
+#[test]
+fn one_that_came_leaves_no_trace() {
+    let mut history = raywake_alloc_guard::boxed!(History, History::new());
+    (0..SWEEPS).for_each(|n| history.push(&cloud(10, 0, n), |column| column % SIDE == 20));
+    let mut of_column = vec![NONE; SIDE * SIDE];
+    (10..10 + LENGTH).for_each(|i| of_column[i * SIDE + 20] = 0);
+    let motion = Motion::around([0.0; 2]).displaced([1.0, 0.0]);
+    let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
+    history.find(&cloud(10, 0, SWEEPS), 0.1, &of_column, &mut found);
+    assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }

@@ -25,7 +25,7 @@ fn movers_are_found_and_little_else() {
         |class: &str| figure(&out, "first-sight", &["labels", class], "Half of it: median, s");
     for (what, value, least, most) in [
         ("precision of columns", verdict("columns", "Precision, %"), 73.0, 100.0),
-        ("recall of columns", verdict("columns", "Recall, %"), 92.5, 100.0),
+        ("recall of columns", verdict("columns", "Recall, %"), 91.8, 100.0),
         ("IoU of columns", verdict("columns", "IoU, %"), 69.5, 100.0),
         ("0.5 m forgiven", verdict("columns", "Precision, 0.5 m forgiven, %"), 95.0, 100.0),
         ("false columns a sweep far from movers", verdict("columns", "Farther"), 0.0, 1.2),
@@ -47,12 +47,12 @@ fn what_stands_is_put_out_so() {
     let out = evaluated(&scratch, "kitti_odometry_00", &["--deskew", "off"]);
     let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Put out as moving, %");
     for (class, most) in [
-        ("all that stands", 0.1),
-        ("building", 0.08),
-        ("vegetation", 0.18),
-        ("fence", 0.1),
+        ("all that stands", 0.07),
+        ("building", 0.07),
+        ("vegetation", 0.03),
+        ("fence", 0.02),
         ("sidewalk", 0.22),
-        ("terrain", 0.75),
+        ("terrain", 0.6),
     ] {
         println!("{class}: {}", share(class));
         assert!(share(class) <= most, "{} % of {class}", share(class));
