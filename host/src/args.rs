@@ -143,7 +143,8 @@ pub struct FlowChoice {
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Profile")]
 pub struct ProfileChoice {
-    /// Built-in profile: hdl64 (window of 50 m x 50 m, the default), wide (70.5 m) or dissertation
+    /// Built-in profile: hdl64 (window of ±25 m, the default), wide (±35 m), far (±50 m) or
+    /// dissertation
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     pub profile: Option<String>,
     /// Custom profile (TOML): `base = "hdl64"` and the parameters to change

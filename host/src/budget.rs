@@ -36,8 +36,8 @@ pub const ALIGNMENT: u64 = 16;
 const HEAPS: [Heap; 3] = [Heap::Upload, Heap::Device, Heap::Readback];
 
 /// The profiles `memory-layout.md` is about.
-pub fn shipped() -> [Profile; 4] {
-    [Profile::hdl64(), Profile::wide(), Profile::dissertation(), Profile::map()]
+pub fn shipped() -> Vec<Profile> {
+    Profile::shipped().into_iter().chain([Profile::map()]).collect()
 }
 
 /// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where

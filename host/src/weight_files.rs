@@ -94,7 +94,7 @@ mod tests {
             let weights = WeightFiles::read(learned, profile)?;
             weights.tables(profile).map(|_| ())
         };
-        for profile in [Profile::hdl64(), Profile::wide(), Profile::dissertation()] {
+        for profile in Profile::shipped() {
             load(&Learned::default(), &profile).unwrap();
         }
         let low = Profile { levels: 12, ..Profile::hdl64() };

@@ -132,10 +132,13 @@ impl Profile {
     }
 
     /// The shipped profiles of the flow pipeline.
-    pub fn named(name: &str) -> Option<Profile> {
+    pub fn shipped() -> [Profile; 4] {
         [Profile::hdl64(), Profile::wide(), Profile::far(), Profile::dissertation()]
-            .into_iter()
-            .find(|p| p.name == name)
+    }
+
+    /// That of a name.
+    pub fn named(name: &str) -> Option<Profile> {
+        Profile::shipped().into_iter().find(|p| p.name == name)
     }
 
     /// Its groups of parameters, each with its name; that of the first is empty.

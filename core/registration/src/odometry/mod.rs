@@ -15,7 +15,7 @@ mod voxel;
 use crate::deskew::{TimedPoint, span_s};
 use crate::gauss_newton::Correspondence;
 use crate::icp::{CORRESPONDENCES_MIN, Registration, geman_mcclure};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
 use surfels::Surfels;
@@ -90,7 +90,7 @@ impl Default for Odometry {
 }
 
 impl Odometry {
-    /// Before the first sweep.
+    /// Before the first sweep, all zeros: a static of it takes no room in a binary.
     pub const fn new() -> Odometry {
         Odometry {
             map: Surfels::new(),
@@ -98,7 +98,7 @@ impl Odometry {
             correspondences: [Correspondence::NONE; MATCHED_MAX],
             count: 0,
             stamp_s: 0.0,
-            pose: Pose::IDENTITY,
+            pose: Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), translation: DVec3::ZERO },
             twist: Twist::ZERO,
             told: false,
         }
@@ -116,7 +116,10 @@ impl Odometry {
         let dt_s = duration_s(rig, stamp_s - self.stamp_s);
         self.stamp_s = stamp_s;
         let locating = match self.count {
-            1 => Locating::Start,
+            1 => {
+                self.pose = Pose::IDENTITY;
+                Locating::Start
+            }
             _ if self.points().len() < RETURNS_MIN => self.miss(dt_s),
             2 => self.start(dt_s),
             _ => self.follow(dt_s),

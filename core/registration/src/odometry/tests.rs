@@ -8,18 +8,8 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
-/// An odometry on the heap, of which no copy lies on the stack.
-fn odometry() -> Box<Odometry> {
-    std::thread::Builder::new()
-        .stack_size(256 << 20)
-        .spawn(|| Box::new(Odometry::new()))
-        .unwrap()
-        .join()
-        .unwrap()
-}
-
 fn located(rig: &Rig, sweeps: &[SimSweep]) -> Vec<Located> {
-    let mut odometry = odometry();
+    let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     sweeps.iter().map(|s| odometry.locate(s.stamp_s, &s.points, rig)).collect()
 }
 
@@ -90,7 +80,7 @@ fn a_tunnel_does_not_tell_how_far() {
         ground_m: -1.7,
         own_vehicle: None,
     };
-    let mut odometry = odometry();
+    let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     for n in 0..4 {
         let found = odometry.locate(0.1 * f64::from(n), &sweep(), &rig);
         let expected = if n == 0 { Locating::Start } else { Locating::Degenerate };
@@ -100,7 +90,7 @@ fn a_tunnel_does_not_tell_how_far() {
 
 #[test]
 fn nothing_at_all() {
-    let mut odometry = odometry();
+    let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     let rig = drive(1, Ego::Standing, 1).rig();
     for n in 0..3 {
         let found = odometry.locate(0.1 * f64::from(n), &[], &rig);

@@ -95,7 +95,7 @@ fn returns_beyond_the_capacity_are_counted() {
     }
     let mut returns = Returns::flat();
     parts.iter().for_each(|p| returns.add(*p, 0));
-    let mut cloud = Box::new(Cloud::new());
+    let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
     let (dropped, _) = returns.fill(&mut cloud);
     assert_eq!(dropped, parts.len() - CLOUD_MAX);
     assert!(dropped > 20_000);
@@ -221,6 +221,7 @@ fn mirrored_returns_do_not_pull_the_ground_down() {
     let heights = [0.1, 1.0, 13.5, 14.5];
     heights.iter().for_each(|h| returns.add([30.5, 30.5, GROUND + h], 0));
     let last = returns.points.len() - heights.len();
-    let (_, apart) = returns.fill(&mut Box::new(Cloud::new()));
+    let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
+    let (_, apart) = returns.fill(&mut cloud);
     assert_eq!(apart[last..], [true, false, false, true]);
 }

@@ -64,7 +64,8 @@ impl Returns {
 
     /// How many had no room, and which are apart from clusters.
     fn fill(&self, cloud: &mut Cloud) -> (usize, Vec<bool>) {
-        let (mut apart, mut scratch) = (vec![false; self.points.len()], Box::new(Scratch::new()));
+        let (mut apart, mut scratch) =
+            (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
         let Returns { points, placed, columns } = self;
         let (corner, stamp_s) = ([0; 3], 0.0);
         let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
@@ -72,7 +73,7 @@ impl Returns {
     }
 
     fn cloud(&self) -> Box<Cloud> {
-        let mut cloud = Box::new(Cloud::new());
+        let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
         self.fill(&mut cloud);
         cloud
     }
