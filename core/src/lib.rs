@@ -30,6 +30,7 @@ pub mod counters;
 pub mod ctrv;
 pub mod digest;
 pub mod dropped;
+pub mod encoder;
 pub mod frame;
 pub mod ground;
 pub mod groups;

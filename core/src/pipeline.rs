@@ -6,6 +6,7 @@
 //! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on
 //! the CPU or on a device, with the same result.
 
+use crate::encoder::{Encoder, EncoderWeights};
 use crate::frame::{Sides, SweepPair};
 use crate::output::{Output, SweepOutput, TrackletState};
 use crate::params::Profile;
@@ -30,6 +31,8 @@ pub struct Pipeline {
     tracklets: Tracklets,
     observations: Observations,
     flow_of_column: FlowOfColumn,
+    encoder: Encoder,
+    encoder_weights: Option<EncoderWeights>,
 }
 
 impl Default for Pipeline {
@@ -48,7 +51,14 @@ impl Pipeline {
             tracklets: Tracklets::new(),
             observations: Observations::new(),
             flow_of_column: FlowOfColumn::new(),
+            encoder: Encoder::new(),
+            encoder_weights: None,
         }
+    }
+
+    /// Refines with what columns are told to be from now on, or without.
+    pub fn set_encoder(&mut self, weights: Option<&EncoderWeights>) {
+        self.encoder_weights = weights.cloned();
     }
 
     /// One sweep. `before` holds the points of the sweep before, whose flow comes back; `out` must
@@ -78,6 +88,11 @@ impl Pipeline {
 
         let mut flows = None;
         if let Some(pair) = self.sides.pair(profile) {
+            if let Some(weights) = &self.encoder_weights {
+                let (side, at) = (profile.side as usize, [corner[0], corner[1]]);
+                self.encoder.encode(team, weights, perceived.columns_before, side, at);
+                timer.lap("encode");
+            }
             let left = self.refine(team, &pair, &sent.uniform, &perceived);
             timer.lap("refine");
             let turnover = self.track(&pair, &sent.uniform, &perceived, left);
@@ -118,7 +133,8 @@ impl Pipeline {
         if pair.profile.refinement_sweeps > 0 {
             let tracklets = &self.tracklets;
             let cells = |v: f32| v * pair.dt_s as f32 / pair.profile.voxel_m as f32;
-            self.refinement.run(team, sweep, perceived, |column| {
+            let scores = self.encoder_weights.is_some().then(|| self.encoder.scores());
+            self.refinement.run(team, sweep, perceived, scores, |column| {
                 let t = tracklets.at(column).filter(|t| t.age > 0)?;
                 Some(Prediction { by: t.ekf.velocity().0.map(cells), certainty: t.ekf.certainty() })
             });

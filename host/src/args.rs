@@ -158,7 +158,7 @@ pub struct ProfileChoice {
     pub set: Vec<String>,
 }
 
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Model weights")]
 pub struct Learned {
     /// Background filter weights; `none` treats every occupied column as foreground
@@ -167,6 +167,9 @@ pub struct Learned {
     /// Occupancy constancy weights
     #[arg(long, value_name = "FILE")]
     pub constancy: Option<PathBuf>,
+    /// Encoder weights; `none` refines without what columns are told to be
+    #[arg(long, value_name = "FILE|none")]
+    pub encoder: Option<PathBuf>,
 }
 
 /// What the grid and flow stages run on.

@@ -43,6 +43,9 @@ pub struct Stepped<'a> {
 impl Drive {
     /// Allocates for a checked profile.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
+        // A constant is written to its place: by way of the stack it would need 30 MiB of it.
+        let mut pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
+        pipeline.set_encoder(tables.encoder.as_deref());
         let parts = Parts {
             setup: Setup {
                 profile: profile.clone(),
@@ -51,8 +54,7 @@ impl Drive {
                 unfiltered: tables.unfiltered,
                 preparation: Preparation::new(),
             },
-            // A constant is written to its place: by way of the stack it would need 30 MiB of it.
-            pipeline: raywake_alloc_guard::boxed!(Pipeline, Pipeline::new()),
+            pipeline,
             backend,
             columns: vec![ColumnFlow::default(); solid(profile)],
             points: vec![PointFlow::default(); profile.returns()],

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use raywake_core::digest::Digest;
+use raywake_core::encoder;
 use raywake_core::params::Profile;
 use raywake_core::stages::background_filter;
 use raywake_core::stages::occupancy_constancy;
@@ -12,12 +13,14 @@ use crate::backend::{LearnedPart, Tables, TablesError};
 use crate::config::read;
 use raywake_io::Error;
 
-/// The texts of both weights files.
+/// The texts of the weights files.
 #[derive(Clone)]
 pub struct WeightFiles {
     /// None: every solid column is foreground.
     filter: Option<WeightFile>,
     constancy: WeightFile,
+    /// None: nothing is encoded.
+    encoder: Option<WeightFile>,
 }
 
 #[derive(Clone)]
@@ -34,14 +37,16 @@ impl WeightFiles {
             Some(path) => Ok(WeightFile { path: Some(path.clone()), text: read(path)? }),
             None => Ok(WeightFile { path: None, text: shipped.to_string() }),
         };
-        let unfiltered = learned.filter.as_ref().is_some_and(|f| f.as_os_str() == "none");
+        let none = |path: &Option<PathBuf>| path.as_ref().is_some_and(|f| f.as_os_str() == "none");
+        let optional = |path: &Option<PathBuf>, shipped: &str| match none(path) {
+            true => Ok(None),
+            false => file(path, shipped).map(Some),
+        };
         let shipped = occupancy_constancy::shipped(profile.frame);
         Ok(WeightFiles {
-            filter: match unfiltered {
-                true => None,
-                false => Some(file(&learned.filter, background_filter::SHIPPED)?),
-            },
+            filter: optional(&learned.filter, background_filter::SHIPPED)?,
             constancy: file(&learned.constancy, shipped)?,
+            encoder: optional(&learned.encoder, encoder::SHIPPED)?,
         })
     }
 
@@ -55,10 +60,16 @@ impl WeightFiles {
         WeightFiles { filter: None, ..self }
     }
 
-    /// A digest of both texts, 16 hexadecimal digits.
+    /// The same without the encoder.
+    pub fn without_encoder(self) -> WeightFiles {
+        WeightFiles { encoder: None, ..self }
+    }
+
+    /// A digest of the texts, 16 hexadecimal digits.
     pub fn digest(&self) -> String {
         let filter = self.filter.as_ref().map(|f| &f.text);
-        let all = format!("{filter:?}{}", self.constancy.text);
+        let encoder = self.encoder.as_ref().map(|f| &f.text);
+        let all = format!("{filter:?}{}{encoder:?}", self.constancy.text);
         format!("{:016x}", Digest::of(all.as_bytes()))
     }
 
@@ -66,13 +77,16 @@ impl WeightFiles {
     /// option for a file where what is built in does not fit.
     pub fn tables(&self, profile: &Profile) -> Result<Tables, Error> {
         let filter = self.filter.as_ref().map(|f| f.text.as_str());
-        Tables::load(profile, filter, &self.constancy.text).map_err(|e| self.mistake(profile, e))
+        let encoder = self.encoder.as_ref().map(|f| f.text.as_str());
+        Tables::load(profile, filter, &self.constancy.text, encoder)
+            .map_err(|e| self.mistake(profile, e))
     }
 
     fn mistake(&self, profile: &Profile, e: TablesError) -> Error {
         let (file, option) = match e.of {
             LearnedPart::Filter => (self.filter.as_ref(), "--filter"),
             LearnedPart::Constancy => (Some(&self.constancy), "--constancy"),
+            LearnedPart::Encoder => (self.encoder.as_ref(), "--encoder"),
         };
         match file.and_then(|f| f.path.as_ref()) {
             Some(path) => Error::input(path, "", e.to_string()),

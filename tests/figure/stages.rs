@@ -79,7 +79,7 @@ fn a_window_of_other_sizes() {
     let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
     // The shipped classifier has 14 levels: another one for 16.
     let text = weights::constancy(42, 16, 150);
-    let tables = Tables::load(&setup.profile, setup.filter.as_deref(), &text).expect("set");
+    let tables = Tables::load(&setup.profile, setup.filter.as_deref(), &text, None).expect("set");
     let device = Device::new(&setup.profile, &tables, &Options::default());
     let Some(device) = raywake_tests::vulkan::expect(device) else { return };
     let scalar = Backend::scalar(&setup.profile, &tables);

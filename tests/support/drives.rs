@@ -2,6 +2,7 @@
 
 use raywake::backend::device::Device;
 use raywake::backend::{Backend, Tables};
+use raywake_core::encoder;
 use raywake_core::params::Profile;
 use raywake_core::stages::occupancy_constancy;
 use raywake_core::sweep::{Rig, Sweep};
@@ -33,7 +34,7 @@ impl Setup {
     /// The learned tables.
     pub fn tables(&self) -> Tables {
         let constancy = occupancy_constancy::shipped(self.profile.frame);
-        Tables::load(&self.profile, self.filter.as_deref(), constancy)
+        Tables::load(&self.profile, self.filter.as_deref(), constancy, Some(encoder::SHIPPED))
             .unwrap_or_else(|e| panic!("{e}"))
     }
 

@@ -83,7 +83,12 @@ impl Side {
 
 impl<P: DerefMut<Target = Pipeline>> Side<P> {
     /// On a pipeline at rest, wherever that is kept.
-    pub fn on(pipeline: P, setup: &drives::Setup, tables: &Tables, backend: Backend) -> Side<P> {
+    pub fn on(
+        mut pipeline: P,
+        setup: &drives::Setup,
+        tables: &Tables,
+        backend: Backend,
+    ) -> Side<P> {
         let setup = Setup {
             profile: setup.profile.clone(),
             rig: setup.rig.clone(),
@@ -91,6 +96,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
             unfiltered: tables.unfiltered,
             preparation: Preparation::new(),
         };
+        pipeline.set_encoder(tables.encoder.as_deref());
         Side { setup, pipeline, backend }
     }
 

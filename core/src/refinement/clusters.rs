@@ -73,13 +73,14 @@ impl Clusters {
         &self.found
     }
 
-    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` what its
-    /// tracklet predicts.
+    /// Finds the clusters and their motion. `stays` tells columns that go with none, `flow` is the
+    /// match of a column, `predicted` what its tracklet predicts.
     pub fn find(
         &mut self,
         team: &impl Team,
         scans: Scans,
         history: &History,
+        stays: impl Fn(usize) -> bool,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
@@ -101,7 +102,8 @@ impl Clusters {
             found.is_dynamic &= found.cues.worn <= scans.scaled.params.worn_max;
         }
         self.take_along(scans);
-        self.cover_ground(scans);
+        self.leave_behind(&stays);
+        self.cover_ground(scans, stays);
         self.look_back(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
         fill(team, 0, &mut self.misfit[..scans.first.side * scans.first.side], &|c| {
@@ -191,6 +193,16 @@ impl Clusters {
         }
     }
 
+    /// Takes what could not move from clusters that do.
+    fn leave_behind(&mut self, stays: &impl Fn(usize) -> bool) {
+        for c in 0..self.of_column.len() {
+            let moves = self.found.get(self.of_column[c] as usize).is_some_and(|f| f.is_dynamic);
+            if moves && stays(c) {
+                self.of_column[c] = NONE;
+            }
+        }
+    }
+
     /// Finds what was hit before where moving clusters came to.
     fn look_back(&mut self, scans: Scans, history: &History) {
         let (of_column, found) = (&self.of_column, &mut self.found);
@@ -203,7 +215,7 @@ impl Clusters {
     }
 
     /// The ground below a moving cluster, where nothing else stands, goes with it.
-    fn cover_ground(&mut self, scans: Scans) {
+    fn cover_ground(&mut self, scans: Scans, stays: impl Fn(usize) -> bool) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
         for c in 0..side * side {
             let found = self.found.get_mut(self.of_column[c] as usize);
@@ -214,9 +226,10 @@ impl Clusters {
         for (n, found) in self.found.iter().enumerate().filter(|(_, f)| f.is_dynamic) {
             let [rows, columns] = found.footprint.cells(margin, side);
             for (i, j) in rows.flat_map(|i| columns.clone().map(move |j| (i, j))) {
-                let of_column = &mut self.of_column[i * side + j];
+                let column = i * side + j;
+                let of_column = &mut self.of_column[column];
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
-                if *of_column == NONE && found.footprint.holds(at, margin) {
+                if *of_column == NONE && found.footprint.holds(at, margin) && !stays(column) {
                     *of_column = n as u32;
                 }
             }

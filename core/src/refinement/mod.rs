@@ -47,6 +47,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use crate::encoder::{ColumnScores, could_move};
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
 use crate::perceive::Perceived;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
@@ -112,13 +113,14 @@ impl Refinement {
         self.clouds[self.newest].fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `predicted` is what the tracklet of a
-    /// column of the new window predicts.
+    /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's, if there is
+    /// one, and `predicted` is what a tracklet predicts, of columns of the new window.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
         step: &SweepUniform,
         perceived: &Perceived,
+        scores: Option<&[ColumnScores]>,
         predicted: impl Fn(usize) -> Option<Prediction> + Sync,
     ) {
         self.clusters.clear();
@@ -135,6 +137,11 @@ impl Refinement {
             inside.then_some((i * step.side + j) as usize)
         };
         let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
+        let least = scaled.params.could_move_min;
+        let stays = |c: usize| {
+            let score = scores.zip(shifted(c)).map(|(scores, c)| could_move(&scores[c]));
+            score.is_some_and(|s| s < least)
+        };
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span_s = self.clouds[newest].stamp_s - first.stamp_s;
         let mut targets = heapless::Vec::<Target, TARGETS_MAX>::new();
@@ -149,7 +156,7 @@ impl Refinement {
             });
         }
         let scans = Scans { scaled, first, targets: &targets, before, now, span_s };
-        self.clusters.find(team, scans, &self.history, flow, predicted);
+        self.clusters.find(team, scans, &self.history, stays, flow, predicted);
         self.history.push(&self.clouds[index(newest, 1)], |c| self.clusters.came(c));
     }
 

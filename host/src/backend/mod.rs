@@ -2,6 +2,7 @@
 
 pub mod device;
 
+use raywake_core::encoder::EncoderWeights;
 use raywake_core::params::Profile;
 use raywake_core::perceive::{self, Perceive, Perceived, StageTimer};
 use raywake_core::record::{Ray, SweepUniform};
@@ -18,6 +19,8 @@ pub enum LearnedPart {
     Filter,
     /// The occupancy constancy.
     Constancy,
+    /// The encoder.
+    Encoder,
 }
 
 /// Why a weights file does not serve a profile.
@@ -25,6 +28,7 @@ pub enum LearnedPart {
 #[error("{}: {why}", match .of {
     LearnedPart::Filter => "background filter",
     LearnedPart::Constancy => "occupancy constancy",
+    LearnedPart::Encoder => "encoder",
 })]
 pub struct TablesError {
     /// Which file.
@@ -48,14 +52,18 @@ pub struct Tables {
     pub provenance: String,
     /// Every solid column is foreground.
     pub unfiltered: bool,
+    /// See [`EncoderWeights::load`]; none where nothing is encoded.
+    pub encoder: Option<Box<EncoderWeights>>,
 }
 
 impl Tables {
-    /// Reads both weights files for a profile; without a filter every solid column is foreground.
+    /// Reads the weights files for a profile; without a filter every solid column is foreground.
+    /// Nothing is encoded where nothing is refined.
     pub fn load(
         profile: &Profile,
         filter: Option<&str>,
         constancy: &str,
+        encoder: Option<&str>,
     ) -> Result<Tables, TablesError> {
         let levels = profile.levels as usize;
         let mut table = vec![0; TABLE_WORDS];
@@ -69,6 +77,7 @@ impl Tables {
                 .unwrap_or_default()
                 .to_string();
         }
+        let encoder = encoder.filter(|_| profile.refinement_sweeps > 0);
         let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
         let scores = occupancy_constancy::load(constancy, levels, &mut weights, &mut costs)
             .map_err(|why| TablesError { of: LearnedPart::Constancy, why })?;
@@ -79,8 +88,16 @@ impl Tables {
             scores,
             provenance,
             unfiltered: filter.is_none(),
+            encoder: encoder.map(|text| encoder_weights(text, levels)).transpose()?,
         })
     }
+}
+
+fn encoder_weights(text: &str, levels: usize) -> Result<Box<EncoderWeights>, TablesError> {
+    let mut weights = raywake_alloc_guard::boxed!(EncoderWeights, EncoderWeights::new());
+    let loaded = weights.load(text, levels);
+    loaded.map_err(|why| TablesError { of: LearnedPart::Encoder, why })?;
+    Ok(weights)
 }
 
 /// The twins over memory of the heap.

@@ -134,7 +134,7 @@ fn data(samples: &[Sample], ridge: f64) -> Data {
 }
 
 fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measured, Error> {
-    let tables = Tables::load(&Profile::hdl64(), None, text)
+    let tables = Tables::load(&Profile::hdl64(), None, text, None)
         .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
     let mut counts = [Ranking::default(); 2];
     let mut ranker = Ranker::new(Profile::hdl64().columns());

@@ -27,6 +27,8 @@ pub struct LabelledSweep {
     /// What every return comes from: an index of `objects`, or [`raywake_core::record::NONE`] for
     /// the background. Empty where only the boxes tell.
     pub object_of_point: Vec<u32>,
+    /// What every return comes from by its class. Empty where only the boxes tell.
+    pub class_of_point: Vec<raywake_sim::Class>,
 }
 
 impl LabelledSweep {

@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use glam::DVec3;
 use raywake_core::params::Profile;
 use raywake_io::Error;
-use raywake_sim::Rng;
+use raywake_sim::{Rng, Scenery};
 use std::path::PathBuf;
 
 /// Sweeps from one that is used to the next: neighbours are nearly the same.
@@ -34,6 +34,9 @@ pub struct Inputs {
     /// Recorded drives to hold out instead: names of their folders.
     #[arg(long, value_name = "NAME", num_args = 1.., requires = "data")]
     pub held_out: Vec<String>,
+    /// Whether every third simulated street is a cluttered one.
+    #[arg(skip)]
+    pub cluttered: bool,
 }
 
 /// A drive that can be opened.
@@ -122,7 +125,13 @@ impl Inputs {
         let wanted = STRIDE * (self.sweeps as usize - 1) + 1;
         let mut drive: Box<dyn Labelled> = match &planned.material {
             // One more, for the last pair.
-            Material::Simulated(n) => Box::new(Simulated::drawn(self.seed, *n, wanted + 1)),
+            Material::Simulated(n) => {
+                let scenery = match self.cluttered && n % 3 == 2 {
+                    true => Scenery::StreetCluttered,
+                    false => Scenery::Street,
+                };
+                Box::new(Simulated::drawn(self.seed, *n, wanted + 1, scenery))
+            }
             Material::Recorded(path) => Box::new(Recorded::open(path)?),
         };
         let simulated = matches!(planned.material, Material::Simulated(_));

@@ -3,6 +3,7 @@
 mod constancy;
 mod constancy_samples;
 mod drives;
+mod encoder;
 mod features;
 mod filter;
 mod filter_samples;
@@ -27,6 +28,8 @@ pub enum Command {
     Filter(filter::Args),
     /// The occupancy constancy (section 3.5.1).
     Constancy(constancy::Args),
+    /// The encoder (after chapter 4).
+    Encoder(encoder::Args),
     /// P(moves): how cues are weighed (after the refinement, which has no section)
     Moves(moves::Args),
 }
@@ -36,6 +39,7 @@ pub fn run(command: &Command) -> Result<(), Error> {
     match command {
         Command::Filter(args) => filter::run(args),
         Command::Constancy(args) => constancy::run(args),
+        Command::Encoder(args) => encoder::run(args),
         Command::Moves(args) => moves::run(args),
     }
 }

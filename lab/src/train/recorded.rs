@@ -34,6 +34,7 @@ impl Labelled for Recorded {
     fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error> {
         self.source.read(index, &mut into.data)?;
         into.object_of_point.clear();
+        into.class_of_point.clear();
         into.objects.clear();
         for (id, track) in self.labels.tracks.iter().enumerate() {
             if let Some(&vehicle_from_box) = track.boxes.get(&into.data.frame) {

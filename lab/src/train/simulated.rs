@@ -8,7 +8,7 @@ use raywake_core::record::NONE;
 use raywake_core::sweep::Rig;
 use raywake_io::Error;
 use raywake_io::source::{SourceGaps, SweepData};
-use raywake_sim::{Class, Drive, Options, Rng, SensorRig};
+use raywake_sim::{Class, Drive, Options, Rng, Scenery, SensorRig};
 
 pub struct Simulated {
     drive: Drive,
@@ -18,12 +18,13 @@ pub struct Simulated {
 
 impl Simulated {
     /// Drive `index` of a seed.
-    pub fn drawn(seed: u64, index: u64, sweeps: usize) -> Simulated {
+    pub fn drawn(seed: u64, index: u64, sweeps: usize, scenery: Scenery) -> Simulated {
         let mut rng = Rng::split(seed, index);
         let options = Options {
             sweeps,
             density: rng.range(0.3, 1.3),
             rig: rig(index, &mut rng),
+            scenery,
             threads: 1,
             ..Options::default()
         };
@@ -109,6 +110,8 @@ impl Labelled for Simulated {
         into.object_of_point.clear();
         into.object_of_point
             .extend(sweep.truth.iter().map(|t| place(t.object).map_or(NONE, |at| at as u32)));
+        into.class_of_point.clear();
+        into.class_of_point.extend(sweep.truth.iter().map(|t| t.class));
         into.objects.clear();
         into.objects.extend(states.iter().map(|s| Seen {
             id: s.id as usize,

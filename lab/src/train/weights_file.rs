@@ -3,6 +3,9 @@
 use raywake_core::digest::Digest;
 use std::fmt::Write;
 
+/// Numbers of a line at most.
+const LINE: usize = 32;
+
 /// Weights as integers of `scale` per unit.
 pub fn quantise(weights: &[f64], scale: f64) -> Vec<i32> {
     weights.iter().map(|w| (w * scale).round() as i32).collect()
@@ -17,7 +20,8 @@ pub fn text(kind: &str, shape: &[usize], scale: f64, weights: &[i32], provenance
         "kind {kind}\nshape {}\nscale {scale}\nprovenance {provenance}\n",
         shape_text.join(" ")
     );
-    for levels in weights.chunks(*shape.last().expect("a shape has levels")) {
+    let line = *shape.last().expect("a shape has levels");
+    for levels in weights.chunks(line.min(LINE)) {
         let line: Vec<String> = levels.iter().map(i32::to_string).collect();
         body += &line.join(" ");
         body.push('\n');

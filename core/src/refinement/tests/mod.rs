@@ -182,8 +182,9 @@ fn run_expecting(
         proposal: &[] as &[Proposal],
     };
     let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
-    refinement
-        .run(&Alone, &step, &perceived, |_| expected.map(|by| Prediction { by, certainty: 3.0 }));
+    refinement.run(&Alone, &step, &perceived, None, |_| {
+        expected.map(|by| Prediction { by, certainty: 3.0 })
+    });
 }
 
 type Moved = Option<([f32; 2], [f32; 3])>;

@@ -153,8 +153,9 @@ fn a_wall_that_seems_to_move_stands() {
         proposal: &[] as &[Proposal],
     };
     let step = SweepUniform { side: 167, ..SweepUniform::default() };
-    refinement
-        .run(&Alone, &step, &perceived, |_| Some(Prediction { by: [10.0, 0.0], certainty: 3.0 }));
+    refinement.run(&Alone, &step, &perceived, None, |_| {
+        Some(Prediction { by: [10.0, 0.0], certainty: 3.0 })
+    });
     let extent_max = scaled().extent_max;
     let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);
     assert!(longest > extent_max, "{longest}");

@@ -71,9 +71,10 @@ fn settings(variant: &Variant, base: &Settings, learned: &Learned) -> Result<Set
     let weights = match variant.numbers {
         Numbers::Base => base.weights.clone(),
         Numbers::NoFilter => base.weights.clone().without_filter(),
+        Numbers::NoEncoder => base.weights.clone().without_encoder(),
         // What is shipped for his profile is his.
         Numbers::Author => {
-            let learned = Learned { filter: learned.filter.clone(), constancy: None };
+            let learned = Learned { constancy: None, ..learned.clone() };
             WeightFiles::read(&learned, &Profile::dissertation())?
         }
     };

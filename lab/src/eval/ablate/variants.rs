@@ -9,6 +9,8 @@ pub enum Numbers {
     Base,
     /// The same without a background filter.
     NoFilter,
+    /// Without the encoder.
+    NoEncoder,
     /// The same with the author's published occupancy constancy.
     Author,
 }
@@ -65,6 +67,7 @@ pub const VARIANTS: [Variant; 24] = [
     of("rounds-20", "20 rounds", |p| Profile { em_rounds: 20, ..p }),
     of("rounds-40", "40 rounds", |p| Profile { em_rounds: 40, ..p }),
     Variant { numbers: Numbers::NoFilter, ..of("filter-off", "every solid column", |p| p) },
+    Variant { numbers: Numbers::NoEncoder, ..of("encoder-off", "no encoder", |p| p) },
     Variant { numbers: Numbers::Author, ..of("author-constancy", "the author's constants", |p| p) },
     of("sensor-frame", "sensor frame, our constants, whole cells", |p| Profile {
         frame: Frame::Sensor,
@@ -116,8 +119,14 @@ mod tests {
             let same = VARIANTS.iter().filter(|v| v.name.starts_with(series) && v.is_base(&base));
             assert_eq!(same.count(), 1, "{series}");
         }
-        let other =
-            ["filter-off", "author-constancy", "sensor-frame", "dissertation", "deskew-off"];
+        let other = [
+            "filter-off",
+            "encoder-off",
+            "author-constancy",
+            "sensor-frame",
+            "dissertation",
+            "deskew-off",
+        ];
         for v in VARIANTS.iter().filter(|v| other.contains(&v.name)) {
             assert!(!v.is_base(&base), "{}", v.name);
         }

@@ -1,0 +1,122 @@
+//! The layers: declared once, for the network, its file of weights and its training.
+
+/// Levels of voxels that the encoder is trained for.
+pub const LEVELS: usize = 14;
+/// Free and occupied voxels of a column.
+pub const BITS: usize = 2 * LEVELS;
+/// Columns along an axis of the coarsest cell.
+pub const OCTET: usize = 8;
+/// The activation that stands for 1.
+pub const ONE: i32 = 16;
+/// Largest activation.
+pub const TOP: i32 = 127;
+/// Largest shift.
+pub const SHIFT_MAX: i32 = 14;
+/// Biases are smaller: with the products of the widest layer, 127 x 127 x 128, they fit 32 bits.
+pub const BIAS_MAX: i32 = 1 << 22;
+
+/// Channels of columns, and of pairs, quads and octets of them. Multiples of 8: whole vectors.
+pub const COLUMN_CHANNELS: usize = 16;
+/// See [`COLUMN_CHANNELS`].
+pub const FINE_CHANNELS: usize = 24;
+/// See [`COLUMN_CHANNELS`].
+pub const MIDDLE_CHANNELS: usize = 32;
+/// See [`COLUMN_CHANNELS`].
+pub const COARSE_CHANNELS: usize = 48;
+/// Channels between the two layers of the head.
+pub const HEAD_CHANNELS: usize = 32;
+/// Scores of a column.
+pub const SCORES: usize = 9;
+
+/// Products of a channel with its 3 x 3 neighbours (depthwise), or of all channels with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layer {
+    /// Numbers that enter one output: 9 in a depthwise layer.
+    pub inputs: usize,
+    /// Channels that come out.
+    pub outputs: usize,
+}
+
+/// Place of a layer in [`LAYERS`].
+pub const COLUMN: usize = 0;
+/// See [`COLUMN`]: from 2 x 2 cells of a level to one of the next, and so on.
+pub const DOWN_FINE: usize = 1;
+/// Where a block of two layers begins: depthwise, then dense and added to what entered.
+pub const BLOCKS_FINE: [usize; 2] = [2, 4];
+/// See [`COLUMN`].
+pub const DOWN_MIDDLE: usize = 6;
+/// See [`BLOCKS_FINE`].
+pub const BLOCKS_MIDDLE: [usize; 3] = [7, 9, 11];
+/// See [`COLUMN`].
+pub const DOWN_COARSE: usize = 13;
+/// See [`BLOCKS_FINE`].
+pub const BLOCKS_COARSE: [usize; 2] = [14, 16];
+/// From a cell to the 2 x 2 of the level before, added to what they hold.
+pub const UP_MIDDLE: usize = 18;
+/// See [`UP_MIDDLE`].
+pub const UP_FINE: usize = 19;
+/// See [`BLOCKS_FINE`].
+pub const BLOCK_AFTER: usize = 20;
+/// From a pair's cell to its columns.
+pub const UP_COLUMN: usize = 22;
+/// What is around a column and what it is, to the head.
+pub const HEAD: usize = 23;
+/// Its scores.
+pub const SCORE: usize = 24;
+
+const fn layer(inputs: usize, outputs: usize) -> Layer {
+    Layer { inputs, outputs }
+}
+
+/// Layers in the order of the weights file.
+pub const LAYERS: [Layer; 25] = {
+    let mut all = [layer(9, 0); 25];
+    all[COLUMN] = layer(BITS, COLUMN_CHANNELS);
+    all[DOWN_FINE] = layer(4 * COLUMN_CHANNELS, FINE_CHANNELS);
+    all = with_blocks(all, &BLOCKS_FINE, FINE_CHANNELS);
+    all[DOWN_MIDDLE] = layer(4 * FINE_CHANNELS, MIDDLE_CHANNELS);
+    all = with_blocks(all, &BLOCKS_MIDDLE, MIDDLE_CHANNELS);
+    all[DOWN_COARSE] = layer(4 * MIDDLE_CHANNELS, COARSE_CHANNELS);
+    all = with_blocks(all, &BLOCKS_COARSE, COARSE_CHANNELS);
+    all[UP_MIDDLE] = layer(COARSE_CHANNELS, MIDDLE_CHANNELS);
+    all[UP_FINE] = layer(MIDDLE_CHANNELS, FINE_CHANNELS);
+    all = with_blocks(all, &[BLOCK_AFTER], FINE_CHANNELS);
+    all[UP_COLUMN] = layer(FINE_CHANNELS, COLUMN_CHANNELS);
+    all[HEAD] = layer(2 * COLUMN_CHANNELS, HEAD_CHANNELS);
+    all[SCORE] = layer(HEAD_CHANNELS, SCORES);
+    all
+};
+
+const fn with_blocks(mut all: [Layer; 25], firsts: &[usize], channels: usize) -> [Layer; 25] {
+    let mut n = 0;
+    while n < firsts.len() {
+        all[firsts[n]] = layer(9, channels);
+        all[firsts[n] + 1] = layer(channels, channels);
+        n += 1;
+    }
+    all
+}
+
+/// Weights, and outputs, of the layers before a layer.
+pub const fn before(layer: usize) -> [usize; 2] {
+    let mut sums = [0; 2];
+    let mut n = 0;
+    while n < layer {
+        sums = [sums[0] + LAYERS[n].inputs * LAYERS[n].outputs, sums[1] + LAYERS[n].outputs];
+        n += 1;
+    }
+    sums
+}
+
+/// Weights, and outputs, of all layers.
+pub const TOTAL: [usize; 2] = before(LAYERS.len());
+
+/// Numbers of a weights file but the last: of each layer its weights, an output's after another's,
+/// then a bias an output, then a shift an output.
+pub const NUMBERS: usize = TOTAL[0] + 2 * TOTAL[1];
+
+/// The activation of a sum, its bias and its shift.
+#[inline]
+pub fn activation(sum: i32, bias: i32, shift: u32) -> u8 {
+    ((sum + bias) >> shift).clamp(0, TOP) as u8
+}

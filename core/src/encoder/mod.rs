@@ -1,0 +1,219 @@
+//! The encoder (after chapter 4): what a column is, told from about 24 m around it.
+//!
+//! A pyramid of small convolutions over free and occupied voxels. Its cells are pairs, quads and
+//! octets of the *world's* columns, so that what stands has the same phase in every sweep. Chapter
+//! 4's network has 41.9 billion products a sweep; this one has 80 million, which a CPU does.
+//!
+//! Integers throughout: activations of 0 to 127, weights of -127 to 127, sums of 32 bits, and a
+//! shift per channel that brings a sum back to an activation. The result is the same on every
+//! machine and for any number of threads. It runs on the CPU beside whatever device perceives.
+
+pub mod layers;
+mod load;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+pub use load::EncoderWeights;
+
+use crate::params::{COLUMNS_MAX, SIDE_MAX};
+use crate::record::Column;
+use crate::team::Team;
+#[cfg(test)]
+use crate::weights::WeightsError;
+use layers::*;
+use rows::{Plane, each_row, gathered};
+
+/// What a column may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum ColumnClass {
+    /// Nothing but ground.
+    Ground = 0,
+    /// Buildings, walls, fences and whatever else is put up to stay.
+    Structure = 1,
+    /// Trees, hedges and bushes.
+    Vegetation = 2,
+    /// Posts, signs and trunks.
+    Pole = 3,
+    /// Cars and vans.
+    Car = 4,
+    /// Trucks, buses and trams.
+    LargeVehicle = 5,
+    /// Somebody on foot.
+    Person = 6,
+    /// Bicycles and motorcycles.
+    TwoWheeler = 7,
+}
+
+impl ColumnClass {
+    /// All of them, in their order.
+    pub const ALL: [ColumnClass; 8] = [
+        ColumnClass::Ground,
+        ColumnClass::Structure,
+        ColumnClass::Vegetation,
+        ColumnClass::Pole,
+        ColumnClass::Car,
+        ColumnClass::LargeVehicle,
+        ColumnClass::Person,
+        ColumnClass::TwoWheeler,
+    ];
+}
+
+/// Scores of a column in units of 1/16 nat, -127 to 127: those of [`ColumnClass::ALL`], then that
+/// of what could move (cars to two-wheelers) against what could not.
+pub type ColumnScores = [i8; SCORES];
+
+/// Score, in nats, of what could move against what could not.
+pub fn could_move(scores: &ColumnScores) -> f32 {
+    f32::from(scores[SCORES - 1]) / ONE as f32
+}
+
+/// The class that scores highest; of equal ones the first.
+pub fn class_of(scores: &ColumnScores) -> ColumnClass {
+    let mut best = ColumnClass::Ground;
+    for class in ColumnClass::ALL {
+        if scores[class as usize] > scores[best as usize] {
+            best = class;
+        }
+    }
+    best
+}
+
+/// The weights shipped with the program: see the file's provenance.
+pub const SHIPPED: &str = include_str!("../../weights/encoder.txt");
+
+/// Cells along an axis of the finest level.
+const FINE: usize = (SIDE_MAX + OCTET - 1).next_multiple_of(OCTET) / 2;
+
+/// What the network works in.
+pub struct Activations {
+    /// Of pairs of columns, quads and octets: the level, and what a block makes of it on the way.
+    fine: [[u8; FINE * FINE * FINE_CHANNELS]; 2],
+    middle: [[u8; FINE * FINE / 4 * MIDDLE_CHANNELS]; 2],
+    coarse: [[u8; FINE * FINE / 16 * COARSE_CHANNELS]; 2],
+}
+
+/// The encoder's results for one sweep, and what it works in.
+pub struct Encoder {
+    activations: Activations,
+    scores: [ColumnScores; COLUMNS_MAX],
+}
+
+impl Default for Encoder {
+    fn default() -> Encoder {
+        Encoder::new()
+    }
+}
+
+impl Encoder {
+    /// Before the first sweep, all zeros.
+    pub const fn new() -> Encoder {
+        Encoder {
+            activations: Activations {
+                fine: [[0; FINE * FINE * FINE_CHANNELS]; 2],
+                middle: [[0; FINE * FINE / 4 * MIDDLE_CHANNELS]; 2],
+                coarse: [[0; FINE * FINE / 16 * COARSE_CHANNELS]; 2],
+            },
+            scores: [[0; SCORES]; COLUMNS_MAX],
+        }
+    }
+
+    /// Scores of the columns of the last sweep; zeros where a column is not solid.
+    pub fn scores(&self) -> &[ColumnScores] {
+        &self.scores
+    }
+
+    /// Encodes the columns of a square window of `side`, whose first is the world's column
+    /// `corner`.
+    pub fn encode(
+        &mut self,
+        team: &impl Team,
+        weights: &EncoderWeights,
+        columns: &[Column],
+        side: usize,
+        corner: [i32; 2],
+    ) {
+        let phase = corner.map(|c| c.rem_euclid(OCTET as i32) as usize);
+        let n = (side + OCTET - 1).next_multiple_of(OCTET) / 2;
+        let Activations { fine, middle, coarse } = &mut self.activations;
+        let [fine, beside] = fine.each_mut().map(|level| &mut level[..n * n * FINE_CHANNELS]);
+        let [middle, beside_middle] =
+            middle.each_mut().map(|level| &mut level[..n * n / 4 * MIDDLE_CHANNELS]);
+        let [coarse, beside_coarse] =
+            coarse.each_mut().map(|level| &mut level[..n * n / 16 * COARSE_CHANNELS]);
+        let view = View { columns, side, phase };
+
+        each_row(team, fine, n * FINE_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<FINE_CHANNELS>().0.iter_mut().enumerate() {
+                let x = weights.columns_of(&view, row, at);
+                *cell = weights.dense::<DOWN_FINE, { 4 * COLUMN_CHANNELS }, FINE_CHANNELS>(&x);
+            }
+        });
+        for first in BLOCKS_FINE {
+            weights.block::<FINE_CHANNELS>(team, first, n, fine, beside);
+        }
+        let down = Plane::<FINE_CHANNELS> { side: n, cells: fine };
+        each_row(team, middle, n / 2 * MIDDLE_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<MIDDLE_CHANNELS>().0.iter_mut().enumerate() {
+                let x: [i16; 4 * FINE_CHANNELS] = gathered(&down, row, at);
+                *cell = weights.dense::<DOWN_MIDDLE, { 4 * FINE_CHANNELS }, MIDDLE_CHANNELS>(&x);
+            }
+        });
+        for first in BLOCKS_MIDDLE {
+            weights.block::<MIDDLE_CHANNELS>(team, first, n / 2, middle, beside_middle);
+        }
+        let down = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
+        each_row(team, coarse, n / 4 * COARSE_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<COARSE_CHANNELS>().0.iter_mut().enumerate() {
+                let x: [i16; 4 * MIDDLE_CHANNELS] = gathered(&down, row, at);
+                *cell = weights.dense::<DOWN_COARSE, { 4 * MIDDLE_CHANNELS }, COARSE_CHANNELS>(&x);
+            }
+        });
+        for first in BLOCKS_COARSE {
+            weights.block::<COARSE_CHANNELS>(team, first, n / 4, coarse, beside_coarse);
+        }
+        let up = Plane::<COARSE_CHANNELS> { side: n / 4, cells: coarse };
+        weights.up::<UP_MIDDLE, COARSE_CHANNELS, MIDDLE_CHANNELS>(team, &up, middle);
+        let up = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
+        weights.up::<UP_FINE, MIDDLE_CHANNELS, FINE_CHANNELS>(team, &up, fine);
+        weights.block::<FINE_CHANNELS>(team, BLOCK_AFTER, n, fine, beside);
+
+        let up = Plane::<FINE_CHANNELS> { side: n, cells: fine };
+        let around = &mut beside[..n * n * COLUMN_CHANNELS];
+        each_row(team, around, n * COLUMN_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
+                let x = up.at(row, at).map(i16::from);
+                *cell = weights.dense::<UP_COLUMN, FINE_CHANNELS, COLUMN_CHANNELS>(&x);
+            }
+        });
+        let around = Plane::<COLUMN_CHANNELS> { side: n, cells: around };
+        each_row(team, &mut self.scores[..side * side], side, &|i, out| {
+            for (j, scores) in out.iter_mut().enumerate() {
+                *scores = match columns[i * side + j] {
+                    [_, 0] => [0; SCORES],
+                    [masks, _] => {
+                        let cell = around.at((i + phase[0]) / 2, (j + phase[1]) / 2);
+                        weights.head(cell, &weights.column(masks))
+                    }
+                };
+            }
+        });
+    }
+}
+
+/// The columns that the network sees.
+struct View<'a> {
+    columns: &'a [Column],
+    side: usize,
+    /// Columns of the first octet that lie before the window, along each axis.
+    phase: [usize; 2],
+}
+
+impl View<'_> {
+    /// Masks of the column at a place of the padded window; unknown outside.
+    fn masks(&self, i: usize, j: usize) -> u32 {
+        let [i, j] = [i.wrapping_sub(self.phase[0]), j.wrapping_sub(self.phase[1])];
+        if i < self.side && j < self.side { self.columns[i * self.side + j][0] } else { 0 }
+    }
+}

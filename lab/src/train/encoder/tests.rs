@@ -1,0 +1,119 @@
+//! The network against its formulas, and against core's.
+
+use super::network::Input;
+use super::samples::Sample;
+use super::*;
+use crate::scratch::Scratch;
+use crate::train::drives::LabelledSweep;
+use crate::train::simulated::Simulated;
+use raywake_core::params::Profile;
+use raywake_sim::{Drive, Options, SensorRig};
+
+/// A window of a simulated street.
+fn street() -> Sample {
+    let options = Options { sweeps: 1, rig: SensorRig::vlp32x2(), ..Options::default() };
+    let mut drive = Simulated::new(Drive::new(5, options));
+    let mut grid = crate::grid::Grid::new(Profile::hdl64());
+    let mut sweep = LabelledSweep::default();
+    crate::train::drives::Labelled::read(&mut drive, 0, &mut sweep).unwrap();
+    samples::sample(&mut grid, &drive, &sweep)
+}
+
+/// A few columns of it.
+fn few(sample: &Sample, side: usize) -> Sample {
+    let from = (sample.side - side) / 2;
+    let cells = || (0..side * side).map(|n| (from + n / side) * sample.side + from + n % side);
+    Sample {
+        side,
+        corner: sample.corner.map(|c| c + from as i32),
+        masks: cells().map(|c| sample.masks[c]).collect(),
+        labels: cells().map(|c| sample.labels[c]).collect(),
+    }
+}
+
+#[test]
+fn gradients_are_those_of_central_differences() {
+    let (input, labels) = few(&street(), 24).input();
+    let mut state = Optimiser::new(3);
+    // Biases above zero: few activations are cut, which differences would step across.
+    state.parameters.biases.iter_mut().for_each(|b| *b = 0.3);
+    let network = Network::new(false);
+    let of = |p: &Parameters| loss(network.forward(p, &input).scores(), &labels).0;
+    let (_, slopes) = slope(&network, &state.parameters, (clone(&input), labels.clone()));
+    for (n, layer) in LAYERS.iter().enumerate() {
+        let [weights, biases] = before(n);
+        let weights = (0..layer.inputs * layer.outputs).map(|w| weights + w);
+        let largest = |of: &[f32], range: &mut dyn Iterator<Item = usize>| {
+            range.max_by(|a, b| of[*a].abs().total_cmp(&of[*b].abs())).unwrap()
+        };
+        let weight = largest(&slopes.weights, &mut { weights });
+        let bias = largest(&slopes.biases, &mut (biases..biases + layer.outputs));
+        let differ = |change: &dyn Fn(&mut Parameters, f32)| {
+            let [up, down] = [1e-3, -1e-3].map(|step| {
+                let mut p = state.parameters.clone();
+                change(&mut p, step);
+                of(&p)
+            });
+            (up - down) / 2e-3
+        };
+        let by_weight = differ(&|p, step| p.weights[weight] += step);
+        let by_bias = differ(&|p, step| p.biases[bias] += step);
+        for (is, should) in [(slopes.weights[weight], by_weight), (slopes.biases[bias], by_bias)] {
+            let off = (f64::from(is) - should).abs();
+            assert!(off < 0.03 * should.abs() + 2e-4, "layer {n}: {is}, not {should}");
+        }
+    }
+}
+
+fn clone(input: &Input) -> Input {
+    Input { side: input.side, masks: input.masks.clone(), asked: input.asked.clone() }
+}
+
+#[test]
+fn rounded_it_is_core_s_bit_for_bit() {
+    let sample = street();
+    let mut state = Optimiser::new(8);
+    let mut rng = Rng::new(4);
+    state.parameters.biases.iter_mut().for_each(|b| *b = rng.range(-0.2, 0.4) as f32);
+    state.choose_shifts();
+    let (input, _) = sample.input();
+    let tape = Network::new(true).forward(&state.rounded(), &input);
+    let mut numbers = state.numbers();
+    numbers.push(0);
+    let mut weights = EncoderWeights::new();
+    weights.load(&text("encoder", &[NUMBERS], 16.0, &numbers, "test"), LEVELS).unwrap();
+    let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+    encoder.encode(&Alone, &weights, &sample.columns(), sample.side, sample.corner);
+    let asked = (0..sample.labels.len()).filter(|c| sample.labels[*c] != UNKNOWN);
+    let mut kinds = std::collections::BTreeSet::new();
+    for (column, scores) in asked.zip(tape.scores()) {
+        let is = encoder.scores()[column].map(|s| f32::from(s) / 16.0);
+        assert!(is == *scores, "column {column}: {is:?}, not {scores:?}");
+        kinds.insert(encoder.scores()[column]);
+    }
+    assert!(kinds.len() > 1000, "{} kinds of scores", kinds.len());
+}
+
+#[test]
+fn one_window_can_be_learned_by_heart_and_interrupted() {
+    let scratch = Scratch::new();
+    let sample = few(&street(), 40);
+    let file = scratch.path().join("checkpoint");
+    let steps = 300;
+    let (state, losses) = fit(&[sample.clone()], steps, 1, Some(&file)).unwrap();
+    assert!(losses[2] < 0.6 * losses[0], "{losses:?}");
+    // Interrupted after the last checkpoint, it comes to the same end; other trainings refuse it.
+    let (again, _) = fit(&[sample.clone()], steps, 1, Some(&file)).unwrap();
+    assert!(again.numbers() == state.numbers());
+    let error = |e: Result<_, Error>| e.map(|_: (Optimiser, _)| ()).unwrap_err().to_string();
+    let other = error(fit(&[sample.clone()], steps, 2, Some(&file)));
+    assert!(other.contains("another training"), "{other}");
+    let mut bytes = std::fs::read(&file).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    std::fs::write(&file, &bytes).unwrap();
+    let damaged = error(fit(&[sample.clone()], steps, 1, Some(&file)));
+    assert!(damaged.contains("damaged"), "{damaged}");
+    std::fs::write(&file, &bytes[..100]).unwrap();
+    let short = error(fit(&[sample], steps, 1, Some(&file)));
+    assert!(short.contains("another length"), "{short}");
+}
