@@ -20,6 +20,7 @@
 //!   (what makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (the window).
 //! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (who runs them),
 //!   [`record`] (what crosses to a device).
+//! - What a column is: [`encoder`] (after chapter 4).
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
 //! - The sparse map of appendix B: [`map`].
 //! - Around them: [`mod@params`], [`weights`], [`team`] (threads), [`digest`], [`mod@counters`],

@@ -6,7 +6,7 @@
 //! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on
 //! the CPU or on a device, with the same result.
 
-use crate::encoder::{Encoder, EncoderWeights};
+use crate::encoder::Encoder;
 use crate::frame::{Sides, SweepPair};
 use crate::output::{Output, SweepOutput, TrackletState};
 use crate::params::Profile;
@@ -31,8 +31,8 @@ pub struct Pipeline {
     tracklets: Tracklets,
     observations: Observations,
     flow_of_column: FlowOfColumn,
-    encoder: Encoder,
-    encoder_weights: Option<EncoderWeights>,
+    /// What columns are; off until it has weights.
+    pub encoder: Encoder,
 }
 
 impl Default for Pipeline {
@@ -52,13 +52,7 @@ impl Pipeline {
             observations: Observations::new(),
             flow_of_column: FlowOfColumn::new(),
             encoder: Encoder::new(),
-            encoder_weights: None,
         }
-    }
-
-    /// Refines with what columns are told to be from now on, or without.
-    pub fn set_encoder(&mut self, weights: Option<&EncoderWeights>) {
-        self.encoder_weights = weights.cloned();
     }
 
     /// One sweep. `before` holds the points of the sweep before, whose flow comes back; `out` must
@@ -77,22 +71,21 @@ impl Pipeline {
         if arrival.reset.is_some() {
             self.tracklets.clear();
             self.refinement.clear();
+            self.encoder.clear();
         }
         let sent = self.returns.send(setup, team, sweep, &arrival, backend.input());
         timer.lap("rays");
 
-        let (returns, refinement) = (&mut self.returns, &mut self.refinement);
         let (mut unrefined, corner) = (0, arrival.window.corner);
-        let insert_cloud = || unrefined = returns.insert(refinement, profile, corner, sweep);
-        let perceived = backend.perceive(&sent.uniform, team, timer, insert_cloud)?;
+        let Pipeline { returns, refinement, encoder, .. } = self;
+        let meanwhile = || {
+            unrefined = returns.insert(refinement, profile, corner, sweep);
+            encoder.encode(team);
+        };
+        let perceived = backend.perceive(&sent.uniform, team, timer, meanwhile)?;
 
         let mut flows = None;
         if let Some(pair) = self.sides.pair(profile) {
-            if let Some(weights) = &self.encoder_weights {
-                let (side, at) = (profile.side as usize, [corner[0], corner[1]]);
-                self.encoder.encode(team, weights, perceived.columns_before, side, at);
-                timer.lap("encode");
-            }
             let left = self.refine(team, &pair, &sent.uniform, &perceived);
             timer.lap("refine");
             let turnover = self.track(&pair, &sent.uniform, &perceived, left);
@@ -110,6 +103,7 @@ impl Pipeline {
             flows = Some(found.put_out(team, before, turnover, &mut self.flow_of_column, out));
             timer.lap("out");
         }
+        self.encoder.keep(perceived.columns_now, profile.side as usize, [corner[0], corner[1]]);
         Ok(SweepOutput {
             flows,
             dropped: sent.dropped,
@@ -133,8 +127,7 @@ impl Pipeline {
         if pair.profile.refinement_sweeps > 0 {
             let tracklets = &self.tracklets;
             let cells = |v: f32| v * pair.dt_s as f32 / pair.profile.voxel_m as f32;
-            let scores = self.encoder_weights.is_some().then(|| self.encoder.scores());
-            self.refinement.run(team, sweep, perceived, scores, |column| {
+            self.refinement.run(team, sweep, perceived, self.encoder.scores(), |column| {
                 let t = tracklets.at(column).filter(|t| t.age > 0)?;
                 Some(Prediction { by: t.ekf.velocity().0.map(cells), certainty: t.ekf.certainty() })
             });

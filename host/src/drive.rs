@@ -45,7 +45,7 @@ impl Drive {
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
         // A constant is written to its place: by way of the stack it would need 30 MiB of it.
         let mut pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
-        pipeline.set_encoder(tables.encoder.as_deref());
+        pipeline.encoder.set_weights(tables.encoder.as_deref());
         let parts = Parts {
             setup: Setup {
                 profile: profile.clone(),

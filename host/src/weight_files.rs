@@ -114,7 +114,7 @@ mod tests {
         let low = Profile { levels: 12, ..Profile::hdl64() };
         let e = load(&Learned::default(), &low).unwrap_err().to_string();
         assert!(e.contains("12 levels") && e.contains("--filter"), "{e}");
-        let none = Learned { filter: Some("none".into()), constancy: None };
+        let none = Learned { filter: Some("none".into()), ..Learned::default() };
         let e = load(&none, &low).unwrap_err().to_string();
         assert!(e.contains("12 levels") && e.contains("--constancy"), "{e}");
     }

@@ -96,7 +96,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
             unfiltered: tables.unfiltered,
             preparation: Preparation::new(),
         };
-        pipeline.set_encoder(tables.encoder.as_deref());
+        pipeline.encoder.set_weights(tables.encoder.as_deref());
         Side { setup, pipeline, backend }
     }
 

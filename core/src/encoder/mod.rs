@@ -94,8 +94,15 @@ pub struct Activations {
     coarse: [[u8; FINE * FINE / 16 * COARSE_CHANNELS]; 2],
 }
 
-/// The encoder's results for one sweep, and what it works in.
+/// One sweep's columns, what they are told to be, and what that is worked out in.
 pub struct Encoder {
+    weights: EncoderWeights,
+    is_on: bool,
+    columns: [Column; COLUMNS_MAX],
+    /// Columns of the window along an axis; 0 where none are kept.
+    side: usize,
+    /// The world's column that is the window's first.
+    corner: [i32; 2],
     activations: Activations,
     scores: [ColumnScores; COLUMNS_MAX],
 }
@@ -110,6 +117,11 @@ impl Encoder {
     /// Before the first sweep, all zeros.
     pub const fn new() -> Encoder {
         Encoder {
+            weights: EncoderWeights::new(),
+            is_on: false,
+            columns: [[0; 2]; COLUMNS_MAX],
+            side: 0,
+            corner: [0; 2],
             activations: Activations {
                 fine: [[0; FINE * FINE * FINE_CHANNELS]; 2],
                 middle: [[0; FINE * FINE / 4 * MIDDLE_CHANNELS]; 2],
@@ -119,21 +131,40 @@ impl Encoder {
         }
     }
 
-    /// Scores of the columns of the last sweep; zeros where a column is not solid.
-    pub fn scores(&self) -> &[ColumnScores] {
-        &self.scores
+    /// Encodes with these weights from now on, or nothing.
+    pub fn set_weights(&mut self, weights: Option<&EncoderWeights>) {
+        self.clear();
+        self.is_on = weights.is_some();
+        self.weights = weights.cloned().unwrap_or_default();
     }
 
-    /// Encodes the columns of a square window of `side`, whose first is the world's column
-    /// `corner`.
-    pub fn encode(
-        &mut self,
-        team: &impl Team,
-        weights: &EncoderWeights,
-        columns: &[Column],
-        side: usize,
-        corner: [i32; 2],
-    ) {
+    /// Keeps the columns of a square window, whose first is the world's column `corner`.
+    pub fn keep(&mut self, columns: &[Column], side: usize, corner: [i32; 2]) {
+        if !self.is_on {
+            return;
+        }
+        (self.side, self.corner) = (side, corner);
+        self.columns[..side * side].copy_from_slice(&columns[..side * side]);
+    }
+
+    /// Forgets them.
+    pub fn clear(&mut self) {
+        self.side = 0;
+    }
+
+    /// Scores of the columns kept, once they are encoded: zeros where a column is not solid, none
+    /// where nothing is encoded.
+    pub fn scores(&self) -> &[ColumnScores] {
+        &self.scores[..self.side * self.side]
+    }
+
+    /// Encodes the columns kept, if there are any.
+    pub fn encode(&mut self, team: &impl Team) {
+        let Encoder { side, corner, .. } = *self;
+        if side == 0 {
+            return;
+        }
+        let (columns, weights) = (&self.columns, &self.weights);
         let phase = corner.map(|c| c.rem_euclid(OCTET as i32) as usize);
         let n = (side + OCTET - 1).next_multiple_of(OCTET) / 2;
         let Activations { fine, middle, coarse } = &mut self.activations;

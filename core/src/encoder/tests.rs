@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::team::Alone;
 use std::fmt::Write;
 use std::string::String;
-use std::vec;
+
 use std::vec::Vec;
 
 /// A weights file of these numbers.
@@ -49,8 +49,10 @@ fn encoded(
     corner: [i32; 2],
 ) -> Vec<ColumnScores> {
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
-    encoder.encode(&Alone, weights, columns, side, corner);
-    encoder.scores()[..side * side].to_vec()
+    encoder.set_weights(Some(weights));
+    encoder.keep(columns, side, corner);
+    encoder.encode(&Alone);
+    encoder.scores().to_vec()
 }
 
 /// The network as it is drawn on paper: levels of `[row][column][channel]`, loops over all.
@@ -203,5 +205,5 @@ fn files_that_do_not_fit_are_refused() {
     assert_eq!(fails(&|n| n[BITS * 16] = BIAS_MAX, LEVELS), WeightsError::Range);
     assert_eq!(fails(&|n| n[BITS * 16 + 16] = SHIFT_MAX + 1, LEVELS), WeightsError::Range);
     assert_eq!(fails(&|n| n[BITS * 16 + 16] = -1, LEVELS), WeightsError::Range);
-    assert!(matches!(fails(&|n| drop(n.pop()), LEVELS), WeightsError::Value(_)));
+    assert!(matches!(fails(&|n| n.truncate(NUMBERS), LEVELS), WeightsError::Value(_)));
 }

@@ -113,14 +113,14 @@ impl Refinement {
         self.clouds[self.newest].fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's, if there is
-    /// one, and `predicted` is what a tracklet predicts, of columns of the new window.
+    /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's of its columns,
+    /// none where nothing is encoded, and `predicted` is what the tracklet of a column of the new window predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
         step: &SweepUniform,
         perceived: &Perceived,
-        scores: Option<&[ColumnScores]>,
+        scores: &[ColumnScores],
         predicted: impl Fn(usize) -> Option<Prediction> + Sync,
     ) {
         self.clusters.clear();
@@ -138,10 +138,7 @@ impl Refinement {
         };
         let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
         let least = scaled.params.could_move_min;
-        let stays = |c: usize| {
-            let score = scores.zip(shifted(c)).map(|(scores, c)| could_move(&scores[c]));
-            score.is_some_and(|s| s < least)
-        };
+        let stays = |c: usize| scores.get(c).is_some_and(|s| could_move(s) < least);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span_s = self.clouds[newest].stamp_s - first.stamp_s;
         let mut targets = heapless::Vec::<Target, TARGETS_MAX>::new();

@@ -7,6 +7,7 @@ mod motion;
 mod odd;
 
 use super::*;
+use crate::encoder::layers::SCORES;
 use crate::random::Random;
 use crate::record::{Column, NONE, Proposal, pack_flow};
 use crate::sweep::{Placed, Point};
@@ -161,7 +162,7 @@ fn columns(returns: &Returns) -> Vec<Column> {
 }
 
 fn run(refinement: &mut Refinement, pair: &[&Returns; 2], flows: &[Flow]) {
-    run_expecting(refinement, pair, flows, None);
+    run_knowing(refinement, pair, flows, None, &[]);
 }
 
 /// The same where every tracklet predicts a displacement.
@@ -170,6 +171,17 @@ fn run_expecting(
     pair: &[&Returns; 2],
     flows: &[Flow],
     expected: Option<[f32; 2]>,
+) {
+    run_knowing(refinement, pair, flows, expected, &[]);
+}
+
+/// The same with the encoder's scores.
+fn run_knowing(
+    refinement: &mut Refinement,
+    pair: &[&Returns; 2],
+    flows: &[Flow],
+    expected: Option<[f32; 2]>,
+    scores: &[ColumnScores],
 ) {
     let [before, now] = pair.map(columns);
     let perceived = Perceived {
@@ -182,7 +194,7 @@ fn run_expecting(
         proposal: &[] as &[Proposal],
     };
     let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
-    refinement.run(&Alone, &step, &perceived, None, |_| {
+    refinement.run(&Alone, &step, &perceived, scores, |_| {
         expected.map(|by| Prediction { by, certainty: 3.0 })
     });
 }

@@ -96,6 +96,31 @@ fn what_stands_is_exactly_still() {
 }
 
 #[test]
+fn columns_that_could_not_move_are_left_behind() {
+    let mut random = Random(9);
+    let of = |n: usize| Car { centre: [25.0 + 2.0 * n as f32, 31.0], yaw: 0.3 };
+    let sweeps: Vec<Returns> = (0..3).map(|n| sweep_of(&of(n), &mut random)).collect();
+    let flows = vec![pack_flow([2, 0]); SIDE * SIDE];
+    // Whatever lies beyond a line could not.
+    let stays = |c: usize| c / SIDE < 26;
+    let found = |scores: &[ColumnScores]| {
+        let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
+        sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
+        run_knowing(&mut refinement, &[&sweeps[1], &sweeps[2]], &flows, None, scores);
+        motions(&refinement)
+    };
+    let scores: Vec<ColumnScores> =
+        (0..SIDE * SIDE).map(|c| [if stays(c) { -127 } else { 0 }; SCORES]).collect();
+    let (all, some) = (found(&[]), found(&scores));
+    let moved = |found: &[Moved], part: &dyn Fn(usize) -> bool| {
+        (0..found.len()).filter(|c| part(*c) && found[*c].is_some()).count()
+    };
+    assert!(moved(&all, &stays) > 5 && moved(&all, &|c| !stays(c)) > 5);
+    assert_eq!(moved(&some, &stays), 0);
+    assert_eq!(moved(&some, &|c| !stays(c)), moved(&all, &|c| !stays(c)));
+}
+
+#[test]
 fn few_returns_move_nothing_by_themselves() {
     for count in 0..5 {
         let cluster = |n: usize| {
@@ -153,7 +178,7 @@ fn a_wall_that_seems_to_move_stands() {
         proposal: &[] as &[Proposal],
     };
     let step = SweepUniform { side: 167, ..SweepUniform::default() };
-    refinement.run(&Alone, &step, &perceived, None, |_| {
+    refinement.run(&Alone, &step, &perceived, &[], |_| {
         Some(Prediction { by: [10.0, 0.0], certainty: 3.0 })
     });
     let extent_max = scaled().extent_max;

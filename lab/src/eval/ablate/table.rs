@@ -41,7 +41,7 @@ const COLUMNS: [&str; 22] = [
 const PARTS: [&[&str]; 3] = [
     &["occupancy_constancy", "window"],
     &["expectation", "maximisation"],
-    &["encode", "refine", "track", "out"],
+    &["refine", "track", "out"],
 ];
 
 /// The row of a variant: what its rows and facts tell.

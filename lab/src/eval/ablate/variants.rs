@@ -51,7 +51,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
 }
 
 /// All of them, as they are listed.
-pub const VARIANTS: [Variant; 24] = [
+pub const VARIANTS: [Variant; 25] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),

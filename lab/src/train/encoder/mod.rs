@@ -231,9 +231,11 @@ fn judge(
         .load(&file, LEVELS)
         .map_err(|e| Error::Usage(format!("the weights learned cannot be used: {e}")))?;
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
+    encoder.set_weights(Some(&weights));
     let (mut rows, mut confusion) = (Vec::new(), vec![vec![0.0; 8]; 8]);
     for sample in samples {
-        encoder.encode(&Alone, &weights, &sample.columns(), sample.side, sample.corner);
+        encoder.keep(&sample.columns(), sample.side, sample.corner);
+        encoder.encode(&Alone);
         for (scores, &label) in encoder.scores().iter().zip(&sample.labels) {
             if label != UNKNOWN {
                 rows.push((f64::from(scores[SCORES - 1]), could_move(label), 1.0));

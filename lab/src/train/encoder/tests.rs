@@ -83,7 +83,9 @@ fn rounded_it_is_core_s_bit_for_bit() {
     let mut weights = EncoderWeights::new();
     weights.load(&text("encoder", &[NUMBERS], 16.0, &numbers, "test"), LEVELS).unwrap();
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
-    encoder.encode(&Alone, &weights, &sample.columns(), sample.side, sample.corner);
+    encoder.set_weights(Some(&weights));
+    encoder.keep(&sample.columns(), sample.side, sample.corner);
+    encoder.encode(&Alone);
     let asked = (0..sample.labels.len()).filter(|c| sample.labels[*c] != UNKNOWN);
     let mut kinds = std::collections::BTreeSet::new();
     for (column, scores) in asked.zip(tape.scores()) {
