@@ -12,10 +12,6 @@ use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill};
 
-/// Share of looks that found nothing from which on a cluster was seen to come: of clusters that
-/// move 0.9 in the median, of those that stand far from any 0.2, of a tenth of them more than 0.75
-/// (simulated drives).
-const FRESH_MIN: f32 = 0.85;
 /// Moving clusters near a fragment that are tried; the first ones are enough.
 const NEIGHBOURS_MAX: usize = 8;
 
@@ -64,7 +60,7 @@ impl Clusters {
 
     /// Whether a column is of a cluster that was seen to come from elsewhere.
     pub fn came(&self, column: usize) -> bool {
-        self.of(column).is_some_and(|f| f.is_dynamic && f.cues.fresh >= FRESH_MIN)
+        self.of(column).is_some_and(|f| f.is_dynamic && f.came())
     }
 
     /// What became of all of them.
@@ -193,11 +189,19 @@ impl Clusters {
         }
     }
 
-    /// Takes what could not move from clusters that do.
+    /// Takes columns that could not move from clusters that do. A cluster of mostly such stands,
+    /// unless it was seen to come: what is like nothing that was learned may still move.
     fn leave_behind(&mut self, stays: &impl Fn(usize) -> bool) {
+        self.found.iter_mut().for_each(|f| f.likeness = 0);
         for c in 0..self.of_column.len() {
-            let moves = self.found.get(self.of_column[c] as usize).is_some_and(|f| f.is_dynamic);
-            if moves && stays(c) {
+            let found = self.found.get_mut(self.of_column[c] as usize);
+            if let Some(found) = found.filter(|f| f.is_dynamic) {
+                found.likeness += if stays(c) { -1 } else { 1 };
+            }
+        }
+        for c in 0..self.of_column.len() {
+            let found = self.found.get(self.of_column[c] as usize);
+            if found.is_some_and(|f| f.is_dynamic && !f.is_strange()) && stays(c) {
                 self.of_column[c] = NONE;
             }
         }
@@ -229,7 +233,10 @@ impl Clusters {
                 let column = i * side + j;
                 let of_column = &mut self.of_column[column];
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
-                if *of_column == NONE && found.footprint.holds(at, margin) && !stays(column) {
+                if *of_column == NONE
+                    && found.footprint.holds(at, margin)
+                    && (found.is_strange() || !stays(column))
+                {
                     *of_column = n as u32;
                 }
             }

@@ -51,12 +51,12 @@ fn what_stands_is_put_out_so() {
     let out = evaluated(&scratch, "kitti_odometry_00", &["--deskew", "off"]);
     let share = |class: &str| figure(&out, "semantic-kitti", &[class], "Put out as moving, %");
     for (class, most) in [
-        ("all that stands", 0.07),
-        ("building", 0.07),
+        ("all that stands", 0.02),
+        ("building", 0.02),
         ("vegetation", 0.03),
         ("fence", 0.02),
-        ("sidewalk", 0.22),
-        ("terrain", 0.6),
+        ("sidewalk", 0.02),
+        ("terrain", 0.35),
     ] {
         println!("{class}: {}", share(class));
         assert!(share(class) <= most, "{} % of {class}", share(class));

@@ -47,7 +47,7 @@ pub struct Args {
     #[command(flatten)]
     outputs: Outputs,
     /// How many times every window is looked at.
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     epochs: u32,
     /// Share of the held-out foreground that the threshold keeps.
     #[arg(long, default_value_t = 0.99, value_name = "SHARE")]
