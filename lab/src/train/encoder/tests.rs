@@ -99,23 +99,23 @@ fn rounded_it_is_core_s_bit_for_bit() {
 #[test]
 fn one_window_can_be_learned_by_heart_and_interrupted() {
     let scratch = Scratch::new();
-    let sample = few(&street(), 40);
+    let samples = [few(&street(), 40)];
     let file = scratch.path().join("checkpoint");
     let steps = 300;
-    let (state, losses) = fit(&[sample.clone()], steps, 1, Some(&file)).unwrap();
+    let (state, losses) = fit(&samples, steps, 1, Some(&file)).unwrap();
     assert!(losses[2] < 0.6 * losses[0], "{losses:?}");
     // Interrupted after the last checkpoint, it comes to the same end; other trainings refuse it.
-    let (again, _) = fit(&[sample.clone()], steps, 1, Some(&file)).unwrap();
+    let (again, _) = fit(&samples, steps, 1, Some(&file)).unwrap();
     assert!(again.numbers() == state.numbers());
     let error = |e: Result<_, Error>| e.map(|_: (Optimiser, _)| ()).unwrap_err().to_string();
-    let other = error(fit(&[sample.clone()], steps, 2, Some(&file)));
+    let other = error(fit(&samples, steps, 2, Some(&file)));
     assert!(other.contains("another training"), "{other}");
     let mut bytes = std::fs::read(&file).unwrap();
     *bytes.last_mut().unwrap() ^= 1;
     std::fs::write(&file, &bytes).unwrap();
-    let damaged = error(fit(&[sample.clone()], steps, 1, Some(&file)));
+    let damaged = error(fit(&samples, steps, 1, Some(&file)));
     assert!(damaged.contains("damaged"), "{damaged}");
     std::fs::write(&file, &bytes[..100]).unwrap();
-    let short = error(fit(&[sample], steps, 1, Some(&file)));
+    let short = error(fit(&samples, steps, 1, Some(&file)));
     assert!(short.contains("another length"), "{short}");
 }
