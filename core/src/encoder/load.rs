@@ -1,8 +1,8 @@
 //! Weights in the form the layers use, and the layers.
 
 use super::layers::*;
-use super::rows::{Plane, each_row};
-use super::{ColumnScores, View};
+use super::rows::{Plane, each_row, gathered};
+use super::{ColumnScores, PaddedWindow};
 use crate::team::Team;
 use crate::weights::{Weights, WeightsError};
 
@@ -108,20 +108,38 @@ impl EncoderWeights {
         })
     }
 
-    /// The 2 x 2 columns of a cell of the finest level, one after another.
-    #[inline]
-    pub(super) fn columns_of(
+    /// The finest level, of 2 x 2 columns a cell.
+    pub(super) fn down_from_columns(
         &self,
-        view: &View,
-        row: usize,
-        at: usize,
-    ) -> [i16; 4 * COLUMN_CHANNELS] {
-        let mut all = [0; 4 * COLUMN_CHANNELS];
-        for (n, x) in all.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
-            let masks = view.masks(2 * row + n / 2, 2 * at + n % 2);
-            *x = self.column(masks).map(i16::from);
-        }
-        all
+        team: &impl Team,
+        window: &PaddedWindow,
+        side: usize,
+        to: &mut [u8],
+    ) {
+        each_row(team, to, side * FINE_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<FINE_CHANNELS>().0.iter_mut().enumerate() {
+                let mut x = [0; 4 * COLUMN_CHANNELS];
+                for (n, x) in x.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
+                    let masks = window.masks(2 * row + n / 2, 2 * at + n % 2);
+                    *x = self.column(masks).map(i16::from);
+                }
+                *cell = self.dense::<DOWN_FINE, { 4 * COLUMN_CHANNELS }, FINE_CHANNELS>(&x);
+            }
+        });
+    }
+
+    /// From a level to the next coarser one, `ALL` numbers of 2 x 2 cells to a cell.
+    pub(super) fn down<const LAYER: usize, const IN: usize, const ALL: usize, const OUT: usize>(
+        &self,
+        team: &impl Team,
+        from: &Plane<IN>,
+        to: &mut [u8],
+    ) {
+        each_row(team, to, from.side / 2 * OUT, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<OUT>().0.iter_mut().enumerate() {
+                *cell = self.dense::<LAYER, ALL, OUT>(&gathered::<IN, ALL>(from, row, at));
+            }
+        });
     }
 
     /// Sums of a layer with their biases, before the shift.

@@ -22,7 +22,7 @@ use crate::team::Team;
 #[cfg(test)]
 use crate::weights::WeightsError;
 use layers::*;
-use rows::{Plane, each_row, gathered};
+use rows::{Plane, each_row};
 
 /// What a column may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -166,59 +166,10 @@ impl Encoder {
         }
         let (columns, weights) = (&self.columns, &self.weights);
         let phase = corner.map(|c| c.rem_euclid(OCTET as i32) as usize);
-        let n = (side + OCTET - 1).next_multiple_of(OCTET) / 2;
-        let Activations { fine, middle, coarse } = &mut self.activations;
-        let [fine, beside] = fine.each_mut().map(|level| &mut level[..n * n * FINE_CHANNELS]);
-        let [middle, beside_middle] =
-            middle.each_mut().map(|level| &mut level[..n * n / 4 * MIDDLE_CHANNELS]);
-        let [coarse, beside_coarse] =
-            coarse.each_mut().map(|level| &mut level[..n * n / 16 * COARSE_CHANNELS]);
-        let view = View { columns, side, phase };
-
-        each_row(team, fine, n * FINE_CHANNELS, &|row, out| {
-            for (at, cell) in out.as_chunks_mut::<FINE_CHANNELS>().0.iter_mut().enumerate() {
-                let x = weights.columns_of(&view, row, at);
-                *cell = weights.dense::<DOWN_FINE, { 4 * COLUMN_CHANNELS }, FINE_CHANNELS>(&x);
-            }
-        });
-        for first in BLOCKS_FINE {
-            weights.block::<FINE_CHANNELS>(team, first, n, fine, beside);
-        }
-        let down = Plane::<FINE_CHANNELS> { side: n, cells: fine };
-        each_row(team, middle, n / 2 * MIDDLE_CHANNELS, &|row, out| {
-            for (at, cell) in out.as_chunks_mut::<MIDDLE_CHANNELS>().0.iter_mut().enumerate() {
-                let x: [i16; 4 * FINE_CHANNELS] = gathered(&down, row, at);
-                *cell = weights.dense::<DOWN_MIDDLE, { 4 * FINE_CHANNELS }, MIDDLE_CHANNELS>(&x);
-            }
-        });
-        for first in BLOCKS_MIDDLE {
-            weights.block::<MIDDLE_CHANNELS>(team, first, n / 2, middle, beside_middle);
-        }
-        let down = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
-        each_row(team, coarse, n / 4 * COARSE_CHANNELS, &|row, out| {
-            for (at, cell) in out.as_chunks_mut::<COARSE_CHANNELS>().0.iter_mut().enumerate() {
-                let x: [i16; 4 * MIDDLE_CHANNELS] = gathered(&down, row, at);
-                *cell = weights.dense::<DOWN_COARSE, { 4 * MIDDLE_CHANNELS }, COARSE_CHANNELS>(&x);
-            }
-        });
-        for first in BLOCKS_COARSE {
-            weights.block::<COARSE_CHANNELS>(team, first, n / 4, coarse, beside_coarse);
-        }
-        let up = Plane::<COARSE_CHANNELS> { side: n / 4, cells: coarse };
-        weights.up::<UP_MIDDLE, COARSE_CHANNELS, MIDDLE_CHANNELS>(team, &up, middle);
-        let up = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
-        weights.up::<UP_FINE, MIDDLE_CHANNELS, FINE_CHANNELS>(team, &up, fine);
-        weights.block::<FINE_CHANNELS>(team, BLOCK_AFTER, n, fine, beside);
-
-        let up = Plane::<FINE_CHANNELS> { side: n, cells: fine };
-        let around = &mut beside[..n * n * COLUMN_CHANNELS];
-        each_row(team, around, n * COLUMN_CHANNELS, &|row, out| {
-            for (at, cell) in out.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
-                let x = up.at(row, at).map(i16::from);
-                *cell = weights.dense::<UP_COLUMN, FINE_CHANNELS, COLUMN_CHANNELS>(&x);
-            }
-        });
-        let around = Plane::<COLUMN_CHANNELS> { side: n, cells: around };
+        let window = PaddedWindow { columns, side, phase };
+        let mut levels = self.activations.levels((side + OCTET - 1).next_multiple_of(OCTET) / 2);
+        levels.fill(team, weights, &window);
+        let around = levels.around_columns(team, weights);
         each_row(team, &mut self.scores[..side * side], side, &|i, out| {
             for (j, scores) in out.iter_mut().enumerate() {
                 *scores = match columns[i * side + j] {
@@ -233,15 +184,89 @@ impl Encoder {
     }
 }
 
+impl Activations {
+    /// The part that a window needs whose finest level has `side` cells along an axis.
+    fn levels(&mut self, side: usize) -> Levels<'_> {
+        let cells = side * side;
+        Levels {
+            side,
+            fine: self.fine.each_mut().map(|l| &mut l[..cells * FINE_CHANNELS]),
+            middle: self.middle.each_mut().map(|l| &mut l[..cells / 4 * MIDDLE_CHANNELS]),
+            coarse: self.coarse.each_mut().map(|l| &mut l[..cells / 16 * COARSE_CHANNELS]),
+        }
+    }
+}
+
+/// The pyramid of one window: each level, and room for what a block makes of it on the way.
+struct Levels<'a> {
+    /// Cells of the finest along an axis.
+    side: usize,
+    fine: [&'a mut [u8]; 2],
+    middle: [&'a mut [u8]; 2],
+    coarse: [&'a mut [u8]; 2],
+}
+
+impl Levels<'_> {
+    /// Down to the coarsest level, and up again.
+    fn fill(&mut self, team: &impl Team, weights: &EncoderWeights, window: &PaddedWindow) {
+        let n = self.side;
+        let [fine, beside_fine] = &mut self.fine;
+        let [middle, beside_middle] = &mut self.middle;
+        let [coarse, beside_coarse] = &mut self.coarse;
+        weights.down_from_columns(team, window, n, fine);
+        for first in BLOCKS_FINE {
+            weights.block::<FINE_CHANNELS>(team, first, n, fine, beside_fine);
+        }
+        let from = Plane::<FINE_CHANNELS> { side: n, cells: fine };
+        weights.down::<DOWN_MIDDLE, FINE_CHANNELS, { 4 * FINE_CHANNELS }, MIDDLE_CHANNELS>(
+            team, &from, middle,
+        );
+        for first in BLOCKS_MIDDLE {
+            weights.block::<MIDDLE_CHANNELS>(team, first, n / 2, middle, beside_middle);
+        }
+        let from = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
+        weights.down::<DOWN_COARSE, MIDDLE_CHANNELS, { 4 * MIDDLE_CHANNELS }, COARSE_CHANNELS>(
+            team, &from, coarse,
+        );
+        for first in BLOCKS_COARSE {
+            weights.block::<COARSE_CHANNELS>(team, first, n / 4, coarse, beside_coarse);
+        }
+        let from = Plane::<COARSE_CHANNELS> { side: n / 4, cells: coarse };
+        weights.up::<UP_MIDDLE, COARSE_CHANNELS, MIDDLE_CHANNELS>(team, &from, middle);
+        let from = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
+        weights.up::<UP_FINE, MIDDLE_CHANNELS, FINE_CHANNELS>(team, &from, fine);
+        weights.block::<FINE_CHANNELS>(team, BLOCK_AFTER, n, fine, beside_fine);
+    }
+
+    /// What is around the columns of each pair.
+    fn around_columns(
+        &mut self,
+        team: &impl Team,
+        weights: &EncoderWeights,
+    ) -> Plane<'_, COLUMN_CHANNELS> {
+        let side = self.side;
+        let [fine, beside] = &mut self.fine;
+        let from = Plane::<FINE_CHANNELS> { side, cells: fine };
+        let around = &mut beside[..side * side * COLUMN_CHANNELS];
+        each_row(team, around, side * COLUMN_CHANNELS, &|row, out| {
+            for (at, cell) in out.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
+                let x = from.at(row, at).map(i16::from);
+                *cell = weights.dense::<UP_COLUMN, FINE_CHANNELS, COLUMN_CHANNELS>(&x);
+            }
+        });
+        Plane { side, cells: around }
+    }
+}
+
 /// The columns that the network sees.
-struct View<'a> {
+struct PaddedWindow<'a> {
     columns: &'a [Column],
     side: usize,
     /// Columns of the first octet that lie before the window, along each axis.
     phase: [usize; 2],
 }
 
-impl View<'_> {
+impl PaddedWindow<'_> {
     /// Masks of the column at a place of the padded window; unknown outside.
     fn masks(&self, i: usize, j: usize) -> u32 {
         let [i, j] = [i.wrapping_sub(self.phase[0]), j.wrapping_sub(self.phase[1])];

@@ -46,6 +46,8 @@ pub struct Cluster<'a> {
     pub centre: [f32; 2],
     /// Largest extent along an axis, voxels.
     pub extent: f32,
+    /// Whether the encoder takes it for what could move.
+    pub could_move: bool,
 }
 
 impl<'a> Cluster<'a> {
@@ -62,7 +64,9 @@ impl<'a> Cluster<'a> {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
         let extent = extent[0].max(extent[1]);
-        Cluster { scans, columns, samples, centre, extent }
+        let scores = columns.iter().map(|c| scans.could_move(*c as usize)).sum::<f32>();
+        let could_move = scores > scans.scaled.params.body_min * columns.len() as f32;
+        Cluster { scans, columns, samples, centre, extent, could_move }
     }
 
     /// Distance from the middle of the window, where the vehicle is, voxels, but not below the
@@ -117,8 +121,16 @@ impl<'a> Cluster<'a> {
     }
 
     /// Mean truncated residual of a motion, both ways, 0 (all lie on something) to 1 (none does).
+    /// What comes to lie where nothing can be seen is missed, unless the cluster could move and
+    /// most of it is seen: behind a corner anything fits.
     pub fn residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
         let scans = &self.scans;
+        if self.could_move {
+            let (residual, visible) = self.seen_residual(motion, visited);
+            if visible > scans.scaled.params.visible_ratio {
+                return residual;
+            }
+        }
         let mut mean = Mean::default();
         for target in scans.targets {
             for s in &self.samples {
@@ -141,23 +153,30 @@ impl<'a> Cluster<'a> {
     /// The same at rest, by what can be seen, 0 where nothing can; and the share of its returns
     /// that can be seen in the second sweep.
     pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
+        self.seen_residual(&Motion::around(self.centre), visited)
+    }
+
+    /// The same of a motion.
+    pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
         let scans = &self.scans;
         let mut mean = Mean::default();
-        self.samples.iter().filter_map(|s| scans.static_residual(s)).for_each(|m| mean.add(m));
+        let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, motion));
+        seen.for_each(|m| mean.add(m));
         let visible = mean.count / self.samples.len().max(1) as f32;
         for target in &scans.targets[1..] {
             for s in &self.samples {
-                let at = target.predict(s, &Motion::default());
+                let at = target.predict(s, motion);
                 if let Some(found) = target.cloud.nearest(at, s.sensor, scans.reach_inlier()) {
                     mean.add(scans.residual(scans.first, s, at, Some(found)));
                 }
             }
         }
-        let (still, target) = (Motion::around(self.centre), &scans.targets[0]);
-        for q in &self.target_samples(&still, visited) {
-            let at = target.retrace(q, &still);
+        let target = &scans.targets[0];
+        for q in &self.target_samples(motion, visited) {
+            let at = target.retrace(q, motion);
             let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
-            if found.is_some() || scans.is_free(scans.before, q.at) {
+            let now = core::array::from_fn(|a| at[a] + target.offset[a]);
+            if found.is_some() || scans.is_free(scans.before, now) {
                 mean.add(scans.residual(target.cloud, q, at, found));
             }
         }

@@ -69,14 +69,13 @@ impl Clusters {
         &self.found
     }
 
-    /// Finds the clusters and their motion. `stays` tells columns that go with none, `flow` is the
-    /// match of a column, `predicted` what its tracklet predicts.
+    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` what
+    /// its tracklet predicts.
     pub fn find(
         &mut self,
         team: &impl Team,
         scans: Scans,
         history: &History,
-        stays: impl Fn(usize) -> bool,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
         predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
     ) {
@@ -98,8 +97,9 @@ impl Clusters {
             found.is_dynamic &= found.cues.worn <= scans.scaled.params.worn_max;
         }
         self.take_along(scans);
-        self.leave_behind(&stays);
-        self.cover_ground(scans, stays);
+        self.complete_bodies(scans, predicted);
+        self.leave_behind(scans);
+        self.cover_ground(scans);
         self.look_back(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
         fill(team, 0, &mut self.misfit[..scans.first.side * scans.first.side], &|c| {
@@ -175,7 +175,7 @@ impl Clusters {
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_| 0);
         for n in 0..self.segments.len() {
             let columns = self.segments.columns(n);
-            let near = self.moving_neighbours(scans, columns);
+            let near = self.moving_neighbours(scans, columns, scans.scaled.fragment_distance);
             if near.is_empty() {
                 continue;
             }
@@ -189,19 +189,49 @@ impl Clusters {
         }
     }
 
+    /// What could move and touches a cluster that moves goes with it where it fits about as well:
+    /// the sides of a bus slide along themselves, its ends tell.
+    fn complete_bodies(
+        &mut self,
+        scans: Scans,
+        predicted: impl Fn(usize) -> Option<Prediction> + Copy,
+    ) {
+        let visited = &mut VisitedColumns::new();
+        let could_move = |c: usize| scans.could_move(c) > scans.scaled.params.body_min;
+        let part = |c: usize| could_move(c) && is_static(&self.of_column, &self.found, c);
+        self.segments.find(&scans, part, |_| 0);
+        for n in 0..self.segments.len() {
+            let columns = self.segments.columns(n);
+            let near = self.moving_neighbours(scans, columns, 1);
+            if near.is_empty() {
+                continue;
+            }
+            let rest = Cluster::new(scans, columns);
+            let with = near.iter().filter_map(|m| {
+                hypothesis::along_with(&rest, &self.found[*m as usize], predicted, visited)
+            });
+            let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
+            // Without room for one more it stands.
+            if best.is_some_and(|best| self.found.push(best).is_ok()) {
+                let id = self.found.len() as u32 - 1;
+                columns.iter().for_each(|c| self.of_column[*c as usize] = id);
+            }
+        }
+    }
+
     /// Takes columns that could not move from clusters that do. A cluster of mostly such stands,
     /// unless it was seen to come: what is like nothing that was learned may still move.
-    fn leave_behind(&mut self, stays: &impl Fn(usize) -> bool) {
+    fn leave_behind(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.likeness = 0);
         for c in 0..self.of_column.len() {
             let found = self.found.get_mut(self.of_column[c] as usize);
             if let Some(found) = found.filter(|f| f.is_dynamic) {
-                found.likeness += if stays(c) { -1 } else { 1 };
+                found.likeness += if scans.stays(c) { -1 } else { 1 };
             }
         }
         for c in 0..self.of_column.len() {
             let found = self.found.get(self.of_column[c] as usize);
-            if found.is_some_and(|f| f.is_dynamic && !f.is_strange()) && stays(c) {
+            if found.is_some_and(|f| f.is_dynamic && !f.is_strange()) && scans.stays(c) {
                 self.of_column[c] = NONE;
             }
         }
@@ -219,7 +249,7 @@ impl Clusters {
     }
 
     /// The ground below a moving cluster, where nothing else stands, goes with it.
-    fn cover_ground(&mut self, scans: Scans, stays: impl Fn(usize) -> bool) {
+    fn cover_ground(&mut self, scans: Scans) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
         for c in 0..side * side {
             let found = self.found.get_mut(self.of_column[c] as usize);
@@ -235,7 +265,7 @@ impl Clusters {
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
                 if *of_column == NONE
                     && found.footprint.holds(at, margin)
-                    && (found.is_strange() || !stays(column))
+                    && (found.is_strange() || !scans.stays(column))
                 {
                     *of_column = n as u32;
                 }
@@ -276,8 +306,9 @@ impl Clusters {
         &self,
         scans: Scans,
         columns: &[u32],
+        reach: usize,
     ) -> heapless::Vec<u32, NEIGHBOURS_MAX> {
-        let (side, reach) = (scans.first.side, scans.scaled.fragment_distance);
+        let side = scans.first.side;
         let mut near = heapless::Vec::new();
         for &c in columns {
             let (i, j) = (c as usize / side, c as usize % side);

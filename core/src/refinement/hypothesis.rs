@@ -144,9 +144,7 @@ pub fn test(
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
     let static_residual = cluster.static_residual(visited).0;
-    let predictions = cluster.columns.iter().filter_map(|c| predicted(*c as usize));
-    let count = cluster.columns.len();
-    let prior = Prior::of(count, params.prior_quorum, scaled.displacement_min, predictions);
+    let prior = prior_of(cluster, predicted);
     let cues =
         Cues::of_cluster(-params.evidence_min, static_residual, cluster.samples.len(), &prior);
     let found =
@@ -171,6 +169,38 @@ pub fn test(
     decide(cluster, Hypothesis { cues, ..found }, motion, residual, needed)
 }
 
+/// What the tracklets of a cluster's columns predict.
+fn prior_of(cluster: &Cluster, predicted: impl Fn(usize) -> Option<Prediction>) -> Prior {
+    let scaled = cluster.scans.scaled;
+    let predictions = cluster.columns.iter().filter_map(|c| predicted(*c as usize));
+    let count = cluster.columns.len();
+    Prior::of(count, scaled.params.prior_quorum, scaled.displacement_min, predictions)
+}
+
+/// The rest of a body that moves, if it fits that motion about as well as rest.
+pub fn along_with(
+    rest: &Cluster,
+    body: &Hypothesis,
+    predicted: impl Fn(usize) -> Option<Prediction>,
+    visited: &mut VisitedColumns,
+) -> Option<Hypothesis> {
+    let scaled = rest.scans.scaled;
+    let static_residual = rest.static_residual(visited).0;
+    let motion = rest.align(body.motion.about(rest.centre), 1, visited);
+    let residual = rest.seen_residual(&motion, visited).0;
+    let fits = residual < static_residual + scaled.params.remainder_residual
+        && motion.is_near(&body.motion, scaled.start_spacing);
+    let prior = prior_of(rest, predicted);
+    fits.then(|| Hypothesis {
+        motion: with_confidence(rest, motion, residual),
+        static_residual,
+        extent: rest.extent,
+        cues: Cues::of_cluster(body.cues.margin, residual, rest.samples.len(), &prior),
+        footprint: Footprint::along(&motion),
+        ..*body
+    })
+}
+
 /// Whether a motion is believed, which takes `needed` evidence, and how uncertain it is.
 fn decide(
     cluster: &Cluster,
@@ -185,16 +215,22 @@ fn decide(
     let fits = residual < params.residual_bad;
     let convinces = evidence > if fits { needed } else { BAD_FIT_EVIDENCE * needed };
     let likely = 1.0 / (1.0 + libm::expf((needed - evidence) / params.evidence_scale));
-    let footprint = libm::sqrtf(cluster.columns.len() as f32);
-    let confidence = scaled.confidence / (cluster.range() * footprint);
-    let covariance = motion.covariance * (confidence * variance_inflation(scaled, residual));
     Hypothesis {
         is_dynamic: convinces
             && motion.delta.xy().norm() > scaled.displacement_min
             && cluster.samples.len() >= params.returns_min as usize,
         variance: likely * (1.0 - likely),
         footprint: Footprint::along(&motion),
-        motion: Motion { covariance, ..motion },
+        motion: with_confidence(cluster, motion, residual),
         ..found
     }
+}
+
+/// A motion with the covariance that is put out, for how well it fits.
+fn with_confidence(cluster: &Cluster, motion: Motion, residual: f32) -> Motion {
+    let scaled = cluster.scans.scaled;
+    let footprint = libm::sqrtf(cluster.columns.len() as f32);
+    let confidence = scaled.confidence / (cluster.range() * footprint);
+    let covariance = motion.covariance * (confidence * variance_inflation(scaled, residual));
+    Motion { covariance, ..motion }
 }

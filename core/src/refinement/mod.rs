@@ -47,7 +47,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-use crate::encoder::{ColumnScores, could_move};
+use crate::encoder::ColumnScores;
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
 use crate::perceive::Perceived;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
@@ -114,7 +114,8 @@ impl Refinement {
     }
 
     /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's of its columns,
-    /// none where nothing is encoded, and `predicted` is what the tracklet of a column of the new window predicts.
+    /// none where nothing is encoded, and `predicted` is what the tracklet of a column of the new
+    /// window predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
@@ -137,8 +138,6 @@ impl Refinement {
             inside.then_some((i * step.side + j) as usize)
         };
         let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
-        let least = scaled.params.could_move_min;
-        let stays = |c: usize| scores.get(c).is_some_and(|s| could_move(s) < least);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span_s = self.clouds[newest].stamp_s - first.stamp_s;
         let mut targets = heapless::Vec::<Target, TARGETS_MAX>::new();
@@ -152,8 +151,8 @@ impl Refinement {
                 share: ((cloud.stamp_s - first.stamp_s) / span_s) as f32,
             });
         }
-        let scans = Scans { scaled, first, targets: &targets, before, now, span_s };
-        self.clusters.find(team, scans, &self.history, stays, flow, predicted);
+        let scans = Scans { scaled, first, targets: &targets, before, now, scores, span_s };
+        self.clusters.find(team, scans, &self.history, flow, predicted);
         self.history.push(&self.clouds[index(newest, 1)], |c| self.clusters.came(c));
     }
 

@@ -31,6 +31,18 @@ impl Motion {
         Motion { delta: Vector3::new(by[0], by[1], 0.0), ..self }
     }
 
+    /// The same motion about another centre.
+    pub fn about(&self, centre: [f32; 2]) -> Motion {
+        let [x, y] = self.of(centre);
+        Motion { delta: Vector3::new(x, y, self.delta.z), centre, ..*self }
+    }
+
+    /// Whether it displaces its centre by less than `distance` differently than another.
+    pub fn is_near(&self, other: &Motion, distance: f32) -> bool {
+        let [x, y] = other.of(self.centre);
+        libm::hypotf(self.delta.x - x, self.delta.y - y) < distance
+    }
+
     /// Displacement of a place, voxels.
     pub fn of(&self, at: [f32; 2]) -> [f32; 2] {
         let [x, y] = [at[0] - self.centre[0], at[1] - self.centre[1]];

@@ -4,6 +4,7 @@ use super::cloud::Cloud;
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
+use crate::encoder::{ColumnScores, could_move};
 use crate::params::LEVELS_MAX;
 use crate::record::Column;
 
@@ -55,11 +56,23 @@ pub struct Scans<'a> {
     pub before: &'a [Column],
     /// Columns of the second sweep.
     pub now: &'a [Column],
+    /// What the first sweep's columns are, nothing where nothing is encoded.
+    pub scores: &'a [ColumnScores],
     /// From the pair's first stamp to the second, s.
     pub span_s: f64,
 }
 
 impl Scans<'_> {
+    /// Score of a column of the first sweep, nats, of what could move; 0 where that is not told.
+    pub fn could_move(&self, column: usize) -> f32 {
+        self.scores.get(column).map_or(0.0, could_move)
+    }
+
+    /// Whether a column goes with no cluster.
+    pub fn stays(&self, column: usize) -> bool {
+        self.could_move(column) < self.scaled.params.could_move_min
+    }
+
     /// Whether rays passed through the voxel of a place of the second sweep's window, and none
     /// ended there: what was there is gone, or has come.
     pub fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {
@@ -100,8 +113,13 @@ impl Scans<'_> {
     /// Residual of a return of the first sweep in the second, if it was static: nothing where it
     /// cannot be seen.
     pub fn static_residual(&self, s: &CloudPoint) -> Option<f32> {
+        self.seen_residual(s, &Motion::default())
+    }
+
+    /// The same of a motion.
+    pub fn seen_residual(&self, s: &CloudPoint, motion: &Motion) -> Option<f32> {
         let target = &self.targets[0];
-        let at = target.predict(s, &Motion::default());
+        let at = target.predict(s, motion);
         let found = target.cloud.nearest(at, s.sensor, self.reach_inlier());
         let visible = found.is_some() || self.is_free(self.now, at);
         visible.then(|| self.residual(self.first, s, at, found))

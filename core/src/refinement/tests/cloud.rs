@@ -141,6 +141,7 @@ fn segments_are_what_a_flood_fill_reaches() {
             first: &cloud,
             targets: &[],
             before: &[],
+            scores: &[],
             now: &[],
             span_s: 0.1,
         };

@@ -7,6 +7,8 @@
 
 mod network;
 mod optimiser;
+mod parameters;
+mod planes;
 mod samples;
 #[cfg(test)]
 mod tests;
@@ -15,8 +17,9 @@ use super::inputs::{Inputs, Visit};
 use super::report::{Counts, Outputs, RECALLS};
 use super::weights_file::text;
 use crate::curve::{Curve, Operating};
-use network::{Network, Parameters};
+use network::Network;
 use optimiser::{Optimiser, Schedule};
+use parameters::Parameters;
 use raywake_core::digest::Digest;
 use raywake_core::encoder::layers::*;
 use raywake_core::encoder::{ColumnClass, Encoder, EncoderWeights, class_of};

@@ -1,6 +1,6 @@
 //! Adam (Kingma and Ba, 2015), the rounding of weights, and checkpoints.
 
-use super::network::Parameters;
+use super::parameters::Parameters;
 use raywake_core::digest::Digest;
 use raywake_core::encoder::layers::*;
 use raywake_io::Error;

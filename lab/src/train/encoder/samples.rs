@@ -102,8 +102,8 @@ fn moving(kind: Kind) -> Option<ColumnClass> {
 /// Share of the ground's columns that a step of training looks at: there are three times as many
 /// of them as of all others.
 const GROUND_KEPT: f64 = 0.25;
-/// Shares, in eighths, of voxels that are taken to be unknown, one of them for each step: sensors with fewer
-/// beams, and chapter 4's dropout of its input.
+/// Shares, in eighths, of voxels that are taken to be unknown, one of them for each step: sensors
+/// with fewer beams, and chapter 4's dropout of its input.
 const LOST_EIGHTHS: [u8; 4] = [0, 0, 1, 2];
 
 impl Sample {
