@@ -21,8 +21,9 @@ pub struct Clusters {
     /// Cluster of each column of the first sweep's window.
     of_column: [u32; COLUMNS_MAX],
     found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
-    /// By how much the returns of each column fit rest worse than its cluster's motion.
-    misfit: [f32; COLUMNS_MAX],
+    /// By how much the returns of each column fit rest worse than its cluster's motion, and the
+    /// encoder's score of what could move.
+    column_cues: [[f32; 2]; COLUMNS_MAX],
     /// Columns of those that there was no room for.
     pub beyond: usize,
     /// Columns that may be part of something that moves, a bit each.
@@ -35,7 +36,7 @@ impl Clusters {
             segments: Segments::new(),
             of_column: [0; COLUMNS_MAX],
             found: heapless::Vec::new(),
-            misfit: [0.0; COLUMNS_MAX],
+            column_cues: [[0.0; 2]; COLUMNS_MAX],
             beyond: 0,
             suspects: [0; COLUMNS_MAX.div_ceil(64)],
         }
@@ -54,8 +55,7 @@ impl Clusters {
 
     /// What tells whether a column moves.
     pub fn cues(&self, column: usize) -> Cues {
-        let misfit = self.misfit[column];
-        self.of(column).map_or(Cues::NONE, |found| Cues { misfit, ..found.cues })
+        self.of(column).map_or(Cues::NONE, |found| found.cues.of_column(self.column_cues[column]))
     }
 
     /// Whether a column is of a cluster that was seen to come from elsewhere.
@@ -102,11 +102,14 @@ impl Clusters {
         self.cover_ground(scans);
         self.look_back(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
-        fill(team, 0, &mut self.misfit[..scans.first.side * scans.first.side], &|c| {
+        fill(team, 0, &mut self.column_cues[..scans.first.side * scans.first.side], &|c| {
             let found = found.get(of_column[c] as usize);
             // What neither moves nor did tells nothing.
             let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
-            found.map_or(0.0, |f| scans.misfit(c, &f.motion))
+            // What is strange is like nothing that the encoder learned.
+            let could_move =
+                |f: &Hypothesis| if f.is_strange() { 0.0 } else { scans.could_move(c) };
+            found.map_or([0.0; 2], |f| [scans.misfit(c, &f.motion), could_move(f)])
         });
     }
 

@@ -9,6 +9,9 @@ use crate::params::MovesParams;
 /// The largest margin that counts: with more, it is plain.
 const MARGIN_MAX: f32 = 0.5;
 
+/// The highest score of what could move that counts: with more, it is plain.
+const COULD_MOVE_MAX: f32 = 4.0;
+
 /// Looks at a voxel that count as having found nothing, so that few do not tell much.
 const FEW_LOOKS: f32 = 8.0;
 
@@ -64,6 +67,8 @@ cues! {
         pub fresh: moves_fresh,
         /// By how much the column's own returns fit rest worse than the motion, -1 to 1.
         pub misfit: moves_misfit,
+        /// The encoder's score of what could move, nats: -4 to 4, 0 where it is not heard.
+        pub could_move: moves_could_move,
     }
 }
 
@@ -79,7 +84,13 @@ impl Cues {
             worn: 0.0,
             fresh: 0.0,
             misfit: 0.0,
+            could_move: 0.0,
         }
+    }
+
+    /// The same with those of a column: by how much it fits rest worse, and the encoder's score.
+    pub(super) fn of_column(self, [misfit, could_move]: [f32; 2]) -> Cues {
+        Cues { misfit, could_move: could_move.clamp(-COULD_MOVE_MAX, COULD_MOVE_MAX), ..self }
     }
 
     /// P(moves).
@@ -204,6 +215,7 @@ mod tests {
                 &mut cues.worn,
                 &mut cues.fresh,
                 &mut cues.misfit,
+                &mut cues.could_move,
             ];
             *all.into_iter().nth(n).unwrap() = 1.0;
             assert!((cues.probability(&params) - 0.75).abs() < 1e-6, "{name}");

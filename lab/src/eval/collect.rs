@@ -212,6 +212,7 @@ impl<'a> Collector<'a> {
             worn: flow.cues.worn,
             fresh: flow.cues.fresh,
             misfit: flow.cues.misfit,
+            could_move: flow.cues.could_move,
         }
     }
 

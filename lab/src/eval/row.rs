@@ -200,6 +200,8 @@ row! {
     fresh: f32,
     /// See `margin`.
     misfit: f32,
+    /// See `margin`.
+    could_move: f32,
 }
 
 impl Row {
@@ -237,8 +239,19 @@ impl Row {
 
     /// What its P(moves) was told by.
     pub fn cues(&self) -> Cues {
-        let Row { margin, share, residual, returns, certainty, worn, fresh, misfit, .. } = *self;
-        Cues { margin, share, residual, returns, certainty, worn, fresh, misfit }
+        let Row {
+            margin,
+            share,
+            residual,
+            returns,
+            certainty,
+            worn,
+            fresh,
+            misfit,
+            could_move,
+            ..
+        } = *self;
+        Cues { margin, share, residual, returns, certainty, worn, fresh, misfit, could_move }
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.
