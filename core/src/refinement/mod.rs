@@ -13,10 +13,12 @@
 //!    where none of these fits, a search.
 //! 4. A hypothesis test tells dynamic clusters from static ones ([`hypothesis`]): with r0 and r the
 //!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000),
-//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). Only what can be seen counts: a voxel
-//!    no ray reached tells nothing. A cluster that moved in the last sweep needs less.
-//! 5. A static cluster may have a part that moves; what remains of it, and fragments beside it, may
-//!    go with that ([`clusters`]).
+//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). At rest only what can be seen counts: a
+//!    voxel no ray reached tells nothing. Of a motion that holds, too, if the encoder says that the
+//!    cluster could move; of all else what comes to lie unseen is missed, because behind a corner
+//!    anything fits. A cluster that moved in the last sweep needs less.
+//! 5. A static cluster may have a part that moves; what remains of it, fragments beside it and what
+//!    the encoder takes for the rest of its body may go with that ([`clusters`]).
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
 //!    that found no match, and the ground below it ([`footprint`]). Covariances are inflated by the
 //!    residual ([`refined`]).
