@@ -13,13 +13,11 @@ use crate::params::Profile;
 use crate::perceive::{Machine, Perceive, Perceived, StageTimer};
 use crate::prepare::Setup;
 use crate::record::SweepUniform;
-use crate::refinement::{Prediction, Refinement};
+use crate::refinement::Refinement;
 use crate::returns::Returns;
 use crate::sweep::{Point, Sweep};
 use crate::team::Team;
-use crate::tracklet::observe::Observations;
-use crate::tracklet::state::state_of;
-use crate::tracklet::{TrackletTurnover, Tracklets};
+use crate::tracklet::{TrackletTurnover, Tracklets, observe::Observations, state::state_of};
 use crate::velocities::{FlowOfColumn, Found};
 
 /// The state between sweeps. Plain and large (see `memory-layout.md`): keep it in a static or a
@@ -124,14 +122,9 @@ impl Pipeline {
         perceived: &Perceived,
     ) -> u32 {
         let left = self.tracklets.place(sweep);
-        if pair.profile.refinement_sweeps > 0 {
-            let tracklets = &self.tracklets;
-            let cells = |v: f32| v * pair.dt_s as f32 / pair.profile.voxel_m as f32;
-            self.refinement.run(team, sweep, perceived, self.encoder.scores(), |column| {
-                let t = tracklets.at(column).filter(|t| t.age > 0)?;
-                Some(Prediction { by: t.ekf.velocity().0.map(cells), certainty: t.ekf.certainty() })
-            });
-        }
+        let [dt_s, voxel_m] = [pair.dt_s, pair.profile.voxel_m].map(|v| v as f32);
+        let predicted = |column| self.tracklets.predict(column, dt_s, voxel_m);
+        self.refinement.run(team, sweep, perceived, self.encoder.scores(), predicted);
         left
     }
 

@@ -16,7 +16,7 @@ mod tests;
 
 use crate::params::{Birth, COLUMNS_MAX, FOREGROUND_MAX, Frame, Profile, TrackletParams};
 use crate::record::{NONE, SweepUniform};
-use crate::refinement::cues::Cues;
+use crate::refinement::cues::{Cues, Prediction};
 use ekf::Ekf;
 use nalgebra::Matrix2;
 
@@ -147,6 +147,13 @@ impl Tracklets {
     /// The tracklet in a column of the new window, after [`Tracklets::place`].
     pub(crate) fn at(&self, column: usize) -> Option<&Tracklet> {
         self.now.get(self.slot_of_column[column] as usize)
+    }
+
+    /// What it predicts over `dt_s` seconds, voxels; nothing before it was observed again.
+    pub(crate) fn predict(&self, column: usize, dt_s: f32, voxel_m: f32) -> Option<Prediction> {
+        let ekf = self.at(column).filter(|t| t.age > 0)?.ekf;
+        let by = ekf.velocity().0.map(|v| v * dt_s / voxel_m);
+        Some(Prediction { by, certainty: ekf.certainty() })
     }
 
     /// Drops all.
