@@ -143,7 +143,9 @@ mod tests {
 
     #[test]
     fn weights_are_a_configuration() {
-        let text = configuration(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, -7.125]);
+        let mut weights = vec![1.0; Cues::WEIGHTS.len()];
+        weights.push(-7.125);
+        let text = configuration(&weights);
         assert!(
             text.starts_with("base = \"hdl64\"\nmoves_margin = 1.00\n")
                 && text.ends_with("moves_bias = -7.12\n")
