@@ -9,9 +9,9 @@
 //! provenance <one line>
 //! <integers, white space between them>
 //! ```
-//! A weight is its integer divided by `scale`. The product of `shape` plus one, the bias, which
-//! comes last, is how many integers there are. Text, so that a change shows in a review; integers,
-//! so that every machine computes with the same numbers.
+//! A weight is its integer divided by `scale`. The product of `shape`, plus one for the bias, which
+//! comes last where the kind has one, is how many integers there are. Text, so that a change shows
+//! in a review; integers, so that every machine computes with the same numbers.
 
 use crate::digest::Digest;
 use core::fmt;
@@ -63,8 +63,13 @@ impl fmt::Display for WeightsError {
 }
 
 impl<'a> Weights<'a> {
-    /// Parses `text`, which must be of `kind` and `shape`.
-    pub fn parse(text: &'a str, kind: &str, shape: &[usize]) -> Result<Weights<'a>, WeightsError> {
+    /// Parses `text`, which must be of `kind` and `shape` and have so many biases after it.
+    pub fn parse(
+        text: &'a str,
+        kind: &str,
+        shape: &[usize],
+        biases: usize,
+    ) -> Result<Weights<'a>, WeightsError> {
         let (magic, rest) = text.split_once('\n').ok_or(WeightsError::Magic)?;
         if magic != "raywake-weights 1" {
             return Err(WeightsError::Magic);
@@ -87,7 +92,7 @@ impl<'a> Weights<'a> {
         let scale = scale.ok_or(WeightsError::Header("scale"))?;
         let (provenance, values) = field(rest, "provenance")?;
         let weights = Weights { scale, provenance, values };
-        let count = shape.iter().product::<usize>() + 1;
+        let count = shape.iter().product::<usize>() + biases;
         let mut words = values.split_whitespace();
         for n in 0..count {
             let value = words.next().and_then(|w| w.parse::<i32>().ok());
@@ -99,7 +104,7 @@ impl<'a> Weights<'a> {
         Ok(weights)
     }
 
-    /// The integers, bias last.
+    /// The integers, a bias last.
     pub fn values(&self) -> impl Iterator<Item = i32> + use<'a> {
         // Every word was checked by `parse`.
         self.values.split_whitespace().map(|w| w.parse().unwrap_or(0))
@@ -127,10 +132,10 @@ mod tests {
     fn good_and_damaged_files() {
         let body = "kind toy\nshape 2 2\nscale 10\nprovenance hand\n1 2 -3\n4 5\n";
         let good = file(body);
-        let w = Weights::parse(&good, "toy", &[2, 2]).unwrap();
+        let w = Weights::parse(&good, "toy", &[2, 2], 1).unwrap();
         assert!(w.values().eq([1, 2, -3, 4, 5]));
         assert_eq!((w.scale, w.provenance), (10, "hand"));
-        let fails = |t: &str| Weights::parse(t, "toy", &[2, 2]).unwrap_err();
+        let fails = |t: &str| Weights::parse(t, "toy", &[2, 2], 1).unwrap_err();
         assert_eq!(fails(""), WeightsError::Magic);
         assert_eq!(fails(&good.replace("-3", "-4")), WeightsError::Checksum);
         assert_eq!(fails(&good[..good.len() - 1]), WeightsError::Checksum);

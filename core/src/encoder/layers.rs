@@ -111,7 +111,7 @@ pub const fn before(layer: usize) -> [usize; 2] {
 /// Weights, and outputs, of all layers.
 pub const TOTAL: [usize; 2] = before(LAYERS.len());
 
-/// Numbers of a weights file but the last: of each layer its weights, an output's after another's,
+/// Numbers of a weights file: of each layer its weights, an output's after another's,
 /// then a bias an output, then a shift an output.
 pub const NUMBERS: usize = TOTAL[0] + 2 * TOTAL[1];
 

@@ -18,9 +18,6 @@ pub struct EncoderWeights {
     shifts: [u8; TOTAL[1]],
     /// The first layer's.
     bytes: ByteTable,
-    /// The score, in sixteenths of a nat, that a share of what could move reaches: see the file's
-    /// provenance.
-    pub threshold: i32,
 }
 
 impl Default for EncoderWeights {
@@ -37,14 +34,13 @@ impl EncoderWeights {
             biases: [0; TOTAL[1]],
             shifts: [0; TOTAL[1]],
             bytes: [[[0; COLUMN_CHANNELS]; 256]; 4],
-            threshold: 0,
         }
     }
 
-    /// Replaces them by those of a file of kind `encoder`; see [`NUMBERS`]. The last number is the
-    /// threshold. Left as they were where it fails.
+    /// Replaces them by those of a file of kind `encoder`; see [`NUMBERS`]. Left as they
+    /// were where it fails.
     pub fn load(&mut self, text: &str, levels: usize) -> Result<(), WeightsError> {
-        let file = Weights::parse(text, "encoder", &[NUMBERS])?;
+        let file = Weights::parse(text, "encoder", &[NUMBERS], 0)?;
         if levels != LEVELS {
             return Err(WeightsError::Shape);
         }
@@ -72,7 +68,6 @@ impl EncoderWeights {
             self.biases[outputs.clone()].fill_with(|| values.next().unwrap_or(0));
             self.shifts[outputs].fill_with(|| values.next().unwrap_or(0) as u8);
         }
-        self.threshold = values.next().unwrap_or(0);
         self.fill_bytes();
         Ok(())
     }

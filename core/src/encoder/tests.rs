@@ -7,7 +7,6 @@ use crate::random::Random;
 use crate::team::Alone;
 use std::fmt::Write;
 use std::string::String;
-
 use std::vec::Vec;
 
 /// A weights file of these numbers.
@@ -21,7 +20,7 @@ fn whole(random: &mut Random, range: core::ops::Range<i32>) -> i32 {
     range.start + random.below(range.len()) as i32
 }
 
-/// Numbers anywhere in their ranges, by layer, and a threshold.
+/// Numbers anywhere in their ranges, by layer.
 fn drawn(random: &mut Random) -> Vec<i32> {
     let mut numbers = Vec::new();
     for layer in LAYERS {
@@ -29,7 +28,6 @@ fn drawn(random: &mut Random) -> Vec<i32> {
         numbers.extend((0..layer.outputs).map(|_| whole(random, -3000..9000)));
         numbers.extend((0..layer.outputs).map(|_| whole(random, 6..11)));
     }
-    numbers.push(-50);
     numbers
 }
 
@@ -162,7 +160,6 @@ fn scores_are_those_of_the_formulas() {
         let columns = columns(&mut random, side);
         let mut weights = EncoderWeights::new();
         weights.load(&file(&numbers), LEVELS).unwrap();
-        assert_eq!(weights.threshold, -50);
         let scores = encoded(&weights, &columns, side, corner);
         assert!(scores == Naive { numbers: &numbers }.scores(&columns, side, corner), "{side}");
         assert!(side < 40 || scores.iter().collect::<std::collections::BTreeSet<_>>().len() > 50);
@@ -205,5 +202,5 @@ fn files_that_do_not_fit_are_refused() {
     assert_eq!(fails(&|n| n[BITS * 16] = BIAS_MAX, LEVELS), WeightsError::Range);
     assert_eq!(fails(&|n| n[BITS * 16 + 16] = SHIFT_MAX + 1, LEVELS), WeightsError::Range);
     assert_eq!(fails(&|n| n[BITS * 16 + 16] = -1, LEVELS), WeightsError::Range);
-    assert!(matches!(fails(&|n| n.truncate(NUMBERS), LEVELS), WeightsError::Value(_)));
+    assert!(matches!(fails(&|n| n.truncate(NUMBERS - 1), LEVELS), WeightsError::Value(_)));
 }

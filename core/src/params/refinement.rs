@@ -99,19 +99,19 @@ crate::params! {
             "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before \
              what stands below was its footprint).";
         /// Columns whose score of what could move (see [`crate::encoder`]) is below this go with no
-        /// cluster, unless most of it is like that and it was seen to come.
+        /// cluster that moves, unless most of that cluster is like them and it was seen to come.
         pub could_move_min: f32 = -4.0, "nat", (-8 to 8),
             "Columns true / false / missed of cluttered streets (`raywake-lab sim --drives 2 \
-             --sweeps 25 --seed 4200 --scenery street-cluttered --sensor vlp32x2`): 20,187 / 591 / \
-             4,032 without the encoder, 20,154 / 427 / 4,065 at -5, 20,073 / 392 / 4,146 here, \
-             19,985 / 353 / 4,234 at -3.";
+             --sweeps 25 --seed 4200 --scenery street-cluttered --sensor vlp32x2`): 18,916 / 442 / \
+             5,303 without the encoder, 22,203 / 388 / 2,016 at -5, 22,163 / 386 / 2,056 here, \
+             22,144 / 378 / 2,075 at -3.";
         /// A cluster whose mean score is above this is judged by what can be seen of it alone;
         /// columns above it that touch a cluster that moves go with it where they fit its motion
         /// about as well as rest (`remainder_residual`).
         pub body_min: f32 = 1.0, "nat", (-8 to 8),
-            "Columns true / false / missed of cluttered streets as above: 20,073 / 392 / 4,146 at \
-             8, which no score exceeds, 22,073 / 403 / 2,146 at 2, 22,200 / 410 / 2,019 here, \
-             22,229 / 412 / 1,990 at 0.";
+            "Columns true / false / missed of cluttered streets as above: 19,868 / 352 / 4,351 at \
+             7.99, which no score exceeds, 22,035 / 377 / 2,184 at 2, 22,163 / 386 / 2,056 here, \
+             22,164 / 387 / 2,055 at 0.";
         /// A cluster stands if something was hit in more than this share of looks at its voxels
         /// in sweeps in which, by its motion, it was not there yet.
         pub worn_max: f32 = 0.5, "", (0 to 1),
@@ -140,11 +140,12 @@ crate::params! {
         /// By how much the motion of a part may fit a column beside it worse than rest does.
         pub growth_residual: f32 = 0.03, "", (0 to 1), SIMULATED;
         /// By how much the motion of its larger part may fit the remainder of a cluster worse than
-        /// rest does.
+        /// rest does, and the motion of a body what could move and touches it.
         pub remainder_residual: f32 = 0.05, "", (0 to 1), SIMULATED;
         /// Share of a cluster's extent that a part must exceed to take the remainder along.
         pub remainder_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
-        /// Share of its returns that must be visible before rest is believed.
+        /// Share of its returns that must be visible before rest is believed, and before a motion
+        /// of what could move is judged by those alone.
         pub visible_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
         /// How far a fragment may lie from a moving cluster that takes it along.
         pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;

@@ -2,7 +2,7 @@
 //! take along.
 
 use super::cluster::{Cluster, VisitedColumns};
-use super::cues::{Cues, Looks, Prediction};
+use super::cues::{ColumnCues, Cues, Looks, Prediction};
 use super::history::History;
 use super::hypothesis::{self, Hypothesis, evidence};
 use super::motion::Motion;
@@ -21,9 +21,7 @@ pub struct Clusters {
     /// Cluster of each column of the first sweep's window.
     of_column: [u32; COLUMNS_MAX],
     found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
-    /// By how much the returns of each column fit rest worse than its cluster's motion, and the
-    /// encoder's score of what could move.
-    column_cues: [[f32; 2]; COLUMNS_MAX],
+    column_cues: [ColumnCues; COLUMNS_MAX],
     /// Columns of those that there was no room for.
     pub beyond: usize,
     /// Columns that may be part of something that moves, a bit each.
@@ -36,7 +34,7 @@ impl Clusters {
             segments: Segments::new(),
             of_column: [0; COLUMNS_MAX],
             found: heapless::Vec::new(),
-            column_cues: [[0.0; 2]; COLUMNS_MAX],
+            column_cues: [ColumnCues::NONE; COLUMNS_MAX],
             beyond: 0,
             suspects: [0; COLUMNS_MAX.div_ceil(64)],
         }
@@ -55,7 +53,7 @@ impl Clusters {
 
     /// What tells whether a column moves.
     pub fn cues(&self, column: usize) -> Cues {
-        self.of(column).map_or(Cues::NONE, |found| found.cues.of_column(self.column_cues[column]))
+        self.of(column).map_or(Cues::NONE, |found| found.cues.with(self.column_cues[column]))
     }
 
     /// Whether a column is of a cluster that was seen to come from elsewhere.
@@ -106,10 +104,10 @@ impl Clusters {
             let found = found.get(of_column[c] as usize);
             // What neither moves nor did tells nothing.
             let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
-            // What is strange is like nothing that the encoder learned.
-            let could_move =
-                |f: &Hypothesis| if f.is_strange() { 0.0 } else { scans.could_move(c) };
-            found.map_or([0.0; 2], |f| [scans.misfit(c, &f.motion), could_move(f)])
+            found.map_or(ColumnCues::NONE, |f| ColumnCues {
+                misfit: scans.misfit(c, &f.motion),
+                could_move: f.could_move(&scans, c),
+            })
         });
     }
 
@@ -210,8 +208,10 @@ impl Clusters {
                 continue;
             }
             let rest = Cluster::new(scans, columns);
+            let static_residual = rest.static_residual(visited).0;
             let with = near.iter().filter_map(|m| {
-                hypothesis::along_with(&rest, &self.found[*m as usize], predicted, visited)
+                let body = &self.found[*m as usize];
+                hypothesis::along_with(&rest, static_residual, body, predicted, visited)
             });
             let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
             // Without room for one more it stands.
@@ -234,7 +234,7 @@ impl Clusters {
         }
         for c in 0..self.of_column.len() {
             let found = self.found.get(self.of_column[c] as usize);
-            if found.is_some_and(|f| f.is_dynamic && !f.is_strange()) && scans.stays(c) {
+            if found.is_some_and(|f| f.is_dynamic && !f.may_take(&scans, c)) {
                 self.of_column[c] = NONE;
             }
         }
@@ -268,7 +268,7 @@ impl Clusters {
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
                 if *of_column == NONE
                     && found.footprint.holds(at, margin)
-                    && (found.is_strange() || !scans.stays(column))
+                    && found.may_take(&scans, column)
                 {
                     *of_column = n as u32;
                 }
@@ -304,7 +304,7 @@ impl Clusters {
         best.1
     }
 
-    /// Moving clusters near a fragment.
+    /// Moving clusters that have columns up to `reach` columns from those of a fragment.
     fn moving_neighbours(
         &self,
         scans: Scans,

@@ -9,7 +9,8 @@ use crate::params::MovesParams;
 /// The largest margin that counts: with more, it is plain.
 const MARGIN_MAX: f32 = 0.5;
 
-/// The highest score of what could move that counts: with more, it is plain.
+/// The highest score of what could move that counts, nats: with more, it is plain. Not measured on
+/// its own.
 const COULD_MOVE_MAX: f32 = 4.0;
 
 /// Looks at a voxel that count as having found nothing, so that few do not tell much.
@@ -72,6 +73,20 @@ cues! {
     }
 }
 
+/// What a column tells beside its cluster.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ColumnCues {
+    /// By how much its returns fit rest worse than its cluster's motion.
+    pub misfit: f32,
+    /// The encoder's score of what could move, nats.
+    pub could_move: f32,
+}
+
+impl ColumnCues {
+    /// Nothing told.
+    pub const NONE: ColumnCues = ColumnCues { misfit: 0.0, could_move: 0.0 };
+}
+
 impl Cues {
     /// Of a cluster; those of a column are missing.
     pub(super) fn of_cluster(margin: f32, residual: f32, returns: usize, prior: &Prior) -> Cues {
@@ -88,8 +103,8 @@ impl Cues {
         }
     }
 
-    /// The same with those of a column: by how much it fits rest worse, and the encoder's score.
-    pub(super) fn of_column(self, [misfit, could_move]: [f32; 2]) -> Cues {
+    /// The same with those of a column.
+    pub(super) fn with(self, ColumnCues { misfit, could_move }: ColumnCues) -> Cues {
         Cues { misfit, could_move: could_move.clamp(-COULD_MOVE_MAX, COULD_MOVE_MAX), ..self }
     }
 

@@ -11,6 +11,7 @@ use super::cues::{Cues, Looks, Prediction, Prior};
 use super::footprint::Footprint;
 use super::motion::Motion;
 use super::scaled::Scaled;
+use super::scans::Scans;
 use super::search::search;
 use super::starts::Votes;
 use crate::record::Flow;
@@ -60,9 +61,20 @@ impl Hypothesis {
         self.cues.fresh >= FRESH_MIN
     }
 
-    /// Whether it was seen to come and is like nothing that could move.
-    pub fn is_strange(&self) -> bool {
+    /// Whether it was seen to come and is like nothing that could move: the encoder, which learned
+    /// nothing like it, is not heard then.
+    fn is_strange(&self) -> bool {
         self.likeness < 0 && self.came()
+    }
+
+    /// Whether a column may go with it.
+    pub fn may_take(&self, scans: &Scans, column: usize) -> bool {
+        self.is_strange() || !scans.stays(column)
+    }
+
+    /// The encoder's score of what could move of one of its columns, nats; 0 where it is not heard.
+    pub fn could_move(&self, scans: &Scans, column: usize) -> f32 {
+        if self.is_strange() { 0.0 } else { scans.could_move(column) }
     }
 }
 
@@ -177,25 +189,30 @@ fn prior_of(cluster: &Cluster, predicted: impl Fn(usize) -> Option<Prediction>) 
     Prior::of(count, scaled.params.prior_quorum, scaled.displacement_min, predictions)
 }
 
-/// The rest of a body that moves, if it fits that motion about as well as rest.
+/// The rest of a body that moves, if it fits that motion about as well as rest, of which the
+/// residual is `static_residual`.
 pub fn along_with(
     rest: &Cluster,
+    static_residual: f32,
     body: &Hypothesis,
     predicted: impl Fn(usize) -> Option<Prediction>,
     visited: &mut VisitedColumns,
 ) -> Option<Hypothesis> {
     let scaled = rest.scans.scaled;
-    let static_residual = rest.static_residual(visited).0;
     let motion = rest.align(body.motion.about(rest.centre), 1, visited);
     let residual = rest.seen_residual(&motion, visited).0;
     let fits = residual < static_residual + scaled.params.remainder_residual
         && motion.is_near(&body.motion, scaled.start_spacing);
-    let prior = prior_of(rest, predicted);
     fits.then(|| Hypothesis {
         motion: with_confidence(rest, motion, residual),
         static_residual,
         extent: rest.extent,
-        cues: Cues::of_cluster(body.cues.margin, residual, rest.samples.len(), &prior),
+        cues: Cues::of_cluster(
+            body.cues.margin,
+            residual,
+            rest.samples.len(),
+            &prior_of(rest, predicted),
+        ),
         footprint: Footprint::along(&motion),
         ..*body
     })

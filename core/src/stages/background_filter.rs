@@ -19,7 +19,7 @@ pub const TABLE_WORDS: usize = FILTER_TABLE + 1;
 /// `background`, shape (25 columns with di outermost, 2 for free then occupied, levels).
 pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsError> {
     assert!(table.len() == TABLE_WORDS && levels <= LEVELS_MAX);
-    let weights = Weights::parse(text, "background", &[PATCH * PATCH, 2, levels])?;
+    let weights = Weights::parse(text, "background", &[PATCH * PATCH, 2, levels], 1)?;
     let largest: i64 = weights.values().map(|w| (w as i64).abs()).sum();
     if largest > i32::MAX as i64 {
         return Err(WeightsError::Range);

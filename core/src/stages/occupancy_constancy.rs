@@ -55,7 +55,7 @@ pub fn load(
     costs: &mut [u32],
 ) -> Result<Scores, WeightsError> {
     assert!(weights.len() == WEIGHT_WORDS && costs.len() == SCORES_MAX && levels <= LEVELS_MAX);
-    let file = Weights::parse(text, "constancy", &[3, levels])?;
+    let file = Weights::parse(text, "constancy", &[3, levels], 1)?;
     weights.fill(0);
     for (n, value) in file.values().enumerate() {
         let at = if n < 3 * levels { n / levels * LEVELS_MAX + n % levels } else { 3 * LEVELS_MAX };

@@ -139,7 +139,7 @@ fn measure(name: &str, text: &str, data: &Data, pairs: &[Pair]) -> Result<Measur
     let mut counts = [Ranking::default(); 2];
     let mut ranker = Ranker::new(Profile::hdl64().columns());
     pairs.iter().for_each(|pair| ranker.add(&tables, pair, &mut counts));
-    let file = Weights::parse(text, "constancy", &[3, LEVELS])
+    let file = Weights::parse(text, "constancy", &[3, LEVELS], 1)
         .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
     let weights: Vec<f64> = file.values().map(|w| f64::from(w) / f64::from(file.scale)).collect();
     let rows = data.rows.chunks_exact(WIDTH).zip(&data.labels);

@@ -1,7 +1,6 @@
 //! Weights files, as `raywake_core::weights` reads them.
 
 use raywake_core::digest::Digest;
-use std::fmt::Write;
 
 /// Numbers of a line at most.
 const LINE: usize = 32;
@@ -12,20 +11,19 @@ pub fn quantise(weights: &[f64], scale: f64) -> Vec<i32> {
 }
 
 /// Text of a file of `kind` and `shape`, its last number being the levels: one line per column of
-/// levels, then the bias, which comes last in `weights`. `provenance` is one line.
+/// levels, then a line of what `weights` has beyond the shape, a bias. `provenance` is one line.
 pub fn text(kind: &str, shape: &[usize], scale: f64, weights: &[i32], provenance: &str) -> String {
-    let (bias, weights) = weights.split_last().expect("there is a bias");
+    let (weights, biases) = weights.split_at(shape.iter().product());
     let shape_text: Vec<String> = shape.iter().map(usize::to_string).collect();
     let mut body = format!(
         "kind {kind}\nshape {}\nscale {scale}\nprovenance {provenance}\n",
         shape_text.join(" ")
     );
     let line = *shape.last().expect("a shape has levels");
-    for levels in weights.chunks(line.min(LINE)) {
+    for levels in weights.chunks(line.min(LINE)).chain(biases.chunks(LINE)) {
         let line: Vec<String> = levels.iter().map(i32::to_string).collect();
         body += &line.join(" ");
         body.push('\n');
     }
-    let _ = writeln!(body, "{bias}");
     format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()))
 }

@@ -224,9 +224,9 @@ fn what_moved_goes_on_by_less() {
     assert_eq!(moving(&still, Some([1.2, 0.0])), 0);
 }
 
-/// What a column may be told to be: nothing, or what could move for sure.
-fn sure(could_move: &dyn Fn(usize) -> bool) -> Vec<ColumnScores> {
-    (0..SIDE * SIDE).map(|c| [if could_move(c) { 127 } else { 0 }; SCORES]).collect()
+/// The same scores for every column: 127 for what could move for sure, 0 for what is not told.
+fn scored(score: i8) -> Vec<ColumnScores> {
+    vec![[score; SCORES]; SIDE * SIDE]
 }
 
 #[test]
@@ -244,11 +244,11 @@ fn the_rest_of_a_body_goes_with_the_part_that_tells() {
     let still = [0.0; 3].map(long_side);
     let part = moving(&steady, &[]);
     assert!((1..20).contains(&part), "{part}");
-    let whole = moving(&steady, &sure(&|_| true));
+    let whole = moving(&steady, &scored(127));
     // The side has 40 columns.
     assert!(whole >= 40, "{whole}, {part} of them by themselves");
-    assert!(moving(&steady, &sure(&|_| false)) == part);
-    assert_eq!(moving(&still, &sure(&|_| true)), 0);
+    assert!(moving(&steady, &scored(0)) == part);
+    assert_eq!(moving(&still, &scored(127)), 0);
 }
 
 #[test]
@@ -285,6 +285,6 @@ fn what_could_move_may_go_where_nothing_is_seen() {
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
         cluster.residual(&motion, &mut VisitedColumns::new())
     };
-    let [unknown, known] = [residual(&[]), residual(&sure(&|_| true))];
+    let [unknown, known] = [residual(&[]), residual(&scored(127))];
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
 }

@@ -52,9 +52,6 @@ pub struct Args {
     /// How many times every window is looked at.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     epochs: u32,
-    /// Share of the held-out foreground that the threshold keeps.
-    #[arg(long, default_value_t = 0.99, value_name = "SHARE")]
-    keep: f64,
     /// File to go on from where training was interrupted.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
@@ -75,9 +72,6 @@ struct Report {
 
 /// Trains, writes and reports.
 pub fn run(args: &Args) -> Result<(), Error> {
-    if !(0.5..1.0).contains(&args.keep) {
-        return Err(Error::Usage("--keep must be at least 0.5 and below 1".into()));
-    }
     let inputs = Inputs { cluttered: true, ..args.inputs.clone() };
     let (text, report) = learn(&inputs, args)?;
     args.outputs.write(&text, &report)
@@ -98,10 +92,8 @@ fn learn(inputs: &Inputs, args: &Args) -> Result<(String, Report), Error> {
     counts[1].both("held-out", "columns of objects", "columns of the background")?;
     let steps = (training.len() * args.epochs as usize).div_ceil(BATCH);
     let (state, losses) = fit(&training, steps, inputs.seed, args.checkpoint.as_deref())?;
-    let mut numbers = state.numbers();
-    let verdict = judge(&held_out, &numbers, &inputs.provenance())?;
-    numbers.push(verdict.0.at_recall(args.keep).threshold.floor() as i32);
-    let (curve, confusion) = verdict;
+    let numbers = state.numbers();
+    let (curve, confusion) = judge(&held_out, &numbers, &inputs.provenance())?;
     let at_95 = curve.at_recall(0.95);
     let provenance = format!(
         "raywake-lab train encoder, {}, {} epochs, held out: AUC {:.4}, background rejected at \
@@ -226,9 +218,7 @@ fn judge(
     numbers: &[i32],
     provenance: &str,
 ) -> Result<(Curve, Vec<Vec<f64>>), Error> {
-    let mut numbers = numbers.to_vec();
-    numbers.push(0);
-    let file = text("encoder", &[NUMBERS], f64::from(ONE), &numbers, provenance);
+    let file = text("encoder", &[NUMBERS], f64::from(ONE), numbers, provenance);
     let mut weights = EncoderWeights::new();
     weights
         .load(&file, LEVELS)

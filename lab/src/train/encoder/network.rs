@@ -233,6 +233,7 @@ impl Network {
         of_scores: Vec<f32>,
         into: &mut Parameters,
     ) {
+        let mut gradients = Gradients { of: p, into };
         let planes = &tape.planes;
         let mut slopes: Vec<Vec<f32>> = planes.iter().map(|x| vec![0.0; x.len()]).collect();
         *slopes.last_mut().expect("there are planes") = of_scores;
@@ -240,32 +241,32 @@ impl Network {
             match op {
                 Op::Columns { out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
-                    columns_slope(into, &input.masks, &slope);
+                    gradients.columns(&input.masks, &slope);
                 }
                 Op::Down { layer, from, gathered, out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
                     let mut below = vec![0.0; planes[gathered].len()];
-                    dense_slope(p, into, layer, &planes[gathered], &slope, &mut below);
+                    gradients.dense(layer, &planes[gathered], &slope, &mut below);
                     scatter(&below, LAYERS[layer].inputs / 4, &mut slopes[from]);
                 }
                 Op::Depthwise { layer, from, out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
-                    depthwise_slope(p, into, layer, &planes[from], &slope, &mut slopes[from]);
+                    gradients.depthwise(layer, &planes[from], &slope, &mut slopes[from]);
                 }
                 Op::Add { layer, from, to, out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
-                    dense_slope(p, into, layer, &planes[from], &slope, &mut slopes[from]);
+                    gradients.dense(layer, &planes[from], &slope, &mut slopes[from]);
                     add_slices(&mut slopes[to], &slope);
                 }
                 Op::AddUp { layer, from, to, out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
                     let sums = summed(&slope, LAYERS[layer].outputs);
-                    dense_slope(p, into, layer, &planes[from], &sums, &mut slopes[from]);
+                    gradients.dense(layer, &planes[from], &sums, &mut slopes[from]);
                     add_slices(&mut slopes[to], &slope);
                 }
                 Op::Dense { layer, from, out } => {
                     let slope = passed(&planes[out], &slopes[out], 0.0);
-                    dense_slope(p, into, layer, &planes[from], &slope, &mut slopes[from]);
+                    gradients.dense(layer, &planes[from], &slope, &mut slopes[from]);
                 }
                 Op::Pick { around, columns, out } => {
                     let both = std::mem::take(&mut slopes[out]);
@@ -278,7 +279,7 @@ impl Network {
                 Op::Score { from, out } => {
                     let least = -(TOP as f32) / ONE as f32;
                     let slope = passed(&planes[out], &slopes[out], least);
-                    dense_slope(p, into, SCORE, &planes[from], &slope, &mut slopes[from]);
+                    gradients.dense(SCORE, &planes[from], &slope, &mut slopes[from]);
                 }
             }
         }

@@ -89,7 +89,7 @@ impl Optimiser {
 
     /// Every number as core has it: weights, biases and shifts by layer.
     pub fn numbers(&self) -> Vec<i32> {
-        let mut numbers = Vec::with_capacity(NUMBERS + 1);
+        let mut numbers = Vec::with_capacity(NUMBERS);
         for (n, layer) in LAYERS.iter().enumerate() {
             let [weights, outputs] = before(n);
             let shifts = &self.shifts[outputs..][..layer.outputs];

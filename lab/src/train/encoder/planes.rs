@@ -81,35 +81,54 @@ pub fn add_slices(to: &mut [f32], values: &[f32]) {
     to.iter_mut().zip(values).for_each(|(t, v)| *t += v);
 }
 
-/// Adds the gradients of the first layer.
-pub fn columns_slope(into: &mut Parameters, masks: &[u32], slope: &[f32]) {
-    let (weights, biases) = into.of_mut(COLUMN);
-    let mut by_bit = transposed::<COLUMN_CHANNELS>(weights);
-    for (&masks, slope) in masks.iter().zip(slope.chunks(COLUMN_CHANNELS)) {
-        add_slices(biases, slope);
-        for bit in bits(masks) {
-            add_slices(&mut by_bit[bit], slope);
-        }
-    }
-    for (bit, of_bit) in by_bit.iter().enumerate() {
-        for (channel, w) in of_bit.iter().enumerate() {
-            weights[channel * BITS + bit] = *w;
-        }
-    }
+/// Gradients by some parameters, added to what is there.
+pub struct Gradients<'a> {
+    pub of: &'a Parameters,
+    pub into: &'a mut Parameters,
 }
 
-/// Adds the gradients of a dense layer, and to `below` that of what entered it.
-pub fn dense_slope(
-    p: &Parameters,
-    into: &mut Parameters,
-    layer: usize,
-    x: &[f32],
-    slope: &[f32],
-    below: &mut [f32],
-) {
-    let Layer { inputs, outputs } = LAYERS[layer];
-    let (weights, into) = (p.of(layer).0, into.of_mut(layer));
-    of_size!(dense_slope_sized(weights, into, x, slope, below) of (inputs, outputs));
+impl Gradients<'_> {
+    /// Of the first layer.
+    pub fn columns(&mut self, masks: &[u32], slope: &[f32]) {
+        let (weights, biases) = self.into.of_mut(COLUMN);
+        let mut by_bit = transposed::<COLUMN_CHANNELS>(weights);
+        for (&masks, slope) in masks.iter().zip(slope.chunks(COLUMN_CHANNELS)) {
+            add_slices(biases, slope);
+            for bit in bits(masks) {
+                add_slices(&mut by_bit[bit], slope);
+            }
+        }
+        for (bit, of_bit) in by_bit.iter().enumerate() {
+            for (channel, w) in of_bit.iter().enumerate() {
+                weights[channel * BITS + bit] = *w;
+            }
+        }
+    }
+
+    /// Of a dense layer; that of what entered it, `x`, is added to `below`.
+    pub fn dense(&mut self, layer: usize, x: &[f32], slope: &[f32], below: &mut [f32]) {
+        let Layer { inputs, outputs } = LAYERS[layer];
+        let (weights, into) = (self.of.of(layer).0, self.into.of_mut(layer));
+        of_size!(dense_slope_sized(weights, into, x, slope, below) of (inputs, outputs));
+    }
+
+    /// Of a depthwise layer, as of a dense one.
+    pub fn depthwise(&mut self, layer: usize, x: &[f32], slope: &[f32], below: &mut [f32]) {
+        let channels = LAYERS[layer].outputs;
+        let by_tap = by_tap(self.of.of(layer).0, channels);
+        let mut of_taps = vec![vec![0.0; channels]; TAPS];
+        each_tap(side_of(x, channels), |cell, other, tap| {
+            let slope = &slope[cell * channels..][..channels];
+            let below = &mut below[other * channels..][..channels];
+            add_products(below, slope, &by_tap[tap]);
+            add_products(&mut of_taps[tap], slope, &x[other * channels..][..channels]);
+        });
+        let (weights, biases) = self.into.of_mut(layer);
+        slope.chunks(channels).for_each(|slope| add_slices(biases, slope));
+        for (tap, of_tap) in of_taps.iter().enumerate() {
+            of_tap.iter().enumerate().for_each(|(c, s)| weights[c * TAPS + tap] += s);
+        }
+    }
 }
 
 fn dense_slope_sized<const IN: usize, const OUT: usize>(
@@ -133,11 +152,24 @@ fn dense_slope_sized<const IN: usize, const OUT: usize>(
     }
 }
 
+/// Adds products of numbers to as many others.
+fn add_products(to: &mut [f32], a: &[f32], b: &[f32]) {
+    to.iter_mut().zip(a).zip(b).for_each(|((t, a), b)| *t += a * b);
+}
+
+/// A cell and its neighbours in a depthwise layer.
+const TAPS: usize = 9;
+
+/// Weights of a depthwise layer with the channels innermost.
+fn by_tap(weights: &[f32], channels: usize) -> Vec<Vec<f32>> {
+    (0..TAPS).map(|tap| (0..channels).map(|c| weights[c * TAPS + tap]).collect()).collect()
+}
+
 /// Calls `each` with a cell, a neighbour and the tap between them, on a square level.
 fn each_tap(side: usize, mut each: impl FnMut(usize, usize, usize)) {
     for row in 0..side {
         for at in 0..side {
-            for tap in 0..9 {
+            for tap in 0..TAPS {
                 // Wraps below zero, and is then not within the level.
                 let [i, j] = [row + tap / 3, at + tap % 3].map(|n| n.wrapping_sub(1));
                 if i < side && j < side {
@@ -150,43 +182,13 @@ fn each_tap(side: usize, mut each: impl FnMut(usize, usize, usize)) {
 
 pub fn depthwise((weights, biases): (&[f32], &[f32]), x: &[f32]) -> Vec<f32> {
     let channels = biases.len();
-    let by_tap: Vec<Vec<f32>> =
-        (0..9).map(|tap| (0..channels).map(|c| weights[c * 9 + tap]).collect()).collect();
+    let by_tap = by_tap(weights, channels);
     let mut out = biases.repeat(x.len() / channels);
     each_tap(side_of(x, channels), |cell, other, tap| {
         let sums = &mut out[cell * channels..][..channels];
-        let x = &x[other * channels..][..channels];
-        sums.iter_mut().zip(x).zip(&by_tap[tap]).for_each(|((s, x), w)| *s += x * w);
+        add_products(sums, &x[other * channels..][..channels], &by_tap[tap]);
     });
     out
-}
-
-pub fn depthwise_slope(
-    p: &Parameters,
-    into: &mut Parameters,
-    layer: usize,
-    x: &[f32],
-    slope: &[f32],
-    below: &mut [f32],
-) {
-    let (weights, channels) = (p.of(layer).0, LAYERS[layer].outputs);
-    let (of_weights, of_biases) = into.of_mut(layer);
-    let by_tap: Vec<Vec<f32>> =
-        (0..9).map(|tap| (0..channels).map(|c| weights[c * 9 + tap]).collect()).collect();
-    let mut of_taps = vec![vec![0.0; channels]; 9];
-    each_tap(side_of(x, channels), |cell, other, tap| {
-        let slope = &slope[cell * channels..][..channels];
-        let below = &mut below[other * channels..][..channels];
-        below.iter_mut().zip(slope).zip(&by_tap[tap]).for_each(|((b, s), w)| *b += s * w);
-        let x = &x[other * channels..][..channels];
-        of_taps[tap].iter_mut().zip(slope).zip(x).for_each(|((t, s), x)| *t += s * x);
-    });
-    for slope in slope.chunks(channels) {
-        of_biases.iter_mut().zip(slope).for_each(|(b, s)| *b += s);
-    }
-    for (tap, of_tap) in of_taps.iter().enumerate() {
-        of_tap.iter().enumerate().for_each(|(c, s)| of_weights[c * 9 + tap] += s);
-    }
 }
 
 /// 2 x 2 cells of a level side by side.
@@ -200,8 +202,7 @@ pub fn gather(x: &[f32], channels: usize) -> Vec<f32> {
 pub fn scatter(x: &[f32], channels: usize, into: &mut [f32]) {
     let half = side_of(into, channels) / 2;
     for (n, x) in x.chunks(channels).enumerate() {
-        let to = &mut into[below(n / 4, n % 4, half) * channels..];
-        to.iter_mut().zip(x).for_each(|(t, x)| *t += x);
+        add_slices(&mut into[below(n / 4, n % 4, half) * channels..], x);
     }
 }
 
@@ -226,8 +227,7 @@ pub fn summed(x: &[f32], channels: usize) -> Vec<f32> {
     let mut out = vec![0.0; x.len() / 4];
     for (n, sums) in out.chunks_mut(channels).enumerate() {
         for k in 0..4 {
-            let from = &x[below(n, k, side) * channels..];
-            sums.iter_mut().zip(from).for_each(|(s, x)| *s += x);
+            add_slices(sums, &x[below(n, k, side) * channels..]);
         }
     }
     out

@@ -78,8 +78,7 @@ fn rounded_it_is_core_s_bit_for_bit() {
     state.choose_shifts();
     let (input, _) = sample.input();
     let tape = Network::new(true).forward(&state.rounded(), &input);
-    let mut numbers = state.numbers();
-    numbers.push(0);
+    let numbers = state.numbers();
     let mut weights = EncoderWeights::new();
     weights.load(&text("encoder", &[NUMBERS], 16.0, &numbers, "test"), LEVELS).unwrap();
     let mut encoder = raywake_alloc_guard::boxed!(Encoder, Encoder::new());
