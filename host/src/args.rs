@@ -64,7 +64,7 @@ pub enum Command {
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -81,7 +81,7 @@ pub struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct OdometryArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -120,6 +120,10 @@ pub struct RecordingKind {
     /// Recording format [default: detected]
     #[arg(long)]
     pub format: Option<Format>,
+    /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only
+    /// one, or all lidars that /tf_static connects]
+    #[arg(long)]
+    pub topic: Vec<String>,
     /// Whether sweeps still contain motion distortion
     #[arg(long, value_name = "on|off", hide_possible_values = true)]
     #[arg(value_parser = BoolishValueParser::new())]
@@ -127,6 +131,9 @@ pub struct RecordingKind {
     /// Ground height in the vehicle frame, m (KITTI: -1.73)
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
+    /// Box around the own vehicle in its frame, m: returns in it, at any height, are left out
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = vehicle_box)]
+    pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
 
 /// What the flow is computed with.
@@ -218,6 +225,9 @@ pub struct Results {
     #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
     #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
     pub png: Option<PictureFrame>,
+    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with velocity, and the poses
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
     /// Do not write per-point files
     #[arg(long)]
     pub no_points: bool,
@@ -247,7 +257,7 @@ pub enum Export {
 
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log, or of point clouds
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -329,8 +339,10 @@ impl RecordingKind {
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             format: self.format,
+            topics: self.topic.clone(),
             deskew: self.deskew,
             ground_m: self.ground,
+            own_vehicle: self.own_vehicle,
             ..OpenOptions::default()
         }
     }
@@ -339,6 +351,17 @@ impl RecordingKind {
 fn count(text: &str) -> Result<usize, String> {
     let count = text.parse().map_err(|_| "not a number")?;
     if count > 0 { Ok(count) } else { Err("must be at least 1".into()) }
+}
+
+fn vehicle_box(text: &str) -> Result<[[f32; 2]; 2], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let numbers = numbers.map_err(|_| "expected four numbers: X0,Y0,X1,Y1")?;
+    match numbers[..] {
+        [a, b, c, d] if a < c && b < d && numbers.iter().all(|n| n.is_finite()) => {
+            Ok([[a, b], [c, d]])
+        }
+        _ => Err("expected X0,Y0,X1,Y1 with X0 below X1 and Y0 below Y1".into()),
+    }
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

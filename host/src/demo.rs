@@ -39,6 +39,7 @@ pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
             png: cfg!(feature = "png").then_some(PictureFrame::World),
             argoverse: false,
         },
+        mcap: cfg!(feature = "mcap").then(|| args.out.join("demo.mcap")),
         summary: None,
         quiet: args.quiet,
         profile,

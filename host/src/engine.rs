@@ -42,6 +42,8 @@ pub struct RunPlan<'a> {
     pub out: Option<PathBuf>,
     /// Which.
     pub kinds: Kinds,
+    /// MCAP file of all sweeps.
+    pub mcap: Option<PathBuf>,
     /// File for the figures; in `out` where none is named.
     pub summary: Option<PathBuf>,
     /// Errors only.
@@ -74,7 +76,8 @@ pub fn execute<S: Source + ?Sized>(
 ) -> Result<RunSummary, RunError> {
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let figures = FiguresFile::create(plan.summary.as_deref(), plan.out.as_deref())?;
-    let outputs = Outputs::create(plan.out.as_deref(), plan.kinds, source.name(), profile)?;
+    let (out, mcap) = (plan.out.as_deref(), plan.mcap.as_deref());
+    let outputs = Outputs::create(out, mcap, plan.kinds, source.overview(), profile)?;
     let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
@@ -88,6 +91,7 @@ pub fn execute<S: Source + ?Sized>(
     let end = each_sweep(source, plan.sweeps.clone(), plan.quiet, |source, visit| {
         run.sweep(source, visit, observe)
     })?;
+    run.outputs.finish()?;
     let backend = run.drive.backend();
     let census = backend.census().unwrap_or_default();
     let facts = Facts {

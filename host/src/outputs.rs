@@ -8,6 +8,8 @@
 //! | `png/FRAME.png` | picture of a pair's first sweep |
 //! | `argoverse/LOG/TIMESTAMP.feather` | returns of a pair's first sweep, for graders |
 //!
+//! Beside them an MCAP file where one is named, see [`raywake_io::sink::bag`].
+//!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.
 
@@ -20,8 +22,9 @@ use raywake_core::params::Profile;
 use crate::args::{Export, PictureFrame, Results};
 use crate::picture::{Pictures, Subject};
 use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::{argoverse, atomic, feather};
-use raywake_io::source::SweepData;
+use raywake_io::source::{Overview, SweepData};
 
 /// Which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,6 +46,7 @@ pub struct Outputs {
     log: String,
     profile: Profile,
     pictures: Option<(Pictures, PictureFrame)>,
+    bag: Option<BagSink>,
 }
 
 impl Kinds {
@@ -71,25 +75,31 @@ impl Kinds {
 }
 
 impl Outputs {
-    /// Creates the folders for the recording named `log` under `root`; without one nothing will be
-    /// written.
+    /// Creates the folders for a recording under `root`, and its MCAP file; without either nothing
+    /// will be written.
     pub fn create(
         root: Option<&Path>,
+        mcap: Option<&Path>,
         kinds: Kinds,
-        log: &str,
+        recording: &Overview,
         profile: &Profile,
     ) -> Result<Outputs, Error> {
+        let log = &recording.name;
         root.map_or(Ok(()), |root| kinds.create_folders(root))?;
         let pictures = match root.zip(kinds.png) {
             Some((root, frame)) => Some((Pictures::folder(&root.join("png"), log)?, frame)),
             None => None,
         };
         let (log, profile) = (log.to_string(), profile.clone());
-        Ok(Outputs { root: root.map(Path::to_path_buf), kinds, log, profile, pictures })
+        let bag = mcap.map(|path| BagSink::create(path, recording.epoch_ns)).transpose()?;
+        Ok(Outputs { root: root.map(Path::to_path_buf), kinds, log, profile, pictures, bag })
     }
 
     /// Writes what a pair of sweeps yields for its first sweep.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
+        if let Some(bag) = &mut self.bag {
+            bag.pair(first, flows)?;
+        }
         let Some(root) = &self.root else { return Ok(()) };
         let meta = meta(first, flows.dt_s);
         if self.kinds.columns {
@@ -110,6 +120,11 @@ impl Outputs {
             argoverse::export(&root.join("argoverse"), &self.log, first.frame, &rows, pose, dt)?;
         }
         Ok(())
+    }
+
+    /// Completes the file that all sweeps go to.
+    pub fn finish(self) -> Result<(), Error> {
+        self.bag.map_or(Ok(()), BagSink::finish)
     }
 
     /// Writes the tracklets at a pair's second sweep, `dt_s` after its first.

@@ -23,6 +23,7 @@ pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
         backend: &args.flow.backend,
         out: args.results.out.clone(),
         kinds: Kinds::of(&args.results),
+        mcap: args.results.mcap.clone(),
         summary: args.results.summary.clone(),
         quiet: args.quiet,
     };

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use raywake_core::output::{Origin, PointFlow};
-use raywake_core::params::{ANCHOR_ABOVE_GROUND_M, Profile};
+use raywake_core::params::Profile;
 use raywake_core::perceive::StageTimer;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
@@ -25,14 +25,11 @@ use crate::picture::{Pictures, Subject};
 use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
-use raywake_io::source::{SweepData, pose_row, read_cloud, read_pose};
+use raywake_io::source::{SweepData, mounting, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
 
 use rows::{Form, PointRow};
 
-/// A sensor is not mounted this near to the ground, m: such clouds are in a vehicle's frame, with
-/// its origin at an axle or below.
-const MOUNTED_MIN_M: f64 = 0.6;
 /// From this speed over ground on a point counts as moving, m/s.
 const MOVING_MPS: f64 = 0.5;
 
@@ -119,11 +116,10 @@ fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error>
     };
     let (place, why) = match args.sensor {
         Some(place) => (DVec3::from_array(place), "given"),
-        None if ground_m < -MOUNTED_MIN_M => (DVec3::ZERO, "assumed at the origin of the clouds"),
-        None => {
-            let height = ground_m + ANCHOR_ABOVE_GROUND_M;
-            (DVec3::new(0.0, 0.0, height), "assumed, as the origin is too close to the ground")
-        }
+        None => match mounting::above(ground_m) {
+            None => (DVec3::ZERO, "assumed at the origin of the clouds"),
+            Some(place) => (place, "assumed, as the origin is too close to the ground"),
+        },
     };
     let rig = Rig {
         sensors: [Pose { translation: place, ..Pose::IDENTITY }].into_iter().collect(),

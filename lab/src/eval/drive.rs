@@ -66,6 +66,7 @@ impl Settings {
             sweeps: 0..sweeps,
             out: None,
             kinds: Kinds::default(),
+            mcap: None,
             summary: None,
             quiet: true,
         }

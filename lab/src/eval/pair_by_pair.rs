@@ -23,6 +23,7 @@ impl<'a> PairByPair<'a> {
                 stamps_s: indices().map(|n| source.stamp_s(n)).collect(),
                 poses: indices().map(|n| source.pose(n)).collect(),
             },
+            epoch_ns: source.overview().epoch_ns,
             // Every other step is none.
             trusted: true,
             notes: source.notes().to_vec(),

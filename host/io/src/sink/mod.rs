@@ -1,8 +1,10 @@
-//! Where results go: feather files and Argoverse 2 submissions, each written whole or not at
-//! all.
+//! Where results go: feather files, MCAP files and Argoverse 2 submissions, each written whole or
+//! not at all.
 
 pub mod argoverse;
 pub mod atomic;
+#[cfg_attr(not(feature = "mcap"), path = "bag_absent.rs")]
+pub mod bag;
 pub mod feather;
 pub mod table;
 

@@ -80,9 +80,10 @@ impl Argoverse {
             own_vehicle: Some(OWN_VEHICLE),
         };
         apply(options, &mut rig);
-        let (frames, files) = files.into_iter().unzip();
+        let (frames, files): (Vec<u64>, _) = files.into_iter().unzip();
+        let epoch_ns = frames[0];
         let (name, trusted) = (folder_name(root), options.trusted);
-        let overview = Overview { name, rig, frames, track, trusted, notes };
+        let overview = Overview { name, rig, frames, track, epoch_ns, trusted, notes };
         let mut log = Argoverse { overview, root: root.to_path_buf(), files, low_lasers: 0 };
         log.assign_lasers(&scanners)?;
         Ok(log)

@@ -254,6 +254,7 @@ impl Opening {
                 rig,
                 frames,
                 track: self.track,
+                epoch_ns: 0,
                 trusted: options.trusted,
                 notes: self.notes,
             },

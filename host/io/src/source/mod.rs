@@ -6,6 +6,7 @@
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
 //! | [`Format::Clouds`] | `*.bin`, `*.pcd` or `*.ply` | a file named on the command line |
+//! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //!
 //! A `.bin` is little-endian float32 x, y, z, intensity per return. Poses and times are read and
 //! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
@@ -13,6 +14,8 @@
 
 #[cfg(feature = "arrow")]
 mod argoverse;
+#[cfg(feature = "mcap")]
+mod bag;
 mod bin;
 mod clouds;
 #[cfg(feature = "arrow")]
@@ -21,6 +24,7 @@ pub mod feather;
 mod feather_check;
 mod kitti;
 mod lzf;
+pub mod mounting;
 mod oxts;
 mod pcd;
 mod ply;
@@ -94,6 +98,8 @@ pub struct Overview {
     pub frames: Vec<u64>,
     /// Stamp of every sweep, and pose where poses are known.
     pub track: PoseTrack,
+    /// Time of the first stamp since 1970, ns; 0 where the recording does not tell.
+    pub epoch_ns: u64,
     /// Whether the poses are to be used without a check.
     pub trusted: bool,
     /// What the user should know: assumptions, gaps in frame numbers.
@@ -190,6 +196,8 @@ pub enum Format {
     /// A folder of `.bin`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
     Clouds,
+    /// A recording of ROS: an `.mcap` file, or a folder of them.
+    Mcap,
 }
 
 /// Frame whose motion a file of poses tells.
@@ -218,6 +226,9 @@ pub enum Unlocated {
 pub struct OpenOptions {
     /// Kind of recording.
     pub format: Option<Format>,
+    /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
+    /// or those of all lidars.
+    pub topics: Vec<String>,
     /// File of 3x4 poses, one row per sweep.
     pub poses: Option<PathBuf>,
     /// Whether poses are needed at all.
@@ -230,6 +241,8 @@ pub struct OpenOptions {
     pub deskew: Option<bool>,
     /// Overrides [`Rig::ground_m`], m.
     pub ground_m: Option<f64>,
+    /// Overrides [`Rig::own_vehicle`].
+    pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
 
 /// Opens the recording at `path`, or the only one in a folder below it.
@@ -245,11 +258,15 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Some(format) => (format, path.to_path_buf()),
         None => recognise(path)?,
     };
+    if format != Format::Mcap && !options.topics.is_empty() {
+        return Err(Error::Usage("only MCAP recordings have topics (--topic)".into()));
+    }
     match format {
         Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),
         Format::KittiOdometry => Ok(Box::new(kitti::open_odometry(&root, options)?)),
         Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
         Format::Argoverse2 => open_argoverse(&root, options),
+        Format::Mcap => open_mcap(&root, options),
     }
 }
 
@@ -264,10 +281,22 @@ fn open_argoverse(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error
     Err(Error::Unsupported(format!("{} {what}", root.display())))
 }
 
+#[cfg(feature = "mcap")]
+fn open_mcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(bag::Bag::open(root, options)?))
+}
+
+#[cfg(not(feature = "mcap"))]
+fn open_mcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    let what = "is an MCAP recording: the feature `mcap` is not compiled in";
+    Err(Error::Unsupported(format!("{} {what}", root.display())))
+}
+
 /// What the user's options change in a rig.
 fn apply(options: &OpenOptions, rig: &mut Rig) {
     rig.distorted = options.deskew.unwrap_or(rig.distorted);
     rig.ground_m = options.ground_m.unwrap_or(rig.ground_m);
+    rig.own_vehicle = options.own_vehicle.or(rig.own_vehicle);
 }
 
 /// Last part of a path, resolved so that `.` has a name too.

@@ -8,6 +8,9 @@ use super::Format;
 use super::clouds::EXTENSIONS;
 use crate::Error;
 
+/// Extension of recordings of ROS.
+pub(super) const MCAP: &str = "mcap";
+
 /// Levels of folders below the named one that are searched for a recording.
 const DEPTH: usize = 2;
 
@@ -17,8 +20,7 @@ const DEPTH: usize = 2;
 pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
     let meta = fs::metadata(path).map_err(Error::reading(path))?;
     if !meta.is_dir() {
-        let what = "expected a folder, found a file";
-        return Err(Error::input(path, "", what));
+        return format_of_file(path).map(|format| (format, path.to_path_buf()));
     }
     if let Some(format) = format_of(path)? {
         return Ok((format, path.to_path_buf()));
@@ -30,7 +32,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
             path,
             "",
             "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
-             nor any `.bin`, `.pcd` or `.ply` file",
+             nor any `.bin`, `.pcd`, `.ply` or `.mcap` file",
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
@@ -38,6 +40,20 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
             Err(Error::input(path, "", what))
         }
     }
+}
+
+/// The format of a recording that is a file, by its extension.
+fn format_of_file(path: &Path) -> Result<Format, Error> {
+    let what = match path.extension().and_then(|e| e.to_str()) {
+        Some(MCAP) => return Ok(Format::Mcap),
+        Some("bag") => "a ROS 1 bag, convert it: mcap convert IN.bag OUT.mcap",
+        Some("db3") => "a ROS 2 bag in SQLite, convert it to MCAP: ros2 bag convert",
+        Some(e) if EXTENSIONS.contains(&e) => {
+            "a single cloud, expected the folder it is in; of two clouds: raywake flow A B"
+        }
+        _ => "expected a folder or an .mcap file",
+    };
+    Err(Error::input(path, "", what))
 }
 
 /// Recordings in the folders below, sorted by path.
@@ -66,6 +82,10 @@ fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     }
     if has("velodyne") {
         return Ok(Some(Format::KittiOdometry));
+    }
+    let is_mcap = |p: &PathBuf| p.extension().is_some_and(|e| e == MCAP);
+    if entries(path)?.iter().any(is_mcap) {
+        return Ok(Some(Format::Mcap));
     }
     Ok(extensions(path)?.next().map(|_| Format::Clouds))
 }

@@ -9,8 +9,8 @@
 //! Times in integers are ns (Ouster `t`, Livox `offset_time`), those in floats s (Velodyne `time`,
 //! Hesai and RoboSense `timestamp`), or ns where they are too large for any date (Livox
 //! `timestamp`). They count from the sweep's stamp, but where the earliest is more than a second
-//! away from it they are of a clock, and count from that earliest. Other fields, `ring` too, are
-//! passed over.
+//! away from it they are of a clock, and count from that earliest, or from the stamp where that is
+//! of the same clock. Other fields, `ring` too, are passed over.
 
 use std::fs;
 use std::path::Path;
@@ -76,6 +76,8 @@ pub(super) struct Fields {
     places: [Option<usize>; 5],
     /// Seconds of a unit of time.
     unit_s: f64,
+    /// The sweep's stamp, s, where it is known.
+    stamp_s: Option<f64>,
 }
 
 impl Fields {
@@ -93,7 +95,13 @@ impl Fields {
         places.extend([find(&["intensity", "i", "reflectivity"]), time]);
         let float = |n: usize| matches!(all[n].1, Number::F32 | Number::F64);
         let unit_s = if time.is_some_and(float) { 1.0 } else { 1e-9 };
-        Ok(Fields { places: [0, 1, 2, 3, 4].map(|n| places[n]), unit_s })
+        Ok(Fields { places: [0, 1, 2, 3, 4].map(|n| places[n]), unit_s, stamp_s: None })
+    }
+
+    /// The same, of a sweep whose stamp is known.
+    #[cfg(feature = "mcap")]
+    pub fn stamped(self, stamp_ns: i64) -> Fields {
+        Fields { stamp_s: Some(stamp_ns as f64 * 1e-9), ..self }
     }
 
     /// Replaces `into` by `rows` returns; `value(row, field)` is a number of the file. Returns
@@ -109,7 +117,11 @@ impl Fields {
         let scale = if all(3).any(|v| v > 1.0) { 255.0 } else { 1.0 };
         let earliest = all(4).fold(f64::INFINITY, f64::min);
         let unit_s = if earliest.abs() > SECONDS_MAX { 1e-9 } else { self.unit_s };
-        let from = if earliest.abs() * unit_s > OFFSET_MAX_S { earliest } else { 0.0 };
+        let from = match self.stamp_s {
+            _ if earliest.abs() * unit_s <= OFFSET_MAX_S => 0.0,
+            Some(stamp_s) if (earliest * unit_s - stamp_s).abs() < OFFSET_MAX_S => stamp_s / unit_s,
+            _ => earliest,
+        };
         into.clear();
         into.extend((0..rows).map(|row| Point {
             position: [0, 1, 2].map(|axis| get(row, axis) as f32),

@@ -25,6 +25,7 @@ impl Simulated {
             rig: drive.rig(),
             frames: (0..drive.sweeps() as u64).collect(),
             track: PoseTrack { stamps_s, poses },
+            epoch_ns: 0,
             trusted: true,
             notes: Vec::new(),
         };

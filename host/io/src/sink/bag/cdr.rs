@@ -1,0 +1,67 @@
+//! CDR, little-endian: messages as ROS 2 sends them.
+
+/// Kind of encapsulation: plain, least significant byte first.
+const HEAD: [u8; 4] = [0, 1, 0, 0];
+
+/// A message while it is written, field after field.
+pub(crate) struct Cdr(Vec<u8>);
+
+impl Cdr {
+    pub fn new() -> Cdr {
+        Cdr(HEAD.to_vec())
+    }
+
+    /// Appends bytes, beginning at a multiple of `alignment` after the head.
+    fn aligned(&mut self, alignment: usize, bytes: &[u8]) {
+        let length = (self.0.len() - HEAD.len()).next_multiple_of(alignment) + HEAD.len();
+        self.0.resize(length, 0);
+        self.0.extend_from_slice(bytes);
+    }
+
+    pub fn byte(&mut self, value: u8) {
+        self.0.push(value);
+    }
+
+    pub fn word(&mut self, value: u32) {
+        self.aligned(4, &value.to_le_bytes());
+    }
+
+    pub fn float(&mut self, value: f32) {
+        self.aligned(4, &value.to_le_bytes());
+    }
+
+    pub fn double(&mut self, value: f64) {
+        self.aligned(8, &value.to_le_bytes());
+    }
+
+    pub fn text(&mut self, value: &str) {
+        self.word(value.len() as u32 + 1);
+        self.0.extend_from_slice(value.as_bytes());
+        self.0.push(0);
+    }
+
+    /// Bytes after their number, as `fill` appends them.
+    pub fn bytes(&mut self, fill: impl FnOnce(&mut Vec<u8>)) {
+        self.word(0);
+        let begin = self.0.len();
+        fill(&mut self.0);
+        let length = (self.0.len() - begin) as u32;
+        self.0[begin - 4..begin].copy_from_slice(&length.to_le_bytes());
+    }
+
+    /// A header: time and name of a frame.
+    pub fn header(&mut self, stamp_ns: u64, frame: &str) {
+        self.word((stamp_ns / 1_000_000_000) as u32);
+        self.word((stamp_ns % 1_000_000_000) as u32);
+        self.text(frame);
+    }
+
+    pub fn doubles(&mut self, values: impl IntoIterator<Item = f64>) {
+        values.into_iter().for_each(|value| self.double(value));
+    }
+
+    /// The message.
+    pub fn message(self) -> Vec<u8> {
+        self.0
+    }
+}

@@ -1,0 +1,29 @@
+//! What stands for [`BagSink`] where MCAP files cannot be written: nothing makes one.
+
+use std::path::Path;
+
+use raywake_core::output::PairFlows;
+
+use crate::Error;
+use crate::source::SweepData;
+
+/// No file.
+pub enum BagSink {}
+
+impl BagSink {
+    /// Fails with [`Error::Unsupported`].
+    pub fn create(path: &Path, _: u64) -> Result<BagSink, Error> {
+        let what = "an MCAP file needs the feature `mcap`, which is not compiled in";
+        Err(Error::Unsupported(format!("{}: {what}", path.display())))
+    }
+
+    /// Never called.
+    pub fn pair(&mut self, _: &SweepData, _: &PairFlows) -> Result<(), Error> {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn finish(self) -> Result<(), Error> {
+        match self {}
+    }
+}

@@ -1,0 +1,209 @@
+//! What is in the files of a recording: clouds, frames, poses. One walk through each file.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mcap::records::{MessageHeader, Record};
+use raywake_core::pose::Pose;
+
+use super::file::{BagFile, End, Place};
+use super::frames::{FixedFrames, Trajectory};
+use super::messages::{self, CloudHeader, Kind, Transform};
+use super::wire::Wire;
+use crate::Error;
+
+/// The topic of frames that never move.
+const FIXED_TOPIC: &str = "tf_static";
+
+/// A cloud that can be read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CloudMessage {
+    /// Which of the files it is in.
+    pub file: usize,
+    pub place: Place,
+    pub stamp_ns: i64,
+}
+
+/// The clouds of a topic, in the order of their times.
+#[derive(Default)]
+pub(super) struct CloudTopic {
+    /// Of its messages: see [`Wire::new`].
+    pub encoding: String,
+    pub frame: String,
+    pub clouds: Vec<CloudMessage>,
+    /// Messages without a point.
+    empty: u64,
+    /// Messages that are not later than one before.
+    late: u64,
+}
+
+/// Who says where a frame was: an odometry's topic, or that of transforms.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PoseSource {
+    pub topic: String,
+    pub parent: String,
+    pub child: String,
+}
+
+/// What is in the files.
+#[derive(Default)]
+pub(super) struct Contents {
+    pub topics: BTreeMap<String, CloudTopic>,
+    pub fixed: FixedFrames,
+    pub poses: BTreeMap<PoseSource, Trajectory>,
+    /// Other topics with the names of their schemas, for errors.
+    pub others: BTreeSet<String>,
+    pub notes: Vec<String>,
+    /// Transforms that are none.
+    wrong: u64,
+}
+
+/// A channel that is of use.
+struct Channel {
+    topic: String,
+    encoding: String,
+    kind: Kind,
+}
+
+impl Contents {
+    /// Of all files, in their order.
+    pub fn read(files: &mut [BagFile]) -> Result<Contents, Error> {
+        let mut contents = Contents::default();
+        for (n, file) in files.iter_mut().enumerate() {
+            contents.add(n, file)?;
+        }
+        for (topic, CloudTopic { empty, late, .. }) in &contents.topics {
+            let notes = [
+                (*empty, "messages without a point"),
+                (*late, "messages that are not later than those before them"),
+            ];
+            let notes = notes.into_iter().filter(|(count, _)| *count > 0);
+            contents.notes.extend(notes.map(|(n, what)| format!("{topic}: skipped {n} {what}")));
+        }
+        if contents.wrong > 0 {
+            let note = format!("skipped {} transforms that are not rigid", contents.wrong);
+            contents.notes.push(note);
+        }
+        contents.topics.retain(|_, topic| !topic.clouds.is_empty());
+        contents.poses.values_mut().for_each(Trajectory::sort);
+        Ok(contents)
+    }
+
+    fn add(&mut self, number: usize, file: &mut BagFile) -> Result<(), Error> {
+        let path = file.path.clone();
+        let (mut schemas, mut channels) = (BTreeMap::new(), BTreeMap::new());
+        let end = file.walk(|place, record| {
+            match record {
+                Record::Schema { header, .. } => {
+                    schemas.insert(header.id, header.name);
+                }
+                Record::Channel(channel) => {
+                    let schema = schemas.get(&channel.schema_id).map_or("", String::as_str);
+                    let encoding = channel.message_encoding;
+                    let known = ["cdr", "ros1"].contains(&encoding.as_str());
+                    match Kind::of(schema).filter(|_| known) {
+                        Some(kind) => {
+                            let topic = channel.topic;
+                            channels.insert(channel.id, Channel { topic, encoding, kind });
+                        }
+                        None => {
+                            self.others.insert(format!("{} ({schema})", channel.topic));
+                        }
+                    }
+                }
+                Record::Message { header, data } => {
+                    if let Some(channel) = channels.get(&header.channel_id) {
+                        let at = CloudMessage { file: number, place, stamp_ns: 0 };
+                        self.message(channel, &header, at, &data).map_err(|what| {
+                            let topic = &channel.topic;
+                            let place = format!("byte {}, topic {topic}", place.record);
+                            Error::input(&path, place, what)
+                        })?;
+                    }
+                }
+                _ => {}
+            }
+            Ok(())
+        })?;
+        if let End::Cut(at) = end {
+            let name = path.file_name().unwrap_or_default().display();
+            self.notes.push(format!("{name} is cut off: read up to byte {at}"));
+        }
+        Ok(())
+    }
+
+    fn message(
+        &mut self,
+        channel: &Channel,
+        header: &MessageHeader,
+        at: CloudMessage,
+        data: &[u8],
+    ) -> Result<(), String> {
+        let mut wire = Wire::new(&channel.encoding, data)?;
+        match channel.kind {
+            Kind::PointCloud2 => self.cloud(channel, header, at, CloudHeader::read(&mut wire)?),
+            Kind::Odometry => match messages::odometry(wire)? {
+                Some(transform) => self.pose(&channel.topic, transform),
+                None => self.wrong += 1,
+            },
+            Kind::Transforms => {
+                let (found, wrong) = messages::transforms(wire)?;
+                self.wrong += wrong;
+                for transform in found {
+                    if channel.topic.ends_with(FIXED_TOPIC) {
+                        self.fixed.add(transform);
+                    } else {
+                        self.pose(&channel.topic, transform);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn cloud(
+        &mut self,
+        channel: &Channel,
+        message: &MessageHeader,
+        at: CloudMessage,
+        cloud: CloudHeader,
+    ) {
+        let topic = self.topics.entry(channel.topic.clone()).or_default();
+        if cloud.size.contains(&0) {
+            topic.empty += 1;
+            return;
+        }
+        // A driver without a clock leaves the stamp at zero.
+        let stamp_ns = if cloud.stamp_ns == 0 { message.log_time as i64 } else { cloud.stamp_ns };
+        if topic.clouds.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
+            topic.late += 1;
+            return;
+        }
+        if topic.clouds.is_empty() {
+            topic.frame = cloud.frame.to_owned();
+            topic.encoding = channel.encoding.clone();
+        }
+        topic.clouds.push(CloudMessage { stamp_ns, ..at });
+    }
+
+    fn pose(&mut self, topic: &str, transform: Transform) {
+        let Transform { stamp_ns, parent, child, parent_from_child } = transform;
+        let source = PoseSource { topic: topic.to_owned(), parent, child };
+        self.poses.entry(source).or_default().add(stamp_ns, parent_from_child);
+    }
+
+    /// Where a base was at some times, as each source says that tells of it or of what is fixed to
+    /// it at half of the times or more.
+    pub fn tracks(&self, base: &str, stamps_ns: &[i64]) -> Vec<(&PoseSource, Vec<Option<Pose>>)> {
+        let tells = |(source, trajectory): (&'_ PoseSource, &Trajectory)| {
+            // An odometry that names no frame tells of the vehicle.
+            let child = if source.child.is_empty() { base } else { &source.child };
+            let (of, base_from_child) = self.fixed.base(child)?;
+            let child_from_base = base_from_child.inverse();
+            let pose = |ns: &i64| trajectory.at(*ns).map(|pose| pose * child_from_base);
+            (of == base).then(|| stamps_ns.iter().map(pose).collect::<Vec<_>>())
+        };
+        let all = self.poses.iter().filter_map(|pair| Some((pair.0, tells(pair)?)));
+        let enough = |poses: &[Option<Pose>]| 2 * poses.iter().flatten().count() >= poses.len();
+        all.filter(|(_, poses)| enough(poses)).collect()
+    }
+}

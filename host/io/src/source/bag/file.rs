@@ -1,0 +1,187 @@
+//! MCAP files: records one after the other, most of them in chunks. They are read in pieces, never
+//! whole.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use mcap::parse_record;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::Error;
+
+/// Longest record that is read, bytes; a chunk may be longer, as it is read in pieces.
+const RECORD_MAX: usize = 256 << 20;
+
+/// What a file begins with.
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// Bytes before the content of a record: its kind and its length.
+const HEAD: u64 = 9;
+
+/// Where a message is in its file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Place {
+    /// First byte of the record it is, or of the chunk it is in.
+    pub record: u64,
+    /// Number of records before it there.
+    pub before: u32,
+}
+
+/// Bytes read at once, at most.
+const PIECE: usize = 1 << 20;
+
+/// A file that is open.
+pub(super) struct BagFile {
+    pub path: PathBuf,
+    file: File,
+    /// Bytes of it.
+    length: u64,
+    open: Option<OpenRecord>,
+}
+
+/// A record of the file while it is read: itself, or those in it.
+struct OpenRecord {
+    reader: LinearReader,
+    /// Place of what comes next in it.
+    next: Place,
+    /// Bytes of it that are still in the file.
+    left: u64,
+}
+
+/// How a walk through a file ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    Whole,
+    /// It is cut off in the record that begins at this byte.
+    Cut(u64),
+}
+
+impl BagFile {
+    /// Fails where it cannot be read or is no MCAP file.
+    pub fn open(path: &Path) -> Result<BagFile, Error> {
+        let mut file = File::open(path).map_err(Error::reading(path))?;
+        let length = file.metadata().map_err(Error::reading(path))?.len();
+        let mut magic = [0; MAGIC.len()];
+        let read = file.read_exact(&mut magic);
+        if read.is_err() || magic != MAGIC {
+            return Err(Error::input(path, "byte 0", "not an MCAP file"));
+        }
+        Ok(BagFile { path: path.to_path_buf(), file, length, open: None })
+    }
+
+    /// Hands every schema, channel and message to `each`, in the order of the file.
+    ///
+    /// Fails where the file cannot be read or is damaged; a file that is cut off is read up to
+    /// there.
+    pub fn walk(
+        &mut self,
+        mut each: impl FnMut(Place, Record) -> Result<(), Error>,
+    ) -> Result<End, Error> {
+        let mut at = MAGIC.len() as u64;
+        while at < self.length {
+            let Some((kind, length)) = self.head(at)? else { return Ok(End::Cut(at)) };
+            match kind {
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => {
+                    self.begin(at, length)?;
+                    while let Some((place, record)) = self.next()? {
+                        each(place, record)?;
+                    }
+                }
+                op::DATA_END | op::FOOTER => return Ok(End::Whole),
+                _ => {}
+            }
+            let next = at.saturating_add(HEAD).saturating_add(length);
+            if next > self.length {
+                return Ok(End::Cut(at));
+            }
+            at = next;
+        }
+        Ok(End::Cut(self.length))
+    }
+
+    /// Bytes of the message at a place. Quick where it follows the one read before.
+    pub fn message(&mut self, wanted: Place) -> Result<Vec<u8>, Error> {
+        let gone = "the message that was here is gone: has the file changed?";
+        let follows = |open: &OpenRecord| {
+            open.next.record == wanted.record && open.next.before <= wanted.before
+        };
+        if !self.open.as_ref().is_some_and(follows) {
+            let head = self.head(wanted.record)?;
+            let (_, length) = head.ok_or_else(|| self.wrong(wanted.record, gone))?;
+            self.begin(wanted.record, length)?;
+        }
+        while let Some((place, record)) = self.next()? {
+            match record {
+                Record::Message { data, .. } if place == wanted => return Ok(data.into_owned()),
+                _ => {}
+            }
+        }
+        Err(self.wrong(wanted.record, gone))
+    }
+
+    /// Kind and length of the record at a byte; `None` where the file ends in its head.
+    fn head(&mut self, at: u64) -> Result<Option<(u8, u64)>, Error> {
+        let mut head = [0; HEAD as usize];
+        if at + HEAD > self.length {
+            return Ok(None);
+        }
+        let read =
+            self.file.seek(SeekFrom::Start(at)).and_then(|_| self.file.read_exact(&mut head));
+        read.map_err(Error::reading(&self.path))?;
+        let [kind, length @ ..] = head;
+        Ok(Some((kind, u64::from_le_bytes(length))))
+    }
+
+    /// Goes to the record at a byte, whose content has some length.
+    fn begin(&mut self, record: u64, length: u64) -> Result<(), Error> {
+        self.file.seek(SeekFrom::Start(record)).map_err(Error::reading(&self.path))?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_validate_chunk_crcs(true)
+            .with_record_length_limit(RECORD_MAX);
+        let reader = LinearReader::new_with_options(options);
+        let left = HEAD.saturating_add(length);
+        self.open = Some(OpenRecord { reader, next: Place { record, before: 0 }, left });
+        Ok(())
+    }
+
+    /// The next record in that one; `None` after its end, and where the file is cut off in it.
+    fn next(&mut self) -> Result<Option<(Place, Record<'static>)>, Error> {
+        let Some(OpenRecord { reader, next, left }) = &mut self.open else { return Ok(None) };
+        let damaged =
+            |what: String| Error::input(&self.path, format!("byte {}", next.record), what);
+        while let Some(event) = reader.next_event() {
+            match event.map_err(|e| damaged(e.to_string()))? {
+                LinearReadEvent::Record { data, opcode } => {
+                    let place = *next;
+                    next.before += 1;
+                    if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
+                        let record = parse_record(opcode, data);
+                        let record = record.map_err(|e| damaged(e.to_string()))?;
+                        return Ok(Some((place, record.into_owned())));
+                    }
+                }
+                LinearReadEvent::ReadRequest(wanted) => {
+                    let wanted = wanted.min(PIECE).min(usize::try_from(*left).unwrap_or(PIECE));
+                    let read = self.file.read(reader.insert(wanted));
+                    let read = read.map_err(Error::reading(&self.path))?;
+                    if read == 0 && *left > 0 {
+                        break;
+                    }
+                    // Nothing more of the record says that it has ended.
+                    reader.notify_read(read);
+                    *left -= read as u64;
+                }
+            }
+        }
+        self.open = None;
+        Ok(None)
+    }
+
+    fn wrong(&self, at: u64, what: impl Into<String>) -> Error {
+        Error::input(&self.path, format!("byte {at}"), what)
+    }
+}

@@ -1,0 +1,165 @@
+//! The messages of ROS that tell sweeps and poses, as their definitions have them:
+//! `sensor_msgs/PointCloud2`, `tf2_msgs/TFMessage` and `nav_msgs/Odometry`.
+
+use glam::{DQuat, DVec3};
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
+
+use super::wire::Wire;
+use crate::source::returns::{Attribute, Fields, Number};
+
+/// Fields of a cloud that are believed.
+const FIELDS_MAX: u32 = 1 << 10;
+/// Transforms of a message that are believed.
+const TRANSFORMS_MAX: u32 = 1 << 14;
+/// How far the length of a quaternion may be from 1.
+const UNIT_TOLERANCE: f64 = 1e-2;
+
+/// Kinds of messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    PointCloud2,
+    Transforms,
+    Odometry,
+}
+
+impl Kind {
+    /// By the name of the schema, of ROS 1 or 2.
+    pub fn of(schema: &str) -> Option<Kind> {
+        match schema {
+            "sensor_msgs/msg/PointCloud2" | "sensor_msgs/PointCloud2" => Some(Kind::PointCloud2),
+            "tf2_msgs/msg/TFMessage" | "tf2_msgs/TFMessage" | "tf/tfMessage" => {
+                Some(Kind::Transforms)
+            }
+            "nav_msgs/msg/Odometry" | "nav_msgs/Odometry" => Some(Kind::Odometry),
+            _ => None,
+        }
+    }
+}
+
+/// Where a frame was in another one.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Transform {
+    pub stamp_ns: i64,
+    pub parent: String,
+    pub child: String,
+    pub parent_from_child: Pose,
+}
+
+/// The transforms of a message. Those that are no rigid transform are left out and counted.
+pub(super) fn transforms(mut wire: Wire) -> Result<(Vec<Transform>, u64), String> {
+    let count = wire.word()?;
+    if count > TRANSFORMS_MAX {
+        return Err(format!("{count} transforms, at most {TRANSFORMS_MAX}"));
+    }
+    let (mut found, mut wrong) = (Vec::new(), 0);
+    for _ in 0..count {
+        let (stamp_ns, parent) = wire.header()?;
+        let child = wire.text()?.trim_start_matches('/');
+        match pose(&mut wire)? {
+            Some(parent_from_child) => found.push(Transform {
+                stamp_ns,
+                parent: parent.into(),
+                child: child.into(),
+                parent_from_child,
+            }),
+            None => wrong += 1,
+        }
+    }
+    Ok((found, wrong))
+}
+
+/// Where the vehicle was; `None` where that is no pose.
+pub(super) fn odometry(mut wire: Wire) -> Result<Option<Transform>, String> {
+    let (stamp_ns, parent) = wire.header()?;
+    let child = wire.text()?.trim_start_matches('/');
+    let (parent, child) = (parent.into(), child.into());
+    let transform = |parent_from_child| Transform { stamp_ns, parent, child, parent_from_child };
+    Ok(pose(&mut wire)?.map(transform))
+}
+
+/// A translation and a quaternion, x, y, z, w; `None` where these are no rigid transform.
+fn pose(wire: &mut Wire) -> Result<Option<Pose>, String> {
+    let mut numbers = [0.0; 7];
+    for number in &mut numbers {
+        *number = wire.double()?;
+    }
+    let [x, y, z, a, b, c, d] = numbers;
+    let rotation = DQuat::from_xyzw(a, b, c, d);
+    let rigid =
+        numbers.iter().all(|n| n.is_finite()) && (rotation.length() - 1.0).abs() < UNIT_TOLERANCE;
+    Ok(rigid.then(|| Pose::new(rotation, DVec3::new(x, y, z))))
+}
+
+/// What a cloud's message says before its points.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CloudHeader<'a> {
+    pub stamp_ns: i64,
+    pub frame: &'a str,
+    /// Rows and points of a row.
+    pub size: [u32; 2],
+}
+
+impl CloudHeader<'_> {
+    pub fn read<'a>(wire: &mut Wire<'a>) -> Result<CloudHeader<'a>, String> {
+        let (stamp_ns, frame) = wire.header()?;
+        Ok(CloudHeader { stamp_ns, frame, size: [wire.word()?, wire.word()?] })
+    }
+}
+
+/// Replaces `points` by those of a cloud, in its frame and with times from its stamp; returns
+/// whether they have times.
+pub(super) fn cloud(mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, String> {
+    points.clear();
+    let CloudHeader { stamp_ns, size: [height, width], .. } = CloudHeader::read(&mut wire)?;
+    let count = wire.word()?;
+    if count > FIELDS_MAX {
+        return Err(format!("{count} fields, at most {FIELDS_MAX}"));
+    }
+    let mut named = Vec::new();
+    let mut starts = Vec::new();
+    for _ in 0..count {
+        let (name, start, kind) = (wire.text()?, wire.word()? as usize, wire.byte()?);
+        wire.word()?;
+        let number = number(kind).ok_or_else(|| format!("field `{name}` has type {kind}"))?;
+        named.push((name.to_owned(), number));
+        starts.push(start);
+    }
+    let big = wire.byte()? != 0;
+    let [step, row_step] = [wire.word()? as usize, wire.word()? as usize];
+    let data = wire.bytes()?;
+    if let Some(n) = (0..named.len()).find(|&n| starts[n] + named[n].1.size() > step) {
+        return Err(format!("field `{}` ends after the {step} bytes of a point", named[n].0));
+    }
+    let (height, width) = (height as usize, width as usize);
+    // Some drivers leave the length of a single row at zero.
+    let row_step = if row_step == 0 { width * step } else { row_step };
+    let before = row_step.checked_mul(height.saturating_sub(1));
+    let wanted = before.and_then(|before| before.checked_add(width * step));
+    if row_step < width * step || wanted.is_none_or(|wanted| wanted > data.len()) {
+        let (has, of) = (data.len(), format!("{height} x {width} points of {step} bytes"));
+        return Err(format!("{has} bytes with rows of {row_step} are too few for {of}"));
+    }
+    let fields = Fields::find(&named)?.stamped(stamp_ns);
+    let value = |point: usize, field: usize| {
+        let start = point / width * row_step + starts[field];
+        let attribute = Attribute { number: named[field].1, start, step };
+        attribute.value(data, point % width, big)
+    };
+    Ok(fields.returns(height * width, value, points))
+}
+
+/// How a field's type stores a number.
+fn number(kind: u8) -> Option<Number> {
+    Some(match kind {
+        1 => Number::Signed(1),
+        2 => Number::Unsigned(1),
+        3 => Number::Signed(2),
+        4 => Number::Unsigned(2),
+        5 => Number::Signed(4),
+        6 => Number::Unsigned(4),
+        7 => Number::F32,
+        8 => Number::F64,
+        _ => return None,
+    })
+}

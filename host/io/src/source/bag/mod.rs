@@ -1,0 +1,381 @@
+//! Recordings of ROS in MCAP files: a file, or the folder that `ros2 bag` makes of several.
+//!
+//! Sweeps are the clouds of a topic (`sensor_msgs/PointCloud2`, of ROS 1 or 2), or of several that
+//! lidars of one vehicle send. The vehicle frame is the one that `/tf_static` fixes the lidar to in
+//! the end, or the cloud's own. Poses are those of the only odometry or transform that tells of it.
+//!
+//! Opening walks through every file once and keeps where each cloud is; a cloud is read when it is
+//! asked for. What is held does not grow with the file but by some words a message.
+
+mod contents;
+mod file;
+mod frames;
+mod messages;
+#[cfg(test)]
+pub(crate) mod tests;
+mod wire;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
+use raywake_registration::ground::ground_height;
+
+use super::mounting;
+use super::poses::{PoseTrack, read_rows};
+use super::recognise::{MCAP, entries};
+use super::sidecars::SPAN_MAX_S;
+use super::{
+    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, apply, folder_name,
+};
+use crate::Error;
+use contents::{CloudMessage, Contents};
+use file::BagFile;
+use wire::Wire;
+
+/// Topics whose numbers of clouds differ by more than this factor are not lidars of one rig.
+const COUNT_RATIO_MAX: usize = 2;
+
+/// A lidar.
+struct Lidar {
+    topic: String,
+    encoding: String,
+    vehicle_from_lidar: Pose,
+}
+
+/// An open recording.
+pub(super) struct Bag {
+    overview: Overview,
+    root: PathBuf,
+    files: Vec<BagFile>,
+    lidars: Vec<Lidar>,
+    /// Of every sweep the cloud of each lidar; the first lidar's is always there and gives the
+    /// stamp.
+    sweeps: Vec<Vec<Option<CloudMessage>>>,
+    poses_from: String,
+    /// A cloud that was just read.
+    cloud: Vec<Point>,
+}
+
+impl Bag {
+    /// Opens a file or a folder of them.
+    pub fn open(root: &Path, options: &OpenOptions) -> Result<Bag, Error> {
+        let mut files = files(root)?;
+        let mut contents = Contents::read(&mut files)?;
+        let topics = choose(root, &contents, &options.topics)?;
+        let (base, lidars) = lidars(root, &contents, &topics)?;
+        let mut bag = Bag {
+            overview: Overview {
+                name: name(root),
+                rig: Rig {
+                    sensors: lidars.iter().map(|l| l.vehicle_from_lidar).collect(),
+                    timing: Timing::AtStamp,
+                    distorted: true,
+                    ground_m: 0.0,
+                    own_vehicle: None,
+                },
+                frames: Vec::new(),
+                track: PoseTrack::default(),
+                epoch_ns: 0,
+                trusted: options.trusted,
+                notes: std::mem::take(&mut contents.notes),
+            },
+            root: root.to_path_buf(),
+            files,
+            lidars,
+            sweeps: together(&contents, &topics),
+            poses_from: "registration".into(),
+            cloud: Vec::new(),
+        };
+        bag.locate(&contents, &base, options)?;
+        bag.set_stamps();
+        bag.look_at_returns(options)?;
+        apply(options, &mut bag.overview.rig);
+        Ok(bag)
+    }
+
+    fn stamps_ns(&self) -> Vec<i64> {
+        let stamp = |sweep: &Vec<Option<CloudMessage>>| sweep[0].map_or(0, |cloud| cloud.stamp_ns);
+        self.sweeps.iter().map(stamp).collect()
+    }
+
+    fn set_stamps(&mut self) {
+        let stamps_ns = self.stamps_ns();
+        let seconds = |ns: &i64| (ns - stamps_ns[0]) as f64 * 1e-9;
+        self.overview.track.stamps_s = stamps_ns.iter().map(seconds).collect();
+        self.overview.frames = stamps_ns.iter().map(|ns| ns.unsigned_abs()).collect();
+        self.overview.epoch_ns = self.overview.frames[0];
+    }
+
+    /// Finds the poses of the sweeps. Those before the first pose and after the last are left out.
+    fn locate(
+        &mut self,
+        contents: &Contents,
+        base: &str,
+        options: &OpenOptions,
+    ) -> Result<(), Error> {
+        if options.unlocated == Unlocated::Always {
+            return Ok(());
+        }
+        if let Some(path) = &options.poses {
+            if options.poses_frame == Some(PosesFrame::Camera) {
+                return Err(Error::Usage("an MCAP file has no camera's frame".into()));
+            }
+            self.overview.track.poses = read_rows(path, self.sweeps.len())?;
+            self.poses_from = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            return Ok(());
+        }
+        let mut tracks = contents.tracks(base, &self.stamps_ns());
+        let told = |track: &(&contents::PoseSource, _)| {
+            format!("{} ({} in {})", track.0.topic, track.0.child, track.0.parent)
+        };
+        if let [track] = &tracks[..] {
+            self.poses_from = told(track);
+            let (_, poses) = tracks.remove(0);
+            let all = self.sweeps.len();
+            let mut known = poses.iter().map(Option::is_some);
+            self.sweeps.retain(|_| known.next().unwrap_or(false));
+            self.overview.track.poses = poses.into_iter().flatten().collect();
+            let left_out = all - self.sweeps.len();
+            if left_out > 0 {
+                let note = format!("{left_out} sweeps skipped: no pose on {}", self.poses_from);
+                self.overview.notes.push(note);
+            }
+            return Ok(());
+        }
+        let found = match tracks.len() {
+            0 => format!("nothing tells where `{base}` was"),
+            n => {
+                let names: Vec<String> = tracks.iter().map(told).collect();
+                format!("{n} sources tell where `{base}` was ({})", names.join(", "))
+            }
+        };
+        if options.unlocated == Unlocated::Refuse {
+            let what = format!("{found}: poses are needed, give a file with --poses");
+            return Err(Error::input(&self.root, "", what));
+        }
+        self.overview.notes.push(format!("{found}: registration does"));
+        Ok(())
+    }
+
+    /// Learns from the first sweep of all lidars when its returns were measured, and where the
+    /// ground is.
+    fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
+        let whole = self.sweeps.iter().position(|sweep| sweep.iter().all(Option::is_some));
+        let mut first = SweepData::default();
+        let timed = self.read_points(whole.unwrap_or(0), &mut first)?;
+        let times = first.points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
+        let limits = (f64::INFINITY, f64::NEG_INFINITY);
+        let (from_s, to_s) = times.fold(limits, |l, t| (l.0.min(t), l.1.max(t)));
+        let span_s = to_s - from_s;
+        let limits_s = [from_s.abs(), span_s];
+        if limits_s.iter().any(|s| s.is_finite() && *s > SPAN_MAX_S) {
+            let what = format!(
+                "{}: returns from {from_s:.3} to {to_s:.3} s around the stamp of a sweep; \
+                 {SPAN_MAX_S} s at most",
+                self.lidars[0].topic
+            );
+            return Err(Error::input(&self.root, "", what));
+        }
+        let Overview { rig, notes, .. } = &mut self.overview;
+        if span_s > 0.0 {
+            rig.timing = Timing::Offset { from_s, span_s };
+        }
+        if !timed {
+            notes.push("returns have no time: motion within a sweep is not corrected".into());
+        }
+        let found = options.ground_m.or_else(|| ground_height(&first.points));
+        rig.ground_m = found.ok_or_else(|| {
+            let what = "no ground found in the first sweep: give its height with --ground";
+            Error::input(&self.root, "", what)
+        })?;
+        if options.ground_m.is_none() {
+            notes.push(format!("ground estimated at {:.2} m", rig.ground_m));
+        }
+        for (pose, lidar) in rig.sensors.iter_mut().zip(&self.lidars) {
+            let own_frame = lidar.vehicle_from_lidar == Pose::IDENTITY;
+            if let Some(place) = mounting::above(rig.ground_m).filter(|_| own_frame) {
+                pose.translation = place;
+                notes.push(format!(
+                    "{}: the origin is close to the ground; the sensor is taken to be {:.2} m \
+                     above it",
+                    lidar.topic,
+                    place.z - rig.ground_m
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Replaces the points by those of a sweep; returns whether all lidars tell their times.
+    fn read_points(&mut self, index: usize, into: &mut SweepData) -> Result<bool, Error> {
+        into.points.clear();
+        let mut timed = true;
+        let stamp_ns = self.sweeps[index][0].map_or(0, |cloud| cloud.stamp_ns);
+        for (n, message) in self.sweeps[index].iter().enumerate() {
+            let Some(message) = message else { continue };
+            let (lidar, file) = (&self.lidars[n], &mut self.files[message.file]);
+            let bytes = file.message(message.place)?;
+            let cloud = Wire::new(&lidar.encoding, &bytes)
+                .and_then(|wire| messages::cloud(wire, &mut self.cloud));
+            timed &= cloud.map_err(|what| {
+                let at = format!("byte {}, topic {}", message.place.record, lidar.topic);
+                into.points.clear();
+                Error::input(&file.path, at, what)
+            })?;
+            let later_s = ((message.stamp_ns - stamp_ns) as f64 * 1e-9) as f32;
+            let pose = &lidar.vehicle_from_lidar;
+            into.points.extend(self.cloud.iter().map(|point| {
+                let at = pose.transform(DVec3::from_array(point.position.map(f64::from)));
+                let offset_s = point.offset_s + later_s;
+                Point { position: at.as_vec3().to_array(), offset_s, sensor: n as u32, ..*point }
+            }));
+        }
+        Ok(timed)
+    }
+}
+
+impl Source for Bag {
+    fn overview(&self) -> &Overview {
+        &self.overview
+    }
+
+    fn describe(&self) -> String {
+        let topics: Vec<&str> = self.lidars.iter().map(|l| l.topic.as_str()).collect();
+        format!(
+            "MCAP {}: {} of {}, poses from {}",
+            self.root.display(),
+            self.overview.length(),
+            topics.join(" and "),
+            self.poses_from
+        )
+    }
+
+    fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
+        self.overview.begin(index, into);
+        into.dropped = SourceGaps::default();
+        self.read_points(index, into).map(|_| ())
+    }
+}
+
+/// The MCAP files at a path, in the order of their names (`..._2` before `..._10`).
+fn files(root: &Path) -> Result<Vec<BagFile>, Error> {
+    let is_folder = fs::metadata(root).map_err(Error::reading(root))?.is_dir();
+    let mut paths = if is_folder { entries(root)? } else { vec![root.to_path_buf()] };
+    paths.retain(|path| !is_folder || path.extension().is_some_and(|e| e == MCAP));
+    if paths.is_empty() {
+        return Err(Error::input(root, "", "no `.mcap` file"));
+    }
+    paths.sort_by_cached_key(|path| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+        let (name, number) = stem.split_at(stem.len() - digits);
+        (name.to_owned(), number.parse::<u64>().ok(), stem)
+    });
+    paths.iter().map(|path| BagFile::open(path)).collect()
+}
+
+fn name(root: &Path) -> String {
+    let name = folder_name(root);
+    name.strip_suffix(&format!(".{MCAP}")).unwrap_or(&name).to_owned()
+}
+
+/// The topics whose clouds are the sweeps: those asked for, the only one, or those of several
+/// lidars of a vehicle.
+fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<String>, Error> {
+    let wrong = |what: String| Err(Error::input(root, "", what));
+    let listed: Vec<String> = contents
+        .topics
+        .iter()
+        .map(|(name, t)| format!("{name} ({} clouds in `{}`)", t.clouds.len(), t.frame))
+        .collect();
+    let listed = listed.join(", ");
+    if contents.topics.is_empty() {
+        let others: Vec<&str> = contents.others.iter().take(8).map(String::as_str).collect();
+        let others = if others.is_empty() { "nothing".into() } else { others.join(", ") };
+        return wrong(format!("no clouds (sensor_msgs/PointCloud2); there are: {others}"));
+    }
+    if let Some(missing) = asked.iter().find(|name| !contents.topics.contains_key(*name)) {
+        return wrong(format!("no clouds on {missing}; there are: {listed}"));
+    }
+    if asked.len() > SENSORS_MAX {
+        return wrong(format!("{} topics, at most {SENSORS_MAX}", asked.len()));
+    }
+    if !asked.is_empty() {
+        return Ok(asked.to_vec());
+    }
+    let names: Vec<String> = contents.topics.keys().cloned().collect();
+    match names.len() == 1 || is_rig(contents) {
+        true => Ok(names),
+        false => wrong(format!("several topics of clouds, choose with --topic: {listed}")),
+    }
+}
+
+/// Whether all topics of clouds are lidars of one vehicle: in frames of their own that are fixed to
+/// one base, and about as many clouds of each.
+fn is_rig(contents: &Contents) -> bool {
+    let topics = || contents.topics.values();
+    let mut frames: Vec<&str> = topics().map(|t| t.frame.as_str()).collect();
+    frames.sort_unstable();
+    let different = frames.windows(2).all(|pair| pair[0] != pair[1]);
+    let base = |frame: &&str| contents.fixed.base(frame).map(|base| base.0);
+    let mut bases = frames.iter().map(base);
+    let first = bases.next().flatten();
+    let counts = || topics().map(|t| t.clouds.len());
+    let alike = counts().max() <= counts().min().map(|least| COUNT_RATIO_MAX * least);
+    let few = contents.topics.len() <= SENSORS_MAX;
+    few && different && alike && first.is_some() && bases.all(|base| base == first)
+}
+
+/// The vehicle frame, and the lidars in it.
+fn lidars(
+    root: &Path,
+    contents: &Contents,
+    topics: &[String],
+) -> Result<(String, Vec<Lidar>), Error> {
+    let mut lidars = Vec::new();
+    let mut base: Option<String> = None;
+    for name in topics {
+        let topic = &contents.topics[name];
+        let (own, vehicle_from_lidar) = contents.fixed.base(&topic.frame).ok_or_else(|| {
+            let what = format!("/tf_static leads in a circle from `{}`", topic.frame);
+            Error::input(root, "", what)
+        })?;
+        if let Some(base) = base.as_ref().filter(|base| **base != own) {
+            let what = format!(
+                "{name} and {} do not hang together: /tf_static fixes them to `{own}` and `{base}`",
+                topics[0]
+            );
+            return Err(Error::input(root, "", what));
+        }
+        base = Some(own);
+        let (topic, encoding) = (name.clone(), topic.encoding.clone());
+        lidars.push(Lidar { topic, encoding, vehicle_from_lidar });
+    }
+    Ok((base.unwrap_or_default(), lidars))
+}
+
+/// The sweeps of all lidars: with each cloud of the first topic that of every other one that is
+/// nearest in time, if it is within half of the time between two.
+fn together(contents: &Contents, topics: &[String]) -> Vec<Vec<Option<CloudMessage>>> {
+    let clouds = |topic: &String| &contents.topics[topic].clouds;
+    let first = clouds(&topics[0]);
+    let mut steps_ns: Vec<i64> =
+        first.windows(2).map(|pair| pair[1].stamp_ns - pair[0].stamp_ns).collect();
+    steps_ns.sort_unstable();
+    let half_ns = steps_ns.get(steps_ns.len() / 2).map_or(0, |step| step / 2);
+    let nearest = |topic: &String, stamp_ns: i64| {
+        let all = clouds(topic);
+        let after = all.partition_point(|cloud| cloud.stamp_ns < stamp_ns);
+        let around = &all[after.saturating_sub(1)..all.len().min(after + 1)];
+        let away = |cloud: &&CloudMessage| cloud.stamp_ns.abs_diff(stamp_ns);
+        around.iter().min_by_key(away).filter(|c| away(c) <= half_ns.unsigned_abs()).copied()
+    };
+    let of_sweep = |cloud: &CloudMessage| {
+        let others = topics[1..].iter().map(|topic| nearest(topic, cloud.stamp_ns));
+        std::iter::once(Some(*cloud)).chain(others).collect()
+    };
+    first.iter().map(of_sweep).collect()
+}
