@@ -73,9 +73,7 @@ impl BagSink {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("raywake ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Zstd))
-            // On one thread, so that the same bytes come out whatever the machine.
-            .compression_threads(0);
+            .compression(Some(Compression::Lz4));
         let begin = || -> mcap::McapResult<_> {
             let mut writer = options.create(file)?;
             let mut channel = |schema: &Schema, topic: &str| {
