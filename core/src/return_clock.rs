@@ -73,7 +73,12 @@ impl Timing {
     /// Seconds after the stamp of a time in slots from the beginning of the sweep.
     #[inline]
     pub fn offset_s(self, slots: f64) -> f64 {
-        let turn = slots / SLOTS as f64;
+        self.at(slots / SLOTS as f64)
+    }
+
+    /// Seconds after the stamp at a part of the sweep, 0 to 1.
+    #[inline]
+    pub fn at(self, turn: f64) -> f64 {
         match self {
             Timing::AtStamp => 0.0,
             Timing::Offset { from_s, span_s } => from_s + turn * span_s,

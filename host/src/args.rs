@@ -3,6 +3,7 @@
 // Flattened groups and plain choices have none.
 #![allow(missing_docs)]
 
+mod clean;
 mod flow;
 mod sweeps;
 mod track;
@@ -17,6 +18,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use raywake_io::Error;
 use raywake_io::source::{Format, OpenOptions, PosesFrame, Unlocated};
 
+pub use clean::CleanArgs;
 pub use flow::FlowArgs;
 pub use sweeps::SweepRange;
 pub use track::{FrontEndKind, TrackArgs};
@@ -48,6 +50,8 @@ pub enum Command {
     Flow(Box<FlowArgs>),
     #[command(after_help = EXIT_CODES, after_long_help = track::after_help(EXIT_CODES))]
     Track(Box<TrackArgs>),
+    #[command(after_help = EXIT_CODES, after_long_help = clean::after_help(EXIT_CODES))]
+    Clean(Box<CleanArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
     Map(Box<MapArgs>),
     /// Find the poses of a recording by registration of its sweeps

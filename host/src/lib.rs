@@ -10,7 +10,7 @@
 //! | [`args`] | the command line |
 //! | [`config`], [`weight_files`], [`choose`] | profile, model weights and backend it asks for |
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
-//! | [`track`], [`map`], `flow`, `odometry`, [`budget`] | the other commands |
+//! | [`track`], [`map`], `flow`, `clean`, `odometry`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
 //! | [`locate`] | sweeps without poses, by registration |
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
@@ -23,6 +23,7 @@ pub mod args;
 pub mod backend;
 pub mod budget;
 pub mod choose;
+mod clean;
 pub mod config;
 pub mod console;
 #[cfg(feature = "demo")]
@@ -58,6 +59,7 @@ pub fn execute(command: Command) -> Result<bool, RunError> {
         Command::Run(args) => Ok(!run::run(&args)?.facts.interrupted),
         Command::Flow(args) => flow::flow(&args).map(|()| true),
         Command::Track(args) => track::track(&args),
+        Command::Clean(args) => clean::clean(&args),
         Command::Map(args) => map::command::map(&args),
         Command::Odometry(args) => odometry::odometry(&args),
         #[cfg(feature = "demo")]

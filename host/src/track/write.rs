@@ -1,14 +1,13 @@
 //! The files of tracks.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::Ended;
 use raywake_io::Error;
-use raywake_io::sink::atomic;
 use raywake_io::sink::table::TableWriter;
+use raywake_io::sink::{atomic, clouds};
 
 /// Where files go, and the rows of `tracks.feather`.
 pub struct Files {
@@ -69,7 +68,8 @@ impl Files {
             [place[0], place[1], place[2], seen.time_s]
         };
         let rows: Vec<[f32; 4]> = track.returns().iter().map(in_frame).collect();
-        ply(&folder.join(format!("clouds/{:05}.ply", track.id)), &rows)
+        let path = folder.join(format!("clouds/{:05}.ply", track.id));
+        clouds::write_ply(&path, ["x", "y", "z", "time"], &rows)
     }
 
     /// All tracks have been seen.
@@ -96,16 +96,4 @@ impl Files {
         t.column("lag_time_s", &self.rows, |r| r.lag.time_s);
         t.write(&folder.join("tracks.feather"), &[])
     }
-}
-
-/// Writes a cloud of x, y, z and time.
-fn ply(path: &Path, rows: &[[f32; 4]]) -> Result<(), Error> {
-    atomic::write(path, |out| {
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", rows.len())?;
-        for name in ["x", "y", "z", "time"] {
-            writeln!(out, "property float {name}")?;
-        }
-        writeln!(out, "end_header")?;
-        rows.iter().flatten().try_for_each(|v| out.write_all(&v.to_le_bytes()))
-    })
 }

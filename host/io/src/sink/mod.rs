@@ -5,6 +5,7 @@ pub mod argoverse;
 pub mod atomic;
 #[cfg_attr(not(feature = "mcap"), path = "bag_absent.rs")]
 pub mod bag;
+pub mod clouds;
 pub mod feather;
 pub mod table;
 

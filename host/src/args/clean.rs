@@ -1,0 +1,55 @@
+//! `raywake clean`.
+
+use std::path::PathBuf;
+
+use super::{FlowChoice, Recording, Selection};
+
+const ABOUT: &str = "\
+Remove what moves from a recording: labels, clouds and a map of what stands
+
+The flow of every sweep is found forwards and backwards in time; a return moves where either says \
+so.";
+
+const FILES: &str = "\
+Files of --out DIR:
+    labels/FRAME.label   SemanticKITTI's labels of moving object segmentation, one per return of
+                         the input: 251 moving, 9 static, 0 neither (outside the window, no
+                         surface)
+    static/FRAME.bin     what does not move, as little-endian float32 x, y, z, intensity in the
+                         vehicle frame; returns outside the window, too
+    moving/FRAME.bin     what moves
+    map.ply              what stands, in the world of the poses: a point per voxel in which more
+                         returns were static than moving";
+
+#[derive(Debug, clap::Args)]
+#[command(about = ABOUT.lines().next(), long_about = ABOUT)]
+pub struct CleanArgs {
+    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
+    pub data: PathBuf,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Output folder: `labels`, `static`, `moving` and `map.ply`
+    #[arg(short, long, value_name = "DIR", help_heading = "Results")]
+    pub out: PathBuf,
+    /// Edge of the voxels of the map, m
+    #[arg(long, value_name = "M", default_value_t = 0.2, value_parser = edge)]
+    #[arg(help_heading = "Results")]
+    pub voxel: f64,
+    #[command(flatten)]
+    pub recording: Recording,
+    #[command(flatten)]
+    pub flow: FlowChoice,
+    #[command(flatten)]
+    pub part: Selection,
+}
+
+fn edge(text: &str) -> Result<f64, String> {
+    let edge: f64 = text.parse().map_err(|_| "not a number")?;
+    if (0.02..=5.0).contains(&edge) { Ok(edge) } else { Err("must be from 0.02 to 5".into()) }
+}
+
+/// The end of `--help`.
+pub(super) fn after_help(exit_codes: &str) -> String {
+    format!("{FILES}\n\n{exit_codes}")
+}

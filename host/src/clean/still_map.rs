@@ -1,0 +1,82 @@
+//! The map of what stands: the mean of the static returns of every voxel in which more of them were
+//! static than moving.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::judged::Judged;
+
+/// Returns in a voxel.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// Sum of places of static ones, from the voxel's corner, m, and of their intensities.
+    sum: [f32; 4],
+    still: u32,
+    moving: u32,
+}
+
+/// A map that grows with the drive.
+pub struct StillMap {
+    voxel_m: f64,
+    voxels: HashMap<[i32; 3], Seen>,
+}
+
+impl StillMap {
+    pub fn new(voxel_m: f64) -> StillMap {
+        StillMap { voxel_m, voxels: HashMap::new() }
+    }
+
+    /// Adds a return at a place of the world.
+    pub fn add(&mut self, at: DVec3, intensity: f32, judged: Judged) {
+        let index = (at / self.voxel_m).floor();
+        let key = index.to_array().map(|c| c as i32);
+        match judged {
+            Judged::Moving => self.voxels.entry(key).or_default().moving += 1,
+            Judged::Static => {
+                let seen = self.voxels.entry(key).or_default();
+                let [x, y, z] = (at - index * self.voxel_m).as_vec3().to_array();
+                seen.sum.iter_mut().zip([x, y, z, intensity]).for_each(|(sum, v)| *sum += v);
+                seen.still += 1;
+            }
+            Judged::None | Judged::Unknown => {}
+        }
+    }
+
+    /// Its points: x, y, z (m, world) and intensity, in the order of their voxels.
+    pub fn points(&self) -> Vec<[f32; 4]> {
+        let still = self.voxels.iter().filter(|(_, seen)| seen.still > seen.moving);
+        let mut still: Vec<_> = still.collect();
+        still.sort_unstable_by_key(|(key, _)| **key);
+        let point = |(key, seen): (&[i32; 3], &Seen)| {
+            let [x, y, z, intensity] = seen.sum.map(|sum| f64::from(sum) / f64::from(seen.still));
+            let corner = DVec3::from_array(key.map(f64::from)) * self.voxel_m;
+            let [x, y, z] = (corner + DVec3::new(x, y, z)).as_vec3().to_array();
+            [x, y, z, intensity as f32]
+        };
+        still.into_iter().map(point).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn voxels_that_mostly_moved_are_left_out() {
+        let mut map = StillMap::new(0.5);
+        for (x, judged) in [
+            (-0.3, Judged::Static),
+            (-0.1, Judged::Static),
+            (-0.2, Judged::Moving),
+            (0.2, Judged::Static),
+            (0.3, Judged::Moving),
+            (0.7, Judged::Unknown),
+        ] {
+            map.add(DVec3::new(x, 1.25, 0.0), 0.5, judged);
+        }
+        let points = map.points();
+        assert_eq!(points.len(), 1, "{points:?}");
+        assert!((points[0][0] + 0.2).abs() < 1e-6 && points[0][1..] == [1.25, 0.0, 0.5]);
+    }
+}
