@@ -7,8 +7,8 @@ use super::{FlowChoice, Recording, Selection};
 const ABOUT: &str = "\
 Remove what moves from a recording: labels, clouds and a map of what stands
 
-The flow of every sweep is found forwards and backwards in time; a return moves where either says \
-so.";
+The flow of every sweep is found twice, forwards and backwards in time. What is kept in memory are \
+60 kB a sweep of 120,000 returns, and the map.";
 
 const FILES: &str = "\
 Files of --out DIR:

@@ -1,8 +1,8 @@
 //! `raywake clean`: a recording without what moves.
 //!
-//! The flow of every sweep is found twice, forwards and backwards in time, and a return moves where
-//! either says so: forwards a mover that has just come into view is known too little, backwards it
-//! has been seen for long.
+//! The flow of every sweep is found twice, forwards and backwards in time: forwards a mover that has
+//! just come into view is known too little, backwards it has been seen for long; and what only seems
+//! to move seldom does so both ways.
 
 mod backwards;
 mod judged;
@@ -25,10 +25,17 @@ use crate::progress::Progress;
 use crate::session::each_sweep;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
-use judged::{Judged, SweepJudged, file};
+use judged::{Judged, OneWay, file, judge};
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
 use still_map::StillMap;
+
+/// Mean of P(moves) of both ways from which on a return moves. Share of static returns kept and of
+/// moving ones removed, % (IoU of these): on cluttered streets 99.93, 97.6 (97.1) at 0.3, 99.95, 97.3
+/// (97.0) here, 99.96, 96.1 (95.9) at 0.5; forwards alone 99.93, 96.9 (96.5), either way at 0.5 99.90,
+/// 97.9 (97.2). On `kitti_raw_0005`, of which the boxes hold ground, too, the IoU is 75.8, 76.8, 74.9;
+/// 75.4, 75.4.
+const MOVING_MIN: f32 = 0.4;
 
 /// Reads a recording twice and writes it without what moves. Returns whether it got to the end.
 pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
@@ -63,7 +70,7 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
 struct Seen {
     world_from_vehicle: Pose,
     twist: Twist,
-    judged: SweepJudged,
+    forwards: OneWay,
 }
 
 struct Cleaning<'a> {
@@ -94,10 +101,10 @@ impl Cleaning<'_> {
             let before = visit.before.map_or(&[][..], |before| &before.points);
             let flows = drive.step(&visit.now.sweep(), before)?.output.flows;
             if let Some((last, flows)) = seen.last_mut().zip(flows) {
-                last.judged = SweepJudged::of(flows.points.iter());
+                last.forwards = OneWay::of(flows.points.iter());
             }
             let &SweepData { world_from_vehicle, twist, .. } = visit.now;
-            seen.push(Seen { world_from_vehicle, twist, judged: SweepJudged::default() });
+            seen.push(Seen { world_from_vehicle, twist, forwards: OneWay::default() });
             Ok(())
         })?;
         Ok(!end.interrupted)
@@ -126,8 +133,8 @@ impl Cleaning<'_> {
             let before = if done > 0 { &later.points[..] } else { &[] };
             let flows = drive.step(&now.sweep(), before)?.output.flows;
             if done > 0 {
-                let judged = flows.map(|flows| SweepJudged::of(flows.points.iter()));
-                self.write(&turned.rig(), index + 1 - sweeps.start, &later, judged)?;
+                let found = flows.map(|flows| OneWay::of(flows.points.iter()));
+                self.write(&turned.rig(), index + 1 - sweeps.start, &later, found)?;
             }
             std::mem::swap(&mut now, &mut later);
             progress.update(done + 1);
@@ -143,13 +150,13 @@ impl Cleaning<'_> {
         rig: &Rig,
         number: usize,
         sweep: &SweepData,
-        backwards: Option<SweepJudged>,
+        backwards: Option<OneWay>,
     ) -> Result<(), RunError> {
         let (root, frame, points) = (&self.args.out, sweep.frame, &sweep.points);
-        let [forwards, backwards] =
-            [std::mem::take(&mut self.seen[number].judged), backwards.unwrap_or_default()];
-        let judged: Vec<Judged> =
-            (0..points.len()).map(|n| forwards.get(n).max(backwards.get(n))).collect();
+        let moving = self.args.flow.profile.moving.unwrap_or(MOVING_MIN);
+        let forwards = std::mem::take(&mut self.seen[number].forwards);
+        let ways = [&forwards, &backwards.unwrap_or_default()];
+        let judged: Vec<Judged> = (0..points.len()).map(|n| judge(ways, n, moving)).collect();
         let labels: Vec<u32> = judged.iter().map(|judged| judged.label()).collect();
         clouds::write_labels(&file(root, "labels", frame, "label"), &labels)?;
         self.write_clouds(root, sweep, &judged)?;
