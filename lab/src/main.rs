@@ -28,26 +28,29 @@ enum Command {
     Sim(simulate::Args),
 }
 
-/// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2.
+/// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2, `eval clean` for `raywake clean`.
 #[derive(clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 struct Eval {
     #[command(flatten)]
     flow: eval::Args,
     #[command(subcommand)]
-    tracks: Option<Tracks>,
+    of: Option<Other>,
 }
 
 #[derive(clap::Subcommand)]
-enum Tracks {
+enum Other {
     /// Trajectory and shape of objects against their truth (chapter 2).
     Tracks(tracks::Args),
+    /// A cleaned recording against its truth: static kept, dynamic removed.
+    Clean(eval::clean::Args),
 }
 
 impl Eval {
     fn run(&self) -> Result<(), RunError> {
-        match &self.tracks {
-            Some(Tracks::Tracks(args)) => tracks::run(args),
+        match &self.of {
+            Some(Other::Tracks(args)) => tracks::run(args),
+            Some(Other::Clean(args)) => Ok(eval::clean::run(args)?),
             None => Ok(eval::run(&self.flow)?),
         }
     }
@@ -86,7 +89,7 @@ mod tests {
         let error = flow.run().unwrap_err().to_string();
         assert!(error.contains("no/drive"), "{error}");
         let tracks = parse("lab eval tracks --out results a/drive");
-        assert!(matches!(tracks, Ok(Command::Eval(e)) if e.tracks.is_some()));
+        assert!(matches!(tracks, Ok(Command::Eval(e)) if e.of.is_some()));
         for wrong in ["lab eval", "lab eval a/drive", "lab eval tracks", "lab eval --out results"] {
             assert!(parse(wrong).is_err(), "{wrong}");
         }

@@ -1,7 +1,5 @@
 //! What became of every return, by either way through the drive.
 
-use std::path::Path;
-
 use raywake_core::output::{PointFlow, Status};
 
 /// Numbers of SemanticKITTI's labels for moving object segmentation.
@@ -83,11 +81,6 @@ pub fn judge(ways: [&OneWay; 2], n: usize, moving: f32) -> Judged {
         count if sum >= moving * f32::from(SURE) * count as f32 => Judged::Moving,
         _ => Judged::Static,
     }
-}
-
-/// Where the files of a sweep go.
-pub fn file(root: &Path, folder: &str, frame: u64, extension: &str) -> std::path::PathBuf {
-    root.join(format!("{folder}/{frame:010}.{extension}"))
 }
 
 #[cfg(test)]

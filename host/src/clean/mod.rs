@@ -25,7 +25,7 @@ use crate::progress::Progress;
 use crate::session::each_sweep;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
-use judged::{Judged, OneWay, file, judge};
+use judged::{Judged, OneWay, judge};
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
 use still_map::StillMap;
@@ -158,7 +158,8 @@ impl Cleaning<'_> {
         let ways = [&forwards, &backwards.unwrap_or_default()];
         let judged: Vec<Judged> = (0..points.len()).map(|n| judge(ways, n, moving)).collect();
         let labels: Vec<u32> = judged.iter().map(|judged| judged.label()).collect();
-        clouds::write_labels(&file(root, "labels", frame, "label"), &labels)?;
+        // As SemanticKITTI names them.
+        clouds::write_labels(&root.join(format!("labels/{frame:06}.label")), &labels)?;
         self.write_clouds(root, sweep, &judged)?;
         for (point, &judged) in points.iter().zip(&judged) {
             self.counts[judged as usize] += 1;
@@ -182,8 +183,9 @@ impl Cleaning<'_> {
             });
             kept.map(|(point, _)| point)
         };
-        clouds::write_bin(&file(root, "static", sweep.frame, "bin"), of(false))?;
-        Ok(clouds::write_bin(&file(root, "moving", sweep.frame, "bin"), of(true))?)
+        let path = |folder: &str| root.join(format!("{folder}/{:010}.bin", sweep.frame));
+        clouds::write_bin(&path("static"), of(false))?;
+        Ok(clouds::write_bin(&path("moving"), of(true))?)
     }
 
     fn text(&self, points: usize) -> String {

@@ -8,6 +8,7 @@
 
 pub mod ablate;
 mod calibration;
+pub mod clean;
 mod collect;
 mod conclude;
 mod drive;

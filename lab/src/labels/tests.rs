@@ -17,7 +17,7 @@ impl Road {
         let (stamps_s, poses): (Vec<f64>, Vec<Pose>) = moments.unzip();
         let (name, frames, notes) = ("road".into(), (0..poses.len() as u64).collect(), Vec::new());
         let track = PoseTrack { stamps_s, poses };
-        Road(Overview { name, rig, frames, track, trusted: true, notes })
+        Road(Overview { name, rig, frames, track, epoch_ns: 0, trusted: true, notes })
     }
 
     pub fn moment(&self, index: usize) -> (f64, Pose) {

@@ -93,7 +93,8 @@ impl Semantic {
         labels::file(&drive, source.frame(0)).is_file().then_some(Semantic(drive))
     }
 
-    fn returns(&self, sweep: &SweepData) -> Result<Vec<PointLabel>, Error> {
+    /// Labels of a sweep's returns.
+    pub fn returns(&self, sweep: &SweepData) -> Result<Vec<PointLabel>, Error> {
         labels::read(&labels::file(&self.0, sweep.frame), sweep.points.len())
     }
 }
