@@ -3,12 +3,30 @@
 
 use std::alloc::System;
 use std::io::{Write, stderr};
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
+use clap::error::ErrorKind;
 use raywake::args::Args;
 use raywake::{execute, team};
 use raywake_alloc_guard::Guard;
+
+/// Ends with what clap says, or with the command for a recording that stands where one is missing.
+fn explain(e: &clap::Error) -> ! {
+    let first = std::env::args_os().nth(1).filter(|first| Path::new(first).exists());
+    if let Some(path) = first.filter(|_| e.kind() == ErrorKind::InvalidSubcommand) {
+        let path = Path::new(&path).display();
+        // Nobody is left to tell where standard error is closed.
+        let _ = writeln!(
+            stderr(),
+            "raywake: a command is missing; to see what moves in it:\n\n    \
+             raywake run {path} --out results --png\n"
+        );
+        std::process::exit(e.exit_code());
+    }
+    e.exit()
+}
 
 /// Exit code of a process ended by SIGINT, as shells have it.
 const INTERRUPTED: u8 = 130;
@@ -17,7 +35,7 @@ const INTERRUPTED: u8 = 130;
 static ALLOCATOR: Guard<System> = Guard(System);
 
 fn main() -> ExitCode {
-    let command = Args::parse().command;
+    let command = Args::try_parse().unwrap_or_else(|e| explain(&e)).command;
     match team::lead(team::available(), || execute(command)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(INTERRUPTED),

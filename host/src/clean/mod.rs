@@ -32,9 +32,9 @@ use still_map::StillMap;
 
 /// Mean of P(moves) of both ways from which on a return moves. Share of static returns kept and of
 /// moving ones removed, % (IoU of these): on cluttered streets 99.93, 97.6 (97.1) at 0.3, 99.95, 97.3
-/// (97.0) here, 99.96, 96.1 (95.9) at 0.5; forwards alone 99.93, 96.9 (96.5), either way at 0.5 99.90,
-/// 97.9 (97.2). On `kitti_raw_0005`, of which the boxes hold ground, too, the IoU is 75.8, 76.8, 74.9;
-/// 75.4, 75.4.
+/// (97.0) here, 99.96, 96.1 (95.9) at 0.5; what is put out forwards alone 99.93, 96.9 (96.5), by
+/// either way 99.90, 97.9 (97.2). On `kitti_raw_0005`, whose boxes hold ground, too, the IoU is 75.8,
+/// 76.8, 74.9; 75.4, 75.4.
 const MOVING_MIN: f32 = 0.4;
 
 /// Reads a recording twice and writes it without what moves. Returns whether it got to the end.
