@@ -68,7 +68,7 @@ pub enum Command {
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
+    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -85,7 +85,7 @@ pub struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct OdometryArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
+    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -261,7 +261,7 @@ pub enum Export {
 
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
+    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]

@@ -41,7 +41,7 @@ struct Eval {
 #[derive(clap::Subcommand)]
 enum Other {
     /// Trajectory and shape of objects against their truth (chapter 2).
-    Tracks(tracks::Args),
+    Tracks(Box<tracks::Args>),
     /// A cleaned recording against its truth: static kept, dynamic removed.
     Clean(eval::clean::Args),
 }

@@ -24,7 +24,7 @@ Files of --out DIR:
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct CleanArgs {
-    /// Recording: folder of a KITTI drive, of an Argoverse 2 log or of point clouds, or an MCAP file
+    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]

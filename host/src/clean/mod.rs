@@ -1,8 +1,8 @@
 //! `raywake clean`: a recording without what moves.
 //!
-//! The flow of every sweep is found twice, forwards and backwards in time: forwards a mover that has
-//! just come into view is known too little, backwards it has been seen for long; and what only seems
-//! to move seldom does so both ways.
+//! The flow of every sweep is found twice, forwards and backwards in time: forwards a mover that
+//! has just come into view is known too little, backwards it has been seen for long; and what only
+//! seems to move seldom does so both ways.
 
 mod backwards;
 mod judged;
@@ -31,10 +31,10 @@ use raywake_io::source::{self, Source, SweepData};
 use still_map::StillMap;
 
 /// Mean of P(moves) of both ways from which on a return moves. Share of static returns kept and of
-/// moving ones removed, % (IoU of these): on cluttered streets 99.93, 97.6 (97.1) at 0.3, 99.95, 97.3
-/// (97.0) here, 99.96, 96.1 (95.9) at 0.5; what is put out forwards alone 99.93, 96.9 (96.5), by
-/// either way 99.90, 97.9 (97.2). On `kitti_raw_0005`, whose boxes hold ground, too, the IoU is 75.8,
-/// 76.8, 74.9; 75.4, 75.4.
+/// moving ones removed, % (IoU of these): on cluttered streets 99.93, 97.6 (97.1) at 0.3, 99.95,
+/// 97.3 (97.0) here, 99.96, 96.1 (95.9) at 0.5; what is put out forwards alone 99.93, 96.9 (96.5),
+/// by either way 99.90, 97.9 (97.2). On `kitti_raw_0005`, whose boxes hold ground, too, the IoU is
+/// 75.8, 76.8, 74.9; 75.4, 75.4.
 const MOVING_MIN: f32 = 0.4;
 
 /// Reads a recording twice and writes it without what moves. Returns whether it got to the end.
@@ -67,7 +67,7 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
 }
 
 /// A sweep that was seen forwards.
-struct Seen {
+struct SeenSweep {
     world_from_vehicle: Pose,
     twist: Twist,
     forwards: OneWay,
@@ -77,7 +77,7 @@ struct Cleaning<'a> {
     args: &'a args::CleanArgs,
     profile: Profile,
     weights: WeightFiles,
-    seen: Vec<Seen>,
+    seen: Vec<SeenSweep>,
     map: StillMap,
     clock: ReturnClock,
     /// Returns by what is known of them.
@@ -104,7 +104,7 @@ impl Cleaning<'_> {
                 last.forwards = OneWay::of(flows.points.iter());
             }
             let &SweepData { world_from_vehicle, twist, .. } = visit.now;
-            seen.push(Seen { world_from_vehicle, twist, forwards: OneWay::default() });
+            seen.push(SeenSweep { world_from_vehicle, twist, forwards: OneWay::default() });
             Ok(())
         })?;
         Ok(!end.interrupted)

@@ -9,7 +9,7 @@ use super::judged::Judged;
 
 /// Returns in a voxel.
 #[derive(Clone, Copy, Default)]
-struct Seen {
+struct VoxelReturns {
     /// Sum of places of static ones, from the voxel's corner, m, and of their intensities.
     sum: [f32; 4],
     still: u32,
@@ -19,7 +19,7 @@ struct Seen {
 /// A map that grows with the drive.
 pub struct StillMap {
     voxel_m: f64,
-    voxels: HashMap<[i32; 3], Seen>,
+    voxels: HashMap<[i32; 3], VoxelReturns>,
 }
 
 impl StillMap {
@@ -48,7 +48,7 @@ impl StillMap {
         let still = self.voxels.iter().filter(|(_, seen)| seen.still > seen.moving);
         let mut still: Vec<_> = still.collect();
         still.sort_unstable_by_key(|(key, _)| **key);
-        let point = |(key, seen): (&[i32; 3], &Seen)| {
+        let point = |(key, seen): (&[i32; 3], &VoxelReturns)| {
             let [x, y, z, intensity] = seen.sum.map(|sum| f64::from(sum) / f64::from(seen.still));
             let corner = DVec3::from_array(key.map(f64::from)) * self.voxel_m;
             let [x, y, z] = (corner + DVec3::new(x, y, z)).as_vec3().to_array();

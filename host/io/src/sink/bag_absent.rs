@@ -8,11 +8,13 @@ use crate::Error;
 use crate::source::SweepData;
 
 /// No file.
-pub enum BagSink {}
+pub enum Absent {}
 
-impl BagSink {
+pub use Absent as BagSink;
+
+impl Absent {
     /// Fails with [`Error::Unsupported`].
-    pub fn create(path: &Path, _: u64) -> Result<BagSink, Error> {
+    pub fn create(path: &Path, _: u64) -> Result<Absent, Error> {
         let what = "an MCAP file needs the feature `mcap`, which is not compiled in";
         Err(Error::Unsupported(format!("{}: {what}", path.display())))
     }

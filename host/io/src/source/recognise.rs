@@ -51,7 +51,7 @@ fn format_of_file(path: &Path) -> Result<Format, Error> {
         Some(e) if EXTENSIONS.contains(&e) => {
             "a single cloud, expected the folder it is in; of two clouds: raywake flow A B"
         }
-        _ => "expected a folder or an .mcap file",
+        _ => "expected a folder or an .mcap file, found a file of another kind",
     };
     Err(Error::input(path, "", what))
 }

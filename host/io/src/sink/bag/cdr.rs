@@ -1,5 +1,7 @@
 //! CDR, little-endian: messages as ROS 2 sends them.
 
+use raywake_core::pose::Pose;
+
 /// Kind of encapsulation: plain, least significant byte first.
 const HEAD: [u8; 4] = [0, 1, 0, 0];
 
@@ -58,6 +60,20 @@ impl Cdr {
 
     pub fn doubles(&mut self, values: impl IntoIterator<Item = f64>) {
         values.into_iter().for_each(|value| self.double(value));
+    }
+
+    /// Translation and quaternion.
+    pub fn pose(&mut self, pose: &Pose) {
+        self.doubles(pose.translation.to_array());
+        self.doubles(pose.rotation.to_array());
+    }
+
+    /// A field of a point: its name, first byte, kind, and that it is one number.
+    pub fn field(&mut self, name: &str, offset: u32, kind: u8) {
+        self.text(name);
+        self.word(offset);
+        self.byte(kind);
+        self.word(1);
     }
 
     /// The message.

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | `/tf` | `tf2_msgs/TFMessage` | the vehicle in the world, as the poses have it |
 //! | `/raywake/points` | `sensor_msgs/PointCloud2` | returns of a sweep with their flow |
-//! | `/raywake/motion` | `visualization_msgs/Marker` | lines from columns that move to where they will be half a second later |
+//! | `/raywake/motion` | `visualization_msgs/Marker` | half a second of motion of what moves |
 //!
 //! Fields of a return, all float32 but the last: `x y z` (m) and `intensity`; `velocity_x
 //! velocity_y` (over ground, along the vehicle's axes) and `speed`, m/s; `p_moves`; `status`, a
@@ -127,8 +127,7 @@ fn transform(stamp_ns: u64, pose: &Pose) -> Vec<u8> {
     cdr.word(1);
     cdr.header(stamp_ns, WORLD);
     cdr.text(VEHICLE);
-    cdr.doubles(pose.translation.to_array());
-    cdr.doubles(pose.rotation.to_array());
+    cdr.pose(pose);
     cdr.message()
 }
 
@@ -148,13 +147,7 @@ fn cloud<'a>(
     let count = returns.len() as u32;
     cdr.header(stamp_ns, VEHICLE);
     [1, count, FLOATS.len() as u32 + 1].into_iter().for_each(|n| cdr.word(n));
-    let fields = FLOATS.iter().map(|name| (*name, FLOAT32)).chain([(STATUS, UINT8)]);
-    for (n, (name, kind)) in fields.enumerate() {
-        cdr.text(name);
-        cdr.word(4 * n as u32);
-        cdr.byte(kind);
-        cdr.word(1);
-    }
+    fields(&mut cdr);
     // Least significant byte first.
     cdr.byte(0);
     cdr.word(STEP);
@@ -173,6 +166,12 @@ fn cloud<'a>(
     // Whether no coordinate may be missing.
     cdr.byte(0);
     cdr.message()
+}
+
+/// Definitions of the fields of a return, a number each.
+fn fields(cdr: &mut Cdr) {
+    let fields = FLOATS.iter().map(|name| (*name, FLOAT32)).chain([(STATUS, UINT8)]);
+    (0..).zip(fields).for_each(|(n, (name, kind))| cdr.field(name, 4 * n, kind));
 }
 
 /// Lines along the motion of columns that move; they last until the next sweep's.
@@ -198,7 +197,12 @@ fn motion(stamp_ns: u64, pose: &Pose, columns: &[ColumnFlow]) -> Vec<u8> {
     cdr.byte(1);
     cdr.word(2 * lines.len() as u32);
     lines.as_flattened().iter().for_each(|[x, y]| cdr.doubles([(*x).into(), (*y).into(), 0.0]));
-    // No colours of their own, no texture, no mesh.
+    without_looks(&mut cdr);
+    cdr.message()
+}
+
+/// The rest of a marker that has no colours of points, no texture, no text and no mesh.
+fn without_looks(cdr: &mut Cdr) {
     cdr.word(0);
     cdr.text("");
     cdr.header(0, "");
@@ -208,5 +212,4 @@ fn motion(stamp_ns: u64, pose: &Pose, columns: &[ColumnFlow]) -> Vec<u8> {
     ["", "", ""].into_iter().for_each(|text| cdr.text(text));
     cdr.bytes(|_| ());
     cdr.byte(0);
-    cdr.message()
 }

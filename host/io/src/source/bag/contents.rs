@@ -1,13 +1,14 @@
 //! What is in the files of a recording: clouds, frames, poses. One walk through each file.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use mcap::records::{MessageHeader, Record};
 use raywake_core::pose::Pose;
 
-use super::file::{BagFile, End, Place};
+use super::file::{BagFile, FileEnd, Place};
 use super::frames::{FixedFrames, Trajectory};
-use super::messages::{self, CloudHeader, Kind, Transform};
+use super::messages::{self, CloudHeader, MessageKind, Transform};
 use super::wire::Wire;
 use crate::Error;
 
@@ -44,6 +45,12 @@ pub(super) struct PoseSource {
     pub child: String,
 }
 
+impl fmt::Display for PoseSource {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} ({} in {})", self.topic, self.child, self.parent)
+    }
+}
+
 /// What is in the files.
 #[derive(Default)]
 pub(super) struct Contents {
@@ -61,7 +68,7 @@ pub(super) struct Contents {
 struct Channel {
     topic: String,
     encoding: String,
-    kind: Kind,
+    kind: MessageKind,
 }
 
 impl Contents {
@@ -98,37 +105,37 @@ impl Contents {
                 }
                 Record::Channel(channel) => {
                     let schema = schemas.get(&channel.schema_id).map_or("", String::as_str);
-                    let encoding = channel.message_encoding;
-                    let known = ["cdr", "ros1"].contains(&encoding.as_str());
-                    match Kind::of(schema).filter(|_| known) {
-                        Some(kind) => {
-                            let topic = channel.topic;
-                            channels.insert(channel.id, Channel { topic, encoding, kind });
-                        }
-                        None => {
-                            self.others.insert(format!("{} ({schema})", channel.topic));
-                        }
-                    }
+                    let id = channel.id;
+                    self.channel(channel, schema).map(|channel| channels.insert(id, channel));
                 }
                 Record::Message { header, data } => {
-                    if let Some(channel) = channels.get(&header.channel_id) {
-                        let at = CloudMessage { file: number, place, stamp_ns: 0 };
-                        self.message(channel, &header, at, &data).map_err(|what| {
-                            let topic = &channel.topic;
-                            let place = format!("byte {}, topic {topic}", place.record);
-                            Error::input(&path, place, what)
-                        })?;
-                    }
+                    let Some(channel) = channels.get(&header.channel_id) else { return Ok(()) };
+                    let at = CloudMessage { file: number, place, stamp_ns: 0 };
+                    self.message(channel, &header, at, &data).map_err(|what| {
+                        let at = format!("byte {}, topic {}", place.record, channel.topic);
+                        Error::input(&path, at, what)
+                    })?;
                 }
                 _ => {}
             }
             Ok(())
         })?;
-        if let End::Cut(at) = end {
+        if let FileEnd::Cut(at) = end {
             let name = path.file_name().unwrap_or_default().display();
             self.notes.push(format!("{name} is cut off: read up to byte {at}"));
         }
         Ok(())
+    }
+
+    /// The channel, if its messages are of use; otherwise it is noted.
+    fn channel(&mut self, channel: mcap::records::Channel, schema: &str) -> Option<Channel> {
+        let mcap::records::Channel { topic, message_encoding: encoding, .. } = channel;
+        let known = ["cdr", "ros1"].contains(&encoding.as_str());
+        let kind = MessageKind::of(schema).filter(|_| known);
+        if kind.is_none() {
+            self.others.insert(format!("{topic} ({schema})"));
+        }
+        Some(Channel { topic, encoding, kind: kind? })
     }
 
     fn message(
@@ -140,21 +147,21 @@ impl Contents {
     ) -> Result<(), String> {
         let mut wire = Wire::new(&channel.encoding, data)?;
         match channel.kind {
-            Kind::PointCloud2 => self.cloud(channel, header, at, CloudHeader::read(&mut wire)?),
-            Kind::Odometry => match messages::odometry(wire)? {
+            MessageKind::PointCloud2 => {
+                self.cloud(channel, header, at, CloudHeader::read(&mut wire)?)
+            }
+            MessageKind::Odometry => match messages::odometry(wire)? {
                 Some(transform) => self.pose(&channel.topic, transform),
                 None => self.wrong += 1,
             },
-            Kind::Transforms => {
+            MessageKind::Transforms => {
                 let (found, wrong) = messages::transforms(wire)?;
                 self.wrong += wrong;
-                for transform in found {
-                    if channel.topic.ends_with(FIXED_TOPIC) {
-                        self.fixed.add(transform);
-                    } else {
-                        self.pose(&channel.topic, transform);
-                    }
-                }
+                let fixed = channel.topic.ends_with(FIXED_TOPIC);
+                found.into_iter().for_each(|transform| match fixed {
+                    true => self.fixed.add(transform),
+                    false => self.pose(&channel.topic, transform),
+                });
             }
         }
         Ok(())

@@ -52,7 +52,7 @@ struct OpenRecord {
 
 /// How a walk through a file ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum FileEnd {
     Whole,
     /// It is cut off in the record that begins at this byte.
     Cut(u64),
@@ -78,10 +78,10 @@ impl BagFile {
     pub fn walk(
         &mut self,
         mut each: impl FnMut(Place, Record) -> Result<(), Error>,
-    ) -> Result<End, Error> {
+    ) -> Result<FileEnd, Error> {
         let mut at = MAGIC.len() as u64;
         while at < self.length {
-            let Some((kind, length)) = self.head(at)? else { return Ok(End::Cut(at)) };
+            let Some((kind, length)) = self.head(at)? else { return Ok(FileEnd::Cut(at)) };
             match kind {
                 op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => {
                     self.begin(at, length)?;
@@ -89,16 +89,16 @@ impl BagFile {
                         each(place, record)?;
                     }
                 }
-                op::DATA_END | op::FOOTER => return Ok(End::Whole),
+                op::DATA_END | op::FOOTER => return Ok(FileEnd::Whole),
                 _ => {}
             }
             let next = at.saturating_add(HEAD).saturating_add(length);
             if next > self.length {
-                return Ok(End::Cut(at));
+                return Ok(FileEnd::Cut(at));
             }
             at = next;
         }
-        Ok(End::Cut(self.length))
+        Ok(FileEnd::Cut(self.length))
     }
 
     /// Bytes of the message at a place. Quick where it follows the one read before.

@@ -17,21 +17,23 @@ const UNIT_TOLERANCE: f64 = 1e-2;
 
 /// Kinds of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MessageKind {
     PointCloud2,
     Transforms,
     Odometry,
 }
 
-impl Kind {
+impl MessageKind {
     /// By the name of the schema, of ROS 1 or 2.
-    pub fn of(schema: &str) -> Option<Kind> {
+    pub fn of(schema: &str) -> Option<MessageKind> {
         match schema {
-            "sensor_msgs/msg/PointCloud2" | "sensor_msgs/PointCloud2" => Some(Kind::PointCloud2),
-            "tf2_msgs/msg/TFMessage" | "tf2_msgs/TFMessage" | "tf/tfMessage" => {
-                Some(Kind::Transforms)
+            "sensor_msgs/msg/PointCloud2" | "sensor_msgs/PointCloud2" => {
+                Some(MessageKind::PointCloud2)
             }
-            "nav_msgs/msg/Odometry" | "nav_msgs/Odometry" => Some(Kind::Odometry),
+            "tf2_msgs/msg/TFMessage" | "tf2_msgs/TFMessage" | "tf/tfMessage" => {
+                Some(MessageKind::Transforms)
+            }
+            "nav_msgs/msg/Odometry" | "nav_msgs/Odometry" => Some(MessageKind::Odometry),
             _ => None,
         }
     }
@@ -112,19 +114,7 @@ impl CloudHeader<'_> {
 pub(super) fn cloud(mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, String> {
     points.clear();
     let CloudHeader { stamp_ns, size: [height, width], .. } = CloudHeader::read(&mut wire)?;
-    let count = wire.word()?;
-    if count > FIELDS_MAX {
-        return Err(format!("{count} fields, at most {FIELDS_MAX}"));
-    }
-    let mut named = Vec::new();
-    let mut starts = Vec::new();
-    for _ in 0..count {
-        let (name, start, kind) = (wire.text()?, wire.word()? as usize, wire.byte()?);
-        wire.word()?;
-        let number = number(kind).ok_or_else(|| format!("field `{name}` has type {kind}"))?;
-        named.push((name.to_owned(), number));
-        starts.push(start);
-    }
+    let (named, starts) = fields(&mut wire)?;
     let big = wire.byte()? != 0;
     let [step, row_step] = [wire.word()? as usize, wire.word()? as usize];
     let data = wire.bytes()?;
@@ -147,6 +137,26 @@ pub(super) fn cloud(mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, Str
         attribute.value(data, point % width, big)
     };
     Ok(fields.returns(height * width, value, points))
+}
+
+/// Names, kinds and first bytes of the numbers of a point.
+type NamedFields = (Vec<(String, Number)>, Vec<usize>);
+
+fn fields(wire: &mut Wire) -> Result<NamedFields, String> {
+    let count = wire.word()?;
+    if count > FIELDS_MAX {
+        return Err(format!("{count} fields, at most {FIELDS_MAX}"));
+    }
+    let (mut named, mut starts) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let (name, start, kind) = (wire.text()?, wire.word()? as usize, wire.byte()?);
+        // How many numbers it has: the first is taken.
+        wire.word()?;
+        let number = number(kind).ok_or_else(|| format!("field `{name}` has type {kind}"))?;
+        named.push((name.to_owned(), number));
+        starts.push(start);
+    }
+    Ok((named, starts))
 }
 
 /// How a field's type stores a number.

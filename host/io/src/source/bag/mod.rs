@@ -66,16 +66,17 @@ impl Bag {
         let mut contents = Contents::read(&mut files)?;
         let topics = choose(root, &contents, &options.topics)?;
         let (base, lidars) = lidars(root, &contents, &topics)?;
+        let rig = Rig {
+            sensors: lidars.iter().map(|l| l.vehicle_from_lidar).collect(),
+            timing: Timing::AtStamp,
+            distorted: true,
+            ground_m: 0.0,
+            own_vehicle: None,
+        };
         let mut bag = Bag {
             overview: Overview {
                 name: name(root),
-                rig: Rig {
-                    sensors: lidars.iter().map(|l| l.vehicle_from_lidar).collect(),
-                    timing: Timing::AtStamp,
-                    distorted: true,
-                    ground_m: 0.0,
-                    own_vehicle: None,
-                },
+                rig,
                 frames: Vec::new(),
                 track: PoseTrack::default(),
                 epoch_ns: 0,
@@ -109,7 +110,7 @@ impl Bag {
         self.overview.epoch_ns = self.overview.frames[0];
     }
 
-    /// Finds the poses of the sweeps. Those before the first pose and after the last are left out.
+    /// Finds the poses of the sweeps.
     fn locate(
         &mut self,
         contents: &Contents,
@@ -128,29 +129,14 @@ impl Bag {
             return Ok(());
         }
         let mut tracks = contents.tracks(base, &self.stamps_ns());
-        let told = |track: &(&contents::PoseSource, _)| {
-            format!("{} ({} in {})", track.0.topic, track.0.child, track.0.parent)
-        };
-        if let [track] = &tracks[..] {
-            self.poses_from = told(track);
-            let (_, poses) = tracks.remove(0);
-            let all = self.sweeps.len();
-            let mut known = poses.iter().map(Option::is_some);
-            self.sweeps.retain(|_| known.next().unwrap_or(false));
-            self.overview.track.poses = poses.into_iter().flatten().collect();
-            let left_out = all - self.sweeps.len();
-            if left_out > 0 {
-                let note = format!("{left_out} sweeps skipped: no pose on {}", self.poses_from);
-                self.overview.notes.push(note);
-            }
+        let names: Vec<String> = tracks.iter().map(|track| track.0.to_string()).collect();
+        if let [name] = &names[..] {
+            self.take_poses(name, tracks.remove(0).1);
             return Ok(());
         }
-        let found = match tracks.len() {
+        let found = match names.len() {
             0 => format!("nothing tells where `{base}` was"),
-            n => {
-                let names: Vec<String> = tracks.iter().map(told).collect();
-                format!("{n} sources tell where `{base}` was ({})", names.join(", "))
-            }
+            n => format!("{n} sources tell where `{base}` was ({})", names.join(", ")),
         };
         if options.unlocated == Unlocated::Refuse {
             let what = format!("{found}: poses are needed, give a file with --poses");
@@ -160,18 +146,51 @@ impl Bag {
         Ok(())
     }
 
+    /// Takes the poses of a source. Sweeps before the first and after the last are left out.
+    fn take_poses(&mut self, name: &str, poses: Vec<Option<Pose>>) {
+        self.poses_from = name.to_owned();
+        let all = self.sweeps.len();
+        let mut known = poses.iter().map(Option::is_some);
+        self.sweeps.retain(|_| known.next().unwrap_or(false));
+        self.overview.track.poses = poses.into_iter().flatten().collect();
+        let left_out = all - self.sweeps.len();
+        if left_out > 0 {
+            let note = format!("{left_out} sweeps skipped: no pose on {name}");
+            self.overview.notes.push(note);
+        }
+    }
+
     /// Learns from the first sweep of all lidars when its returns were measured, and where the
     /// ground is.
     fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let whole = self.sweeps.iter().position(|sweep| sweep.iter().all(Option::is_some));
         let mut first = SweepData::default();
         let timed = self.read_points(whole.unwrap_or(0), &mut first)?;
-        let times = first.points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
+        self.overview.rig.timing = self.timing(&first.points)?;
+        let notes = &mut self.overview.notes;
+        if !timed {
+            notes.push("returns have no time: motion within a sweep is not corrected".into());
+        }
+        let found = options.ground_m.or_else(|| ground_height(&first.points));
+        let ground_m = found.ok_or_else(|| {
+            let what = "no ground found in the first sweep: give its height with --ground";
+            Error::input(&self.root, "", what)
+        })?;
+        if options.ground_m.is_none() {
+            notes.push(format!("ground estimated at {ground_m:.2} m"));
+        }
+        self.overview.rig.ground_m = ground_m;
+        self.mount(ground_m);
+        Ok(())
+    }
+
+    /// When the returns of a sweep were measured.
+    fn timing(&self, points: &[Point]) -> Result<Timing, Error> {
+        let times = points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
         let limits = (f64::INFINITY, f64::NEG_INFINITY);
         let (from_s, to_s) = times.fold(limits, |l, t| (l.0.min(t), l.1.max(t)));
         let span_s = to_s - from_s;
-        let limits_s = [from_s.abs(), span_s];
-        if limits_s.iter().any(|s| s.is_finite() && *s > SPAN_MAX_S) {
+        if [from_s.abs(), span_s].iter().any(|s| s.is_finite() && *s > SPAN_MAX_S) {
             let what = format!(
                 "{}: returns from {from_s:.3} to {to_s:.3} s around the stamp of a sweep; \
                  {SPAN_MAX_S} s at most",
@@ -179,34 +198,24 @@ impl Bag {
             );
             return Err(Error::input(&self.root, "", what));
         }
+        Ok(if span_s > 0.0 { Timing::Offset { from_s, span_s } } else { Timing::AtStamp })
+    }
+
+    /// Lifts sensors above the ground whose clouds are in a frame that lies on it.
+    fn mount(&mut self, ground_m: f64) {
         let Overview { rig, notes, .. } = &mut self.overview;
-        if span_s > 0.0 {
-            rig.timing = Timing::Offset { from_s, span_s };
-        }
-        if !timed {
-            notes.push("returns have no time: motion within a sweep is not corrected".into());
-        }
-        let found = options.ground_m.or_else(|| ground_height(&first.points));
-        rig.ground_m = found.ok_or_else(|| {
-            let what = "no ground found in the first sweep: give its height with --ground";
-            Error::input(&self.root, "", what)
-        })?;
-        if options.ground_m.is_none() {
-            notes.push(format!("ground estimated at {:.2} m", rig.ground_m));
-        }
         for (pose, lidar) in rig.sensors.iter_mut().zip(&self.lidars) {
             let own_frame = lidar.vehicle_from_lidar == Pose::IDENTITY;
-            if let Some(place) = mounting::above(rig.ground_m).filter(|_| own_frame) {
+            if let Some(place) = mounting::above(ground_m).filter(|_| own_frame) {
                 pose.translation = place;
                 notes.push(format!(
                     "{}: the origin is close to the ground; the sensor is taken to be {:.2} m \
                      above it",
                     lidar.topic,
-                    place.z - rig.ground_m
+                    place.z - ground_m
                 ));
             }
         }
-        Ok(())
     }
 
     /// Replaces the points by those of a sweep; returns whether all lidars tell their times.

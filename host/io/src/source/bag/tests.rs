@@ -48,12 +48,7 @@ fn cloud(stamp_ns: u64, frame: &str, height_m: f32) -> Vec<u8> {
     cdr.header(stamp_ns, frame);
     [1, points.len() as u32, 5].into_iter().for_each(|n| cdr.word(n));
     let fields = [("y", 0, 7), ("x", 4, 7), ("z", 8, 7), ("intensity", 16, 2), ("time", 20, 7)];
-    for (name, offset, kind) in fields {
-        cdr.text(name);
-        cdr.word(offset);
-        cdr.byte(kind);
-        cdr.word(1);
-    }
+    fields.into_iter().for_each(|(name, offset, kind)| cdr.field(name, offset, kind));
     cdr.byte(0);
     [24, 24 * points.len() as u32].into_iter().for_each(|n| cdr.word(n));
     let last = points.len() - 1;
@@ -137,7 +132,7 @@ fn one_lidar_without_anything_else() {
     .into_iter()
     .enumerate()
     {
-        let path = temp.write(&format!("{n}.mcap"), &file(&sweeps(4), options));
+        let path = temp.write(&format!("{n}.mcap"), file(&sweeps(4), options));
         let mut source = open(&path, &accept()).unwrap();
         assert_eq!(
             (source.len(), source.name(), source.is_located()),
@@ -169,8 +164,8 @@ fn two_lidars_in_one_vehicle_with_odometry_in_two_files() {
     let all = rig(6);
     let (first, second) = all.split_at(9);
     // The second by number, not by letters.
-    temp.write("drive_2.mcap", &file(first, options()));
-    temp.write("drive_10.mcap", &file(second, options()));
+    temp.write("drive_2.mcap", file(first, options()));
+    temp.write("drive_10.mcap", file(second, options()));
     let mut source = open(temp.path(), &accept()).unwrap();
     // Before the first pose there is none.
     assert_eq!(source.len(), 5, "{:?}", source.notes());
@@ -261,7 +256,7 @@ fn whatever_byte_is_wrong_nothing_panics() {
 fn messages_that_make_no_sense_are_skipped_or_named() {
     let temp = Temp::new();
     let open = |messages: &[Message]| {
-        let path = temp.write("some.mcap", &file(messages, options()));
+        let path = temp.write("some.mcap", file(messages, options()));
         open(&path, &accept())
     };
     let fails = |messages: &[Message]| open(messages).map(|_| ()).unwrap_err().to_string();
@@ -322,14 +317,14 @@ fn two_ways_to_say_where_the_vehicle_was_are_one_too_many() {
     let mut all = rig(4);
     let tf = |n: u64| ("/tf", TF, stamp(n), transform(stamp(n), ["map", "base_link"], 0.0, 0.0));
     all.extend((0..5).map(tf));
-    let path = temp.write("two.mcap", &file(&all, options()));
+    let path = temp.write("two.mcap", file(&all, options()));
     let source = open(&path, &accept()).unwrap();
     let notes = source.notes().join("\n");
     assert!(!source.is_located(), "{notes}");
     assert!(notes.contains("2 sources tell where `base_link` was"), "{notes}");
     // Without the odometry the transforms do.
     all.retain(|message| message.0 != "/odom");
-    let path = temp.write("one.mcap", &file(&all, options()));
+    let path = temp.write("one.mcap", file(&all, options()));
     assert!(open(&path, &accept()).unwrap().describe().contains("/tf (base_link in map)"));
 }
 

@@ -79,11 +79,10 @@ impl<'a> Wire<'a> {
 
     /// A header: time, ns, and name of the frame.
     pub fn header(&mut self) -> Result<(i64, &'a str), String> {
-        if self.ros1 {
-            self.word()?;
-        }
-        let [seconds, ns] = [self.word()?, self.word()?];
+        // ROS 1 counts headers.
+        let _ = self.ros1.then(|| self.word()).transpose()?;
         // ROS 2 counts seconds with a sign; none is before 1970.
+        let [seconds, ns] = [self.word()?, self.word()?];
         let frame = self.text()?;
         Ok((i64::from(seconds) * 1_000_000_000 + i64::from(ns), frame.trim_start_matches('/')))
     }
