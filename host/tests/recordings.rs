@@ -49,6 +49,8 @@ fn a_recording_is_cleaned() {
         assert_eq!(labels, there.len() / 16, "{n}");
         assert!(kept[0] > 100 && kept.iter().sum::<u64>() <= labels, "{n}: {kept:?} of {labels}");
     }
+    let onto_itself = ["clean", drive.to_str().unwrap(), "-o", drive.to_str().unwrap()];
+    raywake(&onto_itself).failed(2, &["--out is the recording"]);
     raywake(&["clean", drive.to_str().unwrap(), "-o", "x", "--voxel", "0"]).failed(2, &["--voxel"]);
 }
 

@@ -26,6 +26,7 @@ use crate::session::each_sweep;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
 use judged::{Judged, OneWay, judge};
+use raywake_io::Error;
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
 use still_map::StillMap;
@@ -40,6 +41,10 @@ const MOVING_MIN: f32 = 0.4;
 /// Reads a recording twice and writes it without what moves. Returns whether it got to the end.
 pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
+    if args.out.canonicalize().is_ok_and(|out| args.data.canonicalize().is_ok_and(|d| d == out)) {
+        let what = "--out is the recording: its own labels would be lost";
+        return Err(Error::Usage(what.into()).into());
+    }
     let profile = config::profile(&args.flow.profile)?;
     for folder in ["labels", "static", "moving"] {
         atomic::create_folder(&args.out.join(folder))?;

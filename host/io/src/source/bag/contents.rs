@@ -35,6 +35,8 @@ pub(super) struct CloudTopic {
     empty: u64,
     /// Messages that are not later than one before.
     late: u64,
+    /// Messages in another frame than the first.
+    foreign: u64,
 }
 
 /// Who says where a frame was: an odometry's topic, or that of transforms.
@@ -78,10 +80,11 @@ impl Contents {
         for (n, file) in files.iter_mut().enumerate() {
             contents.add(n, file)?;
         }
-        for (topic, CloudTopic { empty, late, .. }) in &contents.topics {
+        for (topic, CloudTopic { empty, late, foreign, .. }) in &contents.topics {
             let notes = [
                 (*empty, "messages without a point"),
                 (*late, "messages that are not later than those before them"),
+                (*foreign, "messages in another frame than the first"),
             ];
             let notes = notes.into_iter().filter(|(count, _)| *count > 0);
             contents.notes.extend(notes.map(|(n, what)| format!("{topic}: skipped {n} {what}")));
@@ -179,17 +182,20 @@ impl Contents {
             topic.empty += 1;
             return;
         }
-        // A driver without a clock leaves the stamp at zero.
-        let stamp_ns = if cloud.stamp_ns == 0 { message.log_time as i64 } else { cloud.stamp_ns };
-        if topic.clouds.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
-            topic.late += 1;
-            return;
+        // A driver without a clock leaves the stamp at zero. No date is too late for 63 bits.
+        let logged_ns = || i64::try_from(message.log_time).unwrap_or(i64::MAX);
+        let stamp_ns = if cloud.stamp_ns == 0 { logged_ns() } else { cloud.stamp_ns };
+        match topic.clouds.last() {
+            Some(last) if last.stamp_ns >= stamp_ns => topic.late += 1,
+            Some(_) if topic.frame != cloud.frame => topic.foreign += 1,
+            last => {
+                if last.is_none() {
+                    topic.frame = cloud.frame.to_owned();
+                    topic.encoding = channel.encoding.clone();
+                }
+                topic.clouds.push(CloudMessage { stamp_ns, ..at });
+            }
         }
-        if topic.clouds.is_empty() {
-            topic.frame = cloud.frame.to_owned();
-            topic.encoding = channel.encoding.clone();
-        }
-        topic.clouds.push(CloudMessage { stamp_ns, ..at });
     }
 
     fn pose(&mut self, topic: &str, transform: Transform) {

@@ -312,6 +312,9 @@ fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<Stri
     if asked.len() > SENSORS_MAX {
         return wrong(format!("{} topics, at most {SENSORS_MAX}", asked.len()));
     }
+    if let Some(twice) = (1..asked.len()).find(|&n| asked[..n].contains(&asked[n])) {
+        return wrong(format!("--topic {} is given twice", asked[twice]));
+    }
     if !asked.is_empty() {
         return Ok(asked.to_vec());
     }

@@ -188,6 +188,9 @@ fn two_lidars_in_one_vehicle_with_odometry_in_two_files() {
     assert_eq!((front.sensor, rear.sensor), (0, 1));
     assert!((front.position[0] - 6.0).abs() < 1e-6 && (rear.position[0] - 3.0).abs() < 1e-6);
     assert!((rear.offset_s - 0.12).abs() < 1e-6);
+    let twice = OpenOptions { topics: vec!["/rear".into(); 2], ..accept() };
+    let error = open(temp.path(), &twice).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("--topic /rear is given twice"), "{error}");
     let one = OpenOptions { topics: vec!["/rear".into()], ..accept() };
     let mut rear_only = open(temp.path(), &one).unwrap();
     rear_only.read(0, &mut sweep).unwrap();
@@ -268,14 +271,18 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
     all.push(("/points", CLOUD, stamp(3), none.message()));
     all.push(("/points", CLOUD, stamp(3), cloud(stamp(2), "lidar", 1.8)));
     all.push(("/points", CLOUD, stamp(4), cloud(stamp(0), "lidar", 1.8)));
+    all.push(("/points", CLOUD, stamp(5), cloud(stamp(5), "other", 1.8)));
     let source = open(&all).unwrap();
     let notes = source.notes().join("\n");
     assert_eq!(source.len(), 3);
     assert!(notes.contains("skipped 1 messages without a point"), "{notes}");
     assert!(notes.contains("skipped 2 messages that are not later"), "{notes}");
+    assert!(notes.contains("skipped 1 messages in another frame"), "{notes}");
     // A driver without a clock: when they were recorded.
     let at_zero = |n| ("/points", CLOUD, stamp(n), cloud(0, "lidar", 1.8));
     assert_eq!(open(&[at_zero(0), at_zero(1)]).unwrap().frame(1), stamp(1));
+    let never = ("/points", CLOUD, u64::MAX, cloud(0, "lidar", 1.8));
+    assert_eq!(open(&[at_zero(0), never]).unwrap().frame(1), i64::MAX as u64);
     // Two topics of one lidar.
     let mut twice = sweeps(2);
     twice.push(("/filtered", CLOUD, BEGIN_NS, cloud(BEGIN_NS, "lidar", 1.8)));
