@@ -15,6 +15,7 @@ use std::time::Duration;
 use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
+use crate::picture::PictureFiles;
 use raywake_io::Error;
 use raywake_io::source::{Format, OpenOptions, PosesFrame, Unlocated};
 
@@ -229,6 +230,8 @@ pub struct Results {
     #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
     #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
     pub png: Option<PictureFrame>,
+    #[command(flatten)]
+    pub views: Views,
     /// Also write an MCAP file for Foxglove, Rerun or rviz: points with velocity, and the poses
     #[arg(long, value_name = "FILE")]
     pub mcap: Option<PathBuf>,
@@ -243,10 +246,23 @@ pub struct Results {
     pub summary: Option<PathBuf>,
 }
 
+/// What there is to look at besides pictures of single sweeps.
+#[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+pub struct Views {
+    /// Also write a film at the recording's pace: an animated PNG, which browsers play
+    #[arg(long, value_name = "FILE")]
+    pub film: Option<PathBuf>,
+    /// Also write a page for the browser: a slider over the sweeps, charts, the busiest moments
+    #[arg(long, value_name = "FILE.html")]
+    pub page: Option<PathBuf>,
+}
+
 /// The velocities in a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PictureFrame {
     /// Over ground
+    #[default]
     World,
     /// Relative to the vehicle
     Ego,
@@ -272,6 +288,8 @@ pub struct MapArgs {
     /// Also draw each map from above: DIR/FRAME.png
     #[arg(long)]
     pub png: bool,
+    #[command(flatten)]
+    pub views: Views,
     #[command(flatten)]
     pub recording: Recording,
     #[command(flatten)]
@@ -313,6 +331,13 @@ pub struct BudgetArgs {
     /// Print PARAMETERS.md instead: every parameter with unit, range, default and rationale
     #[arg(long)]
     pub parameters: bool,
+}
+
+impl Views {
+    /// With a folder for single pictures, where there is one.
+    pub fn files(&self, folder: Option<PathBuf>) -> PictureFiles {
+        PictureFiles { folder, film: self.film.clone(), page: self.page.clone() }
+    }
 }
 
 impl Selection {

@@ -1,18 +1,20 @@
 //! `raywake demo`: a small simulated drive, and how far the flow is from its truth.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use raywake_core::output::PairFlows;
 use raywake_core::output::{ColumnFlow, Origin};
 use raywake_core::params::Profile;
 use raywake_sim::Truth;
 
-use crate::args::{DemoArgs, Learned, PictureFrame};
+use crate::args::{DemoArgs, Learned};
 use crate::console::say;
 use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::order_statistics::Spread;
-use crate::outputs::Kinds;
+use crate::outputs::{Kinds, RunFiles};
+use crate::picture::PictureFiles;
 use crate::summary::RunSummary;
 use crate::weight_files::WeightFiles;
 use raywake_io::source::SweepData;
@@ -32,14 +34,7 @@ pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
         weights: WeightFiles::read(&Learned::default(), &profile)?,
         backend: &args.backend,
         sweeps: 0..SWEEPS,
-        out: Some(args.out.clone()),
-        kinds: Kinds {
-            columns: cfg!(feature = "arrow"),
-            points: false,
-            png: cfg!(feature = "png").then_some(PictureFrame::World),
-            argoverse: false,
-        },
-        mcap: cfg!(feature = "mcap").then(|| args.out.join("demo.mcap")),
+        files: files(&args.out),
         summary: None,
         quiet: args.quiet,
         profile,
@@ -52,9 +47,20 @@ pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
         errors.add(&truth, pair.flows);
     })?;
     say(args.quiet, &errors.line())?;
-    let pictures = if cfg!(feature = "png") { "; pictures in png/" } else { "" };
-    say(args.quiet, &format!("results in {}{pictures}\n", args.out.display()))?;
+    let page = if cfg!(feature = "png") { "; open demo.html in a browser" } else { "" };
+    say(args.quiet, &format!("results in {}{page}\n", args.out.display()))?;
     Ok(summary)
+}
+
+/// All that this build can write.
+fn files(out: &Path) -> RunFiles {
+    let png = |name: &str| cfg!(feature = "png").then(|| out.join(name));
+    RunFiles {
+        root: Some(out.to_path_buf()),
+        kinds: Kinds { columns: cfg!(feature = "arrow"), ..Kinds::default() },
+        mcap: cfg!(feature = "mcap").then(|| out.join("demo.mcap")),
+        pictures: PictureFiles { folder: png("png"), film: None, page: png("demo.html") },
+    }
 }
 
 /// True velocities of moving objects by cell of the world.

@@ -19,7 +19,7 @@ use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::laps::{Laps, milliseconds};
 use crate::locate::Locator;
-use crate::outputs::{Kinds, Outputs};
+use crate::outputs::{Outputs, RunFiles};
 use crate::report;
 use crate::session::{Visit, each_sweep};
 use crate::statistics::Statistics;
@@ -38,13 +38,9 @@ pub struct RunPlan<'a> {
     pub backend: &'a BackendChoice,
     /// Sweeps of the source.
     pub sweeps: Range<usize>,
-    /// Folder for results.
-    pub out: Option<PathBuf>,
-    /// Which.
-    pub kinds: Kinds,
-    /// MCAP file of all sweeps.
-    pub mcap: Option<PathBuf>,
-    /// File for the figures; in `out` where none is named.
+    /// Where results go.
+    pub files: RunFiles,
+    /// File for the figures; in the folder of the results where none is named.
     pub summary: Option<PathBuf>,
     /// Errors only.
     pub quiet: bool,
@@ -75,9 +71,8 @@ pub fn execute<S: Source + ?Sized>(
     observe: Observer<S>,
 ) -> Result<RunSummary, RunError> {
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
-    let figures = FiguresFile::create(plan.summary.as_deref(), plan.out.as_deref())?;
-    let (out, mcap) = (plan.out.as_deref(), plan.mcap.as_deref());
-    let outputs = Outputs::create(out, mcap, plan.kinds, source.overview(), profile)?;
+    let figures = FiguresFile::create(plan.summary.as_deref(), plan.files.root.as_deref())?;
+    let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
     let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
@@ -91,7 +86,6 @@ pub fn execute<S: Source + ?Sized>(
     let end = each_sweep(source, plan.sweeps.clone(), plan.quiet, |source, visit| {
         run.sweep(source, visit, observe)
     })?;
-    run.outputs.finish()?;
     let backend = run.drive.backend();
     let census = backend.census().unwrap_or_default();
     let facts = Facts {
@@ -111,7 +105,9 @@ pub fn execute<S: Source + ?Sized>(
         validation_messages: plan.backend.validation.map(|_| backend.messages()),
     };
     let summary = RunSummary::new(facts, &run.statistics);
-    say(&report::text(&summary))?;
+    let text = report::text(&summary);
+    run.outputs.finish(&text)?;
+    say(&text)?;
     figures.write(&summary)?;
     Ok(summary)
 }
@@ -137,8 +133,8 @@ impl Running {
         let clock = Instant::now();
         let dt_s = stepped.output.flows.map(|f| f.dt_s);
         if let (Some(flows), Some(before)) = (&stepped.output.flows, before) {
-            self.outputs.pair(before, flows)?;
             let laps = &stepped.laps;
+            self.outputs.pair(before, flows, laps.stages().map(|(_, ms)| ms).sum())?;
             observe(source, &Pair { index: index - 1, first: before, second: now, flows, laps });
         }
         self.tracklets.clear();

@@ -8,7 +8,7 @@
 //! | `png/FRAME.png` | picture of a pair's first sweep |
 //! | `argoverse/LOG/TIMESTAMP.feather` | returns of a pair's first sweep, for graders |
 //!
-//! Beside them an MCAP file where one is named, see [`raywake_io::sink::bag`].
+//! Beside them a film, a page and an MCAP file, see [`raywake_io::sink::bag`], where they are named.
 //!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.
@@ -16,11 +16,11 @@
 use std::path::{Path, PathBuf};
 
 use raywake_core::output::PairFlows;
-use raywake_core::output::{PointFlow, TrackletState};
+use raywake_core::output::{PointFlow, Status, TrackletState};
 use raywake_core::params::Profile;
 
 use crate::args::{Export, PictureFrame, Results};
-use crate::picture::{Pictures, Subject};
+use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::{argoverse, atomic, feather};
@@ -33,10 +33,33 @@ pub struct Kinds {
     pub columns: bool,
     /// Feather files of returns.
     pub points: bool,
-    /// Pictures.
-    pub png: Option<PictureFrame>,
+    /// Velocities in pictures.
+    pub frame: PictureFrame,
     /// Submission files of Argoverse 2.
     pub argoverse: bool,
+}
+
+/// The files of a run.
+#[derive(Clone, Debug, Default)]
+pub struct RunFiles {
+    /// Folder of all that is a file each sweep.
+    pub root: Option<PathBuf>,
+    /// Which files are there.
+    pub kinds: Kinds,
+    /// Recording of all sweeps.
+    pub mcap: Option<PathBuf>,
+    /// Pictures, film and page.
+    pub pictures: PictureFiles,
+}
+
+impl RunFiles {
+    /// What the command line asks for.
+    pub fn of(results: &Results) -> RunFiles {
+        let root = results.out.clone();
+        let png = root.as_ref().filter(|_| results.png.is_some()).map(|root| root.join("png"));
+        let (mcap, kinds) = (results.mcap.clone(), Kinds::of(results));
+        RunFiles { root, kinds, mcap, pictures: results.views.files(png) }
+    }
 }
 
 /// Where files go.
@@ -45,17 +68,17 @@ pub struct Outputs {
     kinds: Kinds,
     log: String,
     profile: Profile,
-    pictures: Option<(Pictures, PictureFrame)>,
+    pictures: Pictures,
     bag: Option<BagSink>,
 }
 
 impl Kinds {
     /// What the command line asks for.
-    pub fn of(results: &Results) -> Kinds {
+    fn of(results: &Results) -> Kinds {
         Kinds {
             columns: true,
             points: !results.no_points,
-            png: results.png,
+            frame: results.png.unwrap_or_default(),
             argoverse: results.export == Some(Export::Argoverse),
         }
     }
@@ -75,31 +98,36 @@ impl Kinds {
 }
 
 impl Outputs {
-    /// Creates the folders for a recording under `root`, and its MCAP file; without either nothing
+    /// Creates folders and files for some sweeps of a recording; where nothing is named nothing
     /// will be written.
     pub fn create(
-        root: Option<&Path>,
-        mcap: Option<&Path>,
-        kinds: Kinds,
+        files: &RunFiles,
         recording: &Overview,
+        sweeps: usize,
         profile: &Profile,
     ) -> Result<Outputs, Error> {
-        let log = &recording.name;
-        root.map_or(Ok(()), |root| kinds.create_folders(root))?;
-        let pictures = match root.zip(kinds.png) {
-            Some((root, frame)) => Some((Pictures::folder(&root.join("png"), log)?, frame)),
-            None => None,
-        };
-        let (log, profile) = (log.to_string(), profile.clone());
-        let bag = mcap.map(|path| BagSink::create(path, recording.epoch_ns)).transpose()?;
-        Ok(Outputs { root: root.map(Path::to_path_buf), kinds, log, profile, pictures, bag })
+        let RunFiles { root, mcap, pictures, kinds } = files;
+        root.as_deref().map_or(Ok(()), |root| kinds.create_folders(root))?;
+        let bag = |path: &PathBuf| BagSink::create(path, recording.epoch_ns);
+        Ok(Outputs {
+            root: root.clone(),
+            kinds: *kinds,
+            log: recording.name.to_string(),
+            profile: profile.clone(),
+            pictures: Pictures::create(pictures, &recording.name, sweeps)?,
+            bag: mcap.as_ref().map(bag).transpose()?,
+        })
     }
 
-    /// Writes what a pair of sweeps yields for its first sweep.
-    pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
+    /// Writes what a pair of sweeps yields for its first sweep, found in so many milliseconds.
+    pub fn pair(&mut self, first: &SweepData, flows: &PairFlows, ms: f64) -> Result<(), Error> {
         if let Some(bag) = &mut self.bag {
             bag.pair(first, flows)?;
         }
+        let (columns, profile, frame) = (flows.columns, &self.profile, self.kinds.frame);
+        let moving = flows.points.iter().filter(|p| p.status == Status::Moving).count();
+        let figures = [("moving returns", moving as f64), ("ms a sweep", ms)];
+        self.pictures.write(first, &Subject::Flow { columns, profile, frame }, &figures)?;
         let Some(root) = &self.root else { return Ok(()) };
         let meta = meta(first, flows.dt_s);
         if self.kinds.columns {
@@ -110,10 +138,6 @@ impl Outputs {
             let path = named(root, "points", first);
             feather::write_points(&path, &first.points, &of_points, &meta)?;
         }
-        if let Some((pictures, frame)) = &mut self.pictures {
-            let (columns, profile, frame) = (flows.columns, &self.profile, *frame);
-            pictures.write(first, &Subject::Flow { columns, profile, frame })?;
-        }
         if self.kinds.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);
             let rows: Vec<PointFlow> = flows.points.iter().collect();
@@ -122,8 +146,9 @@ impl Outputs {
         Ok(())
     }
 
-    /// Completes the file that all sweeps go to.
-    pub fn finish(self) -> Result<(), Error> {
+    /// Completes the files that all sweeps go to; the page ends with this text.
+    pub fn finish(self, summary: &str) -> Result<(), Error> {
+        self.pictures.finish(summary)?;
         self.bag.map_or(Ok(()), BagSink::finish)
     }
 

@@ -4,7 +4,7 @@ use crate::args;
 use crate::config;
 use crate::engine::{self, RunPlan};
 use crate::error::RunError;
-use crate::outputs::Kinds;
+use crate::outputs::RunFiles;
 use crate::summary::RunSummary;
 use crate::weight_files::WeightFiles;
 use raywake_io::source;
@@ -21,9 +21,7 @@ pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
         profile,
         weights,
         backend: &args.flow.backend,
-        out: args.results.out.clone(),
-        kinds: Kinds::of(&args.results),
-        mcap: args.results.mcap.clone(),
+        files: RunFiles::of(&args.results),
         summary: args.results.summary.clone(),
         quiet: args.quiet,
     };

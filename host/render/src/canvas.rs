@@ -89,7 +89,7 @@ impl Canvas {
 
     /// The picture as a PNG file; it has no transparent pixels.
     pub fn png(&self) -> Vec<u8> {
-        let rgb: Vec<u8> = self.rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        let rgb = self.rgb();
         let mut file = Vec::new();
         let [width, height] = self.size();
         let mut encoder = png::Encoder::new(&mut file, width, height);
@@ -98,6 +98,11 @@ impl Canvas {
         let write = |mut encoder: png::Writer<_>| encoder.write_image_data(&rgb);
         encoder.write_header().and_then(write).expect("writing to memory does not fail");
         file
+    }
+
+    /// Rows from the top of red, green and blue.
+    pub(crate) fn rgb(&self) -> Vec<u8> {
+        self.rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
     /// A filled polygon.

@@ -1,4 +1,4 @@
-//! Bird's-eye pictures: returns, motion, objects, maps and a legend, drawn to PNG.
+//! Bird's-eye pictures: returns, motion, objects, maps and a legend, drawn to PNG, one or many.
 //!
 //! Plain data in, pixels out. All places are in metres in a frame of the caller's choice, x up and
 //! y to the left on the picture, so that a vehicle's frame (x forward, y left) is drawn with its
@@ -15,6 +15,7 @@
 
 pub mod canvas;
 pub mod colours;
+mod film;
 mod legend;
 mod page;
 mod panel;
@@ -26,6 +27,7 @@ mod tests;
 
 pub use canvas::{Canvas, Pen, PictureError};
 pub use colours::Colour;
+pub use film::Film;
 pub use page::birds_eye;
 pub use panel::WINDOW;
 pub use scene::{Arrow, Cell, LegendEntry, Look, Outline, Panel, Sign, Trail};

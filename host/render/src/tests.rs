@@ -2,8 +2,8 @@
 
 use crate::canvas::Canvas;
 use crate::{
-    Arrow, Cell, Colour, LegendEntry, Look, Outline, Panel, PictureError, Sign, Trail, birds_eye,
-    colours,
+    Arrow, Cell, Colour, Film, LegendEntry, Look, Outline, Panel, PictureError, Sign, Trail,
+    birds_eye, colours,
 };
 
 const RED: Colour = [200, 0, 0];
@@ -255,4 +255,31 @@ fn what_cannot_be_drawn_is_an_error() {
     assert_eq!(fails(Look { cell_m: -1.0, ..look() }), PictureError::Extent(-1.0));
     assert!(matches!(fails(Look { side: 1e6, ..look() }), PictureError::Size(_)));
     assert!(matches!(fails(Look { scale: 0.0, ..look() }), PictureError::Size(_)));
+}
+
+#[test]
+fn a_film_has_every_picture_for_its_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.png");
+    let out = std::io::BufWriter::new(std::fs::File::create(&path).unwrap());
+    let pictures = [1.0, 5.0, 9.0]
+        .map(|x| draw(Panel { cells: vec![cell([x, 0.0], [0.0, 3.0])], ..Panel::default() }));
+    let mut film = Film::new(out, pictures[0].size()).unwrap();
+    for (picture, shown_s) in pictures.iter().zip([0.1, 0.25, f64::NAN]) {
+        film.frame(picture, shown_s).unwrap();
+    }
+    let other = birds_eye(&[], &Look { side: 300.0, ..look() }).unwrap();
+    assert!(film.frame(&other, 0.1).unwrap_err().to_string().contains("in a film of 428 x"));
+    film.finish().unwrap();
+
+    let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    assert_eq!(reader.info().animation_control.unwrap().num_frames, 3);
+    for (picture, shown_ms) in pictures.iter().zip([100, 250, 20]) {
+        let mut found = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut found).unwrap();
+        assert!(found == picture.rgb());
+        let control = reader.info().frame_control.unwrap();
+        assert_eq!((control.delay_num, control.delay_den), (shown_ms, 1000));
+    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{FlowChoice, Recording, Selection};
+use super::{FlowChoice, Recording, Selection, Views};
 
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
@@ -48,6 +48,8 @@ pub struct TrackArgs {
     /// Also draw the tracks of each sweep from above: DIR/png/FRAME.png
     #[arg(long, requires = "out", help_heading = "Results")]
     pub png: bool,
+    #[command(flatten)]
+    pub views: Views,
     /// Write run statistics as JSON [default with --out: DIR/summary.json]
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub summary: Option<PathBuf>,

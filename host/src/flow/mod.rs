@@ -21,7 +21,7 @@ use crate::config;
 use crate::console::{note, say};
 use crate::error::RunError;
 use crate::laps::Laps;
-use crate::picture::{Pictures, Subject};
+use crate::picture::{self, Subject};
 use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
@@ -40,8 +40,7 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let say = |text: &str| say(args.quiet, text);
     let beside = |file: &Option<PathBuf>| file.clone().unwrap_or(args.out.with_extension("png"));
-    let mut png =
-        args.png.as_ref().map(|file| Pictures::file(&beside(file), &title(args))).transpose()?;
+    let png = args.png.as_ref().map(beside);
     let mut laps = Laps::start();
 
     let dt_s = args.dt.as_secs_f64();
@@ -60,7 +59,8 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     say(&text)?;
     laps.lap("registration");
 
-    let (flows, dropped) = points(args, &profile, &weights, &rig, [&first, &second], &mut png)?;
+    let (flows, dropped) =
+        points(args, &profile, &weights, &rig, [&first, &second], png.as_deref())?;
     let second_from_first = motion.inverse();
     let rows: Vec<PointRow> = first
         .points
@@ -143,7 +143,7 @@ fn points(
     weights: &WeightFiles,
     rig: &Rig,
     [first, second]: [&SweepData; 2],
-    png: &mut Option<Pictures>,
+    png: Option<&Path>,
 ) -> Result<(Vec<PointFlow>, Dropped), RunError> {
     let chosen = choose::drive(&args.flow.backend, weights, profile, rig)?;
     note(args.quiet, &chosen.note)?;
@@ -158,9 +158,9 @@ fn points(
             in_words(reset).1
         ))));
     }
-    if let Some((pictures, flows)) = png.as_mut().zip(stepped.output.flows.as_ref()) {
+    if let Some((png, flows)) = png.zip(stepped.output.flows.as_ref()) {
         let (columns, frame) = (flows.columns, PictureFrame::World);
-        pictures.write(first, &Subject::Flow { columns, profile, frame })?;
+        picture::write_one(png, first, &Subject::Flow { columns, profile, frame }, &title(args))?;
     }
     let flows = stepped.output.flows.map_or_else(Vec::new, |f| f.points.iter().collect());
     Ok((flows, Dropped { returns, ..Dropped::default() }))

@@ -12,7 +12,7 @@ use crate::console::{bytes, note, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
-use crate::picture::{Pictures, Subject};
+use crate::picture::{Pictures, Subject, SweepFigures};
 use crate::session::each_sweep;
 use crate::statistics::Dropped;
 use raywake_io::sink::atomic;
@@ -37,19 +37,19 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     say(args.quiet, &format!("{}; memory budget: at most {budget} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
-    let mut pictures = args.png.then(|| Pictures::folder(&args.out, source.name())).transpose()?;
+    let files = args.views.files(args.png.then(|| args.out.clone()));
+    let mut pictures = Pictures::create(&files, source.name(), sweeps.len())?;
     let mut tally = MapTally::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         let (voxels, origin_m) = tally.sweep(&mut mapper, &profile, visit.now)?;
         let path = args.out.join(format!("{:010}.feather", visit.now.frame));
-        if let Some(pictures) = &mut pictures {
-            let (voxels, voxel_m) = (&voxels, profile.voxel_m);
-            pictures.write(visit.now, &Subject::Map { voxels, origin_m, voxel_m })?;
-        }
+        let subject = Subject::Map { voxels: &voxels, origin_m, voxel_m: profile.voxel_m };
+        pictures.write(visit.now, &subject, &tally.last(&voxels))?;
         let meta =
             [("frame", visit.now.frame.to_string()), ("stamp_s", visit.now.stamp_s.to_string())];
         Ok(feather::write_map(&path, &voxels, origin_m, profile.voxel_m, &meta)?)
     })?;
+    pictures.finish(&tally.text())?;
     if !end.interrupted {
         say(args.quiet, &tally.text())?;
     }
@@ -88,6 +88,12 @@ impl MapTally {
         let half = 0.5 * profile.voxel_m;
         let origin_m = mapped.window.lattice_origin.to_array().map(|c| c - half);
         Ok((found.iter().map(voxel).collect(), origin_m))
+    }
+
+    /// Of the sweep mapped last.
+    fn last(&self, voxels: &[Voxel]) -> SweepFigures {
+        let ms = self.milliseconds.last().copied().unwrap_or_default();
+        [("voxels", voxels.len() as f64), ("ms a sweep", ms)]
     }
 
     fn text(&self) -> String {

@@ -7,6 +7,8 @@ use raywake_render::{Arrow, LegendEntry, Look, Sign, colours};
 
 /// Width and height of a picture's panel, pixels.
 const SIDE: f32 = 900.0;
+/// The same of a film and of a page: 110 kB a sweep of 120,000 returns instead of 200.
+pub(super) const FILM_SIDE: f32 = 600.0;
 /// Height above the ground of the darkest returns, m.
 const HEIGHT_M: f32 = 2.5;
 /// An arrow is as long as the way in this time, s.

@@ -9,8 +9,8 @@ use raywake_io::sink::feather::Voxel;
 use raywake_io::source::SweepData;
 use raywake_render::{Canvas, colours};
 
-use super::Subject;
 use super::flow::BEYOND;
+use super::{PictureFiles, Pictures, Subject};
 use crate::args::PictureFrame;
 
 fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
@@ -21,7 +21,7 @@ fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
         ..SweepData::default()
     };
     let subject = Subject::Flow { columns, profile: &Profile::hdl64(), frame };
-    super::draw(&sweep, &subject, "drive", String::new()).unwrap()
+    super::pictures::draw(&sweep, &subject)
 }
 
 /// Middle of the strong colours of the panel, m forward and left, and how many pixels have such.
@@ -102,7 +102,7 @@ fn a_map_shows_what_stands_and_what_is_free() {
         world_from_vehicle: Pose::planar(100.0, 50.0, 0.0, 0.0),
         ..SweepData::default()
     };
-    let picture = super::draw(&sweep, &subject, "drive", String::new()).unwrap();
+    let picture = super::pictures::draw(&sweep, &subject);
     let width = picture.size()[0] as usize;
     // 4.5 pixels per metre, the vehicle in the middle of the panel.
     let at = |x_m: f64, y_m: f64| {
@@ -113,4 +113,53 @@ fn a_map_shows_what_stands_and_what_is_free() {
     assert_eq!(at(10.0, 0.2), colours::FREE);
     assert_eq!(at(10.0, 8.0), colours::GROUND);
     assert!(at(20.2, 2.2)[1] < 200, "{:?}", at(20.2, 2.2));
+}
+
+/// Texts of a page between these.
+fn between<'a>(page: &'a str, from: &str, to: &str) -> Vec<&'a str> {
+    let parts = page.split(from).skip(1);
+    parts.map(|part| part.split_once(to).unwrap().0).collect()
+}
+
+#[test]
+fn a_page_holds_every_sweep_and_pictures_of_some() {
+    let folder = tempfile::tempdir().unwrap();
+    let [page, film, none] = ["p.html", "f.png", "n.html"].map(|name| folder.path().join(name));
+    let files = |page, film| PictureFiles { folder: None, page: Some(page), film };
+    // Of 700 sweeps every third has a picture; the recording ends early.
+    let asked = files(page.clone(), Some(film.clone()));
+    let mut pictures = Pictures::create(&asked, "a <b> & c", 700).unwrap();
+    for n in 0..5 {
+        let sweep = SweepData {
+            frame: u64::MAX - n,
+            stamp_s: 7.0 + 0.1 * n as f64,
+            ..SweepData::default()
+        };
+        let profile = Profile::hdl64();
+        let (columns, frame) = (&[COLUMN][..], PictureFrame::World);
+        let subject = Subject::Flow { columns, profile: &profile, frame };
+        pictures.write(&sweep, &subject, &[("moving", n as f64), ("ms", f64::NAN)]).unwrap();
+    }
+    assert!(!page.exists() && !film.exists());
+    pictures.finish("all & done").unwrap();
+    assert!(film.exists());
+
+    let text = std::fs::read_to_string(&page).unwrap();
+    let moments = between(&text, "<script>add(", ")</script>");
+    let moments: Vec<serde_json::Value> =
+        moments.iter().map(|m| serde_json::from_str(m).unwrap()).collect();
+    assert_eq!(moments.len(), 5);
+    assert_eq!(moments[1]["frame"], (u64::MAX - 1).to_string());
+    assert!((moments[4]["time_s"].as_f64().unwrap() - 0.4).abs() < 1e-9);
+    assert_eq!(moments[4]["figures"], serde_json::json!([4.0, null]));
+    let shown: Vec<bool> = moments.iter().map(|m| m.get("picture").is_some()).collect();
+    assert_eq!(shown, [true, false, false, true, false]);
+    assert!(moments[0]["picture"].as_str().unwrap().starts_with("iVBORw0KGgo"), "a PNG file");
+    assert_eq!(between(&text, "<h1>", "</h1>"), ["a &lt;b&gt; &amp; c"]);
+    assert_eq!(between(&text, "<pre>", "</pre>"), ["all &amp; done"]);
+    assert_eq!(between(&text, "names = ", ";"), ["[\"moving\",\"ms\"]"]);
+
+    // Of nothing there is no page.
+    Pictures::create(&files(none.clone(), None), "", 0).unwrap().finish("").unwrap();
+    assert!(!none.exists());
 }

@@ -21,6 +21,7 @@ use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_io::source::{self, SweepData};
 use raywake_objects::estimate::FixedLag;
+use raywake_objects::front_end::Life;
 
 pub use ground::Ground;
 pub use report::TrackSummary;
@@ -36,7 +37,8 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
     let folder = args.out.as_ref().filter(|_| args.png).map(|out| out.join("png"));
-    let mut pictures = folder.map(|f| Pictures::folder(&f, source.name())).transpose()?;
+    let pictures = args.views.files(folder);
+    let mut pictures = Pictures::create(&pictures, source.name(), sweeps.len())?;
     let mut files = write::Files::create(args.out.as_deref())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes())?;
@@ -54,7 +56,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
             report.step(&counts, clock);
             // Flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
-            draw(&mut pictures, stepped, &tracker)?;
+            draw(&mut pictures, stepped, &tracker, &report)?;
             tracker.ended(|ended| report.track(ended, &mut files))?;
         }
         Ok(())
@@ -62,27 +64,28 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let clock = Instant::now();
     if let Some(counts) = tracker.last(&end.last)? {
         report.step(&counts, clock);
-        draw(&mut pictures, &end.last, &tracker)?;
+        draw(&mut pictures, &end.last, &tracker, &report)?;
         tracker.ended(|ended| report.track(ended, &mut files))?;
     }
     report.counts.ended += tracker.finish()?;
     tracker.ended(|ended| report.track(ended, &mut files))?;
     files.finish()?;
     let summary = report.summary(source.name(), args.front_end, end.interrupted);
+    pictures.finish(&summary.text())?;
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
     Ok(!end.interrupted)
 }
 
 fn draw(
-    pictures: &mut Option<Pictures>,
+    pictures: &mut Pictures,
     sweep: &SweepData,
     tracker: &Tracker,
+    report: &report::Report,
 ) -> Result<(), raywake_io::Error> {
-    match pictures {
-        Some(pictures) => pictures.write(sweep, &Subject::Tracks(tracker.tracks())),
-        None => Ok(()),
-    }
+    let live = tracker.tracks().iter().filter(|t| t.life == Life::Live).count();
+    let figures = [("tracks", live as f64), ("ms a sweep", report.last_ms())];
+    pictures.write(sweep, &Subject::Tracks(tracker.tracks()), &figures)
 }
 
 /// The flow, for the front end that takes it.

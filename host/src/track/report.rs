@@ -62,6 +62,11 @@ impl Report {
         self.dropped.returns += counts.dropped;
     }
 
+    /// Time of the last step, ms.
+    pub fn last_ms(&self) -> f64 {
+        self.steps.last().copied().unwrap_or_default()
+    }
+
     /// A sweep as it was read.
     pub fn read(&mut self, sweep: &SweepData) {
         self.dropped.null_rows += u64::from(sweep.dropped.null_rows);

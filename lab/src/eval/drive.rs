@@ -14,7 +14,7 @@ use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
 use raywake::engine::{self, RunPlan};
 use raywake::error::RunError;
-use raywake::outputs::Kinds;
+use raywake::outputs::RunFiles;
 use raywake::weight_files::WeightFiles;
 use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
@@ -64,9 +64,7 @@ impl Settings {
             weights,
             backend: &self.backend,
             sweeps: 0..sweeps,
-            out: None,
-            kinds: Kinds::default(),
-            mcap: None,
+            files: RunFiles::default(),
             summary: None,
             quiet: true,
         }

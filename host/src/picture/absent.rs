@@ -1,0 +1,37 @@
+//! In the place of pictures, in a build without them.
+
+use std::path::Path;
+
+use raywake_io::Error;
+use raywake_io::source::SweepData;
+
+use super::{PictureFiles, Subject, SweepFigures};
+
+/// No pictures.
+pub struct Pictures;
+
+impl Pictures {
+    /// Fails where one is asked for.
+    pub fn create(files: &PictureFiles, _: &str, _: usize) -> Result<Pictures, Error> {
+        if files.is_empty() { Ok(Pictures) } else { Err(lacking()) }
+    }
+
+    /// Draws nothing.
+    pub fn write(&mut self, _: &SweepData, _: &Subject, _: &SweepFigures) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Nothing is left to do.
+    pub fn finish(self, _: &str) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+/// Fails.
+pub fn write_one(_: &Path, _: &SweepData, _: &Subject, _: &str) -> Result<(), Error> {
+    Err(lacking())
+}
+
+fn lacking() -> Error {
+    Error::Unsupported("pictures need the feature `png`, which is not compiled in".into())
+}
