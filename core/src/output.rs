@@ -6,6 +6,7 @@
 
 use crate::continuity::Reset;
 use crate::dropped::DroppedReturns;
+use crate::encoder::ColumnClass;
 use crate::refinement::cues::Cues;
 use crate::thinning::Thinning;
 use crate::tracklet::TrackletTurnover;
@@ -136,6 +137,8 @@ pub struct ColumnFlow {
     pub probability: f32,
     /// What that was told by; zeros where nothing was found to move.
     pub cues: Cues,
+    /// What the encoder takes it for; none where there is no encoder.
+    pub class: Option<ColumnClass>,
 }
 
 /// What became of a return.
@@ -207,6 +210,9 @@ pub struct PointFlow {
     pub status: Status,
     /// P(moves), that of its column.
     pub probability: f32,
+    /// What the encoder takes its column for; none where that is not solid, outside the window and
+    /// without an encoder.
+    pub class: Option<ColumnClass>,
 }
 
 impl PointFlow {
@@ -219,6 +225,7 @@ impl PointFlow {
         origin: Origin::Background,
         status: Status::OverCapacity,
         probability: 0.0,
+        class: None,
     };
 }
 

@@ -97,6 +97,7 @@ impl Pipeline {
                 tracklets: &self.tracklets,
                 refinement: &self.refinement,
                 returns: &self.returns,
+                scores: self.encoder.scores(),
             };
             flows = Some(found.put_out(team, before, turnover, &mut self.flow_of_column, out));
             timer.lap("out");

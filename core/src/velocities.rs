@@ -1,6 +1,7 @@
 //! Out: a velocity for every column and every return (section 3.7).
 
 use crate::dropped::ReturnKind;
+use crate::encoder::{ColumnClass, ColumnScores, class_of};
 use crate::frame::{SweepPair, centre_of};
 use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow, PointFlows, Status};
 use crate::params::COLUMNS_MAX;
@@ -35,6 +36,8 @@ pub(crate) struct Found<'a> {
     pub tracklets: &'a Tracklets,
     pub refinement: &'a Refinement,
     pub returns: &'a Returns,
+    /// Of the columns of the first sweep's window; none without an encoder.
+    pub scores: &'a [ColumnScores],
 }
 
 impl Found<'_> {
@@ -121,8 +124,18 @@ impl Found<'_> {
             cell: [corner[0] + i, corner[1] + j],
             position_world_m: [world.x, world.y],
             position_vehicle_m: [at.x as f32, at.y as f32],
+            class: self.class_at(i, j),
             ..Default::default()
         }
+    }
+
+    /// What a column is taken for that both windows have.
+    fn class_at(&self, i: i32, j: i32) -> Option<ColumnClass> {
+        let [i, j] = [i + self.sweep.shift_x, j + self.sweep.shift_y];
+        let side = self.sweep.side;
+        let inside = (0..side).contains(&i) && (0..side).contains(&j);
+        let scores = self.scores.get((i * side + j) as usize).filter(|_| inside)?;
+        Some(class_of(scores))
     }
 
     /// The match of a column that is `rank`-th of the foreground; whether it has one.
@@ -177,6 +190,7 @@ impl Found<'_> {
             out.age = flow.age;
             out.origin = flow.origin;
             out.probability = flow.probability;
+            out.class = flow.class;
         } else if self.pair.profile.refinement_sweeps > 0 && !is_apart && column != NONE {
             // Its column is not solid, but part of a cluster.
             if let Some(found) = self.refinement.at(column) {

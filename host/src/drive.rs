@@ -89,6 +89,11 @@ impl Drive {
         })
     }
 
+    /// Whether columns and returns come with a class.
+    pub fn tells_classes(&self) -> bool {
+        self.parts.pipeline.encoder.is_on()
+    }
+
     /// Tracklets after the last step.
     pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
         self.parts.pipeline.tracklets(&self.parts.setup.profile)

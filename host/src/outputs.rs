@@ -23,6 +23,7 @@ use crate::args::{Export, PictureFrame, Results};
 use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::objects::Content;
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::{Overview, SweepData};
 
@@ -108,7 +109,7 @@ impl Outputs {
     ) -> Result<Outputs, Error> {
         let RunFiles { root, mcap, pictures, kinds } = files;
         root.as_deref().map_or(Ok(()), |root| kinds.create_folders(root))?;
-        let bag = |path: &PathBuf| BagSink::create(path, recording.epoch_ns);
+        let bag = |path: &PathBuf| BagSink::create(path, recording.epoch_ns, Content::Flow);
         Ok(Outputs {
             root: root.clone(),
             kinds: *kinds,

@@ -10,6 +10,7 @@ const IN_LOG: Duration = Duration::from_secs(5);
 
 /// A line that is kept up to date on a terminal, and repeated now and then in a log.
 pub struct Progress {
+    what: &'static str,
     total: usize,
     started: Instant,
     shown: Option<Instant>,
@@ -18,13 +19,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Starts the clock of a run over `total` sweeps.
-    pub fn new(total: usize, quiet: bool) -> Progress {
+    /// Starts the clock of a run over `total` sweeps, or whatever `what` is one of.
+    pub fn new(what: &'static str, total: usize, quiet: bool) -> Progress {
         let started = Instant::now();
-        Progress { total, started, shown: None, terminal: stderr().is_terminal(), quiet }
+        Progress { what, total, started, shown: None, terminal: stderr().is_terminal(), quiet }
     }
 
-    /// `done` sweeps are done. Shown if the last update is old enough, or it is the last sweep.
+    /// So many are done. Shown if the last update is old enough, or it is the last one.
     pub fn update(&mut self, done: usize) {
         let now = Instant::now();
         let pause = if self.terminal { ON_TERMINAL } else { IN_LOG };
@@ -33,7 +34,7 @@ impl Progress {
             return;
         }
         self.shown = Some(now);
-        let text = line(done, self.total, (now - self.started).as_secs_f64());
+        let text = line(self.what, done, self.total, (now - self.started).as_secs_f64());
         // Nobody is told less of a run because its progress cannot be shown.
         let _ = match self.terminal {
             true => write!(stderr(), "\r{text}\x1b[K"),
@@ -51,7 +52,7 @@ impl Progress {
 }
 
 /// `sweep 12/154, 24.8 sweeps/s, 6 s left`.
-fn line(done: usize, total: usize, elapsed_s: f64) -> String {
+fn line(what: &str, done: usize, total: usize, elapsed_s: f64) -> String {
     let rate = done as f64 / elapsed_s.max(1e-3);
     let left_s = (total - done.min(total)) as f64 / rate.max(1e-9);
     let left = match left_s.round() as u64 {
@@ -59,7 +60,7 @@ fn line(done: usize, total: usize, elapsed_s: f64) -> String {
         s @ 100..6000 => format!("{} min", s.div_ceil(60)),
         s => format!("{} h", s.div_ceil(3600)),
     };
-    format!("sweep {done}/{total}, {rate:.1} sweeps/s, {left} left")
+    format!("{what} {done}/{total}, {rate:.1} {what}s/s, {left} left")
 }
 
 #[cfg(test)]
@@ -68,8 +69,8 @@ mod tests {
 
     #[test]
     fn lines() {
-        assert_eq!(line(10, 20, 2.0), "sweep 10/20, 5.0 sweeps/s, 2 s left");
-        assert_eq!(line(1, 1000, 1.0), "sweep 1/1000, 1.0 sweeps/s, 17 min left");
-        assert_eq!(line(20, 20, 0.0), "sweep 20/20, 20000.0 sweeps/s, 0 s left");
+        assert_eq!(line("sweep", 10, 20, 2.0), "sweep 10/20, 5.0 sweeps/s, 2 s left");
+        assert_eq!(line("track", 1, 1000, 1.0), "track 1/1000, 1.0 tracks/s, 17 min left");
+        assert_eq!(line("sweep", 20, 20, 0.0), "sweep 20/20, 20000.0 sweeps/s, 0 s left");
     }
 }

@@ -45,7 +45,7 @@ pub fn each_sweep<S: Source + ?Sized>(
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
     let mut locator = Locator::of(source);
-    let mut progress = Progress::new(sweeps.len(), quiet);
+    let mut progress = Progress::new("sweep", sweeps.len(), quiet);
     let mut stopped = false;
     for (done, index) in sweeps.enumerate() {
         stopped = interrupted();

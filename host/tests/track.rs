@@ -51,8 +51,9 @@ fn figures_and_files() {
     drive(&t);
     for kind in ["variance", "flow"] {
         let out = t.path().join(kind);
+        let bag = t.path().join("objects.mcap");
         let more = ["--front-end", kind, "--fixed-lag", "--out", out.to_str().unwrap()];
-        let o = track(&t, &more);
+        let o = track(&t, &[&more[..], &["--mcap", bag.to_str().unwrap()]].concat());
         o.succeeded();
         for text in ["memory budget", "updates", "dropped", "digest"] {
             assert!(o.stdout.contains(text), "{text} in {}", o.stdout);
@@ -66,10 +67,25 @@ fn figures_and_files() {
         for line in seen_throughout() {
             let speed = line["speed_mps"].as_f64().unwrap().abs();
             assert!((speed - 8.0).abs() < 0.5 || speed < 0.2, "{line}");
+            let size = [0, 1].map(|a| line["size_m"][a].as_f64().unwrap());
+            assert!((size[0] - 4.0).abs() < 0.3 && (size[1] - 1.8).abs() < 0.3, "{line}");
+            let told = line["p_moves"].as_f64();
+            assert_eq!(told.map(|p| p > 0.5), (kind == "flow").then_some(speed > 1.0), "{line}");
+            assert_eq!(line["class"], serde_json::Value::Null);
             let cloud = format!("clouds/{:05}.ply", line["track"].as_u64().unwrap());
             assert!(fs::read(out.join(cloud)).unwrap().starts_with(b"ply\n"));
         }
         assert!(out.join("tracks.feather").is_file());
+        assert_eq!(fs::read_dir(out.join("returns")).unwrap().count(), 20);
+        // What was written is a recording, too.
+        let o = raywake(&[
+            "odometry",
+            bag.to_str().unwrap(),
+            "--out",
+            out.join("p.txt").to_str().unwrap(),
+        ]);
+        o.succeeded();
+        assert!(o.stdout.contains("20 sweeps"), "{}", o.stdout);
 
         let again = t.path().join("again.json");
         let more = ["--front-end", kind, "--fixed-lag", "--quiet"];

@@ -12,6 +12,7 @@ pub mod centroid_ekf;
 pub mod estimate;
 pub mod front_end;
 pub mod noise;
+pub mod object_box;
 pub mod panorama;
 pub mod params;
 #[cfg(test)]
@@ -61,6 +62,14 @@ impl ObjectState {
         let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - self.position[a]);
         let (sin, cos) = libm::sincos(self.heading);
         [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
+    }
+
+    /// A place in the frame of the object, m from the track's anchor.
+    pub fn placed(&self, at: [f32; 3]) -> [f64; 3] {
+        let [x, y, z] = at.map(f64::from);
+        let (sin, cos) = libm::sincos(self.heading);
+        let [px, py, pz] = self.position;
+        [px + cos * x - sin * y, py + sin * x + cos * y, pz + z]
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::estimate::EstimateParams;
 use crate::front_end::FrontEndParams;
+use crate::object_box::BoxParams;
 use raywake_core::params::{Parameters, ProfileError};
 
 /// What tracking can be set to.
@@ -11,16 +12,21 @@ pub struct TrackingParams {
     pub front_end: FrontEndParams,
     /// From tracks to trajectories and shapes.
     pub estimate: EstimateParams,
+    /// From shapes to boxes.
+    pub boxes: BoxParams,
 }
 
 impl TrackingParams {
     /// The defaults.
-    pub const DEFAULT: TrackingParams =
-        TrackingParams { front_end: FrontEndParams::DEFAULT, estimate: EstimateParams::DEFAULT };
+    pub const DEFAULT: TrackingParams = TrackingParams {
+        front_end: FrontEndParams::DEFAULT,
+        estimate: EstimateParams::DEFAULT,
+        boxes: BoxParams::DEFAULT,
+    };
 
     /// Visits every group of parameters, with its name.
     pub fn each(&mut self, visit: &mut dyn FnMut(&'static str, &mut dyn Parameters)) {
-        let TrackingParams { front_end, estimate } = self;
+        let TrackingParams { front_end, estimate, boxes } = self;
         visit("front_end", front_end);
         visit("passing", &mut front_end.passing);
         visit("filter", &mut front_end.centroid);
@@ -33,6 +39,7 @@ impl TrackingParams {
         visit("smoothing", &mut estimate.smoothing);
         visit("search", &mut estimate.search);
         visit("fixed_lag", &mut estimate.fixed_lag);
+        visit("boxes", boxes);
     }
 
     /// Whether every parameter lies within its bounds.

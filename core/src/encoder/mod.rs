@@ -58,6 +58,25 @@ impl ColumnClass {
         ColumnClass::Person,
         ColumnClass::TwoWheeler,
     ];
+
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ColumnClass::Ground => "ground",
+            ColumnClass::Structure => "structure",
+            ColumnClass::Vegetation => "vegetation",
+            ColumnClass::Pole => "pole",
+            ColumnClass::Car => "car",
+            ColumnClass::LargeVehicle => "large vehicle",
+            ColumnClass::Person => "person",
+            ColumnClass::TwoWheeler => "two-wheeler",
+        }
+    }
+
+    /// Whether it takes part in traffic.
+    pub const fn could_move(self) -> bool {
+        self as u8 >= ColumnClass::Car as u8
+    }
 }
 
 /// Scores of a column in units of 1/16 nat, -127 to 127: those of [`ColumnClass::ALL`], then that
@@ -136,6 +155,11 @@ impl Encoder {
         self.clear();
         self.is_on = weights.is_some();
         self.weights = weights.cloned().unwrap_or_default();
+    }
+
+    /// Whether it has weights.
+    pub fn is_on(&self) -> bool {
+        self.is_on
     }
 
     /// Keeps the columns of a square window, whose first is the world's column `corner`.

@@ -19,7 +19,13 @@ Files of --out DIR:
                      heading_rad (unwrapped), speed_mps, climb_mps, turn_rate_radps three times:
                      by the estimate at the end of the track, by the EKF (ekf_), and by the
                      fixed-lag estimate (lag_; NaN without --fixed-lag), which refers to
-                     lag_time_s, the end of the sweep
+                     lag_time_s, the end of the sweep; the covariance of the EKF's position
+                     (cov_xx cov_xy cov_yy cov_zz, m²) and the variance of its speed (cov_speed);
+                     the box around what was seen of it: box_x_m box_y_m box_z_m (its middle in
+                     the world), box_heading_rad (what stands: either end may be the front),
+                     length_m, width_m, height_m; p_moves (mean of its returns; NaN where not
+                     known); class (names in the metadata; 255: not known)
+    returns/FRAME.feather  track of every return of a sweep, in its order; -1 without one
     clouds/ID.ply    returns of a track in the object's frame: x y z (m), time (s since the start
                      of the track)
     summary.json     statistics of the run";
@@ -33,7 +39,7 @@ pub struct TrackArgs {
     #[arg(short, long)]
     pub quiet: bool,
     /// Detection and association method
-    #[arg(long, value_enum, value_name = "KIND", default_value = "variance")]
+    #[arg(long, value_enum, value_name = "KIND", default_value = "flow")]
     pub front_end: FrontEndKind,
     /// Ground heights in the frame of the poses, an ESRI ASCII grid; where it has no data they are
     /// estimated from the returns
@@ -50,6 +56,12 @@ pub struct TrackArgs {
     pub png: bool,
     #[command(flatten)]
     pub views: Views,
+    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with their track, boxes, poses
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
+    /// Show all tracks, those of what stands and is no vehicle, person or two-wheeler, too
+    #[arg(long)]
+    pub all: bool,
     /// Write run statistics as JSON [default with --out: DIR/summary.json]
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub summary: Option<PathBuf>,
@@ -65,7 +77,9 @@ pub struct TrackArgs {
 pub enum FrontEndKind {
     /// Height variance in cells of a ground grid; association by position
     Variance,
-    /// Scene flow as well: moving points are objects; association by position and velocity
+    /// Scene flow as well: moving points are objects; association by position and velocity. What
+    /// stands and is no vehicle, person or two-wheeler is left out, as is all outside the window
+    /// of the profile (±25 m; `far`: ±50 m)
     Flow,
 }
 

@@ -125,7 +125,7 @@ impl Cleaning<'_> {
         let backend = &self.args.flow.backend;
         let mut drive = choose::drive(backend, &self.weights, &self.profile, &turned.rig())?.drive;
         say(self.args.quiet, "backwards\n")?;
-        let mut progress = Progress::new(sweeps.len(), self.args.quiet);
+        let mut progress = Progress::new("sweep", sweeps.len(), self.args.quiet);
         let (mut now, mut later) = (SweepData::default(), SweepData::default());
         for (done, index) in sweeps.clone().rev().enumerate() {
             if interrupted() {

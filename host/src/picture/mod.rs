@@ -21,9 +21,9 @@ use std::path::PathBuf;
 use raywake_core::output::ColumnFlow;
 use raywake_core::params::Profile;
 use raywake_io::sink::feather::Voxel;
-use raywake_objects::front_end::Track;
 
 use crate::args::PictureFrame;
+use crate::track::LiveObject;
 
 pub use pictures::{Pictures, write_one};
 
@@ -47,8 +47,8 @@ pub enum Subject<'a> {
         /// Edge of a voxel, m.
         voxel_m: f64,
     },
-    /// The tracks after the sweep; those that are not live are left out.
-    Tracks(&'a [Track]),
+    /// The objects in the sweep.
+    Objects(&'a [LiveObject]),
 }
 
 /// Where the pictures of a recording go.

@@ -111,7 +111,7 @@ fn view(sweep: &SweepData, subject: &Subject) -> (Panel, Look) {
         Subject::Map { voxels, origin_m, voxel_m } => {
             map::view(&sweep.world_from_vehicle, voxels, *origin_m, *voxel_m)
         }
-        Subject::Tracks(tracks) => tracks::view(sweep, tracks),
+        Subject::Objects(objects) => tracks::view(sweep, objects),
     }
 }
 

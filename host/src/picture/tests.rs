@@ -56,6 +56,7 @@ const COLUMN: ColumnFlow = ColumnFlow {
     origin: Origin::Matched,
     probability: 1.0,
     cues: Cues::NONE,
+    class: None,
 };
 
 #[test]

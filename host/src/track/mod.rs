@@ -1,6 +1,7 @@
 //! `raywake track`: objects of a recorded drive.
 
 mod ground;
+mod live;
 mod report;
 mod tracker;
 mod write;
@@ -14,16 +15,16 @@ use crate::console::{bytes, note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::figures::FiguresFile;
-use crate::picture::{Pictures, Subject};
+use crate::progress::Progress;
 use crate::session::each_sweep;
 use crate::weight_files::WeightFiles;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
-use raywake_io::source::{self, SweepData};
+use raywake_io::source;
 use raywake_objects::estimate::FixedLag;
-use raywake_objects::front_end::Life;
 
 pub use ground::Ground;
+pub use live::LiveObject;
 pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 
@@ -36,10 +37,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
-    let folder = args.out.as_ref().filter(|_| args.png).map(|out| out.join("png"));
-    let pictures = args.views.files(folder);
-    let mut pictures = Pictures::create(&pictures, source.name(), sweeps.len())?;
-    let mut files = write::Files::create(args.out.as_deref())?;
+    let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes())?;
     let drive = match args.front_end {
@@ -47,6 +45,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         args::FrontEndKind::Flow => Some(flow(args, &settings.profile, source.rig())?),
     };
     let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
+    tracker.all |= args.all;
     say(args.quiet, &budget(args.fixed_lag))?;
     let mut report = report::Report::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
@@ -56,7 +55,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
             report.step(&counts, clock);
             // Flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
-            draw(&mut pictures, stepped, &tracker, &report)?;
+            files.sweep(stepped, &tracker, report.last_ms())?;
             tracker.ended(|ended| report.track(ended, &mut files))?;
         }
         Ok(())
@@ -64,28 +63,23 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let clock = Instant::now();
     if let Some(counts) = tracker.last(&end.last)? {
         report.step(&counts, clock);
-        draw(&mut pictures, &end.last, &tracker, &report)?;
+        files.sweep(&end.last, &tracker, report.last_ms())?;
         tracker.ended(|ended| report.track(ended, &mut files))?;
     }
     report.counts.ended += tracker.finish()?;
-    tracker.ended(|ended| report.track(ended, &mut files))?;
-    files.finish()?;
+    let mut progress = Progress::new("track", tracker.ended_objects(), args.quiet);
+    let mut done = 0;
+    tracker.ended(|ended| {
+        done += 1;
+        progress.update(done);
+        report.track(ended, &mut files)
+    })?;
+    progress.finish();
     let summary = report.summary(source.name(), args.front_end, end.interrupted);
-    pictures.finish(&summary.text())?;
+    files.finish(&summary.text())?;
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
     Ok(!end.interrupted)
-}
-
-fn draw(
-    pictures: &mut Pictures,
-    sweep: &SweepData,
-    tracker: &Tracker,
-    report: &report::Report,
-) -> Result<(), raywake_io::Error> {
-    let live = tracker.tracks().iter().filter(|t| t.life == Life::Live).count();
-    let figures = [("tracks", live as f64), ("ms a sweep", report.last_ms())];
-    pictures.write(sweep, &Subject::Tracks(tracker.tracks()), &figures)
 }
 
 /// The flow, for the front end that takes it.

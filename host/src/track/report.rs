@@ -4,11 +4,12 @@ use std::fmt::Write;
 use std::time::Instant;
 
 use raywake_core::digest::Digest;
+use raywake_core::encoder::ColumnClass;
 use raywake_objects::ObjectState;
 use raywake_objects::front_end::TrackingCounts;
 use serde::{Serialize, Serializer};
 
-use super::Ended;
+use super::tracker::{Ended, moved_m};
 use super::write::Files;
 use crate::args::FrontEndKind;
 use crate::order_statistics::Spread;
@@ -33,6 +34,12 @@ pub struct Line {
     /// Centroids observed.
     pub updates: u32,
     pub returns: u64,
+    /// What the encoder takes most of its returns for; null where nobody tells.
+    pub class: Option<&'static str>,
+    /// Length, width and height of its box, m.
+    pub size_m: [f32; 3],
+    /// Mean P(moves) of its returns over its life; null without the flow.
+    pub p_moves: Option<f32>,
     /// From the first place of the estimate to the last, m.
     pub moved_m: f64,
     /// Speed of the estimate at the end, m/s.
@@ -79,7 +86,7 @@ impl Report {
     /// A track at its end, with its files. The digest is over its number, anchor and start, and at
     /// each state of its history this and the estimate; then the estimates of every sweep.
     pub fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
-        let Ended { track, estimator, report, lag, milliseconds } = *ended;
+        let Ended { track, estimator, shape, report, lag, milliseconds } = *ended;
         self.estimates.push(milliseconds);
         self.digest.word(track.id);
         track.anchor.iter().for_each(|v| self.digest.double(*v));
@@ -90,16 +97,17 @@ impl Report {
         }
         lag.into_iter().flatten().for_each(|state| self.state(state));
         let for_s = track.last_s() - track.start_s;
-        let [first, last] = [0.0, for_s].map(|t| estimator.state(t));
-        let [x, y] = [0, 1].map(|a| last.position[a] - first.position[a]);
         self.lines.push(Line {
             track: track.id,
             from_s: track.start_s,
             for_s,
             updates: track.observations,
             returns: track.returns_seen(),
-            moved_m: x.hypot(y),
-            speed_mps: last.speed,
+            class: track.class().map(ColumnClass::name),
+            size_m: shape.size,
+            p_moves: mean_told(track.p_moves()),
+            moved_m: moved_m(track, estimator),
+            speed_mps: estimator.state(for_s).speed,
             residual_m: report.costs.last().map_or(0.0, |c| c.residual_m),
             iterations: report.iterations,
         });
@@ -131,6 +139,13 @@ impl Report {
             tracks: self.lines,
         }
     }
+}
+
+/// Mean of those that are told.
+fn mean_told(p_moves: &[f32]) -> Option<f32> {
+    let told = || p_moves.iter().filter(|p| !p.is_nan());
+    let count = told().count();
+    (count > 0).then(|| told().sum::<f32>() / count as f32)
 }
 
 /// What a run was and what came of it.
@@ -176,7 +191,7 @@ impl TrackSummary {
         let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
         writeln!(
             out,
-            "\n{} sweeps, {} tracks ({brief} shorter ones omitted){end}",
+            "\n{} sweeps, {} tracks ({brief} omitted as short, or as no object: see --all){end}",
             self.sweeps,
             self.tracks.len()
         )?;
@@ -210,20 +225,14 @@ impl TrackSummary {
         let mut lines: Vec<&Line> = self.tracks.iter().collect();
         lines.sort_by_key(|l| (u32::MAX - l.updates, l.track));
         let head = ["track", "start s", "s", "updates", "returns", "dist m", "m/s", "resid m"];
-        writeln!(out, "\n{}", head.map(|h| format!("{h:>8}")).join(""))?;
+        let head = head.map(|h| format!("{h:>8}")).join("");
+        writeln!(out, "\n{head}  {:16}class", "l x w x h, m")?;
         for l in lines.iter().take(LISTED) {
-            writeln!(
-                out,
-                "{:8}{:8.2}{:8.2}{:8}{:8}{:8.2}{:8.2}{:8.3}",
-                l.track,
-                l.from_s,
-                l.for_s,
-                l.updates,
-                l.returns,
-                l.moved_m,
-                l.speed_mps,
-                l.residual_m
-            )?;
+            write!(out, "{:8}{:8.2}{:8.2}{:8}", l.track, l.from_s, l.for_s, l.updates)?;
+            let (moved, speed, residual) = (l.moved_m, l.speed_mps, l.residual_m);
+            write!(out, "{:8}{moved:8.2}{speed:8.2}{residual:8.3}", l.returns)?;
+            let size = l.size_m.map(|v| format!("{v:.1}")).join(" x ");
+            writeln!(out, "  {size:16}{}", l.class.unwrap_or("-"))?;
         }
         let rest = lines.len().saturating_sub(LISTED);
         if rest > 0 { writeln!(out, "and {rest} more\n") } else { writeln!(out) }

@@ -6,15 +6,16 @@ use std::time::Instant;
 use raywake_alloc_guard::Sealed;
 use raywake_core::sweep::Rig;
 use raywake_core::team::Team as _;
-use raywake_objects::ObjectState;
 use raywake_objects::estimate::{EstimateParams, EstimateReport, Estimator, FixedLag};
 use raywake_objects::front_end::{
     Flows, FrontEnd, HISTORY_MAX, Life, TRACKS_MAX, Thinned, Track, TrackingCounts,
 };
+use raywake_objects::object_box::ObjectBox;
 
 use raywake_objects::params::TrackingParams;
+use raywake_objects::{ObjectReturn, ObjectState};
 
-use super::Ground;
+use super::{Ground, LiveObject};
 use crate::config::Settings;
 use crate::drive::Drive;
 use crate::error::RunError;
@@ -31,6 +32,8 @@ pub struct Tracker {
     parts: Sealed<TrackerParts>,
     /// Rooms of the tracks that ended.
     ended: Vec<usize>,
+    /// Tracks of what is no object are shown, too; without flow and encoder nobody tells.
+    pub all: bool,
 }
 
 struct TrackerParts {
@@ -117,6 +120,7 @@ impl Tracker {
         ground: Option<Ground>,
         fixed_lag: bool,
     ) -> Tracker {
+        let all = drive.as_ref().is_none_or(|d| !d.tells_classes());
         let parts = TrackerParts {
             front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
@@ -132,6 +136,7 @@ impl Tracker {
             ground,
             parts: Sealed::new("tracks", parts),
             ended: Vec::with_capacity(TRACKS_MAX),
+            all,
         }
     }
 
@@ -202,19 +207,46 @@ impl Tracker {
         self.parts.tracks.iter().filter(|t| t.life == Life::Ended)
     }
 
+    /// Of the returns of the last step's sweep those of a track: which one, and the track's number.
+    pub fn members(&self) -> impl Iterator<Item = (usize, u32)> {
+        self.parts.front_end.members().map(|(n, slot)| (n, self.parts.tracks[slot].id))
+    }
+
+    /// The objects of the last step's sweep: those of the tracks that are put out.
+    pub fn objects(&self) -> impl Iterator<Item = LiveObject> {
+        let shown = self.parts.tracks.iter().filter(|t| self.shows(t));
+        shown.filter_map(|track| LiveObject::of(&self.params, track))
+    }
+
+    /// Whether a track is put out: that of an object, or any.
+    fn shows(&self, track: &Track) -> bool {
+        self.all || track.is_object(&self.params.front_end)
+    }
+
+    /// How many of the tracks that ended in the last step are to be shown.
+    pub fn ended_objects(&self) -> usize {
+        self.parts.tracks.iter().filter(|t| self.is_shown_at_its_end(t)).count()
+    }
+
+    fn is_shown_at_its_end(&self, track: &Track) -> bool {
+        let sure = track.observations >= self.params.front_end.observations_min;
+        track.life == Life::Ended && sure && self.shows(track)
+    }
+
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
-    /// estimate of its trajectory and shape. Those that ended before they were sure are left out:
-    /// there is little to estimate.
+    /// estimate of its trajectory and shape: those of objects, unless all are asked for. Those that
+    /// ended before they were sure are left out: there is little to estimate.
     pub fn ended(
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,
     ) -> Result<(), RunError> {
+        self.ended.clear();
+        for slot in 0..self.parts.tracks.len() {
+            if self.is_shown_at_its_end(&self.parts.tracks[slot]) {
+                self.ended.push(slot);
+            }
+        }
         let Tracker { parts, ended, params, .. } = self;
-        let sure = |track: &Track| track.observations >= params.front_end.observations_min;
-        let slots = parts.tracks.iter().enumerate();
-        let slots = slots.filter(|(_, track)| track.life == Life::Ended && sure(track));
-        ended.clear();
-        ended.extend(slots.map(|(slot, _)| slot));
         for group in ended.chunks(parts.solvers.len()) {
             parts.step(|TrackerParts { solvers, tracks, .. }| {
                 solve(&params.estimate, solvers, tracks, group);
@@ -224,11 +256,26 @@ impl Tracker {
             for (&slot, Solver { estimator, report, milliseconds }) in group.iter().zip(solvers) {
                 let lag = lags.get(slot).map(|lag| lag.states.kept());
                 let (track, milliseconds) = (&tracks[slot], *milliseconds);
-                show(&Ended { track, estimator, report, lag, milliseconds })?;
+                let shape = shape(params, track, estimator);
+                show(&Ended { track, estimator, shape, report, lag, milliseconds })?;
             }
         }
         Ok(())
     }
+}
+
+/// The box around all returns of a track, each where its time puts it.
+fn shape(params: &TrackingParams, track: &Track, estimator: &Estimator) -> ObjectBox {
+    let place = |seen: &ObjectReturn| estimator.state(f64::from(seen.time_s)).local(seen.position);
+    let moved_m = moved_m(track, estimator);
+    let places = track.returns().iter().map(place);
+    ObjectBox::around(&params.boxes, places, moved_m).unwrap_or_default()
+}
+
+/// From the first place of the estimate of a track to its last one, along the ground, m.
+pub fn moved_m(track: &Track, estimator: &Estimator) -> f64 {
+    let [first, last] = [0.0, track.last_s() - track.start_s].map(|t| estimator.state(t).position);
+    libm::hypot(last[0] - first[0], last[1] - first[1])
 }
 
 /// A track at its end.
@@ -237,6 +284,8 @@ pub struct Ended<'a> {
     pub track: &'a Track,
     /// With its trajectory and shape.
     pub estimator: &'a Estimator,
+    /// The box around its returns in its frame; without one it has no size.
+    pub shape: ObjectBox,
     /// How these were found.
     pub report: &'a EstimateReport,
     /// The estimates of every sweep where there are any, one for each state of its history.

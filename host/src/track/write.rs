@@ -1,18 +1,29 @@
 //! The files of tracks.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use raywake_objects::front_end::StateVariances;
+use raywake_objects::object_box::ObjectBox;
 use raywake_objects::{ObjectReturn, ObjectState};
 
-use super::Ended;
+use super::{Ended, LiveObject, Tracker};
+use crate::args::TrackArgs;
+use crate::picture::{Pictures, Subject};
 use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::objects::{BoxMark, Content};
 use raywake_io::sink::table::TableWriter;
-use raywake_io::sink::{atomic, clouds};
+use raywake_io::sink::{atomic, clouds, feather};
+use raywake_io::source::{Overview, SweepData};
 
 /// Where files go, and the rows of `tracks.feather`.
 pub struct Files {
     folder: Option<PathBuf>,
+    pictures: Pictures,
+    bag: Option<BagSink>,
     rows: Vec<TrackRow>,
+    /// Number of the track of every return of a sweep, -1 without one.
+    of_returns: Vec<i32>,
 }
 
 /// A track at the time of one of its updates: times of the recording, s, and positions in the
@@ -23,6 +34,11 @@ struct TrackRow {
     estimate: ObjectState,
     /// NaN where there is none.
     lag: ObjectState,
+    /// The box in the frame of the estimate.
+    shape: ObjectBox,
+    variances: StateVariances,
+    p_moves: f32,
+    class: u8,
 }
 
 const NONE: ObjectState = ObjectState {
@@ -35,22 +51,46 @@ const NONE: ObjectState = ObjectState {
 };
 
 impl Files {
-    /// Creates the folders; without one nothing will be written.
-    pub fn create(root: Option<&Path>) -> Result<Files, Error> {
-        if let Some(root) = root {
+    /// Creates folders and files for some sweeps of a recording; where none is named nothing will
+    /// be written.
+    pub fn create(args: &TrackArgs, of: &Overview, sweeps: usize) -> Result<Files, Error> {
+        let folder = args.out.clone();
+        if let Some(root) = &folder {
             if !cfg!(feature = "arrow") {
                 let what = "--out needs the feature `arrow`, which is not compiled in";
                 return Err(Error::Unsupported(what.into()));
             }
-            atomic::create_folder(&root.join("clouds"))?;
+            ["clouds", "returns"].iter().try_for_each(|n| atomic::create_folder(&root.join(n)))?;
         }
-        Ok(Files { folder: root.map(Path::to_path_buf), rows: Vec::new() })
+        let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
+        let pictures = Pictures::create(&args.views.files(png), &of.name, sweeps)?;
+        let bag = |path: &PathBuf| BagSink::create(path, of.epoch_ns, Content::Objects);
+        let bag = args.mcap.as_ref().map(bag).transpose()?;
+        Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
+    }
+
+    /// The sweep of the last step, which took `ms` milliseconds.
+    pub fn sweep(&mut self, sweep: &SweepData, tracker: &Tracker, ms: f64) -> Result<(), Error> {
+        self.of_returns.clear();
+        self.of_returns.resize(sweep.points.len(), -1);
+        tracker.members().for_each(|(n, track)| self.of_returns[n] = track as i32);
+        let objects: Vec<LiveObject> = tracker.objects().collect();
+        let moving = objects.iter().filter(|o| o.velocity.is_some()).count();
+        let figures = [("moving objects", moving as f64), ("ms a sweep", ms)];
+        self.pictures.write(sweep, &Subject::Objects(&objects), &figures)?;
+        if let Some(bag) = &mut self.bag {
+            bag.objects(sweep, &self.of_returns, objects.iter().map(mark))?;
+        }
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let mut t = TableWriter::default();
+        t.column("track", &self.of_returns, |track| *track);
+        t.write(&folder.join(format!("returns/{:010}.feather", sweep.frame)), &[])
     }
 
     /// A track at its end: its cloud, and its rows for later.
     pub fn track(&mut self, ended: &Ended) -> Result<(), Error> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let Ended { track, estimator, .. } = ended;
+        let Ended { track, estimator, shape, .. } = ended;
         let placed = |state: ObjectState| ObjectState {
             time_s: track.start_s + state.time_s,
             position: [0, 1, 2].map(|a| track.anchor[a] + state.position[a]),
@@ -62,6 +102,10 @@ impl Files {
             filter: placed(*filter),
             estimate: placed(estimator.state(filter.time_s)),
             lag: placed(lag(n)),
+            shape: *shape,
+            variances: track.variances().get(n).copied().unwrap_or_default(),
+            p_moves: track.p_moves().get(n).copied().unwrap_or(f32::NAN),
+            class: feather::class(track.class()),
         }));
         let in_frame = |seen: &ObjectReturn| {
             let place = estimator.state(f64::from(seen.time_s)).local(seen.position);
@@ -72,8 +116,10 @@ impl Files {
         clouds::write_ply(&path, ["x", "y", "z", "time"], &rows)
     }
 
-    /// All tracks have been seen.
-    pub fn finish(self) -> Result<(), Error> {
+    /// All tracks have been seen; the page ends with this text.
+    pub fn finish(self, summary: &str) -> Result<(), Error> {
+        self.pictures.finish(summary)?;
+        self.bag.map_or(Ok(()), BagSink::finish)?;
         let Some(folder) = &self.folder else { return Ok(()) };
         let mut t = TableWriter::default();
         t.column("track", &self.rows, |r| r.track);
@@ -94,6 +140,23 @@ impl Files {
         states("", |r| &r.estimate);
         states("lag_", |r| &r.lag);
         t.column("lag_time_s", &self.rows, |r| r.lag.time_s);
-        t.write(&folder.join("tracks.feather"), &[])
+        objects(&mut t, &self.rows);
+        t.write(&folder.join("tracks.feather"), &[feather::class_names()])
     }
+}
+
+/// What a track is beside its states.
+fn objects(t: &mut TableWriter, rows: &[TrackRow]) {
+    t.array(["cov_xx", "cov_xy", "cov_yy", "cov_zz"], rows, |r| r.variances.position);
+    t.column("cov_speed", rows, |r| r.variances.speed);
+    t.array(["box_x_m", "box_y_m", "box_z_m"], rows, |r| r.estimate.placed(r.shape.centre));
+    t.column("box_heading_rad", rows, |r| r.estimate.heading + f64::from(r.shape.turn));
+    t.array(["length_m", "width_m", "height_m"], rows, |r| r.shape.size);
+    t.column("p_moves", rows, |r| r.p_moves);
+    t.column("class", rows, |r| r.class);
+}
+
+fn mark(object: &LiveObject) -> BoxMark {
+    let LiveObject { id, centre, heading, size, velocity, .. } = *object;
+    BoxMark { id, centre, heading, size, moves: velocity.is_some() }
 }

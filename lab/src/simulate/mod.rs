@@ -156,7 +156,7 @@ pub fn write(
     // Threads that find no drive of their own help casting.
     let workers = jobs.clamp(1, missing.len().max(1));
     let threads = (jobs / workers).max(1);
-    let progress = Mutex::new(Progress::new(missing.len() * recipe.sweeps, quiet));
+    let progress = Mutex::new(Progress::new("sweep", missing.len() * recipe.sweeps, quiet));
     let (next, swept, stop) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
     let tell = || {
         let done = swept.fetch_add(1, Ordering::Relaxed) + 1;

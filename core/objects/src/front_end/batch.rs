@@ -3,6 +3,7 @@
 use super::{CELL_M, FrontEndParams, SIDE};
 use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
+use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{Origin, PointFlow, PointFlows, Status};
 use raywake_core::params::{POINTS_MAX, SLOTS};
 use raywake_core::pose::Pose;
@@ -25,6 +26,11 @@ pub(super) struct BatchReturn {
     pub passed: [bool; 2],
     /// Over ground by the flow, m/s, as far as it tells.
     pub velocity: Option<[f32; 2]>,
+    /// P(moves) by the flow and the class of its column, as far as they are told.
+    pub p_moves: Option<f32>,
+    pub class: Option<ColumnClass>,
+    /// Which of its sweep's returns it is.
+    pub index: u32,
 }
 
 impl BatchReturn {
@@ -45,16 +51,18 @@ pub struct Flows<'a> {
 }
 
 impl Flows<'_> {
-    /// Velocity of a return `away` (m) from the vehicle, m/s.
-    fn velocity(&self, n: usize, away: [f64; 2], sigma_max_mps: f32) -> Option<[f32; 2]> {
+    /// That of a return `away` (m) from the vehicle.
+    fn at(&self, n: usize, away: [f64; 2]) -> Option<PointFlow> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
-        let untold =
-            |f: &PointFlow| f.origin == Origin::Unmatched || f.status == Status::OverCapacity;
-        let flow = self.of.get(n).filter(|f| inside && !untold(f))?;
-        let sum = flow.covariance[0] + flow.covariance[2];
-        let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
-        certain.then_some(flow.velocity_world_mps)
+        self.of.get(n).filter(|f| inside && f.status != Status::OverCapacity)
     }
+}
+
+/// Velocity of a return, m/s, where the flow is sure of it.
+fn velocity(flow: PointFlow, sigma_max_mps: f32) -> Option<[f32; 2]> {
+    let sum = flow.covariance[0] + flow.covariance[2];
+    let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
+    (certain && flow.origin != Origin::Unmatched).then_some(flow.velocity_world_mps)
 }
 
 /// Indices of the cell of a place in the window.
@@ -74,6 +82,8 @@ pub(super) struct Batch {
     pub returns: heapless::Vec<BatchReturn, POINTS_MAX>,
     /// Left out since the last step.
     pub dropped: DroppedReturns,
+    /// Whether the step is done: what is here is the last step's.
+    pub is_done: bool,
 }
 
 impl Batch {
@@ -84,13 +94,18 @@ impl Batch {
             corner: DVec3::ZERO,
             returns: heapless::Vec::new(),
             dropped: DroppedReturns::ZERO,
+            is_done: false,
         }
     }
 
-    pub fn clear(&mut self) {
-        self.stamp_s = None;
-        self.returns.clear();
-        self.dropped = DroppedReturns::default();
+    /// Forgets the returns of a step that is done.
+    pub fn begin(&mut self) {
+        if self.is_done {
+            self.stamp_s = None;
+            self.returns.clear();
+            self.dropped = DroppedReturns::default();
+            self.is_done = false;
+        }
     }
 
     /// A place given from the corner, in the world, m.
@@ -107,6 +122,7 @@ impl Batch {
         sweep: &Sweep,
         flows: Option<Flows>,
     ) {
+        self.begin();
         if !is_finite(sweep) {
             self.dropped.not_finite += sweep.points.len() as u64;
             return;
@@ -143,10 +159,15 @@ impl Batch {
                 continue;
             }
             let away = [at[0] as f64 - vehicle.x, at[1] as f64 - vehicle.y];
-            let sigma_max_mps = params.flow_sigma_max_mps;
-            let velocity = flows.as_ref().and_then(|f| f.velocity(n, away, sigma_max_mps));
-            let time_s = (after_s + offset_s) as f32;
-            let one = BatchReturn { time_s, velocity, ..placed };
+            let flow = flows.as_ref().and_then(|f| f.at(n, away));
+            let one = BatchReturn {
+                time_s: (after_s + offset_s) as f32,
+                velocity: flow.and_then(|f| velocity(f, params.flow_sigma_max_mps)),
+                p_moves: flow.map(|f| f.probability),
+                class: flow.and_then(|f| f.class),
+                index: n as u32,
+                ..placed
+            };
             // There is room for all that are taken.
             let _ = self.returns.push(one);
         }

@@ -35,7 +35,7 @@ pub use counts::TrackingCounts;
 pub use object_returns::GroundMap;
 pub use params::FrontEndParams;
 pub use thinned::Thinned;
-pub use track::{HISTORY_MAX, LATEST_MAX, Life, Track};
+pub use track::{HISTORY_MAX, LATEST_MAX, Life, StateVariances, Track};
 
 use crate::panorama::Panorama;
 use association::Association;
@@ -115,6 +115,7 @@ impl FrontEnd {
         let used = tracks.len().min(TRACKS_MAX);
         let tracks = &mut tracks[..used];
         free_ended(tracks);
+        self.batch.begin();
         let mut counts =
             TrackingCounts { dropped: self.batch.dropped, ..TrackingCounts::default() };
         if let Some(stamp_s) = self.batch.stamp_s {
@@ -131,9 +132,19 @@ impl FrontEnd {
             self.begin_tracks(params, tracks, &mut counts);
             self.find_passing(params);
             self.distribute(tracks);
+            tracks.iter_mut().for_each(|track| track.complete(params));
         }
-        self.batch.clear();
+        self.batch.is_done = true;
         counts
+    }
+
+    /// The returns of the last step's sweeps that belong to a track: which of its sweep's returns
+    /// it is, and the slot of its track.
+    pub fn members(&self) -> impl Iterator<Item = (usize, usize)> {
+        let slot = |n: usize| Some(self.association.slot(self.segments.of_return(n)?));
+        let all = self.batch.returns.iter().enumerate();
+        let all = all.filter_map(move |(n, one)| Some((one.index as usize, slot(n)? as usize)));
+        all.filter(|(_, slot)| *slot < TRACKS_MAX)
     }
 
     /// Ends all tracks, as at the end of a drive. Returns how many there were.

@@ -49,6 +49,14 @@ raywake_core::params! {
         pub coarse_gate_mps: f64 = 45.0, "m/s", (above 0), "Saves time alone: faster than any car.";
         /// Time without an observation after which a track ends.
         pub patience_s: f64 = 0.5, "s", (0 to 60);
+        /// Mean P(moves) of its returns from which a track is seen to move.
+        pub track_moves_min: f32 = 0.5, "", (0 to 1);
+        /// Way from its first place to its last one that a track must have come to be an object
+        /// because it moved.
+        pub track_way_min_m: f64 = 1.0, "m", (0 to 100);
+        /// Share of its returns that the encoder takes for vehicles, people or two-wheelers, of
+        /// those it tells of, from which a track that stands is an object.
+        pub road_user_share_min: f32 = 0.5, "", (0 to 1);
         /// Tracks of fewer observations end with the first batch without one.
         pub observations_min: u32 = 3, "observations", (1 to 100);
     } and {

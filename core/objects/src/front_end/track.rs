@@ -4,10 +4,12 @@
 //! track of any length fits: of its returns and states it keeps every k-th, and k doubles when
 //! there is no more room ([`Thinned`]).
 
+use super::FrontEndParams;
 use super::batch::BatchReturn;
 use super::thinned::Thinned;
 use crate::centroid_ekf::{CentroidEkf, CentroidParams};
 use crate::{ObjectReturn, ObjectState, RETURNS_MAX};
+use raywake_core::encoder::ColumnClass;
 
 /// States of the filter that a track keeps.
 pub const HISTORY_MAX: usize = 512;
@@ -43,6 +45,41 @@ pub struct Track {
     history: Thinned<ObjectState, HISTORY_MAX>,
     returns: Thinned<ObjectReturn, RETURNS_MAX>,
     latest: Thinned<ObjectReturn, LATEST_MAX>,
+    told: Told,
+    /// Mean P(moves) of its returns at every state of the history.
+    p_moves: Thinned<f32, HISTORY_MAX>,
+    variances: Thinned<StateVariances, HISTORY_MAX>,
+}
+
+/// How sure the filter is of a state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StateVariances {
+    /// Covariance of the position (xx, xy, yy, zz), m².
+    pub position: [f32; 4],
+    /// Variance of the speed, (m/s)².
+    pub speed: f32,
+}
+
+impl StateVariances {
+    fn of(ekf: &CentroidEkf) -> StateVariances {
+        let at = |row, column| ekf.covariance()[(row, column)] as f32;
+        StateVariances { position: [at(0, 0), at(0, 1), at(1, 1), at(2, 2)], speed: at(4, 4) }
+    }
+}
+
+/// What flow and encoder tell of its returns.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    /// Of the last observation: the sum of P(moves), and of how many returns.
+    p_moves: (f32, u32),
+    /// Returns of each class, in the order of [`ColumnClass::ALL`], of all observations.
+    classes: [u32; ColumnClass::ALL.len()],
+    /// Observations in which it was seen to move.
+    moving: u32,
+}
+
+impl Told {
+    const NONE: Told = Told { p_moves: (0.0, 0), classes: [0; ColumnClass::ALL.len()], moving: 0 };
 }
 
 impl Track {
@@ -58,6 +95,9 @@ impl Track {
             history: Thinned::new(),
             returns: Thinned::new(),
             latest: Thinned::new(),
+            told: Told::NONE,
+            p_moves: Thinned::new(),
+            variances: Thinned::new(),
         }
     }
 
@@ -82,6 +122,46 @@ impl Track {
         self.returns.seen()
     }
 
+    /// How sure the filter was of every state of [`Track::history`] at its time.
+    pub fn variances(&self) -> &[StateVariances] {
+        self.variances.kept()
+    }
+
+    /// From the place of its first state to that of its last one, along the ground, m.
+    pub fn moved_m(&self) -> f64 {
+        let (Some(first), Some(last)) = (self.history().first(), self.history().last()) else {
+            return 0.0;
+        };
+        let [x, y] = [0, 1].map(|a| last.position[a] - first.position[a]);
+        libm::hypot(x, y)
+    }
+
+    /// Mean P(moves) of its returns at every state of [`Track::history`]; NaN where the flow does
+    /// not tell, 0 to 1 else.
+    pub fn p_moves(&self) -> &[f32] {
+        self.p_moves.kept()
+    }
+
+    /// What the encoder takes most of its returns for; none where it does not tell.
+    pub fn class(&self) -> Option<ColumnClass> {
+        let count = |class: &ColumnClass| self.told.classes[*class as usize];
+        // Of equal ones the first.
+        let most = ColumnClass::ALL.into_iter().rev().max_by_key(count)?;
+        (count(&most) > 0).then_some(most)
+    }
+
+    /// Whether flow and encoder tell that it is an object of the traffic: it was seen to move as
+    /// often as a track must be seen and came somewhere, or most of its returns are taken for what
+    /// could. Outside the flow's window nothing is.
+    pub fn is_object(&self, params: &FrontEndParams) -> bool {
+        let told: u32 = self.told.classes.iter().sum();
+        let count = |class: ColumnClass| self.told.classes[class as usize];
+        let users = ColumnClass::ALL.into_iter().filter(|c| c.could_move()).map(count).sum::<u32>();
+        let is_user = told > 0 && users as f32 >= params.road_user_share_min * told as f32;
+        let moved = self.told.moving >= params.observations_min;
+        is_user || moved && self.moved_m() >= params.track_way_min_m
+    }
+
     /// The filter's state, unless there is room only.
     pub fn state(&self) -> Option<ObjectState> {
         self.ekf.as_ref().map(CentroidEkf::state)
@@ -99,6 +179,9 @@ impl Track {
         self.history.clear();
         self.returns.clear();
         self.latest.clear();
+        self.told = Told::NONE;
+        self.p_moves.clear();
+        self.variances.clear();
     }
 
     /// Begins a track at a place in the world.
@@ -108,6 +191,7 @@ impl Track {
         (self.anchor, self.start_s) = (at, time_s);
         let ekf = CentroidEkf::birth(params, 0.0, [0.0; 3]);
         self.history.push(ekf.state());
+        self.variances.push(StateVariances::of(&ekf));
         self.ekf = Some(ekf);
         self.observations = 1;
     }
@@ -124,23 +208,42 @@ impl Track {
         ekf.predict(params, time_s - self.start_s);
         let revision = ekf.update(params, place);
         let state = ekf.state();
+        self.variances.push(StateVariances::of(ekf));
         revision.revise(&state, self.history.kept_mut());
         self.history.push(state);
         self.latest.clear();
+        self.told.p_moves = (0.0, 0);
         self.observations += 1;
+    }
+
+    /// After all returns of an observation.
+    pub(super) fn complete(&mut self, params: &FrontEndParams) {
+        if self.life != Life::Live || self.p_moves.seen() >= self.history.seen() {
+            return;
+        }
+        let (sum, returns) = self.told.p_moves;
+        let mean = if returns > 0 { sum / returns as f32 } else { f32::NAN };
+        self.told.moving += u32::from(mean >= params.track_moves_min);
+        self.p_moves.push(mean);
     }
 
     /// Keeps a return that lies and began at places in the world.
     pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], one: &BatchReturn) {
         let place = |at| self.place(at).map(|v| v as f32);
-        let one = ObjectReturn {
+        let kept = ObjectReturn {
             position: place(at),
             origin: place(origin),
             time_s: (time_s - self.start_s) as f32,
             sensor: one.sensor,
             passed: one.passed,
         };
-        self.returns.push(one);
-        self.latest.push(one);
+        self.returns.push(kept);
+        self.latest.push(kept);
+        if let Some(p) = one.p_moves {
+            self.told.p_moves = (self.told.p_moves.0 + p, self.told.p_moves.1 + 1);
+        }
+        if let Some(class) = one.class {
+            self.told.classes[class as usize] += 1;
+        }
     }
 }

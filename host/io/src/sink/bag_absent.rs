@@ -4,6 +4,7 @@ use std::path::Path;
 
 use raywake_core::output::PairFlows;
 
+use super::objects::{BoxMark, Content};
 use crate::Error;
 use crate::source::SweepData;
 
@@ -14,13 +15,23 @@ pub use Absent as BagSink;
 
 impl Absent {
     /// Fails with [`Error::Unsupported`].
-    pub fn create(path: &Path, _: u64) -> Result<Absent, Error> {
+    pub fn create(path: &Path, _: u64, _: Content) -> Result<Absent, Error> {
         let what = "an MCAP file needs the feature `mcap`, which is not compiled in";
         Err(Error::Unsupported(format!("{}: {what}", path.display())))
     }
 
     /// Never called.
     pub fn pair(&mut self, _: &SweepData, _: &PairFlows) -> Result<(), Error> {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn objects(
+        &mut self,
+        _: &SweepData,
+        _: &[i32],
+        _: impl Iterator<Item = BoxMark>,
+    ) -> Result<(), Error> {
         match *self {}
     }
 

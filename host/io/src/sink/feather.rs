@@ -7,6 +7,7 @@
 
 use std::path::Path;
 
+use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, Origin, PointFlow, Status, TrackletState};
 use raywake_core::sweep::Point;
 
@@ -25,7 +26,8 @@ const STATE: [&str; 5] = ["x", "y", "heading", "speed", "turn"];
 /// (refined displacement over ground until the next sweep) and its covariance `cov_dx_dx cov_dx_dy
 /// cov_dy_dy` (m^2) float32; `age` uint32; `p_moves` (how likely it is that the column moves)
 /// float32; `foreground` (not explained by odometry) and `valid`
-/// (with a match of its own or part of a thing that moves) bool.
+/// (with a match of its own or part of a thing that moves) bool; `class` uint8, what the encoder
+/// takes the column for: the numbers of [`ColumnClass`], whose names are in the metadata, or 255.
 pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
     let mut t = TableWriter::default();
     t.array(["cell_i", "cell_j"], columns, |c| c.cell);
@@ -42,7 +44,8 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
     t.column("p_moves", columns, |c| c.probability);
     t.column("foreground", columns, |c| c.origin != Origin::Background);
     t.column("valid", columns, |c| c.origin >= Origin::Matched);
-    t.write(path, meta)
+    t.column("class", columns, |c| class(c.class));
+    t.write(path, &[meta, &[class_names()]].concat())
 }
 
 /// Writes the flow of returns, one row each in the sweep's order.
@@ -50,7 +53,7 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
 /// cov_yy` of the world velocity float32; `age` uint32; `p_moves` float32; `foreground`, `valid`
 /// bool; `status` uint8, what became of the return: the numbers of
-/// [`raywake_core::output::Status`], whose names are in the metadata.
+/// [`raywake_core::output::Status`], whose names are in the metadata, as are those of `class`.
 ///
 /// `points` and `flows` are of the same sweep; fails with [`Error::Usage`] where their lengths
 /// differ.
@@ -74,7 +77,18 @@ pub fn write_points(
     t.column("foreground", flows, |f| f.origin != Origin::Background);
     t.column("valid", flows, |f| f.origin >= Origin::Matched);
     t.column("status", flows, |f| f.status as u8);
-    t.write(path, &[meta, &[status_names()]].concat())
+    t.column("class", flows, |f| class(f.class));
+    t.write(path, &[meta, &[status_names(), class_names()]].concat())
+}
+
+/// A class as a number, 255 without one.
+pub fn class(of: Option<ColumnClass>) -> u8 {
+    of.map_or(u8::MAX, |class| class as u8)
+}
+
+/// `class`: the name of every number, separated by commas.
+pub fn class_names() -> (&'static str, String) {
+    ("class", ColumnClass::ALL.map(ColumnClass::name).join(","))
 }
 
 /// `status`: the name of every number, separated by commas.

@@ -7,6 +7,7 @@ pub mod atomic;
 pub mod bag;
 pub mod clouds;
 pub mod feather;
+pub mod objects;
 pub mod table;
 
 #[cfg(test)]

@@ -10,6 +10,15 @@
 //! Fields of a return, all float32 but the last: `x y z` (m) and `intensity`; `velocity_x
 //! velocity_y` (over ground, along the vehicle's axes) and `speed`, m/s; `p_moves`; `status`, a
 //! uint8: the number of a [`raywake_core::output::Status`].
+//!
+//! A recording of objects has, in place of the last two:
+//!
+//! | topic | message | what |
+//! |---|---|---|
+//! | `/raywake/points` | `sensor_msgs/PointCloud2` | returns: `x y z intensity`, and `track` |
+//! | `/raywake/objects` | `visualization_msgs/Marker` | a box for each object, red where it moves |
+//!
+//! `track` is an int32, the number of the return's track, or -1; a marker has the same number.
 
 pub(crate) mod cdr;
 mod schemas;
@@ -26,6 +35,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
 use super::atomic::Partial;
+use super::objects::{BoxMark, Content};
 use crate::Error;
 use crate::source::SweepData;
 use cdr::Cdr;
@@ -41,24 +51,40 @@ const AHEAD_S: f32 = 0.5;
 const LINE_M: f64 = 0.08;
 /// Colour of what moves: red, green, blue, opacity.
 const MOVING: [f32; 4] = [0.84, 0.15, 0.16, 1.0];
-/// `LINE_LIST` of `visualization_msgs/Marker`.
+/// Colour of an object that stands.
+const STANDING: [f32; 4] = [0.45, 0.5, 0.6, 0.6];
+/// `CUBE` and `LINE_LIST` of `visualization_msgs/Marker`.
+const CUBE: u32 = 1;
 const LINE_LIST: u32 = 5;
+/// How long a box is shown after its sweep, ns: some sweeps of most sensors.
+const BOX_SHOWN_NS: u32 = 250_000_000;
 
-/// Names of the fields of a return that are float32, and of the one that is uint8.
-const FLOATS: [&str; 8] =
-    ["x", "y", "z", "intensity", "velocity_x", "velocity_y", "speed", "p_moves"];
-const STATUS: &str = "status";
-/// Bytes of a return: with three that are not used, so that numbers stay aligned.
-const STEP: u32 = 4 * FLOATS.len() as u32 + 4;
-/// `FLOAT32` and `UINT8` of `sensor_msgs/PointField`.
+/// `FLOAT32`, `INT32` and `UINT8` of `sensor_msgs/PointField`.
 const FLOAT32: u8 = 7;
+const INT32: u8 = 5;
 const UINT8: u8 = 2;
+/// Fields of a return with its flow, four bytes each.
+const WITH_FLOW: [(&str, u8); 9] = [
+    ("x", FLOAT32),
+    ("y", FLOAT32),
+    ("z", FLOAT32),
+    ("intensity", FLOAT32),
+    ("velocity_x", FLOAT32),
+    ("velocity_y", FLOAT32),
+    ("speed", FLOAT32),
+    ("p_moves", FLOAT32),
+    // Three bytes after it are not used, so that numbers stay aligned.
+    ("status", UINT8),
+];
+/// Fields of a return with its track.
+const WITH_TRACK: [(&str, u8); 5] =
+    [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("intensity", FLOAT32), ("track", INT32)];
 
 /// A file while it is written; it takes its name when it is finished.
 pub struct BagSink {
     writer: Writer<BufWriter<File>>,
     partial: Partial,
-    /// Channels of transforms, returns and lines.
+    /// Channels of transforms, returns and marks.
     channels: [u16; 3],
     sequence: u32,
     /// Added to stamps, ns.
@@ -68,12 +94,16 @@ pub struct BagSink {
 impl BagSink {
     /// Begins a file; `epoch_ns` is added to the sweeps' stamps. Fails with the system's reason
     /// where it cannot be written.
-    pub fn create(path: &Path, epoch_ns: u64) -> Result<BagSink, Error> {
+    pub fn create(path: &Path, epoch_ns: u64, content: Content) -> Result<BagSink, Error> {
         let (partial, file) = Partial::create(path)?;
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("raywake ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Lz4));
+        let marks = match content {
+            Content::Flow => "/raywake/motion",
+            Content::Objects => "/raywake/objects",
+        };
         let begin = || -> mcap::McapResult<_> {
             let mut writer = options.create(file)?;
             let mut channel = |schema: &Schema, topic: &str| {
@@ -84,7 +114,7 @@ impl BagSink {
             let channels = [
                 channel(&TRANSFORMS, "/tf")?,
                 channel(&POINT_CLOUD, "/raywake/points")?,
-                channel(&MARKER, "/raywake/motion")?,
+                channel(&MARKER, marks)?,
             ];
             Ok((writer, channels))
         };
@@ -94,12 +124,32 @@ impl BagSink {
 
     /// Writes a sweep and the flow of a pair that it begins.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
-        let stamp_ns = self.epoch_ns.saturating_add((first.stamp_s * 1e9).round() as u64);
-        let pose = &first.world_from_vehicle;
+        let (stamp_ns, pose) = (self.stamp_ns(first), &first.world_from_vehicle);
         self.write(0, stamp_ns, transform(stamp_ns, pose))?;
-        let points = first.points.iter().zip(flows.points.iter());
-        self.write(1, stamp_ns, cloud(stamp_ns, pose, points))?;
+        let returns = first.points.iter().zip(flows.points.iter());
+        let returns = returns.map(|(point, flow)| with_flow(pose, point, flow));
+        self.write(1, stamp_ns, cloud(stamp_ns, &WITH_FLOW, returns))?;
         self.write(2, stamp_ns, motion(stamp_ns, pose, flows.columns))
+    }
+
+    /// Writes a sweep, the number of the track of each of its returns (-1: of none), and the
+    /// objects in it.
+    pub fn objects(
+        &mut self,
+        sweep: &SweepData,
+        tracks: &[i32],
+        objects: impl Iterator<Item = BoxMark>,
+    ) -> Result<(), Error> {
+        let stamp_ns = self.stamp_ns(sweep);
+        self.write(0, stamp_ns, transform(stamp_ns, &sweep.world_from_vehicle))?;
+        let returns = sweep.points.iter().zip(tracks);
+        let returns = returns.map(|(point, track)| with_track(point, *track));
+        self.write(1, stamp_ns, cloud(stamp_ns, &WITH_TRACK, returns))?;
+        objects.map(|object| cube(stamp_ns, &object)).try_for_each(|m| self.write(2, stamp_ns, m))
+    }
+
+    fn stamp_ns(&self, sweep: &SweepData) -> u64 {
+        self.epoch_ns.saturating_add((sweep.stamp_s * 1e9).round() as u64)
     }
 
     fn write(&mut self, channel: usize, time_ns: u64, message: Vec<u8>) -> Result<(), Error> {
@@ -137,41 +187,61 @@ fn along_vehicle(pose: &Pose, [x, y]: [f32; 2]) -> [f32; 2] {
     [v.x as f32, v.y as f32]
 }
 
-/// Returns with their flow, in the vehicle's frame.
-fn cloud<'a>(
+/// Fields of a return as [`WITH_FLOW`] names them.
+fn with_flow(pose: &Pose, point: &Point, flow: PointFlow) -> [[u8; 4]; WITH_FLOW.len()] {
+    let [x, y, z] = point.position.map(f32::to_le_bytes);
+    let [vx, vy] = along_vehicle(pose, flow.velocity_world_mps);
+    let [i, vx, vy, speed, p] =
+        [point.intensity, vx, vy, vx.hypot(vy), flow.probability].map(f32::to_le_bytes);
+    [x, y, z, i, vx, vy, speed, p, [flow.status as u8, 0, 0, 0]]
+}
+
+/// Fields of a return as [`WITH_TRACK`] names them.
+fn with_track(point: &Point, track: i32) -> [[u8; 4]; WITH_TRACK.len()] {
+    let [x, y, z] = point.position.map(f32::to_le_bytes);
+    [x, y, z, point.intensity.to_le_bytes(), track.to_le_bytes()]
+}
+
+/// Returns with these fields, in the vehicle's frame.
+fn cloud<const FIELDS: usize>(
     stamp_ns: u64,
-    pose: &Pose,
-    returns: impl ExactSizeIterator<Item = (&'a Point, PointFlow)>,
+    fields: &[(&str, u8); FIELDS],
+    returns: impl ExactSizeIterator<Item = [[u8; 4]; FIELDS]>,
 ) -> Vec<u8> {
     let mut cdr = Cdr::new();
-    let count = returns.len() as u32;
+    let (count, step) = (returns.len() as u32, 4 * FIELDS as u32);
     cdr.header(stamp_ns, VEHICLE);
-    [1, count, FLOATS.len() as u32 + 1].into_iter().for_each(|n| cdr.word(n));
-    fields(&mut cdr);
+    [1, count, FIELDS as u32].into_iter().for_each(|n| cdr.word(n));
+    (0..).zip(fields).for_each(|(n, (name, kind))| cdr.field(name, 4 * n, *kind));
     // Least significant byte first.
     cdr.byte(0);
-    cdr.word(STEP);
-    cdr.word(STEP * count);
+    cdr.word(step);
+    cdr.word(step * count);
     cdr.bytes(|bytes| {
-        bytes.reserve((STEP * count) as usize);
-        for (point, flow) in returns {
-            let [x, y, z] = point.position;
-            let [vx, vy] = along_vehicle(pose, flow.velocity_world_mps);
-            let speed = vx.hypot(vy);
-            let values = [x, y, z, point.intensity, vx, vy, speed, flow.probability];
-            values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
-            bytes.extend_from_slice(&[flow.status as u8, 0, 0, 0]);
-        }
+        bytes.reserve((step * count) as usize);
+        returns.for_each(|one| bytes.extend_from_slice(one.as_flattened()));
     });
     // Whether no coordinate may be missing.
     cdr.byte(0);
     cdr.message()
 }
 
-/// Definitions of the fields of a return, a number each.
-fn fields(cdr: &mut Cdr) {
-    let fields = FLOATS.iter().map(|name| (*name, FLOAT32)).chain([(STATUS, UINT8)]);
-    (0..).zip(fields).for_each(|(n, (name, kind))| cdr.field(name, 4 * n, kind));
+/// The box of an object.
+fn cube(stamp_ns: u64, object: &BoxMark) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, WORLD);
+    cdr.text("objects");
+    [object.id, CUBE, 0].into_iter().for_each(|n| cdr.word(n));
+    let (sin, cos) = (0.5 * object.heading).sin_cos();
+    let size = object.size.map(|v| f64::from(v).max(LINE_M));
+    cdr.doubles(object.centre.into_iter().chain([0.0, 0.0, sin, cos]).chain(size));
+    let colour = if object.moves { MOVING } else { STANDING };
+    colour.into_iter().for_each(|v| cdr.float(v));
+    [0, BOX_SHOWN_NS].into_iter().for_each(|n| cdr.word(n));
+    cdr.byte(0);
+    cdr.word(0);
+    without_looks(&mut cdr);
+    cdr.message()
 }
 
 /// Lines along the motion of columns that move; they last until the next sweep's.
