@@ -5,6 +5,7 @@
 
 mod clean;
 mod flow;
+mod results;
 mod sweeps;
 mod track;
 
@@ -15,12 +16,12 @@ use std::time::Duration;
 use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
-use crate::picture::PictureFiles;
 use raywake_io::Error;
 use raywake_io::source::{Format, OpenOptions, PosesFrame, Unlocated};
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
+pub use results::{Export, PictureFrame, Results, Views};
 pub use sweeps::SweepRange;
 pub use track::{FrontEndKind, TrackArgs};
 
@@ -220,61 +221,6 @@ pub struct BackendChoice {
     pub validation: Option<Validate>,
 }
 
-#[derive(Debug, Default, clap::Args)]
-#[command(next_help_heading = "Results")]
-pub struct Results {
-    /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
-    #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
-    #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
-    pub png: Option<PictureFrame>,
-    #[command(flatten)]
-    pub views: Views,
-    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with velocity, and the poses
-    #[arg(long, value_name = "FILE")]
-    pub mcap: Option<PathBuf>,
-    /// Do not write per-point files
-    #[arg(long)]
-    pub no_points: bool,
-    /// Also write submission files: DIR/argoverse/LOG/TIMESTAMP.feather
-    #[arg(long, value_name = "FORMAT", requires = "out")]
-    pub export: Option<Export>,
-    /// Write run statistics as JSON [default with --out: DIR/summary.json]
-    #[arg(long, value_name = "FILE")]
-    pub summary: Option<PathBuf>,
-}
-
-/// What there is to look at besides pictures of single sweeps.
-#[derive(Debug, Default, clap::Args)]
-#[command(next_help_heading = "Results")]
-pub struct Views {
-    /// Also write a film at the recording's pace: an animated PNG, which browsers play
-    #[arg(long, value_name = "FILE")]
-    pub film: Option<PathBuf>,
-    /// Also write a page for the browser: a slider over the sweeps, charts, the busiest moments
-    #[arg(long, value_name = "FILE.html")]
-    pub page: Option<PathBuf>,
-}
-
-/// The velocities in a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PictureFrame {
-    /// Over ground
-    #[default]
-    World,
-    /// Relative to the vehicle
-    Ego,
-}
-
-/// Formats of other tools.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Export {
-    /// Argoverse 2 scene flow
-    Argoverse,
-}
-
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
     /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
@@ -331,13 +277,6 @@ pub struct BudgetArgs {
     /// Print PARAMETERS.md instead: every parameter with unit, range, default and rationale
     #[arg(long)]
     pub parameters: bool,
-}
-
-impl Views {
-    /// With a folder for single pictures, where there is one.
-    pub fn files(&self, folder: Option<PathBuf>) -> PictureFiles {
-        PictureFiles { folder, film: self.film.clone(), page: self.page.clone() }
-    }
 }
 
 impl Selection {

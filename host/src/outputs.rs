@@ -8,7 +8,7 @@
 //! | `png/FRAME.png` | picture of a pair's first sweep |
 //! | `argoverse/LOG/TIMESTAMP.feather` | returns of a pair's first sweep, for graders |
 //!
-//! Beside them a film, a page and an MCAP file, see [`raywake_io::sink::bag`], where they are named.
+//! Beside them a film, a page and an MCAP file ([`raywake_io::sink::bag`]), where they are named.
 //!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.
@@ -59,7 +59,7 @@ impl RunFiles {
         let root = results.out.clone();
         let png = root.as_ref().filter(|_| results.png.is_some()).map(|root| root.join("png"));
         let (mcap, kinds) = (results.mcap.clone(), Kinds::of(results));
-        RunFiles { root, kinds, mcap, pictures: results.views.files(png) }
+        RunFiles { root, kinds, mcap, pictures: PictureFiles::of(&results.views, png) }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::console::{bytes, note, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
-use crate::picture::{Pictures, Subject, SweepFigures};
+use crate::picture::{PictureFiles, Pictures, Subject, SweepFigures};
 use crate::session::each_sweep;
 use crate::statistics::Dropped;
 use raywake_io::sink::atomic;
@@ -37,7 +37,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     say(args.quiet, &format!("{}; memory budget: at most {budget} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
-    let files = args.views.files(args.png.then(|| args.out.clone()));
+    let files = PictureFiles::of(&args.views, args.png.then(|| args.out.clone()));
     let mut pictures = Pictures::create(&files, source.name(), sweeps.len())?;
     let mut tally = MapTally::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {

@@ -8,12 +8,14 @@ use raywake_io::source::SweepData;
 use super::{PictureFiles, Subject, SweepFigures};
 
 /// No pictures.
-pub struct Pictures;
+pub struct NoPictures;
 
-impl Pictures {
+pub use NoPictures as Pictures;
+
+impl NoPictures {
     /// Fails where one is asked for.
-    pub fn create(files: &PictureFiles, _: &str, _: usize) -> Result<Pictures, Error> {
-        if files.is_empty() { Ok(Pictures) } else { Err(lacking()) }
+    pub fn create(files: &PictureFiles, _: &str, _: usize) -> Result<NoPictures, Error> {
+        if files.is_empty() { Ok(NoPictures) } else { Err(lacking()) }
     }
 
     /// Draws nothing.

@@ -22,7 +22,7 @@ use raywake_core::output::ColumnFlow;
 use raywake_core::params::Profile;
 use raywake_io::sink::feather::Voxel;
 
-use crate::args::PictureFrame;
+use crate::args::{PictureFrame, Views};
 use crate::track::LiveObject;
 
 pub use pictures::{Pictures, write_one};
@@ -63,6 +63,11 @@ pub struct PictureFiles {
 }
 
 impl PictureFiles {
+    /// What the command line asks for, and a folder for single pictures where there is one.
+    pub fn of(views: &Views, folder: Option<PathBuf>) -> PictureFiles {
+        PictureFiles { folder, film: views.film.clone(), page: views.page.clone() }
+    }
+
     /// Whether nothing is asked for.
     pub fn is_empty(&self) -> bool {
         *self == PictureFiles::default()

@@ -8,7 +8,7 @@ use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::{Ended, LiveObject, Tracker};
 use crate::args::TrackArgs;
-use crate::picture::{Pictures, Subject};
+use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::objects::{BoxMark, Content};
@@ -63,7 +63,7 @@ impl Files {
             ["clouds", "returns"].iter().try_for_each(|n| atomic::create_folder(&root.join(n)))?;
         }
         let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
-        let pictures = Pictures::create(&args.views.files(png), &of.name, sweeps)?;
+        let pictures = Pictures::create(&PictureFiles::of(&args.views, png), &of.name, sweeps)?;
         let bag = |path: &PathBuf| BagSink::create(path, of.epoch_ns, Content::Objects);
         let bag = args.mcap.as_ref().map(bag).transpose()?;
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })

@@ -1,0 +1,60 @@
+//! What a run writes.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+#[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+pub struct Results {
+    /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
+    #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
+    #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
+    pub png: Option<PictureFrame>,
+    #[command(flatten)]
+    pub views: Views,
+    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with velocity, and the poses
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
+    /// Do not write per-point files
+    #[arg(long)]
+    pub no_points: bool,
+    /// Also write submission files: DIR/argoverse/LOG/TIMESTAMP.feather
+    #[arg(long, value_name = "FORMAT", requires = "out")]
+    pub export: Option<Export>,
+    /// Write run statistics as JSON [default with --out: DIR/summary.json]
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+}
+
+/// What there is to look at besides pictures of single sweeps.
+#[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+pub struct Views {
+    /// Also write a film at the recording's pace: an animated PNG, which browsers play
+    #[arg(long, value_name = "FILE")]
+    pub film: Option<PathBuf>,
+    /// Also write a page for the browser: a slider over the sweeps, charts, the busiest moments
+    #[arg(long, value_name = "FILE.html")]
+    pub page: Option<PathBuf>,
+}
+
+/// The velocities in a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PictureFrame {
+    /// Over ground
+    #[default]
+    World,
+    /// Relative to the vehicle
+    Ego,
+}
+
+/// Formats of other tools.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Export {
+    /// Argoverse 2 scene flow
+    Argoverse,
+}
