@@ -125,10 +125,12 @@ impl Outputs {
         if let Some(bag) = &mut self.bag {
             bag.pair(first, flows)?;
         }
-        let (columns, profile, frame) = (flows.columns, &self.profile, self.kinds.frame);
-        let moving = flows.points.iter().filter(|p| p.status == Status::Moving).count();
-        let figures = [("moving returns", moving as f64), ("ms a sweep", ms)];
-        self.pictures.write(first, &Subject::Flow { columns, profile, frame }, &figures)?;
+        if self.pictures.are_wanted() {
+            let (columns, profile, frame) = (flows.columns, &self.profile, self.kinds.frame);
+            let moving = flows.points.iter().filter(|p| p.status == Status::Moving).count();
+            let figures = [("moving returns", moving as f64), ("ms a sweep", ms)];
+            self.pictures.write(first, &Subject::Flow { columns, profile, frame }, &figures)?;
+        }
         let Some(root) = &self.root else { return Ok(()) };
         let meta = meta(first, flows.dt_s);
         if self.kinds.columns {

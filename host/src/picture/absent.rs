@@ -18,6 +18,11 @@ impl NoPictures {
         if files.is_empty() { Ok(NoPictures) } else { Err(lacking()) }
     }
 
+    /// No.
+    pub fn are_wanted(&self) -> bool {
+        false
+    }
+
     /// Draws nothing.
     pub fn write(&mut self, _: &SweepData, _: &Subject, _: &SweepFigures) -> Result<(), Error> {
         Ok(())

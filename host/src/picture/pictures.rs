@@ -42,6 +42,11 @@ impl Pictures {
         })
     }
 
+    /// Whether any are drawn.
+    pub fn are_wanted(&self) -> bool {
+        self.folder.is_some() || self.film.is_some() || self.page.is_some()
+    }
+
     /// Draws a sweep. The time is counted from the first sweep drawn.
     ///
     /// # Errors
@@ -52,7 +57,7 @@ impl Pictures {
         subject: &Subject,
         figures: &SweepFigures,
     ) -> Result<(), Error> {
-        if self.folder.is_none() && self.film.is_none() && self.page.is_none() {
+        if !self.are_wanted() {
             return Ok(());
         }
         let [start_s, last_s] = self.stamps_s.unwrap_or([sweep.stamp_s; 2]);

@@ -71,6 +71,9 @@ impl Files {
 
     /// The sweep of the last step, which took `ms` milliseconds.
     pub fn sweep(&mut self, sweep: &SweepData, tracker: &Tracker, ms: f64) -> Result<(), Error> {
+        if self.folder.is_none() && self.bag.is_none() && !self.pictures.are_wanted() {
+            return Ok(());
+        }
         self.of_returns.clear();
         self.of_returns.resize(sweep.points.len(), -1);
         tracker.members().for_each(|(n, track)| self.of_returns[n] = track as i32);
