@@ -70,7 +70,7 @@ pub enum Command {
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
+    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -87,7 +87,7 @@ pub struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct OdometryArgs {
-    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
+    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -127,7 +127,7 @@ pub struct RecordingKind {
     #[arg(long)]
     pub format: Option<Format>,
     /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only
-    /// one, or all lidars that /tf_static connects]
+    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT
     #[arg(long)]
     pub topic: Vec<String>,
     /// Whether sweeps still contain motion distortion
@@ -223,7 +223,7 @@ pub struct BackendChoice {
 
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
-    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
+    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]

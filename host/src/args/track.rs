@@ -33,7 +33,7 @@ Files of --out DIR:
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct TrackArgs {
-    /// Recording: an MCAP file, or the folder of a KITTI drive, Argoverse 2 log or point clouds
+    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]

@@ -38,8 +38,13 @@ const AGREE_MIN: f64 = 0.6;
 /// Speeds ahead that are tried where the motion is unknown, m/s. Each reaches 10 m/s to both sides
 /// where anything stands beside the way.
 const SPEEDS_MPS: [f64; 4] = [0.0, 10.0, 20.0, 30.0];
-/// Times that a sweep and the one before it are registered, each moved by the motion found before.
-const ROUNDS: usize = 2;
+/// A motion is found when it moves no return by this much more or less than the one before, m.
+/// Where the stamp is at an end of a sweep, a round leaves a third of the error before it.
+const SETTLED_M: f64 = 0.01;
+/// Rounds to get there, at most: what is left of 30 m/s then is below 1 cm.
+const ROUNDS_MAX: usize = 5;
+/// Where returns are that a turn moves, m.
+const AWAY_M: f64 = 20.0;
 /// Stamps this close to whole turns of the sensor are of a coarser clock, turns.
 const WHOLE: f64 = 0.2;
 
@@ -163,7 +168,8 @@ impl Odometry {
                 best = Some(found);
             }
         }
-        let (found, before) = best.expect("several were tried");
+        let best = best.expect("several were tried");
+        let (found, before) = self.settle(best, dt_s);
         self.map_of_before(&before);
         if is_located(&found) {
             return self.go(&found, dt_s);
@@ -175,15 +181,35 @@ impl Odometry {
     /// Registers the sweep with the one before it alone, both moved evenly, first as told and then
     /// as found; and the motion that the one before was moved by.
     fn pair(&mut self, motion: Twist, dt_s: f64) -> (Registration, Twist) {
-        let mut motion = motion;
         self.map_of_before(&motion);
-        let mut found = self.register(self.pose * motion.over(dt_s), dt_s, &KERNELS_M);
-        for _ in 1..ROUNDS {
-            motion = (self.pose.inverse() * found.pose).twist(dt_s);
-            self.map_of_before(&motion);
-            found = self.register(found.pose, dt_s, &KERNELS_M[EXPECTED_FROM..]);
+        let found = self.register(self.pose * motion.over(dt_s), dt_s, &KERNELS_M);
+        self.again(&found, dt_s)
+    }
+
+    /// Registers them once more, the one before moved by the motion found; and that motion.
+    fn again(&mut self, found: &Registration, dt_s: f64) -> (Registration, Twist) {
+        let motion = (self.pose.inverse() * found.pose).twist(dt_s);
+        self.map_of_before(&motion);
+        (self.register(found.pose, dt_s, &KERNELS_M[EXPECTED_FROM..]), motion)
+    }
+
+    /// Goes on so until the motion moves returns as the one before did.
+    fn settle(
+        &mut self,
+        (found, before): (Registration, Twist),
+        dt_s: f64,
+    ) -> (Registration, Twist) {
+        let (mut found, mut before) = (found, before);
+        for _ in 0..ROUNDS_MAX {
+            let now = (self.pose.inverse() * found.pose).twist(dt_s);
+            let (linear, angular) = (now.linear - before.linear, now.angular - before.angular);
+            let changed_m = (linear.length() + AWAY_M * angular.length()) * dt_s.abs();
+            if !is_located(&found) || changed_m < SETTLED_M {
+                break;
+            }
+            (found, before) = self.again(&found, dt_s);
         }
-        (found, motion)
+        (found, before)
     }
 
     /// A map of nothing but the sweep before, whose vehicle had a motion.

@@ -43,6 +43,24 @@ fn simulated_drives_from_nothing() {
     }
 }
 
+/// With the stamp at the start of each sweep the first motion moves all returns one way.
+#[test]
+fn stamps_at_the_start_of_a_sweep() {
+    let drive = drive(4, Ego::Straight { speed: 11.0 }, 4);
+    let mut rig = drive.rig();
+    let Timing::Offset { from_s, .. } = &mut rig.timing else { panic!("{:?}", rig.timing) };
+    let sooner_s = std::mem::take(from_s);
+    let mut sweeps: Vec<SimSweep> = drive.into_iter().collect();
+    let points = sweeps.iter_mut().flat_map(|sweep| &mut sweep.points);
+    points.for_each(|point| point.offset_s -= sooner_s as f32);
+    let found = located(&rig, &sweeps);
+    // The motion is even: what is between stamps is between starts.
+    for (sweep, found) in sweeps.iter().zip(&found) {
+        let off = way(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
+        assert!(off.translation.length() < 0.02, "{off:?}");
+    }
+}
+
 /// Sweeps that are missing or empty on the way: it goes on evenly, and finds its way again.
 #[test]
 fn gaps() {

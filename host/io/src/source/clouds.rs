@@ -21,14 +21,6 @@ pub(super) struct Clouds {
     pub sidecars: Option<Sidecars>,
 }
 
-impl Clouds {
-    /// Sweeps that frame numbers say are missing before one.
-    fn missing_before(&self, index: usize) -> u64 {
-        let frames = &self.overview.frames;
-        index.checked_sub(1).map_or(0, |before| frames[index] - frames[before] - 1)
-    }
-}
-
 impl Source for Clouds {
     fn overview(&self) -> &Overview {
         &self.overview
@@ -40,7 +32,8 @@ impl Source for Clouds {
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         self.overview.begin(index, into);
-        into.dropped = SourceGaps { sweeps_before: self.missing_before(index), null_rows: 0 };
+        let sweeps_before = self.overview.missing_before(index);
+        into.dropped = SourceGaps { sweeps_before, null_rows: 0 };
         let path = &self.files[index];
         read_cloud(path, &mut into.points)?;
         let Some(sidecars) = &self.sidecars else { return Ok(()) };

@@ -10,8 +10,8 @@ use raywake_core::sweep::{Rig, Timing};
 use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
-use super::sidecars::{SPAN_MAX_S, Sidecars};
-use super::{OpenOptions, Overview, PosesFrame, Unlocated, apply, folder_name, oxts};
+use super::sidecars::Sidecars;
+use super::{OpenOptions, Overview, PosesFrame, Unlocated, apply, first_sweep, folder_name, oxts};
 use crate::Error;
 
 /// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
@@ -39,7 +39,7 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Er
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
         None if drive.join("oxts/data").is_dir() => opening.read_oxts()?,
-        None => opening.go_without_poses(options, "neither `poses.txt` nor `oxts/data`")?,
+        None => options.go_without_poses(&opening.root, "neither `poses.txt` nor `oxts/data`")?,
     }
     opening.sidecars = Sidecars::open(&drive.join("velodyne_points"))?;
     Ok(opening.finish(options))
@@ -55,7 +55,7 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Cl
     match options.poses.as_ref().or(own.iter().find(|p| p.is_file())) {
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Camera)?,
-        None => opening.go_without_poses(options, "no `poses.txt`")?,
+        None => options.go_without_poses(&opening.root, "no `poses.txt`")?,
     }
     Ok(opening.finish(options))
 }
@@ -73,7 +73,7 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     match &options.poses {
         _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
-        None => opening.go_without_poses(options, "point clouds only")?,
+        None => options.go_without_poses(&opening.root, "point clouds only")?,
     }
     opening.span = opening.find_span()?;
     let spins = match opening.span {
@@ -166,17 +166,6 @@ impl Opening {
         Ok(())
     }
 
-    /// Leaves the poses unknown, or fails where they are needed.
-    fn go_without_poses(&self, options: &OpenOptions, found: &str) -> Result<(), Error> {
-        match options.unlocated {
-            Unlocated::Refuse => {
-                let what = format!("{found}: poses are needed, give a file with --poses");
-                Err(Error::input(&self.root, "", what))
-            }
-            Unlocated::Accept | Unlocated::Always => Ok(()),
-        }
-    }
-
     /// Poses from `oxts/data`, by frame number; sweeps without a packet are left out. The world is
     /// the Velodyne frame of the first sweep that has one.
     fn read_oxts(&mut self) -> Result<(), Error> {
@@ -229,15 +218,7 @@ impl Opening {
         if !read_cloud(path, &mut points)? {
             return Ok(None);
         }
-        let times = points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
-        let limits = (f64::INFINITY, f64::NEG_INFINITY);
-        let (from_s, to_s) = times.fold(limits, |l, t| (l.0.min(t), l.1.max(t)));
-        let span_s = to_s - from_s;
-        if span_s > SPAN_MAX_S {
-            let what = format!("times of returns {span_s:.3} s apart; {SPAN_MAX_S} s at most");
-            return Err(Error::input(path, "", what));
-        }
-        Ok((span_s > 0.0).then_some([from_s, span_s]))
+        first_sweep::span(&points).map_err(|what| Error::input(path, "", what))
     }
 
     fn finish(self, options: &OpenOptions) -> Clouds {

@@ -7,6 +7,7 @@
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
 //! | [`Format::Clouds`] | `*.bin`, `*.pcd` or `*.ply` | a file named on the command line |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
+//! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
 //!
 //! A `.bin` is little-endian float32 x, y, z, intensity per return. Poses and times are read and
 //! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
@@ -17,11 +18,14 @@ mod argoverse;
 #[cfg(feature = "mcap")]
 mod bag;
 mod bin;
+#[cfg(feature = "pcap")]
+mod capture;
 mod clouds;
 #[cfg(feature = "arrow")]
 pub mod feather;
 #[cfg(feature = "arrow")]
 mod feather_check;
+mod first_sweep;
 mod kitti;
 mod lzf;
 pub mod mounting;
@@ -117,6 +121,11 @@ impl Overview {
         sweep.twist = known.map_or(Twist::ZERO, |_| self.track.twist(index));
     }
 
+    /// Sweeps that frame numbers say are missing before one.
+    fn missing_before(&self, index: usize) -> u64 {
+        index.checked_sub(1).map_or(0, |before| self.frames[index] - self.frames[before] - 1)
+    }
+
     /// Number of sweeps and time from the first to the last, for people.
     fn length(&self) -> String {
         format!("{} sweeps, {:.1} s", self.frames.len(), self.track.duration_s())
@@ -198,6 +207,8 @@ pub enum Format {
     Clouds,
     /// A recording of ROS: an `.mcap` file, or a folder of them.
     Mcap,
+    /// Packets of an Ouster or Velodyne sensor in a `.pcap` or `.pcapng` file.
+    Pcap,
 }
 
 /// Frame whose motion a file of poses tells.
@@ -227,7 +238,7 @@ pub struct OpenOptions {
     /// Kind of recording.
     pub format: Option<Format>,
     /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
-    /// or those of all lidars.
+    /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`.
     pub topics: Vec<String>,
     /// File of 3x4 poses, one row per sweep.
     pub poses: Option<PathBuf>,
@@ -245,6 +256,20 @@ pub struct OpenOptions {
     pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
 
+impl OpenOptions {
+    /// Leaves the poses of a recording unknown, in which this was found instead, or fails where
+    /// they are needed.
+    fn go_without_poses(&self, root: &Path, found: &str) -> Result<(), Error> {
+        match self.unlocated {
+            Unlocated::Refuse => {
+                let what = format!("{found}: poses are needed, give a file with --poses");
+                Err(Error::input(root, "", what))
+            }
+            Unlocated::Accept | Unlocated::Always => Ok(()),
+        }
+    }
+}
+
 /// Opens the recording at `path`, or the only one in a folder below it.
 ///
 /// Fails where no known format is recognised, where poses (unless it may come without), times or
@@ -258,8 +283,8 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Some(format) => (format, path.to_path_buf()),
         None => recognise(path)?,
     };
-    if format != Format::Mcap && !options.topics.is_empty() {
-        return Err(Error::Usage("only MCAP recordings have topics (--topic)".into()));
+    if !matches!(format, Format::Mcap | Format::Pcap) && !options.topics.is_empty() {
+        return Err(Error::Usage("only recordings in MCAP and pcap have topics (--topic)".into()));
     }
     match format {
         Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),
@@ -267,6 +292,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
         Format::Argoverse2 => open_argoverse(&root, options),
         Format::Mcap => open_mcap(&root, options),
+        Format::Pcap => open_pcap(&root, options),
     }
 }
 
@@ -289,6 +315,17 @@ fn open_mcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Erro
 #[cfg(not(feature = "mcap"))]
 fn open_mcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     let what = "is an MCAP recording: the feature `mcap` is not compiled in";
+    Err(Error::Unsupported(format!("{} {what}", root.display())))
+}
+
+#[cfg(feature = "pcap")]
+fn open_pcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(capture::Capture::open(root, options)?))
+}
+
+#[cfg(not(feature = "pcap"))]
+fn open_pcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    let what = "is a capture of packets: the feature `pcap` is not compiled in";
     Err(Error::Unsupported(format!("{} {what}", root.display())))
 }
 

@@ -11,6 +11,9 @@ use crate::Error;
 /// Extension of recordings of ROS.
 pub(super) const MCAP: &str = "mcap";
 
+/// Extensions of captures of packets.
+const PCAP: [&str; 2] = ["pcap", "pcapng"];
+
 /// Levels of folders below the named one that are searched for a recording.
 const DEPTH: usize = 2;
 
@@ -32,7 +35,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
             path,
             "",
             "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
-             nor any `.bin`, `.pcd`, `.ply` or `.mcap` file",
+             nor any `.bin`, `.pcd`, `.ply` or `.mcap` file; a `.pcap` is to be named itself",
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
@@ -46,12 +49,13 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
 fn format_of_file(path: &Path) -> Result<Format, Error> {
     let what = match path.extension().and_then(|e| e.to_str()) {
         Some(MCAP) => return Ok(Format::Mcap),
+        Some(e) if PCAP.contains(&e) => return Ok(Format::Pcap),
         Some("bag") => "a ROS 1 bag, convert it: mcap convert IN.bag OUT.mcap",
         Some("db3") => "a ROS 2 bag in SQLite, convert it to MCAP: ros2 bag convert",
         Some(e) if EXTENSIONS.contains(&e) => {
             "a single cloud, expected the folder it is in; of two clouds: raywake flow A B"
         }
-        _ => "expected a folder or an .mcap file, found a file of another kind",
+        _ => "expected a folder, an .mcap or a .pcap file, found a file of another kind",
     };
     Err(Error::input(path, "", what))
 }

@@ -20,15 +20,13 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
-use raywake_registration::ground::ground_height;
+use raywake_core::sweep::{Point, SENSORS_MAX};
 
-use super::mounting;
-use super::poses::{PoseTrack, read_rows};
+use super::poses::read_rows;
 use super::recognise::{MCAP, entries};
-use super::sidecars::SPAN_MAX_S;
 use super::{
-    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, apply, folder_name,
+    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
+    folder_name,
 };
 use crate::Error;
 use contents::{CloudMessage, Contents};
@@ -66,23 +64,10 @@ impl Bag {
         let mut contents = Contents::read(&mut files)?;
         let topics = choose(root, &contents, &options.topics)?;
         let (base, lidars) = lidars(root, &contents, &topics)?;
-        let rig = Rig {
-            sensors: lidars.iter().map(|l| l.vehicle_from_lidar).collect(),
-            timing: Timing::AtStamp,
-            distorted: true,
-            ground_m: 0.0,
-            own_vehicle: None,
-        };
+        let sensors = lidars.iter().map(|l| l.vehicle_from_lidar).collect();
+        let notes = std::mem::take(&mut contents.notes);
         let mut bag = Bag {
-            overview: Overview {
-                name: name(root),
-                rig,
-                frames: Vec::new(),
-                track: PoseTrack::default(),
-                epoch_ns: 0,
-                trusted: options.trusted,
-                notes: std::mem::take(&mut contents.notes),
-            },
+            overview: first_sweep::before(name(root), sensors, notes, options),
             root: root.to_path_buf(),
             files,
             lidars,
@@ -93,7 +78,6 @@ impl Bag {
         bag.locate(&contents, &base, options)?;
         bag.set_stamps();
         bag.look_at_returns(options)?;
-        apply(options, &mut bag.overview.rig);
         Ok(bag)
     }
 
@@ -138,10 +122,7 @@ impl Bag {
             0 => format!("nothing tells where `{base}` was"),
             n => format!("{n} sources tell where `{base}` was ({})", names.join(", ")),
         };
-        if options.unlocated == Unlocated::Refuse {
-            let what = format!("{found}: poses are needed, give a file with --poses");
-            return Err(Error::input(&self.root, "", what));
-        }
+        options.go_without_poses(&self.root, &found)?;
         self.overview.notes.push(format!("{found}: registration does"));
         Ok(())
     }
@@ -160,62 +141,14 @@ impl Bag {
         }
     }
 
-    /// Learns from the first sweep of all lidars when its returns were measured, and where the
-    /// ground is.
+    /// Learns from the first sweep of all lidars what else there is to know of the rig.
     fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let whole = self.sweeps.iter().position(|sweep| sweep.iter().all(Option::is_some));
         let mut first = SweepData::default();
         let timed = self.read_points(whole.unwrap_or(0), &mut first)?;
-        self.overview.rig.timing = self.timing(&first.points)?;
-        let notes = &mut self.overview.notes;
-        if !timed {
-            notes.push("returns have no time: motion within a sweep is not corrected".into());
-        }
-        let found = options.ground_m.or_else(|| ground_height(&first.points));
-        let ground_m = found.ok_or_else(|| {
-            let what = "no ground found in the first sweep: give its height with --ground";
-            Error::input(&self.root, "", what)
-        })?;
-        if options.ground_m.is_none() {
-            notes.push(format!("ground estimated at {ground_m:.2} m"));
-        }
-        self.overview.rig.ground_m = ground_m;
-        self.mount(ground_m);
-        Ok(())
-    }
-
-    /// When the returns of a sweep were measured.
-    fn timing(&self, points: &[Point]) -> Result<Timing, Error> {
-        let times = points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
-        let limits = (f64::INFINITY, f64::NEG_INFINITY);
-        let (from_s, to_s) = times.fold(limits, |l, t| (l.0.min(t), l.1.max(t)));
-        let span_s = to_s - from_s;
-        if [from_s.abs(), span_s].iter().any(|s| s.is_finite() && *s > SPAN_MAX_S) {
-            let what = format!(
-                "{}: returns from {from_s:.3} to {to_s:.3} s around the stamp of a sweep; \
-                 {SPAN_MAX_S} s at most",
-                self.lidars[0].topic
-            );
-            return Err(Error::input(&self.root, "", what));
-        }
-        Ok(if span_s > 0.0 { Timing::Offset { from_s, span_s } } else { Timing::AtStamp })
-    }
-
-    /// Lifts sensors above the ground whose clouds are in a frame that lies on it.
-    fn mount(&mut self, ground_m: f64) {
-        let Overview { rig, notes, .. } = &mut self.overview;
-        for (pose, lidar) in rig.sensors.iter_mut().zip(&self.lidars) {
-            let own_frame = lidar.vehicle_from_lidar == Pose::IDENTITY;
-            if let Some(place) = mounting::above(ground_m).filter(|_| own_frame) {
-                pose.translation = place;
-                notes.push(format!(
-                    "{}: the origin is close to the ground; the sensor is taken to be {:.2} m \
-                     above it",
-                    lidar.topic,
-                    place.z - ground_m
-                ));
-            }
-        }
+        let names: Vec<&str> = self.lidars.iter().map(|lidar| lidar.topic.as_str()).collect();
+        first_sweep::learn(&mut self.overview, (&first.points, timed), &names, options)
+            .map_err(|what| Error::input(&self.root, "", what))
     }
 
     /// Replaces the points by those of a sweep; returns whether all lidars tell their times.

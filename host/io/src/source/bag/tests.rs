@@ -10,6 +10,7 @@ use super::*;
 use crate::sink::bag::cdr::Cdr;
 use crate::source::tests::Temp;
 use crate::source::{Format, open};
+use raywake_core::sweep::Timing;
 
 /// Time of the first sweep, ns.
 const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
@@ -342,7 +343,7 @@ fn files_that_are_no_recording_say_what_to_do() {
         ("a.bag", "mcap convert"),
         ("a.db3", "ros2 bag convert"),
         ("a.pcd", "raywake flow A B"),
-        ("a.txt", "expected a folder or an .mcap file"),
+        ("a.txt", "expected a folder, an .mcap or a .pcap file"),
     ] {
         let error = open(&temp.write(name, b""), &accept()).map(|_| ()).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");

@@ -1,0 +1,15 @@
+//! When lasers measured.
+
+/// Angles of a turn.
+pub(super) const TURN: u64 = 1 << 16;
+
+/// When a sensor's lasers measured, all of them at one angle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Firing {
+    /// By the sensor's clock, ns.
+    pub clock_ns: u64,
+    /// Since the rear, clockwise.
+    pub angle: u16,
+    /// Number of the turn, where the sensor counts them.
+    pub frame: Option<u16>,
+}

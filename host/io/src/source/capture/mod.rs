@@ -1,0 +1,187 @@
+//! Captures of the packets that a sensor sends: `.pcap` and `.pcapng` files of one Ouster or
+//! Velodyne sensor, or of one of several.
+//!
+//! An Ouster's metadata is the file of its capture's name that ends in `.json`, or the one beside
+//! it whose name begins that name. The vehicle frame is the sensor's; a sweep begins at the rear
+//! and is stamped there, by the sensor's clock.
+//!
+//! Opening walks through the file once and keeps where each sweep begins; a sweep is read when it
+//! is asked for. Left out, and told: packets of others, with a wrong check sum or late, and turns
+//! at the ends of which a part is missing.
+
+mod datagrams;
+mod firing;
+mod ouster;
+mod sensor;
+mod streams;
+#[cfg(test)]
+mod tests;
+mod velodyne;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
+
+use super::poses::read_rows;
+use super::{
+    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
+    folder_name,
+};
+use crate::Error;
+use datagrams::{Datagram, Datagrams, Sender};
+use firing::TURN;
+use sensor::{Order, Sensor};
+use streams::{Cut, Stream};
+
+/// Clocks beyond this count from 1970, ns: 2001.
+const EPOCH_MIN_NS: u64 = 1_000_000_000_000_000_000;
+
+/// An open capture.
+pub(super) struct Capture {
+    overview: Overview,
+    path: PathBuf,
+    datagrams: Datagrams,
+    sender: Sender,
+    sensor: Sensor,
+    /// Of every sweep; the last one's end comes after them.
+    cuts: Vec<Cut>,
+    poses_from: String,
+}
+
+impl Capture {
+    /// Opens a file.
+    pub fn open(path: &Path, options: &OpenOptions) -> Result<Capture, Error> {
+        let datagrams = Datagrams::open(path)?;
+        let (all, counts) = streams::streams(path, &datagrams)?;
+        let mut stream = streams::choose(path, all, &options.topics)?;
+        let mut notes = streams::notes(&stream, &counts);
+        let cuts = stream.sweeps(&mut notes);
+        let Stream { sender, sensor, .. } = stream;
+        let sensors = core::iter::once(Pose::IDENTITY).collect();
+        let mut capture = Capture {
+            overview: first_sweep::before(name(path), sensors, notes, options),
+            path: path.to_path_buf(),
+            datagrams,
+            sender,
+            sensor,
+            cuts,
+            poses_from: "registration".into(),
+        };
+        capture.set_stamps()?;
+        capture.locate(options)?;
+        let mut first = Vec::new();
+        capture.read_points(0, &mut first)?;
+        let sensor = capture.sensor.clone();
+        first_sweep::learn(&mut capture.overview, (&first, true), &[sensor.name()], options)
+            .map_err(|what| Error::input(path, "", what))?;
+        Ok(capture)
+    }
+
+    /// Stamps of the sweeps, and their numbers: where a turn is missing, one is passed over.
+    fn set_stamps(&mut self) -> Result<(), Error> {
+        let cuts = &self.cuts[..self.cuts.len() - 1];
+        let step = |pair: &[Cut]| self.sensor.since(pair[1].clock_ns, pair[0].clock_ns);
+        let steps: Vec<i64> = cuts.windows(2).map(step).collect();
+        if let Some(n) = steps.iter().position(|step| *step <= 0) {
+            let what = format!("the sensor's clock goes back by {} s", -steps[n] as f64 * 1e-9);
+            return Err(Error::input(&self.path, format!("byte {}", cuts[n + 1].place), what));
+        }
+        let usual = median(&steps) as f64;
+        let Overview { frames, track, epoch_ns, .. } = &mut self.overview;
+        (*frames, track.stamps_s) = (vec![0], vec![0.0]);
+        let mut since_ns = 0;
+        for (step, pair) in steps.into_iter().zip(cuts.windows(2)) {
+            since_ns += step;
+            track.stamps_s.push(since_ns as f64 * 1e-9);
+            // A sweep may begin within a turn, where packets are missing.
+            let within = (f64::from(pair[1].angle) - f64::from(pair[0].angle)) / TURN as f64;
+            let turns = libm::round(step as f64 / usual - within).max(1.0);
+            frames.push(frames[frames.len() - 1] + turns as u64);
+        }
+        let first = &cuts[0];
+        let told = first.clock_ns >= EPOCH_MIN_NS;
+        *epoch_ns = if told { first.clock_ns } else { first.time_ns };
+        Ok(())
+    }
+
+    fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {
+        match &options.poses {
+            _ if options.unlocated == Unlocated::Always => Ok(()),
+            None => options.go_without_poses(&self.path, "packets of a sensor"),
+            Some(_) if options.poses_frame == Some(PosesFrame::Camera) => {
+                Err(Error::Usage("a capture has no camera's frame".into()))
+            }
+            Some(path) => {
+                self.overview.track.poses = read_rows(path, self.overview.frames.len())?;
+                self.poses_from = folder_name(path);
+                Ok(())
+            }
+        }
+    }
+
+    /// Replaces the points by those of a sweep.
+    fn read_points(&self, index: usize, points: &mut Vec<Point>) -> Result<(), Error> {
+        points.clear();
+        let (cut, next) = (&self.cuts[index], &self.cuts[index + 1]);
+        let mut last = None;
+        self.datagrams.each(cut.from, |datagram| {
+            let Datagram { sender, payload, place, .. } = datagram;
+            if place > next.place {
+                return ControlFlow::Break(());
+            }
+            let mine = sender == self.sender && self.sensor.is_mine(payload);
+            if place < cut.place || !mine || !self.sensor.is_sound(payload) {
+                return ControlFlow::Continue(());
+            }
+            for (number, firing) in self.sensor.firings(payload) {
+                let before = place == cut.place && number < cut.firing;
+                let after = place == next.place && number >= next.firing;
+                let order = self.sensor.order(&firing, last.as_ref());
+                if !before && !after && order != Order::Late {
+                    let offset_ns = self.sensor.since(firing.clock_ns, cut.clock_ns);
+                    self.sensor.returns(payload, number, offset_ns, points);
+                    last = Some(firing);
+                }
+            }
+            ControlFlow::Continue(())
+        })?;
+        Ok(())
+    }
+}
+
+impl Source for Capture {
+    fn overview(&self) -> &Overview {
+        &self.overview
+    }
+
+    fn describe(&self) -> String {
+        format!(
+            "capture {}: {} of {} {}, poses from {}",
+            self.path.display(),
+            self.overview.length(),
+            self.sensor.name(),
+            self.sender,
+            self.poses_from
+        )
+    }
+
+    fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
+        self.overview.begin(index, into);
+        let sweeps_before = self.overview.missing_before(index);
+        into.dropped = SourceGaps { sweeps_before, null_rows: 0 };
+        self.read_points(index, &mut into.points)
+    }
+}
+
+/// The median of times between sweeps, ns; 1 without any.
+fn median(steps: &[i64]) -> i64 {
+    let mut sorted = steps.to_vec();
+    sorted.sort_unstable();
+    sorted.get(sorted.len() / 2).copied().unwrap_or(1)
+}
+
+fn name(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}

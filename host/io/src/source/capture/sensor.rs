@@ -1,0 +1,104 @@
+//! Sensors that send packets, and when they measured what is in them.
+
+use std::sync::Arc;
+
+use raywake_core::sweep::Point;
+
+use super::firing::{Firing, TURN};
+use super::ouster::Ouster;
+use super::velodyne::{self, Velodyne};
+
+/// A firing this long after the one before begins another sweep, where the sensor does not count
+/// its turns, ns: a turn of the fastest sensor.
+const PAUSE_NS: i64 = 50_000_000;
+/// A firing not after the one before is late or a copy; by this much, ns, the clock was set.
+const SET_BACK_NS: i64 = -1_000_000_000;
+
+/// Where a firing belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// A sweep begins with it.
+    Begins,
+    GoesOn,
+    /// It comes after later ones, or again.
+    Late,
+}
+
+/// A sensor that sends packets.
+#[derive(Clone)]
+pub(super) enum Sensor {
+    Velodyne(Arc<Velodyne>),
+    Ouster(Arc<Ouster>),
+}
+
+impl Sensor {
+    pub fn name(&self) -> &str {
+        match self {
+            Sensor::Velodyne(sensor) => sensor.name(),
+            Sensor::Ouster(sensor) => sensor.name(),
+        }
+    }
+
+    pub fn is_mine(&self, packet: &[u8]) -> bool {
+        match self {
+            Sensor::Velodyne(sensor) => sensor.is_mine(packet),
+            Sensor::Ouster(sensor) => sensor.is_mine(packet),
+        }
+    }
+
+    pub fn is_sound(&self, packet: &[u8]) -> bool {
+        match self {
+            Sensor::Velodyne(_) => true,
+            Sensor::Ouster(sensor) => sensor.is_sound(packet),
+        }
+    }
+
+    /// Numbers and firings of a packet that is its own.
+    pub fn firings(&self, packet: &[u8]) -> impl Iterator<Item = (usize, Firing)> {
+        let count = match self {
+            Sensor::Velodyne(_) => velodyne::BLOCKS,
+            Sensor::Ouster(sensor) => sensor.packet_columns,
+        };
+        let firing = |n| match self {
+            Sensor::Velodyne(sensor) => sensor.firing(packet, n),
+            Sensor::Ouster(sensor) => sensor.firing(packet, n),
+        };
+        (0..count).filter_map(move |n| Some((n, firing(n)?)))
+    }
+
+    pub fn returns(&self, packet: &[u8], firing: usize, offset_ns: i64, into: &mut Vec<Point>) {
+        match self {
+            Sensor::Velodyne(sensor) => sensor.returns(packet, firing, offset_ns, into),
+            Sensor::Ouster(sensor) => sensor.returns(packet, firing, offset_ns, into),
+        }
+    }
+
+    /// From one time of its clock to another, ns.
+    pub fn since(&self, later_ns: u64, earlier_ns: u64) -> i64 {
+        match self {
+            Sensor::Velodyne(_) => {
+                let clock = velodyne::CLOCK_NS;
+                let ahead = (later_ns + clock - earlier_ns) % clock;
+                if ahead < clock / 2 { ahead as i64 } else { ahead as i64 - clock as i64 }
+            }
+            Sensor::Ouster(_) => later_ns.wrapping_sub(earlier_ns) as i64,
+        }
+    }
+
+    /// Where a firing belongs that comes after another one.
+    pub fn order(&self, firing: &Firing, before: Option<&Firing>) -> Order {
+        let Some(before) = before else { return Order::Begins };
+        let since_ns = self.since(firing.clock_ns, before.clock_ns);
+        let turns = match (firing.frame, before.frame) {
+            (Some(frame), Some(before)) => frame != before,
+            _ if since_ns >= PAUSE_NS => true,
+            _ => u64::from(before.angle.saturating_sub(firing.angle)) > TURN / 2,
+        };
+        match since_ns {
+            _ if since_ns <= SET_BACK_NS => Order::Begins,
+            ..=0 => Order::Late,
+            _ if turns => Order::Begins,
+            _ => Order::GoesOn,
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! What the sensors of a capture sent, and where their sweeps begin.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::datagrams::{Datagram, Datagrams, FrameCounts, Sender};
+use super::firing::Firing;
+use super::ouster::Ouster;
+use super::sensor::{Order, Sensor};
+use super::velodyne::Velodyne;
+use crate::Error;
+use crate::source::recognise::entries;
+
+/// A turn at an end of the capture with a smaller share of the firings of the fullest is left out.
+const WHOLE_MIN: f64 = 0.9;
+/// Sensors of a capture that are told apart.
+const SENSORS_TOLD: usize = 16;
+
+/// Where a sweep begins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cut {
+    /// Byte from which its first packet can be read.
+    pub from: u64,
+    /// Place of that packet, and number of the first firing in it.
+    pub place: u64,
+    pub firing: usize,
+    pub clock_ns: u64,
+    pub angle: u16,
+    /// When that packet was captured.
+    pub time_ns: u64,
+    /// Its firings.
+    pub firings: u64,
+}
+
+impl Cut {
+    fn at(datagram: &Datagram, number: usize, firing: &Firing) -> Cut {
+        let Datagram { from, place, time_ns, .. } = *datagram;
+        let Firing { clock_ns, angle, .. } = *firing;
+        Cut { from, place, firing: number, clock_ns, angle, time_ns, firings: 0 }
+    }
+
+    /// After every other.
+    pub const END: Cut =
+        Cut { from: 0, place: u64::MAX, firing: 0, clock_ns: 0, angle: 0, time_ns: 0, firings: 0 };
+}
+
+/// What one sensor sent.
+pub(super) struct Stream {
+    pub sender: Sender,
+    pub sensor: Sensor,
+    cuts: Vec<Cut>,
+    last: Option<Firing>,
+    packets: u64,
+    /// Packets with a wrong check sum, and late firings.
+    unsound: u64,
+    late: u64,
+}
+
+impl Stream {
+    fn new(sender: Sender, sensor: Sensor) -> Stream {
+        Stream { sender, sensor, cuts: Vec::new(), last: None, packets: 0, unsound: 0, late: 0 }
+    }
+
+    fn take(&mut self, datagram: &Datagram) {
+        self.packets += 1;
+        if !self.sensor.is_sound(datagram.payload) {
+            self.unsound += 1;
+            return;
+        }
+        let sensor = self.sensor.clone();
+        for (number, firing) in sensor.firings(datagram.payload) {
+            match sensor.order(&firing, self.last.as_ref()) {
+                Order::Late => {
+                    self.late += 1;
+                    continue;
+                }
+                Order::Begins => self.cuts.push(Cut::at(datagram, number, &firing)),
+                Order::GoesOn => {}
+            }
+            self.last = Some(firing);
+            if let Some(cut) = self.cuts.last_mut() {
+                cut.firings += 1;
+            }
+        }
+    }
+
+    /// Where sweeps begin and the last one ends, without turns at the ends of which a part is
+    /// missing.
+    pub fn sweeps(&mut self, notes: &mut Vec<String>) -> Vec<Cut> {
+        let most = self.cuts.iter().map(|cut| cut.firings).max().unwrap_or(0) as f64;
+        let part = |cut: &&Cut| (cut.firings as f64) < WHOLE_MIN * most;
+        let mut cuts = std::mem::take(&mut self.cuts);
+        cuts.push(Cut::END);
+        let sweeps = cuts.len() - 1;
+        let last = cuts[..sweeps].last().filter(part).map_or(sweeps, |_| sweeps - 1);
+        let first = usize::from(cuts[..last].first().filter(part).is_some());
+        if sweeps > last - first {
+            let left_out = sweeps + first - last;
+            notes.push(format!("left out: incomplete turns at the ends ({left_out})"));
+        }
+        let few = cuts[first..last].iter().filter(part).count();
+        if few > 0 {
+            notes.push(format!("sweeps that lack more than a tenth of their packets: {few}"));
+        }
+        cuts[first..=last].to_vec()
+    }
+}
+
+/// Streams of a capture while it is walked through.
+struct Streams {
+    all: Vec<Stream>,
+    /// What the metadata beside the capture tells of.
+    ouster: Option<Arc<Ouster>>,
+    /// Datagrams, and bytes of the largest one.
+    seen: u64,
+    largest: usize,
+}
+
+impl Streams {
+    fn take(&mut self, datagram: &Datagram) {
+        let Datagram { sender, payload, .. } = *datagram;
+        self.seen += 1;
+        self.largest = self.largest.max(payload.len());
+        let known = |s: &Stream| s.sender == sender && s.sensor.is_mine(payload);
+        let known = self.all.iter().position(known).or_else(|| self.find(sender, payload));
+        if let Some(n) = known {
+            self.all[n].take(datagram);
+        }
+    }
+
+    /// Begins the stream of a sensor that is met for the first time.
+    fn find(&mut self, sender: Sender, packet: &[u8]) -> Option<usize> {
+        let velodyne = Velodyne::of(packet).map(|sensor| Sensor::Velodyne(Arc::new(sensor)));
+        let ouster = self.ouster.as_ref().filter(|ouster| ouster.is_mine(packet));
+        let sensor = velodyne.or_else(|| ouster.cloned().map(Sensor::Ouster))?;
+        let room = self.all.len() < SENSORS_TOLD;
+        room.then(|| self.all.push(Stream::new(sender, sensor)))?;
+        Some(self.all.len() - 1)
+    }
+
+    /// That nothing of a sensor was found.
+    fn none(&self, path: &Path) -> Error {
+        let Streams { ouster, seen, largest, .. } = self;
+        let ouster = match ouster {
+            Some(ouster) => {
+                format!("nor of the {} that the .json beside it tells of", ouster.name())
+            }
+            None => "and Ouster's need the sensor's metadata, NAME.json beside NAME.pcap".into(),
+        };
+        let what = format!(
+            "no packets of a VLP-16, VLP-32C or HDL-32E among {seen} datagrams of at most \
+             {largest} bytes, {ouster}"
+        );
+        Error::input(path, "", what)
+    }
+}
+
+/// What all sensors of a capture sent, and what was left out. Fails where none sent anything.
+pub(super) fn streams(
+    path: &Path,
+    datagrams: &Datagrams,
+) -> Result<(Vec<Stream>, FrameCounts), Error> {
+    let ouster = metadata(path)?.map(|path| Ouster::read(&path)).transpose()?.map(Arc::new);
+    let mut streams = Streams { all: Vec::new(), ouster, seen: 0, largest: 0 };
+    let counts = datagrams.each(0, |datagram| {
+        streams.take(&datagram);
+        ControlFlow::Continue(())
+    })?;
+    streams.all.retain(|stream| !stream.cuts.is_empty());
+    if streams.all.is_empty() {
+        return Err(streams.none(path));
+    }
+    Ok((streams.all, counts))
+}
+
+/// What the user should know of a stream.
+pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
+    let all = [
+        (format!("packets with a wrong check sum, of {}", stream.packets), stream.unsound),
+        ("late firings".into(), stream.late),
+        ("frames that are cut or damaged".into(), counts.cut),
+        ("frames of unknown links".into(), counts.strange),
+    ];
+    let told = all.into_iter().filter(|(_, count)| *count > 0);
+    let mut notes: Vec<String> =
+        told.map(|(what, count)| format!("left out: {what} ({count})")).collect();
+    if counts.ends_early {
+        notes.push("the file ends within a frame".into());
+    }
+    notes
+}
+
+/// The stream asked for, or the only one.
+pub(super) fn choose(
+    path: &Path,
+    mut streams: Vec<Stream>,
+    asked: &[String],
+) -> Result<Stream, Error> {
+    let of = |s: &Stream| format!("{} ({}, {} packets)", s.sender, s.sensor.name(), s.packets);
+    let listed: Vec<String> = streams.iter().map(of).collect();
+    let listed = listed.join(", ");
+    let wrong = |what: String| Err(Error::input(path, "", what));
+    match asked {
+        [] if streams.len() == 1 => Ok(streams.remove(0)),
+        [] => wrong(format!("several sensors, choose one with --topic: {listed}")),
+        [one] => match streams.iter().position(|s| s.sender.to_string() == *one) {
+            Some(n) => Ok(streams.swap_remove(n)),
+            None => wrong(format!("no sensor sends as {one}; there are: {listed}")),
+        },
+        _ => wrong("one sensor of a capture can be read, several are asked for".into()),
+    }
+}
+
+/// The metadata that belongs to a capture: the `.json` beside it with the longest name that begins
+/// its own.
+fn metadata(path: &Path) -> Result<Option<PathBuf>, Error> {
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut files = entries(parent.unwrap_or(Path::new(".")))?;
+    let own = stem(path);
+    files.retain(|p| p.extension().is_some_and(|e| e == "json") && own.starts_with(&stem(p)));
+    Ok(files.into_iter().max_by_key(|p| stem(p).len()))
+}

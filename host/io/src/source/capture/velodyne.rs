@@ -1,0 +1,274 @@
+//! Packets of Velodyne's VLP-16 (Puck), Puck Hi-Res, VLP-32C and HDL-32E.
+//!
+//! A packet has 1206 bytes: twelve blocks of a flag, an azimuth and 32 measurements of a distance
+//! and a reflectivity, then the time in µs since the full hour, the kind of returns and the model
+//! (VLP-16 user manual 63-9243, section 9; VLP-32C 63-9325; HDL-32E 63-9113). Azimuths are
+//! clockwise seen from above, from straight ahead.
+
+use std::f64::consts::TAU;
+
+use raywake_core::sweep::Point;
+
+use super::firing::{Firing, TURN};
+
+/// Bytes of a packet.
+const PACKET: usize = 1206;
+/// Blocks of a packet.
+pub(super) const BLOCKS: usize = 12;
+const BLOCK: usize = 100;
+/// Measurements of a block, and bytes before them and of each.
+const MEASUREMENTS: usize = 32;
+const BLOCK_HEAD: usize = 4;
+const MEASUREMENT: usize = 3;
+/// First bytes of a block.
+const FLAG: [u8; 2] = [0xff, 0xee];
+/// Where the kind of returns stands, and what it is where each block is there twice: the last
+/// returns, then the strongest.
+const RETURNS_AT: usize = 1204;
+const DUAL: u8 = 0x39;
+const MODEL_AT: usize = 1205;
+const TIME_AT: usize = 1200;
+/// Azimuths of a turn: 0.01°.
+const AZIMUTHS: u32 = 36_000;
+const NS_OF_US: u64 = 1000;
+/// Its clock counts to this, ns: an hour.
+pub(super) const CLOCK_NS: u64 = 3_600_000_000_000;
+/// Largest reflectivity.
+const REFLECTIVITY_MAX: f32 = 255.0;
+
+/// What is fixed about a model.
+struct Model {
+    /// Number in its packets.
+    code: u8,
+    name: &'static str,
+    /// Elevation of every laser, and how much farther its azimuth is than the block's, degrees.
+    lasers: &'static [[f64; 2]],
+    /// Unit of distances, m.
+    unit_m: f64,
+    /// From the axis to the point that all beams go through, m: a beam that looks down leaves the
+    /// axis higher by this times the tangent.
+    focus_m: f64,
+    /// Time between firings of all lasers, and between two lasers or pairs of them, ns.
+    cycle_ns: f64,
+    laser_ns: f64,
+    /// Lasers that fire at once.
+    together: usize,
+}
+
+/// Angles from the manuals, distances of the focus from the envelope drawings (86-0101, 86-0129,
+/// 86-0106 and that of the VLP-32C).
+static MODELS: [Model; 4] = [
+    Model {
+        code: 0x22,
+        name: "VLP-16",
+        lasers: &straight([
+            -15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0,
+            15.0,
+        ]),
+        unit_m: 0.002,
+        focus_m: 0.04191,
+        cycle_ns: 55_296.0,
+        laser_ns: 2304.0,
+        together: 1,
+    },
+    Model {
+        code: 0x24,
+        name: "Puck Hi-Res",
+        lasers: &straight([
+            -10.0, 0.667, -8.667, 2.0, -7.333, 3.333, -6.0, 4.667, -4.667, 6.0, -3.333, 7.333,
+            -2.0, 8.667, -0.667, 10.0,
+        ]),
+        unit_m: 0.002,
+        focus_m: 0.04191,
+        cycle_ns: 55_296.0,
+        laser_ns: 2304.0,
+        together: 1,
+    },
+    Model {
+        code: 0x21,
+        name: "HDL-32E",
+        lasers: &straight([
+            -30.67, -9.33, -29.33, -8.0, -28.0, -6.67, -26.67, -5.33, -25.33, -4.0, -24.0, -2.67,
+            -22.67, -1.33, -21.33, 0.0, -20.0, 1.33, -18.67, 2.67, -17.33, 4.0, -16.0, 5.33,
+            -14.67, 6.67, -13.33, 8.0, -12.0, 9.33, -10.67, 10.67,
+        ]),
+        unit_m: 0.002,
+        focus_m: 0.02883,
+        cycle_ns: 46_080.0,
+        laser_ns: 1152.0,
+        together: 1,
+    },
+    Model {
+        code: 0x28,
+        name: "VLP-32C",
+        lasers: &[
+            [-25.0, 1.4],
+            [-1.0, -4.2],
+            [-1.667, 1.4],
+            [-15.639, -1.4],
+            [-11.31, 1.4],
+            [0.0, -1.4],
+            [-0.667, 4.2],
+            [-8.843, -1.4],
+            [-7.254, 1.4],
+            [0.333, -4.2],
+            [-0.333, 1.4],
+            [-6.148, -1.4],
+            [-5.333, 4.2],
+            [1.333, -1.4],
+            [0.667, 4.2],
+            [-4.0, -1.4],
+            [-4.667, 1.4],
+            [1.667, -4.2],
+            [1.0, 1.4],
+            [-3.667, -4.2],
+            [-3.333, 4.2],
+            [3.333, -1.4],
+            [2.333, 1.4],
+            [-2.667, -1.4],
+            [-3.0, 1.4],
+            [7.0, -1.4],
+            [4.667, 1.4],
+            [-2.333, -4.2],
+            [-2.0, 4.2],
+            [15.0, -1.4],
+            [10.333, 1.4],
+            [-1.333, -1.4],
+        ],
+        unit_m: 0.004,
+        focus_m: 0.0424,
+        cycle_ns: 55_296.0,
+        laser_ns: 2304.0,
+        together: 2,
+    },
+];
+
+/// Lasers above each other.
+const fn straight<const N: usize>(elevations: [f64; N]) -> [[f64; 2]; N] {
+    let mut lasers = [[0.0; 2]; N];
+    let mut n = 0;
+    while n < N {
+        lasers[n][0] = elevations[n];
+        n += 1;
+    }
+    lasers
+}
+
+/// A laser of a sensor.
+struct Laser {
+    /// Cosine and sine of its elevation.
+    elevation: [f64; 2],
+    /// Its azimuth after the block's, rad.
+    azimuth: f64,
+    /// Where its beam leaves the axis, m.
+    height_m: f64,
+}
+
+impl Laser {
+    /// What it sees at a range, m, and an azimuth of the block, rad.
+    fn place(&self, range_m: f64, azimuth: f64) -> [f32; 3] {
+        let (angle, [cos, sin]) = (azimuth + self.azimuth, self.elevation);
+        let along = range_m * cos;
+        let place = [along * libm::cos(angle), -along * libm::sin(angle), range_m * sin];
+        [place[0], place[1], place[2] + self.height_m].map(|v| v as f32)
+    }
+}
+
+/// A sensor.
+pub(super) struct Velodyne {
+    model: &'static Model,
+    lasers: Vec<Laser>,
+}
+
+impl Velodyne {
+    /// The sensor that sent a packet; `None` where it is none of a known model.
+    pub fn of(packet: &[u8]) -> Option<Velodyne> {
+        let model = MODELS.iter().find(|model| is_of(packet, model.code))?;
+        let laser = |[elevation, azimuth]: &[f64; 2]| {
+            let angle = elevation.to_radians();
+            Laser {
+                elevation: [libm::cos(angle), libm::sin(angle)],
+                azimuth: azimuth.to_radians(),
+                height_m: -model.focus_m * libm::tan(angle),
+            }
+        };
+        Some(Velodyne { model, lasers: model.lasers.iter().map(laser).collect() })
+    }
+
+    pub fn name(&self) -> &'static str {
+        self.model.name
+    }
+
+    /// Whether a packet is of this model.
+    pub fn is_mine(&self, packet: &[u8]) -> bool {
+        is_of(packet, self.model.code)
+    }
+
+    /// Time and azimuth of a block. A turn begins at the rear, so that what is ahead is seen at
+    /// once. `None` where the block is damaged, or is there a second time.
+    pub fn firing(&self, packet: &[u8], block: usize) -> Option<Firing> {
+        let azimuth = azimuth(packet, block).filter(|_| !is_dual(packet) || block % 2 == 1)?;
+        let turned = (u64::from(azimuth + AZIMUTHS / 2) % u64::from(AZIMUTHS)) * TURN;
+        let us = packet.get(TIME_AT..TIME_AT + 4)?.try_into().ok()?;
+        let clock_ns = u64::from(u32::from_le_bytes(us)) * NS_OF_US;
+        let later_ns = self.block_ns(packet, block) as u64;
+        let angle = (turned / u64::from(AZIMUTHS)) as u16;
+        Some(Firing { clock_ns: (clock_ns + later_ns) % CLOCK_NS, angle, frame: None })
+    }
+
+    /// Adds the returns of a block, in the frame of the sensor: x ahead, y to the left, z up.
+    pub fn returns(&self, packet: &[u8], block: usize, offset_ns: i64, into: &mut Vec<Point>) {
+        let Some(azimuth) = azimuth(packet, block) else { return };
+        let per_ns = turning(packet, self.block_ns(packet, BLOCKS - 1));
+        for n in 0..MEASUREMENTS {
+            let at = block * BLOCK + BLOCK_HEAD + n * MEASUREMENT;
+            let distance = u16::from_le_bytes([packet[at], packet[at + 1]]);
+            if distance == 0 {
+                continue;
+            }
+            let lasers = self.lasers.len();
+            let laser = &self.lasers[n % lasers];
+            let order = (n % lasers / self.model.together) as f64;
+            let later_ns = (n / lasers) as f64 * self.model.cycle_ns + order * self.model.laser_ns;
+            let azimuths = f64::from(azimuth) + per_ns * later_ns;
+            let range_m = f64::from(distance) * self.model.unit_m;
+            into.push(Point {
+                position: laser.place(range_m, azimuths / f64::from(AZIMUTHS) * TAU),
+                intensity: f32::from(packet[at + 2]) / REFLECTIVITY_MAX,
+                offset_s: ((offset_ns as f64 + later_ns) * 1e-9) as f32,
+                sensor: 0,
+            });
+        }
+    }
+
+    /// When a block is fired after the packet's first one, ns.
+    fn block_ns(&self, packet: &[u8], block: usize) -> f64 {
+        let cycles = MEASUREMENTS / self.lasers.len();
+        let before = if is_dual(packet) { block / 2 } else { block };
+        (before * cycles) as f64 * self.model.cycle_ns
+    }
+}
+
+fn is_of(packet: &[u8], code: u8) -> bool {
+    packet.len() == PACKET && packet[MODEL_AT] == code && packet.starts_with(&FLAG)
+}
+
+fn is_dual(packet: &[u8]) -> bool {
+    packet[RETURNS_AT] == DUAL
+}
+
+/// The azimuth of a block, where it is one.
+fn azimuth(packet: &[u8], block: usize) -> Option<u32> {
+    let head = packet.get(block * BLOCK..)?.get(..BLOCK_HEAD)?;
+    let azimuth = u32::from(u16::from_le_bytes([head[2], head[3]]));
+    (head.starts_with(&FLAG) && azimuth < AZIMUTHS).then_some(azimuth)
+}
+
+/// How fast it turns within a packet, azimuths a ns; `span_ns` is the time from the first block to
+/// the last.
+fn turning(packet: &[u8], span_ns: f64) -> f64 {
+    let (Some(first), Some(last)) = (azimuth(packet, 0), azimuth(packet, BLOCKS - 1)) else {
+        return 0.0;
+    };
+    f64::from((last + AZIMUTHS - first) % AZIMUTHS) / span_ns
+}
