@@ -4,9 +4,9 @@
 //! lattice; `map/*img_Sim2_city.json` maps a place in the city to (column, row) as `s (R p + t)`,
 //! rounded, halves to the even number.
 
-use super::npy::{self, Array};
 use glam::{DMat2, DVec2, DVec3};
 use raywake_io::Error;
+use raywake_io::source::npy::{self, Array};
 use serde::Deserialize;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -20,7 +20,6 @@ mod category;
 pub mod grade;
 mod grades;
 mod ground;
-mod npy;
 mod pair;
 mod print;
 pub mod reference;

@@ -11,7 +11,9 @@ use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::Sidecars;
-use super::{OpenOptions, Overview, PosesFrame, Unlocated, apply, first_sweep, folder_name, oxts};
+use super::{
+    OpenOptions, Overview, PosesFrame, Unlocated, apply, first_sweep, folder_name, oxts, pose_files,
+};
 use crate::Error;
 
 /// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
@@ -151,7 +153,12 @@ impl Opening {
         options: &OpenOptions,
         usual: PosesFrame,
     ) -> Result<(), Error> {
-        let mut rows = poses::read_rows(path, self.files.len())?;
+        let stamps_ns = self.track.stamps_s.iter().map(|s| (s * 1e9).round() as i64);
+        let poses = pose_files::read(path, &stamps_ns.collect::<Vec<_>>())?;
+        pose_files::note_missing(&poses, &folder_name(path), &mut self.notes);
+        pose_files::keep(&mut self.files, &poses);
+        pose_files::keep(&mut self.track.stamps_s, &poses);
+        let mut rows: Vec<Pose> = poses.into_iter().flatten().collect();
         if options.poses_frame.unwrap_or(usual) == PosesFrame::Camera {
             let calib = self.root.join("calib.txt");
             if !calib.is_file() {
@@ -162,7 +169,7 @@ impl Opening {
             poses::from_camera(&mut rows, poses::read_camera(&calib)?);
         }
         self.track.poses = rows;
-        self.poses_from = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.poses_from = folder_name(path);
         Ok(())
     }
 

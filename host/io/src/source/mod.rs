@@ -29,9 +29,11 @@ mod first_sweep;
 mod kitti;
 mod lzf;
 pub mod mounting;
+pub mod npy;
 mod oxts;
 mod pcd;
 mod ply;
+mod pose_files;
 mod poses;
 mod recognise;
 mod returns;
@@ -39,6 +41,7 @@ mod sidecars;
 #[cfg(feature = "simulated")]
 pub mod simulated;
 pub mod text;
+mod trajectory;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -51,7 +54,8 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 use crate::Error;
 
 pub use clouds::read_cloud;
-pub use poses::{PoseTrack, pose_row, read_pose};
+pub use pose_files::read_pose;
+pub use poses::{PoseTrack, pose_row};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again, so that its memory is reused.
@@ -240,7 +244,7 @@ pub struct OpenOptions {
     /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
     /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`.
     pub topics: Vec<String>,
-    /// File of 3x4 poses, one row per sweep.
+    /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep of the first, or of TUM.
     pub poses: Option<PathBuf>,
     /// Whether poses are needed at all.
     pub unlocated: Unlocated,

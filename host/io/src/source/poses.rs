@@ -13,9 +13,6 @@ use crate::Error;
 /// Interval between sweeps that is assumed where a source has no times, s.
 pub(super) const INTERVAL_S: f64 = 0.1;
 
-/// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
-const REACH_MAX_M: f64 = 1e6;
-
 /// Stamp and pose of every sweep of a source.
 #[derive(Clone, Debug, Default)]
 pub struct PoseTrack {
@@ -78,39 +75,6 @@ pub(super) fn pose_from(rows: &[f64; 12], path: &Path, place: String) -> Result<
         };
         Error::input(path, place, what)
     })
-}
-
-/// The rows of a `poses.txt`, one per sweep.
-///
-/// Fails where a line is not a pose, where one lies out of reach of any drive, or where there are
-/// more or fewer rows than `sweeps`.
-pub(super) fn read_rows(path: &Path, sweeps: usize) -> Result<Vec<Pose>, Error> {
-    let text = text::read(path)?;
-    let mut poses = Vec::with_capacity(sweeps);
-    for (line, content) in text::lines(&text) {
-        let rows = text::exactly(path, line, content)?;
-        let pose = pose_from(&rows, path, format!("line {line}"))?;
-        let first = poses.first().unwrap_or(&pose);
-        let away_m = (pose.translation - first.translation).length();
-        if away_m > REACH_MAX_M {
-            let what = format!("{away_m:.3e} m from the first pose, more than {REACH_MAX_M:.0e} m");
-            return Err(Error::input(path, format!("line {line}"), what));
-        }
-        poses.push(pose);
-    }
-    if poses.len() != sweeps {
-        let what = format!("{} poses, expected {sweeps}", poses.len());
-        return Err(Error::input(path, "", what));
-    }
-    Ok(poses)
-}
-
-/// The pose in a file of one row.
-///
-/// Fails where the file cannot be read, or has no row, several, or one that is no pose.
-pub fn read_pose(path: &Path) -> Result<Pose, Error> {
-    let poses = read_rows(path, 1)?;
-    Ok(poses[0])
 }
 
 /// A pose as such a row: 3x4 numbers that read back as they are.

@@ -7,10 +7,11 @@ use mcap::records::{MessageHeader, Record};
 use raywake_core::pose::Pose;
 
 use super::file::{BagFile, FileEnd, Place};
-use super::frames::{FixedFrames, Trajectory};
+use super::frames::FixedFrames;
 use super::messages::{self, CloudHeader, MessageKind, Transform};
 use super::wire::Wire;
 use crate::Error;
+use crate::source::trajectory::Trajectory;
 
 /// The topic of frames that never move.
 const FIXED_TOPIC: &str = "tf_static";

@@ -22,11 +22,10 @@ use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, SENSORS_MAX};
 
-use super::poses::read_rows;
 use super::recognise::{MCAP, entries};
 use super::{
     OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
-    folder_name,
+    folder_name, pose_files,
 };
 use crate::Error;
 use contents::{CloudMessage, Contents};
@@ -108,8 +107,8 @@ impl Bag {
             if options.poses_frame == Some(PosesFrame::Camera) {
                 return Err(Error::Usage("an MCAP file has no camera's frame".into()));
             }
-            self.overview.track.poses = read_rows(path, self.sweeps.len())?;
-            self.poses_from = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let poses = pose_files::read(path, &self.stamps_ns())?;
+            self.take_poses(&folder_name(path), poses);
             return Ok(());
         }
         let mut tracks = contents.tracks(base, &self.stamps_ns());
@@ -127,18 +126,12 @@ impl Bag {
         Ok(())
     }
 
-    /// Takes the poses of a source. Sweeps before the first and after the last are left out.
+    /// Takes the poses of a source. Sweeps without one are left out.
     fn take_poses(&mut self, name: &str, poses: Vec<Option<Pose>>) {
         self.poses_from = name.to_owned();
-        let all = self.sweeps.len();
-        let mut known = poses.iter().map(Option::is_some);
-        self.sweeps.retain(|_| known.next().unwrap_or(false));
+        pose_files::keep(&mut self.sweeps, &poses);
+        pose_files::note_missing(&poses, name, &mut self.overview.notes);
         self.overview.track.poses = poses.into_iter().flatten().collect();
-        let left_out = all - self.sweeps.len();
-        if left_out > 0 {
-            let note = format!("{left_out} sweeps skipped: no pose on {name}");
-            self.overview.notes.push(note);
-        }
     }
 
     /// Learns from the first sweep of all lidars what else there is to know of the rig.

@@ -24,10 +24,9 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
-use super::poses::read_rows;
 use super::{
     OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
-    folder_name,
+    folder_name, pose_files,
 };
 use crate::Error;
 use datagrams::{Datagram, Datagrams, Sender};
@@ -45,8 +44,8 @@ pub(super) struct Capture {
     datagrams: Datagrams,
     sender: Sender,
     sensor: Sensor,
-    /// Of every sweep; the last one's end comes after them.
-    cuts: Vec<Cut>,
+    /// Where each begins, and where the next one does.
+    sweeps: Vec<[Cut; 2]>,
     poses_from: String,
 }
 
@@ -57,7 +56,7 @@ impl Capture {
         let (all, counts) = streams::streams(path, &datagrams)?;
         let mut stream = streams::choose(path, all, &options.topics)?;
         let mut notes = streams::notes(&stream, &counts);
-        let cuts = stream.sweeps(&mut notes);
+        let sweeps = stream.sweeps(&mut notes);
         let Stream { sender, sensor, .. } = stream;
         let sensors = core::iter::once(Pose::IDENTITY).collect();
         let mut capture = Capture {
@@ -66,7 +65,7 @@ impl Capture {
             datagrams,
             sender,
             sensor,
-            cuts,
+            sweeps,
             poses_from: "registration".into(),
         };
         capture.set_stamps()?;
@@ -81,7 +80,7 @@ impl Capture {
 
     /// Stamps of the sweeps, and their numbers: where a turn is missing, one is passed over.
     fn set_stamps(&mut self) -> Result<(), Error> {
-        let cuts = &self.cuts[..self.cuts.len() - 1];
+        let cuts: Vec<Cut> = self.sweeps.iter().map(|sweep| sweep[0]).collect();
         let step = |pair: &[Cut]| self.sensor.since(pair[1].clock_ns, pair[0].clock_ns);
         let steps: Vec<i64> = cuts.windows(2).map(step).collect();
         if let Some(n) = steps.iter().position(|step| *step <= 0) {
@@ -114,8 +113,16 @@ impl Capture {
                 Err(Error::Usage("a capture has no camera's frame".into()))
             }
             Some(path) => {
-                self.overview.track.poses = read_rows(path, self.overview.frames.len())?;
+                let Overview { frames, track, epoch_ns, notes, .. } = &mut self.overview;
+                let ns = |s: &f64| *epoch_ns as i64 + (s * 1e9).round() as i64;
+                let stamps_ns: Vec<i64> = track.stamps_s.iter().map(ns).collect();
+                let poses = pose_files::read(path, &stamps_ns)?;
                 self.poses_from = folder_name(path);
+                pose_files::note_missing(&poses, &self.poses_from, notes);
+                pose_files::keep(&mut self.sweeps, &poses);
+                pose_files::keep(frames, &poses);
+                pose_files::keep(&mut track.stamps_s, &poses);
+                track.poses = poses.into_iter().flatten().collect();
                 Ok(())
             }
         }
@@ -124,7 +131,7 @@ impl Capture {
     /// Replaces the points by those of a sweep.
     fn read_points(&self, index: usize, points: &mut Vec<Point>) -> Result<(), Error> {
         points.clear();
-        let (cut, next) = (&self.cuts[index], &self.cuts[index + 1]);
+        let [cut, next] = &self.sweeps[index];
         let mut last = None;
         self.datagrams.each(cut.from, |datagram| {
             let Datagram { sender, payload, place, .. } = datagram;

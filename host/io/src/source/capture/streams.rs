@@ -85,9 +85,9 @@ impl Stream {
         }
     }
 
-    /// Where sweeps begin and the last one ends, without turns at the ends of which a part is
+    /// Where each sweep and the next one begin, without turns at the ends of which a part is
     /// missing.
-    pub fn sweeps(&mut self, notes: &mut Vec<String>) -> Vec<Cut> {
+    pub fn sweeps(&mut self, notes: &mut Vec<String>) -> Vec<[Cut; 2]> {
         let most = self.cuts.iter().map(|cut| cut.firings).max().unwrap_or(0) as f64;
         let part = |cut: &&Cut| (cut.firings as f64) < WHOLE_MIN * most;
         let mut cuts = std::mem::take(&mut self.cuts);
@@ -103,7 +103,7 @@ impl Stream {
         if few > 0 {
             notes.push(format!("sweeps that lack more than a tenth of their packets: {few}"));
         }
-        cuts[first..=last].to_vec()
+        cuts[first..=last].windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }
 }
 

@@ -179,7 +179,8 @@ fn way_of_an_os1() {
     let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     let found = all.iter().map(|s| odometry.locate(s.stamp_s, &s.points, source.rig()));
     let found: Vec<Pose> = found.map(|l| l.world_from_vehicle).collect();
-    let told = read_rows(&packets("OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"), 3).unwrap();
+    let told = pose_files::read(&packets("OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"), &[0; 3]);
+    let told: Vec<Pose> = told.unwrap().into_iter().flatten().collect();
     for (found, told) in found.iter().zip(&told) {
         let off = told.inverse() * *found;
         assert!(

@@ -1,37 +1,42 @@
-//! The one kind of NumPy file that is needed: a two-dimensional array of floats.
+//! NumPy files of rows of floats: clouds, poses, rasters of heights.
 
-use arrow_array::types::{ArrowPrimitiveType, Float16Type};
-use raywake_io::Error;
 use std::path::Path;
+
+use half::f16;
+
+use super::returns::load;
+use crate::Error;
 
 /// First bytes of the format.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Rows of numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
+pub struct Array {
     /// Number of rows, at least 1.
     pub rows: usize,
-    /// Numbers in a row, at least 1.
+    /// Numbers in a row, at least 1; of an array of more dimensions, all but those of the first.
     pub columns: usize,
     /// Row after row.
     pub values: Vec<f64>,
 }
 
 /// Reads `<f2`, `<f4` or `<f8`, row after row, in versions 1 to 3 of the format.
-pub(super) fn read(path: &Path) -> Result<Array, Error> {
-    parse(&std::fs::read(path).map_err(Error::reading(path))?)
-        .map_err(|what| Error::input(path, "", what))
+///
+/// # Errors
+/// Where the file cannot be read, is too large for a cloud, or holds something else.
+pub fn read(path: &Path) -> Result<Array, Error> {
+    parse(&load(path)?).map_err(|what| Error::input(path, "", what))
 }
 
 /// `Err` with what is wrong.
-pub(super) fn parse(bytes: &[u8]) -> Result<Array, String> {
+fn parse(bytes: &[u8]) -> Result<Array, String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("is no NumPy file")?;
     let (header, data) = split(rest).ok_or("truncated within the header")?;
     let header = std::str::from_utf8(header).map_err(|_| "the header is not UTF-8 text")?;
     let kind = value(header, "descr")?.trim_matches(['\'', '"']);
     let number: fn(&[u8]) -> f64 = match kind {
-        "<f2" => |b| <Float16Type as ArrowPrimitiveType>::Native::from_le_bytes(all(b)).into(),
+        "<f2" => |b| f16::from_le_bytes(all(b)).into(),
         "<f4" => |b| f32::from_le_bytes(all(b)).into(),
         "<f8" => |b| f64::from_le_bytes(all(b)),
         other => return Err(format!("holds `{other}`; <f2, <f4 or <f8 expected")),
@@ -77,10 +82,13 @@ fn shape(header: &str) -> Result<[usize; 2], String> {
     let (_, after) = header.split_once("'shape':").ok_or("the header has no `shape`")?;
     let inside = after.trim_start().strip_prefix('(').and_then(|s| Some(s.split_once(')')?.0));
     let inside = inside.ok_or("the shape is none")?;
-    let sizes: Vec<Option<usize>> =
-        inside.split(',').map(|s| s.trim().parse().ok().filter(|&n| n > 0)).collect();
-    match sizes[..] {
-        [Some(rows), Some(columns)] => Ok([rows, columns]),
+    let size = |s: &str| s.trim().parse().ok().filter(|&n| n > 0);
+    let sizes: Option<Vec<usize>> = inside.split(',').map(size).collect();
+    let columns = |rest: &[usize]| rest.iter().try_fold(1_usize, |n, size| n.checked_mul(*size));
+    match sizes.as_deref() {
+        Some([rows, rest @ ..]) if !rest.is_empty() => {
+            Ok([*rows, columns(rest).ok_or("the shape is too large")?])
+        }
         _ => Err(format!("of shape ({inside}); rows and columns expected, both above zero")),
     }
 }
