@@ -17,7 +17,7 @@ use clap::builder::BoolishValueParser;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use raywake_io::Error;
-use raywake_io::source::{Format, OpenOptions, PosesFrame, Unlocated};
+use raywake_io::source::{BinFields, Format, OpenOptions, PosesFrame, Unlocated};
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
@@ -107,8 +107,9 @@ pub struct OdometryArgs {
 pub struct Recording {
     #[command(flatten)]
     pub kind: RecordingKind,
-    /// Poses, 12 numbers (a 3x4 matrix) per line, one line per sweep; or `register` to find them by
-    /// registration [default: those of the recording; without, by registration]
+    /// Poses: 12 numbers (a 3x4 matrix) per line, one line per sweep from the first one on, or TUM's
+    /// time, x, y, z and quaternion; or `register` to find them by registration [default: those of
+    /// the recording; without, by registration]
     #[arg(long, value_name = "FILE|register")]
     pub poses: Option<PathBuf>,
     /// Frame the poses refer to
@@ -130,6 +131,10 @@ pub struct RecordingKind {
     /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT
     #[arg(long)]
     pub topic: Vec<String>,
+    /// Numbers of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:
+    /// x,y,z,intensity, and for .pcd.bin those of nuScenes]
+    #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
+    pub bin_fields: Option<BinFields>,
     /// Whether sweeps still contain motion distortion
     #[arg(long, value_name = "on|off", hide_possible_values = true)]
     #[arg(value_parser = BoolishValueParser::new())]
@@ -308,6 +313,7 @@ impl RecordingKind {
         OpenOptions {
             format: self.format,
             topics: self.topic.clone(),
+            bin_fields: self.bin_fields.clone(),
             deskew: self.deskew,
             ground_m: self.ground,
             own_vehicle: self.own_vehicle,

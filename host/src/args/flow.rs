@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use raywake_core::params::POINTS_MAX;
+use raywake_io::source::BinFields;
 
 use super::{FlowChoice, seconds};
 
@@ -12,7 +13,7 @@ Scene flow from cloud A to cloud B; no poses needed
 
 The motion of the sensor is estimated by registration, then both clouds are processed as two \
 sweeps of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or \
-the vehicle: .bin (float32 x, y, z, intensity), .pcd, .ply or .feather (columns x, y, z); A and B \
+the vehicle: .bin (float32 x, y, z, intensity), .npy, .pcd, .ply or .feather (columns x, y, z); A and B \
 may differ in format. Times of individual returns are ignored.";
 
 const FILES: &str = "\
@@ -49,6 +50,9 @@ pub struct FlowArgs {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     #[arg(help_heading = "Results")]
     pub png: Option<Option<PathBuf>>,
+    /// Numbers of a point in .bin and .npy files [default: x,y,z,intensity]
+    #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
+    pub bin_fields: Option<BinFields>,
     /// Time from A to B, s
     #[arg(long, value_name = "SECONDS", default_value = "0.1", value_parser = seconds)]
     pub dt: Duration,

@@ -25,7 +25,7 @@ use crate::picture::{self, Subject};
 use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
-use raywake_io::source::{SweepData, mounting, pose_row, read_cloud, read_pose};
+use raywake_io::source::{BinFields, SweepData, mounting, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
 
 use rows::{Form, PointRow};
@@ -44,8 +44,8 @@ pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let mut laps = Laps::start();
 
     let dt_s = args.dt.as_secs_f64();
-    let first = cloud(&args.first, 0.0)?;
-    let mut second = cloud(&args.second, dt_s)?;
+    let first = cloud(&args.first, args.bin_fields.as_ref(), 0.0)?;
+    let mut second = cloud(&args.second, args.bin_fields.as_ref(), dt_s)?;
     let (rig, place) = rig(args, &first)?;
     say(&place)?;
     laps.lap("read");
@@ -88,9 +88,9 @@ fn title(args: &args::FlowArgs) -> String {
 }
 
 /// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.
-fn cloud(path: &Path, stamp_s: f64) -> Result<SweepData, Error> {
+fn cloud(path: &Path, fields: Option<&BinFields>, stamp_s: f64) -> Result<SweepData, Error> {
     let mut sweep = SweepData { stamp_s, ..SweepData::default() };
-    read_cloud(path, &mut sweep.points)?;
+    read_cloud(path, fields, &mut sweep.points)?;
     let there = |p: &[f32; 3]| p.iter().all(|v| v.is_finite());
     match sweep.points.iter().any(|p| there(&p.position)) {
         true => Ok(sweep),

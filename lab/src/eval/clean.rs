@@ -182,7 +182,7 @@ mod tests {
         assert!(size("static") / 16 + size("moving") / 16 <= returns);
         assert!(size("static") / 16 > returns / 2 && size("moving") > 0);
         let mut map = Vec::new();
-        raywake_io::source::read_cloud(&cleaned.join("map.ply"), &mut map).unwrap();
+        raywake_io::source::read_cloud(&cleaned.join("map.ply"), None, &mut map).unwrap();
         assert!(map.len() > 5000, "{} voxels", map.len());
         let error = super::tally(scratch.path(), scratch.path()).unwrap_err().to_string();
         assert!(error.contains("no labels"), "{error}");

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use raywake_core::sweep::Point;
 
+use super::bin::{self, BinFields};
 use super::sidecars::Sidecars;
-use super::{Overview, Source, SourceGaps, SweepData, bin, pcd, ply};
+use super::{Overview, Source, SourceGaps, SweepData, pcd, ply};
 use crate::Error;
 
 /// An open folder.
@@ -17,6 +18,8 @@ pub(super) struct Clouds {
     pub poses_from: String,
     /// File of every sweep.
     pub files: Vec<PathBuf>,
+    /// What the numbers of a return are, where the user tells.
+    pub fields: Option<BinFields>,
     /// Files that tell times and sensors of returns.
     pub sidecars: Option<Sidecars>,
 }
@@ -35,26 +38,32 @@ impl Source for Clouds {
         let sweeps_before = self.overview.missing_before(index);
         into.dropped = SourceGaps { sweeps_before, null_rows: 0 };
         let path = &self.files[index];
-        read_cloud(path, &mut into.points)?;
+        read_cloud(path, self.fields.as_ref(), &mut into.points)?;
         let Some(sidecars) = &self.sidecars else { return Ok(()) };
         sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
     }
 }
 
-/// Replaces `points` by the returns of a file, whose extension tells the format: `bin`, `pcd`,
-/// `ply`, or `feather` with columns `x`, `y` and `z`; returns whether they have times.
+/// Replaces `points` by the returns of a file, whose extension tells the format: `bin`, `npy`,
+/// `pcd`, `ply`, or `feather` with columns `x`, `y` and `z`; returns whether they have times.
+/// `fields` are those of the first two, where they are not the usual ones.
 ///
 /// Fails, leaving no points, where the extension is another one, and where the file cannot be read
 /// or is damaged.
-pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
+pub fn read_cloud(
+    path: &Path,
+    fields: Option<&BinFields>,
+    points: &mut Vec<Point>,
+) -> Result<bool, Error> {
     points.clear();
     match path.extension().and_then(|e| e.to_str()) {
-        Some("bin") => bin::read(path, points).map(|()| false),
+        Some("bin") => bin::read(path, fields, points),
+        Some("npy") => bin::read_npy(path, fields, points),
         Some("pcd") => pcd::read(path, points),
         Some("ply") => ply::read(path, points),
         Some("feather") => read_feather(path, points).map(|()| false),
         _ => {
-            let what = "unknown extension, expected .bin, .pcd, .ply or .feather";
+            let what = "unknown extension, expected .bin, .npy, .pcd, .ply or .feather";
             Err(Error::input(path, "", what))
         }
     }
@@ -62,8 +71,12 @@ pub fn read_cloud(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
 
 #[cfg(feature = "arrow")]
 fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
-    let table = super::feather::FeatherTable::read(path, &["x", "y", "z"])?;
-    let positions = table.vectors(["x", "y", "z"])?.into_iter();
+    let named = |names: [&'static str; 3]| {
+        super::feather::FeatherTable::read(path, &names).map(|table| (table, names))
+    };
+    let (table, names) =
+        named(["x", "y", "z"]).or_else(|e| named(["X", "Y", "Z"]).map_err(|_| e))?;
+    let positions = table.vectors(names)?.into_iter();
     points.extend(positions.map(|position| Point { position, ..Point::default() }));
     Ok(())
 }
@@ -75,4 +88,4 @@ fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
 }
 
 /// Names of files of clouds end so in a folder of clouds.
-pub(super) const EXTENSIONS: [&str; 3] = ["bin", "pcd", "ply"];
+pub(super) const EXTENSIONS: [&str; 4] = ["bin", "npy", "pcd", "ply"];

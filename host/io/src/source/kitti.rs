@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
+use raywake_registration::ground::ground_height;
 
 use super::clouds::{Clouds, read_cloud};
 use super::poses::{self, PoseTrack};
@@ -77,15 +78,7 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
         None => options.go_without_poses(&opening.root, "point clouds only")?,
     }
-    opening.span = opening.find_span()?;
-    let spins = match opening.span {
-        Some(_) => "",
-        None => " and spins",
-    };
-    let note = format!(
-        "assuming that the sensor is mounted{spins} like KITTI's HDL-64E (1.73 m above ground)"
-    );
-    opening.notes.push(note);
+    opening.look_at_returns(options)?;
     Ok(opening.finish(options))
 }
 
@@ -101,6 +94,8 @@ struct Opening {
     sidecars: Option<Sidecars>,
     /// Earliest time after the stamp and duration of a sweep, s, where clouds have times.
     span: Option<[f64; 2]>,
+    /// Height of the ground in the frame of the clouds, m.
+    ground_m: f64,
     notes: Vec<String>,
 }
 
@@ -128,6 +123,7 @@ impl Opening {
             timed: false,
             sidecars: None,
             span: None,
+            ground_m: GROUND_M,
             notes,
         })
     }
@@ -219,13 +215,23 @@ impl Opening {
         Ok(oxts::default_velo_from_imu())
     }
 
-    /// The span of the first sweep's times; `None` where it has none, or they are all the same.
-    fn find_span(&self) -> Result<Option<[f64; 2]>, Error> {
+    /// Learns from the first cloud when its returns were measured, and where the ground is.
+    fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let (path, mut points) = (&self.files[0].1, Vec::new());
-        if !read_cloud(path, &mut points)? {
-            return Ok(None);
+        if read_cloud(path, options.bin_fields.as_ref(), &mut points)? {
+            self.span = first_sweep::span(&points).map_err(|what| Error::input(path, "", what))?;
         }
-        first_sweep::span(&points).map_err(|what| Error::input(path, "", what))
+        if self.span.is_none() {
+            self.notes.push("assuming that the sensor spins like KITTI's HDL-64E".into());
+        }
+        let found = ground_height(&points).filter(|_| options.ground_m.is_none());
+        self.ground_m = found.unwrap_or(GROUND_M);
+        match found {
+            Some(ground_m) => self.notes.push(format!("ground estimated at {ground_m:.2} m")),
+            None if options.ground_m.is_some() => {}
+            None => self.notes.push(format!("no ground found: assumed at {GROUND_M} m")),
+        }
+        Ok(())
     }
 
     fn finish(self, options: &OpenOptions) -> Clouds {
@@ -249,11 +255,12 @@ impl Opening {
             kind: format!("{} {}", self.kind, self.root.display()),
             poses_from: self.poses_from,
             files: self.files.into_iter().map(|f| f.1).collect(),
+            fields: options.bin_fields.clone(),
             sidecars: self.sidecars,
         }
     }
 
-    /// KITTI's HDL-64E on its vehicle.
+    /// A sensor as KITTI's HDL-64E on its vehicle.
     fn velodyne(&self, frames: &[u64]) -> Rig {
         Rig {
             sensors: core::iter::once(Pose::IDENTITY).collect(),
@@ -262,7 +269,7 @@ impl Opening {
                 None => Timing::Azimuth { span_s: self.turn_s(frames) },
             },
             distorted: true,
-            ground_m: GROUND_M,
+            ground_m: self.ground_m,
             own_vehicle: Some(OWN_VEHICLE),
         }
     }

@@ -5,11 +5,11 @@
 //! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt`, else `oxts/data/N.txt` |
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
-//! | [`Format::Clouds`] | `*.bin`, `*.pcd` or `*.ply` | a file named on the command line |
+//! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a file named on the command line |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
 //!
-//! A `.bin` is little-endian float32 x, y, z, intensity per return. Poses and times are read and
+//! A `.bin` is little-endian float32 x, y, z, intensity per return, or as [`BinFields`] say. Poses and times are read and
 //! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
 //! `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` beside its clouds.
 
@@ -53,6 +53,7 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 
 use crate::Error;
 
+pub use bin::BinFields;
 pub use clouds::read_cloud;
 pub use pose_files::read_pose;
 pub use poses::{PoseTrack, pose_row};
@@ -206,7 +207,7 @@ pub enum Format {
     /// An Argoverse 2 sensor log.
     #[value(name = "argoverse")]
     Argoverse2,
-    /// A folder of `.bin`, `.pcd` or `.ply` clouds.
+    /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
     Clouds,
     /// A recording of ROS: an `.mcap` file, or a folder of them.
@@ -252,6 +253,8 @@ pub struct OpenOptions {
     pub trusted: bool,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
+    /// What the numbers of a return are, for `.bin` and `.npy` files.
+    pub bin_fields: Option<BinFields>,
     /// Overrides [`Rig::distorted`].
     pub deskew: Option<bool>,
     /// Overrides [`Rig::ground_m`], m.

@@ -37,7 +37,7 @@ fn text() -> String {
 
 fn cloud(t: &Temp, name: &str, content: impl AsRef<[u8]>) -> Result<(Vec<Point>, bool), String> {
     let mut points = vec![Point::default(); 7];
-    match read_cloud(&t.write(name, content), &mut points) {
+    match read_cloud(&t.write(name, content), None, &mut points) {
         Ok(timed) => Ok((points, timed)),
         Err(e) => {
             assert!(points.is_empty() && e.exit_code() == 3);
