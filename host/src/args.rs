@@ -8,6 +8,7 @@ mod flow;
 mod results;
 mod sweeps;
 mod track;
+mod values;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -24,6 +25,7 @@ pub use flow::FlowArgs;
 pub use results::{Export, PictureFrame, Results, Views};
 pub use sweeps::SweepRange;
 pub use track::{FrontEndKind, TrackArgs};
+use values::{count, seconds, size, vehicle_box};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -63,9 +65,30 @@ pub enum Command {
     #[cfg(feature = "demo")]
     Demo(DemoArgs),
     /// Print the memory layout: every buffer, its size, and who writes and reads it
+    #[command(after_help = EXIT_CODES)]
     Budget(BudgetArgs),
     /// List Vulkan devices
-    Devices,
+    Devices(DevicesArgs),
+    /// Print a completion script for a shell
+    #[cfg(feature = "shell")]
+    Completions {
+        /// Shell to complete commands in
+        shell: clap_complete::Shell,
+    },
+    /// Print a manual page
+    #[cfg(feature = "shell")]
+    Man {
+        /// Command that it is about [default: all, in short]
+        #[arg(value_name = "COMMAND")]
+        of: Option<String>,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+pub struct DevicesArgs {
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -94,7 +117,7 @@ pub struct OdometryArgs {
     pub quiet: bool,
     /// Poses to write, for `--poses` (KITTI odometry: with `--poses-frame vehicle`): 12 numbers (a
     /// 3x4 matrix) per line, one line per sweep; the world is the vehicle's frame at the first
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     #[command(flatten)]
     pub kind: RecordingKind,
@@ -107,7 +130,7 @@ pub struct OdometryArgs {
 pub struct Recording {
     #[command(flatten)]
     pub kind: RecordingKind,
-    /// Poses: 12 numbers (a 3x4 matrix) per line, one line per sweep from the first one on, or TUM's
+    /// Poses: 12 numbers (a 3x4 matrix) per line, a line per sweep from the first one on, or TUM's
     /// time, x, y, z and quaternion; or `register` to find them by registration [default: those of
     /// the recording; without, by registration]
     #[arg(long, value_name = "FILE|register")]
@@ -234,7 +257,7 @@ pub struct MapArgs {
     #[arg(short, long)]
     pub quiet: bool,
     /// Output folder: FRAME.feather per sweep, with i, j, k and log-odds of every observed voxel
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
     /// Also draw each map from above: DIR/FRAME.png
     #[arg(long)]
@@ -263,25 +286,28 @@ pub struct Selection {
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// Output folder
-    #[arg(long, value_name = "DIR", default_value = "raywake-demo")]
+    #[arg(short, long, value_name = "DIR", default_value = "raywake-demo")]
     pub out: PathBuf,
-    #[command(flatten)]
-    pub backend: BackendChoice,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
+    #[command(flatten)]
+    pub backend: BackendChoice,
 }
 
 #[derive(Debug, clap::Args)]
 pub struct BudgetArgs {
-    #[command(flatten)]
-    pub profile: ProfileChoice,
-    /// Exit with code 6 if device and host memory together exceed this many bytes
-    #[arg(long, value_name = "BYTES")]
+    /// Exit with code 6 if device and host memory together exceed this, for example 64MiB or 128MB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
     pub limit: Option<u64>,
     /// Print PARAMETERS.md instead: every parameter with unit, range, default and rationale
-    #[arg(long)]
+    #[arg(long, conflicts_with = "json")]
     pub parameters: bool,
+    /// Print JSON: sizes in bytes
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub profile: ProfileChoice,
 }
 
 impl Selection {
@@ -322,28 +348,6 @@ impl RecordingKind {
     }
 }
 
-fn count(text: &str) -> Result<usize, String> {
-    let count = text.parse().map_err(|_| "not a number")?;
-    if count > 0 { Ok(count) } else { Err("must be at least 1".into()) }
-}
-
-fn vehicle_box(text: &str) -> Result<[[f32; 2]; 2], String> {
-    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    let numbers = numbers.map_err(|_| "expected four numbers: X0,Y0,X1,Y1")?;
-    match numbers[..] {
-        [a, b, c, d] if a < c && b < d && numbers.iter().all(|n| n.is_finite()) => {
-            Ok([[a, b], [c, d]])
-        }
-        _ => Err("expected X0,Y0,X1,Y1 with X0 below X1 and Y0 below Y1".into()),
-    }
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "not a number")?;
-    let duration = Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())?;
-    if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -352,12 +356,5 @@ mod tests {
     #[test]
     fn the_declaration_is_sound() {
         Args::command().debug_assert();
-    }
-
-    #[test]
-    fn numbers() {
-        assert_eq!(seconds("0.5"), Ok(Duration::from_millis(500)));
-        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|s| seconds(s).is_err()));
-        assert!(count("0").is_err());
     }
 }

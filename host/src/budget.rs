@@ -12,13 +12,13 @@ use raywake_core::stages::{FLOW_PROGRAMS, MAP_PROGRAMS};
 use raywake_core::stages::{background_filter, occupancy_constancy};
 use raywake_core::sweep::Point;
 use raywake_core::tracklet::Tracklets;
-use raywake_gpu::Heap;
+use raywake_gpu::{Buffer, Heap};
 use raywake_kernels::schedule::Schedule;
 
 use crate::args;
 use crate::backend::{Backend, Scalar};
 use crate::config;
-use crate::console::{bytes, say};
+use crate::console::{self, bytes, say};
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::map::Mapper;
@@ -26,6 +26,7 @@ use crate::statistics::BUDGET_MS;
 use crate::team;
 use crate::track::Tracker;
 use raywake_io::Error;
+use serde::Serialize;
 
 pub use markdown::memory_layout;
 pub use parameters::parameters;
@@ -48,12 +49,47 @@ pub fn budget(args: &args::BudgetArgs) -> Result<(), RunError> {
         return Ok(());
     }
     let profiles = profiles(&args.profile)?;
-    say(false, &memory_layout(&profiles))?;
+    let text = if args.json { json(&profiles)? } else { memory_layout(&profiles) };
+    say(false, &text)?;
     let most = profiles.iter().map(|p| device_bytes(p) + host_bytes(p, false)).max();
     match (most, args.limit) {
         (Some(bytes), Some(limit)) if bytes > limit => Err(RunError::OverBudget { bytes, limit }),
         _ => Ok(()),
     }
+}
+
+/// What a profile takes, as JSON has it.
+#[derive(Serialize)]
+struct ProfileBudget {
+    profile: String,
+    device_bytes: u64,
+    host_bytes: u64,
+    buffers: Vec<BufferBudget>,
+    host_parts: Vec<Part>,
+}
+
+#[derive(Serialize)]
+struct BufferBudget {
+    name: &'static str,
+    heap: String,
+    bytes: u64,
+}
+
+fn json(profiles: &[Profile]) -> Result<String, Error> {
+    let of = |profile: &Profile| {
+        let buffer = |b: &Buffer| {
+            let heap = format!("{:?}", b.heap).to_lowercase();
+            BufferBudget { name: b.name, heap, bytes: b.bytes }
+        };
+        ProfileBudget {
+            profile: profile.name.to_string(),
+            device_bytes: device_bytes(profile),
+            host_bytes: host_bytes(profile, false),
+            buffers: schedule(profile).buffers(profile).iter().map(buffer).collect(),
+            host_parts: host_parts(profile, false),
+        }
+    };
+    console::json(&profiles.iter().map(of).collect::<Vec<_>>())
 }
 
 /// The profiles asked for. `map` is one here only: nothing but `raywake map` runs on it.
@@ -87,7 +123,7 @@ pub fn device_bytes(profile: &Profile) -> u64 {
 }
 
 /// A part of the host's memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Part {
     /// What it is.
     pub name: &'static str,

@@ -7,10 +7,12 @@ use raywake_gpu::{DeviceInfo, DeviceKind, GpuError, Options, Validation, devices
 use crate::args::{BackendChoice, BackendKind, Validate};
 use crate::backend::Backend;
 use crate::backend::device::Device;
+use crate::console;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
+use serde::Serialize;
 
 /// The pipeline on a backend, everything allocated.
 pub struct Chosen {
@@ -89,14 +91,46 @@ fn options(choice: &BackendChoice) -> Options {
     Options { device: choice.device, validation, timeout: choice.timeout }
 }
 
-/// The table of Vulkan devices, or why there is none.
-pub fn list_devices() -> Result<String, RunError> {
+/// A device as JSON has it.
+#[derive(Serialize)]
+struct ListedDevice {
+    index: usize,
+    name: String,
+    kind: &'static str,
+    vulkan: String,
+    driver: String,
+    /// Features that it would need to be usable.
+    missing: Vec<String>,
+}
+
+impl ListedDevice {
+    fn of(d: &DeviceInfo) -> ListedDevice {
+        ListedDevice {
+            index: d.index,
+            name: d.name.clone(),
+            kind: kind(d.kind),
+            vulkan: version(d),
+            driver: d.driver.clone(),
+            missing: d.missing.iter().map(|m| m.to_string()).collect(),
+        }
+    }
+}
+
+/// The table of Vulkan devices, or why there is none; or a list of them as JSON.
+pub fn list_devices(json: bool) -> Result<String, RunError> {
     match devices() {
+        Ok(list) if json => listed(&list),
+        Err(GpuError::NoDevice | GpuError::NoLoader) if json => listed(&[]),
         Ok(list) if !list.is_empty() => Ok(table(&list)),
         Ok(_) | Err(GpuError::NoDevice) => Ok(without("device")),
         Err(GpuError::NoLoader) => Ok(without("loader")),
         Err(e) => Err(RunError::Device(e)),
     }
+}
+
+fn listed(list: &[DeviceInfo]) -> Result<String, RunError> {
+    let list: Vec<ListedDevice> = list.iter().map(ListedDevice::of).collect();
+    Ok(console::json(&list)?)
 }
 
 fn without(what: &str) -> String {
@@ -120,13 +154,20 @@ fn row(d: &DeviceInfo) -> [String; 6] {
         true => "yes".to_string(),
         false => format!("no: missing {}", d.missing.join(", ")),
     };
-    let kind = match d.kind {
+    let (kind, version) = (kind(d.kind).into(), version(d));
+    [d.index.to_string(), d.name.clone(), kind, version, d.driver.clone(), missing]
+}
+
+fn kind(kind: DeviceKind) -> &'static str {
+    match kind {
         DeviceKind::Discrete => "discrete GPU",
         DeviceKind::Integrated => "integrated GPU",
         DeviceKind::Virtual => "virtual GPU",
         DeviceKind::Other => "other",
         DeviceKind::Cpu => "CPU",
-    };
-    let version = d.api_version.map(|v| v.to_string()).join(".");
-    [d.index.to_string(), d.name.clone(), kind.into(), version, d.driver.clone(), missing]
+    }
+}
+
+fn version(d: &DeviceInfo) -> String {
+    d.api_version.map(|v| v.to_string()).join(".")
 }

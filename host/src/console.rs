@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use raywake_io::Error;
+use serde::Serialize;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -44,4 +45,10 @@ pub fn bytes(bytes: u64) -> String {
         10_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
         _ => format!("{:.1} MB", bytes as f64 * 1e-6),
     }
+}
+
+/// What is to be read by programs, as lines of JSON.
+pub fn json(what: &impl Serialize) -> Result<String, Error> {
+    let text = serde_json::to_string_pretty(what);
+    Ok(text.map_err(|e| Error::Unsupported(format!("no JSON: {e}")))? + "\n")
 }

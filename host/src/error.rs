@@ -1,5 +1,6 @@
 //! What can end a command, and the exit code of each.
 
+use crate::console;
 use raywake_alloc_guard::Allocation;
 use raywake_gpu::GpuError;
 use raywake_io::Error;
@@ -17,7 +18,7 @@ pub enum RunError {
     #[error("a defect of this program: {0}")]
     Allocation(#[from] Allocation),
     /// More memory than the user allows.
-    #[error("{bytes} bytes needed, over the limit of {limit}")]
+    #[error("{} needed, over the limit of {}", console::bytes(*.bytes), console::bytes(*.limit))]
     OverBudget {
         /// What is needed, bytes.
         bytes: u64,

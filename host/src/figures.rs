@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::console::json;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use serde::Serialize;
@@ -31,8 +32,7 @@ impl FiguresFile {
     /// as it comes, because a file must not take its place.
     pub fn write(&self, figures: &impl Serialize) -> Result<(), Error> {
         let Some(path) = &self.0 else { return Ok(()) };
-        let text = serde_json::to_string_pretty(figures);
-        let text = text.map_err(|e| Error::writing(path)(e.into()))? + "\n";
+        let text = json(figures)?;
         if fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
             let mut out = File::options().write(true).open(path).map_err(Error::writing(path))?;
             return out.write_all(text.as_bytes()).map_err(Error::writing(path));

@@ -16,7 +16,7 @@
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
 //! | [`outputs`], [`summary`], `figures` | files of a run, its figures, and where these go |
 //! | [`statistics`], [`order_statistics`], [`laps`] | what is counted and timed |
-//! | [`console`], [`progress`], `report` | what the user reads |
+//! | [`console`], [`progress`], `report`, `shell` | what the user reads, and types |
 //! | [`error`] | what can end a command, and its exit code |
 
 pub mod args;
@@ -44,6 +44,8 @@ pub mod progress;
 mod report;
 mod run;
 mod session;
+#[cfg(feature = "shell")]
+mod shell;
 pub mod statistics;
 pub mod summary;
 pub mod team;
@@ -65,9 +67,13 @@ pub fn execute(command: Command) -> Result<bool, RunError> {
         #[cfg(feature = "demo")]
         Command::Demo(args) => Ok(!demo::demo(&args)?.facts.interrupted),
         Command::Budget(args) => budget::budget(&args).map(|()| true),
-        Command::Devices => {
-            console::say(false, &choose::list_devices()?)?;
+        Command::Devices(args) => {
+            console::say(false, &choose::list_devices(args.json)?)?;
             Ok(true)
         }
+        #[cfg(feature = "shell")]
+        Command::Completions { shell } => shell::completions(shell).map(|()| true),
+        #[cfg(feature = "shell")]
+        Command::Man { of } => shell::man(of.as_deref()).map(|()| true),
     }
 }

@@ -61,6 +61,11 @@ impl RunFiles {
         let (mcap, kinds) = (results.mcap.clone(), Kinds::of(results));
         RunFiles { root, kinds, mcap, pictures: PictureFiles::of(&results.views, png) }
     }
+
+    /// Whether nothing will be written.
+    pub fn is_empty(&self) -> bool {
+        self.root.is_none() && self.mcap.is_none() && self.pictures.is_empty()
+    }
 }
 
 /// Where files go.

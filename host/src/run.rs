@@ -2,6 +2,7 @@
 
 use crate::args;
 use crate::config;
+use crate::console::note;
 use crate::engine::{self, RunPlan};
 use crate::error::RunError;
 use crate::outputs::RunFiles;
@@ -25,5 +26,9 @@ pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
         summary: args.results.summary.clone(),
         quiet: args.quiet,
     };
+    if plan.files.is_empty() && plan.summary.is_none() {
+        let what = "nothing will be written, only measured: --out, --mcap, --film or --page do";
+        note(plan.quiet, [&what.to_owned()])?;
+    }
     engine::execute(&plan, source.as_mut(), &mut |_, _| ())
 }

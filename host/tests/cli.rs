@@ -275,9 +275,22 @@ fn budgets() {
     let one = raywake(&["budget", "--profile", "wide", "--limit", "1000000000"]);
     one.succeeded();
     assert!(one.stdout.contains("`ray") && !one.stdout.contains("dissertation"));
-    let over = raywake(&["budget", "--limit", "1"]);
-    over.failed(6, &["the limit of 1"]);
+    let over = raywake(&["budget", "--limit", "1kB"]);
+    over.failed(6, &["MB needed, over the limit of 1000 B"]);
     assert!(over.stdout.contains("## Totals"));
+    raywake(&["budget", "--profile", "wide", "--limit", "1GiB"]).succeeded();
+    raywake(&["budget", "--limit", "1 parsec"]).failed(2, &["--limit", "KiB"]);
+    let json = raywake(&["budget", "--profile", "wide", "--json"]);
+    json.succeeded();
+    let json: serde_json::Value = serde_json::from_str(&json.stdout).unwrap();
+    let sum = |list: &str| -> u64 {
+        let rows = json[0][list].as_array().unwrap();
+        rows.iter().map(|row| row["bytes"].as_u64().unwrap()).sum()
+    };
+    let of = |name: &str| json[0][name].as_u64().unwrap();
+    assert_eq!((json[0]["profile"].as_str(), sum("host_parts")), (Some("wide"), of("host_bytes")));
+    // Between buffers there may be room.
+    assert!((0..1000).contains(&(of("device_bytes") - sum("buffers"))), "{json}");
 }
 
 #[test]
@@ -286,8 +299,35 @@ fn help_and_devices() {
     help.succeeded();
     assert!(help.stdout.contains("130  interrupted") && help.stdout.contains("--ground"));
     raywake(&["devices"]).succeeded();
+    let devices: serde_json::Value =
+        serde_json::from_str(&raywake(&["devices", "--json"]).stdout).unwrap();
+    assert!(devices.as_array().unwrap().iter().all(|d| d["name"].is_string()), "{devices}");
     raywake(&["run"]).failed(2, &["<DATA>"]);
     raywake(&["run", "x", "--png"]).failed(2, &["--out"]);
+}
+
+#[cfg(feature = "shell")]
+#[test]
+fn completions_and_manual_pages() {
+    let bash = raywake(&["completions", "bash"]);
+    bash.succeeded();
+    assert!(bash.stdout.contains("--bin-fields") && bash.stdout.contains("complete -F"));
+    let page = raywake(&["man", "run"]);
+    page.succeeded();
+    assert!(page.stdout.contains(".SH OPTIONS") && page.stdout.contains("bin\\-fields"));
+    assert!(raywake(&["man"]).stdout.contains("raywake"));
+    raywake(&["man", "nothing"]).failed(2, &["no command `nothing`"]);
+}
+
+#[test]
+fn a_run_for_nothing_says_so() {
+    let t = Temp::new();
+    t.drive(2);
+    let says = "nothing will be written, only measured";
+    assert!(run(&t, &[]).stdout.contains(says));
+    let out = t.path().join("o");
+    assert!(!run(&t, &["-o", out.to_str().unwrap()]).stdout.contains(says));
+    assert!(out.join("summary.json").is_file());
 }
 
 #[cfg(feature = "demo")]

@@ -32,6 +32,27 @@ fn what_is_written_as_mcap_can_be_read() {
     raywake(&["run", drive, "--topic", "/other"]).failed(2, &["--topic"]);
 }
 
+/// Three sweeps of an OS1 on the road: what moves there is found without anything but the file.
+#[test]
+#[cfg(feature = "pcap")]
+fn packets_of_a_sensor() {
+    let t = Temp::new();
+    let (out, packets) =
+        (t.path().join("out"), concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/packets"));
+    let capture = format!("{packets}/OS-1-128_v2.3.0_1024x10_lb_n3.pcap");
+    let o = raywake(&[&["run", &capture, "-o", out.to_str().unwrap()], &BACKEND[..]].concat());
+    o.succeeded();
+    for says in [
+        "3 sweeps, 0.2 s of OS-1-128 127.0.0.1:7502",
+        "ground estimated at -2.0",
+        "2 sweeps located",
+    ] {
+        assert!(o.stdout.contains(says), "{says} in {}", o.stdout);
+    }
+    let s = o.summary(&out.join("summary.json"));
+    assert!(s["valid_flows_per_sweep"].as_f64() > Some(1000.0), "{s}");
+}
+
 #[test]
 fn a_recording_is_cleaned() {
     let t = Temp::new();

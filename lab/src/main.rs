@@ -5,6 +5,7 @@ use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
 use raywake_lab::{eval, matching, results, simulate, tracks, train};
+use std::error::Error;
 use std::process::ExitCode;
 
 /// Off-board tools of raywake.
@@ -70,9 +71,16 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("raywake-lab: {error}");
-            ExitCode::FAILURE
+            ExitCode::from(exit_code(error.as_ref()))
         }
     }
+}
+
+/// That of the program for the same error; 1 for those that only the lab has.
+fn exit_code(error: &(dyn Error + 'static)) -> u8 {
+    let io = error.downcast_ref::<raywake_io::Error>().map(raywake_io::Error::exit_code);
+    let run = error.downcast_ref::<RunError>().map(RunError::exit_code);
+    io.or(run).unwrap_or(1)
 }
 
 #[cfg(test)]

@@ -6,15 +6,16 @@ use std::time::Duration;
 use raywake_core::params::POINTS_MAX;
 use raywake_io::source::BinFields;
 
-use super::{FlowChoice, seconds};
+use super::FlowChoice;
+use super::values::seconds;
 
 const ABOUT: &str = "\
 Scene flow from cloud A to cloud B; no poses needed
 
 The motion of the sensor is estimated by registration, then both clouds are processed as two \
 sweeps of a drive. Clouds are scans of a spinning sensor, with z up, in the frame of the sensor or \
-the vehicle: .bin (float32 x, y, z, intensity), .npy, .pcd, .ply or .feather (columns x, y, z); A and B \
-may differ in format. Times of individual returns are ignored.";
+the vehicle: .bin (float32 x, y, z, intensity), .npy, .pcd, .ply or .feather (columns x, y, z); A \
+and B may differ in format. Times of individual returns are ignored.";
 
 const FILES: &str = "\
 Columns of --out FILE.feather, one row per point of A in file order, including invalid points:
@@ -44,7 +45,7 @@ pub struct FlowArgs {
     #[arg(short, long)]
     pub quiet: bool,
     /// Output file: .feather or .bin
-    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    #[arg(short, long, value_name = "FILE", help_heading = "Results")]
     pub out: PathBuf,
     /// Also draw the flow from above; without a name, beside --out
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]

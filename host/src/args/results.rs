@@ -8,7 +8,7 @@ use clap::ValueEnum;
 #[command(next_help_heading = "Results")]
 pub struct Results {
     /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
     #[arg(long, requires = "out", value_name = "FRAME", value_enum)]

@@ -49,7 +49,7 @@ pub struct TrackArgs {
     #[arg(long)]
     pub fixed_lag: bool,
     /// Output folder: `tracks.feather`, `clouds` and `summary.json`
-    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    #[arg(short, long, value_name = "DIR", help_heading = "Results")]
     pub out: Option<PathBuf>,
     /// Also draw the tracks of each sweep from above: DIR/png/FRAME.png
     #[arg(long, requires = "out", help_heading = "Results")]

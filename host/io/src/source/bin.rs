@@ -65,28 +65,22 @@ pub(super) fn read(
     let bytes = load(path)?;
     let (usual, wrong) = (BinFields::usual(path), |what| Error::input(path, "", what));
     let fields = told.unwrap_or(&usual);
-    let width = fields.0.len();
-    if bytes.len() % (NUMBER * width) != 0 {
+    let (numbers, rest) = bytes.as_chunks::<NUMBER>();
+    let (width, names) = (fields.0.len(), fields.0.join(", "));
+    if !rest.is_empty() || numbers.len() % width != 0 {
         return Err(wrong(format!(
-            "{} bytes, not a multiple of {} (float32 {}): truncated, or other numbers \
+            "{} bytes, not a multiple of {} (float32 {names}): truncated, or other numbers \
              (--bin-fields)?",
             bytes.len(),
             NUMBER * width,
-            fields.0.join(", ")
         )));
     }
-    let (numbers, _) = bytes.as_chunks::<NUMBER>();
     let value = |row: usize, field: usize| f32::from_le_bytes(numbers[row * width + field]);
     let rows = numbers.len() / width;
-    if told.is_none() {
-        let negative = (0..rows).filter(|row| value(*row, 3) < 0.0).count();
-        if negative as f64 > NEGATIVE_MAX * rows as f64 {
-            return Err(wrong(format!(
-                "{negative} of {rows} intensities are negative: other numbers than float32 {}? \
-                 (--bin-fields)",
-                fields.0.join(", ")
-            )));
-        }
+    let negative = (0..rows).filter(|row| told.is_none() && value(*row, 3) < 0.0).count();
+    if negative as f64 > NEGATIVE_MAX * rows as f64 {
+        let what = format!("{negative} of {rows} intensities are negative: other numbers than");
+        return Err(wrong(format!("{what} float32 {names}? (--bin-fields)")));
     }
     let found = fields.find().map_err(wrong)?;
     Ok(found.returns(rows, |row, field| value(row, field).into(), points))

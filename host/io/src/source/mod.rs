@@ -9,9 +9,10 @@
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
 //!
-//! A `.bin` is little-endian float32 x, y, z, intensity per return, or as [`BinFields`] say. Poses and times are read and
-//! checked when a source is opened, clouds one at a time. A KITTI raw drive of several sensors has
-//! `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` beside its clouds.
+//! A `.bin` is little-endian float32 x, y, z, intensity per return, or as [`BinFields`] say. Poses
+//! and times are read and checked when a source is opened, clouds one at a time. A KITTI raw drive
+//! of several sensors has `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` beside its
+//! clouds.
 
 #[cfg(feature = "arrow")]
 mod argoverse;

@@ -35,8 +35,8 @@ struct PoseRow {
 
 /// The pose at each of some stamps, ns, by a file; `None` where it has none.
 ///
-/// Rows without a time are those of the first sweeps, and so are rows with times that are of another
-/// clock, if there is one for each sweep. Fails where a row is no pose, where one lies out of reach
+/// Rows without a time are those of the first sweeps, and so are rows with times of another clock,
+/// if there is one for each sweep. Fails where a row is no pose, where one lies out of reach
 /// of any drive, where there are more rows without time than sweeps, and where no sweep has a pose.
 pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, Error> {
     let (rows, sweeps) = (rows(path)?, stamps_ns.len());

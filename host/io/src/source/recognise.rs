@@ -35,7 +35,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
             path,
             "",
             "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
-             nor any `.bin`, `.npy`, `.pcd`, `.ply` or `.mcap` file; a `.pcap` is to be named itself",
+             nor any `.bin`, `.npy`, `.pcd`, `.ply` or `.mcap` file (a `.pcap` is named itself)",
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();

@@ -21,7 +21,7 @@ impl Trajectory {
         self.rows.sort_by_key(|row| row.0);
     }
 
-    /// The pose at a time, ns, or at the nearer end where it is beyond that by no more than `slack_ns`.
+    /// The pose at a time, ns; beyond an end by no more than `slack_ns`, the one there.
     pub fn near(&self, stamp_ns: i64, slack_ns: i64) -> Option<Pose> {
         let (first, last) = (self.rows.first()?.0, self.rows.last()?.0);
         let inside = stamp_ns.clamp(first, last);

@@ -279,19 +279,13 @@ impl Frames {
         }
         let from = self.fragments[0];
         self.pool.retain(|last| *last >= from);
-        let mut flow = ControlFlow::Continue(());
-        match self.pool.process_sliced_packet(packet, place, ()) {
-            Ok(Some(whole)) => {
-                if whole.ip_number == ip_number::UDP
-                    && let Ok(udp) = UdpSlice::from_slice(&whole.payload)
-                {
-                    flow = show(from, &udp);
-                }
-                self.pool.return_buf(whole);
-            }
-            Ok(None) => {}
-            Err(_) => counts.cut += 1,
-        }
+        let whole = self.pool.process_sliced_packet(packet, place, ());
+        counts.cut += u64::from(whole.is_err());
+        let Ok(Some(whole)) = whole else { return ControlFlow::Continue(()) };
+        let is_udp = whole.ip_number == ip_number::UDP;
+        let udp = UdpSlice::from_slice(&whole.payload).ok().filter(|_| is_udp);
+        let flow = udp.map_or(ControlFlow::Continue(()), |udp| show(from, &udp));
+        self.pool.return_buf(whole);
         flow
     }
 }

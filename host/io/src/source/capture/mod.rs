@@ -145,12 +145,13 @@ impl Capture {
             for (number, firing) in self.sensor.firings(payload) {
                 let before = place == cut.place && number < cut.firing;
                 let after = place == next.place && number >= next.firing;
-                let order = self.sensor.order(&firing, last.as_ref());
-                if !before && !after && order != Order::Late {
-                    let offset_ns = self.sensor.since(firing.clock_ns, cut.clock_ns);
-                    self.sensor.returns(payload, number, offset_ns, points);
-                    last = Some(firing);
+                let late = || self.sensor.order(&firing, last.as_ref()) == Order::Late;
+                if before || after || late() {
+                    continue;
                 }
+                let offset_ns = self.sensor.since(firing.clock_ns, cut.clock_ns);
+                self.sensor.returns(payload, number, offset_ns, points);
+                last = Some(firing);
             }
             ControlFlow::Continue(())
         })?;

@@ -1,0 +1,63 @@
+//! Values of options.
+
+use std::time::Duration;
+
+/// A number of at least one.
+pub(super) fn count(text: &str) -> Result<usize, String> {
+    let count = text.parse().map_err(|_| "not a number")?;
+    if count > 0 { Ok(count) } else { Err("must be at least 1".into()) }
+}
+
+/// Corners of a rectangle.
+pub(super) fn vehicle_box(text: &str) -> Result<[[f32; 2]; 2], String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let numbers = numbers.map_err(|_| "expected four numbers: X0,Y0,X1,Y1")?;
+    match numbers[..] {
+        [a, b, c, d] if a < c && b < d && numbers.iter().all(|n| n.is_finite()) => {
+            Ok([[a, b], [c, d]])
+        }
+        _ => Err("expected X0,Y0,X1,Y1 with X0 below X1 and Y0 below Y1".into()),
+    }
+}
+
+/// Bytes: a number with or without a unit.
+pub(super) fn size(text: &str) -> Result<u64, String> {
+    let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let (number, unit) = text.split_at(digits);
+    let unit = match unit.trim() {
+        "" | "B" => 1,
+        "kB" => 1_000,
+        "MB" => 1_000_000,
+        "GB" => 1_000_000_000,
+        "KiB" => 1 << 10,
+        "MiB" => 1 << 20,
+        "GiB" => 1 << 30,
+        _ => return Err("expected a whole number with B, kB, MB, GB, KiB, MiB or GiB".into()),
+    };
+    let bytes = number.parse::<u64>().ok().and_then(|n| n.checked_mul(unit));
+    bytes.ok_or_else(|| "not a number of bytes".into())
+}
+
+/// A duration.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number")?;
+    let duration = Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())?;
+    if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers() {
+        assert_eq!(seconds("0.5"), Ok(Duration::from_millis(500)));
+        assert!(["0", "-1", "nan", "inf", "x"].iter().all(|s| seconds(s).is_err()));
+        assert!(count("0").is_err());
+        let sizes = ["7", "64MiB", "2 kB", "3GB"].map(size);
+        assert_eq!(sizes, [Ok(7), Ok(64 << 20), Ok(2000), Ok(3_000_000_000)]);
+        assert!(
+            ["", "MB", "-1", "1.5MB", "4M", "99999999999999GB"].iter().all(|s| size(s).is_err())
+        );
+    }
+}
