@@ -22,6 +22,7 @@ use crate::locate::Locator;
 use crate::outputs::{Outputs, RunFiles};
 use crate::report;
 use crate::session::{Visit, each_sweep};
+use crate::settings_file::Made;
 use crate::statistics::Statistics;
 use crate::summary::{Facts, RunSummary};
 use crate::team;
@@ -71,7 +72,17 @@ pub fn execute<S: Source + ?Sized>(
     observe: Observer<S>,
 ) -> Result<RunSummary, RunError> {
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
-    let figures = FiguresFile::create(plan.summary.as_deref(), plan.files.root.as_deref())?;
+    let root = plan.files.root.as_deref();
+    let made = Made {
+        command: "run",
+        recording: source.overview(),
+        first: plan.sweeps.start,
+        profile,
+        objects: None,
+        weights: &plan.weights.digest(),
+    };
+    made.claim(root)?;
+    let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
     let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     say(&format!("{}\n", source.describe()))?;

@@ -14,7 +14,7 @@
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
 //! | [`locate`] | sweeps without poses, by registration |
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
-//! | [`outputs`], [`summary`], `figures` | files of a run, its figures, and where these go |
+//! | [`outputs`], [`summary`], `figures`, `settings_file` | files of a run, its figures, settings |
 //! | [`statistics`], [`order_statistics`], [`laps`] | what is counted and timed |
 //! | [`console`], [`progress`], `report`, `shell` | what the user reads, and types |
 //! | [`error`] | what can end a command, and its exit code |
@@ -44,6 +44,7 @@ pub mod progress;
 mod report;
 mod run;
 mod session;
+mod settings_file;
 #[cfg(feature = "shell")]
 mod shell;
 pub mod statistics;

@@ -23,6 +23,7 @@ use crate::console::{interrupted, note, say};
 use crate::error::RunError;
 use crate::progress::Progress;
 use crate::session::each_sweep;
+use crate::settings_file::Made;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
 use judged::{Judged, OneWay, judge};
@@ -46,10 +47,20 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         return Err(Error::Usage(what.into()).into());
     }
     let profile = config::profile(&args.flow.profile)?;
+    let weights = WeightFiles::read(&args.flow.learned, &profile)?;
+    let sweeps = args.part.range(source.len())?;
+    let made = Made {
+        command: "clean",
+        recording: source.overview(),
+        first: sweeps.start,
+        profile: &profile,
+        objects: None,
+        weights: &weights.digest(),
+    };
+    made.claim(Some(&args.out))?;
     for folder in ["labels", "static", "moving"] {
         atomic::create_folder(&args.out.join(folder))?;
     }
-    let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let mut cleaning = Cleaning {
         args,
         profile,
@@ -60,7 +71,6 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         counts: [0; 4],
     };
     say(args.quiet, &format!("{}\n", source.describe()))?;
-    let sweeps = args.part.range(source.len())?;
     let done = cleaning.forwards(source.as_mut(), sweeps.clone())?
         && cleaning.backwards(source.as_mut(), sweeps)?;
     if done {

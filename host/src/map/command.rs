@@ -14,8 +14,8 @@ use crate::laps::milliseconds;
 use crate::order_statistics::Spread;
 use crate::picture::{PictureFiles, Pictures, Subject, SweepFigures};
 use crate::session::each_sweep;
+use crate::settings_file::Made;
 use crate::statistics::Dropped;
-use raywake_io::sink::atomic;
 use raywake_io::sink::feather::{self, Voxel};
 use raywake_io::source::{self, SweepData};
 
@@ -25,7 +25,15 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
-    atomic::create_folder(&args.out)?;
+    let made = Made {
+        command: "map",
+        recording: source.overview(),
+        first: sweeps.start,
+        profile: &profile,
+        objects: None,
+        weights: "none",
+    };
+    made.claim(Some(&args.out))?;
     let wanted = choose::wanted(&args.backend)?;
     let backend = match &wanted.device {
         Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),

@@ -17,6 +17,7 @@ use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::progress::Progress;
 use crate::session::each_sweep;
+use crate::settings_file::Made;
 use crate::weight_files::WeightFiles;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
@@ -36,6 +37,15 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
+    let made = Made {
+        command: "track",
+        recording: source.overview(),
+        first: sweeps.start,
+        profile: &settings.profile,
+        objects: Some(&settings.objects),
+        weights: &WeightFiles::read(&args.flow.learned, &settings.profile)?.digest(),
+    };
+    made.claim(args.out.as_deref())?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
     let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
     say(args.quiet, &format!("{}\n", source.describe()))?;

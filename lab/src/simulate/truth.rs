@@ -152,7 +152,7 @@ pub(super) fn of_objects(
 
 /// Writes the truth of a sweep's returns.
 pub fn write_points(path: &Path, rows: &[PointTruth]) -> Result<(), Error> {
-    let mut t = TableWriter::compressed();
+    let mut t = TableWriter::default();
     t.column("offset_s", rows, |r| r.offset_s);
     t.column("sensor", rows, |r| r.sensor);
     t.column("object", rows, |r| r.object);
@@ -202,7 +202,7 @@ fn numbers(o: &ObjectTruth) -> [f64; 14] {
 
 /// Writes the truth of objects.
 pub fn write_objects(path: &Path, rows: &[ObjectTruth]) -> Result<(), Error> {
-    let mut t = TableWriter::compressed();
+    let mut t = TableWriter::default();
     t.column("frame", rows, |o| o.frame);
     t.column("id", rows, |o| o.id);
     t.column("class", rows, |o| class_name(o.class).to_owned());

@@ -26,16 +26,9 @@ values!(F32 f32, F64 f64, I32 i32, U8 u8, U32 u32, U64 u64, Bool bool, Text Stri
 #[derive(Default)]
 pub struct TableWriter {
     columns: Vec<(String, Values)>,
-    #[cfg_attr(not(feature = "arrow"), allow(dead_code))]
-    compressed: bool,
 }
 
 impl TableWriter {
-    /// A table that is written with LZ4: of a simulated sweep's truth a twentieth is left.
-    pub fn compressed() -> TableWriter {
-        TableWriter { compressed: true, ..TableWriter::default() }
-    }
-
     /// Adds a column of a value of every row; all columns must be of the same length.
     pub fn column<R, V>(&mut self, name: &str, rows: &[R], value: impl Fn(&R) -> V)
     where
@@ -59,16 +52,13 @@ impl TableWriter {
         }
     }
 
-    /// Writes the table, uncompressed unless it was made so: a sweep's worth takes a millisecond
-    /// then. The metadata goes to the schema, with this program's version as `raywake`.
+    /// Writes the table, compressed by Zstandard: a third is left of a sweep's flow. The metadata
+    /// goes to the schema, with this program's version as `raywake`.
     #[cfg(feature = "arrow")]
     pub fn write(self, path: &Path, meta: Meta<'_>) -> Result<(), Error> {
         let batch = arrow::batch(self.columns, meta)
             .map_err(|e| Error::Write { path: path.to_path_buf(), source: arrow::reason(e) })?;
-        let compressed = self.compressed;
-        super::atomic::write(path, |out| {
-            arrow::write(&batch, compressed, out).map_err(arrow::reason)
-        })
+        super::atomic::write(path, |out| arrow::write(&batch, out).map_err(arrow::reason))
     }
 
     /// Fails: this build has no feather files.
@@ -126,12 +116,8 @@ mod arrow {
     }
 
     /// One batch as a file.
-    pub fn write(
-        batch: &RecordBatch,
-        compressed: bool,
-        out: &mut impl Write,
-    ) -> Result<(), ArrowError> {
-        let codec = compressed.then_some(CompressionType::LZ4_FRAME);
+    pub fn write(batch: &RecordBatch, out: &mut impl Write) -> Result<(), ArrowError> {
+        let codec = Some(CompressionType::ZSTD);
         let options = IpcWriteOptions::default().try_with_compression(codec)?;
         let mut writer = FileWriter::try_new_with_options(out, &batch.schema(), options)?;
         writer.write(batch)?;

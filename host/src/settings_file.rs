@@ -1,0 +1,184 @@
+//! `settings.toml` beside results: what they were made with, as `--config` takes it (the parameters
+//! of `raywake map` are fixed).
+//!
+//! It keeps results of different settings or recordings from being mixed: a folder that has one
+//! takes only results that would leave the same one.
+
+use std::fmt::Write;
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+
+use raywake_core::params::{Parameters, Profile, Value};
+use raywake_io::Error;
+use raywake_io::sink::atomic;
+use raywake_io::source::Overview;
+use raywake_objects::params::TrackingParams;
+
+/// Name of the file.
+const NAME: &str = "settings.toml";
+
+/// What results are made with.
+pub struct Made<'a> {
+    /// The command that makes them.
+    pub command: &'static str,
+    /// The recording.
+    pub recording: &'a Overview,
+    /// Index of the first sweep: what is known of movers grows from there.
+    pub first: usize,
+    /// Parameters of the flow or the map.
+    pub profile: &'a Profile,
+    /// Parameters of tracking, where it is done.
+    pub objects: Option<&'a TrackingParams>,
+    /// Digest of the model weights, or what takes their place.
+    pub weights: &'a str,
+}
+
+impl Made<'_> {
+    /// Writes the file into the folder of the results, where there is one.
+    ///
+    /// # Errors
+    /// Where the folder has results of another recording or other settings, and where the file
+    /// cannot be written.
+    pub fn claim(&self, root: Option<&Path>) -> Result<(), Error> {
+        let Some(root) = root else { return Ok(()) };
+        let (path, text) = (root.join(NAME), self.text());
+        if path.is_file() {
+            let there = fs::read_to_string(&path).map_err(Error::reading(&path))?;
+            return if there == text { Ok(()) } else { Err(different(root, &there, &text)) };
+        }
+        atomic::create_folder(root)?;
+        atomic::write(&path, |out| out.write_all(text.as_bytes()))
+    }
+
+    fn text(&self) -> String {
+        let Made { command, recording, first, profile, objects, weights } = self;
+        let Overview { name, rig, frames, .. } = recording;
+        let poses = if recording.track.poses.is_empty() { "none" } else { "of the recording" };
+        let own = rig.own_vehicle.map_or("none".into(), |own| format!("{own:?} m"));
+        let mut text = format!(
+            "# raywake {} {command}, model weights {weights}\n\
+             # {name}: {} sweeps from frame {}, from the sweep with index {first} on\n\
+             # poses: {poses}; ground at {:?} m; deskew {}; box of the own vehicle: {own}\n\
+             base = \"hdl64\"\nname = \"{}\"\n",
+            env!("CARGO_PKG_VERSION"),
+            frames.len(),
+            frames[0],
+            rig.ground_m,
+            rig.distorted,
+            profile.name,
+        );
+        for (group, parameters) in profile.groups() {
+            add(&mut text, group, parameters);
+        }
+        if let Some(objects) = objects {
+            let mut objects = **objects;
+            objects.each(&mut |group, parameters| {
+                add(&mut text, &format!("objects.{group}"), parameters);
+            });
+        }
+        text
+    }
+}
+
+/// That a folder has other results, with the first line that tells.
+fn different(root: &Path, there: &str, here: &str) -> Error {
+    let mut lines = there.lines().zip(here.lines());
+    let (there, here) = lines.find(|(a, b)| a != b).unwrap_or(("shorter", "longer"));
+    Error::Usage(format!(
+        "{} holds other results; its {NAME} has `{there}`, these would have `{here}`: choose \
+         another folder, or delete it",
+        root.display()
+    ))
+}
+
+/// Adds a group of parameters, with its name as the head of a table.
+fn add(text: &mut String, group: &str, parameters: &dyn Parameters) {
+    if !group.is_empty() {
+        let _ = write!(text, "\n[{group}]\n");
+    }
+    for parameter in parameters.declared() {
+        let value = match parameters.get(parameter.name) {
+            Some(Value::Number(v)) => format!("{v:?}"),
+            Some(Value::Single(v)) => format!("{v:?}"),
+            Some(Value::Whole(v)) => v.to_string(),
+            Some(Value::Flag(v)) => v.to_string(),
+            Some(Value::Word(v)) => format!("\"{v}\""),
+            None => continue,
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{} = {value}", parameter.name);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::ProfileChoice;
+    use crate::config;
+    use raywake_core::pose::Pose;
+    use raywake_core::sweep::{Rig, Timing};
+    use raywake_io::source::PoseTrack;
+
+    fn recording() -> Overview {
+        Overview {
+            name: "a drive".into(),
+            rig: Rig {
+                sensors: core::iter::once(Pose::IDENTITY).collect(),
+                timing: Timing::AtStamp,
+                distorted: true,
+                ground_m: -1.73,
+                own_vehicle: None,
+            },
+            frames: vec![3, 4],
+            track: PoseTrack::default(),
+            epoch_ns: 0,
+            trusted: false,
+            notes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_is_written_sets_the_same() {
+        let (folder, recording) = (tempfile::tempdir().unwrap(), recording());
+        let mut objects = TrackingParams::DEFAULT;
+        objects.front_end.link_m = 0.1 + 0.2;
+        for profile in &Profile::shipped() {
+            let root = folder.path().join(profile.name.as_str());
+            let (objects, weights) = (Some(&objects), "0");
+            let made = Made {
+                command: "track",
+                recording: &recording,
+                first: 0,
+                profile,
+                objects,
+                weights,
+            };
+            made.claim(Some(&root)).unwrap();
+            let choice = ProfileChoice { config: Some(root.join(NAME)), ..Default::default() };
+            let settings = config::settings(&choice).unwrap();
+            assert_eq!((&settings.profile, Some(&settings.objects)), (profile, objects));
+        }
+    }
+
+    #[test]
+    fn results_are_not_mixed() {
+        let (folder, recording) = (tempfile::tempdir().unwrap(), recording());
+        let profile = &Profile::hdl64();
+        let made = |first, weights| {
+            let made = Made {
+                command: "run",
+                recording: &recording,
+                first,
+                profile,
+                objects: None,
+                weights,
+            };
+            made.claim(Some(folder.path())).map_err(|e| e.to_string())
+        };
+        assert_eq!((made(0, "0"), made(0, "0")), (Ok(()), Ok(())));
+        let e = made(1, "0").unwrap_err();
+        assert!(e.contains("with index 0 on`, these would have") && e.contains("index 1"), "{e}");
+        assert!(made(0, "1").unwrap_err().contains("holds other results"));
+    }
+}
