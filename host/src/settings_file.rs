@@ -17,6 +17,8 @@ use raywake_objects::params::TrackingParams;
 
 /// Name of the file.
 const NAME: &str = "settings.toml";
+/// Differences that an error tells, at most.
+const LINES_TOLD: usize = 3;
 
 /// What results are made with.
 pub struct Made<'a> {
@@ -81,14 +83,15 @@ impl Made<'_> {
     }
 }
 
-/// That a folder has other results, with the first line that tells.
+/// That a folder has other results, with the first lines that tell.
 fn different(root: &Path, there: &str, here: &str) -> Error {
-    let mut lines = there.lines().zip(here.lines());
-    let (there, here) = lines.find(|(a, b)| a != b).unwrap_or(("shorter", "longer"));
+    let lines = there.lines().zip(here.lines());
+    let told = lines.filter(|(a, b)| a != b).take(LINES_TOLD);
+    let told: Vec<String> = told.map(|(a, b)| format!("`{a}`, not `{b}`")).collect();
     Error::Usage(format!(
-        "{} holds other results; its {NAME} has `{there}`, these would have `{here}`: choose \
-         another folder, or delete it",
-        root.display()
+        "{} holds other results: its {NAME} has {}; choose another folder, or delete it",
+        root.display(),
+        told.join(", ")
     ))
 }
 
@@ -178,7 +181,7 @@ mod tests {
         };
         assert_eq!((made(0, "0"), made(0, "0")), (Ok(()), Ok(())));
         let e = made(1, "0").unwrap_err();
-        assert!(e.contains("with index 0 on`, these would have") && e.contains("index 1"), "{e}");
+        assert!(e.contains("with index 0 on`, not `") && e.contains("index 1"), "{e}");
         assert!(made(0, "1").unwrap_err().contains("holds other results"));
     }
 }
