@@ -34,6 +34,8 @@ use firing::TURN;
 use sensor::{Order, Sensor};
 use streams::{Cut, Stream};
 
+/// Longest time between two sweeps that is believed, ns: an hour.
+const STEP_MAX_NS: i64 = 3_600_000_000_000;
 /// Clocks beyond this count from 1970, ns: 2001.
 const EPOCH_MIN_NS: u64 = 1_000_000_000_000_000_000;
 
@@ -68,7 +70,7 @@ impl Capture {
             sweeps,
             poses_from: "registration".into(),
         };
-        capture.set_stamps()?;
+        capture.set_stamps();
         capture.locate(options)?;
         let mut first = Vec::new();
         capture.read_points(0, &mut first)?;
@@ -79,15 +81,19 @@ impl Capture {
     }
 
     /// Stamps of the sweeps, and their numbers: where a turn is missing, one is passed over.
-    fn set_stamps(&mut self) -> Result<(), Error> {
+    fn set_stamps(&mut self) {
         let cuts: Vec<Cut> = self.sweeps.iter().map(|sweep| sweep[0]).collect();
         let step = |pair: &[Cut]| self.sensor.since(pair[1].clock_ns, pair[0].clock_ns);
-        let steps: Vec<i64> = cuts.windows(2).map(step).collect();
-        if let Some(n) = steps.iter().position(|step| *step <= 0) {
-            let what = format!("the sensor's clock goes back by {} s", -steps[n] as f64 * 1e-9);
-            return Err(Error::input(&self.path, format!("byte {}", cuts[n + 1].place), what));
+        let mut steps: Vec<i64> = cuts.windows(2).map(step).collect();
+        let usual = median(&steps);
+        let set = steps.iter_mut().filter(|step| !(1..=STEP_MAX_NS).contains(*step));
+        let set = set.map(|step| *step = usual.clamp(1, STEP_MAX_NS)).count();
+        if set > 0 {
+            let note =
+                format!("the sensor's clock was set, one turn is assumed there: {set} times");
+            self.overview.notes.push(note);
         }
-        let usual = median(&steps) as f64;
+        let usual = usual as f64;
         let Overview { frames, track, epoch_ns, .. } = &mut self.overview;
         (*frames, track.stamps_s) = (vec![0], vec![0.0]);
         let mut since_ns = 0;
@@ -102,7 +108,6 @@ impl Capture {
         let first = &cuts[0];
         let told = first.clock_ns >= EPOCH_MIN_NS;
         *epoch_ns = if told { first.clock_ns } else { first.time_ns };
-        Ok(())
     }
 
     fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {

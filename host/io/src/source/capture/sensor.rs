@@ -11,8 +11,8 @@ use super::velodyne::{self, Velodyne};
 /// A firing this long after the one before begins another sweep, where the sensor does not count
 /// its turns, ns: a turn of the fastest sensor.
 const PAUSE_NS: i64 = 50_000_000;
-/// A firing not after the one before is late or a copy; by this much, ns, the clock was set.
-const SET_BACK_NS: i64 = -1_000_000_000;
+/// A firing not after the one before is late or a copy; this far from it, ns, the clock was set.
+const SET_NS: u64 = 1_000_000_000;
 
 /// Where a firing belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +95,7 @@ impl Sensor {
             _ => u64::from(before.angle.saturating_sub(firing.angle)) > TURN / 2,
         };
         match since_ns {
-            _ if since_ns <= SET_BACK_NS => Order::Begins,
+            _ if since_ns.unsigned_abs() >= SET_NS => Order::Begins,
             ..=0 => Order::Late,
             _ if turns => Order::Begins,
             _ => Order::GoesOn,

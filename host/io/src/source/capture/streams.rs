@@ -161,7 +161,9 @@ pub(super) fn streams(
     path: &Path,
     datagrams: &Datagrams,
 ) -> Result<(Vec<Stream>, FrameCounts), Error> {
-    let ouster = metadata(path)?.map(|path| Ouster::read(&path)).transpose()?.map(Arc::new);
+    let ouster = metadata(path)?.map(|path| Ouster::read(&path).map(Arc::new)).transpose();
+    // Of a Velodyne's capture a file of that name is something else.
+    let (ouster, unread) = ouster.map_or_else(|e| (None, Some(e)), |ouster| (ouster, None));
     let mut streams = Streams { all: Vec::new(), ouster, seen: 0, largest: 0 };
     let counts = datagrams.each(0, |datagram| {
         streams.take(&datagram);
@@ -169,7 +171,7 @@ pub(super) fn streams(
     })?;
     streams.all.retain(|stream| !stream.cuts.is_empty());
     if streams.all.is_empty() {
-        return Err(streams.none(path));
+        return Err(unread.unwrap_or_else(|| streams.none(path)));
     }
     Ok((streams.all, counts))
 }
