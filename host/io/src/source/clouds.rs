@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
 use super::bin::{self, BinFields};
 use super::sidecars::Sidecars;
-use super::{Overview, Source, SourceGaps, SweepData, pcd, ply};
+use super::{Overview, Source, SourceGaps, SweepData, pcd, ply, viewpoints};
 use crate::Error;
 
 /// An open folder.
@@ -18,6 +19,8 @@ pub(super) struct Clouds {
     pub poses_from: String,
     /// File of every sweep.
     pub files: Vec<PathBuf>,
+    /// Poses of the clouds, where their points are in the world and not in the vehicle's frame.
+    pub world_from_cloud: Vec<Pose>,
     /// What the numbers of a return are, where the user tells.
     pub fields: Option<BinFields>,
     /// Files that tell times and sensors of returns.
@@ -39,6 +42,9 @@ impl Source for Clouds {
         into.dropped = SourceGaps { sweeps_before, null_rows: 0 };
         let path = &self.files[index];
         read_cloud(path, self.fields.as_ref(), &mut into.points)?;
+        if let Some(pose) = self.world_from_cloud.get(index) {
+            viewpoints::leave_world(&mut into.points, pose);
+        }
         let Some(sidecars) = &self.sidecars else { return Ok(()) };
         sidecars.fill(path, &mut into.points).inspect_err(|_| into.points.clear())
     }

@@ -13,7 +13,8 @@ use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::Sidecars;
 use super::{
-    OpenOptions, Overview, PosesFrame, Unlocated, apply, first_sweep, folder_name, oxts, pose_files,
+    OpenOptions, Overview, PosesFrame, Unlocated, apply, first_sweep, folder_name, oxts,
+    pose_files, viewpoints,
 };
 use crate::Error;
 
@@ -73,9 +74,11 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     }
     let mut opening = Opening::new(folder, folder, kind, "folder of clouds")?;
     opening.read_times(&["times.txt"])?;
+    let viewpoints = if kind == "pcd" { viewpoints::read(&opening.files)? } else { None };
     match &options.poses {
-        _ if options.unlocated == Unlocated::Always => {}
         Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
+        _ if viewpoints.is_some() => opening.take_viewpoints(viewpoints, options),
+        _ if options.unlocated == Unlocated::Always => {}
         None => options.go_without_poses(&opening.root, "point clouds only")?,
     }
     opening.look_at_returns(options)?;
@@ -94,8 +97,10 @@ struct Opening {
     sidecars: Option<Sidecars>,
     /// Earliest time after the stamp and duration of a sweep, s, where clouds have times.
     span: Option<[f64; 2]>,
-    /// Height of the ground in the frame of the clouds, m.
+    /// Height of the ground in the frame of the vehicle, m.
     ground_m: f64,
+    /// Poses of the clouds, where their points are in the world and not in the vehicle's frame.
+    world_from_cloud: Vec<Pose>,
     notes: Vec<String>,
 }
 
@@ -124,6 +129,7 @@ impl Opening {
             sidecars: None,
             span: None,
             ground_m: GROUND_M,
+            world_from_cloud: Vec::new(),
             notes,
         })
     }
@@ -215,10 +221,27 @@ impl Opening {
         Ok(oxts::default_velo_from_imu())
     }
 
+    /// Takes poses from the headers of PCD files.
+    fn take_viewpoints(&mut self, found: Option<(Vec<Pose>, bool)>, options: &OpenOptions) {
+        let Some((poses, in_world)) = found else { return };
+        let frame = if in_world { "the world" } else { "the frame of the sensor" };
+        self.notes.push(format!("VIEWPOINT: points are in {frame}"));
+        if in_world {
+            self.world_from_cloud.clone_from(&poses);
+        }
+        if options.unlocated != Unlocated::Always {
+            (self.track.poses, self.poses_from) = (poses, "VIEWPOINT".into());
+        }
+    }
+
     /// Learns from the first cloud when its returns were measured, and where the ground is.
     fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let (path, mut points) = (&self.files[0].1, Vec::new());
-        if read_cloud(path, options.bin_fields.as_ref(), &mut points)? {
+        let timed = read_cloud(path, options.bin_fields.as_ref(), &mut points)?;
+        if let Some(pose) = self.world_from_cloud.first() {
+            viewpoints::leave_world(&mut points, pose);
+        }
+        if timed {
             self.span = first_sweep::span(&points).map_err(|what| Error::input(path, "", what))?;
         }
         if self.span.is_none() {
@@ -256,6 +279,7 @@ impl Opening {
             poses_from: self.poses_from,
             files: self.files.into_iter().map(|f| f.1).collect(),
             fields: options.bin_fields.clone(),
+            world_from_cloud: self.world_from_cloud,
             sidecars: self.sidecars,
         }
     }

@@ -5,7 +5,7 @@
 //! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt`, else `oxts/data/N.txt` |
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
-//! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a file named on the command line |
+//! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a named file, PCD's `VIEWPOINT` |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
 //!
@@ -43,6 +43,7 @@ mod sidecars;
 pub mod simulated;
 pub mod text;
 mod trajectory;
+mod viewpoints;
 
 #[cfg(test)]
 pub(crate) mod tests;

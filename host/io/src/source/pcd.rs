@@ -1,14 +1,18 @@
 //! PCD files of the Point Cloud Library, version 0.7: text, binary or compressed.
 //!
-//! The fields are those of [`super::returns`]. `VIEWPOINT` is not applied: points are taken to be
-//! in the vehicle frame.
+//! The fields are those of [`super::returns`]. `VIEWPOINT`, where the sensor was, makes poses of a
+//! folder of files that have it ([`super::viewpoints`]).
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
+use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
-use super::lzf;
+use super::poses::rigid;
 use super::returns::{Attribute, Fields, Head, Number, load, records, table};
+use super::{lzf, text};
 use crate::Error;
 
 /// Replaces `points` by those of a file; returns whether they have times.
@@ -45,6 +49,30 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
             Ok(fields.returns(rows, |row, f| columns[f].value(&unpacked, row, false), points))
         }
     }
+}
+
+/// Bytes of a file that its header is looked for in.
+const HEADER_MAX: u64 = 4096;
+
+/// What a header says of where the sensor was, x, y, z and quaternion w, x, y, z; `None` where it
+/// says nothing.
+///
+/// Fails where the file cannot be read, and where that is no pose.
+pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
+    let file = File::open(path).map_err(Error::reading(path))?;
+    let mut bytes = Vec::new();
+    file.take(HEADER_MAX).read_to_end(&mut bytes).map_err(Error::reading(path))?;
+    for (n, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        if line.starts_with("DATA") {
+            break;
+        }
+        let Some(numbers) = line.strip_prefix("VIEWPOINT") else { continue };
+        let [x, y, z, w, a, b, c] = text::exactly(path, n + 1, numbers)?;
+        let pose = rigid([x, y, z], [a, b, c, w]);
+        return pose.map(Some).map_err(|what| Error::input(path, format!("line {}", n + 1), what));
+    }
+    Ok(None)
 }
 
 /// The body of a compressed file: its packed and unpacked length, 32 bits each, and the former's

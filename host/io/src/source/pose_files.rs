@@ -8,18 +8,15 @@
 
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-use super::poses::pose_from;
+use super::poses::{pose_from, rigid};
 use super::trajectory::Trajectory;
 use super::{npy, text};
 use crate::Error;
 
 /// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
 const REACH_MAX_M: f64 = 1e6;
-/// How far the length of a quaternion may be from 1.
-const UNIT_TOLERANCE: f64 = 1e-2;
 /// A stamp this little before the first pose or after the last one has that, ns: text rounds times.
 const SLACK_NS: i64 = 1_000_000;
 /// Largest time that is believed, s.
@@ -124,17 +121,12 @@ fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
     let wrong = |what: &str| Error::input(path, place.clone(), what);
     let (time_s, pose) = match *numbers {
         [time_s, x, y, z, a, b, c, d] => {
-            let rotation = DQuat::from_xyzw(a, b, c, d);
-            if !numbers.iter().all(|n| n.is_finite()) {
-                return Err(wrong("a pose with a NaN or infinite number"));
-            }
-            if (rotation.length() - 1.0).abs() > UNIT_TOLERANCE {
-                return Err(wrong("the quaternion of the pose has not the length 1"));
-            }
-            if time_s.abs() > TIME_MAX_S {
+            let pose = rigid([x, y, z], [a, b, c, d]).map_err(wrong)?;
+            // Not the other way round: NaN lies within nothing.
+            if !(-TIME_MAX_S..=TIME_MAX_S).contains(&time_s) {
                 return Err(wrong(&format!("a time of {time_s} s")));
             }
-            (Some(time_s), Pose::new(rotation, DVec3::new(x, y, z)))
+            (Some(time_s), pose)
         }
         _ => {
             let matrix = numbers.first_chunk().filter(|_| matches!(numbers.len(), 12 | 16));
@@ -191,7 +183,7 @@ mod tests {
         assert!(refused("m.txt", "1 2 3", &[0]).contains("line 1: 12 numbers (a 3x4 matrix) or 8"));
         let skew = tum(0.0).replace("0 0 0 1", "0 0 0 0.5");
         assert!(refused("m.txt", &skew, &[0]).contains("has not the length 1"));
-        assert!(refused("m.txt", &tum(f64::NAN), &[0]).contains("NaN or infinite"));
+        assert!(refused("m.txt", &tum(f64::NAN), &[0]).contains("a time of NaN s"));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use raywake_core::continuity::ContinuityLimits;
 use raywake_core::pose::{Pose, PoseError, Twist};
 
@@ -64,6 +64,21 @@ pub(super) fn check_rising(
         }
     }
     Ok(())
+}
+
+/// How far the length of a quaternion may be from 1.
+const UNIT_TOLERANCE: f64 = 1e-2;
+
+/// A pose from a place and a quaternion x, y, z, w, or what is wrong with it.
+pub(super) fn rigid(place: [f64; 3], [x, y, z, w]: [f64; 4]) -> Result<Pose, &'static str> {
+    let (rotation, place) = (DQuat::from_xyzw(x, y, z, w), DVec3::from_array(place));
+    if !rotation.is_finite() || !place.is_finite() {
+        return Err("a pose with a NaN or infinite number");
+    }
+    if (rotation.length() - 1.0).abs() > UNIT_TOLERANCE {
+        return Err("the quaternion of the pose has not the length 1");
+    }
+    Ok(Pose::new(rotation, place))
 }
 
 /// A pose from 3x4 row-major numbers, or an error at `place`.

@@ -1,19 +1,17 @@
 //! The messages of ROS that tell sweeps and poses, as their definitions have them:
 //! `sensor_msgs/PointCloud2`, `tf2_msgs/TFMessage` and `nav_msgs/Odometry`.
 
-use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
 use super::wire::Wire;
+use crate::source::poses::rigid;
 use crate::source::returns::{Attribute, Fields, Number};
 
 /// Fields of a cloud that are believed.
 const FIELDS_MAX: u32 = 1 << 10;
 /// Transforms of a message that are believed.
 const TRANSFORMS_MAX: u32 = 1 << 14;
-/// How far the length of a quaternion may be from 1.
-const UNIT_TOLERANCE: f64 = 1e-2;
 
 /// Kinds of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,10 +85,7 @@ fn pose(wire: &mut Wire) -> Result<Option<Pose>, String> {
         *number = wire.double()?;
     }
     let [x, y, z, a, b, c, d] = numbers;
-    let rotation = DQuat::from_xyzw(a, b, c, d);
-    let rigid =
-        numbers.iter().all(|n| n.is_finite()) && (rotation.length() - 1.0).abs() < UNIT_TOLERANCE;
-    Ok(rigid.then(|| Pose::new(rotation, DVec3::new(x, y, z))))
+    Ok(rigid([x, y, z], [a, b, c, d]).ok())
 }
 
 /// What a cloud's message says before its points.
