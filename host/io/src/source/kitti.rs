@@ -76,10 +76,12 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     opening.read_times(&["times.txt"])?;
     let viewpoints = if kind == "pcd" { viewpoints::read(&opening.files)? } else { None };
     match &options.poses {
-        Some(path) => opening.read_poses(path, options, PosesFrame::Vehicle)?,
+        Some(path) if options.unlocated != Unlocated::Always => {
+            opening.read_poses(path, options, PosesFrame::Vehicle)?;
+        }
         _ if viewpoints.is_some() => opening.take_viewpoints(viewpoints, options),
         _ if options.unlocated == Unlocated::Always => {}
-        None => options.go_without_poses(&opening.root, "point clouds only")?,
+        _ => options.go_without_poses(&opening.root, "point clouds only")?,
     }
     opening.look_at_returns(options)?;
     Ok(opening.finish(options))
