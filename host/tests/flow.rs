@@ -263,8 +263,13 @@ fn tables_in_and_out() {
     table.write(&a, &[]).unwrap();
     let b = t.write("b.ply", ply(&positions(&sweeps().0[1])));
     let [plain, out] = ["f.bin", "f.feather"].map(|name| t.path().join(name));
-    for out in [&plain, &out] {
-        flow(&a, &b, out, &[]).succeeded();
+    flow(&a, &b, &plain, &[]).succeeded();
+    let mcap = t.path().join("f.mcap");
+    let more: &[&str] =
+        if cfg!(feature = "mcap") { &["--mcap", mcap.to_str().unwrap()] } else { &[] };
+    flow(&a, &b, &out, more).succeeded();
+    if !more.is_empty() {
+        assert!(std::fs::read(&mcap).unwrap().starts_with(b"\x89MCAP0\r\n"));
     }
     let names = [
         "x_m",

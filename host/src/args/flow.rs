@@ -51,6 +51,9 @@ pub struct FlowArgs {
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     #[arg(help_heading = "Results")]
     pub png: Option<Option<PathBuf>>,
+    /// Also write an MCAP file for Foxglove, Rerun or rviz: A with velocities
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    pub mcap: Option<PathBuf>,
     /// Numbers of a point in .bin and .npy files [default: x,y,z,intensity]
     #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
     pub bin_fields: Option<BinFields>,

@@ -9,7 +9,7 @@ mod rows;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use raywake_core::output::{Origin, PointFlow};
+use raywake_core::output::{Origin, PairFlows, PointFlow};
 use raywake_core::params::Profile;
 use raywake_core::perceive::StageTimer;
 use raywake_core::pose::Pose;
@@ -25,6 +25,8 @@ use crate::picture::{self, Subject};
 use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::objects::Content;
 use raywake_io::source::{BinFields, SweepData, mounting, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
 
@@ -158,12 +160,29 @@ fn points(
             in_words(reset).1
         ))));
     }
-    if let Some((png, flows)) = png.zip(stepped.output.flows.as_ref()) {
-        let (columns, frame) = (flows.columns, PictureFrame::World);
-        picture::write_one(png, first, &Subject::Flow { columns, profile, frame }, &title(args))?;
+    if let Some(flows) = &stepped.output.flows {
+        show(args, png, profile, first, flows)?;
     }
     let flows = stepped.output.flows.map_or_else(Vec::new, |f| f.points.iter().collect());
     Ok((flows, Dropped { returns, ..Dropped::default() }))
+}
+
+/// Writes what is to be looked at.
+fn show(
+    args: &args::FlowArgs,
+    png: Option<&Path>,
+    profile: &Profile,
+    first: &SweepData,
+    flows: &PairFlows,
+) -> Result<(), Error> {
+    if let Some(png) = png {
+        let (columns, frame) = (flows.columns, PictureFrame::World);
+        picture::write_one(png, first, &Subject::Flow { columns, profile, frame }, &title(args))?;
+    }
+    let Some(mcap) = &args.mcap else { return Ok(()) };
+    let mut bag = BagSink::create(mcap, 0, Content::Flow)?;
+    bag.pair(first, flows)?;
+    bag.finish()
 }
 
 /// A line on what was found.
