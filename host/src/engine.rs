@@ -73,6 +73,7 @@ pub fn execute<S: Source + ?Sized>(
 ) -> Result<RunSummary, RunError> {
     let (profile, say) = (&plan.profile, |text: &str| say(plan.quiet, text));
     let root = plan.files.root.as_deref();
+    let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     let made = Made {
         command: "run",
         recording: source.overview(),
@@ -81,10 +82,10 @@ pub fn execute<S: Source + ?Sized>(
         objects: None,
         weights: &plan.weights.digest(),
     };
+    // After all that can be wrong, and before anything there is replaced.
     made.claim(root)?;
     let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
-    let chosen = choose::drive(plan.backend, &plan.weights, profile, source.rig())?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
     say(&budget::paragraph(profile, chosen.drive.backend(), &chosen.filter))?;

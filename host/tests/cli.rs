@@ -328,6 +328,10 @@ fn a_run_for_nothing_says_so() {
     let out = t.path().join("o");
     assert!(!run(&t, &["-o", out.to_str().unwrap()]).stdout.contains(says));
     assert!(out.join("summary.json").is_file());
+    // Results of other settings stay apart, and what is there stays.
+    let other = run(&t, &["-o", out.to_str().unwrap(), "--set", "em_rounds=2"]);
+    other.failed(2, &["holds other results", "`em_rounds = 3`, not `em_rounds = 2`"]);
+    assert!(out.join("summary.json").is_file());
 }
 
 #[cfg(feature = "demo")]

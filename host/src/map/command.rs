@@ -25,6 +25,11 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
+    let wanted = choose::wanted(&args.backend)?;
+    let backend = match &wanted.device {
+        Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),
+        None => MapBackend::Scalar(Box::new(ScalarMap::new(&profile))),
+    };
     let made = Made {
         command: "map",
         recording: source.overview(),
@@ -34,11 +39,6 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
         weights: "none",
     };
     made.claim(Some(&args.out))?;
-    let wanted = choose::wanted(&args.backend)?;
-    let backend = match &wanted.device {
-        Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),
-        None => MapBackend::Scalar(Box::new(ScalarMap::new(&profile))),
-    };
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes().iter().chain(&wanted.note))?;
     let budget = bytes(Mapper::bytes(&profile) as u64);

@@ -37,6 +37,12 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
+    say(args.quiet, &format!("{}\n", source.describe()))?;
+    note(args.quiet, source.notes())?;
+    let drive = match args.front_end {
+        args::FrontEndKind::Variance => None,
+        args::FrontEndKind::Flow => Some(flow(args, &settings.profile, source.rig())?),
+    };
     let made = Made {
         command: "track",
         recording: source.overview(),
@@ -48,12 +54,6 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     made.claim(args.out.as_deref())?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
     let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
-    say(args.quiet, &format!("{}\n", source.describe()))?;
-    note(args.quiet, source.notes())?;
-    let drive = match args.front_end {
-        args::FrontEndKind::Variance => None,
-        args::FrontEndKind::Flow => Some(flow(args, &settings.profile, source.rig())?),
-    };
     let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
     tracker.all |= args.all;
     say(args.quiet, &budget(args.fixed_lag))?;
