@@ -9,6 +9,7 @@ use raywake_core::sweep::{Rig, Timing};
 use raywake_registration::ground::ground_height;
 
 use super::clouds::{Clouds, read_cloud};
+use super::median::median;
 use super::poses::{self, PoseTrack};
 use super::recognise::{extensions, note_gaps, numbered};
 use super::sidecars::Sidecars;
@@ -311,11 +312,10 @@ impl Opening {
             .filter(|(f, _)| f[1] == f[0] + 1)
             .map(|(_, s)| s[1] - s[0])
             .collect();
-        if steps.is_empty() || !self.timed {
+        if !self.timed {
             return TURN_S;
         }
-        steps.sort_by(f64::total_cmp);
-        let median = steps[steps.len() / 2];
+        let Some(median) = median(steps.clone(), f64::total_cmp) else { return TURN_S };
         steps.retain(|s| (0.6 * median..1.6 * median).contains(s));
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
         mean.clamp(TURN_LIMITS_S[0], TURN_LIMITS_S[1])

@@ -29,6 +29,7 @@ mod feather_check;
 mod first_sweep;
 mod kitti;
 mod lzf;
+mod median;
 pub mod mounting;
 pub mod npy;
 mod oxts;

@@ -8,6 +8,7 @@ use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
+use super::median::median;
 use super::pcd;
 use crate::Error;
 
@@ -43,9 +44,8 @@ pub(super) fn leave_world(points: &mut [Point], pose: &Pose) {
 
 fn median_distance(points: &[Point], from: DVec3) -> f64 {
     let away = |p: &Point| DVec3::from_array(p.position.map(f64::from)).distance(from);
-    let mut all: Vec<f64> = points.iter().map(away).filter(|d| d.is_finite()).collect();
-    all.sort_unstable_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
+    let all = points.iter().map(away).filter(|d| d.is_finite()).collect();
+    median(all, f64::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, SENSORS_MAX};
 
+use super::median::median;
 use super::recognise::{MCAP, entries};
 use super::{
     OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
@@ -300,10 +301,8 @@ fn lidars(
 fn together(contents: &Contents, topics: &[String]) -> Vec<Vec<Option<CloudMessage>>> {
     let clouds = |topic: &String| &contents.topics[topic].clouds;
     let first = clouds(&topics[0]);
-    let mut steps_ns: Vec<i64> =
-        first.windows(2).map(|pair| pair[1].stamp_ns - pair[0].stamp_ns).collect();
-    steps_ns.sort_unstable();
-    let half_ns = steps_ns.get(steps_ns.len() / 2).map_or(0, |step| step / 2);
+    let steps_ns = first.windows(2).map(|pair| pair[1].stamp_ns - pair[0].stamp_ns).collect();
+    let half_ns = median(steps_ns, i64::cmp).map_or(0, |step| step / 2);
     let nearest = |topic: &String, stamp_ns: i64| {
         let all = clouds(topic);
         let after = all.partition_point(|cloud| cloud.stamp_ns < stamp_ns);

@@ -29,7 +29,7 @@ const NS_OF_S: u64 = 1_000_000_000;
 const US_OF_S: u64 = 1_000_000;
 
 /// Who sends: its address, and the port it sends to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sender {
     pub address: IpAddr,
     pub port: u16,

@@ -1,5 +1,7 @@
 //! When lasers measured.
 
+/// Largest reflectivity of a return; profile `LEGACY` of Ouster has larger ones.
+pub(super) const REFLECTIVITY_MAX: f32 = 255.0;
 /// Angles of a turn.
 pub(super) const TURN: u64 = 1 << 16;
 

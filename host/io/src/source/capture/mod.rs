@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
+use super::median::median;
 use super::{
     OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
     folder_name, pose_files,
@@ -85,7 +86,7 @@ impl Capture {
         let cuts: Vec<Cut> = self.sweeps.iter().map(|sweep| sweep[0]).collect();
         let step = |pair: &[Cut]| self.sensor.since(pair[1].clock_ns, pair[0].clock_ns);
         let mut steps: Vec<i64> = cuts.windows(2).map(step).collect();
-        let usual = median(&steps);
+        let usual = median(steps.clone(), i64::cmp).unwrap_or(1);
         let set = steps.iter_mut().filter(|step| !(1..=STEP_MAX_NS).contains(*step));
         let set = set.map(|step| *step = usual.clamp(1, STEP_MAX_NS)).count();
         if set > 0 {
@@ -186,13 +187,6 @@ impl Source for Capture {
         into.dropped = SourceGaps { sweeps_before, null_rows: 0 };
         self.read_points(index, &mut into.points)
     }
-}
-
-/// The median of times between sweeps, ns; 1 without any.
-fn median(steps: &[i64]) -> i64 {
-    let mut sorted = steps.to_vec();
-    sorted.sort_unstable();
-    sorted.get(sorted.len() / 2).copied().unwrap_or(1)
 }
 
 fn name(path: &Path) -> String {

@@ -14,7 +14,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 use serde_json::Value;
 
-use super::firing::{Firing, TURN};
+use super::firing::{Firing, REFLECTIVITY_MAX, TURN};
 use crate::Error;
 use crate::source::returns::load;
 
@@ -22,8 +22,6 @@ use crate::source::returns::load;
 const BEAMS: Range<usize> = 1..257;
 const COLUMNS: Range<usize> = 1..8193;
 const PACKET_COLUMNS: Range<usize> = 1..65;
-/// Largest reflectivity; the `LEGACY` profile has larger ones.
-const REFLECTIVITY_MAX: f32 = 255.0;
 const M_OF_MM: f64 = 1e-3;
 /// Bytes of the check sum at the end of a packet's foot, and what stands there without one (in
 /// captures of firmware 2.3).

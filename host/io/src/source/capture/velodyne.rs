@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use raywake_core::sweep::Point;
 
-use super::firing::{Firing, TURN};
+use super::firing::{Firing, REFLECTIVITY_MAX, TURN};
 
 /// Bytes of a packet.
 const PACKET: usize = 1206;
@@ -33,8 +33,6 @@ const AZIMUTHS: u32 = 36_000;
 const NS_OF_US: u64 = 1000;
 /// Its clock counts to this, ns: an hour.
 pub(super) const CLOCK_NS: u64 = 3_600_000_000_000;
-/// Largest reflectivity.
-const REFLECTIVITY_MAX: f32 = 255.0;
 
 /// What is fixed about a model.
 struct Model {
@@ -197,6 +195,12 @@ impl Velodyne {
 
     pub fn name(&self) -> &'static str {
         self.model.name
+    }
+
+    /// Elevation and azimuth of its lasers, degrees.
+    #[cfg(test)]
+    pub fn angles(&self) -> &'static [[f64; 2]] {
+        self.model.lasers
     }
 
     /// Whether a packet is of this model.
