@@ -22,7 +22,7 @@ use raywake_io::source::{BinFields, Format, OpenOptions, PosesFrame, Unlocated};
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
-pub use results::{Export, PictureFrame, Results, Views};
+pub use results::{Export, PictureFrame, Results, StreamArgs, Views};
 pub use sweeps::SweepRange;
 pub use track::{FrontEndKind, TrackArgs};
 use values::{count, seconds, size, vehicle_box};

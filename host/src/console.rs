@@ -2,9 +2,15 @@
 
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
 use serde::Serialize;
+
+/// How often it is asked whether a viewer is there.
+const VIEWER_POLL: Duration = Duration::from_millis(20);
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
@@ -36,6 +42,19 @@ pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
 /// Prints what the user should know, a line each.
 pub fn note<'a>(quiet: bool, notes: impl IntoIterator<Item = &'a String>) -> Result<(), Error> {
     notes.into_iter().try_for_each(|note| say(quiet, &format!("note: {note}\n")))
+}
+
+/// Waits until a viewer sees what is sent to viewers, or a signal comes.
+pub fn await_viewer(quiet: bool, sink: Option<&BagSink>) -> Result<(), Error> {
+    let is_watched = || sink.is_none_or(BagSink::is_watched);
+    if !is_watched() {
+        listen();
+        say(quiet, "waiting for Foxglove to connect\n")?;
+    }
+    while !is_watched() && !interrupted() {
+        thread::sleep(VIEWER_POLL);
+    }
+    Ok(())
 }
 
 /// Bytes in the unit that suits them.

@@ -89,6 +89,7 @@ pub fn execute<S: Source + ?Sized>(
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
     say(&budget::paragraph(profile, chosen.drive.backend(), &chosen.filter))?;
+    outputs.await_viewer(plan.quiet)?;
     let mut run = Running {
         drive: chosen.drive,
         outputs,

@@ -8,7 +8,7 @@
 //! | `png/FRAME.png` | picture of a pair's first sweep |
 //! | `argoverse/LOG/TIMESTAMP.feather` | returns of a pair's first sweep, for graders |
 //!
-//! Beside them a film, a page and an MCAP file ([`raywake_io::sink::bag`]), where they are named.
+//! Beside them a film, a page and messages ([`raywake_io::sink::bag`]), where they are asked for.
 //!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.
@@ -20,10 +20,11 @@ use raywake_core::output::{PointFlow, Status, TrackletState};
 use raywake_core::params::Profile;
 
 use crate::args::{Export, PictureFrame, Results};
+use crate::console::await_viewer;
 use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::sink::objects::Content;
+use raywake_io::sink::streams::{Content, Streams};
 use raywake_io::sink::{argoverse, atomic, feather};
 use raywake_io::source::{Overview, SweepData};
 
@@ -47,8 +48,8 @@ pub struct RunFiles {
     pub root: Option<PathBuf>,
     /// Which files are there.
     pub kinds: Kinds,
-    /// Recording of all sweeps.
-    pub mcap: Option<PathBuf>,
+    /// Messages of all sweeps.
+    pub streams: Streams,
     /// Pictures, film and page.
     pub pictures: PictureFiles,
 }
@@ -58,13 +59,13 @@ impl RunFiles {
     pub fn of(results: &Results) -> RunFiles {
         let root = results.out.clone();
         let png = root.as_ref().filter(|_| results.png.is_some()).map(|root| root.join("png"));
-        let (mcap, kinds) = (results.mcap.clone(), Kinds::of(results));
-        RunFiles { root, kinds, mcap, pictures: PictureFiles::of(&results.views, png) }
+        let (streams, kinds) = (results.streams.sinks(), Kinds::of(results));
+        RunFiles { root, kinds, streams, pictures: PictureFiles::of(&results.views, png) }
     }
 
     /// Whether nothing will be written.
     pub fn is_empty(&self) -> bool {
-        self.root.is_none() && self.mcap.is_none() && self.pictures.is_empty()
+        self.root.is_none() && self.streams == Streams::default() && self.pictures.is_empty()
     }
 }
 
@@ -112,17 +113,21 @@ impl Outputs {
         sweeps: usize,
         profile: &Profile,
     ) -> Result<Outputs, Error> {
-        let RunFiles { root, mcap, pictures, kinds } = files;
+        let RunFiles { root, streams, pictures, kinds } = files;
         root.as_deref().map_or(Ok(()), |root| kinds.create_folders(root))?;
-        let bag = |path: &PathBuf| BagSink::create(path, recording.epoch_ns, Content::Flow);
         Ok(Outputs {
             root: root.clone(),
             kinds: *kinds,
             log: recording.name.to_string(),
             profile: profile.clone(),
             pictures: Pictures::create(pictures, &recording.name, sweeps)?,
-            bag: mcap.as_ref().map(bag).transpose()?,
+            bag: BagSink::create(streams, recording.epoch_ns, Content::Flow)?,
         })
+    }
+
+    /// Waits for a viewer, where one is to look.
+    pub fn await_viewer(&self, quiet: bool) -> Result<(), Error> {
+        await_viewer(quiet, self.bag.as_ref())
     }
 
     /// Writes what a pair of sweeps yields for its first sweep, found in so many milliseconds.

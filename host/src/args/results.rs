@@ -1,8 +1,11 @@
 //! What a run writes.
 
+#[cfg(feature = "live")]
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use raywake_io::sink::streams::Streams;
 
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
@@ -16,9 +19,8 @@ pub struct Results {
     pub png: Option<PictureFrame>,
     #[command(flatten)]
     pub views: Views,
-    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with velocity, and the poses
-    #[arg(long, value_name = "FILE")]
-    pub mcap: Option<PathBuf>,
+    #[command(flatten)]
+    pub streams: StreamArgs,
     /// Do not write per-point files
     #[arg(long)]
     pub no_points: bool,
@@ -40,6 +42,31 @@ pub struct Views {
     /// Also write a page for the browser: a slider over the sweeps, charts, the busiest moments
     #[arg(long, value_name = "FILE.html")]
     pub page: Option<PathBuf>,
+}
+
+/// Messages of ROS 2.
+#[derive(Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+pub struct StreamArgs {
+    /// Also write an MCAP file for Foxglove, Rerun, rviz or Autoware: points, what moves, poses
+    #[arg(long, value_name = "FILE")]
+    pub mcap: Option<PathBuf>,
+    /// Also send the same to Foxglove at the recording's pace, once it has connected
+    #[cfg(feature = "live")]
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "127.0.0.1:8765")]
+    pub live: Option<SocketAddr>,
+}
+
+impl StreamArgs {
+    /// For [`raywake_io::sink::bag`].
+    pub fn sinks(&self) -> Streams {
+        #[cfg(feature = "live")]
+        let live = self.live;
+        #[cfg(not(feature = "live"))]
+        let live = None;
+        Streams { mcap: self.mcap.clone(), live }
+    }
 }
 
 /// The velocities in a picture.

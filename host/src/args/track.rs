@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{FlowChoice, Recording, Selection, Views};
+use super::{FlowChoice, Recording, Selection, StreamArgs, Views};
 
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
@@ -20,8 +20,8 @@ Files of --out DIR:
                      by the estimate at the end of the track, by the EKF (ekf_), and by the
                      fixed-lag estimate (lag_; NaN without --fixed-lag), which refers to
                      lag_time_s, the end of the sweep; the covariance of the EKF's position
-                     (cov_xx cov_xy cov_yy cov_zz, m²) and the variance of its speed (cov_speed);
-                     the box around what was seen of it: box_x_m box_y_m box_z_m (its middle in
+                     (cov_xx cov_xy cov_yy cov_zz, m²) and the variances of its speed and heading
+                     (cov_speed, cov_heading, rad²); the box around what was seen of it: box_x_m box_y_m box_z_m (its middle in
                      the world), box_heading_rad (what stands: either end may be the front),
                      length_m, width_m, height_m; p_moves (mean of its returns; NaN where not
                      known); class (names in the metadata; 255: not known)
@@ -56,9 +56,8 @@ pub struct TrackArgs {
     pub png: bool,
     #[command(flatten)]
     pub views: Views,
-    /// Also write an MCAP file for Foxglove, Rerun or rviz: points with their track, boxes, poses
-    #[arg(long, value_name = "FILE")]
-    pub mcap: Option<PathBuf>,
+    #[command(flatten)]
+    pub streams: StreamArgs,
     /// Show all tracks, those of what stands and is no vehicle, person or two-wheeler, too
     #[arg(long)]
     pub all: bool,

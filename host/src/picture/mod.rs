@@ -21,9 +21,9 @@ use std::path::PathBuf;
 use raywake_core::output::ColumnFlow;
 use raywake_core::params::Profile;
 use raywake_io::sink::feather::Voxel;
+use raywake_io::sink::objects::TrackedObject;
 
 use crate::args::{PictureFrame, Views};
-use crate::track::LiveObject;
 
 pub use pictures::{Pictures, write_one};
 
@@ -48,7 +48,7 @@ pub enum Subject<'a> {
         voxel_m: f64,
     },
     /// The objects in the sweep.
-    Objects(&'a [LiveObject]),
+    Objects(&'a [TrackedObject]),
 }
 
 /// Where the pictures of a recording go.

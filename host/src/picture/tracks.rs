@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
+use raywake_io::sink::objects::TrackedObject;
 use raywake_io::source::SweepData;
 use raywake_render::{Look, Outline, Panel, Sign, Trail, colours};
 
 use super::drawing::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
-use crate::track::LiveObject;
 
 /// How far a picture reaches, m.
 const REACH_M: f64 = 50.0;
@@ -15,7 +15,7 @@ const CELL_M: f64 = 0.4;
 /// The smallest side of a box, m.
 const SIDE_MIN_M: f32 = 0.4;
 
-pub(super) fn view(sweep: &SweepData, objects: &[LiveObject]) -> (Panel, Look) {
+pub(super) fn view(sweep: &SweepData, objects: &[TrackedObject]) -> (Panel, Look) {
     let pose = &sweep.world_from_vehicle;
     let mut panel = Panel { title: "Objects".into(), points: places(sweep), ..Panel::default() };
     for object in objects {
@@ -36,10 +36,10 @@ pub(super) fn view(sweep: &SweepData, objects: &[LiveObject]) -> (Panel, Look) {
 }
 
 /// With number and class where it moves.
-fn outline(object: &LiveObject, pose: &Pose) -> Outline {
+fn outline(object: &TrackedObject, pose: &Pose) -> Outline {
     let (sin, cos) = libm::sincos(object.heading);
     let arrow = object.velocity.map(|velocity| arrow(along_vehicle(pose, velocity), WIDE));
-    let class = object.class.map_or(String::new(), |class| format!(" {}", class.name()));
+    let class = object.class.map_or(String::new(), |(class, _)| format!(" {}", class.name()));
     Outline {
         at: seen_from(pose, object.centre),
         forward: along_vehicle(pose, [cos, sin]),

@@ -1,7 +1,7 @@
-//! An object as it is known while its track lives: for pictures and recordings.
+//! An object as it is known while its track lives: for pictures and messages.
 
 use glam::DVec3;
-use raywake_core::encoder::ColumnClass;
+use raywake_io::sink::objects::TrackedObject;
 use raywake_objects::ObjectState;
 use raywake_objects::front_end::{Life, Track};
 use raywake_objects::object_box::ObjectBox;
@@ -15,45 +15,27 @@ const MOVED_M: f64 = 1.0;
 const UPDATES_MIN: u32 = 3;
 const MOVING_UPDATES_MIN: u32 = 6;
 
-/// A box with a velocity, in the world.
-#[derive(Clone, Debug)]
-pub struct LiveObject {
-    /// Number of its track.
-    pub id: u32,
-    /// Middle of the box around the returns of its last update, m.
-    pub centre: [f64; 3],
-    /// Direction of its length about +z, rad.
-    pub heading: f64,
-    /// Length, width and height, m.
-    pub size: [f32; 3],
-    /// Along x and y, m/s; none where it stands.
-    pub velocity: Option<[f64; 2]>,
-    /// What the encoder takes it for.
-    pub class: Option<ColumnClass>,
-    /// Its way so far, m.
-    pub way: Vec<[f64; 3]>,
-}
-
-impl LiveObject {
-    /// Of a track that lives and is old enough to be shown.
-    pub fn of(params: &TrackingParams, track: &Track) -> Option<LiveObject> {
-        let shown = track.life == Life::Live && track.observations >= UPDATES_MIN;
-        let state = track.state().filter(|_| shown)?;
-        let places = track.latest().iter().map(|seen| state.local(seen.position));
-        let around = ObjectBox::around(&params.boxes, places, track.moved_m())?;
-        let (sin, cos) = libm::sincos(state.heading);
-        let velocity = [cos * state.speed, sin * state.speed];
-        let world = |at: [f64; 3]| (DVec3::from(track.anchor) + DVec3::from(at)).to_array();
-        Some(LiveObject {
-            id: track.id,
-            centre: world(state.placed(around.centre)),
-            heading: state.heading + f64::from(around.turn),
-            size: around.size,
-            velocity: moves(params, track, &state).then_some(velocity),
-            class: track.class(),
-            way: track.history().iter().map(|s| world(s.position)).collect(),
-        })
-    }
+/// Of a track that lives and is old enough to be shown.
+pub fn seen(params: &TrackingParams, track: &Track) -> Option<TrackedObject> {
+    let shown = track.life == Life::Live && track.observations >= UPDATES_MIN;
+    let state = track.state().filter(|_| shown)?;
+    let places = track.latest().iter().map(|seen| state.local(seen.position));
+    let around = ObjectBox::around(&params.boxes, places, track.moved_m())?;
+    let (sin, cos) = libm::sincos(state.heading);
+    let velocity = [cos * state.speed, sin * state.speed];
+    let world = |at: [f64; 3]| (DVec3::from(track.anchor) + DVec3::from(at)).to_array();
+    Some(TrackedObject {
+        id: track.id,
+        centre: world(state.placed(around.centre)),
+        heading: state.heading + f64::from(around.turn),
+        size: around.size,
+        velocity: moves(params, track, &state).then_some(velocity),
+        turn_rate: state.turn_rate,
+        variances: track.variances().last().copied().unwrap_or_default(),
+        p_moves: track.p_moves().last().copied().filter(|p| !p.is_nan()),
+        class: track.class().map(|class| (class, track.class_share())),
+        way: track.history().iter().map(|s| world(s.position)).collect(),
+    })
 }
 
 /// Whether it moves: as the flow tells, where it does.

@@ -25,7 +25,6 @@ use raywake_io::source;
 use raywake_objects::estimate::FixedLag;
 
 pub use ground::Ground;
-pub use live::LiveObject;
 pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 
@@ -57,6 +56,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
     tracker.all |= args.all;
     say(args.quiet, &budget(args.fixed_lag))?;
+    files.await_viewer(args.quiet)?;
     let mut report = report::Report::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         report.read(visit.now);

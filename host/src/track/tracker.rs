@@ -15,11 +15,13 @@ use raywake_objects::object_box::ObjectBox;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::{ObjectReturn, ObjectState};
 
-use super::{Ground, LiveObject};
+use super::Ground;
+use super::live::seen;
 use crate::config::Settings;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::team::{THREADS_MAX, ThreadTeam};
+use raywake_io::sink::objects::TrackedObject;
 use raywake_io::source::SweepData;
 
 /// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
@@ -213,9 +215,9 @@ impl Tracker {
     }
 
     /// The objects of the last step's sweep: those of the tracks that are put out.
-    pub fn objects(&self) -> impl Iterator<Item = LiveObject> {
+    pub fn objects(&self) -> impl Iterator<Item = TrackedObject> {
         let shown = self.parts.tracks.iter().filter(|t| self.shows(t));
-        shown.filter_map(|track| LiveObject::of(&self.params, track))
+        shown.filter_map(|track| seen(&self.params, track))
     }
 
     /// Whether a track is put out: that of an object, or any.

@@ -6,12 +6,14 @@ use raywake_objects::front_end::StateVariances;
 use raywake_objects::object_box::ObjectBox;
 use raywake_objects::{ObjectReturn, ObjectState};
 
-use super::{Ended, LiveObject, Tracker};
+use super::{Ended, Tracker};
 use crate::args::TrackArgs;
+use crate::console::await_viewer;
 use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::sink::objects::{BoxMark, Content};
+use raywake_io::sink::objects::TrackedObject;
+use raywake_io::sink::streams::Content;
 use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{atomic, clouds, feather};
 use raywake_io::source::{Overview, SweepData};
@@ -64,9 +66,13 @@ impl Files {
         }
         let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
         let pictures = Pictures::create(&PictureFiles::of(&args.views, png), &of.name, sweeps)?;
-        let bag = |path: &PathBuf| BagSink::create(path, of.epoch_ns, Content::Objects);
-        let bag = args.mcap.as_ref().map(bag).transpose()?;
+        let bag = BagSink::create(&args.streams.sinks(), of.epoch_ns, Content::Objects)?;
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
+    }
+
+    /// Waits for a viewer, where one is to look.
+    pub fn await_viewer(&self, quiet: bool) -> Result<(), Error> {
+        await_viewer(quiet, self.bag.as_ref())
     }
 
     /// The sweep of the last step, which took `ms` milliseconds.
@@ -77,12 +83,12 @@ impl Files {
         self.of_returns.clear();
         self.of_returns.resize(sweep.points.len(), -1);
         tracker.members().for_each(|(n, track)| self.of_returns[n] = track as i32);
-        let objects: Vec<LiveObject> = tracker.objects().collect();
+        let objects: Vec<TrackedObject> = tracker.objects().collect();
         let moving = objects.iter().filter(|o| o.velocity.is_some()).count();
         let figures = [("moving objects", moving as f64), ("ms a sweep", ms)];
         self.pictures.write(sweep, &Subject::Objects(&objects), &figures)?;
         if let Some(bag) = &mut self.bag {
-            bag.objects(sweep, &self.of_returns, objects.iter().map(mark))?;
+            bag.objects(sweep, &self.of_returns, &objects)?;
         }
         let Some(folder) = &self.folder else { return Ok(()) };
         let mut t = TableWriter::default();
@@ -152,14 +158,10 @@ impl Files {
 fn objects(t: &mut TableWriter, rows: &[TrackRow]) {
     t.array(["cov_xx", "cov_xy", "cov_yy", "cov_zz"], rows, |r| r.variances.position);
     t.column("cov_speed", rows, |r| r.variances.speed);
+    t.column("cov_heading", rows, |r| r.variances.heading);
     t.array(["box_x_m", "box_y_m", "box_z_m"], rows, |r| r.estimate.placed(r.shape.centre));
     t.column("box_heading_rad", rows, |r| r.estimate.heading + f64::from(r.shape.turn));
     t.array(["length_m", "width_m", "height_m"], rows, |r| r.shape.size);
     t.column("p_moves", rows, |r| r.p_moves);
     t.column("class", rows, |r| r.class);
-}
-
-fn mark(object: &LiveObject) -> BoxMark {
-    let LiveObject { id, centre, heading, size, velocity, .. } = *object;
-    BoxMark { id, centre, heading, size, moves: velocity.is_some() }
 }

@@ -56,14 +56,23 @@ pub struct Track {
 pub struct StateVariances {
     /// Covariance of the position (xx, xy, yy, zz), m².
     pub position: [f32; 4],
+    /// Variance of the heading, rad².
+    pub heading: f32,
     /// Variance of the speed, (m/s)².
     pub speed: f32,
+    /// Variance of the turn rate, (rad/s)².
+    pub turn_rate: f32,
 }
 
 impl StateVariances {
     fn of(ekf: &CentroidEkf) -> StateVariances {
         let at = |row, column| ekf.covariance()[(row, column)] as f32;
-        StateVariances { position: [at(0, 0), at(0, 1), at(1, 1), at(2, 2)], speed: at(4, 4) }
+        StateVariances {
+            position: [at(0, 0), at(0, 1), at(1, 1), at(2, 2)],
+            heading: at(3, 3),
+            speed: at(4, 4),
+            turn_rate: at(6, 6),
+        }
     }
 }
 
@@ -148,6 +157,12 @@ impl Track {
         // Of equal ones the first.
         let most = ColumnClass::ALL.into_iter().rev().max_by_key(count)?;
         (count(&most) > 0).then_some(most)
+    }
+
+    /// The share of its returns that the encoder takes for that, 0 to 1.
+    pub fn class_share(&self) -> f32 {
+        let most = self.told.classes.into_iter().max().unwrap_or(0);
+        most as f32 / self.told.classes.iter().sum::<u32>().max(1) as f32
     }
 
     /// Whether flow and encoder tell that it is an object of the traffic: it was seen to move as

@@ -1,23 +1,30 @@
-//! What stands for [`BagSink`] where MCAP files cannot be written: nothing makes one.
-
-use std::path::Path;
+//! What stands for [`BagSink`] where messages cannot be written: nothing makes one.
 
 use raywake_core::output::PairFlows;
 
-use super::objects::{BoxMark, Content};
+use super::objects::TrackedObject;
+use super::streams::{Content, Streams};
 use crate::Error;
 use crate::source::SweepData;
 
-/// No file.
+/// No stream.
 pub enum Absent {}
 
 pub use Absent as BagSink;
 
 impl Absent {
-    /// Fails with [`Error::Unsupported`].
-    pub fn create(path: &Path, _: u64, _: Content) -> Result<Absent, Error> {
-        let what = "an MCAP file needs the feature `mcap`, which is not compiled in";
-        Err(Error::Unsupported(format!("{}: {what}", path.display())))
+    /// None where none is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where one is.
+    pub fn create(streams: &Streams, _: u64, _: Content) -> Result<Option<Absent>, Error> {
+        let what = "messages need the feature `mcap`, which is not compiled in";
+        if *streams == Streams::default() { Ok(None) } else { Err(Error::Unsupported(what.into())) }
+    }
+
+    /// Never called.
+    pub fn is_watched(&self) -> bool {
+        match *self {}
     }
 
     /// Never called.
@@ -26,12 +33,7 @@ impl Absent {
     }
 
     /// Never called.
-    pub fn objects(
-        &mut self,
-        _: &SweepData,
-        _: &[i32],
-        _: impl Iterator<Item = BoxMark>,
-    ) -> Result<(), Error> {
+    pub fn objects(&mut self, _: &SweepData, _: &[i32], _: &[TrackedObject]) -> Result<(), Error> {
         match *self {}
     }
 

@@ -1,4 +1,4 @@
-//! Where results go: feather files, MCAP files and Argoverse 2 submissions, each written whole or
+//! Where results go: feather files, MCAP files, viewers and Argoverse 2 submissions, each written whole or
 //! not at all.
 
 pub mod argoverse;
@@ -8,6 +8,7 @@ pub mod bag;
 pub mod clouds;
 pub mod feather;
 pub mod objects;
+pub mod streams;
 pub mod table;
 
 #[cfg(test)]

@@ -68,6 +68,12 @@ impl Cdr {
         self.doubles(pose.rotation.to_array());
     }
 
+    /// A place and a direction about +z, rad.
+    pub fn planar(&mut self, at: [f64; 3], direction: f64) {
+        let (sin, cos) = libm::sincos(0.5 * direction);
+        self.doubles(at.into_iter().chain([0.0, 0.0, sin, cos]));
+    }
+
     /// A field of a point: its name, first byte, kind, and that it is one number.
     pub fn field(&mut self, name: &str, offset: u32, kind: u8) {
         self.text(name);

@@ -1,0 +1,34 @@
+//! What stands for [`LiveServer`] where viewers cannot connect: nothing makes one.
+
+use std::net::SocketAddr;
+
+use super::Topic;
+use crate::Error;
+
+/// No server.
+pub(super) enum NoServer {}
+
+pub(super) use NoServer as LiveServer;
+
+impl NoServer {
+    /// Fails with [`Error::Unsupported`].
+    pub fn start(_: SocketAddr, _: &[Topic]) -> Result<NoServer, Error> {
+        let what = "--live needs the feature `live`, which is not compiled in";
+        Err(Error::Unsupported(what.into()))
+    }
+
+    /// Never called.
+    pub fn is_watched(&self) -> bool {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn write(&mut self, _: usize, _: u64, _: &[u8]) {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn finish(self) {
+        match self {}
+    }
+}

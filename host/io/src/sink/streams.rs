@@ -1,0 +1,22 @@
+//! Where messages go, and what they are of.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// Where messages go: to a file, to viewers, to both or nowhere.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Streams {
+    /// An MCAP file.
+    pub mcap: Option<PathBuf>,
+    /// Address of this machine at which viewers connect.
+    pub live: Option<SocketAddr>,
+}
+
+/// What the messages of a stream are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// The flow of every sweep.
+    Flow,
+    /// The objects in every sweep.
+    Objects,
+}
