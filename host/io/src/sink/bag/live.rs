@@ -14,10 +14,15 @@ use crate::Error;
 
 /// The longest wait for the time of a message, s: where times of a recording jump, it goes on.
 const WAIT_MAX_S: f64 = 1.0;
+/// Before the first message, as a viewer asks for one topic after the other, and after the last
+/// one, as closing drops what is still to be sent.
+const GRACE: Duration = Duration::from_millis(200);
 
 /// A server that plays messages at the pace of their times. What nobody sees is not sent.
 pub(super) struct LiveServer {
     server: WebSocketServerHandle,
+    /// What connects them: channels and server hold it weakly.
+    _context: Arc<Context>,
     channels: Vec<Arc<RawChannel>>,
     /// When the last message was sent, and its time, ns.
     last: Option<(Instant, u64)>,
@@ -38,7 +43,7 @@ impl LiveServer {
         let server = WebSocketServer::new().name("raywake").context(&context);
         let server = server.bind(address.ip().to_string(), address.port());
         let server = server.start_blocking().map_err(failed)?;
-        Ok(LiveServer { server, channels, last: None })
+        Ok(LiveServer { server, _context: context, channels, last: None })
     }
 
     /// Whether a viewer has asked for a topic.
@@ -48,6 +53,9 @@ impl LiveServer {
 
     /// Sends a message of a topic when it is time for it.
     pub fn write(&mut self, topic: usize, time_ns: u64, message: &[u8]) {
+        if self.last.is_none() {
+            thread::sleep(GRACE);
+        }
         if let Some((sent, last_ns)) = self.last {
             let apart_s = time_ns.saturating_sub(last_ns) as f64 * 1e-9;
             let due = sent + Duration::from_secs_f64(apart_s.min(WAIT_MAX_S));
@@ -61,6 +69,7 @@ impl LiveServer {
 
     /// Closes the connections, after what was sent last.
     pub fn finish(self) {
+        thread::sleep(GRACE);
         self.server.stop().wait_blocking();
     }
 }

@@ -16,7 +16,7 @@
 //!
 //! | topic | message | what |
 //! |---|---|---|
-//! | `/raywake/points` | `sensor_msgs/PointCloud2` | returns: `x y z intensity`, and `track` |
+//! | `/raywake/tracked_points` | `sensor_msgs/PointCloud2` | returns: `x y z intensity`, `track` |
 //! | `/raywake/objects` | `visualization_msgs/Marker` | a box for each object, red where it moves |
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all that is known |
 //! | `/raywake/tracked_objects` | `autoware_perception_msgs/TrackedObjects` | for Autoware |
@@ -65,6 +65,7 @@ type Topic = (&'static str, Schema);
 
 const TF: Topic = ("/tf", TRANSFORMS);
 const POINTS: Topic = ("/raywake/points", POINT_CLOUD);
+const TRACKED_POINTS: Topic = ("/raywake/tracked_points", POINT_CLOUD);
 const MOTION: Topic = ("/raywake/motion", MARKER);
 const BOXES: Topic = ("/raywake/objects", MARKER);
 const SCENES: Topic = ("/raywake/scene", SCENE);
@@ -74,7 +75,7 @@ const TRACKED: Topic = ("/raywake/tracked_objects", TRACKED_OBJECTS);
 const fn topics(content: Content) -> &'static [Topic] {
     match content {
         Content::Flow => &[TF, POINTS, MOTION, SCENES],
-        Content::Objects => &[TF, POINTS, BOXES, SCENES, TRACKED],
+        Content::Objects => &[TF, TRACKED_POINTS, BOXES, SCENES, TRACKED],
     }
 }
 
@@ -130,7 +131,7 @@ impl BagSink {
     ) -> Result<(), Error> {
         let stamp_ns = self.stamp_ns(sweep);
         self.write(&TF, stamp_ns, transform(stamp_ns, &sweep.world_from_vehicle))?;
-        self.write(&POINTS, stamp_ns, points::with_tracks(stamp_ns, sweep, tracks))?;
+        self.write(&TRACKED_POINTS, stamp_ns, points::with_tracks(stamp_ns, sweep, tracks))?;
         for object in objects {
             self.write(&BOXES, stamp_ns, markers::cube(stamp_ns, object))?;
         }
@@ -187,4 +188,33 @@ fn transform(stamp_ns: u64, pose: &Pose) -> Vec<u8> {
 fn along_vehicle(pose: &Pose, [x, y]: [f32; 2]) -> [f32; 2] {
     let v = pose.rotation.conjugate() * glam::dvec3(x.into(), y.into(), 0.0);
     [v.x as f32, v.y as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_layout_for_foxglove_names_the_topics() {
+        let layout = include_str!("../../../../../examples/foxglove_layout.json");
+        for content in [Content::Flow, Content::Objects] {
+            for (topic, _) in topics(content).iter().filter(|(topic, _)| *topic != TF.0) {
+                assert!(layout.contains(&format!("\"{topic}\"")), "{topic}");
+            }
+        }
+        assert!(
+            [VEHICLE, WORLD].iter().all(|frame| layout.contains(&format!("\"frame:{frame}\"")))
+        );
+    }
+
+    #[test]
+    fn every_definition_that_is_named_is_there() {
+        for (topic, schema) in [Content::Flow, Content::Objects].into_iter().flat_map(topics) {
+            let text = schema.text();
+            let kinds = text.lines().filter(|l| l.contains('/') && !l.starts_with("MSG"));
+            for kind in kinds.filter_map(|line| line.split([' ', '[']).next()) {
+                assert!(text.contains(&format!("MSG: {kind}\n")), "{kind} of {topic}");
+            }
+        }
+    }
 }
