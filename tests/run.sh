@@ -98,6 +98,20 @@ else
     cargo test --quiet -p raywake-lab --lib a_browser -- --ignored "${unable[@]}"
 fi
 
+say "other programs' recordings in, ours into theirs"
+# Wheels that are there or can be had; a failure of what they run is a failure.
+viewers() {
+    ! command -v apt-get >/dev/null || install python3-venv || return 1
+    python3 -m venv target/viewers 2>/dev/null || return 1
+    target/viewers/bin/pip install --quiet --disable-pip-version-check \
+        mcap-ros2-support numpy rerun-sdk 2>/dev/null
+}
+if viewers; then
+    target/viewers/bin/python tests/viewers.py target/release/raywake target/viewers/recordings
+else
+    echo "skipped: mcap-ros2-support, numpy and rerun-sdk cannot be installed"
+fi
+
 say "variants side by side, two sweeps each"
 cargo test --quiet -p raywake-tests --benches
 
