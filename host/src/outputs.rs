@@ -10,6 +10,9 @@
 //!
 //! Beside them a film, a page and messages ([`raywake_io::sink::bag`]), where they are asked for.
 //!
+//! In place of the first three kinds there may be a Parquet file each for all sweeps. What is there
+//! of them is kept: a run that was interrupted finds the same again, and goes on.
+//!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.
 
@@ -24,17 +27,20 @@ use crate::console::await_viewer;
 use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::flow_tables::{FlowTables, SweepMark};
 use raywake_io::sink::streams::{Content, Streams};
-use raywake_io::sink::{argoverse, atomic, feather};
+use raywake_io::sink::{argoverse, atomic};
 use raywake_io::source::{Overview, SweepData};
 
 /// Which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
-    /// Feather files of columns and tracklets.
+    /// Tables of columns and tracklets.
     pub columns: bool,
-    /// Feather files of returns.
+    /// Tables of returns.
     pub points: bool,
+    /// One Parquet file for all sweeps of a table.
+    pub parquet: bool,
     /// Velocities in pictures.
     pub frame: PictureFrame,
     /// Submission files of Argoverse 2.
@@ -73,6 +79,7 @@ impl RunFiles {
 pub struct Outputs {
     root: Option<PathBuf>,
     kinds: Kinds,
+    tables: Option<FlowTables>,
     log: String,
     profile: Profile,
     pictures: Pictures,
@@ -85,22 +92,27 @@ impl Kinds {
         Kinds {
             columns: true,
             points: !results.no_points,
+            parquet: results.parquet,
             frame: results.png.unwrap_or_default(),
             argoverse: results.export == Some(Export::Argoverse),
         }
     }
 
     /// Creates the folders. Fails where this build lacks a feature that the files need.
-    fn create_folders(&self, root: &Path) -> Result<(), Error> {
+    fn tables(&self, root: &Path) -> Result<Option<FlowTables>, Error> {
         if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
             let what = "--out needs the feature `arrow`, which is not compiled in";
             return Err(Error::Unsupported(what.into()));
         }
         atomic::create_folder(root)?;
-        let (columns, points) = (self.columns, self.points);
-        let all = [("columns", columns), ("tracklets", columns), ("points", points)];
-        let all = all.into_iter().chain([("argoverse", self.argoverse)]);
-        all.filter(|f| f.1).try_for_each(|(name, _)| atomic::create_folder(&root.join(name)))
+        if self.argoverse {
+            atomic::create_folder(&root.join("argoverse"))?;
+        }
+        Ok(match (self.columns, self.parquet) {
+            (false, _) => None,
+            (true, true) => Some(FlowTables::files(root)),
+            (true, false) => Some(FlowTables::folders(root, self.points)?),
+        })
     }
 }
 
@@ -114,10 +126,11 @@ impl Outputs {
         profile: &Profile,
     ) -> Result<Outputs, Error> {
         let RunFiles { root, streams, pictures, kinds } = files;
-        root.as_deref().map_or(Ok(()), |root| kinds.create_folders(root))?;
+        let tables = root.as_deref().map(|root| kinds.tables(root)).transpose()?.flatten();
         Ok(Outputs {
             root: root.clone(),
             kinds: *kinds,
+            tables,
             log: recording.name.to_string(),
             profile: profile.clone(),
             pictures: Pictures::create(pictures, &recording.name, sweeps)?,
@@ -142,18 +155,16 @@ impl Outputs {
             self.pictures.write(first, &Subject::Flow { columns, profile, frame }, &figures)?;
         }
         let Some(root) = &self.root else { return Ok(()) };
-        let meta = meta(first, flows.dt_s);
-        if self.kinds.columns {
-            feather::write_columns(&named(root, "columns", first), flows.columns, &meta)?;
-        }
-        if self.kinds.points {
-            let of_points: Vec<PointFlow> = flows.points.iter().collect();
-            let path = named(root, "points", first);
-            feather::write_points(&path, &first.points, &of_points, &meta)?;
+        let rows: Vec<PointFlow> = flows.points.iter().collect();
+        if let Some(tables) = &mut self.tables {
+            let mark = mark(first, flows.dt_s);
+            tables.columns(&mark, flows.columns)?;
+            if self.kinds.points {
+                tables.points(&mark, &first.points, &rows)?;
+            }
         }
         if self.kinds.argoverse {
             let (pose, dt) = (&first.world_from_vehicle, flows.dt_s);
-            let rows: Vec<PointFlow> = flows.points.iter().collect();
             argoverse::export(&root.join("argoverse"), &self.log, first.frame, &rows, pose, dt)?;
         }
         Ok(())
@@ -162,35 +173,22 @@ impl Outputs {
     /// Completes the files that all sweeps go to; the page ends with this text.
     pub fn finish(self, summary: &str) -> Result<(), Error> {
         self.pictures.finish(summary)?;
+        self.tables.map_or(Ok(()), FlowTables::finish)?;
         self.bag.map_or(Ok(()), BagSink::finish)
     }
 
     /// Writes the tracklets at a pair's second sweep, `dt_s` after its first.
     pub fn tracklets(
-        &self,
+        &mut self,
         second: &SweepData,
         tracklets: &[TrackletState],
         dt_s: f64,
     ) -> Result<(), Error> {
-        match &self.root {
-            Some(root) if self.kinds.columns => {
-                let path = named(root, "tracklets", second);
-                feather::write_tracklets(&path, tracklets, &meta(second, dt_s))
-            }
-            _ => Ok(()),
-        }
+        let Some(tables) = &mut self.tables else { return Ok(()) };
+        tables.tracklets(&mark(second, dt_s), tracklets)
     }
 }
 
-/// A sweep's file. Ten digits, so that names sort as frames do.
-fn named(root: &Path, kind: &str, sweep: &SweepData) -> PathBuf {
-    root.join(format!("{kind}/{:010}.feather", sweep.frame))
-}
-
-fn meta(sweep: &SweepData, dt_s: f64) -> [(&'static str, String); 3] {
-    [
-        ("frame", sweep.frame.to_string()),
-        ("stamp_s", sweep.stamp_s.to_string()),
-        ("dt_s", dt_s.to_string()),
-    ]
+fn mark(sweep: &SweepData, dt_s: f64) -> SweepMark {
+    SweepMark { frame: sweep.frame, stamp_s: sweep.stamp_s, dt_s }
 }

@@ -15,8 +15,11 @@ const FILTER_WEIGHTS: usize = 25 * 2 * 14;
 const BACKEND: [&str; 2] = ["--backend", "scalar"];
 
 /// `raywake run DRIVE` with more arguments, on a small window.
+/// Parameters of a small window.
+const SMALL: &str = "name = \"small\"\nside = 61\nem_rounds = 3\n";
+
 fn run(t: &Temp, more: &[&str]) -> Outcome {
-    let config = t.write("small.toml", "name = \"small\"\nside = 61\nem_rounds = 3\n");
+    let config = t.write("small.toml", SMALL);
     let data = t.path().join("drive");
     let head = ["run", data.to_str().unwrap(), "--config", config.to_str().unwrap()];
     raywake(&[&head, &BACKEND[..], more].concat())
@@ -237,7 +240,7 @@ fn an_interrupt_ends_the_run_in_order() {
     let t = Temp::new();
     t.drive(1200);
     let out = t.path().join("out");
-    let config = t.write("small.toml", "side = 61\n");
+    let config = t.write("small.toml", SMALL);
     let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
         .args(BACKEND)
         .args(["--out", out.to_str().unwrap(), "--config", config.to_str().unwrap()])
@@ -264,6 +267,24 @@ fn an_interrupt_ends_the_run_in_order() {
         assert_eq!(names.len() as u64, pairs, "{folder}");
         let whole = |name: &str| !name.ends_with(".partial");
         assert!(names.iter().all(|n| whole(n.as_ref().unwrap().file_name().to_str().unwrap())));
+    }
+    // It goes on where it was, and leaves what one run leaves.
+    let kept = out.join("points/0000000000.feather");
+    let written = fs::metadata(&kept).unwrap().modified().unwrap();
+    let count = (sweeps + 3).to_string();
+    let whole = t.path().join("whole");
+    for out in [&out, &whole] {
+        run(&t, &["--out", out.to_str().unwrap(), "-n", &count]).succeeded();
+    }
+    assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), written);
+    for folder in ["columns", "points", "tracklets"] {
+        let files: Vec<_> = fs::read_dir(whole.join(folder)).unwrap().collect();
+        assert_eq!(files.len() as u64, sweeps + 2, "{folder}");
+        for file in files {
+            let path = file.unwrap().path();
+            let same = out.join(folder).join(path.file_name().unwrap());
+            assert!(fs::read(&path).unwrap() == fs::read(&same).unwrap(), "{}", path.display());
+        }
     }
 }
 

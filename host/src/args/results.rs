@@ -1,6 +1,5 @@
 //! What a run writes.
 
-#[cfg(feature = "live")]
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -10,7 +9,8 @@ use raywake_io::sink::streams::Streams;
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Results {
-    /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`
+    /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`. Tables
+    /// that an interrupted run left there are kept
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
@@ -21,6 +21,10 @@ pub struct Results {
     pub views: Views,
     #[command(flatten)]
     pub streams: StreamArgs,
+    /// Write columns.parquet, points.parquet and tracklets.parquet, a row group each sweep, in
+    /// place of a feather file each (feature `parquet`)
+    #[arg(long, requires = "out")]
+    pub parquet: bool,
     /// Do not write per-point files
     #[arg(long)]
     pub no_points: bool,
@@ -51,8 +55,7 @@ pub struct StreamArgs {
     /// Also write an MCAP file for Foxglove, Rerun, rviz or Autoware: points, what moves, poses
     #[arg(long, value_name = "FILE")]
     pub mcap: Option<PathBuf>,
-    /// Also send the same to Foxglove at the recording's pace, once it has connected
-    #[cfg(feature = "live")]
+    /// Also send the same to Foxglove at the recording's pace, once it has connected (feature `live`)
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true)]
     #[arg(default_missing_value = "127.0.0.1:8765")]
     pub live: Option<SocketAddr>,
@@ -61,11 +64,7 @@ pub struct StreamArgs {
 impl StreamArgs {
     /// For [`raywake_io::sink::bag`].
     pub fn sinks(&self) -> Streams {
-        #[cfg(feature = "live")]
-        let live = self.live;
-        #[cfg(not(feature = "live"))]
-        let live = None;
-        Streams { mcap: self.mcap.clone(), live }
+        Streams { mcap: self.mcap.clone(), live: self.live }
     }
 }
 

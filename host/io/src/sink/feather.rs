@@ -2,8 +2,7 @@
 //!
 //! Every column is named with its unit; frames are those of [`raywake_core::output`]: `_world` is
 //! the frame of the poses, without it the vehicle's; `v` is over ground along world axes, `v_ego`
-//! relative to the moving vehicle along its axes. All functions fail with the system's reason when
-//! the file cannot be written, and with [`Error::Unsupported`] without the feature `arrow`.
+//! relative to the moving vehicle along its axes.
 
 use std::path::Path;
 
@@ -18,7 +17,7 @@ use crate::Error;
 /// Elements of a tracklet's state: m, m, rad, m/s and rad/s.
 const STATE: [&str; 5] = ["x", "y", "heading", "speed", "turn"];
 
-/// Writes the flow of columns, one row each.
+/// The flow of columns, one row each.
 ///
 /// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `vx_world_mps vy_world_mps`,
 /// `vx_ego_mps vy_ego_mps`, `cov_xx cov_xy cov_yy` ((m/s)^2, of the world velocity) float32;
@@ -28,7 +27,7 @@ const STATE: [&str; 5] = ["x", "y", "heading", "speed", "turn"];
 /// float32; `foreground` (not explained by odometry) and `valid`
 /// (with a match of its own or part of a thing that moves) bool; `class` uint8, what the encoder
 /// takes the column for: the numbers of [`ColumnClass`], whose names are in the metadata, or 255.
-pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Result<(), Error> {
+pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["cell_i", "cell_j"], columns, |c| c.cell);
     t.array(["x_world_m", "y_world_m"], columns, |c| c.position_world_m);
@@ -45,32 +44,41 @@ pub fn write_columns(path: &Path, columns: &[ColumnFlow], meta: Meta<'_>) -> Res
     t.column("foreground", columns, |c| c.origin != Origin::Background);
     t.column("valid", columns, |c| c.origin >= Origin::Matched);
     t.column("class", columns, |c| class(c.class));
-    t.write(path, &[meta, &[class_names()]].concat())
+    t
 }
 
-/// Writes the flow of returns, one row each in the sweep's order.
+/// The flow of returns, one row each in the sweep's order.
 ///
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
 /// cov_yy` of the world velocity float32; `age` uint32; `p_moves` float32; `foreground`, `valid`
 /// bool; `status` uint8, what became of the return: the numbers of
 /// [`raywake_core::output::Status`], whose names are in the metadata, as are those of `class`.
 ///
-/// `points` and `flows` are of the same sweep; fails with [`Error::Usage`] where their lengths
-/// differ.
-pub fn write_points(
-    path: &Path,
-    points: &[Point],
-    flows: &[PointFlow],
-    meta: Meta<'_>,
-) -> Result<(), Error> {
-    if points.len() != flows.len() {
-        let lengths = format!("{} returns, {} flows", points.len(), flows.len());
-        return Err(Error::Usage(format!("{}: {lengths}", path.display())));
-    }
+/// `points` and `flows` are of the same sweep.
+pub fn points(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["x_m", "y_m", "z_m"], points, |p| p.position);
-    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
     t.array(["vx_ego_mps", "vy_ego_mps", "vz_ego_mps"], flows, |f| f.velocity_ego_mps);
+    found(&mut t, flows);
+    t
+}
+
+/// The same without what the recording tells: places are those of what moves, null for the rest,
+/// and velocities are over ground.
+pub fn points_in_short(points: &[Point], flows: &[PointFlow]) -> TableWriter {
+    let mut t = TableWriter::default();
+    let rows: Vec<_> = points.iter().zip(flows).collect();
+    let place = |(point, flow): &(&Point, &PointFlow)| {
+        point.position.map(|v| (flow.status == Status::Moving).then_some(v))
+    };
+    t.array(["x_m", "y_m", "z_m"], &rows, place);
+    found(&mut t, flows);
+    t
+}
+
+/// What was found of returns.
+fn found(t: &mut TableWriter, flows: &[PointFlow]) {
+    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
     t.array(["cov_xx", "cov_xy", "cov_yy"], flows, |f| f.covariance);
     t.column("age", flows, |f| f.age);
     t.column("p_moves", flows, |f| f.probability);
@@ -78,7 +86,6 @@ pub fn write_points(
     t.column("valid", flows, |f| f.origin >= Origin::Matched);
     t.column("status", flows, |f| f.status as u8);
     t.column("class", flows, |f| class(f.class));
-    t.write(path, &[meta, &[status_names(), class_names()]].concat())
 }
 
 /// A class as a number, 255 without one.
@@ -96,17 +103,13 @@ pub fn status_names() -> (&'static str, String) {
     ("status", Status::ALL.map(Status::name).join(","))
 }
 
-/// Writes tracklets, one row each.
+/// Tracklets, one row each.
 ///
 /// `cell_i cell_j` int32; `x_world_m y_world_m` float64; `x_m y_m`, `heading_world_rad`,
 /// `speed_mps`, `turn_rate_radps`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps` and the
 /// upper half of the covariance, `cov_x_x` to `cov_turn_turn`, float32; `age` uint32; `p_moves`
 /// float32.
-pub fn write_tracklets(
-    path: &Path,
-    tracklets: &[TrackletState],
-    meta: Meta<'_>,
-) -> Result<(), Error> {
+pub fn tracklets(tracklets: &[TrackletState]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["cell_i", "cell_j"], tracklets, |s| s.cell);
     t.array(["x_world_m", "y_world_m"], tracklets, |s| s.position_world_m);
@@ -123,7 +126,7 @@ pub fn write_tracklets(
     }
     t.column("age", tracklets, |s| s.age);
     t.column("p_moves", tracklets, |s| s.probability);
-    t.write(path, meta)
+    t
 }
 
 /// A voxel of a map of occupancy.

@@ -1,4 +1,4 @@
-//! Where results go: feather files, MCAP files, viewers and Argoverse 2 submissions, each written whole or
+//! Where results go: feather and Parquet files, MCAP files, viewers and Argoverse 2 submissions, each written whole or
 //! not at all.
 
 pub mod argoverse;
@@ -7,7 +7,10 @@ pub mod atomic;
 pub mod bag;
 pub mod clouds;
 pub mod feather;
+pub mod flow_tables;
 pub mod objects;
+#[cfg_attr(not(feature = "parquet"), path = "parquet_absent.rs")]
+pub mod parquet;
 pub mod streams;
 pub mod table;
 

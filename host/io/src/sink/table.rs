@@ -1,5 +1,8 @@
-//! Named columns as an Arrow IPC file.
+//! Named columns as an Arrow IPC file, or as a part of a Parquet file.
 
+#[cfg(feature = "arrow")]
+use std::io;
+use std::io::Write;
 use std::path::Path;
 
 use super::Meta;
@@ -20,7 +23,9 @@ macro_rules! values {
     };
 }
 
-values!(F32 f32, F64 f64, I32 i32, U8 u8, U32 u32, U64 u64, Bool bool, Text String);
+values!(
+    F32 f32, Known Option<f32>, F64 f64, I32 i32, U8 u8, U32 u32, U64 u64, Bool bool, Text String
+);
 
 /// A table under construction.
 #[derive(Default)]
@@ -52,18 +57,37 @@ impl TableWriter {
         }
     }
 
+    /// The columns of both tables, which have the same rows.
+    pub fn beside(mut self, other: TableWriter) -> TableWriter {
+        self.columns.extend(other.columns);
+        self
+    }
+
     /// Writes the table, compressed by Zstandard: a third is left of a sweep's flow. The metadata
     /// goes to the schema, with this program's version as `raywake`.
-    #[cfg(feature = "arrow")]
     pub fn write(self, path: &Path, meta: Meta<'_>) -> Result<(), Error> {
-        let batch = arrow::batch(self.columns, meta)
-            .map_err(|e| Error::Write { path: path.to_path_buf(), source: arrow::reason(e) })?;
-        super::atomic::write(path, |out| arrow::write(&batch, out).map_err(arrow::reason))
+        let bytes = self.file(path, meta)?;
+        super::atomic::write(path, |out| out.write_all(&bytes))
+    }
+
+    /// What the file of a name would hold.
+    #[cfg(feature = "arrow")]
+    pub fn file(self, path: &Path, meta: Meta<'_>) -> Result<Vec<u8>, Error> {
+        let mut bytes = Vec::new();
+        let batch = self.batch(meta).map_err(Error::writing(path))?;
+        let written = arrow::write(&batch, &mut bytes).map_err(arrow::reason);
+        written.map(|()| bytes).map_err(Error::writing(path))
+    }
+
+    /// The table in memory.
+    #[cfg(feature = "arrow")]
+    pub(super) fn batch(self, meta: Meta<'_>) -> io::Result<arrow_array::RecordBatch> {
+        arrow::batch(self.columns, meta).map_err(arrow::reason)
     }
 
     /// Fails: this build has no feather files.
     #[cfg(not(feature = "arrow"))]
-    pub fn write(self, path: &Path, _: Meta<'_>) -> Result<(), Error> {
+    pub fn file(self, path: &Path, _: Meta<'_>) -> Result<Vec<u8>, Error> {
         let what = "the feature `arrow` for feather files is not compiled in";
         Err(Error::Unsupported(format!("{}: {what}", path.display())))
     }
@@ -90,21 +114,26 @@ mod arrow {
         columns: Vec<(String, Values)>,
         meta: Meta<'_>,
     ) -> Result<RecordBatch, ArrowError> {
-        let arrays: Vec<(String, ArrayRef)> =
-            columns.into_iter().map(|(name, column)| (name, array(column))).collect();
-        let field = |(name, a): &(String, ArrayRef)| Field::new(name, a.data_type().clone(), false);
-        let fields: Vec<Field> = arrays.iter().map(field).collect();
+        let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns
+            .into_iter()
+            .map(|(name, column)| {
+                let has_nulls = matches!(column, Values::Known(_));
+                let array = array(column);
+                (Field::new(name, array.data_type().clone(), has_nulls), array)
+            })
+            .unzip();
         let version = ("raywake", env!("CARGO_PKG_VERSION").to_owned());
         let meta: HashMap<String, String> =
             meta.iter().cloned().chain([version]).map(|(k, v)| (k.to_owned(), v)).collect();
         let schema = Schema::new(fields).with_metadata(meta);
-        RecordBatch::try_new(Arc::new(schema), arrays.into_iter().map(|(_, a)| a).collect())
+        RecordBatch::try_new(Arc::new(schema), arrays)
     }
 
     /// Takes over the memory of a column.
     fn array(column: Values) -> ArrayRef {
         match column {
             Values::F32(v) => Arc::new(Float32Array::from(v)),
+            Values::Known(v) => Arc::new(Float32Array::from(v)),
             Values::F64(v) => Arc::new(Float64Array::from(v)),
             Values::I32(v) => Arc::new(Int32Array::from(v)),
             Values::U8(v) => Arc::new(UInt8Array::from(v)),

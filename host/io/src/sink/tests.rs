@@ -46,12 +46,15 @@ fn a_file_is_whole_or_absent() {
 #[cfg(feature = "arrow")]
 mod tables {
     use super::*;
+    use crate::sink::flow_tables::{FlowTables, SweepMark};
     use crate::sink::{argoverse, feather};
     use arrow_array::RecordBatch;
     use arrow_array::cast::AsArray;
+    #[cfg(feature = "parquet")]
+    use arrow_array::types::UInt64Type;
     use arrow_array::types::{Float32Type, Float64Type, Int32Type, UInt32Type};
     use arrow_ipc::reader::FileReader;
-    use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
+    use raywake_core::output::{ColumnFlow, Origin, PointFlow, Status, TrackletState};
     use raywake_core::pose::Pose;
     use raywake_core::sweep::Point;
 
@@ -82,7 +85,7 @@ mod tables {
             ..ColumnFlow::default()
         };
         let rows = [flow, ColumnFlow { origin: Origin::Matched, ..flow }, ColumnFlow::default()];
-        feather::write_columns(&path, &rows, &[("frame", "17".into())]).unwrap();
+        feather::columns(&rows).write(&path, &[("frame", "17".into())]).unwrap();
         let b = back(&path);
         let cells = b.column_by_name("cell_i").unwrap().as_primitive::<Int32Type>();
         assert_eq!(cells.values(), &[-3, -3, 0]);
@@ -97,7 +100,7 @@ mod tables {
         let schema = b.schema();
         assert_eq!(schema.metadata["frame"], "17");
         assert_eq!(schema.metadata["raywake"], env!("CARGO_PKG_VERSION"));
-        feather::write_columns(&path, &[], &[]).unwrap();
+        feather::columns(&[]).write(&path, &[]).unwrap();
         assert_eq!(names(t.path()), ["c.feather"]);
     }
 
@@ -106,12 +109,11 @@ mod tables {
         let t = Temp::new();
         let path = t.path().join("p.feather");
         let (points, flows) = ([Point::default(); 2], [PointFlow::default(); 2]);
-        feather::write_points(&path, &points, &flows, &[]).unwrap();
+        feather::points(&points, &flows).write(&path, &[]).unwrap();
         assert_eq!(back(&path).num_rows(), 2);
-        assert!(feather::write_points(&path, &points, &flows[1..], &[]).is_err());
         let mut state = TrackletState { speed_mps: 4.0, ..TrackletState::default() };
         state.covariance[3][4] = 0.5;
-        feather::write_tracklets(&path, &[state], &[]).unwrap();
+        feather::tracklets(&[state]).write(&path, &[]).unwrap();
         let b = back(&path);
         assert_eq!((f32s(&b, "speed_mps"), f32s(&b, "cov_speed_turn")), (vec![4.0], vec![0.5]));
         let of_cov = |f: &&std::sync::Arc<arrow_schema::Field>| f.name().starts_with("cov_");
@@ -123,7 +125,64 @@ mod tables {
         assert_eq!(b.schema().metadata["origin_y_m"], "2");
         assert_eq!(b.schema().metadata["resolution_m"], "0.3");
         let absent = t.path().join("no/p.feather");
-        assert_eq!(feather::write_columns(&absent, &[], &[]).unwrap_err().exit_code(), 4);
+        assert_eq!(feather::columns(&[]).write(&absent, &[]).unwrap_err().exit_code(), 4);
+    }
+
+    const MARK: SweepMark = SweepMark { frame: 7, stamp_s: 0.5, dt_s: 0.1 };
+
+    #[test]
+    fn what_an_interrupted_run_left_is_kept() {
+        let t = Temp::new();
+        let rows = [ColumnFlow { age: 3, ..ColumnFlow::default() }];
+        let write = |frame, rows: &[ColumnFlow]| {
+            let mut tables = FlowTables::folders(t.path(), false).unwrap();
+            tables.columns(&SweepMark { frame, ..MARK }, rows)
+        };
+        write(7, &rows).unwrap();
+        let path = t.path().join("columns/0000000007.feather");
+        let time = || fs::metadata(&path).unwrap().modified().unwrap();
+        let first = time();
+        write(7, &rows).unwrap();
+        assert_eq!(time(), first);
+        let e = write(7, &[]).unwrap_err();
+        assert!(e.to_string().contains("0000000007.feather is not what this run finds"), "{e}");
+        assert_eq!((e.exit_code(), time()), (2, first));
+        // Once it is known that they are the same, they are not read again.
+        let mut tables = FlowTables::folders(t.path(), false).unwrap();
+        write(8, &rows).unwrap();
+        tables.columns(&MARK, &rows).unwrap();
+        tables.columns(&SweepMark { frame: 8, ..MARK }, &[]).unwrap();
+        assert!(!t.path().join("points").exists());
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn all_sweeps_in_one_file() {
+        use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+        let t = Temp::new();
+        let moving = PointFlow { status: Status::Moving, ..PointFlow::default() };
+        let point = Point { position: [1.0, 2.0, 3.0], ..Point::default() };
+        let mut tables = FlowTables::files(t.path());
+        for frame in [7, 8] {
+            let flows = [moving, PointFlow::default()];
+            tables.points(&SweepMark { frame, ..MARK }, &[point; 2], &flows).unwrap();
+        }
+        assert_eq!(names(t.path()), [".points.parquet.partial"]);
+        tables.finish().unwrap();
+        assert_eq!(names(t.path()), ["points.parquet"]);
+        let file = fs::File::open(t.path().join("points.parquet")).unwrap();
+        let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+        assert_eq!(reader.metadata().num_row_groups(), 2);
+        assert!(reader.schema().metadata()["status"].starts_with("static,moving"));
+        let b = reader.build().unwrap().next().unwrap().unwrap();
+        let frames = b.column_by_name("frame").unwrap().as_primitive::<UInt64Type>();
+        assert_eq!(frames.values(), &[7, 7, 8, 8]);
+        let y = b.column_by_name("y_m").unwrap().as_primitive::<Float32Type>();
+        assert_eq!(y.iter().collect::<Vec<_>>(), [Some(2.0), None, Some(2.0), None]);
+        // No table, no file; and no folder is an error that names the file.
+        FlowTables::files(t.path()).finish().unwrap();
+        let e = FlowTables::files(&t.path().join("no")).columns(&MARK, &[]).unwrap_err();
+        assert!(e.to_string().contains("columns.parquet") && e.exit_code() == 4, "{e}");
     }
 
     #[test]

@@ -1,0 +1,146 @@
+//! The tables of a run's flow: a feather file each sweep, or a Parquet file for all.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
+use raywake_core::sweep::Point;
+
+use super::feather::{self, class_names, status_names};
+use super::parquet::ParquetFile;
+use super::table::TableWriter;
+use super::{Meta, atomic};
+use crate::Error;
+
+/// The sweep that rows are of.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepMark {
+    /// Its frame number or timestamp.
+    pub frame: u64,
+    /// Its time, s.
+    pub stamp_s: f64,
+    /// From the first sweep of its pair to the second, s.
+    pub dt_s: f64,
+}
+
+/// Kinds of tables: names of folders and files.
+const KINDS: [&str; 3] = ["columns", "points", "tracklets"];
+const COLUMNS: usize = 0;
+const POINTS: usize = 1;
+const TRACKLETS: usize = 2;
+
+/// Where tables go.
+pub enum FlowTables {
+    /// A folder for each kind in this one, a file `FRAME.feather` each sweep in that.
+    Folders(Folders),
+    /// A file of each kind.
+    Files([ParquetFile; KINDS.len()]),
+}
+
+/// Tables of single sweeps. What is there already is kept, as an interrupted run left it.
+pub struct Folders {
+    root: PathBuf,
+    /// Whether a table of a kind that was there was found to be the one that would be written.
+    checked: [bool; KINDS.len()],
+}
+
+impl FlowTables {
+    /// Creates folders for all kinds, but for that of returns where they are not wanted.
+    pub fn folders(root: &Path, with_points: bool) -> Result<FlowTables, Error> {
+        let kinds = KINDS.iter().enumerate().filter(|(n, _)| with_points || *n != POINTS);
+        kinds.map(|(_, name)| root.join(name)).try_for_each(|f| atomic::create_folder(&f))?;
+        let checked = [false; KINDS.len()];
+        Ok(FlowTables::Folders(Folders { root: root.to_path_buf(), checked }))
+    }
+
+    /// One file of each kind, [`KINDS`] with `.parquet`. Rows begin with `frame` uint64, `stamp_s`
+    /// and `dt_s` float64.
+    pub fn files(root: &Path) -> FlowTables {
+        FlowTables::Files(KINDS.map(|name| ParquetFile::new(&root.join(format!("{name}.parquet")))))
+    }
+
+    /// Writes the flow of columns, as [`feather::columns`] describes it.
+    pub fn columns(&mut self, of: &SweepMark, rows: &[ColumnFlow]) -> Result<(), Error> {
+        self.write(COLUMNS, of, rows.len(), feather::columns(rows), &[class_names()])
+    }
+
+    /// Writes the flow of returns: [`feather::points`], in one file [`feather::points_in_short`].
+    pub fn points(
+        &mut self,
+        of: &SweepMark,
+        points: &[Point],
+        flows: &[PointFlow],
+    ) -> Result<(), Error> {
+        let table = match self {
+            FlowTables::Folders(_) => feather::points(points, flows),
+            FlowTables::Files(_) => feather::points_in_short(points, flows),
+        };
+        self.write(POINTS, of, points.len(), table, &[status_names(), class_names()])
+    }
+
+    /// Writes tracklets, as [`feather::tracklets`] describes them.
+    pub fn tracklets(&mut self, of: &SweepMark, rows: &[TrackletState]) -> Result<(), Error> {
+        self.write(TRACKLETS, of, rows.len(), feather::tracklets(rows), &[])
+    }
+
+    fn write(
+        &mut self,
+        kind: usize,
+        of: &SweepMark,
+        rows: usize,
+        table: TableWriter,
+        meta: Meta<'_>,
+    ) -> Result<(), Error> {
+        match self {
+            FlowTables::Folders(folders) => folders.write(kind, of, table, meta),
+            FlowTables::Files(files) => {
+                let rows = vec![(); rows];
+                let mut whole = TableWriter::default();
+                whole.column("frame", &rows, |()| of.frame);
+                whole.column("stamp_s", &rows, |()| of.stamp_s);
+                whole.column("dt_s", &rows, |()| of.dt_s);
+                files[kind].append(whole.beside(table), meta)
+            }
+        }
+    }
+
+    /// Completes the files.
+    pub fn finish(self) -> Result<(), Error> {
+        match self {
+            FlowTables::Folders(_) => Ok(()),
+            FlowTables::Files(files) => files.into_iter().try_for_each(ParquetFile::finish),
+        }
+    }
+}
+
+impl Folders {
+    fn write(
+        &mut self,
+        kind: usize,
+        of: &SweepMark,
+        table: TableWriter,
+        meta: Meta<'_>,
+    ) -> Result<(), Error> {
+        // Ten digits, so that names sort as frames do.
+        let path = self.root.join(format!("{}/{:010}.feather", KINDS[kind], of.frame));
+        let is_there = path.is_file();
+        if is_there && self.checked[kind] {
+            return Ok(());
+        }
+        let mark = [
+            ("frame", of.frame.to_string()),
+            ("stamp_s", of.stamp_s.to_string()),
+            ("dt_s", of.dt_s.to_string()),
+        ];
+        let bytes = table.file(&path, &[&mark, meta].concat())?;
+        if !is_there {
+            return atomic::write(&path, |out| std::io::Write::write_all(out, &bytes));
+        }
+        if fs::read(&path).map_err(Error::reading(&path))? != bytes {
+            let what = "is not what this run finds: choose another folder, or delete it";
+            return Err(Error::Usage(format!("{} {what}", path.display())));
+        }
+        self.checked[kind] = true;
+        Ok(())
+    }
+}
