@@ -54,7 +54,7 @@ mod tables {
     use arrow_array::types::UInt64Type;
     use arrow_array::types::{Float32Type, Float64Type, Int32Type, UInt32Type};
     use arrow_ipc::reader::FileReader;
-    use raywake_core::output::{ColumnFlow, Origin, PointFlow, Status, TrackletState};
+    use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
     use raywake_core::pose::Pose;
     use raywake_core::sweep::Point;
 
@@ -159,6 +159,7 @@ mod tables {
     #[test]
     fn all_sweeps_in_one_file() {
         use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+        use raywake_core::output::Status;
         let t = Temp::new();
         let moving = PointFlow { status: Status::Moving, ..PointFlow::default() };
         let point = Point { position: [1.0, 2.0, 3.0], ..Point::default() };

@@ -8,7 +8,7 @@ use raywake_core::pose::Pose;
 
 use super::file::{BagFile, FileEnd, Place};
 use super::frames::FixedFrames;
-use super::messages::{self, CloudHeader, MessageKind, Transform};
+use super::messages::{self, CloudForm, CloudHeader, MessageKind, Transform};
 use super::wire::Wire;
 use crate::Error;
 use crate::source::trajectory::Trajectory;
@@ -30,6 +30,7 @@ pub(super) struct CloudMessage {
 pub(super) struct CloudTopic {
     /// Of its messages: see [`Wire::new`].
     pub encoding: String,
+    pub form: CloudForm,
     pub frame: String,
     pub clouds: Vec<CloudMessage>,
     /// Messages without a point.
@@ -151,8 +152,9 @@ impl Contents {
     ) -> Result<(), String> {
         let mut wire = Wire::new(&channel.encoding, data)?;
         match channel.kind {
-            MessageKind::PointCloud2 => {
-                self.cloud(channel, header, at, CloudHeader::read(&mut wire)?)
+            MessageKind::Cloud(form) => {
+                let cloud = CloudHeader::read(form, &mut wire)?;
+                self.cloud(channel, header, at, cloud, form);
             }
             MessageKind::Odometry => match messages::odometry(wire)? {
                 Some(transform) => self.pose(&channel.topic, transform),
@@ -177,6 +179,7 @@ impl Contents {
         message: &MessageHeader,
         at: CloudMessage,
         cloud: CloudHeader,
+        form: CloudForm,
     ) {
         let topic = self.topics.entry(channel.topic.clone()).or_default();
         if cloud.size.contains(&0) {
@@ -192,7 +195,7 @@ impl Contents {
             last => {
                 if last.is_none() {
                     topic.frame = cloud.frame.to_owned();
-                    topic.encoding = channel.encoding.clone();
+                    (topic.encoding, topic.form) = (channel.encoding.clone(), form);
                 }
                 topic.clouds.push(CloudMessage { stamp_ns, ..at });
             }

@@ -1,5 +1,5 @@
 //! The messages of ROS that tell sweeps and poses, as their definitions have them:
-//! `sensor_msgs/PointCloud2`, `tf2_msgs/TFMessage` and `nav_msgs/Odometry`.
+//! `sensor_msgs/PointCloud2`, Livox's `CustomMsg`, `tf2_msgs/TFMessage` and `nav_msgs/Odometry`.
 
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
@@ -13,10 +13,19 @@ const FIELDS_MAX: u32 = 1 << 10;
 /// Transforms of a message that are believed.
 const TRANSFORMS_MAX: u32 = 1 << 14;
 
+/// How a message tells a cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum CloudForm {
+    #[default]
+    PointCloud2,
+    /// `CustomMsg` of Livox's drivers.
+    Livox,
+}
+
 /// Kinds of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MessageKind {
-    PointCloud2,
+    Cloud(CloudForm),
     Transforms,
     Odometry,
 }
@@ -26,7 +35,10 @@ impl MessageKind {
     pub fn of(schema: &str) -> Option<MessageKind> {
         match schema {
             "sensor_msgs/msg/PointCloud2" | "sensor_msgs/PointCloud2" => {
-                Some(MessageKind::PointCloud2)
+                Some(MessageKind::Cloud(CloudForm::PointCloud2))
+            }
+            livox if livox.starts_with("livox_") && livox.ends_with("/CustomMsg") => {
+                Some(MessageKind::Cloud(CloudForm::Livox))
             }
             "tf2_msgs/msg/TFMessage" | "tf2_msgs/TFMessage" | "tf/tfMessage" => {
                 Some(MessageKind::Transforms)
@@ -98,17 +110,69 @@ pub(super) struct CloudHeader<'a> {
 }
 
 impl CloudHeader<'_> {
-    pub fn read<'a>(wire: &mut Wire<'a>) -> Result<CloudHeader<'a>, String> {
+    pub fn read<'a>(form: CloudForm, wire: &mut Wire<'a>) -> Result<CloudHeader<'a>, String> {
         let (stamp_ns, frame) = wire.header()?;
-        Ok(CloudHeader { stamp_ns, frame, size: [wire.word()?, wire.word()?] })
+        let rows = match form {
+            CloudForm::PointCloud2 => wire.word()?,
+            CloudForm::Livox => {
+                // The time that those of the points count from: the header's.
+                wire.double()?;
+                1
+            }
+        };
+        Ok(CloudHeader { stamp_ns, frame, size: [rows, wire.word()?] })
     }
 }
 
 /// Replaces `points` by those of a cloud, in its frame and with times from its stamp; returns
 /// whether they have times.
-pub(super) fn cloud(mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, String> {
+pub(super) fn cloud(
+    form: CloudForm,
+    mut wire: Wire,
+    points: &mut Vec<Point>,
+) -> Result<bool, String> {
     points.clear();
-    let CloudHeader { stamp_ns, size: [height, width], .. } = CloudHeader::read(&mut wire)?;
+    let header = CloudHeader::read(form, &mut wire)?;
+    match form {
+        CloudForm::PointCloud2 => point_cloud(header, wire, points),
+        CloudForm::Livox => livox(header, wire, points),
+    }
+}
+
+/// Numbers of a point of Livox's: tag and line are passed over.
+const LIVOX: [(&str, Number); 5] = [
+    ("offset_time", Number::Unsigned(4)),
+    ("x", Number::F32),
+    ("y", Number::F32),
+    ("z", Number::F32),
+    ("reflectivity", Number::Unsigned(1)),
+];
+/// Bytes of such a point.
+const LIVOX_POINT: usize = 19;
+
+fn livox(header: CloudHeader, mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, String> {
+    // The number of the lidar, and three bytes for later.
+    (0..4).try_for_each(|_| wire.byte().map(|_| ()))?;
+    let count = wire.word()? as usize;
+    if count != header.size[1] as usize {
+        return Err(format!("{count} points, said to be {}", header.size[1]));
+    }
+    let (data, step) = wire.records(count, LIVOX_POINT)?;
+    let named = LIVOX.map(|(name, number)| (name.to_owned(), number));
+    let fields = Fields::find(&named)?.stamped(header.stamp_ns);
+    let value = |point: usize, field: usize| {
+        let attribute = Attribute { number: LIVOX[field].1, start: 4 * field, step };
+        attribute.value(data, point, wire.is_big())
+    };
+    Ok(fields.returns(count, value, points))
+}
+
+fn point_cloud(
+    header: CloudHeader,
+    mut wire: Wire,
+    points: &mut Vec<Point>,
+) -> Result<bool, String> {
+    let CloudHeader { stamp_ns, size: [height, width], .. } = header;
     let (named, starts) = fields(&mut wire)?;
     let big = wire.byte()? != 0;
     let [step, row_step] = [wire.word()? as usize, wire.word()? as usize];

@@ -1,6 +1,7 @@
 //! Recordings of ROS in MCAP files: a file, or the folder that `ros2 bag` makes of several.
 //!
-//! Sweeps are the clouds of a topic (`sensor_msgs/PointCloud2`, of ROS 1 or 2), or of several that
+//! Sweeps are the clouds of a topic (`sensor_msgs/PointCloud2` or Livox's
+//! `CustomMsg`, of ROS 1 or 2), or of several that
 //! lidars of one vehicle send. The vehicle frame is the one that `/tf_static` fixes the lidar to in
 //! the end, or the cloud's own. Poses are those of the only odometry or transform that tells of it.
 //!
@@ -31,6 +32,7 @@ use super::{
 use crate::Error;
 use contents::{CloudMessage, Contents};
 use file::BagFile;
+use messages::CloudForm;
 use wire::Wire;
 
 /// Topics whose numbers of clouds differ by more than this factor are not lidars of one rig.
@@ -40,6 +42,7 @@ const COUNT_RATIO_MAX: usize = 2;
 struct Lidar {
     topic: String,
     encoding: String,
+    form: CloudForm,
     vehicle_from_lidar: Pose,
 }
 
@@ -155,7 +158,7 @@ impl Bag {
             let (lidar, file) = (&self.lidars[n], &mut self.files[message.file]);
             let bytes = file.message(message.place)?;
             let cloud = Wire::new(&lidar.encoding, &bytes)
-                .and_then(|wire| messages::cloud(wire, &mut self.cloud));
+                .and_then(|wire| messages::cloud(lidar.form, wire, &mut self.cloud));
             timed &= cloud.map_err(|what| {
                 let at = format!("byte {}, topic {}", message.place.record, lidar.topic);
                 into.points.clear();
@@ -231,7 +234,9 @@ fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<Stri
     if contents.topics.is_empty() {
         let others: Vec<&str> = contents.others.iter().take(8).map(String::as_str).collect();
         let others = if others.is_empty() { "nothing".into() } else { others.join(", ") };
-        return wrong(format!("no clouds (sensor_msgs/PointCloud2); there are: {others}"));
+        return wrong(format!(
+            "no clouds (sensor_msgs/PointCloud2, livox CustomMsg); there are: {others}"
+        ));
     }
     if let Some(missing) = asked.iter().find(|name| !contents.topics.contains_key(*name)) {
         return wrong(format!("no clouds on {missing}; there are: {listed}"));
@@ -290,8 +295,8 @@ fn lidars(
             return Err(Error::input(root, "", what));
         }
         base = Some(own);
-        let (topic, encoding) = (name.clone(), topic.encoding.clone());
-        lidars.push(Lidar { topic, encoding, vehicle_from_lidar });
+        let (encoding, form) = (topic.encoding.clone(), topic.form);
+        lidars.push(Lidar { topic: name.clone(), encoding, form, vehicle_from_lidar });
     }
     Ok((base.unwrap_or_default(), lidars))
 }

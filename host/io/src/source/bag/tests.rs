@@ -356,3 +356,43 @@ fn files_that_are_no_recording_say_what_to_do() {
     let error = open(temp.path(), &topic).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("--topic"), "{error}");
 }
+
+/// As Livox's drivers put out what is no turn of a sensor: petals, each with the time of its points.
+fn livox(stamp_ns: u64, said: u32) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, "livox_frame");
+    cdr.double(f64::from_bits(stamp_ns));
+    cdr.word(said);
+    [1, 0, 0, 0].into_iter().for_each(|byte| cdr.byte(byte));
+    cdr.word(2000);
+    for n in 0..2000u16 {
+        let (sin, cos) = (f32::from(n) * 0.9).sin_cos();
+        let range_m = 4.0 + 3.0 * (f32::from(n) * 0.1).sin();
+        cdr.word(u32::from(n) * 50_000);
+        [range_m * cos, range_m * sin, -1.8].into_iter().for_each(|v| cdr.float(v));
+        [51, 16, (n % 4) as u8].into_iter().for_each(|byte| cdr.byte(byte));
+    }
+    cdr.message()
+}
+
+#[test]
+fn petals_of_a_livox() {
+    let temp = Temp::new();
+    let message =
+        |n| ("/livox/lidar", "livox_ros_driver2/msg/CustomMsg", stamp(n), livox(stamp(n), 2000));
+    let mut all: Vec<Message> = (0..3).map(message).collect();
+    let path = temp.write("livox.mcap", file(&all, options()));
+    let mut source = open(&path, &accept()).unwrap();
+    assert!(matches!(source.rig().timing, Timing::Offset { .. }) && source.len() == 3);
+    let mut sweep = SweepData::default();
+    source.read(2, &mut sweep).unwrap();
+    assert_eq!(sweep.points.len(), 2000);
+    let last = sweep.points[1999];
+    assert!((last.offset_s - 0.09995).abs() < 1e-6 && last.position[2] == -1.8, "{last:?}");
+    assert!((last.intensity - 0.2).abs() < 1e-6);
+    // What says another number than it has, or ends early, is an error.
+    all[1].3 = livox(stamp(1), 1999);
+    let path = temp.write("said.mcap", file(&all, options()));
+    let e = open(&path, &accept()).unwrap().read(1, &mut sweep).unwrap_err().to_string();
+    assert!(e.contains("topic /livox/lidar: 2000 points, said to be 1999"), "{e}");
+}

@@ -70,6 +70,21 @@ impl<'a> Wire<'a> {
         self.take(length)
     }
 
+    /// Whether the most significant byte of a number comes first.
+    pub fn is_big(&self) -> bool {
+        self.big
+    }
+
+    /// So many records that begin with a number of four bytes, and the bytes from one to the next.
+    pub fn records(&mut self, count: usize, size: usize) -> Result<(&'a [u8], usize), String> {
+        let alignment = self.alignment.min(4);
+        self.at = self.at.next_multiple_of(alignment);
+        let step = size.next_multiple_of(alignment);
+        let all = count.saturating_sub(1).checked_mul(step).and_then(|n| n.checked_add(size));
+        let all = all.filter(|_| count > 0).unwrap_or(0);
+        Ok((self.take(all)?, step))
+    }
+
     /// A string.
     pub fn text(&mut self) -> Result<&'a str, String> {
         let bytes = self.bytes()?;
