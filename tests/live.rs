@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use raywake_core::sweep::Point;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::objects::TrackedObject;
-use raywake_io::sink::streams::{Content, Streams};
+use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::source::SweepData;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::stream::MaybeTlsStream;
@@ -61,7 +61,7 @@ fn seen(address: SocketAddr) -> (Vec<String>, Duration) {
 #[test]
 fn a_viewer_sees_all_of_it() {
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let streams = Streams { mcap: None, live: Some(free) };
+    let streams = StreamTargets { mcap: None, live: Some(free) };
     let mut sink = BagSink::create(&streams, 0, Content::Objects).unwrap().unwrap();
     assert!(!sink.is_watched());
     let taken = BagSink::create(&streams, 0, Content::Flow).err().unwrap().to_string();

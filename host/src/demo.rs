@@ -17,7 +17,7 @@ use crate::outputs::{Kinds, RunFiles};
 use crate::picture::PictureFiles;
 use crate::summary::RunSummary;
 use crate::weight_files::WeightFiles;
-use raywake_io::sink::streams::Streams;
+use raywake_io::sink::streams::StreamTargets;
 use raywake_io::source::SweepData;
 use raywake_io::source::simulated::Simulated;
 
@@ -59,7 +59,7 @@ fn files(out: &Path) -> RunFiles {
     RunFiles {
         root: Some(out.to_path_buf()),
         kinds: Kinds { columns: cfg!(feature = "arrow"), ..Kinds::default() },
-        streams: Streams {
+        streams: StreamTargets {
             mcap: cfg!(feature = "mcap").then(|| out.join("demo.mcap")),
             live: None,
         },

@@ -28,7 +28,7 @@ use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::flow_tables::{FlowTables, SweepMark};
-use raywake_io::sink::streams::{Content, Streams};
+use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::sink::{argoverse, atomic};
 use raywake_io::source::{Overview, SweepData};
 
@@ -55,7 +55,7 @@ pub struct RunFiles {
     /// Which files are there.
     pub kinds: Kinds,
     /// Messages of all sweeps.
-    pub streams: Streams,
+    pub streams: StreamTargets,
     /// Pictures, film and page.
     pub pictures: PictureFiles,
 }
@@ -71,7 +71,7 @@ impl RunFiles {
 
     /// Whether nothing will be written.
     pub fn is_empty(&self) -> bool {
-        self.root.is_none() && self.streams == Streams::default() && self.pictures.is_empty()
+        self.root.is_none() && self.streams == StreamTargets::default() && self.pictures.is_empty()
     }
 }
 

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use raywake_io::sink::streams::Streams;
+use raywake_io::sink::streams::StreamTargets;
 
 #[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
@@ -55,7 +55,8 @@ pub struct StreamArgs {
     /// Also write an MCAP file for Foxglove, Rerun, rviz or Autoware: points, what moves, poses
     #[arg(long, value_name = "FILE")]
     pub mcap: Option<PathBuf>,
-    /// Also send the same to Foxglove at the recording's pace, once it has connected (feature `live`)
+    /// Also send the same to Foxglove, once it has connected, at the recording's pace (feature
+    /// `live`)
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true)]
     #[arg(default_missing_value = "127.0.0.1:8765")]
     pub live: Option<SocketAddr>,
@@ -63,8 +64,8 @@ pub struct StreamArgs {
 
 impl StreamArgs {
     /// For [`raywake_io::sink::bag`].
-    pub fn sinks(&self) -> Streams {
-        Streams { mcap: self.mcap.clone(), live: self.live }
+    pub fn sinks(&self) -> StreamTargets {
+        StreamTargets { mcap: self.mcap.clone(), live: self.live }
     }
 }
 

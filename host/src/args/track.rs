@@ -21,10 +21,11 @@ Files of --out DIR:
                      fixed-lag estimate (lag_; NaN without --fixed-lag), which refers to
                      lag_time_s, the end of the sweep; the covariance of the EKF's position
                      (cov_xx cov_xy cov_yy cov_zz, m²) and the variances of its speed and heading
-                     (cov_speed, cov_heading, rad²); the box around what was seen of it: box_x_m box_y_m box_z_m (its middle in
-                     the world), box_heading_rad (what stands: either end may be the front),
-                     length_m, width_m, height_m; p_moves (mean of its returns; NaN where not
-                     known); class (names in the metadata; 255: not known)
+                     (cov_speed, cov_heading, rad²); the box around what was seen of it:
+                     box_x_m box_y_m box_z_m (its middle in the world), box_heading_rad (what
+                     stands: either end may be the front), length_m, width_m, height_m; p_moves
+                     (mean of its returns; NaN where not known); class (names in the metadata;
+                     255: not known)
     returns/FRAME.feather  track of every return of a sweep, in its order; -1 without one
     clouds/ID.ply    returns of a track in the object's frame: x y z (m), time (s since the start
                      of the track)

@@ -26,7 +26,7 @@ use crate::statistics::{Dropped, in_words};
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::sink::streams::{Content, Streams};
+use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::source::{BinFields, SweepData, mounting, pose_row, read_cloud, read_pose};
 use raywake_registration::ground::ground_height;
 
@@ -179,7 +179,7 @@ fn show(
         let (columns, frame) = (flows.columns, PictureFrame::World);
         picture::write_one(png, first, &Subject::Flow { columns, profile, frame }, &title(args))?;
     }
-    let streams = Streams { mcap: args.mcap.clone(), live: None };
+    let streams = StreamTargets { mcap: args.mcap.clone(), live: None };
     let Some(mut bag) = BagSink::create(&streams, 0, Content::Flow)? else { return Ok(()) };
     bag.pair(first, flows)?;
     bag.finish()

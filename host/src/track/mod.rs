@@ -52,11 +52,10 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     };
     made.claim(args.out.as_deref())?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
+    say(args.quiet, &budget(args.fixed_lag))?;
     let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
     let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
     tracker.all |= args.all;
-    say(args.quiet, &budget(args.fixed_lag))?;
-    files.await_viewer(args.quiet)?;
     let mut report = report::Report::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {
         report.read(visit.now);

@@ -53,8 +53,8 @@ const NONE: ObjectState = ObjectState {
 };
 
 impl Files {
-    /// Creates folders and files for some sweeps of a recording; where none is named nothing will
-    /// be written.
+    /// Creates folders and files for some sweeps of a recording, and waits for a viewer, where one
+    /// is to look; where nothing is named nothing will be written.
     pub fn create(args: &TrackArgs, of: &Overview, sweeps: usize) -> Result<Files, Error> {
         let folder = args.out.clone();
         if let Some(root) = &folder {
@@ -67,12 +67,8 @@ impl Files {
         let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
         let pictures = Pictures::create(&PictureFiles::of(&args.views, png), &of.name, sweeps)?;
         let bag = BagSink::create(&args.streams.sinks(), of.epoch_ns, Content::Objects)?;
+        await_viewer(args.quiet, bag.as_ref())?;
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
-    }
-
-    /// Waits for a viewer, where one is to look.
-    pub fn await_viewer(&self, quiet: bool) -> Result<(), Error> {
-        await_viewer(quiet, self.bag.as_ref())
     }
 
     /// The sweep of the last step, which took `ms` milliseconds.

@@ -3,7 +3,7 @@
 use raywake_core::output::PairFlows;
 
 use super::objects::TrackedObject;
-use super::streams::{Content, Streams};
+use super::streams::{Content, StreamTargets};
 use crate::Error;
 use crate::source::SweepData;
 
@@ -17,9 +17,13 @@ impl Absent {
     ///
     /// # Errors
     /// [`Error::Unsupported`] where one is.
-    pub fn create(streams: &Streams, _: u64, _: Content) -> Result<Option<Absent>, Error> {
+    pub fn create(streams: &StreamTargets, _: u64, _: Content) -> Result<Option<Absent>, Error> {
         let what = "messages need the feature `mcap`, which is not compiled in";
-        if *streams == Streams::default() { Ok(None) } else { Err(Error::Unsupported(what.into())) }
+        if *streams == StreamTargets::default() {
+            Ok(None)
+        } else {
+            Err(Error::Unsupported(what.into()))
+        }
     }
 
     /// Never called.

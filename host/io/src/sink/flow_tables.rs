@@ -34,7 +34,7 @@ pub enum FlowTables {
     /// A folder for each kind in this one, a file `FRAME.feather` each sweep in that.
     Folders(Folders),
     /// A file of each kind.
-    Files([ParquetFile; KINDS.len()]),
+    Files(Box<[ParquetFile; KINDS.len()]>),
 }
 
 /// Tables of single sweeps. What is there already is kept, as an interrupted run left it.
@@ -56,7 +56,8 @@ impl FlowTables {
     /// One file of each kind, [`KINDS`] with `.parquet`. Rows begin with `frame` uint64, `stamp_s`
     /// and `dt_s` float64.
     pub fn files(root: &Path) -> FlowTables {
-        FlowTables::Files(KINDS.map(|name| ParquetFile::new(&root.join(format!("{name}.parquet")))))
+        let file = |name| ParquetFile::new(&root.join(format!("{name}.parquet")));
+        FlowTables::Files(Box::new(KINDS.map(file)))
     }
 
     /// Writes the flow of columns, as [`feather::columns`] describes it.

@@ -1,5 +1,5 @@
-//! Where results go: feather and Parquet files, MCAP files, viewers and Argoverse 2 submissions, each written whole or
-//! not at all.
+//! Where results go: feather, Parquet and MCAP files and Argoverse 2 submissions, each whole or
+//! absent, and viewers.
 
 pub mod argoverse;
 pub mod atomic;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Where messages go: to a file, to viewers, to both or nowhere.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Streams {
+pub struct StreamTargets {
     /// An MCAP file.
     pub mcap: Option<PathBuf>,
     /// Address of this machine at which viewers connect.

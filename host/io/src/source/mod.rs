@@ -5,6 +5,7 @@
 //! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt`, else `oxts/data/N.txt` |
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
+//! | [`Format::NuScenes`] | `LIDAR_TOP` of a scene in `sample_data.json` | `ego_pose.json` |
 //! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a named file, PCD's `VIEWPOINT` |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
@@ -32,6 +33,8 @@ mod lzf;
 mod median;
 pub mod mounting;
 pub mod npy;
+#[cfg(feature = "nuscenes")]
+mod nuscenes;
 mod oxts;
 mod pcd;
 mod ply;
@@ -210,6 +213,9 @@ pub enum Format {
     /// An Argoverse 2 sensor log.
     #[value(name = "argoverse")]
     Argoverse2,
+    /// Scenes of nuScenes.
+    #[value(name = "nuscenes")]
+    NuScenes,
     /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
     Clouds,
@@ -246,7 +252,8 @@ pub struct OpenOptions {
     /// Kind of recording.
     pub format: Option<Format>,
     /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
-    /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`.
+    /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`; for
+    /// [`Format::NuScenes`] a scene.
     pub topics: Vec<String>,
     /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep of the first, or of TUM.
     pub poses: Option<PathBuf>,
@@ -293,14 +300,17 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Some(format) => (format, path.to_path_buf()),
         None => recognise(path)?,
     };
-    if !matches!(format, Format::Mcap | Format::Pcap) && !options.topics.is_empty() {
-        return Err(Error::Usage("only recordings in MCAP and pcap have topics (--topic)".into()));
+    let has_topics = matches!(format, Format::Mcap | Format::NuScenes | Format::Pcap);
+    if !has_topics && !options.topics.is_empty() {
+        let what = "only recordings in MCAP, pcap and nuScenes have topics (--topic)";
+        return Err(Error::Usage(what.into()));
     }
     match format {
         Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),
         Format::KittiOdometry => Ok(Box::new(kitti::open_odometry(&root, options)?)),
         Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
         Format::Argoverse2 => open_argoverse(&root, options),
+        Format::NuScenes => open_nuscenes(&root, options),
         Format::Mcap => open_mcap(&root, options),
         Format::Pcap => open_pcap(&root, options),
     }
@@ -314,6 +324,17 @@ fn open_argoverse(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>,
 #[cfg(not(feature = "arrow"))]
 fn open_argoverse(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     let what = "is an Argoverse 2 log: the feature `arrow` is not compiled in";
+    Err(Error::Unsupported(format!("{} {what}", root.display())))
+}
+
+#[cfg(feature = "nuscenes")]
+fn open_nuscenes(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(nuscenes::NuScenes::open(root, options)?))
+}
+
+#[cfg(not(feature = "nuscenes"))]
+fn open_nuscenes(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    let what = "has scenes of nuScenes: the feature `nuscenes` is not compiled in";
     Err(Error::Unsupported(format!("{} {what}", root.display())))
 }
 

@@ -11,6 +11,9 @@ use crate::Error;
 /// Extension of recordings of ROS.
 pub(super) const MCAP: &str = "mcap";
 
+/// The table by which scenes of nuScenes are known.
+pub(super) const SCENES: &str = "sample_data.json";
+
 /// Extensions of captures of packets.
 const PCAP: [&str; 2] = ["pcap", "pcapng"];
 
@@ -86,6 +89,10 @@ fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     }
     if has("velodyne") {
         return Ok(Some(Format::KittiOdometry));
+    }
+    let has_tables = |p: &PathBuf| p.join(SCENES).is_file();
+    if has_tables(&path.to_path_buf()) || entries(path)?.iter().any(has_tables) {
+        return Ok(Some(Format::NuScenes));
     }
     let is_mcap = |p: &PathBuf| p.extension().is_some_and(|e| e == MCAP);
     if entries(path)?.iter().any(is_mcap) {

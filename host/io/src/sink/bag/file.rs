@@ -13,7 +13,7 @@ use crate::Error;
 use crate::sink::atomic::Partial;
 
 /// A file while it is written; it takes its name when it is finished.
-pub(super) struct BagFile {
+pub(super) struct MessageFile {
     writer: Writer<BufWriter<File>>,
     partial: Partial,
     /// A channel for each topic.
@@ -21,9 +21,9 @@ pub(super) struct BagFile {
     sequence: u32,
 }
 
-impl BagFile {
+impl MessageFile {
     /// Begins a file. Fails with the system's reason where it cannot be written.
-    pub fn create(path: &Path, topics: &[Topic]) -> Result<BagFile, Error> {
+    pub fn create(path: &Path, topics: &[Topic]) -> Result<MessageFile, Error> {
         let (partial, file) = Partial::create(path)?;
         let options = WriteOptions::new()
             .profile("ros2")
@@ -40,7 +40,7 @@ impl BagFile {
             Ok((writer, channels))
         };
         let (writer, channels) = begin().map_err(|e| partial.error(e))?;
-        Ok(BagFile { writer, partial, channels, sequence: 0 })
+        Ok(MessageFile { writer, partial, channels, sequence: 0 })
     }
 
     /// Appends a message of a topic.

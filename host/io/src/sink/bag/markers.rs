@@ -1,7 +1,7 @@
 //! What moves as `visualization_msgs/Marker`, which rviz shows.
 
 use super::cdr::Cdr;
-use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, Motion, STANDING, VEHICLE, WORLD};
+use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
 use crate::sink::objects::TrackedObject;
 
 /// `CUBE` and `LINE_LIST` of the message.
@@ -26,7 +26,7 @@ pub(super) fn cube(stamp_ns: u64, object: &TrackedObject) -> Vec<u8> {
 }
 
 /// Lines along motions; they last until the next sweep's.
-pub(super) fn lines(stamp_ns: u64, moving: &[Motion]) -> Vec<u8> {
+pub(super) fn lines(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, VEHICLE);
     cdr.text("motion");
@@ -39,7 +39,7 @@ pub(super) fn lines(stamp_ns: u64, moving: &[Motion]) -> Vec<u8> {
     [0, 0].into_iter().for_each(|n| cdr.word(n));
     cdr.byte(1);
     cdr.word(2 * moving.len() as u32);
-    for Motion { at: [x, y], velocity: [u, v] } in moving {
+    for MovingColumn { at: [x, y], velocity: [u, v] } in moving {
         let ends = [[*x, *y], [x + AHEAD_S * u, y + AHEAD_S * v]];
         ends.into_iter().for_each(|[x, y]| cdr.doubles([x.into(), y.into(), 0.0]));
     }

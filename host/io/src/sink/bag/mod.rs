@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | `/tf` | `tf2_msgs/TFMessage` | the vehicle in the world, as the poses have it |
 //! | `/raywake/points` | `sensor_msgs/PointCloud2` | returns of a sweep with their flow |
-//! | `/raywake/motion` | `visualization_msgs/Marker` | half a second of motion of what moves: rviz |
+//! | `/raywake/motion` | `visualization_msgs/Marker` | half a second of motion, for rviz |
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | the same as arrows: Foxglove |
 //!
 //! Fields of a return, all float32 but the last: `x y z` (m) and `intensity`; `velocity_x
@@ -37,11 +37,11 @@ use raywake_core::output::{ColumnFlow, PairFlows};
 use raywake_core::pose::Pose;
 
 use super::objects::TrackedObject;
-use super::streams::{Content, Streams};
+use super::streams::{Content, StreamTargets};
 use crate::Error;
 use crate::source::SweepData;
 use cdr::Cdr;
-use file::BagFile;
+use file::MessageFile;
 use live::LiveServer;
 use schemas::{MARKER, POINT_CLOUD, SCENE, Schema, TRACKED_OBJECTS, TRANSFORMS};
 
@@ -81,7 +81,7 @@ const fn topics(content: Content) -> &'static [Topic] {
 
 /// A stream of messages. Its file takes its name when it is finished.
 pub struct BagSink {
-    file: Option<BagFile>,
+    file: Option<MessageFile>,
     live: Option<LiveServer>,
     topics: &'static [Topic],
     /// Added to stamps, ns.
@@ -94,12 +94,13 @@ impl BagSink {
     /// # Errors
     /// Where the file cannot be written or the address is not to be had, with the system's reason.
     pub fn create(
-        streams: &Streams,
+        streams: &StreamTargets,
         epoch_ns: u64,
         content: Content,
     ) -> Result<Option<BagSink>, Error> {
         let topics = topics(content);
-        let file = streams.mcap.as_ref().map(|path| BagFile::create(path, topics)).transpose()?;
+        let file =
+            streams.mcap.as_ref().map(|path| MessageFile::create(path, topics)).transpose()?;
         let live = streams.live.map(|address| LiveServer::start(address, topics)).transpose()?;
         let is_wanted = file.is_some() || live.is_some();
         Ok(is_wanted.then_some(BagSink { file, live, topics, epoch_ns }))
@@ -115,8 +116,8 @@ impl BagSink {
         let (stamp_ns, pose) = (self.stamp_ns(first), &first.world_from_vehicle);
         self.write(&TF, stamp_ns, transform(stamp_ns, pose))?;
         self.write(&POINTS, stamp_ns, points::with_flow(stamp_ns, first, flows))?;
-        let moving: Vec<Motion> =
-            flows.columns.iter().filter_map(|column| Motion::of(pose, column)).collect();
+        let moving: Vec<MovingColumn> =
+            flows.columns.iter().filter_map(|column| MovingColumn::of(pose, column)).collect();
         self.write(&MOTION, stamp_ns, markers::lines(stamp_ns, &moving))?;
         self.write(&SCENES, stamp_ns, scene::motion(stamp_ns, &moving))
     }
@@ -154,23 +155,23 @@ impl BagSink {
     /// Completes the file; viewers see that it is over.
     pub fn finish(self) -> Result<(), Error> {
         self.live.into_iter().for_each(LiveServer::finish);
-        self.file.map_or(Ok(()), BagFile::finish)
+        self.file.map_or(Ok(()), MessageFile::finish)
     }
 }
 
 /// A column that moves, in the vehicle's frame.
-struct Motion {
+struct MovingColumn {
     /// m.
     at: [f32; 2],
     /// Over ground, m/s.
     velocity: [f32; 2],
 }
 
-impl Motion {
-    fn of(pose: &Pose, column: &ColumnFlow) -> Option<Motion> {
+impl MovingColumn {
+    fn of(pose: &Pose, column: &ColumnFlow) -> Option<MovingColumn> {
         let moves = column.velocity_world_mps != [0.0; 2];
         let velocity = along_vehicle(pose, column.velocity_world_mps);
-        moves.then_some(Motion { at: column.position_vehicle_m, velocity })
+        moves.then_some(MovingColumn { at: column.position_vehicle_m, velocity })
     }
 }
 

@@ -2,7 +2,7 @@
 //! known of an object where it is clicked on.
 
 use super::cdr::Cdr;
-use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, Motion, STANDING, VEHICLE, WORLD};
+use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
 use crate::sink::objects::TrackedObject;
 
 /// Height of a name, m, and how far above its box it is, m.
@@ -24,8 +24,8 @@ struct Entity {
 }
 
 /// Motions as arrows, until the next sweep's.
-pub(super) fn motion(stamp_ns: u64, moving: &[Motion]) -> Vec<u8> {
-    let arrow = |m: &Motion| {
+pub(super) fn motion(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
+    let arrow = |m: &MovingColumn| {
         let [u, v] = m.velocity;
         let length = f64::from(AHEAD_S * u.hypot(v));
         ([m.at[0].into(), m.at[1].into(), 0.0], f64::from(v.atan2(u)), length)

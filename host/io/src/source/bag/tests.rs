@@ -357,7 +357,7 @@ fn files_that_are_no_recording_say_what_to_do() {
     assert!(error.contains("--topic"), "{error}");
 }
 
-/// As Livox's drivers put out what is no turn of a sensor: petals, each with the time of its points.
+/// As Livox's drivers put it: petals in place of a sensor's turn, a time for each point.
 fn livox(stamp_ns: u64, said: u32) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, "livox_frame");

@@ -5,6 +5,8 @@ mod argoverse;
 mod files;
 mod formats;
 mod mistakes;
+#[cfg(feature = "nuscenes")]
+mod nuscenes;
 mod real;
 mod sidecars;
 
