@@ -5,7 +5,8 @@
 //! front up. The same scene gives the same bytes on every machine: the font is embedded, the
 //! rasteriser runs scalar code, and no function of the platform's maths library is called.
 //!
-//! `example.png` is `png/0000000010.png` of `raywake demo`, its colours reduced to a palette.
+//! `film.png` is what `raywake run DRIVE --film` made of sweeps 10 to 33 of the drive of `raywake-lab
+//! sim OUT --scenery roundabout --seed 4`, its colours reduced to a palette of 48.
 //!
 //! What is static is drawn pale, what moves in strong colours that colour-blind readers can tell
 //! apart (see [`colours`]).
