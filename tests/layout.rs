@@ -19,7 +19,7 @@ const MAY_NAME: [(&str, &[&str]); 10] = [
     ("gpu/alloc-guard", &[]),
     ("kernels", &["raywake-core", "raywake-gpu"]),
     ("lab/sim", &["raywake-core"]),
-    ("host/io", &["raywake-core", "raywake-registration", "raywake-sim"]),
+    ("host/io", &["raywake-core", "raywake-objects", "raywake-registration", "raywake-sim"]),
     ("host/render", &[]),
     (
         "host",
