@@ -5,8 +5,8 @@
 //! front up. The same scene gives the same bytes on every machine: the font is embedded, the
 //! rasteriser runs scalar code, and no function of the platform's maths library is called.
 //!
-//! `film.png` is what `raywake run DRIVE --film` made of sweeps 10 to 33 of the drive of `raywake-lab
-//! sim OUT --scenery roundabout --seed 4`, its colours reduced to a palette of 48.
+//! `film.png` is what `raywake run DRIVE --film` made of sweeps 10 to 33 of the drive that
+//! `raywake-lab sim OUT --scenery roundabout --seed 4` writes, in a palette of 48 colours.
 //!
 //! What is static is drawn pale, what moves in strong colours that colour-blind readers can tell
 //! apart (see [`colours`]).

@@ -6,6 +6,7 @@
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
 //! | [`Format::NuScenes`] | `LIDAR_TOP` of a scene in `sample_data.json` | `ego_pose.json` |
+//! | [`Format::Waymo`] | images of ranges in `lidar/SEGMENT.parquet` | `vehicle_pose` beside it |
 //! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a named file, PCD's `VIEWPOINT` |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
@@ -48,6 +49,8 @@ pub mod simulated;
 pub mod text;
 mod trajectory;
 mod viewpoints;
+#[cfg(feature = "parquet")]
+mod waymo;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -216,6 +219,8 @@ pub enum Format {
     /// Scenes of nuScenes.
     #[value(name = "nuscenes")]
     NuScenes,
+    /// Segments of Waymo's Open Dataset in Parquet.
+    Waymo,
     /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
     Clouds,
@@ -253,7 +258,7 @@ pub struct OpenOptions {
     pub format: Option<Format>,
     /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
     /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`; for
-    /// [`Format::NuScenes`] a scene.
+    /// [`Format::NuScenes`] and [`Format::Waymo`] a scene or segment.
     pub topics: Vec<String>,
     /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep of the first, or of TUM.
     pub poses: Option<PathBuf>,
@@ -300,9 +305,10 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Some(format) => (format, path.to_path_buf()),
         None => recognise(path)?,
     };
-    let has_topics = matches!(format, Format::Mcap | Format::NuScenes | Format::Pcap);
+    let has_topics =
+        matches!(format, Format::Mcap | Format::NuScenes | Format::Pcap | Format::Waymo);
     if !has_topics && !options.topics.is_empty() {
-        let what = "only recordings in MCAP, pcap and nuScenes have topics (--topic)";
+        let what = "only recordings in MCAP and pcap, nuScenes and Waymo have topics (--topic)";
         return Err(Error::Usage(what.into()));
     }
     match format {
@@ -311,6 +317,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
         Format::Argoverse2 => open_argoverse(&root, options),
         Format::NuScenes => open_nuscenes(&root, options),
+        Format::Waymo => open_waymo(&root, options),
         Format::Mcap => open_mcap(&root, options),
         Format::Pcap => open_pcap(&root, options),
     }
@@ -335,6 +342,17 @@ fn open_nuscenes(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, 
 #[cfg(not(feature = "nuscenes"))]
 fn open_nuscenes(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     let what = "has scenes of nuScenes: the feature `nuscenes` is not compiled in";
+    Err(Error::Unsupported(format!("{} {what}", root.display())))
+}
+
+#[cfg(feature = "parquet")]
+fn open_waymo(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(waymo::Waymo::open(root, options)?))
+}
+
+#[cfg(not(feature = "parquet"))]
+fn open_waymo(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
+    let what = "has segments of Waymo's: the feature `parquet` is not compiled in";
     Err(Error::Unsupported(format!("{} {what}", root.display())))
 }
 

@@ -264,17 +264,17 @@ fn poses<'a>(
 fn each<T: DeserializeOwned>(path: &Path, see: impl FnMut(T)) -> Result<(), Error> {
     let file = File::open(path).map_err(Error::reading(path))?;
     let mut table = serde_json::Deserializer::from_reader(BufReader::new(file));
-    let read = table.deserialize_seq(Rows { see, of: PhantomData }).and_then(|()| table.end());
+    let read = table.deserialize_seq(EachRow { see, of: PhantomData }).and_then(|()| table.end());
     read.map_err(|e| Error::input(path, "", e.to_string()))
 }
 
 /// What the rows of a table are shown to.
-struct Rows<T, F> {
+struct EachRow<T, F> {
     see: F,
     of: PhantomData<T>,
 }
 
-impl<'de, T: DeserializeOwned, F: FnMut(T)> Visitor<'de> for Rows<T, F> {
+impl<'de, T: DeserializeOwned, F: FnMut(T)> Visitor<'de> for EachRow<T, F> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {

@@ -11,6 +11,9 @@ use crate::Error;
 /// Extension of recordings of ROS.
 pub(super) const MCAP: &str = "mcap";
 
+/// The folder of a Waymo segment's images, beside that of their calibration.
+pub(super) const WAYMO_LASERS: &str = "lidar";
+
 /// The table by which scenes of nuScenes are known.
 pub(super) const SCENES: &str = "sample_data.json";
 
@@ -89,6 +92,9 @@ fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     }
     if has("velodyne") {
         return Ok(Some(Format::KittiOdometry));
+    }
+    if has(WAYMO_LASERS) && has("lidar_calibration") {
+        return Ok(Some(Format::Waymo));
     }
     let has_tables = |p: &PathBuf| p.join(SCENES).is_file();
     if has_tables(&path.to_path_buf()) || entries(path)?.iter().any(has_tables) {

@@ -9,6 +9,8 @@ mod mistakes;
 mod nuscenes;
 mod real;
 mod sidecars;
+#[cfg(feature = "parquet")]
+mod waymo;
 
 use std::fs;
 use std::path::{Path, PathBuf};
