@@ -103,8 +103,8 @@ impl ImageRows {
         &self.table.path
     }
 
-    /// An image from its columns of numbers and shape. ImageRows before the last one that was read are
-    /// reached from the file's beginning.
+    /// An image from its columns of numbers and shape. What lies before the last one that was read
+    /// is reached from the file's beginning.
     pub fn image(&mut self, row: usize, values: &str, shape: &str) -> Result<Image, Error> {
         if row < self.next {
             self.reader = self.table.reader(&self.columns, 1)?;
