@@ -16,7 +16,7 @@ use crate::Error;
 
 /// Numbers of an image that are believed: six of each of 64 x 2650 pixels are ten times less.
 const NUMBERS_MAX: usize = 1 << 24;
-/// ImageRows that are decoded at once where rows are small.
+/// Rows that are decoded at once where rows are small.
 const BATCH: usize = 256;
 
 /// An open file.
@@ -33,7 +33,7 @@ pub(super) struct TableRow<'a> {
     row: usize,
 }
 
-/// ImageRows that are decoded one after the other, where they are large.
+/// Rows that are decoded one after the other, where they are large.
 pub(super) struct ImageRows {
     table: ParquetTable,
     columns: Vec<String>,
@@ -90,7 +90,7 @@ impl ParquetTable {
         Ok(())
     }
 
-    /// ImageRows with these columns, one after the other.
+    /// Rows with these columns, one after the other.
     pub fn rows(self, columns: &[&str]) -> Result<ImageRows, Error> {
         let columns: Vec<String> = columns.iter().map(|&column| column.to_owned()).collect();
         let reader = self.reader(&columns, 1)?;
