@@ -93,7 +93,7 @@ pub struct DevicesArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct RunArgs {
-    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
+    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -110,7 +110,7 @@ pub struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct OdometryArgs {
-    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
+    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
@@ -151,7 +151,8 @@ pub struct RecordingKind {
     #[arg(long)]
     pub format: Option<Format>,
     /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only
-    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT
+    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT; of
+    /// nuScenes and Waymo: the scene or segment
     #[arg(long)]
     pub topic: Vec<String>,
     /// Numbers of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:
@@ -251,7 +252,7 @@ pub struct BackendChoice {
 
 #[derive(Debug, clap::Args)]
 pub struct MapArgs {
-    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
+    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]

@@ -24,7 +24,7 @@ Files of --out DIR:
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct CleanArgs {
-    /// Recording: an MCAP or pcap file, or the folder of a KITTI drive, Argoverse 2 log or clouds
+    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
     /// Print errors only
     #[arg(short, long)]
