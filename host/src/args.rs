@@ -151,8 +151,8 @@ pub struct RecordingKind {
     #[arg(long)]
     pub format: Option<Format>,
     /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only
-    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT; of
-    /// nuScenes and Waymo: the scene or segment
+    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT.
+    /// Of nuScenes and Waymo: the scene or segment
     #[arg(long)]
     pub topic: Vec<String>,
     /// Numbers of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:

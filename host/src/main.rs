@@ -28,6 +28,21 @@ fn explain(e: &clap::Error) -> ! {
     e.exit()
 }
 
+/// A decoder that panics has met a damaged file, and that is what is told. Where panics do not
+/// unwind, it is the end.
+#[cfg(feature = "parquet")]
+fn tell_of_damaged_files() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| match raywake_io::source::decoder::damaged() {
+        Some(e) if cfg!(panic = "abort") => {
+            let _ = writeln!(stderr(), "raywake: {e}");
+            std::process::exit(e.exit_code().into());
+        }
+        Some(_) => {}
+        None => usual(panic),
+    }));
+}
+
 /// Exit code of a process ended by SIGINT, as shells have it.
 const INTERRUPTED: u8 = 130;
 
@@ -35,6 +50,8 @@ const INTERRUPTED: u8 = 130;
 static ALLOCATOR: Guard<System> = Guard(System);
 
 fn main() -> ExitCode {
+    #[cfg(feature = "parquet")]
+    tell_of_damaged_files();
     let command = Args::try_parse().unwrap_or_else(|e| explain(&e)).command;
     match team::lead(team::available(), || execute(command)) {
         Ok(true) => ExitCode::SUCCESS,

@@ -24,6 +24,8 @@ mod bin;
 #[cfg(feature = "pcap")]
 mod capture;
 mod clouds;
+#[cfg(feature = "parquet")]
+pub mod decoder;
 #[cfg(feature = "arrow")]
 pub mod feather;
 #[cfg(feature = "arrow")]

@@ -40,8 +40,9 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
         0 => Err(Error::input(
             path,
             "",
-            "no recording found: neither `velodyne_points/data`, `velodyne` nor `sensors/lidar`, \
-             nor any `.bin`, `.npy`, `.pcd`, `.ply` or `.mcap` file (a `.pcap` is named itself)",
+            "no recording found: neither `velodyne_points/data`, `velodyne`, `sensors/lidar`, \
+             `sample_data.json` nor `lidar_calibration`, nor any `.bin`, `.npy`, `.pcd`, `.ply` or \
+             `.mcap` file (a `.pcap` is named itself)",
         )),
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();

@@ -13,6 +13,7 @@ use parquet::arrow::arrow_reader::{
 
 use super::images::Image;
 use crate::Error;
+use crate::source::decoder::guarded;
 
 /// Numbers of an image that are believed: six of each of 64 x 2650 pixels are ten times less.
 const NUMBERS_MAX: usize = 1 << 24;
@@ -45,7 +46,7 @@ pub(super) struct ImageRows {
 impl ParquetTable {
     pub fn open(path: &Path) -> Result<ParquetTable, Error> {
         let file = File::open(path).map_err(Error::reading(path))?;
-        let metadata = ArrowReaderMetadata::load(&file, Default::default());
+        let metadata = guarded(path, || ArrowReaderMetadata::load(&file, Default::default()))?;
         let metadata = metadata.map_err(|e| Error::input(path, "", e.to_string()))?;
         Ok(ParquetTable { path: path.to_path_buf(), file, metadata })
     }
@@ -71,7 +72,8 @@ impl ParquetTable {
         };
         let roots = columns.iter().map(|c| number(c.as_ref())).collect::<Result<Vec<_>, _>>()?;
         let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-        let reader = builder.with_projection(mask).with_batch_size(batch).build();
+        let builder = builder.with_projection(mask).with_batch_size(batch);
+        let reader = guarded(&self.path, || builder.build())?;
         reader.map_err(|e| Error::input(&self.path, "", e.to_string()))
     }
 
@@ -81,7 +83,8 @@ impl ParquetTable {
         columns: &[&str],
         mut see: impl FnMut(&TableRow) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        for batch in self.reader(columns, BATCH)? {
+        let mut reader = self.reader(columns, BATCH)?;
+        while let Some(batch) = guarded(&self.path, || reader.next())? {
             let batch = batch.map_err(|e| Error::input(&self.path, "", e.to_string()))?;
             let rows =
                 (0..batch.num_rows()).map(|row| TableRow { path: &self.path, batch: &batch, row });
@@ -113,7 +116,8 @@ impl ImageRows {
         let at = || format!("row {row}");
         let wrong = |what: String| Error::input(&self.table.path, at(), what);
         let skipped = row - self.next;
-        let batch = self.reader.nth(skipped).ok_or_else(|| wrong("is missing".into()))?;
+        let batch = guarded(&self.table.path, || self.reader.nth(skipped))?
+            .ok_or_else(|| wrong("is missing".into()))?;
         self.next = row + 1;
         let batch = batch.map_err(|e| wrong(e.to_string()))?;
         let row = TableRow { path: &self.table.path, batch: &batch, row: 0 };
