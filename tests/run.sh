@@ -104,7 +104,7 @@ viewers() {
     ! command -v apt-get >/dev/null || install python3-venv || return 1
     python3 -m venv target/viewers 2>/dev/null || return 1
     target/viewers/bin/pip install --quiet --disable-pip-version-check \
-        mcap-ros2-support numpy rerun-sdk 2>/dev/null
+        mcap-ros2-support==0.6.0 numpy==2.4.6 rerun-sdk==0.41.0 2>/dev/null
 }
 if viewers; then
     target/viewers/bin/python tests/viewers.py target/release/raywake target/viewers/recordings
