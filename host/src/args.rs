@@ -155,6 +155,10 @@ pub struct RecordingKind {
     /// Of nuScenes and Waymo: the scene or segment
     #[arg(long)]
     pub topic: Vec<String>,
+    /// Where the lidars of an MCAP recording sit, in place of /tf_static, a line each:
+    /// PARENT CHILD x y z qx qy qz qw, where CHILD is a frame or a topic
+    #[arg(long, value_name = "FILE")]
+    pub extrinsics: Option<PathBuf>,
     /// Numbers of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:
     /// x,y,z,intensity, and for .pcd.bin those of nuScenes]
     #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
@@ -340,6 +344,7 @@ impl RecordingKind {
         OpenOptions {
             format: self.format,
             topics: self.topic.clone(),
+            extrinsics: self.extrinsics.clone(),
             bin_fields: self.bin_fields.clone(),
             deskew: self.deskew,
             ground_m: self.ground,

@@ -12,7 +12,7 @@ macro_rules! values {
     ($($kind:ident $value:ty),*) => {
         /// Values of one column, by their type in the file.
         pub enum Values {
-            $(#[doc = stringify!($value)] $kind(Vec<$value>),)*
+            $(#[doc = concat!("`", stringify!($value), "`.")] $kind(Vec<$value>),)*
         }
 
         $(impl From<Vec<$value>> for Values {

@@ -270,6 +270,8 @@ pub struct OpenOptions {
     pub trusted: bool,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
+    /// Where lidars sit, for [`Format::Mcap`].
+    pub extrinsics: Option<PathBuf>,
     /// What the numbers of a return are, for `.bin` and `.npy` files.
     pub bin_fields: Option<BinFields>,
     /// Overrides [`Rig::distorted`].
@@ -312,6 +314,9 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
     if !has_topics && !options.topics.is_empty() {
         let what = "only recordings in MCAP and pcap, nuScenes and Waymo have topics (--topic)";
         return Err(Error::Usage(what.into()));
+    }
+    if format != Format::Mcap && options.extrinsics.is_some() {
+        return Err(Error::Usage("--extrinsics is for recordings in MCAP".into()));
     }
     match format {
         Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),

@@ -20,6 +20,11 @@ impl FixedFrames {
         self.parents.insert(child, (parent, parent_from_child));
     }
 
+    /// Whether a frame is fixed to another one.
+    pub fn has(&self, frame: &str) -> bool {
+        self.parents.contains_key(frame)
+    }
+
     /// The frame that a frame is fixed to in the end, itself where it is to none, and its place in
     /// that: that of a vehicle for its sensors. `None` where links lead in a circle.
     pub fn base(&self, frame: &str) -> Option<(String, Pose)> {

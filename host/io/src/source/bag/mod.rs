@@ -9,6 +9,7 @@
 //! asked for. What is held does not grow with the file but by some words a message.
 
 mod contents;
+mod extrinsics;
 mod file;
 mod frames;
 mod messages;
@@ -65,6 +66,9 @@ impl Bag {
     pub fn open(root: &Path, options: &OpenOptions) -> Result<Bag, Error> {
         let mut files = files(root)?;
         let mut contents = Contents::read(&mut files)?;
+        if let Some(path) = &options.extrinsics {
+            extrinsics::add(path, &mut contents)?;
+        }
         let topics = choose(root, &contents, &options.topics)?;
         let (base, lidars) = lidars(root, &contents, &topics)?;
         let sensors = lidars.iter().map(|l| l.vehicle_from_lidar).collect();

@@ -17,10 +17,10 @@ const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
 const PERIOD_NS: u64 = 100_000_000;
 
 /// A message: topic, schema, time, content.
-type Message = (&'static str, &'static str, u64, Vec<u8>);
+pub(super) type Message = (&'static str, &'static str, u64, Vec<u8>);
 
 /// A file of some messages.
-fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
+pub(super) fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer: Writer<_> = options.create(Cursor::new(&mut bytes)).unwrap();
     for (topic, name, log_time, data) in messages {
@@ -36,7 +36,7 @@ fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
 }
 
 /// Small chunks.
-fn options() -> WriteOptions {
+pub(super) fn options() -> WriteOptions {
     WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(50_000))
 }
 
@@ -98,7 +98,7 @@ fn sweeps(sweeps: u64) -> Vec<Message> {
 }
 
 /// Those and a second lidar behind, 20 ms later, on a vehicle that drives 1 m a sweep.
-fn rig(count: u64) -> Vec<Message> {
+pub(super) fn rig(count: u64) -> Vec<Message> {
     let mut all = vec![
         ("/tf_static", TF, BEGIN_NS, transform(0, ["base_link", "lidar"], 1.0, 1.8)),
         ("/tf_static", TF, BEGIN_NS, transform(0, ["base_link", "rear"], -2.0, 0.9)),
@@ -117,7 +117,7 @@ fn rig(count: u64) -> Vec<Message> {
     all
 }
 
-fn accept() -> OpenOptions {
+pub(super) fn accept() -> OpenOptions {
     OpenOptions { unlocated: Unlocated::Accept, ..OpenOptions::default() }
 }
 
