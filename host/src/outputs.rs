@@ -104,6 +104,10 @@ impl Kinds {
             let what = "--out needs the feature `arrow`, which is not compiled in";
             return Err(Error::Unsupported(what.into()));
         }
+        if self.parquet && !cfg!(feature = "parquet") {
+            let what = "--parquet needs the feature `parquet`, which is not compiled in";
+            return Err(Error::Unsupported(what.into()));
+        }
         atomic::create_folder(root)?;
         if self.argoverse {
             atomic::create_folder(&root.join("argoverse"))?;

@@ -176,6 +176,25 @@ fn what_is_wrong_with_segments_is_told() {
         t.remove(&format!("{folder}/seg.parquet"));
         assert!(open(t.path(), &OpenOptions::default()).is_err());
     }
+    let t = segment(4);
+    let [to, from] =
+        ["lidar_calibration", "even"].map(|name| t.path().join(name).join("seg.parquet"));
+    // As the calibration of lasers whose beams are spread evenly, but from where to where is null.
+    let named = |name: &str| format!("[LiDARCalibrationComponent].{name}");
+    table(
+        &t,
+        "even",
+        vec![
+            ("key.laser_name".into(), Arc::new(Int8Array::from(vec![1]))),
+            (named("extrinsic.transform"), fixed(vec![matrix(0.0, 0.0, 2.0, 0.0)])),
+            (named("beam_inclination.min"), Arc::new(Float64Array::from(vec![None]))),
+            (named("beam_inclination.max"), Arc::new(Float64Array::from(vec![0.1]))),
+            (named("beam_inclination.values"), lists(vec![None])),
+        ],
+    );
+    fs::copy(from, to).unwrap();
+    let e = open(t.path(), &OpenOptions::default()).err().unwrap().to_string();
+    assert!(e.contains("neither inclinations of beams nor their range"), "{e}");
     let t = segment(1);
     let e = open(t.path(), &OpenOptions::default()).unwrap().read(0, &mut SweepData::default());
     let e = e.unwrap_err().to_string();

@@ -210,6 +210,10 @@ fn lasers(path: &Path) -> Result<BTreeMap<i64, RangeLaser>, Error> {
     ParquetTable::open(path)?.each(&columns, |row| {
         let values = row.numbers(&names[2])?;
         let range = [row.number(&names[0])?, row.number(&names[1])?];
+        if values.iter().chain(range.iter().filter(|_| values.is_empty())).any(|v| !v.is_finite()) {
+            let what = "neither inclinations of beams nor their range, or none that are finite";
+            return Err(Error::input(path, "", what));
+        }
         let vehicle_from_laser = pose(&row.numbers(EXTRINSIC)?, path)?;
         let laser = RangeLaser { vehicle_from_laser, inclinations: values, range };
         lasers.insert(row.integer(LASER)?, laser);
