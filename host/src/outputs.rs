@@ -101,12 +101,10 @@ impl Kinds {
     /// Creates the folders. Fails where this build lacks a feature that the files need.
     fn tables(&self, root: &Path) -> Result<Option<FlowTables>, Error> {
         if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
-            let what = "--out needs the feature `arrow`, which is not compiled in";
-            return Err(Error::Unsupported(what.into()));
+            return Err(Error::lacking("--out", "arrow"));
         }
         if self.parquet && !cfg!(feature = "parquet") {
-            let what = "--parquet needs the feature `parquet`, which is not compiled in";
-            return Err(Error::Unsupported(what.into()));
+            return Err(Error::lacking("--parquet", "parquet"));
         }
         atomic::create_folder(root)?;
         if self.argoverse {

@@ -46,6 +46,12 @@ impl Error {
         Error::Input { path: path.to_path_buf(), place: place.into(), what: what.into() }
     }
 
+    /// [`Error::Unsupported`] for want of a feature.
+    pub fn lacking(what: impl std::fmt::Display, feature: &str) -> Error {
+        let text = format!("{what} needs the feature `{feature}`, which is not compiled in");
+        Error::Unsupported(text)
+    }
+
     /// For `map_err` on reading `path`.
     pub fn reading(path: &Path) -> impl FnOnce(io::Error) -> Error + '_ {
         move |source| Error::Read { path: path.to_path_buf(), source }

@@ -40,5 +40,5 @@ pub fn write_one(_: &Path, _: &SweepData, _: &Subject, _: &str) -> Result<(), Er
 }
 
 fn lacking() -> Error {
-    Error::Unsupported("pictures need the feature `png`, which is not compiled in".into())
+    Error::lacking("a picture", "png")
 }

@@ -59,8 +59,7 @@ impl Files {
         let folder = args.out.clone();
         if let Some(root) = &folder {
             if !cfg!(feature = "arrow") {
-                let what = "--out needs the feature `arrow`, which is not compiled in";
-                return Err(Error::Unsupported(what.into()));
+                return Err(Error::lacking("--out", "arrow"));
             }
             ["clouds", "returns"].iter().try_for_each(|n| atomic::create_folder(&root.join(n)))?;
         }

@@ -18,11 +18,9 @@ impl Absent {
     /// # Errors
     /// [`Error::Unsupported`] where one is.
     pub fn create(streams: &StreamTargets, _: u64, _: Content) -> Result<Option<Absent>, Error> {
-        let what = "messages need the feature `mcap`, which is not compiled in";
-        if *streams == StreamTargets::default() {
-            Ok(None)
-        } else {
-            Err(Error::Unsupported(what.into()))
+        match *streams == StreamTargets::default() {
+            true => Ok(None),
+            false => Err(Error::lacking("a stream of messages", "mcap")),
         }
     }
 

@@ -19,8 +19,7 @@ impl NoParquet {
 
     /// Fails with [`Error::Unsupported`].
     pub fn append(&mut self, _: TableWriter, _: Meta<'_>) -> Result<(), Error> {
-        let what = "--parquet needs the feature `parquet`, which is not compiled in";
-        Err(Error::Unsupported(what.into()))
+        Err(Error::lacking("a Parquet file", "parquet"))
     }
 
     /// Nothing was written.

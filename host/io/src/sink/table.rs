@@ -88,8 +88,7 @@ impl TableWriter {
     /// Fails: this build has no feather files.
     #[cfg(not(feature = "arrow"))]
     pub fn file(self, path: &Path, _: Meta<'_>) -> Result<Vec<u8>, Error> {
-        let what = "the feature `arrow` for feather files is not compiled in";
-        Err(Error::Unsupported(format!("{}: {what}", path.display())))
+        Err(Error::lacking(path.display(), "arrow"))
     }
 }
 

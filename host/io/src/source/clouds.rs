@@ -89,8 +89,7 @@ fn read_feather(path: &Path, points: &mut Vec<Point>) -> Result<(), Error> {
 
 #[cfg(not(feature = "arrow"))]
 fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
-    let what = "is a feather file: the feature `arrow` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", path.display())))
+    Err(Error::lacking(format!("{}, a feather file,", path.display()), "arrow"))
 }
 
 /// Names of files of clouds end so in a folder of clouds.

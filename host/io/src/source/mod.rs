@@ -337,8 +337,7 @@ fn open_argoverse(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>,
 
 #[cfg(not(feature = "arrow"))]
 fn open_argoverse(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "is an Argoverse 2 log: the feature `arrow` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", root.display())))
+    Err(Error::lacking(format!("{}, an Argoverse 2 log,", root.display()), "arrow"))
 }
 
 #[cfg(feature = "nuscenes")]
@@ -348,8 +347,7 @@ fn open_nuscenes(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, 
 
 #[cfg(not(feature = "nuscenes"))]
 fn open_nuscenes(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "has scenes of nuScenes: the feature `nuscenes` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", root.display())))
+    Err(Error::lacking(format!("{}, nuScenes,", root.display()), "nuscenes"))
 }
 
 #[cfg(feature = "parquet")]
@@ -359,8 +357,7 @@ fn open_waymo(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Err
 
 #[cfg(not(feature = "parquet"))]
 fn open_waymo(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "has segments of Waymo's: the feature `parquet` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", root.display())))
+    Err(Error::lacking(format!("{}, Waymo's segments,", root.display()), "parquet"))
 }
 
 #[cfg(feature = "mcap")]
@@ -370,8 +367,7 @@ fn open_mcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Erro
 
 #[cfg(not(feature = "mcap"))]
 fn open_mcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "is an MCAP recording: the feature `mcap` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", root.display())))
+    Err(Error::lacking(format!("{}, an MCAP recording,", root.display()), "mcap"))
 }
 
 #[cfg(feature = "pcap")]
@@ -381,8 +377,7 @@ fn open_pcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Erro
 
 #[cfg(not(feature = "pcap"))]
 fn open_pcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    let what = "is a capture of packets: the feature `pcap` is not compiled in";
-    Err(Error::Unsupported(format!("{} {what}", root.display())))
+    Err(Error::lacking(format!("{}, a capture of packets,", root.display()), "pcap"))
 }
 
 /// What the user's options change in a rig.

@@ -13,8 +13,7 @@ pub(super) use NoServer as LiveServer;
 impl NoServer {
     /// Fails with [`Error::Unsupported`].
     pub fn start(_: SocketAddr, _: &[Topic]) -> Result<NoServer, Error> {
-        let what = "--live needs the feature `live`, which is not compiled in";
-        Err(Error::Unsupported(what.into()))
+        Err(Error::lacking("--live", "live"))
     }
 
     /// Never called.
