@@ -75,6 +75,46 @@ fn a_recording_is_cleaned() {
     raywake(&["clean", drive.to_str().unwrap(), "-o", "x", "--voxel", "0"]).failed(2, &["--voxel"]);
 }
 
+/// What is left of a bag is a bag, in the order of time, and of other clouds clouds like them.
+#[test]
+#[cfg(feature = "mcap")]
+fn what_is_clean_is_stored_as_it_came() {
+    let t = Temp::new();
+    t.drive(4);
+    let [drive, mcap, out] = ["drive", "flow.mcap", "clean"].map(|name| t.path().join(name));
+    let [drive, mcap, out] = [&drive, &mcap, &out].map(|path| path.to_str().unwrap());
+    raywake(&[&["run", drive, "--mcap", mcap], &BACKEND[..]].concat()).succeeded();
+    let line = ["clean", mcap, "-o", out, "--ground", "-1.7"];
+    raywake(&[&line, &BACKEND[..]].concat()).succeeded();
+    let still = t.path().join("clean/static.mcap");
+    assert!(
+        t.path().join("clean/moving.mcap").is_file() && !t.path().join("clean/static").exists()
+    );
+    let again =
+        raywake(&[&["run", still.to_str().unwrap(), "--ground", "-1.7"], &BACKEND[..]].concat());
+    again.succeeded();
+    let says = "3 sweeps, 0.2 s of /points, poses from /tf (vehicle in world)";
+    assert!(again.stdout.contains(says), "{}", again.stdout);
+    let clouds = t.path().join("clouds");
+    fs::create_dir(&clouds).unwrap();
+    let x = |n: usize| common::row(0.5 * n as f64);
+    for n in 0..3 {
+        let rows: String = (0..400).map(|i| format!("{} {} -1.7\n", i % 20, i / 20 - 10)).collect();
+        let head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 400\n\
+                    HEIGHT 1\nPOINTS 400\nDATA ascii\n";
+        fs::write(clouds.join(format!("{n}.pcd")), [head, &rows].concat()).unwrap();
+    }
+    fs::write(clouds.join("poses.txt"), (0..3).map(x).collect::<String>()).unwrap();
+    let line = ["clean", clouds.to_str().unwrap(), "-o", out, "--ground", "-1.7"];
+    raywake(&line).failed(2, &["holds other results"]);
+    let other = t.path().join("other");
+    let line =
+        ["clean", clouds.to_str().unwrap(), "-o", other.to_str().unwrap(), "--ground", "-1.7"];
+    raywake(&[&line, &BACKEND[..]].concat()).succeeded();
+    let pcd = fs::read(other.join("static/0000000001.pcd")).unwrap();
+    assert!(pcd.starts_with(b"# .PCD v0.7\n") && pcd.len() > 300 * 20);
+}
+
 #[test]
 fn a_recording_without_a_command_is_told_one() {
     let t = Temp::new();

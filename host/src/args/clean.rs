@@ -8,16 +8,18 @@ const ABOUT: &str = "\
 Remove what moves from a recording: labels, clouds and a map of what stands
 
 The flow of every sweep is found twice, forwards and backwards in time. What is kept in memory are \
-60 kB a sweep of 120,000 returns, and the map.";
+60 kB a sweep of 120,000 returns, and the map. Then all sweeps are written, in their order.";
 
 const FILES: &str = "\
 Files of --out DIR:
     labels/FRAME.label   SemanticKITTI's labels of moving object segmentation, one per return of
                          the input: 251 moving, 9 static, 0 neither (outside the window, no
                          surface)
-    static/FRAME.bin     what does not move, as little-endian float32 x, y, z, intensity in the
-                         vehicle frame; returns outside the window, too
-    moving/FRAME.bin     what moves
+    static/FRAME.bin     what does not move, as the recording's clouds are: .bin (little-endian
+                         float32 x, y, z, intensity), .npy, .pcd, .ply or .feather, in the vehicle
+                         frame; returns outside the window, too. Of an MCAP file or a capture:
+                         static.mcap, with /points and /tf
+    moving/FRAME.bin     what moves; or moving.mcap
     map.ply              what stands, in the world of the poses: a point per voxel in which more
                          returns were static than moving";
 

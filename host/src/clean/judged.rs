@@ -9,6 +9,7 @@ const MOVING: u32 = 251;
 
 /// What is known of a return by both ways.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Judged {
     /// No surface: no echo, the own vehicle, not finite.
     None,
@@ -19,6 +20,9 @@ pub enum Judged {
 }
 
 impl Judged {
+    /// All of them, in their order.
+    const ALL: [Judged; 4] = [Judged::None, Judged::Unknown, Judged::Static, Judged::Moving];
+
     pub fn label(self) -> u32 {
         match self {
             Judged::None | Judged::Unknown => UNLABELLED,
@@ -47,29 +51,58 @@ fn nibble(flow: &PointFlow) -> Nibble {
     }
 }
 
+/// Four bits for each return of a sweep.
+#[derive(Clone, Debug, Default)]
+struct Nibbles(Vec<u8>);
+
+impl Nibbles {
+    fn of(all: impl ExactSizeIterator<Item = Nibble>) -> Nibbles {
+        let mut nibbles = vec![0; all.len().div_ceil(2)];
+        for (n, nibble) in all.enumerate() {
+            nibbles[n / 2] |= nibble << (n % 2 * 4);
+        }
+        Nibbles(nibbles)
+    }
+
+    fn get(&self, n: usize) -> Option<Nibble> {
+        self.0.get(n / 2).map(|byte| byte >> (n % 2 * 4) & 15)
+    }
+}
+
 /// What one way tells of the returns of a sweep.
 #[derive(Clone, Debug, Default)]
-pub struct OneWay {
-    nibbles: Vec<u8>,
-}
+pub struct OneWay(Nibbles);
 
 impl OneWay {
     pub fn of(flows: impl ExactSizeIterator<Item = PointFlow>) -> OneWay {
-        let mut nibbles = vec![0; flows.len().div_ceil(2)];
-        for (n, flow) in flows.enumerate() {
-            nibbles[n / 2] |= nibble(&flow) << (n % 2 * 4);
-        }
-        OneWay { nibbles }
+        OneWay(Nibbles::of(flows.map(|flow| nibble(&flow))))
     }
 
     fn get(&self, n: usize) -> Nibble {
-        self.nibbles.get(n / 2).map_or(UNKNOWN, |byte| byte >> (n % 2 * 4) & 15)
+        self.0.get(n).unwrap_or(UNKNOWN)
+    }
+}
+
+/// What became of the returns of a sweep.
+#[derive(Clone, Debug, Default)]
+pub struct Verdicts(Nibbles);
+
+impl Verdicts {
+    /// Of so many returns, by both ways.
+    pub fn of(ways: [&OneWay; 2], returns: usize, moving: f32) -> Verdicts {
+        Verdicts(Nibbles::of((0..returns).map(|n| judge(ways, n, moving) as Nibble)))
+    }
+
+    /// Of so many returns.
+    pub fn all(&self, returns: usize) -> Vec<Judged> {
+        let judged = |n| self.0.get(n).and_then(|nibble| Judged::ALL.get(usize::from(nibble)));
+        (0..returns).map(|n| judged(n).copied().unwrap_or(Judged::Unknown)).collect()
     }
 }
 
 /// What is known of a return by both ways: it moves where the mean of P(moves) of those that looked
 /// at it reaches `moving`.
-pub fn judge(ways: [&OneWay; 2], n: usize, moving: f32) -> Judged {
+fn judge(ways: [&OneWay; 2], n: usize, moving: f32) -> Judged {
     let told = ways.map(|way| way.get(n));
     if told.contains(&NONE) {
         return Judged::None;
@@ -113,7 +146,12 @@ mod tests {
         }
         let nothing = OneWay::default();
         assert_eq!(judge([&nothing, &nothing], 7, 0.4), Judged::Unknown);
-        let all = [Judged::None, Judged::Unknown, Judged::Static, Judged::Moving];
-        assert_eq!(all.map(Judged::label), [0, 0, 9, 251]);
+        assert_eq!(Judged::ALL.map(Judged::label), [0, 0, 9, 251]);
+        let way = OneWay::of([moving, still, own, out, moving].into_iter());
+        let verdicts = Verdicts::of([&way, &way], 5, 0.4);
+        let [moves, stands, none, unknown] =
+            [Judged::Moving, Judged::Static, Judged::None, Judged::Unknown];
+        assert_eq!(verdicts.all(5), [moves, stands, none, unknown, moves]);
+        assert_eq!(Verdicts::default().all(1), [unknown]);
     }
 }

@@ -6,10 +6,10 @@
 
 mod backwards;
 mod judged;
+mod kept;
 mod still_map;
 
 use std::ops::Range;
-use std::path::Path;
 
 use raywake_core::params::Profile;
 use raywake_core::pose::{Pose, Twist};
@@ -26,7 +26,8 @@ use crate::session::each_sweep;
 use crate::settings_file::Made;
 use crate::weight_files::WeightFiles;
 use backwards::Backwards;
-use judged::{Judged, OneWay, judge};
+use judged::{OneWay, Verdicts};
+use kept::KeptClouds;
 use raywake_io::Error;
 use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
@@ -58,9 +59,8 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         weights: &weights.digest(),
     };
     made.claim(Some(&args.out))?;
-    for folder in ["labels", "static", "moving"] {
-        atomic::create_folder(&args.out.join(folder))?;
-    }
+    atomic::create_folder(&args.out.join("labels"))?;
+    let kept = KeptClouds::create(&args.out, source.clouds(), source.overview())?;
     let mut cleaning = Cleaning {
         args,
         profile,
@@ -71,8 +71,10 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         counts: [0; 4],
     };
     say(args.quiet, &format!("{}\n", source.describe()))?;
-    let done = cleaning.forwards(source.as_mut(), sweeps.clone())?
-        && cleaning.backwards(source.as_mut(), sweeps)?;
+    let source = source.as_mut();
+    let done = cleaning.forwards(source, sweeps.clone())?
+        && cleaning.backwards(source, sweeps.clone())?
+        && cleaning.write(source, sweeps, kept)?;
     if done {
         let points = cleaning.map.points();
         clouds::write_ply(&args.out.join("map.ply"), ["x", "y", "z", "intensity"], &points)?;
@@ -86,6 +88,7 @@ struct SeenSweep {
     world_from_vehicle: Pose,
     twist: Twist,
     forwards: OneWay,
+    verdicts: Verdicts,
 }
 
 struct Cleaning<'a> {
@@ -119,13 +122,14 @@ impl Cleaning<'_> {
                 last.forwards = OneWay::of(flows.points.iter());
             }
             let &SweepData { world_from_vehicle, twist, .. } = visit.now;
-            seen.push(SeenSweep { world_from_vehicle, twist, forwards: OneWay::default() });
+            let (forwards, verdicts) = Default::default();
+            seen.push(SeenSweep { world_from_vehicle, twist, forwards, verdicts });
             Ok(())
         })?;
         Ok(!end.interrupted)
     }
 
-    /// Finds the flow against the order of time, and writes what comes of both.
+    /// Finds the flow against the order of time, and what comes of both.
     fn backwards(
         &mut self,
         source: &mut dyn Source,
@@ -137,70 +141,79 @@ impl Cleaning<'_> {
         say(self.args.quiet, "backwards\n")?;
         let mut progress = Progress::new("sweep", sweeps.len(), self.args.quiet);
         let (mut now, mut later) = (SweepData::default(), SweepData::default());
-        for (done, index) in sweeps.clone().rev().enumerate() {
+        for (done, number) in (0..sweeps.len()).rev().enumerate() {
             if interrupted() {
                 return Ok(false);
             }
-            source.read(index, &mut now)?;
-            let seen = &self.seen[index - sweeps.start];
-            (now.world_from_vehicle, now.twist) = (seen.world_from_vehicle, seen.twist);
+            self.read(source, sweeps.start, number, &mut now)?;
             turned.turn(&mut now);
             let before = if done > 0 { &later.points[..] } else { &[] };
             let flows = drive.step(&now.sweep(), before)?.output.flows;
             if done > 0 {
                 let found = flows.map(|flows| OneWay::of(flows.points.iter()));
-                self.write(&turned.rig(), index + 1 - sweeps.start, &later, found)?;
+                self.judge(number + 1, later.points.len(), &found.unwrap_or_default());
             }
             std::mem::swap(&mut now, &mut later);
             progress.update(done + 1);
         }
         progress.finish();
-        self.write(&turned.rig(), 0, &later, None)?;
+        self.judge(0, later.points.len(), &OneWay::default());
         Ok(true)
     }
 
-    /// Writes a sweep that was turned around.
-    fn write(
-        &mut self,
-        rig: &Rig,
-        number: usize,
-        sweep: &SweepData,
-        backwards: Option<OneWay>,
-    ) -> Result<(), RunError> {
-        let (root, frame, points) = (&self.args.out, sweep.frame, &sweep.points);
+    /// Decides what became of the returns of a sweep.
+    fn judge(&mut self, number: usize, returns: usize, backwards: &OneWay) {
         let moving = self.args.flow.profile.moving.unwrap_or(MOVING_MIN);
-        let forwards = std::mem::take(&mut self.seen[number].forwards);
-        let ways = [&forwards, &backwards.unwrap_or_default()];
-        let judged: Vec<Judged> = (0..points.len()).map(|n| judge(ways, n, moving)).collect();
-        let labels: Vec<u32> = judged.iter().map(|judged| judged.label()).collect();
-        // As SemanticKITTI names them.
-        clouds::write_labels(&root.join(format!("labels/{frame:06}.label")), &labels)?;
-        self.write_clouds(root, sweep, &judged)?;
-        for (point, &judged) in points.iter().zip(&judged) {
-            self.counts[judged as usize] += 1;
-            self.map.add(place(&self.clock, rig, sweep, point), point.intensity, judged);
-        }
+        let seen = &mut self.seen[number];
+        let forwards = std::mem::take(&mut seen.forwards);
+        seen.verdicts = Verdicts::of([&forwards, backwards], returns, moving);
+    }
+
+    /// Reads a sweep, with the pose that was found for it.
+    fn read(
+        &self,
+        source: &mut dyn Source,
+        first: usize,
+        number: usize,
+        into: &mut SweepData,
+    ) -> Result<(), Error> {
+        source.read(first + number, into)?;
+        let seen = &self.seen[number];
+        (into.world_from_vehicle, into.twist) = (seen.world_from_vehicle, seen.twist);
         Ok(())
     }
 
-    fn write_clouds(
-        &self,
-        root: &Path,
-        sweep: &SweepData,
-        judged: &[Judged],
-    ) -> Result<(), RunError> {
-        let of = |moving: bool| {
-            let all = sweep.points.iter().zip(judged);
-            let kept = all.filter(move |(_, judged)| match judged {
-                Judged::None => false,
-                Judged::Unknown | Judged::Static => !moving,
-                Judged::Moving => moving,
-            });
-            kept.map(|(point, _)| point)
-        };
-        let path = |folder: &str| root.join(format!("{folder}/{:010}.bin", sweep.frame));
-        clouds::write_bin(&path("static"), of(false))?;
-        Ok(clouds::write_bin(&path("moving"), of(true))?)
+    /// Writes what comes of all sweeps, in the order of time.
+    fn write(
+        &mut self,
+        source: &mut dyn Source,
+        sweeps: Range<usize>,
+        mut kept: KeptClouds,
+    ) -> Result<bool, RunError> {
+        say(self.args.quiet, "writing\n")?;
+        let mut progress = Progress::new("sweep", sweeps.len(), self.args.quiet);
+        let mut sweep = SweepData::default();
+        for number in 0..sweeps.len() {
+            if interrupted() {
+                return Ok(false);
+            }
+            self.read(source, sweeps.start, number, &mut sweep)?;
+            let judged = self.seen[number].verdicts.all(sweep.points.len());
+            let labels: Vec<u32> = judged.iter().map(|judged| judged.label()).collect();
+            // As SemanticKITTI names them.
+            let name = format!("labels/{:06}.label", sweep.frame);
+            clouds::write_labels(&self.args.out.join(name), &labels)?;
+            kept.sweep(&sweep, &judged)?;
+            for (point, &judged) in sweep.points.iter().zip(&judged) {
+                self.counts[judged as usize] += 1;
+                let at = place(&self.clock, source.rig(), &sweep, point);
+                self.map.add(at, point.intensity, judged);
+            }
+            progress.update(number + 1);
+        }
+        progress.finish();
+        kept.finish()?;
+        Ok(true)
     }
 
     fn text(&self, points: usize) -> String {

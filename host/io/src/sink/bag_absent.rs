@@ -1,6 +1,7 @@
 //! What stands for [`BagSink`] where messages cannot be written: nothing makes one.
 
 use raywake_core::output::PairFlows;
+use raywake_core::sweep::Point;
 
 use super::objects::TrackedObject;
 use super::streams::{Content, StreamTargets};
@@ -36,6 +37,11 @@ impl Absent {
 
     /// Never called.
     pub fn objects(&mut self, _: &SweepData, _: &[i32], _: &[TrackedObject]) -> Result<(), Error> {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn cloud(&mut self, _: &SweepData, _: &[Point]) -> Result<(), Error> {
         match *self {}
     }
 

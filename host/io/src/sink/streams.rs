@@ -19,4 +19,6 @@ pub enum Content {
     Flow,
     /// The objects in every sweep.
     Objects,
+    /// The returns of every sweep.
+    Clouds,
 }

@@ -13,7 +13,7 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use super::feather::FeatherTable;
 use super::poses::{PoseTrack, check_rising};
 use super::recognise::numbered;
-use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
+use super::{CloudKind, OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
 use super::{apply, folder_name};
 use crate::Error;
 
@@ -138,6 +138,10 @@ impl Source for Argoverse {
 
     fn describe(&self) -> String {
         format!("Argoverse 2 log {}: {}", self.root.display(), self.overview.length())
+    }
+
+    fn clouds(&self) -> CloudKind {
+        CloudKind::Feather
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

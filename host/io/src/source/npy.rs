@@ -82,14 +82,14 @@ fn shape(header: &str) -> Result<[usize; 2], String> {
     let (_, after) = header.split_once("'shape':").ok_or("the header has no `shape`")?;
     let inside = after.trim_start().strip_prefix('(').and_then(|s| Some(s.split_once(')')?.0));
     let inside = inside.ok_or("the shape is none")?;
-    let size = |s: &str| s.trim().parse().ok().filter(|&n| n > 0);
+    let size = |s: &str| s.trim().parse().ok();
     let sizes: Option<Vec<usize>> = inside.split(',').map(size).collect();
     let columns = |rest: &[usize]| rest.iter().try_fold(1_usize, |n, size| n.checked_mul(*size));
     match sizes.as_deref() {
-        Some([rows, rest @ ..]) if !rest.is_empty() => {
+        Some([rows, rest @ ..]) if !rest.is_empty() && !rest.contains(&0) => {
             Ok([*rows, columns(rest).ok_or("the shape is too large")?])
         }
-        _ => Err(format!("of shape ({inside}); rows and columns expected, both above zero")),
+        _ => Err(format!("of shape ({inside}); rows and columns expected, columns above zero")),
     }
 }
 
@@ -129,7 +129,7 @@ mod tests {
         assert!(refused(good, &[0; 3]).starts_with("3 bytes of data, but 1 x 1"));
         assert!(refused(&good.replace("<f4", "<i4"), &[0; 4]).starts_with("holds `<i4`"));
         assert!(refused(&good.replace("False", "True"), &[0; 4]).contains("column after column"));
-        assert!(refused(&good.replace("(1, 1)", "(0, 1)"), &[]).contains("above zero"));
+        assert!(refused(&good.replace("(1, 1)", "(1, 0)"), &[]).contains("above zero"));
         assert!(refused(&good.replace("(1, 1)", "(1,)"), &[0; 4]).contains("shape (1,)"));
         assert!(refused(&good.replace("(1, 1)", "1"), &[0; 4]).contains("shape is none"));
         let huge = good.replace("(1, 1)", "(4294967296, 4294967296)");

@@ -21,6 +21,8 @@
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all that is known |
 //! | `/raywake/tracked_objects` | `autoware_perception_msgs/TrackedObjects` | for Autoware |
 //!
+//! A stream of clouds has `/tf` and `/points`: `x y z intensity`, and `time`, s after the stamp.
+//!
 //! `track` is an int32, the number of the return's track, or -1; a marker has the same number.
 
 pub(crate) mod cdr;
@@ -35,6 +37,7 @@ mod tracked;
 
 use raywake_core::output::{ColumnFlow, PairFlows};
 use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
 
 use super::objects::TrackedObject;
 use super::streams::{Content, StreamTargets};
@@ -66,6 +69,7 @@ type Topic = (&'static str, Schema);
 const TF: Topic = ("/tf", TRANSFORMS);
 const POINTS: Topic = ("/raywake/points", POINT_CLOUD);
 const TRACKED_POINTS: Topic = ("/raywake/tracked_points", POINT_CLOUD);
+const CLOUDS: Topic = ("/points", POINT_CLOUD);
 const MOTION: Topic = ("/raywake/motion", MARKER);
 const BOXES: Topic = ("/raywake/objects", MARKER);
 const SCENES: Topic = ("/raywake/scene", SCENE);
@@ -75,6 +79,7 @@ const TRACKED: Topic = ("/raywake/tracked_objects", TRACKED_OBJECTS);
 const fn topics(content: Content) -> &'static [Topic] {
     match content {
         Content::Flow => &[TF, POINTS, MOTION, SCENES],
+        Content::Clouds => &[TF, CLOUDS],
         Content::Objects => &[TF, TRACKED_POINTS, BOXES, SCENES, TRACKED],
     }
 }
@@ -138,6 +143,13 @@ impl BagSink {
         }
         self.write(&SCENES, stamp_ns, scene::objects(stamp_ns, objects))?;
         self.write(&TRACKED, stamp_ns, tracked::objects(stamp_ns, objects))
+    }
+
+    /// Writes a sweep, or what is left of it: these returns.
+    pub fn cloud(&mut self, sweep: &SweepData, returns: &[Point]) -> Result<(), Error> {
+        let stamp_ns = self.stamp_ns(sweep);
+        self.write(&TF, stamp_ns, transform(stamp_ns, &sweep.world_from_vehicle))?;
+        self.write(&CLOUDS, stamp_ns, points::alone(stamp_ns, returns))
     }
 
     fn stamp_ns(&self, sweep: &SweepData) -> u64 {

@@ -29,6 +29,19 @@ const WITH_FLOW: [(&str, u8); 9] = [
 const WITH_TRACK: [(&str, u8); 5] =
     [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("intensity", FLOAT32), ("track", INT32)];
 
+/// Fields of a return as it came.
+const ALONE: [(&str, u8); 5] =
+    [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("intensity", FLOAT32), ("time", FLOAT32)];
+
+/// Returns as they came.
+pub(super) fn alone(stamp_ns: u64, returns: &[Point]) -> Vec<u8> {
+    let fields = |point: &Point| {
+        let [x, y, z] = point.position;
+        [x, y, z, point.intensity, point.offset_s].map(f32::to_le_bytes)
+    };
+    cloud(stamp_ns, &ALONE, returns.iter().map(fields))
+}
+
 /// A sweep with its flow.
 pub(super) fn with_flow(stamp_ns: u64, sweep: &SweepData, flows: &PairFlows) -> Vec<u8> {
     let returns = sweep.points.iter().zip(flows.points.iter());

@@ -27,8 +27,8 @@ use raywake_core::sweep::{Point, SENSORS_MAX};
 use super::median::median;
 use super::recognise::{MCAP, entries};
 use super::{
-    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
-    folder_name, pose_files,
+    CloudKind, OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated,
+    first_sweep, folder_name, pose_files,
 };
 use crate::Error;
 use contents::{CloudMessage, Contents};
@@ -194,6 +194,10 @@ impl Source for Bag {
             topics.join(" and "),
             self.poses_from
         )
+    }
+
+    fn clouds(&self) -> CloudKind {
+        CloudKind::Messages
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

@@ -26,8 +26,8 @@ use raywake_core::sweep::Point;
 
 use super::median::median;
 use super::{
-    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
-    folder_name, pose_files,
+    CloudKind, OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated,
+    first_sweep, folder_name, pose_files,
 };
 use crate::Error;
 use datagrams::{Datagram, Datagrams, Sender};
@@ -179,6 +179,10 @@ impl Source for Capture {
             self.sender,
             self.poses_from
         )
+    }
+
+    fn clouds(&self) -> CloudKind {
+        CloudKind::Messages
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

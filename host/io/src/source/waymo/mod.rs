@@ -23,7 +23,7 @@ use raywake_core::sweep::{Rig, Timing};
 
 use super::poses::{PoseTrack, check_rising, pose_from};
 use super::recognise::{WAYMO_LASERS, entries};
-use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply};
+use super::{CloudKind, OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply};
 use crate::Error;
 use images::RangeLaser;
 use table::{ImageRows, ParquetTable};
@@ -135,6 +135,10 @@ impl Source for Waymo {
     fn describe(&self) -> String {
         let (name, root) = (&self.overview.name, self.root.display());
         format!("Waymo segment {name} in {root}: {}", self.overview.length())
+    }
+
+    fn clouds(&self) -> CloudKind {
+        CloudKind::Feather
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

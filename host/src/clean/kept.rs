@@ -1,0 +1,80 @@
+//! The clouds of what stands and of what moves, stored as the recording's are.
+
+use std::path::{Path, PathBuf};
+
+use raywake_core::sweep::Point;
+use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::streams::{Content, StreamTargets};
+use raywake_io::sink::{atomic, clouds};
+use raywake_io::source::{CloudKind, Overview, SweepData};
+
+use super::judged::Judged;
+
+/// Names of folders and files.
+const NAMES: [&str; 2] = ["static", "moving"];
+
+/// Where clouds go.
+pub enum KeptClouds {
+    /// A file each in a folder of what stands and one of what moves.
+    Files { root: PathBuf, extension: &'static str },
+    /// Two recordings of messages.
+    Bags(Box<[BagSink; 2]>),
+}
+
+impl KeptClouds {
+    /// Creates folders or files for clouds of this kind.
+    pub fn create(root: &Path, kind: CloudKind, of: &Overview) -> Result<KeptClouds, Error> {
+        let extension = match kind {
+            CloudKind::Bin => "bin",
+            CloudKind::Npy => "npy",
+            CloudKind::Pcd => "pcd",
+            CloudKind::Ply => "ply",
+            CloudKind::Feather => "feather",
+            CloudKind::Messages => {
+                let bag = |name| {
+                    let mcap = Some(root.join(format!("{name}.mcap")));
+                    let targets = StreamTargets { mcap, live: None };
+                    BagSink::create(&targets, of.epoch_ns, Content::Clouds)
+                };
+                let [still, moving] = NAMES.map(bag);
+                let bags = still?.zip(moving?);
+                let bags = bags.ok_or_else(|| Error::lacking("an MCAP file", "mcap"))?;
+                return Ok(KeptClouds::Bags(Box::new(bags.into())));
+            }
+        };
+        NAMES.iter().try_for_each(|name| atomic::create_folder(&root.join(name)))?;
+        Ok(KeptClouds::Files { root: root.to_path_buf(), extension })
+    }
+
+    /// Writes the returns of a sweep by what became of them.
+    pub fn sweep(&mut self, sweep: &SweepData, judged: &[Judged]) -> Result<(), Error> {
+        let of = |moves: bool| -> Vec<Point> {
+            let all = sweep.points.iter().zip(judged);
+            let kept = all.filter(|(_, judged)| match judged {
+                Judged::None => false,
+                Judged::Unknown | Judged::Static => !moves,
+                Judged::Moving => moves,
+            });
+            kept.map(|(point, _)| *point).collect()
+        };
+        for (n, points) in [of(false), of(true)].iter().enumerate() {
+            match self {
+                KeptClouds::Bags(bags) => bags[n].cloud(sweep, points)?,
+                KeptClouds::Files { root, extension } => {
+                    let name = format!("{}/{:010}.{extension}", NAMES[n], sweep.frame);
+                    clouds::write_cloud(&root.join(name), points)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Completes the files.
+    pub fn finish(self) -> Result<(), Error> {
+        match self {
+            KeptClouds::Files { .. } => Ok(()),
+            KeptClouds::Bags(bags) => bags.into_iter().try_for_each(BagSink::finish),
+        }
+    }
+}
