@@ -10,8 +10,8 @@
 //!
 //! Beside them a film, a page and messages ([`raywake_io::sink::bag`]), where they are asked for.
 //!
-//! In place of the first three kinds there may be a Parquet file each for all sweeps. What is there
-//! of them is kept: a run that was interrupted finds the same again, and goes on.
+//! In place of the first three kinds there may be a Parquet file each for all sweeps. Feather files
+//! that are there are kept: a run that was interrupted finds the same again, and goes on.
 //!
 //! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
 //! or absent.

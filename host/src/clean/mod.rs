@@ -40,7 +40,8 @@ use still_map::StillMap;
 /// 75.8, 76.8, 74.9; 75.4, 75.4.
 const MOVING_MIN: f32 = 0.4;
 
-/// Reads a recording twice and writes it without what moves. Returns whether it got to the end.
+/// Reads a recording three times and writes it without what moves. Returns whether it got to the
+/// end.
 pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     if args.out.canonicalize().is_ok_and(|out| args.data.canonicalize().is_ok_and(|d| d == out)) {

@@ -58,6 +58,7 @@ pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
 pub fn points(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["x_m", "y_m", "z_m"], points, |p| p.position);
+    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
     t.array(["vx_ego_mps", "vy_ego_mps", "vz_ego_mps"], flows, |f| f.velocity_ego_mps);
     found(&mut t, flows);
     t
@@ -72,13 +73,13 @@ pub fn points_in_short(points: &[Point], flows: &[PointFlow]) -> TableWriter {
         point.position.map(|v| (flow.status == Status::Moving).then_some(v))
     };
     t.array(["x_m", "y_m", "z_m"], &rows, place);
+    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
     found(&mut t, flows);
     t
 }
 
-/// What was found of returns.
+/// What was found of returns beside their velocities.
 fn found(t: &mut TableWriter, flows: &[PointFlow]) {
-    t.array(["vx_world_mps", "vy_world_mps"], flows, |f| f.velocity_world_mps);
     t.array(["cov_xx", "cov_xy", "cov_yy"], flows, |f| f.covariance);
     t.column("age", flows, |f| f.age);
     t.column("p_moves", flows, |f| f.probability);

@@ -53,11 +53,9 @@ struct SensorRow {
 struct CalibrationRow {
     token: String,
     sensor_token: String,
-    translation: [f64; 3],
-    /// w, x, y, z.
-    rotation: [f64; 4],
 }
 
+/// Of a vehicle or a sensor.
 #[derive(serde::Deserialize)]
 struct PlacedRow {
     token: String,
@@ -102,11 +100,14 @@ impl NuScenes {
             let what = format!("{} has no sweeps of {LIDAR}", scene.name);
             return Err(Error::input(&tables, SWEEPS, what));
         }
-        let vehicle_from_lidar = mountings(&tables, &sweeps)?;
+        let vehicle_from_lidar = poses(&tables.join("calibrated_sensor.json"), &sweeps, |sweep| {
+            &sweep.calibrated_sensor_token
+        })?;
+        let poses = poses(&tables.join("ego_pose.json"), &sweeps, |sweep| &sweep.ego_pose_token)?;
         let (frames, first): (Vec<u64>, _) =
             (sweeps.iter().map(|sweep| sweep.timestamp).collect(), sweeps[0].timestamp);
         let stamps_s = frames.iter().map(|us| (us - first) as f64 * 1e-6).collect();
-        let mut track = PoseTrack { stamps_s, poses: ego_poses(&tables, &sweeps)? };
+        let mut track = PoseTrack { stamps_s, poses };
         check_rising(&track.stamps_s, &tables.join(SWEEPS), |i| format!("sweep {i}"))?;
         if options.unlocated == Unlocated::Always {
             track.poses.clear();
@@ -220,33 +221,15 @@ fn sweeps(tables: &Path, scene: &str) -> Result<Vec<SweepRow>, Error> {
     Ok(sweeps)
 }
 
-/// `vehicle_from_lidar` of every sweep.
-fn mountings(tables: &Path, sweeps: &[SweepRow]) -> Result<Vec<Pose>, Error> {
-    let path = tables.join("calibrated_sensor.json");
-    let rows = |see: &mut dyn FnMut(PlacedRow)| {
-        each(&path, |CalibrationRow { token, translation, rotation, .. }: CalibrationRow| {
-            see(PlacedRow { token, translation, rotation });
-        })
-    };
-    poses(&path, rows, sweeps.iter().map(|sweep| sweep.calibrated_sensor_token.as_str()))
-}
-
-/// `world_from_vehicle` of every sweep.
-fn ego_poses(tables: &Path, sweeps: &[SweepRow]) -> Result<Vec<Pose>, Error> {
-    let path = tables.join("ego_pose.json");
-    let rows = |see: &mut dyn FnMut(PlacedRow)| each(&path, see);
-    poses(&path, rows, sweeps.iter().map(|sweep| sweep.ego_pose_token.as_str()))
-}
-
-/// The poses with these tokens.
-fn poses<'a>(
+/// The pose that a token of every sweep names in a table.
+fn poses(
     path: &Path,
-    rows: impl FnOnce(&mut dyn FnMut(PlacedRow)) -> Result<(), Error>,
-    tokens: impl Iterator<Item = &'a str> + Clone,
+    sweeps: &[SweepRow],
+    token: impl Fn(&SweepRow) -> &str,
 ) -> Result<Vec<Pose>, Error> {
-    let wanted: BTreeSet<&str> = tokens.clone().collect();
+    let wanted: BTreeSet<&str> = sweeps.iter().map(&token).collect();
     let mut found = BTreeMap::new();
-    rows(&mut |row| {
+    each(path, |row: PlacedRow| {
         if wanted.contains(row.token.as_str()) {
             let [w, x, y, z] = row.rotation;
             found.insert(row.token, rigid(row.translation, [x, y, z, w]));
@@ -257,7 +240,7 @@ fn poses<'a>(
         Some(Err(what)) => Err(Error::input(path, format!("token {token}"), *what)),
         None => Err(Error::input(path, "", format!("has no token {token}"))),
     };
-    tokens.map(pose).collect()
+    sweeps.iter().map(|sweep| pose(token(sweep))).collect()
 }
 
 /// Hands out the rows of a table, one after the other.

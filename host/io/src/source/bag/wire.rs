@@ -80,9 +80,9 @@ impl<'a> Wire<'a> {
         let alignment = self.alignment.min(4);
         self.at = self.at.next_multiple_of(alignment);
         let step = size.next_multiple_of(alignment);
-        let all = count.saturating_sub(1).checked_mul(step).and_then(|n| n.checked_add(size));
-        let all = all.filter(|_| count > 0).unwrap_or(0);
-        Ok((self.take(all)?, step))
+        let before = count.saturating_sub(1).checked_mul(step);
+        let all = before.and_then(|before| before.checked_add(if count > 0 { size } else { 0 }));
+        Ok((self.take(all.ok_or("more records than there can be")?)?, step))
     }
 
     /// A string.

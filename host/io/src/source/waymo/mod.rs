@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::{Rig, Timing};
 
-use super::poses::{PoseTrack, check_rising, pose_from};
+use super::poses::{PoseTrack, pose_from};
 use super::recognise::{WAYMO_LASERS, entries};
 use super::{CloudKind, OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply};
 use crate::Error;
@@ -96,7 +96,6 @@ impl Waymo {
         let poses = vehicle_poses(&file("vehicle_pose"), by_time.keys())?;
         let stamps_s = by_time.keys().map(|us| (us - first) as f64 * 1e-6).collect();
         let mut track = PoseTrack { stamps_s, poses: poses.clone() };
-        check_rising(&track.stamps_s, &path, |i| format!("sweep {i}"))?;
         if options.unlocated == Unlocated::Always {
             track.poses.clear();
         }
@@ -119,9 +118,9 @@ impl Waymo {
         };
         let rows = |(us, images)| SweepRows { images, pixel_poses: pixels.get(&us).copied() };
         let sweeps = by_time.into_iter().map(rows).collect();
-        let images = table.rows(&[LASER, &of(IMAGE, "values"), &of(IMAGE, "shape")])?;
+        let images = table.rows(&[&of(IMAGE, "values"), &of(IMAGE, "shape")])?;
         let pixel_poses =
-            pose_table.rows(&[LASER, &of(PIXEL_POSES, "values"), &of(PIXEL_POSES, "shape")])?;
+            pose_table.rows(&[&of(PIXEL_POSES, "values"), &of(PIXEL_POSES, "shape")])?;
         let root = root.to_path_buf();
         Ok(Waymo { overview, root, lasers, images, pixel_poses, sweeps, poses })
     }
