@@ -7,7 +7,7 @@ use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::sink::{atomic, clouds};
-use raywake_io::source::{CloudKind, Overview, SweepData};
+use raywake_io::source::{Overview, SweepData};
 
 use super::judged::Judged;
 
@@ -17,34 +17,31 @@ const NAMES: [&str; 2] = ["static", "moving"];
 /// Where clouds go.
 pub enum KeptClouds {
     /// A file each in a folder of what stands and one of what moves.
-    Files { root: PathBuf, extension: &'static str },
+    Files { root: PathBuf, extension: String },
     /// Two recordings of messages.
     Bags(Box<[BagSink; 2]>),
 }
 
 impl KeptClouds {
-    /// Creates folders or files for clouds of this kind.
-    pub fn create(root: &Path, kind: CloudKind, of: &Overview) -> Result<KeptClouds, Error> {
-        let extension = match kind {
-            CloudKind::Bin => "bin",
-            CloudKind::Npy => "npy",
-            CloudKind::Pcd => "pcd",
-            CloudKind::Ply => "ply",
-            CloudKind::Feather => "feather",
-            CloudKind::Messages => {
-                let bag = |name| {
-                    let mcap = Some(root.join(format!("{name}.mcap")));
-                    let targets = StreamTargets { mcap, live: None };
-                    BagSink::create(&targets, of.epoch_ns, Content::Clouds)
-                };
-                let [still, moving] = NAMES.map(bag);
-                let bags = still?.zip(moving?);
-                let bags = bags.ok_or_else(|| Error::lacking("an MCAP file", "mcap"))?;
-                return Ok(KeptClouds::Bags(Box::new(bags.into())));
-            }
+    /// Creates folders for files with this extension, or, without, files of messages.
+    pub fn create(
+        root: &Path,
+        extension: Option<&str>,
+        of: &Overview,
+    ) -> Result<KeptClouds, Error> {
+        let Some(extension) = extension else {
+            let bag = |name| {
+                let mcap = Some(root.join(format!("{name}.mcap")));
+                let targets = StreamTargets { mcap, live: None };
+                BagSink::create(&targets, of.epoch_ns, Content::Clouds)
+            };
+            let [still, moving] = NAMES.map(bag);
+            let bags = still?.zip(moving?);
+            let bags = bags.ok_or_else(|| Error::lacking("an MCAP file", "mcap"))?;
+            return Ok(KeptClouds::Bags(Box::new(bags.into())));
         };
         NAMES.iter().try_for_each(|name| atomic::create_folder(&root.join(name)))?;
-        Ok(KeptClouds::Files { root: root.to_path_buf(), extension })
+        Ok(KeptClouds::Files { root: root.to_path_buf(), extension: extension.into() })
     }
 
     /// Writes the returns of a sweep by what became of them.

@@ -61,7 +61,7 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     };
     made.claim(Some(&args.out))?;
     atomic::create_folder(&args.out.join("labels"))?;
-    let kept = KeptClouds::create(&args.out, source.clouds(), source.overview())?;
+    let kept = KeptClouds::create(&args.out, source.extension(), source.overview())?;
     let mut cleaning = Cleaning {
         args,
         profile,

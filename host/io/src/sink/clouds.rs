@@ -8,7 +8,6 @@ use raywake_core::sweep::Point;
 use super::atomic;
 use super::table::TableWriter;
 use crate::Error;
-use crate::source::CloudKind;
 
 /// Numbers of a return in files that name them: m, 0 to 1, and s after the sweep's stamp.
 const NAMES: [&str; 5] = ["x", "y", "z", "intensity", "time"];
@@ -23,24 +22,22 @@ fn numbers(point: &Point) -> [f32; NAMES.len()] {
 pub fn write_cloud(path: &Path, points: &[Point]) -> Result<(), Error> {
     let rows: Vec<[f32; NAMES.len()]> = points.iter().map(numbers).collect();
     let bare = || rows.iter().flat_map(|[x, y, z, intensity, _]| [*x, *y, *z, *intensity]);
-    match CloudKind::of(path) {
-        CloudKind::Npy => atomic::write(path, |out| {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("npy") => atomic::write(path, |out| {
             out.write_all(&npy_head(rows.len()))?;
             bare().try_for_each(|v| out.write_all(&v.to_le_bytes()))
         }),
-        CloudKind::Pcd => atomic::write(path, |out| {
+        Some("pcd") => atomic::write(path, |out| {
             out.write_all(pcd_head(rows.len()).as_bytes())?;
             rows.as_flattened().iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))
         }),
-        CloudKind::Ply => write_ply(path, NAMES, &rows),
-        CloudKind::Feather => {
+        Some("ply") => write_ply(path, NAMES, &rows),
+        Some("feather") => {
             let mut table = TableWriter::default();
             table.array(NAMES, &rows, |row| *row);
             table.write(path, &[])
         }
-        CloudKind::Bin | CloudKind::Messages => {
-            atomic::write(path, |out| bare().try_for_each(|v| out.write_all(&v.to_le_bytes())))
-        }
+        _ => atomic::write(path, |out| bare().try_for_each(|v| out.write_all(&v.to_le_bytes()))),
     }
 }
 

@@ -13,7 +13,7 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use super::feather::FeatherTable;
 use super::poses::{PoseTrack, check_rising};
 use super::recognise::numbered;
-use super::{CloudKind, OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
+use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
 use super::{apply, folder_name};
 use crate::Error;
 
@@ -140,8 +140,8 @@ impl Source for Argoverse {
         format!("Argoverse 2 log {}: {}", self.root.display(), self.overview.length())
     }
 
-    fn clouds(&self) -> CloudKind {
-        CloudKind::Feather
+    fn extension(&self) -> Option<&str> {
+        Some("feather")
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

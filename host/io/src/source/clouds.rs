@@ -36,8 +36,8 @@ impl Source for Clouds {
         format!("{}: {}, poses from {}", self.kind, self.overview.length(), self.poses_from)
     }
 
-    fn clouds(&self) -> CloudKind {
-        self.files.first().map_or(CloudKind::Bin, |path| CloudKind::of(path))
+    fn extension(&self) -> Option<&str> {
+        self.files.first()?.extension()?.to_str()
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
@@ -98,34 +98,3 @@ fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
 
 /// Names of files of clouds end so in a folder of clouds.
 pub(super) const EXTENSIONS: [&str; 4] = ["bin", "npy", "pcd", "ply"];
-
-/// How clouds are stored, so that others can be written alike.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CloudKind {
-    /// x, y, z and intensity in single precision.
-    #[default]
-    Bin,
-    /// The same as an array of numpy.
-    Npy,
-    /// Point Cloud Library's.
-    Pcd,
-    /// Stanford's.
-    Ply,
-    /// A table of Arrow's.
-    Feather,
-    /// Messages or packets of sensors.
-    Messages,
-}
-
-impl CloudKind {
-    /// By the extension of a file that is a cloud.
-    pub fn of(path: &Path) -> CloudKind {
-        match path.extension().and_then(|e| e.to_str()) {
-            Some("npy") => CloudKind::Npy,
-            Some("pcd") => CloudKind::Pcd,
-            Some("ply") => CloudKind::Ply,
-            Some("feather") => CloudKind::Feather,
-            _ => CloudKind::Bin,
-        }
-    }
-}

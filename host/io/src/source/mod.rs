@@ -65,7 +65,7 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 use crate::Error;
 
 pub use bin::BinFields;
-pub use clouds::{CloudKind, read_cloud};
+pub use clouds::read_cloud;
 pub use pose_files::read_pose;
 pub use poses::{PoseTrack, pose_row};
 pub use recognise::recognise;
@@ -161,9 +161,9 @@ pub trait Source {
     /// Fails where the file is unreadable or damaged; `into` then holds no points.
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error>;
 
-    /// How its clouds are stored.
-    fn clouds(&self) -> CloudKind {
-        CloudKind::Bin
+    /// Extension of files of clouds like its own; none where they come as messages or packets.
+    fn extension(&self) -> Option<&str> {
+        Some("bin")
     }
 
     /// See [`Overview::name`].

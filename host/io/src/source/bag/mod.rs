@@ -27,8 +27,8 @@ use raywake_core::sweep::{Point, SENSORS_MAX};
 use super::median::median;
 use super::recognise::{MCAP, entries};
 use super::{
-    CloudKind, OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated,
-    first_sweep, folder_name, pose_files,
+    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
+    folder_name, pose_files,
 };
 use crate::Error;
 use contents::{CloudMessage, Contents};
@@ -196,8 +196,8 @@ impl Source for Bag {
         )
     }
 
-    fn clouds(&self) -> CloudKind {
-        CloudKind::Messages
+    fn extension(&self) -> Option<&str> {
+        None
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

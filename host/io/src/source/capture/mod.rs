@@ -26,8 +26,8 @@ use raywake_core::sweep::Point;
 
 use super::median::median;
 use super::{
-    CloudKind, OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated,
-    first_sweep, folder_name, pose_files,
+    OpenOptions, Overview, PosesFrame, Source, SourceGaps, SweepData, Unlocated, first_sweep,
+    folder_name, pose_files,
 };
 use crate::Error;
 use datagrams::{Datagram, Datagrams, Sender};
@@ -181,8 +181,8 @@ impl Source for Capture {
         )
     }
 
-    fn clouds(&self) -> CloudKind {
-        CloudKind::Messages
+    fn extension(&self) -> Option<&str> {
+        None
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {

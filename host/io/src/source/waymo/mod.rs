@@ -23,7 +23,7 @@ use raywake_core::sweep::{Rig, Timing};
 
 use super::poses::{PoseTrack, pose_from};
 use super::recognise::{WAYMO_LASERS, entries};
-use super::{CloudKind, OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply};
+use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply};
 use crate::Error;
 use images::RangeLaser;
 use table::{ImageRows, ParquetTable};
@@ -136,8 +136,8 @@ impl Source for Waymo {
         format!("Waymo segment {name} in {root}: {}", self.overview.length())
     }
 
-    fn clouds(&self) -> CloudKind {
-        CloudKind::Feather
+    fn extension(&self) -> Option<&str> {
+        Some("feather")
     }
 
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
