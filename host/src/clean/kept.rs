@@ -36,9 +36,9 @@ impl KeptClouds {
                 BagSink::create(&targets, of.epoch_ns, Content::Clouds)
             };
             let [still, moving] = NAMES.map(bag);
-            let bags = still?.zip(moving?);
-            let bags = bags.ok_or_else(|| Error::lacking("an MCAP file", "mcap"))?;
-            return Ok(KeptClouds::Bags(Box::new(bags.into())));
+            let bags = still?.zip(moving?).map(|(still, moving)| Box::new([still, moving]));
+            let absent = || Error::lacking("an MCAP file", "mcap");
+            return bags.map(KeptClouds::Bags).ok_or_else(absent);
         };
         NAMES.iter().try_for_each(|name| atomic::create_folder(&root.join(name)))?;
         Ok(KeptClouds::Files { root: root.to_path_buf(), extension: extension.into() })
