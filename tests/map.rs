@@ -4,8 +4,8 @@
 
 use raywake::map::{MapBackend, Mapped, Mapper, device::DeviceMap, scalar::ScalarMap};
 use raywake_core::frame::place;
-use raywake_core::map::Update;
 use raywake_core::params::Profile;
+use raywake_core::record::Update;
 use raywake_core::sweep::Rig;
 use raywake_gpu::Options;
 use raywake_sim::SimSweep;

@@ -58,7 +58,7 @@ else
 fi
 
 say "the program alone, onboard, with every index clamped, and for aarch64"
-cargo build --quiet --release -p raywake
+cargo build --quiet --release -p raywake --all-features
 cargo build --quiet --profile onboard -p raywake --no-default-features
 RAYWAKE_KERNELS=restrict cargo build --quiet --release -p raywake --target-dir target/restrict
 # States are zeros at the start, which take no room in a file; one that is not shows here.

@@ -3,9 +3,6 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-/// 99 % quantile of chi-square with two degrees of freedom: the gate of a position.
-pub const CHI2_99_2DOF: f64 = 9.2103;
-
 /// Variance of a heading of which nothing is known: uniform over a turn, pi²/3.
 const HEADING_UNKNOWN: f32 = 3.289_868;
 

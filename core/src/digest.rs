@@ -1,6 +1,7 @@
 //! A digest of results: 64-bit FNV-1a over little-endian bytes. It tells whether two runs put out
 //! the same bits; it is no protection against anybody.
 
+#[cfg(feature = "pipeline")]
 use crate::output::{ColumnFlow, TrackletState};
 
 /// A running digest.
@@ -47,6 +48,14 @@ impl Digest {
         (v + 0.0).to_bits().to_le_bytes().into_iter().for_each(|b| self.byte(b));
     }
 
+    /// The digest so far.
+    pub fn value(&self) -> u64 {
+        self.0
+    }
+}
+
+#[cfg(feature = "pipeline")]
+impl Digest {
     /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over
     /// ground, velocity relative to the vehicle, covariance, age, P(moves).
     pub fn column(&mut self, c: &ColumnFlow) {
@@ -72,11 +81,6 @@ impl Digest {
         t.covariance.iter().flatten().for_each(|v| self.float(*v));
         self.word(t.age);
         self.float(t.probability);
-    }
-
-    /// The digest so far.
-    pub fn value(&self) -> u64 {
-        self.0
     }
 }
 

@@ -27,32 +27,53 @@
 //!   [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`], [`ctrv`].
 
 pub mod continuity;
+#[cfg(feature = "pipeline")]
 pub mod counters;
+#[cfg(feature = "pipeline")]
 pub mod ctrv;
 pub mod digest;
+#[cfg(feature = "pipeline")]
 pub mod dropped;
+#[cfg(feature = "pipeline")]
 pub mod encoder;
+#[cfg(feature = "pipeline")]
 pub mod frame;
+#[cfg(feature = "pipeline")]
 pub mod ground;
+#[cfg(feature = "pipeline")]
 pub mod groups;
+#[cfg(feature = "pipeline")]
 pub mod map;
+#[cfg(feature = "pipeline")]
 pub mod motion_compensation;
+#[cfg(feature = "pipeline")]
 pub mod output;
 pub mod params;
+#[cfg(feature = "pipeline")]
 pub mod perceive;
+#[cfg(feature = "pipeline")]
 pub mod pipeline;
 pub mod pose;
+#[cfg(feature = "pipeline")]
 pub mod prepare;
 #[cfg(test)]
 mod random;
 pub mod record;
+#[cfg(feature = "pipeline")]
 pub mod refinement;
+#[cfg(feature = "pipeline")]
 pub mod return_clock;
+#[cfg(feature = "pipeline")]
 pub mod returns;
 pub mod stages;
+#[cfg(feature = "pipeline")]
 pub mod sweep;
+#[cfg(feature = "pipeline")]
 pub mod team;
+#[cfg(feature = "pipeline")]
 pub mod thinning;
+#[cfg(feature = "pipeline")]
 pub mod tracklet;
+#[cfg(feature = "pipeline")]
 mod velocities;
 pub mod weights;

@@ -12,7 +12,7 @@ use crate::stages::{MAP_BAND, MAP_COUNT, MAP_RAYS, Storage, run};
 
 const _: () = assert!(POINTS_MAX <= BAND_UPDATES);
 
-pub use crate::record::Update;
+use crate::record::Update;
 
 /// Bands remembered from sweep to sweep.
 const BANDS_MAX: usize = 256;

@@ -5,12 +5,12 @@
 
 use crate::dropped::DroppedReturns;
 use crate::frame::{Window, central};
-use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, Profile, SLOTS};
+use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, Profile, SENSORS_MAX, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
 use crate::return_clock::{ReturnClock, slot_of};
 use crate::stages::occupancy_constancy::Scores;
-use crate::sweep::{Placed, Point, Rig, SENSORS_MAX, Sweep, Timing};
+use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
 

@@ -50,13 +50,13 @@ pub use declare::{Argument, BufferElement, BufferRow, GroupCount, List, Stage, V
 pub use program::{Runner, StageOp, StageProgram, needed, run, walk};
 
 use crate::params::*;
-use crate::record::{Column, Flow, MinCost, NO_END, NONE, Proposal, Ray, SweepUniform, VALID};
+use crate::record::{
+    Column, Flow, MinCost, NO_END, NONE, Proposal, Ray, SweepUniform, Update, VALID,
+};
 use background_filter::{FILTER_TABLE, TABLE_WORDS};
 use declare::{argument, buffers, constants, passed, stage};
 use occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS};
 use program::words_of;
-
-use crate::map::Update;
 
 buffers! {
     uniform sweep: SweepUniform, "sizes, shift and costs of the sweep";

@@ -1,5 +1,6 @@
 //! What a source hands over: one sweep of returns, and the rig that made it.
 
+use crate::params::SENSORS_MAX;
 use crate::pose::{Pose, Twist};
 
 /// One return.
@@ -42,9 +43,6 @@ pub struct Sweep<'a> {
     /// Velocity of the vehicle at the stamp.
     pub twist: Twist,
 }
-
-/// Sensors a rig may have.
-pub const SENSORS_MAX: usize = 8;
 
 /// Where a return's time within the sweep comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]

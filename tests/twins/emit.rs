@@ -1,7 +1,7 @@
 //! Updates of the sparse map, counted and written band by band.
 
-use raywake_core::map::Update;
 use raywake_core::params::{EXTENT_VOXELS, MERGE_SLOTS, POINTS_MAX, ROW_WORKGROUP, TILE};
+use raywake_core::record::Update;
 use raywake_core::record::{Ray, SweepUniform, ray};
 use raywake_core::stages::map::emit::{count, emit};
 use raywake_core::stages::prefix_sum::prefix_sum;

@@ -1,7 +1,7 @@
 //! The sparse map's updates, sorted by key: a pass by itself, and all eight.
 
-use raywake_core::map::Update;
 use raywake_core::params::{BAND_UPDATES, RADIX, TILE};
+use raywake_core::record::Update;
 use raywake_core::stages::map::radix_sort::radix_sort;
 use raywake_core::stages::prefix_sum::prefix_sum;
 use raywake_core::stages::{COUNTERS, DIGIT_SHIFT};

@@ -1,7 +1,7 @@
 //! The sparse map's updates, summed by key.
 
-use raywake_core::map::Update;
 use raywake_core::params::{BAND_UPDATES, TILE, WORKGROUP};
+use raywake_core::record::Update;
 use raywake_core::stages::map::reduce_by_key::reduce_by_key;
 use raywake_core::stages::prefix_sum::prefix_sum;
 use raywake_gpu::Kernel;

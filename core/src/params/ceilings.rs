@@ -22,8 +22,10 @@ pub const CLUSTERS_MAX: usize = SOLID_MAX;
 pub const FOREGROUND_MAX: usize = 12_288;
 /// Time slots a sweep is divided into for ray origins and motion correction: 1.6 ms at 10 Hz.
 pub const SLOTS: usize = 64;
+/// Sensors a rig may have.
+pub const SENSORS_MAX: usize = 8;
 /// Distinct ray origins of a sweep: every sensor in every slot.
-pub const ORIGINS_MAX: usize = crate::sweep::SENSORS_MAX * SLOTS;
+pub const ORIGINS_MAX: usize = SENSORS_MAX * SLOTS;
 /// Half width of the search, cells (n_s = 31, section 3.8.1): 45 m/s at 0.30 m and 10 Hz.
 pub const REACH: i32 = 15;
 /// Width of the search, cells.

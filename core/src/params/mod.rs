@@ -15,7 +15,7 @@ pub use ceilings::*;
 pub use moves::MovesParams;
 pub use profile::{Frame, Profile};
 pub use refinement::{GroundParams, RefinementParams};
-pub use tracklet::{Birth, TrackletParams};
+pub use tracklet::{Birth, CHI2_99_2DOF, TrackletParams};
 
 use core::fmt;
 

@@ -1,7 +1,9 @@
 //! Parameters of the tracklet filter.
 
 use super::{Kind, Value};
-use crate::ctrv::CHI2_99_2DOF;
+
+/// 99 % quantile of chi-square with two degrees of freedom: the gate of a position.
+pub const CHI2_99_2DOF: f64 = 9.2103;
 
 /// Where a tracklet is born.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

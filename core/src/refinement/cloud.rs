@@ -8,10 +8,10 @@ use crate::frame::central;
 use crate::ground::GroundGrid;
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
-    SUBVOXELS_MAX,
+    SENSORS_MAX, SUBVOXELS_MAX,
 };
 use crate::record::NONE;
-use crate::sweep::{Placed, SENSORS_MAX};
+use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
 use core::ops::Range;
 

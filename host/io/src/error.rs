@@ -48,7 +48,10 @@ impl Error {
 
     /// [`Error::Unsupported`] for want of a feature.
     pub fn lacking(what: impl std::fmt::Display, feature: &str) -> Error {
-        let text = format!("{what} needs the feature `{feature}`, which is not compiled in");
+        let text = format!(
+            "{what} needs the feature `{feature}`, which is not compiled in: build raywake with \
+             --all-features"
+        );
         Error::Unsupported(text)
     }
 

@@ -68,9 +68,7 @@ impl Form {
         let unable = |what: &str| format!("--out {}: {what}", path.display());
         match path.extension().and_then(|e| e.to_str()) {
             Some("feather") if cfg!(feature = "arrow") => Ok(Form::Feather),
-            Some("feather") => Err(Error::Unsupported(unable(
-                "the feature `arrow` for feather files is not compiled in; use .bin",
-            ))),
+            Some("feather") => Err(Error::lacking(format!("--out {}", path.display()), "arrow")),
             Some("bin") => Ok(Form::Bin),
             _ => Err(Error::Usage(unable("the extension must be .feather or .bin"))),
         }

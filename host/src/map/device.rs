@@ -1,7 +1,8 @@
 //! The map's kernels on a Vulkan device: three recorded programs.
 
-use raywake_core::map::{Bands, Update};
+use raywake_core::map::Bands;
 use raywake_core::params::{BAND_UPDATES, Profile, TILE};
+use raywake_core::record::Update;
 use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::{Buffer, MAP_PROGRAMS};
 use raywake_gpu::{Executor, GpuError, Heap, Options};

@@ -6,9 +6,9 @@ pub mod scalar;
 
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::frame::{Window, place};
-use raywake_core::map::Update;
 use raywake_core::params::Profile;
 use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
+use raywake_core::record::Update;
 use raywake_core::record::{NONE, Ray, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 use raywake_core::sweep::{Rig, Sweep};

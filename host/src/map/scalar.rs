@@ -1,7 +1,8 @@
 //! The scalar map: memory allocated once for the buffers it needs.
 
-use raywake_core::map::{Bands, Update, map};
+use raywake_core::map::{Bands, map};
 use raywake_core::params::Profile;
+use raywake_core::record::Update;
 use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 

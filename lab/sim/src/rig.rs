@@ -2,8 +2,9 @@
 
 use crate::sensor::Sensor;
 use glam::{DQuat, DVec3};
+use raywake_core::params::SENSORS_MAX;
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
+use raywake_core::sweep::{Point, Rig, Timing};
 use std::fmt;
 use std::str::FromStr;
 

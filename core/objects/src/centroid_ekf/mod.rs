@@ -15,7 +15,8 @@ mod tests;
 use crate::ObjectState;
 use crate::noise::ProcessNoise;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
-use raywake_core::ctrv::{CHI2_99_2DOF, TwoPointStart};
+use raywake_core::ctrv::TwoPointStart;
+use raywake_core::params::CHI2_99_2DOF;
 
 /// Elements of the state.
 pub const STATE: usize = 7;

@@ -5,10 +5,10 @@ use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{Origin, PointFlow, PointFlows, Status};
-use raywake_core::params::{POINTS_MAX, SLOTS};
+use raywake_core::params::{POINTS_MAX, SENSORS_MAX, SLOTS};
 use raywake_core::pose::Pose;
 use raywake_core::return_clock::{ReturnClock, slot_of};
-use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Sweep, Timing};
+use raywake_core::sweep::{Point, Rig, Sweep, Timing};
 use raywake_core::thinning::TakenPoints;
 
 /// A return in the world.

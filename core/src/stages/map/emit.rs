@@ -1,7 +1,7 @@
 //! The list of updates (B.2.2), at its exact size.
 
-use crate::map::Update;
 use crate::params::{LOG_ODDS_FREE, LOG_ODDS_OCCUPIED};
+use crate::record::Update;
 use crate::record::{NO_END, Ray, SweepUniform, ray_end, ray_origin};
 use crate::stages::grid::ray_merge::merged;
 use crate::stages::grid::ray_trace::inside;

@@ -1,7 +1,7 @@
 //! Stable sort of updates by key (B.2.3), least significant digit first.
 
-use crate::map::Update;
 use crate::params::TILE;
+use crate::record::Update;
 
 /// Sorts the first `count_tiles[TILE]` of `updates` by key; equal keys keep their order. `scratch`
 /// must have room for as many. Digits are bytes here; the kernels take four bits at a time.

@@ -1,7 +1,7 @@
 //! Sums of the updates of each voxel (B.2.3).
 
-use crate::map::Update;
 use crate::params::TILE;
+use crate::record::Update;
 
 /// Sums runs of equal keys among the first `count_tiles[TILE]` of the sorted `updates` into
 /// `voxels`, which must have room for as many; `run_tiles[TILE]` becomes the number of runs.

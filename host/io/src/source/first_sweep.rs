@@ -4,8 +4,9 @@
 use raywake_core::sweep::Point;
 #[cfg(any(feature = "mcap", feature = "pcap"))]
 use raywake_core::{
+    params::SENSORS_MAX,
     pose::Pose,
-    sweep::{Rig, SENSORS_MAX, Timing},
+    sweep::{Rig, Timing},
 };
 
 use super::sidecars::SPAN_MAX_S;

@@ -14,8 +14,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use raywake_core::params::SENSORS_MAX;
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig, SENSORS_MAX, Timing};
+use raywake_core::sweep::{Point, Rig, Timing};
 
 use super::poses::pose_from;
 use super::text;

@@ -21,8 +21,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use raywake_core::params::SENSORS_MAX;
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, SENSORS_MAX};
+use raywake_core::sweep::Point;
 
 use super::median::median;
 use super::recognise::{MCAP, entries};
