@@ -89,6 +89,11 @@ impl Grid {
         window
     }
 
+    /// Log-odds of every voxel of the last sweep, tenths.
+    pub fn log_odds(&mut self) -> &[i32] {
+        Storage::over(&mut self.words, GRID_ALONE, &self.profile).log_odds
+    }
+
     /// Indices of the solid columns.
     pub fn solid(&self) -> impl Iterator<Item = usize> + use<'_> {
         self.columns.iter().enumerate().filter(|(_, c)| c[1] != 0).map(|(n, _)| n)

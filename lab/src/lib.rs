@@ -4,8 +4,10 @@
 
 mod curve;
 pub mod eval;
+mod flsf;
 pub mod grid;
 pub mod labels;
+mod learning;
 pub mod matching;
 pub mod metrics;
 pub mod report;
@@ -13,5 +15,6 @@ pub mod results;
 #[cfg(test)]
 mod scratch;
 pub mod simulate;
+pub mod toy;
 pub mod tracks;
 pub mod train;

@@ -4,7 +4,7 @@
 use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, matching, results, simulate, tracks, train};
+use raywake_lab::{eval, matching, results, simulate, toy, tracks, train};
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -25,6 +25,8 @@ enum Command {
     Match(matching::Args),
     /// Write RESULTS.md from the results of evaluations.
     Results(results::Args),
+    /// Feature learning on digits (section 4.3): table 4.1, figures 4.2 and 4.3.
+    Toy(toy::Args),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
 }
@@ -65,6 +67,7 @@ fn main() -> ExitCode {
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => matching::run(&args),
         Command::Sim(args) => simulate::run(&args),
+        Command::Toy(args) => toy::run(&args).map_err(Into::into),
         Command::Results(args) => results::run(&args).map_err(Into::into),
     };
     match done {

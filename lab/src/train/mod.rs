@@ -2,23 +2,24 @@
 
 mod constancy;
 mod constancy_samples;
-mod drives;
+pub(crate) mod drives;
 mod encoder;
 mod features;
 mod filter;
 mod filter_samples;
-mod inputs;
+pub(crate) mod inputs;
 mod logistic;
 mod moves;
 mod owner;
 mod pairs;
 mod ranking;
-mod recorded;
-mod report;
-mod simulated;
+pub(crate) mod recorded;
+pub(crate) mod report;
+pub(crate) mod simulated;
 mod solve;
 mod weights_file;
 
+use crate::flsf;
 use raywake_io::Error;
 
 /// What can be trained.
@@ -30,6 +31,8 @@ pub enum Command {
     Constancy(constancy::Args),
     /// The encoder (after chapter 4).
     Encoder(encoder::Args),
+    /// The features of chapter 4 as printed, off-board
+    Flsf(flsf::Args),
     /// P(moves): how cues are weighed (after the refinement, which has no section)
     Moves(moves::Args),
 }
@@ -40,6 +43,7 @@ pub fn run(command: &Command) -> Result<(), Error> {
         Command::Filter(args) => filter::run(args),
         Command::Constancy(args) => constancy::run(args),
         Command::Encoder(args) => encoder::run(args),
+        Command::Flsf(args) => flsf::run(args),
         Command::Moves(args) => moves::run(args),
     }
 }

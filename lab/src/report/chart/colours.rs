@@ -14,7 +14,10 @@ pub(super) const REFERENCE: RGBColor = rgb(0xc3cad5);
 /// Marks upon curves.
 pub(super) const MARK: RGBColor = rgb(0xc0182b);
 
-const SERIES: [u32; 7] = [0x0072b2, 0xd55e00, 0x009e73, 0xb5609a, 0xe69f00, 0x56b4e9, 0x7a6a53];
+const SERIES: [u32; 10] = [
+    0x0072b2, 0xd55e00, 0x009e73, 0xb5609a, 0xe69f00, 0x56b4e9, 0x7a6a53, 0x3d3d8f, 0xa3b18a,
+    0x9b2226,
+];
 
 const ORDERED: [u32; 7] = [0xa9d4ea, 0x7cbbdf, 0x4f9fd0, 0x2f81bb, 0x1b639f, 0x12467b, 0x0a2a54];
 
@@ -22,7 +25,7 @@ const fn rgb(v: u32) -> RGBColor {
     RGBColor((v >> 16) as u8, (v >> 8) as u8, v as u8)
 }
 
-/// Of the `i`-th of several series; repeats after seven.
+/// Of the `i`-th of several series; repeats after ten.
 pub(super) fn series(i: usize) -> RGBColor {
     rgb(SERIES[i % SERIES.len()])
 }

@@ -1,7 +1,7 @@
 //! Adam (Kingma and Ba, 2015), the rounding of weights, and checkpoints.
 
 use super::parameters::Parameters;
-use raywake_core::digest::Digest;
+use crate::learning::checkpoint;
 use raywake_core::encoder::layers::*;
 use raywake_io::Error;
 use raywake_sim::Rng;
@@ -126,37 +126,23 @@ impl Optimiser {
 
     /// Writes a checkpoint of the training called `of`.
     pub fn write(&self, to: &mut impl Write, of: u64) -> io::Result<()> {
-        let mut bytes = Vec::new();
-        bytes.extend(of.to_le_bytes());
-        bytes.extend((self.step as u64).to_le_bytes());
-        bytes.extend(&self.shifts);
+        let mut body = (self.step as u64).to_le_bytes().to_vec();
+        body.extend(&self.shifts);
         for part in [&self.parameters, &self.means, &self.squares] {
-            part.each().for_each(|x| bytes.extend(x.to_le_bytes()));
+            part.each().for_each(|x| body.extend(x.to_le_bytes()));
         }
-        to.write_all(MAGIC)?;
-        to.write_all(&Digest::of(&bytes).to_le_bytes())?;
-        to.write_all(&bytes)
+        checkpoint::write(to, MAGIC, of, &body)
     }
 
     /// Reads a checkpoint; fails where it is damaged, or of another training than `of`.
     pub fn read(file: &Path, of: u64) -> Result<Optimiser, Error> {
-        let error = |what: &str| Error::input(file, "", what.to_string());
-        let bytes = std::fs::read(file).map_err(|e| error(&e.to_string()))?;
-        let body = bytes.strip_prefix(MAGIC).ok_or_else(|| error("not a checkpoint"))?;
         let parameters: usize = TOTAL.iter().sum();
-        if body.len() != 24 + TOTAL[1] + 3 * 4 * parameters {
-            return Err(error("a checkpoint of another length"));
-        }
-        let word = |n: usize| u64::from_le_bytes(body[8 * n..][..8].try_into().expect("8 bytes"));
-        if Digest::of(&body[8..]) != word(0) {
-            return Err(error("checksum does not match: the checkpoint is damaged"));
-        }
-        if word(1) != of {
-            return Err(error("a checkpoint of another training: other inputs, seed or epochs"));
-        }
+        let length = 8 + TOTAL[1] + 3 * 4 * parameters;
+        let body = checkpoint::read(file, MAGIC, of, length)?;
+        let (step, rest) = body.split_at(8);
         let mut state = Optimiser::new(0);
-        state.step = word(2) as usize;
-        let (shifts, numbers) = body[24..].split_at(TOTAL[1]);
+        state.step = u64::from_le_bytes(step.try_into().expect("8 bytes")) as usize;
+        let (shifts, numbers) = rest.split_at(TOTAL[1]);
         state.shifts.copy_from_slice(shifts);
         let parts = [&mut state.parameters, &mut state.means, &mut state.squares];
         let all = parts.into_iter().flat_map(Parameters::each_mut);

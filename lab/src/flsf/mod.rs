@@ -1,0 +1,16 @@
+//! Feature learning for scene flow as the dissertation prints it (chapter 4): a network of six
+//! convolutions on the occupancy of a sweep in the vehicle's frame, trained by pairs of cells.
+//!
+//! For the record, off-board: 41.9 billion products a sweep. What ships is
+//! [`raywake_core::encoder`].
+
+mod crops;
+mod network;
+mod occupancy;
+mod pairs;
+#[cfg(test)]
+mod tests;
+mod train;
+mod weights;
+
+pub use train::{Args, run};

@@ -1,0 +1,152 @@
+//! Two sweeps, each in the frame of its vehicle, and where every cell of the first went.
+
+use super::occupancy::{BORDER, OccupancyMap, SIDE, WIDE};
+use crate::grid::Grid;
+use crate::labels::{Footprint, Kind};
+use crate::train::drives::{Labelled, LabelledSweep, Seen};
+use raywake_core::continuity::ContinuityLimits;
+use raywake_core::frame::Window;
+use raywake_core::pose::Pose;
+use raywake_io::Error;
+use std::collections::HashMap;
+
+/// What a cell of the first sweep is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellOwner {
+    /// In an object's footprint: an index of [`FlowPair::objects`].
+    Object(u16),
+    /// Nothing that is labelled.
+    Background,
+    /// Of an object of no kind, or where nothing is labelled.
+    Unknown,
+}
+
+/// A cell of the first sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// What it is.
+    pub owner: CellOwner,
+    /// Whether there is a return in it.
+    pub solid: bool,
+    /// Where it went, cells along both axes; nothing where that is not known.
+    pub displacement: Option<[f32; 2]>,
+}
+
+/// A labelled object of the first sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LabelledObject {
+    /// What it is.
+    pub kind: Kind,
+    /// Speed over ground, m/s; nothing where the second sweep does not have it.
+    pub speed_mps: Option<f64>,
+}
+
+/// Two sweeps with the truth, on the cells of the flow's window.
+pub struct FlowPair {
+    /// Occupancy of both.
+    pub maps: [OccupancyMap; 2],
+    /// `SIDE` x `SIDE` cells of the first.
+    pub cells: Vec<Cell>,
+    /// Objects of the first.
+    pub objects: Vec<LabelledObject>,
+    /// Time between them, s.
+    pub dt_s: f64,
+}
+
+/// What is worked with, kept so that its memory is reused.
+#[derive(Default)]
+pub struct TwoSweeps([LabelledSweep; 2]);
+
+impl FlowPair {
+    /// The pair that begins at a sweep of a drive; none where the next does not continue it.
+    pub fn read(
+        grid: &mut Grid,
+        drive: &mut dyn Labelled,
+        index: usize,
+        sweeps: &mut TwoSweeps,
+    ) -> Result<Option<FlowPair>, Error> {
+        for (n, sweep) in sweeps.0.iter_mut().enumerate() {
+            drive.read(index + n, sweep)?;
+        }
+        let [first, second] = &sweeps.0;
+        let dt_s = second.data.stamp_s - first.data.stamp_s;
+        let poses = [first, second].map(|s| s.data.world_from_vehicle);
+        if ContinuityLimits::DEFAULT.broken(&poses[0], &poses[1], dt_s).is_some() {
+            return Ok(None);
+        }
+        let (later, _) = OccupancyMap::of(grid, drive.rig(), &second.data.sweep());
+        let (map, window) = OccupancyMap::of(grid, drive.rig(), &first.data.sweep());
+        let motions = motions(first, second, dt_s);
+        let cells = cells(grid, &window, drive, first, &poses, &motions);
+        let objects = first.objects.iter().zip(&motions).map(|(o, motion)| LabelledObject {
+            kind: o.kind,
+            speed_mps: motion.map(|(_, speed)| speed),
+        });
+        Ok(Some(FlowPair { maps: [map, later], cells, objects: objects.collect(), dt_s }))
+    }
+
+    /// Rounded displacement of a cell, where it is known and ends within the search.
+    pub fn step(&self, cell: usize) -> Option<[i32; 2]> {
+        let step = self.cells[cell].displacement?.map(|d| d.round() as i32);
+        let near = step.iter().all(|d| d.abs() <= raywake_core::params::REACH);
+        near.then_some(step)
+    }
+
+    /// Indices of solid cells of objects whose displacement is known and within the search.
+    pub fn sources(&self) -> Vec<usize> {
+        let foreground = |c: &Cell| c.solid && matches!(c.owner, CellOwner::Object(_));
+        (0..SIDE * SIDE).filter(|n| foreground(&self.cells[*n]) && self.step(*n).is_some()).collect()
+    }
+}
+
+/// Motion in the world of each object, and its speed over ground, m/s.
+fn motions(first: &LabelledSweep, second: &LabelledSweep, dt_s: f64) -> Vec<Option<(Pose, f64)>> {
+    let later: HashMap<usize, &Seen> = second.objects.iter().map(|o| (o.id, o)).collect();
+    let motion = |o: &Seen| {
+        let (from, to) = (first.world_from_box(o), second.world_from_box(later.get(&o.id)?));
+        let speed = (to.translation - from.translation).truncate().length() / dt_s;
+        Some((to * from.inverse(), speed))
+    };
+    first.objects.iter().map(motion).collect()
+}
+
+fn cells(
+    grid: &Grid,
+    window: &Window,
+    drive: &dyn Labelled,
+    first: &LabelledSweep,
+    poses: &[Pose; 2],
+    motions: &[Option<(Pose, f64)>],
+) -> Vec<Cell> {
+    let near = |o: &&(usize, Footprint)| motions.len() > o.0;
+    let footprints: Vec<(usize, Footprint)> = first
+        .objects
+        .iter()
+        .enumerate()
+        .filter(|(_, o)| {
+            o.vehicle_from_box.translation.truncate().length() < grid.reach_m() + o.size[0]
+        })
+        .map(|(n, o)| (n, Footprint::new(o.vehicle_from_box, o.size[0], o.size[1])))
+        .collect();
+    let vehicle_from_world = poses[1].inverse();
+    let moved = |at, motion: &Pose| vehicle_from_world.transform(motion.transform(poses[0].transform(at))) - at;
+    let cell = |n: usize| {
+        let wide = (n / SIDE + BORDER) * WIDE + n % SIDE + BORDER;
+        let at = grid.centre(window, wide);
+        let within = footprints.iter().filter(near).find(|(_, f)| f.holds(at, 0.0));
+        let owner = match within {
+            Some((n, _)) if first.objects[*n].kind == Kind::Other => CellOwner::Unknown,
+            Some((n, _)) => CellOwner::Object(*n as u16),
+            None if !drive.sees(at) => CellOwner::Unknown,
+            None => CellOwner::Background,
+        };
+        let by = match owner {
+            CellOwner::Object(n) => motions[usize::from(n)].map(|(motion, _)| moved(at, &motion)),
+            CellOwner::Background => Some(moved(at, &Pose::IDENTITY)),
+            CellOwner::Unknown => None,
+        };
+        let displacement = by.map(|by| [by.x, by.y].map(|d| (d / grid.voxel_m()) as f32));
+        Cell { owner, solid: grid.columns[wide][1] != 0, displacement }
+    };
+    (0..SIDE * SIDE).map(cell).collect()
+}

@@ -1,0 +1,46 @@
+//! Numbers of the network, and training under way, as files.
+
+use crate::learning::{Adam, checkpoint};
+use raywake_io::Error;
+use raywake_io::sink::atomic;
+use std::path::Path;
+
+/// What files of weights begin with.
+const WEIGHTS: &[u8] = b"raywake-flsf-weights 1\n";
+/// What checkpoints begin with.
+const TRAINING: &[u8] = b"raywake-flsf-training 1\n";
+
+/// Writes weights.
+pub fn write(path: &Path, numbers: &[f32]) -> Result<(), Error> {
+    let body: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    atomic::write(path, |to| checkpoint::write(to, WEIGHTS, 0, &body))
+}
+
+/// Reads weights: `count` numbers. Fails where the file is damaged or of another network.
+pub fn read(path: &Path, count: usize) -> Result<Vec<f32>, Error> {
+    let body = checkpoint::read(path, WEIGHTS, 0, 4 * count)?;
+    Ok(floats(&body))
+}
+
+/// Writes training of the kind `of` as it stands.
+pub fn write_state(path: &Path, of: u64, numbers: &[f32], state: &Adam) -> Result<(), Error> {
+    let mut body: Vec<u8> = state.step.to_le_bytes().to_vec();
+    let all = numbers.iter().chain(&state.means).chain(&state.squares);
+    body.extend(all.flat_map(|n| n.to_le_bytes()));
+    atomic::write(path, |to| checkpoint::write(to, TRAINING, of, &body))
+}
+
+/// Reads it again; fails where it is damaged, or of another training.
+pub fn read_state(path: &Path, of: u64, count: usize) -> Result<(Vec<f32>, Adam), Error> {
+    let body = checkpoint::read(path, TRAINING, of, 4 + 12 * count)?;
+    let (step, rest) = body.split_at(4);
+    let mut numbers = floats(rest);
+    let squares = numbers.split_off(2 * count);
+    let means = numbers.split_off(count);
+    let step = u32::from_le_bytes(step.try_into().expect("4 bytes"));
+    Ok((numbers, Adam { means, squares, step }))
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}

@@ -1,0 +1,36 @@
+//! Files of numbers that say what they are of and tell whether they are damaged.
+
+use raywake_core::digest::Digest;
+use raywake_io::Error;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Writes a file: `magic`, a checksum, what it is `of`, and `body`.
+pub fn write(to: &mut impl Write, magic: &[u8], of: u64, body: &[u8]) -> io::Result<()> {
+    let bytes = [&of.to_le_bytes(), body].concat();
+    to.write_all(magic)?;
+    to.write_all(&Digest::of(&bytes).to_le_bytes())?;
+    to.write_all(&bytes)
+}
+
+/// The body of a file, `length` bytes. Fails where it is of another kind or length, damaged, or of
+/// something else than `of`.
+pub fn read(file: &Path, magic: &[u8], of: u64, length: usize) -> Result<Vec<u8>, Error> {
+    let error = |what: &str| Error::input(file, "", what.to_string());
+    let bytes = std::fs::read(file).map_err(Error::reading(file))?;
+    let rest = bytes.strip_prefix(magic).ok_or_else(|| {
+        let kind = String::from_utf8_lossy(magic);
+        error(&format!("does not begin with '{}'", kind.trim_end()))
+    })?;
+    if rest.len() != 16 + length {
+        return Err(error(&format!("of another length: {} bytes, not {}", rest.len(), 16 + length)));
+    }
+    let word = |n: usize| u64::from_le_bytes(rest[8 * n..][..8].try_into().expect("8 bytes"));
+    if Digest::of(&rest[8..]) != word(0) {
+        return Err(error("checksum does not match: the file is damaged"));
+    }
+    if word(1) != of {
+        return Err(error("of another training: other inputs, seed or steps"));
+    }
+    Ok(rest[16..].to_vec())
+}
