@@ -4,7 +4,7 @@
 
 mod curve;
 pub mod eval;
-mod flsf;
+pub mod flsf;
 pub mod grid;
 pub mod labels;
 mod learning;

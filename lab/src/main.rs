@@ -4,7 +4,7 @@
 use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, matching, results, simulate, toy, tracks, train};
+use raywake_lab::{eval, flsf, matching, results, simulate, toy, tracks, train};
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -45,6 +45,8 @@ struct Eval {
 enum Other {
     /// Trajectory and shape of objects against their truth (chapter 2).
     Tracks(Box<tracks::Args>),
+    /// Learned features as chapter 4 prints them: table 4.2 and figure 4.8.
+    Flsf(flsf::evaluate::Args),
     /// A cleaned recording against its truth: static kept, dynamic removed.
     Clean(eval::clean::Args),
 }
@@ -53,6 +55,7 @@ impl Eval {
     fn run(&self) -> Result<(), RunError> {
         match &self.of {
             Some(Other::Tracks(args)) => tracks::run(args),
+            Some(Other::Flsf(args)) => Ok(flsf::evaluate::run(args)?),
             Some(Other::Clean(args)) => Ok(eval::clean::run(args)?),
             None => Ok(eval::run(&self.flow)?),
         }

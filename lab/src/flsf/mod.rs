@@ -4,10 +4,14 @@
 //! For the record, off-board: 41.9 billion products a sweep. What ships is
 //! [`raywake_core::encoder`].
 
+mod conclude;
 mod crops;
+pub mod evaluate;
+mod matching;
 mod network;
 mod occupancy;
 mod pairs;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod train;

@@ -13,8 +13,7 @@ pub const FEATURES: usize = 10;
 pub const SCORES: usize = 2;
 /// Kernels and outputs of the encoder's layers, then of the classifier, which reads the encoding
 /// alone.
-const LAYERS: [[usize; 2]; 6] =
-    [[9, 200], [7, 100], [5, 50], [3, 25], [3, FEATURES], [3, SCORES]];
+const LAYERS: [[usize; 2]; 6] = [[9, 200], [7, 100], [5, 50], [3, 25], [3, FEATURES], [3, SCORES]];
 /// Cells that an encoding sees to each side of its own.
 pub const SEEN: usize = 11;
 /// Below zero a fifth is let through, in every layer.
@@ -97,9 +96,8 @@ impl Flsf {
     ) -> [f32; 2] {
         let (of_encoder, of_classifier) = numbers.split_at(self.encoder.numbers());
         let (into_encoder, into_classifier) = into.split_at_mut(of_encoder.len());
-        let tapes = lesson.maps.each_ref().map(|map| {
-            self.encoder.forward(of_encoder, map.clone(), rng)
-        });
+        let tapes =
+            lesson.maps.each_ref().map(|map| self.encoder.forward(of_encoder, map.clone(), rng));
         let (matching, [mut first, second]) =
             of_pairs(tapes.each_ref().map(|t| t.output()), &lesson.pairs);
         let told = self.classifier.forward(of_classifier, tapes[0].output().clone(), rng);

@@ -4,9 +4,11 @@ use super::occupancy::{BORDER, OccupancyMap, SIDE, WIDE};
 use crate::grid::Grid;
 use crate::labels::{Footprint, Kind};
 use crate::train::drives::{Labelled, LabelledSweep, Seen};
+use glam::DVec3;
 use raywake_core::continuity::ContinuityLimits;
 use raywake_core::frame::Window;
 use raywake_core::pose::Pose;
+use raywake_core::record::Column;
 use raywake_io::Error;
 use std::collections::HashMap;
 
@@ -30,6 +32,8 @@ pub struct Cell {
     pub solid: bool,
     /// Where it went, cells along both axes; nothing where that is not known.
     pub displacement: Option<[f32; 2]>,
+    /// Where it would have gone, did it stand.
+    pub odometry: [f32; 2],
 }
 
 /// A labelled object of the first sweep.
@@ -47,10 +51,10 @@ pub struct FlowPair {
     pub maps: [OccupancyMap; 2],
     /// `SIDE` x `SIDE` cells of the first.
     pub cells: Vec<Cell>,
+    /// Columns of both, in the same cells.
+    pub columns: [Vec<Column>; 2],
     /// Objects of the first.
     pub objects: Vec<LabelledObject>,
-    /// Time between them, s.
-    pub dt_s: f64,
 }
 
 /// What is worked with, kept so that its memory is reused.
@@ -75,6 +79,7 @@ impl FlowPair {
             return Ok(None);
         }
         let (later, _) = OccupancyMap::of(grid, drive.rig(), &second.data.sweep());
+        let columns_later = inner(&grid.columns);
         let (map, window) = OccupancyMap::of(grid, drive.rig(), &first.data.sweep());
         let motions = motions(first, second, dt_s);
         let cells = cells(grid, &window, drive, first, &poses, &motions);
@@ -82,7 +87,8 @@ impl FlowPair {
             kind: o.kind,
             speed_mps: motion.map(|(_, speed)| speed),
         });
-        Ok(Some(FlowPair { maps: [map, later], cells, objects: objects.collect(), dt_s }))
+        let columns = [inner(&grid.columns), columns_later];
+        Ok(Some(FlowPair { maps: [map, later], cells, columns, objects: objects.collect() }))
     }
 
     /// Rounded displacement of a cell, where it is known and ends within the search.
@@ -95,7 +101,9 @@ impl FlowPair {
     /// Indices of solid cells of objects whose displacement is known and within the search.
     pub fn sources(&self) -> Vec<usize> {
         let foreground = |c: &Cell| c.solid && matches!(c.owner, CellOwner::Object(_));
-        (0..SIDE * SIDE).filter(|n| foreground(&self.cells[*n]) && self.step(*n).is_some()).collect()
+        (0..SIDE * SIDE)
+            .filter(|n| foreground(&self.cells[*n]) && self.step(*n).is_some())
+            .collect()
     }
 }
 
@@ -110,6 +118,12 @@ fn motions(first: &LabelledSweep, second: &LabelledSweep, dt_s: f64) -> Vec<Opti
     first.objects.iter().map(motion).collect()
 }
 
+/// The columns of the flow's window.
+fn inner(wide: &[Column]) -> Vec<Column> {
+    let rows = wide.chunks_exact(WIDE).skip(BORDER).take(SIDE);
+    rows.flat_map(|row| &row[BORDER..][..SIDE]).copied().collect()
+}
+
 fn cells(
     grid: &Grid,
     window: &Window,
@@ -118,7 +132,6 @@ fn cells(
     poses: &[Pose; 2],
     motions: &[Option<(Pose, f64)>],
 ) -> Vec<Cell> {
-    let near = |o: &&(usize, Footprint)| motions.len() > o.0;
     let footprints: Vec<(usize, Footprint)> = first
         .objects
         .iter()
@@ -129,24 +142,29 @@ fn cells(
         .map(|(n, o)| (n, Footprint::new(o.vehicle_from_box, o.size[0], o.size[1])))
         .collect();
     let vehicle_from_world = poses[1].inverse();
-    let moved = |at, motion: &Pose| vehicle_from_world.transform(motion.transform(poses[0].transform(at))) - at;
+    let moved = |at, motion: &Pose| {
+        vehicle_from_world.transform(motion.transform(poses[0].transform(at))) - at
+    };
     let cell = |n: usize| {
         let wide = (n / SIDE + BORDER) * WIDE + n % SIDE + BORDER;
         let at = grid.centre(window, wide);
-        let within = footprints.iter().filter(near).find(|(_, f)| f.holds(at, 0.0));
+        let within = footprints.iter().find(|(_, f)| f.holds(at, 0.0));
         let owner = match within {
             Some((n, _)) if first.objects[*n].kind == Kind::Other => CellOwner::Unknown,
             Some((n, _)) => CellOwner::Object(*n as u16),
             None if !drive.sees(at) => CellOwner::Unknown,
             None => CellOwner::Background,
         };
-        let by = match owner {
-            CellOwner::Object(n) => motions[usize::from(n)].map(|(motion, _)| moved(at, &motion)),
-            CellOwner::Background => Some(moved(at, &Pose::IDENTITY)),
+        let cells = |by: DVec3| [by.x, by.y].map(|d| (d / grid.voxel_m()) as f32);
+        let odometry = cells(moved(at, &Pose::IDENTITY));
+        let displacement = match owner {
+            CellOwner::Object(n) => {
+                motions[usize::from(n)].map(|(motion, _)| cells(moved(at, &motion)))
+            }
+            CellOwner::Background => Some(odometry),
             CellOwner::Unknown => None,
         };
-        let displacement = by.map(|by| [by.x, by.y].map(|d| (d / grid.voxel_m()) as f32));
-        Cell { owner, solid: grid.columns[wide][1] != 0, displacement }
+        Cell { owner, solid: grid.columns[wide][1] != 0, displacement, odometry }
     };
     (0..SIDE * SIDE).map(cell).collect()
 }

@@ -66,9 +66,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     for (pairs, planned) in args.inputs.visit(&plan, &of_drive)?.into_iter().zip(&plan) {
         if planned.held_out { &mut held_out } else { &mut training }.extend(pairs);
     }
-    let counts = [&training, &held_out].map(|pairs: &Vec<Material>| {
-        [pairs.len(), pairs.iter().map(|m| m.sources.len()).sum()]
-    });
+    let counts = [&training, &held_out]
+        .map(|pairs: &Vec<Material>| [pairs.len(), pairs.iter().map(|m| m.sources.len()).sum()]);
     for ([_, sources], part) in counts.into_iter().zip(["training", "held-out"]) {
         Counts { positive: sources, negative: 1 }.both(part, "cells of labelled objects", "")?;
     }
@@ -147,6 +146,12 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// What a checkpoint is of.
+    pub fn identity(pairs: &[Material], seed: u64, steps: u32) -> u64 {
+        let weights = class_weights(pairs);
+        Digest::of(format!("{seed} {steps} {} {weights:?}", pairs.len()).as_bytes())
+    }
+
     /// Learns from pairs of sweeps, or goes on from a checkpoint.
     pub fn of(
         pairs: &[Material],
@@ -156,7 +161,7 @@ impl Fit {
     ) -> Result<Fit, Error> {
         let network = Flsf::new(true);
         let weights = class_weights(pairs);
-        let of = Digest::of(format!("{seed} {steps} {} {weights:?}", pairs.len()).as_bytes());
+        let of = Fit::identity(pairs, seed, steps);
         let (mut numbers, mut state) = match checkpoint.filter(|c| c.exists()) {
             Some(file) => weights::read_state(file, of, network.numbers())?,
             None => {
@@ -225,7 +230,8 @@ fn judge(pairs: &[Material], numbers: &[f32]) -> Curve {
         let lesson = pairs[rng.bits() as usize % pairs.len()].lesson(&mut rng);
         let maps = lesson.maps.each_ref().map(|map| network.encoder.apply(of_encoder, map));
         rows.extend(lesson.pairs.iter().map(|p| {
-            let [a, b] = [&maps[0].values[p.first * FEATURES..], &maps[1].values[p.second * FEATURES..]];
+            let [a, b] =
+                [&maps[0].values[p.first * FEATURES..], &maps[1].values[p.second * FEATURES..]];
             let (d, _) = crate::learning::pair_loss(&a[..FEATURES], &b[..FEATURES], true, D_MAX);
             (-f64::from(d), p.matching, 1.0)
         }));

@@ -23,7 +23,11 @@ pub fn read(file: &Path, magic: &[u8], of: u64, length: usize) -> Result<Vec<u8>
         error(&format!("does not begin with '{}'", kind.trim_end()))
     })?;
     if rest.len() != 16 + length {
-        return Err(error(&format!("of another length: {} bytes, not {}", rest.len(), 16 + length)));
+        return Err(error(&format!(
+            "of another length: {} bytes, not {}",
+            rest.len(),
+            16 + length
+        )));
     }
     let word = |n: usize| u64::from_le_bytes(rest[8 * n..][..8].try_into().expect("8 bytes"));
     if Digest::of(&rest[8..]) != word(0) {
