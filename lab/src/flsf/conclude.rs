@@ -1,7 +1,7 @@
 //! Tables and figures of `eval flsf`.
 
-use super::evaluate::{Compared, Outcome};
 use super::network::D_MAX;
+use super::outcome::{Compared, Outcome};
 use super::tally::{ErrorSums, METHODS, Tally};
 use crate::curve::Curve;
 use crate::learning::pair_loss;

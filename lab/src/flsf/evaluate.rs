@@ -2,21 +2,17 @@
 //! one protocol on the same drives.
 
 use super::conclude::conclude;
-use super::matching::{Constancy, Encoded, Features, Matched, place};
+use super::matching::{Constancy, Features};
 use super::network::Flsf;
-use super::occupancy::{SIDE, wide_grid};
-use super::pairs::{CellOwner, FlowPair, TwoSweeps};
-use super::tally::{Errors, METHODS, Tally};
+use super::outcome::{Compared, Outcome, walk};
 use super::weights;
-use crate::train::drives::Labelled;
 use crate::train::recorded::Recorded;
 use raywake::args::Learned;
 use raywake::weight_files::WeightFiles;
-use raywake_core::params::{Profile, REACH, SIDE as SEARCH};
+use raywake_core::params::Profile;
 use raywake_io::Error;
 use raywake_sim::Rng;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Options of `eval flsf`.
 #[derive(clap::Args)]
@@ -29,48 +25,14 @@ pub struct Args {
     weights: PathBuf,
     /// Folder of results
     #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
+    out: PathBuf,
     /// Stop after this many sweeps of every drive
     #[arg(short = 'n', value_name = "COUNT")]
     count: Option<usize>,
 }
 
 /// Pairs of cells, one of each source, that figure 4.8 is drawn of (section 4.5.2).
-pub const SOURCES: usize = 5000;
-
-/// Seconds that a method took for all pairs.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Seconds {
-    /// Occupancy constancy: costs and minimisation.
-    pub constancy: f64,
-    /// The network, a sweep.
-    pub encoder: f64,
-    /// Distances and minimisation.
-    pub features: f64,
-}
-
-/// A pair of cells, whether the one went to the other, and what each metric says: constancy of the
-/// column alone, of its window, and distance of features, the lower the likelier.
-#[derive(Clone, Copy, Debug)]
-pub struct Compared {
-    /// Whether it did.
-    pub matching: bool,
-    /// What they say.
-    pub costs: [f64; 3],
-}
-
-/// What came of all drives.
-#[derive(Default)]
-pub struct Outcome {
-    /// Pairs of sweeps.
-    pub pairs: usize,
-    /// As chapter 3 counts, and as chapter 4's program does.
-    pub tallies: [Tally; 2],
-    /// For figure 4.8.
-    pub compared: Vec<Compared>,
-    /// Of all pairs.
-    pub seconds: Seconds,
-}
+const SOURCES: usize = 5000;
 
 /// Evaluates, writes and prints.
 pub fn run(args: &Args) -> Result<(), Error> {
@@ -98,107 +60,4 @@ fn thin(compared: &mut Vec<Compared>, rng: &mut Rng) {
         compared.swap(n, other);
     }
     compared.truncate(SOURCES);
-}
-
-/// All pairs of a drive.
-pub fn walk(
-    drive: &mut dyn Labelled,
-    count: Option<usize>,
-    methods: &(Constancy, Features),
-    rng: &mut Rng,
-    outcome: &mut Outcome,
-) -> Result<(), Error> {
-    let mut grid = wide_grid();
-    let mut sweeps = TwoSweeps::default();
-    let mut last: Option<Encoded> = None;
-    let count = count.map_or(drive.len(), |n| drive.len().min(n));
-    for index in 0..count.saturating_sub(1) {
-        let Some(pair) = FlowPair::read(&mut grid, drive, index, &mut sweeps)? else {
-            last = None;
-            continue;
-        };
-        last = Some(outcome.add(&pair, methods, last.take(), rng));
-    }
-    Ok(())
-}
-
-impl Outcome {
-    /// Adds a pair of sweeps; `first` is what the network made of its first, if that is known.
-    /// Returns what it made of the second.
-    fn add(
-        &mut self,
-        pair: &FlowPair,
-        (constancy, features): &(Constancy, Features),
-        first: Option<Encoded>,
-        rng: &mut Rng,
-    ) -> Encoded {
-        let first = first.unwrap_or_else(|| features.encode(&pair.maps[0]));
-        let begin = Instant::now();
-        let second = features.encode(&pair.maps[1]);
-        self.seconds.encoder += begin.elapsed().as_secs_f64();
-        let begin = Instant::now();
-        let learned = features.flow([&first, &second]);
-        self.seconds.features += begin.elapsed().as_secs_f64();
-        let begin = Instant::now();
-        let printed = constancy.flow(pair);
-        self.seconds.constancy += begin.elapsed().as_secs_f64();
-        self.pairs += 1;
-        let sources = pair.sources();
-        self.count(pair, [&printed, &learned]);
-        let costs = constancy.costs(pair, &sources.iter().map(|n| *n as u32).collect());
-        let sources: Vec<u32> = sources.into_iter().map(|n| n as u32).collect();
-        let distances = features.costs([&first, &second], &sources);
-        for (n, &source) in sources.iter().enumerate() {
-            let Some((step, matching)) = drawn(pair, source as usize, rng) else { continue };
-            let at = n * raywake_core::params::ROW + place(step);
-            let costs = [costs[0][at], costs[1][at], distances[at]].map(f64::from);
-            self.compared.push(Compared { matching, costs });
-        }
-        second
-    }
-
-    /// Errors of every solid cell of an object.
-    fn count(&mut self, pair: &FlowPair, methods: [&Matched; 2]) {
-        for (n, cell) in pair.cells.iter().enumerate().filter(|(_, c)| c.solid) {
-            let (CellOwner::Object(object), Some(truth)) = (cell.owner, cell.displacement) else {
-                continue;
-            };
-            let object = pair.objects[usize::from(object)];
-            let Some(speed_mps) = object.speed_mps else { continue };
-            let error = |flow: [f32; 2]| {
-                let off = [0, 1].map(|a| f64::from(flow[a] - truth[a]));
-                0.3 * off[0].hypot(off[1])
-            };
-            let flow = |m: &Matched| m.displacement(n).map(|d| d.map(|d| d as f32));
-            let references = [error([0.0; 2]), error(cell.odometry), error(truth.map(f32::round))];
-            let filled = methods.map(|m| Some(error(flow(m).unwrap_or(cell.odometry))));
-            let valid = methods.map(|m| flow(m).filter(|_| m.takes(n)).map(error));
-            for (tally, own) in self.tallies.iter_mut().zip([filled, valid]) {
-                let errors: Errors = std::array::from_fn(|method| match method {
-                    n if n < references.len() => Some(references[n]),
-                    n => own[n - references.len()],
-                });
-                const { assert!(METHODS.len() == 5) };
-                tally.add(object.kind, speed_mps, errors);
-            }
-        }
-    }
-}
-
-/// A displacement of a source: half the time where it went, else any other within the window.
-fn drawn(pair: &FlowPair, source: usize, rng: &mut Rng) -> Option<([i32; 2], bool)> {
-    let inside = |step: [i32; 2]| {
-        let at = [source / SIDE, source % SIDE];
-        [0, 1].iter().all(|&a| (0..SIDE as i32).contains(&(at[a] as i32 + step[a])))
-    };
-    let truth = pair.step(source).filter(|step| inside(*step))?;
-    if rng.chance(0.5) {
-        return Some((truth, true));
-    }
-    loop {
-        let step = [(); 2].map(|()| (rng.bits() as usize % SEARCH) as i32 - REACH);
-        if step != truth && inside(step) {
-            return Some((step, false));
-        }
-    }
 }

@@ -6,7 +6,7 @@ use super::occupancy::{OccupancyMap, SIDE, WIDE};
 use super::pairs::FlowPair;
 use crate::learning::FeatureMap;
 use raywake::backend::Tables;
-use raywake_core::params::{LINE, Profile, REACH, ROW, SIDE as SEARCH, TILE};
+use raywake_core::params::{LINE, Profile, REACH, ROW, SIDE as SEARCH};
 use raywake_core::prepare::uniform_of;
 use raywake_core::record::{Flow, NONE, SweepUniform, VALID, flow_displacement};
 use raywake_core::stages::background_filter::background_filter_by_bytes;
@@ -41,12 +41,6 @@ impl Matched {
     /// Whether a cell takes part.
     pub fn takes(&self, cell: usize) -> bool {
         self.foreground.binary_search(&(cell as u32)).is_ok()
-    }
-
-    /// The row of a cell that takes part.
-    pub fn row(&self, cell: usize) -> Option<&[u16]> {
-        let n = self.foreground.binary_search(&(cell as u32)).ok()?;
-        Some(&self.costs[n * ROW..][..ROW])
     }
 
     fn minimised(foreground: Vec<u32>, costs: Vec<u16>, step: &SweepUniform) -> Matched {
@@ -103,13 +97,14 @@ impl Constancy {
     pub fn flow(&self, pair: &FlowPair) -> Matched {
         let mut marks = vec![0; SIDE * SIDE];
         background_filter_by_bytes(&self.step, &self.tables.filter, &pair.columns[0], &mut marks);
-        let foreground = (0..).zip(&marks).filter(|(_, m)| **m != 0).map(|(n, _)| n).collect();
+        let foreground: Vec<u32> =
+            (0..).zip(&marks).filter(|(_, m)| **m != 0).map(|(n, _)| n).collect();
         let [_, costs] = self.costs(pair, &foreground);
         Matched::minimised(foreground, costs, &self.step)
     }
 
     /// Costs of some columns, each alone and with its window (3.13).
-    pub fn costs(&self, pair: &FlowPair, foreground: &Vec<u32>) -> [Vec<u16>; 2] {
+    pub fn costs(&self, pair: &FlowPair, foreground: &[u32]) -> [Vec<u16>; 2] {
         let mut rank = vec![NONE; SIDE * SIDE];
         (0..).zip(foreground).for_each(|(n, cell)| rank[*cell as usize] = n);
         let mut alone = vec![0; foreground.len() * ROW];
@@ -120,7 +115,6 @@ impl Constancy {
         );
         let mut around = vec![0; foreground.len() * ROW];
         window(&self.step, foreground, &rank, &alone, &mut around);
-        const { assert!(TILE > 0) };
         [alone, around]
     }
 }
@@ -210,12 +204,11 @@ impl Features {
         let foreground: Vec<u32> =
             (0..(SIDE * SIDE) as u32).filter(|n| both[0].takes(*n as usize)).collect();
         let costs = self.costs(both, &foreground);
-        let profile = Profile { smoothing: SMOOTHING as u32, ..Profile::dissertation() };
         let step = SweepUniform {
             smoothing: SMOOTHING,
             displacement_cost: 0,
             outside_cost: 0,
-            ..uniform_of(&profile, 0)
+            ..uniform_of(&Profile::dissertation(), 0)
         };
         Matched::minimised(foreground, costs, &step)
     }

@@ -10,6 +10,7 @@ pub mod evaluate;
 mod matching;
 mod network;
 mod occupancy;
+mod outcome;
 mod pairs;
 mod tally;
 #[cfg(test)]

@@ -84,8 +84,8 @@ impl Flsf {
         numbers
     }
 
-    /// Losses of a lesson: of the pairs (4.6) and of the classes (4.7), the means; adds the gradient
-    /// of their sum (4.8). `weights` are those of background and foreground.
+    /// Mean losses of a lesson, of the pairs (4.6) and of the classes (4.7); adds the gradient of
+    /// their sum (4.8). `weights` are those of background and foreground.
     pub fn learn(
         &self,
         numbers: &[f32],

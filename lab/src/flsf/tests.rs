@@ -1,7 +1,7 @@
-use super::evaluate::{Outcome, walk};
 use super::matching::{Constancy, Features, place};
 use super::network::{FEATURES, Flsf, LEVELS};
 use super::occupancy::{BORDER, OccupancyMap, SIDE, Symmetry, WIDE, wide_grid};
+use super::outcome::{Outcome, walk};
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::train::{Fit, Material};
 use super::weights;
@@ -110,7 +110,7 @@ fn lessons_match_where_cells_went() {
             seen[usize::from(p.matching)] += 1;
         }
         assert_eq!(lesson.classes.len(), (SEARCH - 2).pow(2));
-        assert!(lesson.classes.iter().any(|c| *c == Some(true)));
+        assert!(lesson.classes.contains(&Some(true)));
         let wide = SEARCH + 2 * super::network::SEEN;
         assert_eq!([lesson.maps[0].rows, lesson.maps[1].columns], [wide, wide]);
     }

@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
     /// Steps of four lessons.
-    #[arg(long, default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// File to go on from where training was interrupted.
     #[arg(long, value_name = "FILE")]

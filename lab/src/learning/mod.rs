@@ -1,5 +1,5 @@
-//! Networks in floating point, for chapter 4 as printed: convolutions without padding, the losses of
-//! pairs and of classes, dropout and Adam.
+//! Networks in floating point, for chapter 4 as printed: convolutions without padding, the losses
+//! of pairs and of classes, dropout and Adam.
 //!
 //! Products of matrices are `ndarray`'s, which asks the processor for its widest vectors: a seed
 //! gives the same numbers again on the same kind of processor, and nearly the same on another. What

@@ -63,7 +63,7 @@ fn three_digits_reach_the_optimum() {
 #[test]
 fn drawn_digits_end_to_end() {
     let scratch = Scratch::new();
-    let digits = scratch.write("digits.csv", &drawn(1000));
+    let digits = scratch.write("digits.csv", drawn(1000));
     let out = scratch.path().join("out");
     let run_once = || {
         let line = ["toy", digits.to_str().unwrap(), "--out", out.to_str().unwrap()];

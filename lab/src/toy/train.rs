@@ -24,7 +24,7 @@ pub struct Training {
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
     hidden: Vec<u16>,
     /// Steps of Adam, of 100 pictures or 100 pairs.
-    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Rate at the first step; it falls evenly to nothing.
     #[arg(long, default_value_t = 1e-3)]
