@@ -21,14 +21,12 @@ const SMOOTHING: i32 = 70;
 /// Thousandths of a distance.
 const THOUSAND: f32 = 1000.0;
 
-/// Costs of every displacement of some cells, and the flow of least energy.
+/// The flow of least energy.
 pub struct Matched {
     /// Cells that take part, ascending.
-    pub foreground: Vec<u32>,
-    /// A row of [`ROW`] thousandths for each.
-    pub costs: Vec<u16>,
+    foreground: Vec<u32>,
     /// Of every cell of the window; 0 where it has none.
-    pub flow: Vec<Flow>,
+    flow: Vec<Flow>,
 }
 
 impl Matched {
@@ -43,7 +41,8 @@ impl Matched {
         self.foreground.binary_search(&(cell as u32)).is_ok()
     }
 
-    fn minimised(foreground: Vec<u32>, costs: Vec<u16>, step: &SweepUniform) -> Matched {
+    /// Of some cells with a row of [`ROW`] costs each.
+    fn minimised(foreground: Vec<u32>, costs: &[u16], step: &SweepUniform) -> Matched {
         let mut flow = vec![0; SIDE * SIDE];
         let mut energies = vec![NONE; SIDE * SIDE];
         let mut winners = vec![NONE; SIDE * SIDE];
@@ -63,7 +62,7 @@ impl Matched {
             winners.fill(NONE);
             maximisation(step, &foreground, &proposals, &mut energies, &mut winners, &mut flow);
         }
-        Matched { foreground, costs, flow }
+        Matched { foreground, flow }
     }
 }
 
@@ -100,7 +99,7 @@ impl Constancy {
         let foreground: Vec<u32> =
             (0..).zip(&marks).filter(|(_, m)| **m != 0).map(|(n, _)| n).collect();
         let [_, costs] = self.costs(pair, &foreground);
-        Matched::minimised(foreground, costs, &self.step)
+        Matched::minimised(foreground, &costs, &self.step)
     }
 
     /// Costs of some columns, each alone and with its window (3.13).
@@ -210,6 +209,6 @@ impl Features {
             outside_cost: 0,
             ..uniform_of(&Profile::dissertation(), 0)
         };
-        Matched::minimised(foreground, costs, &step)
+        Matched::minimised(foreground, &costs, &step)
     }
 }
