@@ -52,7 +52,7 @@ impl Matched {
             expectation_by_rings(
                 step,
                 &foreground,
-                &costs,
+                costs,
                 &flow,
                 &energies,
                 &mut least,

@@ -38,6 +38,7 @@ pub mod mounting;
 pub mod npy;
 #[cfg(feature = "nuscenes")]
 mod nuscenes;
+mod options;
 mod oxts;
 mod pcd;
 mod ply;
@@ -57,7 +58,7 @@ mod waymo;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig, Sweep};
@@ -65,7 +66,10 @@ use raywake_core::sweep::{Point, Rig, Sweep};
 use crate::Error;
 
 pub use bin::BinFields;
+use clap::ValueEnum;
 pub use clouds::read_cloud;
+use options::apply;
+pub use options::{OpenOptions, PosesFrame, Unlocated};
 pub use pose_files::read_pose;
 pub use poses::{PoseTrack, pose_row};
 pub use recognise::recognise;
@@ -212,92 +216,117 @@ pub trait Source {
     }
 }
 
-/// Kinds of recordings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+/// What a format is known by.
+struct FormatRow {
+    kind: Format,
+    /// What a folder of it has, for people.
+    marks: &'static [&'static str],
+    /// Whether a folder is one.
+    holds: fn(&Path) -> Result<bool, Error>,
+    /// Extensions of files that are one.
+    files: &'static [&'static str],
+    /// Whether [`OpenOptions::topics`] choose within it.
+    topics: bool,
+    open: fn(&Path, &OpenOptions) -> Opened,
+}
+
+type Opened = Result<Box<dyn Source>, Error>;
+
+/// [`Format`] and what is known of every format.
+macro_rules! formats {
+    ($($(#[$meta:meta])* $kind:ident {
+        marks: $marks:expr, holds: $holds:expr, files: $files:expr, topics: $topics:literal,
+        open: $open:path $(, if $feature:tt: $is:literal)?
+    })*) => {
+        /// Kinds of recordings.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+        pub enum Format {
+            $($(#[$meta])* $kind,)*
+        }
+
+        /// In the order in which a folder is asked.
+        const FORMATS: &[FormatRow] = &[$(FormatRow {
+            kind: Format::$kind,
+            marks: &$marks,
+            holds: $holds,
+            files: &$files,
+            topics: $topics,
+            open: opened!($open $(, $feature, $is)?),
+        }),*];
+    };
+}
+
+/// The function that opens a format, or says which feature it is for.
+macro_rules! opened {
+    ($open:path) => {
+        |root, options| Ok(Box::new($open(root, options)?))
+    };
+    ($open:path, $feature:tt, $is:literal) => {{
+        #[cfg(feature = $feature)]
+        fn open(root: &Path, options: &OpenOptions) -> Opened {
+            Ok(Box::new($open(root, options)?))
+        }
+        #[cfg(not(feature = $feature))]
+        fn open(root: &Path, _: &OpenOptions) -> Opened {
+            Err(Error::lacking(format!(concat!("{}, ", $is, ","), root.display()), $feature))
+        }
+        open
+    }};
+}
+
+formats! {
     /// A KITTI raw drive.
     #[value(name = "kitti")]
-    KittiRaw,
-    /// A sequence of KITTI's odometry benchmark (or SemanticKITTI).
-    KittiOdometry,
+    KittiRaw {
+        marks: ["velodyne_points/data"], holds: |p| Ok(p.join("velodyne_points/data").is_dir()),
+        files: [], topics: false, open: kitti::open_raw
+    }
     /// An Argoverse 2 sensor log.
     #[value(name = "argoverse")]
-    Argoverse2,
+    Argoverse2 {
+        marks: ["sensors/lidar"], holds: |p| Ok(p.join("sensors/lidar").is_dir()),
+        files: [], topics: false,
+        open: argoverse::Argoverse::open, if "arrow": "an Argoverse 2 log"
+    }
+    /// A sequence of KITTI's odometry benchmark (or SemanticKITTI).
+    KittiOdometry {
+        marks: ["velodyne"], holds: |p| Ok(p.join("velodyne").is_dir()),
+        files: [], topics: false, open: kitti::open_odometry
+    }
+    /// Segments of Waymo's Open Dataset in Parquet.
+    Waymo {
+        marks: ["lidar_calibration"], holds: recognise::is_waymo,
+        files: [], topics: true, open: waymo::Waymo::open, if "parquet": "Waymo's segments"
+    }
     /// Scenes of nuScenes.
     #[value(name = "nuscenes")]
-    NuScenes,
-    /// Segments of Waymo's Open Dataset in Parquet.
-    Waymo,
+    NuScenes {
+        marks: [recognise::SCENES], holds: recognise::is_nuscenes,
+        files: [], topics: true, open: nuscenes::NuScenes::open, if "nuscenes": "nuScenes"
+    }
+    /// A recording of ROS: an `.mcap` file, or a folder of them.
+    Mcap {
+        marks: ["*.mcap"], holds: |p| recognise::has_extension(p, recognise::MCAP),
+        files: [recognise::MCAP], topics: true,
+        open: bag::Bag::open, if "mcap": "an MCAP recording"
+    }
+    /// Packets of an Ouster or Velodyne sensor in a `.pcap` or `.pcapng` file.
+    Pcap {
+        marks: [], holds: |_| Ok(false), files: ["pcap", "pcapng"], topics: true,
+        open: capture::Capture::open, if "pcap": "a capture of packets"
+    }
     /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
-    Clouds,
-    /// A recording of ROS: an `.mcap` file, or a folder of them.
-    Mcap,
-    /// Packets of an Ouster or Velodyne sensor in a `.pcap` or `.pcapng` file.
-    Pcap,
+    Clouds {
+        marks: ["*.bin", "*.npy", "*.pcd", "*.ply"],
+        holds: |p| Ok(recognise::extensions(p)?.next().is_some()),
+        files: [], topics: false, open: kitti::open_folder
+    }
 }
 
-/// Frame whose motion a file of poses tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum PosesFrame {
-    /// The left camera of KITTI; `calib.txt` tells where it sits.
-    Camera,
-    /// The frame of the clouds.
-    Vehicle,
-}
-
-/// Whether a recording may be opened without poses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Unlocated {
-    /// It fails to open.
-    #[default]
-    Refuse,
-    /// Where it has none.
-    Accept,
-    /// Those that it has are left out.
-    Always,
-}
-
-/// What the user says about a recording instead of what its folder tells.
-#[derive(Clone, Debug, Default)]
-pub struct OpenOptions {
-    /// Kind of recording.
-    pub format: Option<Format>,
-    /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
-    /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`; for
-    /// [`Format::NuScenes`] and [`Format::Waymo`] a scene or segment.
-    pub topics: Vec<String>,
-    /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep of the first, or of TUM.
-    pub poses: Option<PathBuf>,
-    /// Whether poses are needed at all.
-    pub unlocated: Unlocated,
-    /// See [`Overview::trusted`].
-    pub trusted: bool,
-    /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
-    pub poses_frame: Option<PosesFrame>,
-    /// Where lidars sit, for [`Format::Mcap`].
-    pub extrinsics: Option<PathBuf>,
-    /// What the numbers of a return are, for `.bin` and `.npy` files.
-    pub bin_fields: Option<BinFields>,
-    /// Overrides [`Rig::distorted`].
-    pub deskew: Option<bool>,
-    /// Overrides [`Rig::ground_m`], m.
-    pub ground_m: Option<f64>,
-    /// Overrides [`Rig::own_vehicle`].
-    pub own_vehicle: Option<[[f32; 2]; 2]>,
-}
-
-impl OpenOptions {
-    /// Leaves the poses of a recording unknown, in which this was found instead, or fails where
-    /// they are needed.
-    fn go_without_poses(&self, root: &Path, found: &str) -> Result<(), Error> {
-        match self.unlocated {
-            Unlocated::Refuse => {
-                let what = format!("{found}: poses are needed, give a file with --poses");
-                Err(Error::input(root, "", what))
-            }
-            Unlocated::Accept | Unlocated::Always => Ok(()),
-        }
+impl Format {
+    fn row(self) -> &'static FormatRow {
+        FORMATS.iter().find(|row| row.kind == self).expect("every format has a row")
     }
 }
 
@@ -314,82 +343,16 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
         Some(format) => (format, path.to_path_buf()),
         None => recognise(path)?,
     };
-    let has_topics =
-        matches!(format, Format::Mcap | Format::NuScenes | Format::Pcap | Format::Waymo);
-    if !has_topics && !options.topics.is_empty() {
-        let what = "only recordings in MCAP and pcap, nuScenes and Waymo have topics (--topic)";
-        return Err(Error::Usage(what.into()));
+    if !format.row().topics && !options.topics.is_empty() {
+        let names = FORMATS.iter().filter(|r| r.topics).filter_map(|r| r.kind.to_possible_value());
+        let names: Vec<_> = names.map(|n| n.get_name().to_string()).collect();
+        let what = format!("only recordings in {} have topics (--topic)", names.join(", "));
+        return Err(Error::Usage(what));
     }
     if format != Format::Mcap && options.extrinsics.is_some() {
         return Err(Error::Usage("--extrinsics is for recordings in MCAP".into()));
     }
-    match format {
-        Format::KittiRaw => Ok(Box::new(kitti::open_raw(&root, options)?)),
-        Format::KittiOdometry => Ok(Box::new(kitti::open_odometry(&root, options)?)),
-        Format::Clouds => Ok(Box::new(kitti::open_folder(&root, options)?)),
-        Format::Argoverse2 => open_argoverse(&root, options),
-        Format::NuScenes => open_nuscenes(&root, options),
-        Format::Waymo => open_waymo(&root, options),
-        Format::Mcap => open_mcap(&root, options),
-        Format::Pcap => open_pcap(&root, options),
-    }
-}
-
-#[cfg(feature = "arrow")]
-fn open_argoverse(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(argoverse::Argoverse::open(root, options)?))
-}
-
-#[cfg(not(feature = "arrow"))]
-fn open_argoverse(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Err(Error::lacking(format!("{}, an Argoverse 2 log,", root.display()), "arrow"))
-}
-
-#[cfg(feature = "nuscenes")]
-fn open_nuscenes(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(nuscenes::NuScenes::open(root, options)?))
-}
-
-#[cfg(not(feature = "nuscenes"))]
-fn open_nuscenes(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Err(Error::lacking(format!("{}, nuScenes,", root.display()), "nuscenes"))
-}
-
-#[cfg(feature = "parquet")]
-fn open_waymo(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(waymo::Waymo::open(root, options)?))
-}
-
-#[cfg(not(feature = "parquet"))]
-fn open_waymo(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Err(Error::lacking(format!("{}, Waymo's segments,", root.display()), "parquet"))
-}
-
-#[cfg(feature = "mcap")]
-fn open_mcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(bag::Bag::open(root, options)?))
-}
-
-#[cfg(not(feature = "mcap"))]
-fn open_mcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Err(Error::lacking(format!("{}, an MCAP recording,", root.display()), "mcap"))
-}
-
-#[cfg(feature = "pcap")]
-fn open_pcap(root: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(capture::Capture::open(root, options)?))
-}
-
-#[cfg(not(feature = "pcap"))]
-fn open_pcap(root: &Path, _: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    Err(Error::lacking(format!("{}, a capture of packets,", root.display()), "pcap"))
-}
-
-/// What the user's options change in a rig.
-fn apply(options: &OpenOptions, rig: &mut Rig) {
-    rig.distorted = options.deskew.unwrap_or(rig.distorted);
-    rig.ground_m = options.ground_m.unwrap_or(rig.ground_m);
-    rig.own_vehicle = options.own_vehicle.or(rig.own_vehicle);
+    (format.row().open)(&root, options)
 }
 
 /// Last part of a path, resolved so that `.` has a name too.

@@ -4,8 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::Format;
 use super::clouds::EXTENSIONS;
+use super::{FORMATS, Format, FormatRow};
 use crate::Error;
 
 /// Extension of recordings of ROS.
@@ -16,9 +16,6 @@ pub(super) const WAYMO_LASERS: &str = "lidar";
 
 /// The table by which scenes of nuScenes are known.
 pub(super) const SCENES: &str = "sample_data.json";
-
-/// Extensions of captures of packets.
-const PCAP: [&str; 2] = ["pcap", "pcapng"];
 
 /// Levels of folders below the named one that are searched for a recording.
 const DEPTH: usize = 2;
@@ -37,13 +34,11 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
     let mut found = below(path, DEPTH)?;
     match found.len() {
         1 => Ok(found.remove(0)),
-        0 => Err(Error::input(
-            path,
-            "",
-            "no recording found: neither `velodyne_points/data`, `velodyne`, `sensors/lidar`, \
-             `sample_data.json` nor `lidar_calibration`, nor any `.bin`, `.npy`, `.pcd`, `.ply` or \
-             `.mcap` file (a `.pcap` is named itself)",
-        )),
+        0 => {
+            let marks: Vec<&str> = FORMATS.iter().flat_map(|row| row.marks).copied().collect();
+            let what = format!("no recording found: none of `{}`", marks.join("`, `"));
+            Err(Error::input(path, "", what + " (a `.pcap` is named itself)"))
+        }
         n => {
             let some: Vec<_> = found.iter().take(3).map(|f| f.1.display().to_string()).collect();
             let what = format!("contains {n} recordings, choose one: {}", some.join(", "));
@@ -54,9 +49,12 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
 
 /// The format of a recording that is a file, by its extension.
 fn format_of_file(path: &Path) -> Result<Format, Error> {
-    let what = match path.extension().and_then(|e| e.to_str()) {
-        Some(MCAP) => return Ok(Format::Mcap),
-        Some(e) if PCAP.contains(&e) => return Ok(Format::Pcap),
+    let extension = path.extension().and_then(|e| e.to_str());
+    let is_of = |row: &&FormatRow| extension.is_some_and(|e| row.files.contains(&e));
+    if let Some(row) = FORMATS.iter().find(is_of) {
+        return Ok(row.kind);
+    }
+    let what = match extension {
         Some("bag") => "a ROS 1 bag, convert it: mcap convert IN.bag OUT.mcap",
         Some("db3") => "a ROS 2 bag in SQLite, convert it to MCAP: ros2 bag convert",
         Some(e) if EXTENSIONS.contains(&e) => {
@@ -84,28 +82,28 @@ fn below(path: &Path, depth: usize) -> Result<Vec<(Format, PathBuf)>, Error> {
 
 /// The format a folder has by the names in it.
 fn format_of(path: &Path) -> Result<Option<Format>, Error> {
-    let has = |folder: &str| path.join(folder).is_dir();
-    if has("velodyne_points/data") {
-        return Ok(Some(Format::KittiRaw));
+    for row in FORMATS {
+        if (row.holds)(path)? {
+            return Ok(Some(row.kind));
+        }
     }
-    if has("sensors/lidar") {
-        return Ok(Some(Format::Argoverse2));
-    }
-    if has("velodyne") {
-        return Ok(Some(Format::KittiOdometry));
-    }
-    if has(WAYMO_LASERS) && has("lidar_calibration") {
-        return Ok(Some(Format::Waymo));
-    }
+    Ok(None)
+}
+
+/// Whether a folder holds segments of Waymo's.
+pub(super) fn is_waymo(path: &Path) -> Result<bool, Error> {
+    Ok(path.join(WAYMO_LASERS).is_dir() && path.join("lidar_calibration").is_dir())
+}
+
+/// Whether a folder, or one in it, holds the tables of nuScenes.
+pub(super) fn is_nuscenes(path: &Path) -> Result<bool, Error> {
     let has_tables = |p: &PathBuf| p.join(SCENES).is_file();
-    if has_tables(&path.to_path_buf()) || entries(path)?.iter().any(has_tables) {
-        return Ok(Some(Format::NuScenes));
-    }
-    let is_mcap = |p: &PathBuf| p.extension().is_some_and(|e| e == MCAP);
-    if entries(path)?.iter().any(is_mcap) {
-        return Ok(Some(Format::Mcap));
-    }
-    Ok(extensions(path)?.next().map(|_| Format::Clouds))
+    Ok(has_tables(&path.to_path_buf()) || entries(path)?.iter().any(has_tables))
+}
+
+/// Whether a folder has a file of an extension.
+pub(super) fn has_extension(path: &Path, extension: &str) -> Result<bool, Error> {
+    Ok(entries(path)?.iter().any(|p| p.extension().is_some_and(|e| e == extension)))
 }
 
 /// Extensions of the clouds in a folder, each once.
