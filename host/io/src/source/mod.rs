@@ -54,7 +54,6 @@ mod trajectory;
 mod viewpoints;
 #[cfg(feature = "parquet")]
 mod waymo;
-mod xyz;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -315,11 +314,6 @@ formats! {
     Pcap {
         marks: [], holds: |_| Ok(false), files: ["pcap", "pcapng"], topics: true,
         open: capture::Capture::open, if "pcap": "a capture of packets"
-    }
-    /// A folder of `.xyz` files.
-    Xyz {
-        marks: ["*.xyz"], holds: |p| recognise::has_extension(p, "xyz"),
-        files: [], topics: false, open: xyz::XyzFolder::open
     }
     /// A folder of `.bin`, `.npy`, `.pcd` or `.ply` clouds.
     #[value(alias = "bin")]
