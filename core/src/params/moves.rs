@@ -14,8 +14,6 @@ crate::params! {
         pub moves_min: f32 = 0.3, "", (0 to 1),
             "Columns true / false / missed of `kitti_raw_0005`: 5,972 / 1,401 / 462; at 0.2 \
              5,990 / 1,459 / 444, at 0.5 5,934 / 1,305 / 500.";
-        /// What a viewer draws of what moves has at least this P(moves).
-        pub shown_min: f32 = 0.5, "", (0 to 1), "To show how a parameter is added.";
         /// Logit without any cue.
         pub moves_bias: f32 = -2.85, "nat", (-100 to 100), FITTED;
         /// Weight of the evidence beyond what the hypothesis test asked for.
