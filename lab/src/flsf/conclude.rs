@@ -1,11 +1,13 @@
 //! Tables and figures of `eval flsf`.
 
 use super::network::D_MAX;
-use super::outcome::{Compared, Outcome};
+use super::outcome::{Compared, Outcome, PICTURED};
 use super::tally::{ErrorSums, METHODS, Tally};
 use crate::curve::Curve;
 use crate::learning::pair_loss;
-use crate::report::{Axis, Cell, Chart, Lines, Plot, Report, Results, Series, Table, TableRow};
+use crate::report::{
+    Axis, Cell, Chart, Lines, Picture, Plot, Report, Results, Series, Table, TableRow,
+};
 use raywake_io::Error;
 use std::path::Path;
 
@@ -47,6 +49,20 @@ pub fn conclude(outcome: &Outcome, drives: &str, out: &Path) -> Result<Results, 
     ));
     let curves = curves(&outcome.compared);
     report.section("Figure 4.8").table(precision(&curves)).chart(figure_4_8(&curves));
+    for (kind, id) in PICTURED.iter().zip(["figure-4-6", "figure-4-7"]) {
+        if let Some(distances) = outcome.distances.get(kind) {
+            let kind = format!("{kind:?}").to_lowercase();
+            let caption = format!(
+                "Three cells that move ({kind}), in the pair with most of them: distance of their \
+                 features from those around a sweep later. Dots are cells with a return, a white \
+                 frame is where the cell went; forward is up, 9.3 m across."
+            );
+            let title =
+                format!("Figure 4.{}: distances, {kind}", id.trim_start_matches("figure-4-"));
+            let picture = Picture { id: id.into(), caption, png: distances.png()? };
+            report.section(&title).picture(picture);
+        }
+    }
     report.section("Figure 4.5").chart(figure_4_5());
     report.section("Time").table(times(outcome));
     report.write(out)

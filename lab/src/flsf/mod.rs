@@ -6,6 +6,7 @@
 
 mod conclude;
 mod crops;
+mod distances;
 pub mod evaluate;
 mod matching;
 mod network;

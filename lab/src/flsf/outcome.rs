@@ -1,13 +1,16 @@
 //! What both methods put out for the pairs of drives, against the labels.
 
+use super::distances::{Distances, moving};
 use super::matching::{Constancy, Encoded, Features, Matched, place};
 use super::occupancy::{SIDE, wide_grid};
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::tally::{Errors, METHODS, Tally};
+use crate::labels::Kind;
 use crate::train::drives::Labelled;
 use raywake_core::params::{REACH, ROW, SIDE as SEARCH};
 use raywake_io::Error;
 use raywake_sim::Rng;
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// Seconds that a method took for all pairs.
@@ -31,6 +34,9 @@ pub struct Compared {
     pub costs: [f64; 3],
 }
 
+/// Kinds that figures 4.6 and 4.7 show.
+pub const PICTURED: [Kind; 2] = [Kind::Car, Kind::Pedestrian];
+
 /// What came of all drives.
 #[derive(Default)]
 pub struct Outcome {
@@ -42,6 +48,8 @@ pub struct Outcome {
     pub compared: Vec<Compared>,
     /// Of all pairs.
     pub seconds: Seconds,
+    /// For figures 4.6 and 4.7: the pair with most moving cells of a kind.
+    pub distances: BTreeMap<Kind, Distances>,
 }
 
 /// All pairs of a drive.
@@ -91,6 +99,7 @@ impl Outcome {
         let sources: Vec<u32> = pair.sources().into_iter().map(|n| n as u32).collect();
         let costs = constancy.costs(pair, &sources);
         let distances = features.costs([&first, &second], &sources);
+        self.look(pair, features, [&first, &second]);
         for (n, &source) in sources.iter().enumerate() {
             let Some((step, matching)) = drawn(pair, source as usize, rng) else { continue };
             let at = n * ROW + place(step);
@@ -98,6 +107,16 @@ impl Outcome {
             self.compared.push(Compared { matching, costs });
         }
         second
+    }
+
+    /// Keeps the distances around cells that move, if there are more of them than before.
+    fn look(&mut self, pair: &FlowPair, features: &Features, both: [&Encoded; 2]) {
+        for kind in PICTURED {
+            let cells = moving(pair, kind);
+            if cells.len() > self.distances.get(&kind).map_or(0, |d| d.cells) {
+                self.distances.insert(kind, Distances::of(pair, &cells, features, both));
+            }
+        }
     }
 
     /// Errors of every solid cell of an object.

@@ -182,6 +182,16 @@ fn both_methods_are_counted_on_the_same_cells() {
     assert!(filled[2].mean_cm() < 22.0 && filled[1].mean_cm() > 20.0);
     assert_eq!(outcome.compared.len(), filled[0].count);
     assert!(outcome.compared.iter().any(|c| c.matching));
+    let [(kind, distances)] = &outcome.distances.iter().collect::<Vec<_>>()[..] else {
+        panic!("one kind moves");
+    };
+    assert!(**kind == crate::labels::Kind::Car && distances.cells > 8);
+    let scratch = Scratch::new();
+    let results = super::conclude::conclude(&outcome, "by hand", scratch.path()).unwrap();
+    assert_eq!(results.tables.len(), 4);
+    for file in ["pictures/figure-4-6.png", "charts/figure-4-8.svg", "charts/figure-4-5.csv"] {
+        assert!(scratch.path().join(file).exists(), "{file}");
+    }
 }
 
 #[test]
