@@ -42,7 +42,7 @@ pub struct OpenOptions {
     pub poses: Option<PathBuf>,
     /// Whether poses are needed at all.
     pub unlocated: Unlocated,
-    /// See [`Overview::trusted`].
+    /// See [`super::Overview::trusted`].
     pub trusted: bool,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
