@@ -98,6 +98,9 @@ else
     cargo test --quiet -p raywake-lab --lib a_browser -- --ignored "${unable[@]}"
 fi
 
+say "tests of what is compiled unless more is asked for"
+cargo test --quiet -p raywake -p raywake-io --no-default-features --features raywake/demo,raywake/png
+
 say "other programs' recordings in, ours into theirs"
 # Wheels that are there or can be had; a failure of what they run is a failure.
 viewers() {

@@ -28,9 +28,12 @@ const METRICS: [&str; 3] = [
 ];
 
 /// Writes the report.
-pub fn conclude(outcome: &Outcome, drives: &str, out: &Path) -> Result<Results, Error> {
+pub fn conclude(outcome: &Outcome, facts: &[(&str, String)], out: &Path) -> Result<Results, Error> {
     let mut report = Report::new("Learned features", "Chapter 4 as printed, by one protocol");
-    report.fact("Drives", drives).fact("Pairs of sweeps", &outcome.pairs.to_string());
+    for (name, value) in facts {
+        report.fact(name, value);
+    }
+    report.fact("Pairs of sweeps", &outcome.pairs.to_string());
     let [filled, valid] = &outcome.tallies;
     let all = filled.of(|_, _| true);
     let change = 100.0 * (all[4].mean_cm() / all[3].mean_cm() - 1.0);

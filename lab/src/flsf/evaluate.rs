@@ -5,7 +5,7 @@ use super::conclude::conclude;
 use super::matching::{Constancy, Features};
 use super::network::Flsf;
 use super::outcome::{Compared, Outcome, walk};
-use super::weights;
+use super::weights::TrainedNumbers;
 use crate::train::recorded::Recorded;
 use raywake::args::Learned;
 use raywake::weight_files::WeightFiles;
@@ -38,8 +38,8 @@ const SOURCES: usize = 5000;
 pub fn run(args: &Args) -> Result<(), Error> {
     let profile = Profile::dissertation();
     let tables = WeightFiles::read(&Learned::default(), &profile)?.tables(&profile)?;
-    let numbers = weights::read(&args.weights, Flsf::new(false).numbers())?;
-    let methods = (Constancy::new(tables), Features::new(numbers));
+    let trained = TrainedNumbers::read(&args.weights, Flsf::new(false).numbers())?;
+    let methods = (Constancy::new(tables), Features::new(trained.numbers));
     let mut outcome = Outcome::default();
     let mut rng = Rng::new(48);
     for path in &args.drives {
@@ -49,7 +49,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     thin(&mut outcome.compared, &mut rng);
     let names: Vec<_> = args.drives.iter().map(|d| d.display().to_string()).collect();
-    conclude(&outcome, &names.join(", "), &args.out)?.print(&args.out);
+    let facts = [("Drives", names.join(", ")), ("Weights", trained.provenance)];
+    conclude(&outcome, &facts, &args.out)?.print(&args.out);
     Ok(())
 }
 

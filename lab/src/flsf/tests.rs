@@ -4,7 +4,7 @@ use super::occupancy::{BORDER, OccupancyMap, SIDE, Symmetry, WIDE, wide_grid};
 use super::outcome::{Outcome, walk};
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::train::{Fit, Material};
-use super::weights;
+use super::weights::{self, TrainedNumbers};
 use crate::learning::Adam;
 use crate::scratch::Scratch;
 use crate::train::simulated::Simulated;
@@ -151,15 +151,21 @@ fn training_goes_on_where_it_was() {
     assert!(error.contains("another training"), "{error}");
 
     let out = scratch.path().join("weights");
-    weights::write(&out, &whole.numbers).unwrap();
-    assert!(weights::read(&out, whole.numbers.len()).unwrap() == whole.numbers);
-    assert!(weights::read(&out, 7).unwrap_err().to_string().contains("another length"));
-    let kind = weights::read(&file, 7).unwrap_err().to_string();
-    assert!(kind.contains("raywake-flsf-weights"), "{kind}");
+    let (numbers, provenance) = (whole.numbers, "by hand".to_string());
+    let trained = TrainedNumbers { numbers, provenance };
+    trained.write(&out).unwrap();
+    let count = trained.numbers.len();
+    let again = TrainedNumbers::read(&out, count).unwrap();
+    assert!(again.numbers == trained.numbers && again.provenance == "by hand");
+    let refused = |file: &std::path::Path, count: usize| {
+        TrainedNumbers::read(file, count).map(|_| ()).unwrap_err().to_string()
+    };
+    assert!(refused(&out, 7).contains("another length"));
+    assert!(refused(&file, 7).contains("raywake-flsf-weights"));
     let mut bytes = std::fs::read(&out).unwrap();
     bytes[999] ^= 4;
     std::fs::write(&out, &bytes).unwrap();
-    let damaged = weights::read(&out, whole.numbers.len()).unwrap_err().to_string();
+    let damaged = refused(&out, count);
     assert!(damaged.contains("damaged"), "{damaged}");
 }
 
@@ -187,7 +193,7 @@ fn both_methods_are_counted_on_the_same_cells() {
     };
     assert!(**kind == crate::labels::Kind::Car && distances.cells > 8);
     let scratch = Scratch::new();
-    let results = super::conclude::conclude(&outcome, "by hand", scratch.path()).unwrap();
+    let results = super::conclude::conclude(&outcome, &[], scratch.path()).unwrap();
     assert_eq!(results.tables.len(), 4);
     for file in ["pictures/figure-4-6.png", "charts/figure-4-8.svg", "charts/figure-4-5.csv"] {
         assert!(scratch.path().join(file).exists(), "{file}");

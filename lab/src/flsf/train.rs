@@ -3,7 +3,7 @@
 use super::network::{D_MAX, FEATURES, Flsf, Lesson, SCORES};
 use super::occupancy::wide_grid;
 use super::pairs::{CellOwner, FlowPair, TwoSweeps};
-use super::weights;
+use super::weights::{self, TrainedNumbers};
 use crate::curve::{Curve, Operating};
 use crate::learning::Adam;
 use crate::train::inputs::{Inputs, Visit};
@@ -72,8 +72,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Counts { positive: sources, negative: 1 }.both(part, "cells of labelled objects", "")?;
     }
     let fitted = Fit::of(&training, args.inputs.seed, args.steps, args.checkpoint.as_deref())?;
-    weights::write(&args.out, &fitted.numbers)?;
-    let curve = judge(&held_out, &fitted.numbers);
+    let trained = TrainedNumbers {
+        numbers: fitted.numbers,
+        provenance: format!(
+            "raywake-lab train flsf, {}, {} steps of {BATCH} lessons",
+            args.inputs.provenance(),
+            args.steps
+        ),
+    };
+    trained.write(&args.out)?;
+    let curve = judge(&held_out, &trained.numbers);
     let [training, held_out] = counts;
     let report = Report {
         inputs: args.inputs.provenance(),

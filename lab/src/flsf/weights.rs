@@ -10,16 +10,33 @@ const WEIGHTS: &[u8] = b"raywake-flsf-weights 1\n";
 /// What checkpoints begin with.
 const TRAINING: &[u8] = b"raywake-flsf-training 1\n";
 
-/// Writes weights.
-pub fn write(path: &Path, numbers: &[f32]) -> Result<(), Error> {
-    let body: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
-    atomic::write(path, |to| checkpoint::write(to, WEIGHTS, 0, &body))
+/// Bytes of a text of where weights come from, at most.
+const PROVENANCE_MAX: usize = 10_000;
+
+/// Trained numbers, and where they come from.
+pub struct TrainedNumbers {
+    /// Of the network.
+    pub numbers: Vec<f32>,
+    /// Command, inputs, steps.
+    pub provenance: String,
 }
 
-/// Reads weights: `count` numbers. Fails where the file is damaged or of another network.
-pub fn read(path: &Path, count: usize) -> Result<Vec<f32>, Error> {
-    let body = checkpoint::read(path, WEIGHTS, 0, 4 * count)?;
-    Ok(floats(&body))
+impl TrainedNumbers {
+    /// Writes them.
+    pub fn write(&self, path: &Path) -> Result<(), Error> {
+        let mut body: Vec<u8> = self.numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+        body.extend(self.provenance.bytes().take(PROVENANCE_MAX));
+        atomic::write(path, |to| checkpoint::write(to, WEIGHTS, 0, &body))
+    }
+
+    /// Reads `count` numbers. Fails where the file is damaged or of another network.
+    pub fn read(path: &Path, count: usize) -> Result<TrainedNumbers, Error> {
+        let lengths = 4 * count..=4 * count + PROVENANCE_MAX;
+        let body = checkpoint::read(path, WEIGHTS, 0, lengths)?;
+        let (numbers, provenance) = body.split_at(4 * count);
+        let provenance = String::from_utf8_lossy(provenance).into_owned();
+        Ok(TrainedNumbers { numbers: floats(numbers), provenance })
+    }
 }
 
 /// Writes training of the kind `of` as it stands.
@@ -32,7 +49,8 @@ pub fn write_state(path: &Path, of: u64, numbers: &[f32], state: &Adam) -> Resul
 
 /// Reads it again; fails where it is damaged, or of another training.
 pub fn read_state(path: &Path, of: u64, count: usize) -> Result<(Vec<f32>, Adam), Error> {
-    let body = checkpoint::read(path, TRAINING, of, 4 + 12 * count)?;
+    let length = 4 + 12 * count;
+    let body = checkpoint::read(path, TRAINING, of, length..=length)?;
     let (step, rest) = body.split_at(4);
     let mut numbers = floats(rest);
     let squares = numbers.split_off(2 * count);

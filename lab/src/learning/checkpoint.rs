@@ -3,6 +3,7 @@
 use raywake_core::digest::Digest;
 use raywake_io::Error;
 use std::io::{self, Write};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// Writes a file: `magic`, a checksum, what it is `of`, and `body`.
@@ -13,21 +14,24 @@ pub fn write(to: &mut impl Write, magic: &[u8], of: u64, body: &[u8]) -> io::Res
     to.write_all(&bytes)
 }
 
-/// The body of a file, `length` bytes. Fails where it is of another kind or length, damaged, or of
-/// something else than `of`.
-pub fn read(file: &Path, magic: &[u8], of: u64, length: usize) -> Result<Vec<u8>, Error> {
+/// The body of a file, `lengths` bytes long. Fails where it is of another kind or length, damaged,
+/// or of something else than `of`.
+pub fn read(
+    file: &Path,
+    magic: &[u8],
+    of: u64,
+    lengths: RangeInclusive<usize>,
+) -> Result<Vec<u8>, Error> {
     let error = |what: &str| Error::input(file, "", what.to_string());
     let bytes = std::fs::read(file).map_err(Error::reading(file))?;
     let rest = bytes.strip_prefix(magic).ok_or_else(|| {
         let kind = String::from_utf8_lossy(magic);
         error(&format!("does not begin with '{}'", kind.trim_end()))
     })?;
-    if rest.len() != 16 + length {
-        return Err(error(&format!(
-            "of another length: {} bytes, not {}",
-            rest.len(),
-            16 + length
-        )));
+    let body = rest.len().saturating_sub(16);
+    if rest.len() < 16 || !lengths.contains(&body) {
+        let wanted = lengths.start();
+        return Err(error(&format!("of another length: {body} bytes, not {wanted}")));
     }
     let word = |n: usize| u64::from_le_bytes(rest[8 * n..][..8].try_into().expect("8 bytes"));
     if Digest::of(&rest[8..]) != word(0) {

@@ -138,7 +138,7 @@ impl Optimiser {
     pub fn read(file: &Path, of: u64) -> Result<Optimiser, Error> {
         let parameters: usize = TOTAL.iter().sum();
         let length = 8 + TOTAL[1] + 3 * 4 * parameters;
-        let body = checkpoint::read(file, MAGIC, of, length)?;
+        let body = checkpoint::read(file, MAGIC, of, length..=length)?;
         let (step, rest) = body.split_at(8);
         let mut state = Optimiser::new(0);
         state.step = u64::from_le_bytes(step.try_into().expect("8 bytes")) as usize;
