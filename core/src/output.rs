@@ -97,8 +97,8 @@ pub enum Origin {
     Unmatched = 1,
     /// Foreground with a valid match (section 3.5.2).
     Matched = 2,
-    /// Without a match of its own, but part of a thing that was found to move: the flow is that
-    /// thing's.
+    /// Without a match of its own, but part of a cluster that was found to move: the flow is
+    /// the cluster's.
     Joined = 3,
 }
 
