@@ -4,7 +4,7 @@
 
 use glam::{DVec2, DVec3};
 use raywake::order_statistics::median;
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_core::params::Profile;
 use raywake_core::stages::background_filter;
 use raywake_sim::{Class, Drive, ObjectState, Options, Path, Scene, State, models};
@@ -71,7 +71,7 @@ fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
 fn errors(drive: &Drive) -> BTreeMap<u32, Vec<DVec2>> {
     let mut errors = BTreeMap::<u32, Vec<DVec2>>::new();
     follow(drive, |columns, objects| {
-        for c in columns.iter().filter(|c| c.origin == Origin::Matched && c.age >= AGE) {
+        for c in columns.iter().filter(|c| c.basis == FlowBasis::Matched && c.age >= AGE) {
             if let Some(object) = objects.iter().find(|o| inside(c, o, 0.0)) {
                 let found = DVec2::from_array(c.velocity_world_mps.map(f64::from));
                 let off = found - object.velocity_world.truncate();

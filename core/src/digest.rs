@@ -56,11 +56,11 @@ impl Digest {
 
 #[cfg(feature = "pipeline")]
 impl Digest {
-    /// Adds a column's flow: cell, origin, displacement, its covariance, energy, velocity over
+    /// Adds a column's flow: cell, basis, displacement, its covariance, energy, velocity over
     /// ground, velocity relative to the vehicle, covariance, age, P(moves).
     pub fn column(&mut self, c: &ColumnFlow) {
         c.cell.iter().for_each(|v| self.word(*v as u32));
-        self.word(c.origin as u32);
+        self.word(c.basis as u32);
         c.displacement_cells.iter().for_each(|v| self.word(*v as u32));
         c.displacement_m.iter().for_each(|v| self.float(*v));
         c.displacement_covariance.iter().for_each(|v| self.float(*v));

@@ -86,10 +86,10 @@ pub struct Output<'a> {
     pub points: &'a mut [PointFlow],
 }
 
-/// What is known of a column's flow.
+/// What a column's flow rests on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-pub enum Origin {
+pub enum FlowBasis {
     /// Not foreground: the flow follows from odometry (section 3.4.2).
     #[default]
     Background = 0,
@@ -131,7 +131,7 @@ pub struct ColumnFlow {
     /// Observations of the tracklet after its birth (section 3.6.2).
     pub age: u32,
     /// Where the flow comes from.
-    pub origin: Origin,
+    pub basis: FlowBasis,
     /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min) displacement and
     /// velocity are those of what stands.
     pub probability: f32,
@@ -205,7 +205,7 @@ pub struct PointFlow {
     /// Age of the column's tracklet.
     pub age: u32,
     /// Where the flow comes from; returns outside the window are background.
-    pub origin: Origin,
+    pub basis: FlowBasis,
     /// What became of it.
     pub status: Status,
     /// P(moves), that of its column.
@@ -222,7 +222,7 @@ impl PointFlow {
         velocity_ego_mps: [0.0; 3],
         covariance: [0.0; 3],
         age: 0,
-        origin: Origin::Background,
+        basis: FlowBasis::Background,
         status: Status::OverCapacity,
         probability: 0.0,
         class: None,

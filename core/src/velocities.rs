@@ -3,7 +3,7 @@
 use crate::dropped::ReturnKind;
 use crate::encoder::{ColumnClass, ColumnScores, class_of};
 use crate::frame::{SweepPair, centre_of};
-use crate::output::{ColumnFlow, Origin, Output, PairFlows, PointFlow, PointFlows, Status};
+use crate::output::{ColumnFlow, FlowBasis, Output, PairFlows, PointFlow, PointFlows, Status};
 use crate::params::COLUMNS_MAX;
 use crate::perceive::Perceived;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
@@ -87,7 +87,7 @@ impl Found<'_> {
             let matched = self.set_match(&mut flow, column, rank);
             valid += matched as usize;
             if let Some(o) = observed.next_if(|o| o.column as usize == column) {
-                flow.origin = if matched { Origin::Matched } else { Origin::Joined };
+                flow.basis = if matched { FlowBasis::Matched } else { FlowBasis::Joined };
                 let tracklet = self.tracklets.all().get(o.slot as usize);
                 flow.age = tracklet.map_or(0, |t| t.age);
                 (flow.probability, flow.cues) = (o.probability, o.cues);
@@ -141,7 +141,7 @@ impl Found<'_> {
     /// The match of a column that is `rank`-th of the foreground; whether it has one.
     fn set_match(&self, flow: &mut ColumnFlow, column: usize, rank: Option<usize>) -> bool {
         let Some(rank) = rank else { return false };
-        flow.origin = Origin::Unmatched;
+        flow.basis = FlowBasis::Unmatched;
         let found = self.perceived.flow[column];
         if found & VALID == 0 {
             return false;
@@ -188,7 +188,7 @@ impl Found<'_> {
             out.velocity_world_mps = flow.velocity_world_mps;
             out.covariance = flow.covariance;
             out.age = flow.age;
-            out.origin = flow.origin;
+            out.basis = flow.basis;
             out.probability = flow.probability;
             out.class = flow.class;
         } else if self.pair.profile.refinement_sweeps > 0 && !is_apart && column != NONE {
@@ -196,7 +196,7 @@ impl Found<'_> {
             if let Some(found) = self.refinement.at(column) {
                 let (r, dt) = (self.pair.profile.voxel_m as f32, self.pair.dt_s as f32);
                 out.probability = found.cues.probability(&self.pair.profile.moves);
-                out.origin = Origin::Joined;
+                out.basis = FlowBasis::Joined;
                 if self.moves(out.probability) {
                     out.velocity_world_mps = found.by.map(|v| v * r / dt);
                     out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
@@ -214,7 +214,7 @@ impl Found<'_> {
     fn status(&self, column: u32, point: &Point, flow: &PointFlow) -> Status {
         match ReturnKind::of(self.rig, point) {
             ReturnKind::Valid if column == NONE => Status::OutsideWindow,
-            ReturnKind::Valid if flow.origin == Origin::Unmatched => Status::Unmatched,
+            ReturnKind::Valid if flow.basis == FlowBasis::Unmatched => Status::Unmatched,
             ReturnKind::Valid if self.is_moving(flow) => Status::Moving,
             ReturnKind::Valid => Status::Static,
             ReturnKind::OwnVehicle => Status::OwnVehicle,

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use raywake_core::output::PairFlows;
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_core::params::Profile;
 use raywake_sim::Truth;
 
@@ -112,7 +112,7 @@ struct SpeedErrors {
 impl SpeedErrors {
     /// Matched columns of moving objects whose tracklet is old enough.
     fn add(&mut self, truth: &VelocityField, flows: &PairFlows) {
-        let old = |c: &&ColumnFlow| c.origin == Origin::Matched && c.age >= AGE;
+        let old = |c: &&ColumnFlow| c.basis == FlowBasis::Matched && c.age >= AGE;
         for column in flows.columns.iter().filter(old) {
             let Some([x, y]) = truth.at(column) else { continue };
             let [u, v] = column.velocity_world_mps;

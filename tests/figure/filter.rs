@@ -1,7 +1,7 @@
 //! The background filter concerns sources alone (section 3.4.2, before 3.5).
 
 use glam::DVec3;
-use raywake_core::output::Origin;
+use raywake_core::output::FlowBasis;
 use raywake_core::params::Profile;
 use raywake_sim::SimSweep;
 use raywake_tests::drives::{Setup, pairs, street};
@@ -23,7 +23,7 @@ fn odometry(sweep: &SimSweep, next: &SimSweep, at: DVec3) -> DVec3 {
 
 fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
     for c in &stages.columns {
-        assert_eq!((c.origin, c.age), (Origin::Background, 0));
+        assert_eq!((c.basis, c.age), (FlowBasis::Background, 0));
         assert_eq!((c.velocity_world_mps, c.covariance), ([0.0; 2], [0.0; 3]));
         let [x, y] = c.position_vehicle_m.map(f64::from);
         let wanted = odometry(sweep, next, DVec3::new(x, y, 0.0));
@@ -31,7 +31,7 @@ fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
         assert!((wanted.x - u).abs() < 1e-4 && (wanted.y - v).abs() < 1e-4, "{c:?}: {wanted}");
     }
     for (p, flow) in sweep.points.iter().zip(&stages.points) {
-        assert_eq!((flow.origin, flow.velocity_world_mps), (Origin::Background, [0.0; 2]));
+        assert_eq!((flow.basis, flow.velocity_world_mps), (FlowBasis::Background, [0.0; 2]));
         let wanted = odometry(sweep, next, DVec3::from_array(p.position.map(f64::from)));
         let off = wanted - DVec3::from_array(flow.velocity_ego_mps.map(f64::from));
         assert!(off.length() < 1e-4, "{flow:?}: {wanted}");

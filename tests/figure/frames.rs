@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 use raywake::order_statistics::median;
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_core::params::Profile;
 use raywake_core::pose::Pose;
 use raywake_sim::{Class, Path, Scene, Shape, SimSweep, State, Surface};
@@ -29,7 +29,7 @@ fn sweeps() -> Vec<SimSweep> {
 
 fn near_a_post(c: &&ColumnFlow) -> bool {
     let at = DVec2::from_array(c.position_world_m);
-    c.origin == Origin::Matched && c.age >= 5 && posts().any(|p| p.distance(at) < 0.6)
+    c.basis == FlowBasis::Matched && c.age >= 5 && posts().any(|p| p.distance(at) < 0.6)
 }
 
 /// Median displacement (cells), velocity over ground and relative to the vehicle, along the road.
@@ -81,7 +81,7 @@ fn columns_keep_the_axes_of_their_sweep_in_a_turn() {
     for (now, before) in pairs(&sweeps) {
         for c in side.step(now, before).columns {
             // A tracklet just born has the velocity of its displacement, in the same axes.
-            if c.origin == Origin::Matched && c.age == 0 && c.displacement_cells != [0, 0] {
+            if c.basis == FlowBasis::Matched && c.age == 0 && c.displacement_cells != [0, 0] {
                 let raw = c.displacement_cells.map(|d| d as f32 * 3.0);
                 let off = (c.velocity_ego_mps[0] - raw[0]).hypot(c.velocity_ego_mps[1] - raw[1]);
                 assert!(off < 0.03, "{c:?}");

@@ -9,7 +9,7 @@ mod rows;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use raywake_core::output::{Origin, PairFlows, PointFlow};
+use raywake_core::output::{FlowBasis, PairFlows, PointFlow};
 use raywake_core::params::Profile;
 use raywake_core::perceive::StageTimer;
 use raywake_core::pose::Pose;
@@ -194,7 +194,7 @@ fn census(rows: &[PointRow], dt_s: f64, dropped: &Dropped) -> String {
         "flow       {} points: {} foreground, {} of them matched, {} moving at {MOVING_MPS} m/s or \
          more\ndropped    {dropped}\n",
         rows.len(),
-        count(&|row| row.origin != Origin::Background),
+        count(&|row| row.basis != FlowBasis::Background),
         count(&PointRow::valid),
         count(&moving),
     )

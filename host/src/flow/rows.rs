@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use glam::Vec3;
-use raywake_core::output::{Origin, PointFlow, Status};
+use raywake_core::output::{FlowBasis, PointFlow, Status};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
@@ -25,7 +25,7 @@ pub struct PointRow {
     pub motion: [f32; 3],
     /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
-    pub origin: Origin,
+    pub basis: FlowBasis,
     pub status: Status,
 }
 
@@ -42,14 +42,14 @@ impl PointRow {
             flow: (then - at.as_dvec3()).as_vec3().to_array(),
             motion,
             covariance: flow.covariance.map(|v| v * (dt_s * dt_s) as f32),
-            origin: flow.origin,
+            basis: flow.basis,
             status: flow.status,
         }
     }
 
     /// Matched, or part of a moving cluster.
     pub fn valid(&self) -> bool {
-        self.origin >= Origin::Matched
+        self.basis >= FlowBasis::Matched
     }
 }
 
@@ -92,7 +92,7 @@ fn table(rows: &[PointRow]) -> TableWriter {
     t.array(["flow_x_m", "flow_y_m", "flow_z_m"], rows, |r| r.flow);
     t.array(["motion_x_m", "motion_y_m", "motion_z_m"], rows, |r| r.motion);
     t.array(["cov_dx_dx", "cov_dx_dy", "cov_dy_dy"], rows, |r| r.covariance);
-    t.column("foreground", rows, |r| r.origin != Origin::Background);
+    t.column("foreground", rows, |r| r.basis != FlowBasis::Background);
     t.column("valid", rows, PointRow::valid);
     t.column("status", rows, |r| r.status as u8);
     t
@@ -111,7 +111,7 @@ mod tests {
             let flow = PointFlow {
                 velocity_world_mps,
                 covariance: [4.0, 1.0, 2.0],
-                origin: Origin::Matched,
+                basis: FlowBasis::Matched,
                 ..PointFlow::default()
             };
             let point = Point { position, ..Point::default() };

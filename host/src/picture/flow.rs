@@ -1,6 +1,6 @@
 //! A sweep and its flow.
 
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_core::params::{Frame, Profile};
 use raywake_core::pose::Pose;
 use raywake_io::source::SweepData;
@@ -32,7 +32,7 @@ pub(super) fn view(
         PictureFrame::World => "over ground",
         PictureFrame::Ego => "relative to the vehicle",
     };
-    let drawn = columns.iter().filter(|c| c.origin >= Origin::Matched);
+    let drawn = columns.iter().filter(|c| c.basis >= FlowBasis::Matched);
     let drawn = drawn.map(|column| cell(column, pose, frame));
     let (cells, tiles) = drawn.partition(|c| c.arrows[0].is_some());
     let panel = Panel {

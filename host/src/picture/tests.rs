@@ -1,6 +1,6 @@
 //! Pictures of known motion.
 
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_core::params::Profile;
 use raywake_core::pose::Pose;
 use raywake_core::refinement::cues::Cues;
@@ -53,7 +53,7 @@ const COLUMN: ColumnFlow = ColumnFlow {
     velocity_ego_mps: [0.0, -10.0],
     covariance: [0.0; 3],
     age: 3,
-    origin: Origin::Matched,
+    basis: FlowBasis::Matched,
     probability: 1.0,
     cues: Cues::NONE,
     class: None,
@@ -77,13 +77,13 @@ fn motion_shows_from_the_first_observation_on_and_the_young_is_thinner() {
     let young = pixels(ColumnFlow { age: 0, ..COLUMN });
     assert!(young > 50, "{young}");
     assert!(pixels(COLUMN) > young);
-    assert!(pixels(ColumnFlow { origin: Origin::Joined, ..COLUMN }) > young);
+    assert!(pixels(ColumnFlow { basis: FlowBasis::Joined, ..COLUMN }) > young);
 }
 
 #[test]
 fn what_is_static_or_unknown_has_no_arrow() {
     let static_ = ColumnFlow { velocity_world_mps: [0.3, 0.0], ..COLUMN };
-    let unmatched = ColumnFlow { origin: Origin::Unmatched, ..COLUMN };
+    let unmatched = ColumnFlow { basis: FlowBasis::Unmatched, ..COLUMN };
     let nonsense = ColumnFlow { velocity_world_mps: [f32::NAN; 2], ..COLUMN };
     let picture = draw(&[static_, unmatched, nonsense], 0.0, PictureFrame::World);
     assert_eq!(motion(&picture).1, 0);

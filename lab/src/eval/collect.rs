@@ -182,7 +182,7 @@ impl<'a> Collector<'a> {
             mover_m: Present::mover_m(self.present(seen), flat(flow)),
             voxels,
             score,
-            origin: flow.origin as u8,
+            basis: flow.basis as u8,
             flow_x: flow.displacement_m[0],
             flow_y: flow.displacement_m[1],
             flow_cov_xx: flow.displacement_covariance[0],
@@ -275,7 +275,7 @@ mod tests {
     use super::*;
     use crate::eval::row::CLASSES;
     use crate::labels::{Kind, Labels, Track};
-    use raywake_core::output::Origin;
+    use raywake_core::output::FlowBasis;
     use raywake_core::stages::background_filter::TABLE_WORDS;
     use raywake_core::sweep::Point;
     use raywake_io::source::Source;
@@ -329,7 +329,7 @@ mod tests {
             ColumnFlow {
                 cell: [column / side + window.corner[0], column % side + window.corner[1]],
                 position_vehicle_m: [at.x as f32, at.y as f32],
-                origin: Origin::Unmatched,
+                basis: FlowBasis::Unmatched,
                 ..ColumnFlow::default()
             }
         };

@@ -7,7 +7,7 @@ use super::objects::Present;
 use super::row::Row;
 use crate::report::{Column, Look, Outline, Panel, birds_eye};
 use glam::DVec3;
-use raywake_core::output::{ColumnFlow, Origin};
+use raywake_core::output::{ColumnFlow, FlowBasis};
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use std::io::Write;
@@ -128,7 +128,7 @@ impl Candidate {
 
     /// Raw flow, with the errors of labelled columns.
     fn raw(&self) -> Panel {
-        let foreground = self.rows.iter().filter(|r| r.origin != Origin::Background as u8);
+        let foreground = self.rows.iter().filter(|r| r.basis != FlowBasis::Background as u8);
         self.panel("raw flow over ground", foreground.map(|r| self.raw_column(r)).collect())
     }
 
@@ -150,7 +150,8 @@ impl Candidate {
             true => self.arrow(c.velocity_world_mps.map(f64::from)),
             false => c.velocity_ego_mps.map(|v| ARROW_S * f64::from(v)),
         };
-        let old = self.seen.columns.iter().filter(|c| c.origin >= Origin::Matched && c.age >= AGE);
+        let old =
+            self.seen.columns.iter().filter(|c| c.basis >= FlowBasis::Matched && c.age >= AGE);
         let columns = old.map(|c| Column {
             at: c.position_vehicle_m.map(f64::from),
             error: None,

@@ -11,7 +11,7 @@ use arrow_array::{
     RecordBatch, StringArray, UInt8Array, UInt32Array, UInt64Array,
 };
 use arrow_schema::{DataType, Field, Schema};
-use raywake_core::output::Origin;
+use raywake_core::output::FlowBasis;
 use raywake_core::refinement::cues::Cues;
 use std::sync::Arc;
 
@@ -139,8 +139,8 @@ row! {
     voxels: u8,
     /// Score of the background filter, in the weights' integers; foreground above 0.
     score: i32,
-    /// [`raywake_core::output::Origin`]: 0 background, 1 unmatched, 2 matched, 3 joined.
-    origin: u8,
+    /// [`raywake_core::output::FlowBasis`]: 0 background, 1 unmatched, 2 matched, 3 joined.
+    basis: u8,
     /// Estimated displacement over ground until the next sweep, world axes, m.
     flow_x: f32,
     /// See `flow_x`.
@@ -218,7 +218,7 @@ impl Row {
 
     /// Whether the flow is that of a match, the column's own or its thing's.
     pub fn is_matched(&self) -> bool {
-        self.origin >= Origin::Matched as u8
+        self.basis >= FlowBasis::Matched as u8
     }
 
     /// Whether a displacement over ground was put out.

@@ -165,7 +165,7 @@ mod tests {
             class,
             motion,
             in_view: true,
-            origin: 2,
+            basis: 2,
             voxels: 2,
             flow_x: flow,
             true_x: truth,
@@ -183,7 +183,7 @@ mod tests {
         let mut tally = Tally::new();
         tally.row(&row(1, 2, 0.6, 0.5));
         tally.row(&row(1, 0, 0.0, 0.02));
-        tally.row(&Row { voxels: 5, origin: 1, ..row(7, 2, 0.0, 0.4) });
+        tally.row(&Row { voxels: 5, basis: 1, ..row(7, 2, 0.0, 0.4) });
         tally.row(&row(0, 0, 0.3, 0.0));
         tally.row(&Row { in_view: false, ..row(1, 2, 9.0, 0.0) });
         let flow = |e, g, m| tally.flow(e, Truth::Raw, g, m, Weight::Column);

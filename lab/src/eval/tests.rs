@@ -7,7 +7,7 @@ use super::{Args, ablate, rows_file, run};
 use crate::scratch::Scratch;
 use crate::simulate::{Motion, Recipe, truth, write};
 use clap::Parser;
-use raywake_core::output::Origin;
+use raywake_core::output::FlowBasis;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ fn same(a: f32, b: f32) -> bool {
 
 /// Whether a column moves with its thing, whatever the filter and the match said.
 fn joined(row: &Row) -> bool {
-    row.origin == Origin::Joined as u8
+    row.basis == FlowBasis::Joined as u8
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn a_simulated_drive() {
         assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
     }
     // Whatever the filter rejects scored no more than 0.
-    assert!(rows.iter().filter(|r| !joined(r)).all(|r| (r.origin > 0) == (r.score > 0)));
+    assert!(rows.iter().filter(|r| !joined(r)).all(|r| (r.basis > 0) == (r.score > 0)));
 
     let first = facts(&out);
     assert_eq!((&first["pairs"], &first["sweeps"]), (&5.into(), &6.into()));
@@ -240,7 +240,7 @@ fn a_moving_vehicle() {
     let all = rows(&rows_of);
     // The window moves on between the sweeps, and scores are still those the filter saw.
     assert!(all.iter().any(|r| r.carried_x.hypot(r.carried_y) > 0.3));
-    let other = all.iter().filter(|r| !joined(r) && (r.origin > 0) != (r.score > 0)).count();
+    let other = all.iter().filter(|r| !joined(r) && (r.basis > 0) != (r.score > 0)).count();
     assert_eq!(other, 0, "of {}", all.len());
 
     // Named by a folder above it, it has the same truth.

@@ -4,7 +4,7 @@ use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
 use crate::curve::{Curve, Operating};
 use crate::eval::{Row, rows_of};
-use raywake_core::output::Origin;
+use raywake_core::output::FlowBasis;
 use raywake_core::refinement::cues::Cues;
 use raywake_io::Error;
 use serde::Serialize;
@@ -92,7 +92,7 @@ fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
 
 /// Whether something is known of the column, and it either moves or stands.
 fn counts(row: &Row) -> bool {
-    row.in_view && row.origin >= Origin::Matched as u8 && (row.is_moving() || row.motion == 0)
+    row.in_view && row.basis >= FlowBasis::Matched as u8 && (row.is_moving() || row.motion == 0)
 }
 
 /// Brier score and reliability of logits beside what is true.
@@ -124,9 +124,9 @@ mod tests {
 
     #[test]
     fn what_moves_and_what_stands_count() {
-        let row = Row { in_view: true, origin: 2, motion: 2, ..Row::default() };
+        let row = Row { in_view: true, basis: 2, motion: 2, ..Row::default() };
         assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
-        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { origin: 1, ..row }));
+        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { basis: 1, ..row }));
         assert!(!counts(&Row { in_view: false, ..row }));
     }
 

@@ -4,7 +4,7 @@ use super::{CELL_M, FrontEndParams, SIDE};
 use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::encoder::ColumnClass;
-use raywake_core::output::{Origin, PointFlow, PointFlows, Status};
+use raywake_core::output::{FlowBasis, PointFlow, PointFlows, Status};
 use raywake_core::params::{POINTS_MAX, SENSORS_MAX, SLOTS};
 use raywake_core::pose::Pose;
 use raywake_core::return_clock::{ReturnClock, slot_of};
@@ -62,7 +62,7 @@ impl Flows<'_> {
 fn velocity(flow: PointFlow, sigma_max_mps: f32) -> Option<[f32; 2]> {
     let sum = flow.covariance[0] + flow.covariance[2];
     let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
-    (certain && flow.origin != Origin::Unmatched).then_some(flow.velocity_world_mps)
+    (certain && flow.basis != FlowBasis::Unmatched).then_some(flow.velocity_world_mps)
 }
 
 /// Indices of the cell of a place in the window.

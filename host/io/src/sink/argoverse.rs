@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use raywake_core::output::{Origin, PointFlow};
+use raywake_core::output::{FlowBasis, PointFlow};
 use raywake_core::pose::Pose;
 
 use super::atomic;
@@ -34,7 +34,7 @@ pub fn export(
     let path = folder.join(format!("{timestamp_ns}.feather"));
     let mut table = TableWriter::default();
     table.array(["flow_tx_m", "flow_ty_m", "flow_tz_m"], flows, |f| displacement(f, first, dt_s));
-    table.column("is_valid", flows, |f| f.origin != Origin::Unmatched);
+    table.column("is_valid", flows, |f| f.basis != FlowBasis::Unmatched);
     table.write(&path, &[])?;
     Ok(path)
 }

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use raywake_core::encoder::ColumnClass;
-use raywake_core::output::{ColumnFlow, Origin, PointFlow, Status, TrackletState};
+use raywake_core::output::{ColumnFlow, FlowBasis, PointFlow, Status, TrackletState};
 use raywake_core::sweep::Point;
 
 use super::Meta;
@@ -41,8 +41,8 @@ pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
     t.column("energy_millinats", columns, |c| c.energy);
     t.column("age", columns, |c| c.age);
     t.column("p_moves", columns, |c| c.probability);
-    t.column("foreground", columns, |c| c.origin != Origin::Background);
-    t.column("valid", columns, |c| c.origin >= Origin::Matched);
+    t.column("foreground", columns, |c| c.basis != FlowBasis::Background);
+    t.column("valid", columns, |c| c.basis >= FlowBasis::Matched);
     t.column("class", columns, |c| class(c.class));
     t
 }
@@ -83,8 +83,8 @@ fn found(t: &mut TableWriter, flows: &[PointFlow]) {
     t.array(["cov_xx", "cov_xy", "cov_yy"], flows, |f| f.covariance);
     t.column("age", flows, |f| f.age);
     t.column("p_moves", flows, |f| f.probability);
-    t.column("foreground", flows, |f| f.origin != Origin::Background);
-    t.column("valid", flows, |f| f.origin >= Origin::Matched);
+    t.column("foreground", flows, |f| f.basis != FlowBasis::Background);
+    t.column("valid", flows, |f| f.basis >= FlowBasis::Matched);
     t.column("status", flows, |f| f.status as u8);
     t.column("class", flows, |f| class(f.class));
 }

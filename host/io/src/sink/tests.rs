@@ -54,7 +54,7 @@ mod tables {
     use arrow_array::types::UInt64Type;
     use arrow_array::types::{Float32Type, Float64Type, Int32Type, UInt32Type};
     use arrow_ipc::reader::FileReader;
-    use raywake_core::output::{ColumnFlow, Origin, PointFlow, TrackletState};
+    use raywake_core::output::{ColumnFlow, FlowBasis, PointFlow, TrackletState};
     use raywake_core::pose::Pose;
     use raywake_core::sweep::Point;
 
@@ -81,10 +81,10 @@ mod tables {
             velocity_world_mps: [1.5, -2.5],
             covariance: [0.1, 0.2, 0.3],
             age: 9,
-            origin: Origin::Unmatched,
+            basis: FlowBasis::Unmatched,
             ..ColumnFlow::default()
         };
-        let rows = [flow, ColumnFlow { origin: Origin::Matched, ..flow }, ColumnFlow::default()];
+        let rows = [flow, ColumnFlow { basis: FlowBasis::Matched, ..flow }, ColumnFlow::default()];
         feather::columns(&rows).write(&path, &[("frame", "17".into())]).unwrap();
         let b = back(&path);
         let cells = b.column_by_name("cell_i").unwrap().as_primitive::<Int32Type>();
@@ -190,8 +190,8 @@ mod tables {
     fn argoverse_export() {
         let t = Temp::new();
         let flow =
-            |x, origin| PointFlow { velocity_world_mps: [x, 0.0], origin, ..PointFlow::default() };
-        let flows = [flow(10.0, Origin::Matched), flow(0.0, Origin::Unmatched)];
+            |x, basis| PointFlow { velocity_world_mps: [x, 0.0], basis, ..PointFlow::default() };
+        let flows = [flow(10.0, FlowBasis::Matched), flow(0.0, FlowBasis::Unmatched)];
         let pose = Pose::planar(5.0, 5.0, 0.0, core::f64::consts::PI);
         let path = argoverse::export(t.path(), "log", 123, &flows, &pose, 0.1).unwrap();
         assert!(path.ends_with("log/123.feather"));

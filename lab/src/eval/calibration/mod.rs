@@ -158,7 +158,7 @@ mod tests {
             class: 1,
             motion: 2,
             in_view: true,
-            origin: 2,
+            basis: 2,
             flow_x: (1.0 + error[0]) as f32,
             flow_y: (-0.5 + error[1]) as f32,
             smooth_x: 1.0,

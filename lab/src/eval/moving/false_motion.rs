@@ -1,4 +1,4 @@
-//! What false motion is like: class, range, age of the tracklet, height, origin.
+//! What false motion is like: class, range, age of the tracklet, height, basis.
 
 use super::{ZONES, per_sweep, percent, zone};
 use crate::eval::calibration::truth;
@@ -42,9 +42,9 @@ const ASPECTS: [Aspect; 6] = [
         bin: |row| bin(&VOXELS, row.voxels),
     },
     Aspect {
-        name: "origin",
+        name: "basis",
         bins: &["background", "unmatched", "matched", "joined"],
-        bin: |row| row.origin.min(3) as usize,
+        bin: |row| row.basis.min(3) as usize,
     },
 ];
 
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn every_column_is_in_one_bin_of_every_aspect() {
         let mut counted = FalseMotion::default();
-        let row = |x, age, voxels, origin| Row { x, age, voxels, origin, ..Row::default() };
+        let row = |x, age, voxels, basis| Row { x, age, voxels, basis, ..Row::default() };
         let rows = [row(9.9, 0, 1, 0), row(10.0, 3, 2, 2), row(45.0, 400, 14, 3)];
         for (row, mover_m) in rows.iter().zip([0.4, 1.0, f32::INFINITY]) {
             counted.standing(&Row { mover_m, ..*row }, row.age > 0);
