@@ -17,6 +17,7 @@ use raywake_core::stages::background_filter;
 use raywake_core::team::Team as _;
 use raywake_gpu::{Census, Options};
 use raywake_io::source::SweepData;
+use raywake_objects::params::TrackingParams;
 use raywake_tests::drives::{Setup, pairs, street, sweep};
 
 #[global_allocator]
@@ -105,7 +106,8 @@ fn check(setup: &Setup, backend: Backend) -> u64 {
 fn check_tracks(flow: bool) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.to_string()));
     let drive = flow.then(|| setup.drive(setup.scalar()));
-    let settings = Settings::new(setup.profile.clone());
+    let (profile, objects) = (setup.profile.clone(), TrackingParams::DEFAULT);
+    let settings = Settings { profile, objects };
     let mut tracker = Tracker::new(&setup.rig, &settings, drive, None, true);
     let sweeps: Vec<SweepData> = street()
         .iter()

@@ -34,6 +34,7 @@ fn run(setup: &Setup, backend: raywake::backend::Backend, source: &mut dyn Sourc
         if let Some(flows) = stepped.output.flows {
             flows.columns.iter().for_each(|c| digest.column(c));
             run.valid.push(flows.valid);
+            flows.points.iter().for_each(|p| digest.point(&p));
             run.points += flows.points.count();
         }
         drive.tracklets().for_each(|t| digest.tracklet(&t));

@@ -54,6 +54,13 @@ impl Bands {
     }
 }
 
+/// Probability that a voxel is occupied (B.2, B.3): its log-odds, tenths of nats, cut off at
+/// `clip_nats` either way (l_min and l_max of table B.1).
+pub fn occupancy_probability(log_odds_tenths: i32, clip_nats: f32) -> f32 {
+    let nats = (log_odds_tenths as f32 / 10.0).max(-clip_nats).min(clip_nats);
+    1.0 / (1.0 + libm::expf(-nats))
+}
+
 /// Maps the sweep in `storage` on the CPU: `put` receives the voxels of each band, in ascending
 /// order of keys.
 pub fn map(storage: &mut Storage, bands: &mut Bands, mut put: impl FnMut(&[Update])) {
@@ -82,6 +89,19 @@ mod tests {
     use crate::stages::{DISTINCT_COUNT, MAP_PROGRAMS};
     use std::vec;
     use std::vec::Vec;
+
+    #[test]
+    fn probabilities_of_log_odds() {
+        let p = |tenths| occupancy_probability(tenths, 3.0);
+        assert_eq!(p(0), 0.5);
+        // log(p / (1 - p)) gives the log-odds back, as far as they are not cut off.
+        for tenths in [-30, -7, 1, 10, 29] {
+            let nats = (p(tenths) / (1.0 - p(tenths))).ln();
+            assert!((nats - tenths as f32 / 10.0).abs() < 1e-5, "{tenths}");
+        }
+        assert_eq!((p(1_000_000), p(i32::MIN)), (p(30), p(-30)));
+        assert!(occupancy_probability(31, 4.0) > p(31));
+    }
 
     #[test]
     fn bands_cover_all_keys_and_are_remembered() {

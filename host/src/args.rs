@@ -24,8 +24,8 @@ pub use clean::CleanArgs;
 pub use flow::FlowArgs;
 pub use results::{Export, PictureFrame, Results, StreamArgs, Views};
 pub use sweeps::SweepRange;
-pub use track::{FrontEndKind, TrackArgs};
-use values::{count, seconds, size, vehicle_box};
+pub use track::{EstimateKind, FrontEndKind, TrackArgs};
+use values::{count, nats, seconds, size, vehicle_box};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -261,9 +261,13 @@ pub struct MapArgs {
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
-    /// Output folder: FRAME.feather per sweep, with i, j, k and log-odds of every observed voxel
+    /// Output folder: FRAME.feather per sweep, with i, j, k, log-odds and probability of every
+    /// observed voxel
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Log-odds beyond this do not make a voxel's probability any surer
+    #[arg(long, value_name = "NATS", default_value = "3", value_parser = nats)]
+    pub clip: f32,
     /// Also draw each map from above: DIR/FRAME.png
     #[arg(long)]
     pub png: bool,

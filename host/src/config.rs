@@ -24,11 +24,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A profile, with the defaults of tracking.
-    pub fn new(profile: Profile) -> Settings {
-        Settings { profile, objects: TrackingParams::DEFAULT }
-    }
-
     fn check(&self) -> Result<(), ProfileError> {
         self.profile.check().and_then(|()| self.objects.check())
     }
@@ -41,12 +36,18 @@ pub fn profile(choice: &ProfileChoice) -> Result<Profile, Error> {
 
 /// The same with the parameters of tracking.
 pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
+    settings_over(choice, TrackingParams::DEFAULT)
+}
+
+/// The same where tracking starts from these parameters instead of the defaults.
+pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<Settings, Error> {
     let mut settings = match (&choice.config, &choice.profile) {
-        (Some(path), _) => parse(path, &read(path)?)?,
+        (Some(path), _) => parse(path, &read(path)?, objects)?,
         (None, Some(name)) => {
-            Settings::new(Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?)
+            let profile = Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?;
+            Settings { profile, objects }
         }
-        (None, None) => Settings::new(Profile::hdl64()),
+        (None, None) => Settings { profile: Profile::hdl64(), objects },
     };
     for assignment in &choice.set {
         assign(&mut settings, assignment)
@@ -62,7 +63,7 @@ pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
 }
 
 fn no_profile(name: &str) -> String {
-    format!("no profile `{name}`: there are hdl64, wide and dissertation")
+    format!("no profile `{name}`: there are hdl64, wide, far and dissertation")
 }
 
 /// Sets a parameter from `name=value` or `group.name=value`. The profile's name gets an asterisk.
@@ -117,7 +118,7 @@ fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Res
     }
 }
 
-fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
+fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, Error> {
     let line = |at: usize| format!("line {}", text[..at.min(text.len())].matches('\n').count() + 1);
     let table = DeTable::parse(text).map_err(|e| {
         let place = e.span().map_or(String::new(), |s| line(s.start));
@@ -132,7 +133,7 @@ fn parse(path: &Path, text: &str) -> Result<Settings, Error> {
     let base = word("base", "hdl64")?;
     let profile =
         Profile::named(base).ok_or_else(|| Error::input(path, "key `base`", no_profile(base)))?;
-    let mut settings = Settings::new(profile);
+    let mut settings = Settings { profile, objects };
     settings.profile.name = word("name", "custom")?
         .parse()
         .map_err(|_| Error::input(path, "key `name`", "must be at most 24 bytes long"))?;
@@ -195,10 +196,12 @@ mod tests {
     use raywake_core::params::{Birth, Frame};
 
     fn parsed(text: &str) -> Result<Profile, String> {
-        parse(Path::new("p.toml"), text).map(|settings| settings.profile).map_err(|e| {
-            assert_eq!(e.exit_code(), 3);
-            e.to_string()
-        })
+        parse(Path::new("p.toml"), text, TrackingParams::DEFAULT)
+            .map(|settings| settings.profile)
+            .map_err(|e| {
+                assert_eq!(e.exit_code(), 3);
+                e.to_string()
+            })
     }
 
     #[test]

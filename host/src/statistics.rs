@@ -133,7 +133,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Counts a sweep; its columns go to the digest.
+    /// Counts a sweep; its columns and returns go to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
         self.dropped.returns += stepped.output.dropped;
         self.dropped.unrefined += stepped.output.unrefined as u64;
@@ -161,6 +161,7 @@ impl Statistics {
         self.dropped.foreground += flows.foreground_dropped as u64;
         self.turnover += flows.turnover;
         flows.columns.iter().for_each(|c| self.digest.column(c));
+        flows.points.iter().for_each(|p| self.digest.point(&p));
     }
 
     fn times(&mut self, laps: &Laps) {
@@ -177,8 +178,9 @@ impl Statistics {
 
     /// Counts the tracklets after a sweep.
     ///
-    /// The digest is over every column of a pair in the order of the output, then every tracklet
-    /// after the pair in the order of the output, pair by pair.
+    /// The digest is over every column of a pair in the order of the output, every return in the
+    /// order of the sweep, then every tracklet after the pair in the order of the output, pair by
+    /// pair.
     pub fn tracklets(&mut self, tracklets: &[TrackletState], paired: bool) {
         self.ages_at_end = [0; AGES.len()];
         for tracklet in tracklets {

@@ -42,10 +42,10 @@ impl WeightFiles {
             true => Ok(None),
             false => file(path, shipped).map(Some),
         };
-        let shipped = occupancy_constancy::shipped(profile.frame);
+        let frame = profile.frame;
         Ok(WeightFiles {
-            filter: optional(&learned.filter, background_filter::SHIPPED)?,
-            constancy: file(&learned.constancy, shipped)?,
+            filter: optional(&learned.filter, background_filter::shipped(frame))?,
+            constancy: file(&learned.constancy, occupancy_constancy::shipped(frame))?,
             encoder: optional(&learned.encoder, encoder::SHIPPED)?,
         })
     }
@@ -63,6 +63,11 @@ impl WeightFiles {
     /// The same without the encoder.
     pub fn without_encoder(self) -> WeightFiles {
         WeightFiles { encoder: None, ..self }
+    }
+
+    /// The same with another occupancy constancy, known by its text.
+    pub fn with_constancy(self, text: &str) -> WeightFiles {
+        WeightFiles { constancy: WeightFile { path: None, text: text.into() }, ..self }
     }
 
     /// A digest of the texts, 16 hexadecimal digits.

@@ -96,6 +96,29 @@ fn figures_and_files() {
     }
 }
 
+/// The estimate as printed starts from other parameters, which `--set` still changes.
+#[test]
+fn chapter_2_as_printed() {
+    let t = Temp::new();
+    drive(&t);
+    let run = |name: &str, more: &[&str]| {
+        let out = t.path().join(name);
+        let all = ["--front-end", "variance", "--quiet", "--out", out.to_str().unwrap()];
+        let o = track(&t, &[&all[..], more].concat());
+        o.succeeded();
+        let settings = fs::read_to_string(out.join("settings.toml")).unwrap();
+        (settings, o.summary(&out.join("summary.json"))["digest"].clone())
+    };
+    let (printed, digest) = run("printed", &["--estimate", "printed"]);
+    for line in ["basis_s = 0.5\n", "return_sigma_m = 0.5\n", "surfaces = false\n"] {
+        assert!(printed.contains(line), "{line} in {printed}");
+    }
+    assert_ne!(digest, run("refined", &[]).1);
+    let more = ["--estimate", "printed", "--set", "objects.basis_s=0.7"];
+    assert!(run("set", &more).0.contains("basis_s = 0.7\n"));
+    track(&t, &["--estimate", "exact"]).failed(2, &["printed"]);
+}
+
 /// A map that says the ground is above all of it leaves nothing to follow.
 #[test]
 fn a_map_of_the_ground() {

@@ -8,9 +8,10 @@ use crate::continuity::ContinuityLimits;
 use heapless::String;
 
 /// The frame the grid lies in (B.2.2 leaves it open).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Frame {
     /// Axes and cell borders fixed in the world; the window follows the vehicle by whole cells.
+    #[default]
     Lattice,
     /// The vehicle frame of each sweep, as in the dissertation.
     Sensor,
@@ -118,6 +119,8 @@ impl Profile {
             deskew: false,
             refinement_sweeps: 0,
             em_rounds: 20,
+            // Table B.1 (n_max).
+            returns_max: 150_000,
             // 14 log(p q + (1 - p)(1 - q)) with p, q at the clip bounds -1 and 3.
             outside_cost: 17_289,
             tracklet: TrackletParams::DISSERTATION,

@@ -4,7 +4,7 @@
 //! score > 0, needs no sigmoid; the threshold is part of the bias. Weights are integers, in a table
 //! of sums by whole bytes of a column's masks: 100 lookups take the place of 700 products.
 
-use crate::params::LEVELS_MAX;
+use crate::params::{Frame, LEVELS_MAX};
 use crate::record::{Column, SweepUniform};
 use crate::weights::{Weights, WeightsError};
 
@@ -141,6 +141,15 @@ fn mark(
 
 /// The filter shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../../weights/background.txt");
+
+/// What is shipped for a frame: on the lattice ours; in the vehicle's frame, as section 3.4.2 trains
+/// it.
+pub fn shipped(frame: Frame) -> &'static str {
+    match frame {
+        Frame::Lattice => SHIPPED,
+        Frame::Sensor => include_str!("../../weights/background_as_printed.txt"),
+    }
+}
 
 #[cfg(test)]
 mod tests {

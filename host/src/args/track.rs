@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use raywake_objects::estimate::EstimateParams;
 
 use super::{FlowChoice, Recording, Selection, StreamArgs, Views};
 
@@ -42,6 +43,9 @@ pub struct TrackArgs {
     /// Detection and association method
     #[arg(long, value_enum, value_name = "KIND", default_value = "flow")]
     pub front_end: FrontEndKind,
+    /// How trajectory and shape are estimated
+    #[arg(long, value_enum, value_name = "KIND", default_value = "refined")]
+    pub estimate: EstimateKind,
     /// Ground heights in the frame of the poses, an ESRI ASCII grid; where it has no data they are
     /// estimated from the returns
     #[arg(long, value_name = "FILE")]
@@ -81,6 +85,24 @@ pub enum FrontEndKind {
     /// stands and is no vehicle, person or two-wheeler is left out, as is all outside the window
     /// of the profile (±25 m; `far`: ±50 m)
     Flow,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EstimateKind {
+    /// Chapter 2, refined: surfaces, ends, what rays pass and carve, several starts
+    Refined,
+    /// Chapter 2 as printed, with its parameters (2.6.2)
+    Printed,
+}
+
+impl EstimateKind {
+    /// Parameters that it starts from; `--set` and files change them.
+    pub fn params(self) -> EstimateParams {
+        match self {
+            EstimateKind::Refined => EstimateParams::DEFAULT,
+            EstimateKind::Printed => EstimateParams::DISSERTATION,
+        }
+    }
 }
 
 /// The end of `--help`.

@@ -45,6 +45,12 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
 }
 
+/// Log-odds that probabilities are cut off at. Beyond 20 a probability is 1 in single precision.
+pub(super) fn nats(text: &str) -> Result<f32, String> {
+    let nats: f32 = text.parse().map_err(|_| "not a number")?;
+    if (0.001..=20.0).contains(&nats) { Ok(nats) } else { Err("must be 0.001 to 20".into()) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,6 +60,7 @@ mod tests {
         assert_eq!(seconds("0.5"), Ok(Duration::from_millis(500)));
         assert!(["0", "-1", "nan", "inf", "x"].iter().all(|s| seconds(s).is_err()));
         assert!(count("0").is_err());
+        assert!(nats("3") == Ok(3.0) && ["0", "-3", "nan", "21"].iter().all(|s| nats(s).is_err()));
         let sizes = ["7", "64MiB", "2 kB", "3GB"].map(size);
         assert_eq!(sizes, [Ok(7), Ok(64 << 20), Ok(2000), Ok(3_000_000_000)]);
         assert!(

@@ -55,7 +55,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
         pictures.write(visit.now, &subject, &tally.last(&voxels))?;
         let meta =
             [("frame", visit.now.frame.to_string()), ("stamp_s", visit.now.stamp_s.to_string())];
-        Ok(feather::write_map(&path, &voxels, origin_m, profile.voxel_m, &meta)?)
+        Ok(feather::write_map(&path, &voxels, origin_m, profile.voxel_m, args.clip, &meta)?)
     })?;
     pictures.finish(&tally.text())?;
     if !end.interrupted {

@@ -23,6 +23,7 @@ use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_io::source;
 use raywake_objects::estimate::FixedLag;
+use raywake_objects::params::TrackingParams;
 
 pub use ground::Ground;
 pub use report::TrackSummary;
@@ -31,7 +32,8 @@ pub use tracker::{Ended, Tracker};
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
 /// the sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
-    let mut settings = config::settings(&args.flow.profile)?;
+    let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
+    let mut settings = config::settings_over(&args.flow.profile, objects)?;
     settings.profile.deskew |= args.recording.kind.deskew == Some(true);
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;

@@ -3,7 +3,7 @@
 use super::facts::Facts;
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
-use super::tables::{RECALL, stages};
+use super::tables::{GRID, RECALL, stages};
 use super::tally::{SETTLED, Tally};
 use crate::curve::{Curve, Operating};
 use crate::report::{
@@ -73,7 +73,7 @@ fn histogram(errors: &Sorted, cell_m: f64) -> Plot {
     Plot::Histogram(histogram)
 }
 
-/// Figures 3.7 and 3.8: errors of the raw flow by class, and of all that moves and is parked.
+/// Figures 3.7 and 3.8: errors of the raw flow by class, and of all, what moves and what is parked.
 pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     let of = |group, motion| {
         histogram(&tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column), cell_m)
@@ -84,7 +84,7 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
         .flat_map(|g| MotionGroup::of(g).iter().map(move |m| (g, *m)))
         .filter(|(g, m)| tally.coverage(*g, *m)[0] > 0)
         .map(|(g, m)| (title(g, m), of(g, m)));
-    let motions = [MotionGroup::Moving, MotionGroup::Parked];
+    let motions = [MotionGroup::Any, MotionGroup::Moving, MotionGroup::Parked];
     let by_motion = motions.map(|m| (title(ClassGroup::Labelled, m), of(ClassGroup::Labelled, m)));
     [
         Chart::small_multiples(
@@ -96,7 +96,7 @@ pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
         Chart::small_multiples(
             "figure-3-8",
             "As figure 3.8 of the dissertation: errors of the raw flow of all labelled columns, \
-            moving and parked apart.",
+            then what moves and what is parked.",
             by_motion.into(),
         ),
     ]
@@ -191,22 +191,25 @@ pub fn times(drives: &[Facts]) -> Chart {
     Chart::new("figure-stages", caption, Plot::Bars(bars))
 }
 
-/// Section B.4: time against number of points.
+/// Section B.4: time of the occupancy grid, and of everything, against number of points.
 pub fn time_by_points(drives: &[Facts]) -> Chart {
-    let points = drives.iter().flat_map(|d| d.points.iter().zip(&d.totals));
-    let series = Series {
-        name: "pairs of sweeps".into(),
-        points: points.map(|(n, ms)| [*n as f64, *ms]).collect(),
-        style: Style::Dots,
-        marks: Vec::new(),
+    let series = |name: &str, ms: &dyn Fn(&Facts) -> Vec<f64>| {
+        let points = drives.iter().flat_map(|d| d.points.iter().zip(ms(d)));
+        Series {
+            name: name.into(),
+            points: points.map(|(n, ms)| [*n as f64, ms]).collect(),
+            style: Style::Dots,
+            marks: Vec::new(),
+        }
     };
-    let mut lines = Lines::new(Axis::new("returns of the sweep"), Axis::new("total time, ms"));
-    lines.series.push(series);
+    let mut lines = Lines::new(Axis::new("returns of the sweep"), Axis::new("time, ms"));
+    lines.series.push(series(GRID.name, &|d| GRID.of(d)));
+    lines.series.push(series("all of a pair of sweeps", &|d| d.totals.clone()));
     let slowest = drives.iter().flat_map(|d| &d.totals).fold(0.0, |a, b| f64::max(a, *b));
     if slowest > 0.5 * BUDGET_MS {
         lines.guides.push(Guide::Y(BUDGET_MS, "time between sweeps".into()));
     }
-    let caption = "As section B.4 of the dissertation: time of a pair of sweeps against its \
-        number of returns.";
+    let caption = "As section B.4 of the dissertation: time of the occupancy grid against the \
+        number of returns; all of a pair of sweeps beside it.";
     Chart::new("figure-b-4", caption, Plot::Lines(lines))
 }

@@ -37,8 +37,11 @@ struct Candidate {
     outlines: Vec<Outline>,
 }
 
-/// Which sweeps are drawn.
-const PICTURES: [&str; 3] = ["worst", "best", "busiest"];
+/// Which sweeps are drawn: by the error of their raw flow, then those with most tracklets that move
+/// while the vehicle stands (figure 3.10) and while it drives (figures 3.11 and 3.12).
+const PICTURES: [&str; 4] = ["worst", "best", "busiest standing", "busiest driving"];
+/// A vehicle slower than this stands, m/s: its poses wander by as much.
+const STANDING_MPS: f64 = 0.3;
 
 /// The sweeps to be drawn so far.
 #[derive(Default)]
@@ -54,7 +57,11 @@ impl Panels {
         }
         let mean_m = labelled().map(|r| error_m(r).min(CLIP_M)).sum::<f32>() / count as f32;
         let moving = labelled().filter(|r| r.is_moving() && r.age >= AGE).count() as f32;
-        for (kept, merit) in self.0.iter_mut().zip([mean_m, -mean_m, moving]) {
+        let driven = seen.then.translation - seen.first.world_from_vehicle.translation;
+        let stands = driven.length() < STANDING_MPS * seen.dt_s;
+        let busy = |this: bool| if this { moving } else { f32::NEG_INFINITY };
+        let merits = [mean_m, -mean_m, busy(stands), busy(!stands)];
+        for (kept, merit) in self.0.iter_mut().zip(merits).filter(|m| m.1.is_finite()) {
             if kept.as_ref().is_none_or(|c| merit > c.merit) {
                 let outlines = present.iter().map(outline).collect();
                 let (seen, rows) = (seen.clone(), rows.to_vec());
@@ -73,13 +80,17 @@ impl Panels {
         let mut written = Vec::new();
         for (what, candidate) in PICTURES.iter().zip(self.0) {
             let Some(c) = candidate else { continue };
-            let file = format!("{drive}-{what}.png");
+            let file = format!("{drive}-{}.png", what.replace(' ', "-"));
             let frame = c.seen.first.frame;
             let (panels, shows) = match *what {
-                "busiest" => (
+                "busiest standing" => (
+                    [c.raw(), c.tracklets(true)],
+                    "Temporal scene flow while the vehicle stands, as in figure 3.10.".to_string(),
+                ),
+                "busiest driving" => (
                     [c.tracklets(true), c.tracklets(false)],
-                    "Tracklets over ground and as the moving vehicle sees them, as in figures 3.10 \
-                     to 3.12."
+                    "Temporal scene flow over ground, as in figure 3.11, and as the moving vehicle \
+                     sees it, as in figure 3.12."
                         .to_string(),
                 ),
                 _ => (

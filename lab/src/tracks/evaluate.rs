@@ -6,6 +6,7 @@ use super::extent::extent;
 use super::object::{Moment, Object, moment_at};
 use super::tracker::{Track, baseline, baseline_live, fixed_lag, motion};
 use crate::labels::Kind;
+use glam::DVec2;
 use raywake_objects::centroid_ekf::CentroidParams;
 use raywake_objects::estimate::{
     Cost, EndpointParams, EstimateParams, Estimator, FreeSpaceParams, GrowthParams, Termination,
@@ -24,6 +25,9 @@ pub enum Method {
     BaselineLive,
     /// Trajectory and shape together.
     Proposed(EstimateParams),
+    /// The same from the true trajectory instead of the baseline's: what the method itself makes of
+    /// the returns, whatever its start.
+    FromTruth(EstimateParams),
     /// The same over the last seconds, after every batch, as on board: judged by the states it has
     /// at the time.
     FixedLag(EstimateParams),
@@ -31,7 +35,7 @@ pub enum Method {
 
 /// The trackers of the tables and their names: those of the dissertation, then each option by
 /// itself.
-pub fn methods() -> [(&'static str, Method); 16] {
+pub fn methods() -> [(&'static str, Method); 18] {
     let (printed, ours) = (EstimateParams::DISSERTATION, EstimateParams::DEFAULT);
     let of = Method::Proposed;
     let dense = |params| of(EstimateParams { model_points: 3000, ..params });
@@ -44,6 +48,11 @@ pub fn methods() -> [(&'static str, Method); 16] {
         ("as printed, n_m = 3000", dense(printed)),
         ("ours, n_m = 300", of(ours)),
         ("ours, n_m = 3000", dense(ours)),
+        ("as printed, from the true start", Method::FromTruth(printed)),
+        (
+            "as printed, R_z = 0.5 m²",
+            of(EstimateParams { return_sigma_m: std::f64::consts::FRAC_1_SQRT_2, ..printed }),
+        ),
         ("as printed, damped", of(EstimateParams { damping: true, ..printed })),
         ("as printed, carved by rays", of(EstimateParams { free_space: carving(3), ..printed })),
         ("ours without ends", of(EstimateParams { endpoints, ..ours })),
@@ -60,6 +69,8 @@ pub fn methods() -> [(&'static str, Method); 16] {
 
 /// Index of our tracker of 300 points in [`methods`].
 pub const OURS: usize = 3;
+/// The baseline and those as printed in [`methods`] that table 2.1 is taken apart with.
+pub const AS_PRINTED: [usize; 4] = [0, 1, 5, 6];
 /// Trackers of the dissertation's tables, the first ones.
 pub const MAIN: usize = 5;
 
@@ -92,6 +103,8 @@ pub struct Outcome {
     pub span_s: f64,
     /// Mean range of its returns, m.
     pub range_m: f64,
+    /// Range of the nearest of its returns, m.
+    pub nearest_m: f64,
     /// By how much its true headings differ, rad.
     pub turned_rad: f64,
     /// Entropy of its cloud by its true trajectory, nats.
@@ -125,8 +138,12 @@ pub fn track(
     };
     let live = match method {
         Method::Baseline => return done(Track::of(object, motion(history)), 0.0),
-        Method::Proposed(params) => {
-            let report = estimator.solve(params, &object.returns, history);
+        Method::Proposed(params) | Method::FromTruth(params) => {
+            let start: Vec<ObjectState> = match method {
+                Method::FromTruth(_) => history.iter().map(|s| true_state(object, s)).collect(),
+                _ => history.to_vec(),
+            };
+            let report = estimator.solve(params, &object.returns, &start);
             let seconds = begin.elapsed().as_secs_f64();
             let track = Track::of(object, |t| estimator.state(t).into());
             let costs = report.costs.to_vec();
@@ -139,6 +156,20 @@ pub fn track(
     // Judged by its states themselves, with the cloud by what joins them.
     let moments = live.iter().map(|s| Moment::from(*s)).collect();
     done(Track { moments, ..Track::of(object, motion(&live)) }, seconds)
+}
+
+/// What the object really did when a state tells of it.
+fn true_state(object: &Object, state: &ObjectState) -> ObjectState {
+    let truth = moment_at(&object.truth, state.time_s);
+    let along = DVec2::from_angle(truth.heading);
+    ObjectState {
+        time_s: state.time_s,
+        position: truth.position.to_array(),
+        heading: truth.heading,
+        speed: along.dot(truth.velocity.truncate()),
+        climb: truth.velocity.z,
+        turn_rate: truth.turn_rate,
+    }
 }
 
 /// What a tracker makes of an object, measured.
@@ -166,6 +197,7 @@ fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) 
     let headings =
         |of: fn(f64, f64) -> f64| object.truth.iter().map(|m| m.heading).reduce(of).unwrap_or(0.0);
     let ranges: f64 = object.returns.iter().map(range).sum();
+    let nearest_m = object.returns.iter().map(range).fold(f64::INFINITY, f64::min);
     Outcome {
         name: object.name.clone(),
         kind: object.kind,
@@ -174,6 +206,7 @@ fn outcome(object: &Object, history: &[ObjectState], estimator: &mut Estimator) 
         returns: object.returns.len(),
         span_s: object.span_s(),
         range_m: ranges / object.returns.len() as f64,
+        nearest_m,
         turned_rad: headings(f64::max) - headings(f64::min),
         entropy: entropy(&really.cloud),
         extent: extent(&really.cloud),

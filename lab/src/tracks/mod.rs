@@ -163,6 +163,9 @@ fn conclude(
         if set.outcomes.iter().any(|o| o.kind != Kind::Car) {
             all.insert(2, tables::kinds(set));
         }
+        if set.id == "stationary" {
+            all.push(tables::by_distance(set));
+        }
         if set.id == DRIVES[0] {
             all[0].rows.push(tables::wandering(labels));
         }

@@ -1,7 +1,7 @@
 //! Tables 2.1 and 2.2 of the dissertation, and what else is counted.
 
 use super::errors::{Errors, Rmse};
-use super::evaluate::{MAIN, OURS, Outcome, Score, methods};
+use super::evaluate::{AS_PRINTED, MAIN, OURS, Outcome, Score, methods};
 use super::front_ends::Found;
 use crate::labels::Kind;
 use crate::report::{Cell, Table, TableRow};
@@ -9,6 +9,9 @@ use raywake::order_statistics::median;
 
 /// Tracks listed as the worst.
 const WORST: usize = 10;
+
+/// Ranges of nearest returns that are told apart, m: a lane beside it, a lane between, farther.
+const PASSING_M: [(f64, f64); 3] = [(0.0, 4.0), (4.0, 8.0), (8.0, f64::INFINITY)];
 
 /// What turns by less goes straight on, rad.
 const STRAIGHT_RAD: f64 = 0.1;
@@ -128,6 +131,53 @@ pub fn errors(set: &Set) -> Table {
     let columns = "Tracker | Position, m | x and y, m | z, m | Velocity, m/s | Heading, rad \
         | Heading rate, rad/s | Median track's position, m | Flips";
     table(format!("errors-{}", set.id), caption, columns, rows)
+}
+
+/// Errors of what the dissertation compares by how near the vehicle passes, and their ratios to the
+/// baseline's; what it prints as well.
+pub fn by_distance(set: &Set) -> Table {
+    let none = f64::NAN;
+    let mut rows = Vec::new();
+    let baseline = PRINTED[0].1;
+    for (name, errors) in PRINTED {
+        let ratios = [0, 1, 2, 3].map(|n| errors[n] / baseline[n]);
+        rows.push(TableRow::reference(numbers(
+            name,
+            [none].into_iter().chain(errors).chain(ratios),
+            3,
+        )));
+    }
+    for (least, most) in PASSING_M {
+        let of = |o: &Outcome| (least..most).contains(&o.nearest_m);
+        let count = set.outcomes.iter().filter(|o| of(o)).count();
+        if count == 0 {
+            continue;
+        }
+        let errors = |method: usize| {
+            let r = set.errors(method, of).rmse();
+            [r.position, r.velocity, r.heading, r.turn_rate]
+        };
+        let baseline = errors(0);
+        for n in AS_PRINTED {
+            let (name, errors) = (methods()[n].0, errors(n));
+            let ratios = [0, 1, 2, 3].map(|n| errors[n] / baseline[n]);
+            let name = match most.is_finite() {
+                true => format!("{name}, {least} to {most} m"),
+                false => format!("{name}, {least} m and more"),
+            };
+            let all = [count as f64].into_iter().chain(errors).chain(ratios);
+            rows.push(TableRow::new(numbers(&name, all, 3)));
+        }
+    }
+    let caption = format!(
+        "Table 2.1 by the range of an object's nearest return, {}; and errors as multiples of the \
+         baseline's.",
+        set.name
+    );
+    let columns = "Tracker | Objects | Position, m | Velocity, m/s | Heading, rad \
+        | Heading rate, rad/s | Position, ratio | Velocity, ratio | Heading, ratio \
+        | Heading rate, ratio";
+    table(format!("distance-{}", set.id), caption, columns, rows)
 }
 
 /// A row of [`errors`]: a tracker over some objects.

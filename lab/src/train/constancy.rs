@@ -1,6 +1,6 @@
 //! `raywake-lab train constancy`: the occupancy constancy (section 3.5.1).
 
-use super::constancy_samples::{Sample, WIDTH, samples};
+use super::constancy_samples::{Negatives, Sample, WIDTH, samples};
 use super::features::LEVELS;
 use super::inputs::{Inputs, Visit};
 use super::logistic::{Data, Progress};
@@ -10,7 +10,7 @@ use super::report::{Counts, Outputs};
 use super::weights_file::{quantise, text};
 use crate::curve::Curve;
 use raywake::backend::Tables;
-use raywake_core::params::Profile;
+use raywake_core::params::{Frame, Profile};
 use raywake_core::weights::Weights;
 use raywake_io::Error;
 use serde::Serialize;
@@ -32,6 +32,10 @@ pub struct Args {
     /// Other weights to measure on the same held-out drives.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     beside: Vec<PathBuf>,
+    /// By the recipe of section 3.5.1: the grid in the vehicle's frame, other columns from the
+    /// whole search neighbourhood.
+    #[arg(long)]
+    as_printed: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -68,15 +72,25 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let beside: Vec<(String, String)> =
         args.beside.iter().map(read).collect::<Result<_, Error>>()?;
-    let (text, report) = learn(&args.inputs, &beside)?;
+    let inputs = match args.as_printed {
+        true => Inputs { frame: Frame::Sensor, ..args.inputs.clone() },
+        false => args.inputs.clone(),
+    };
+    let (text, report) = learn(&inputs, &beside)?;
     args.outputs.write(&text, &report)
 }
 
-/// The weights file, and how it came about; `beside` are names and texts of others.
+/// The weights file, and how it came about; `beside` are names and texts of others. In the
+/// vehicle's frame the recipe is the text's.
 fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report), Error> {
+    let (negatives, option) = match inputs.frame {
+        Frame::Lattice => (Negatives::Near, ""),
+        Frame::Sensor => (Negatives::Search, " --as-printed"),
+    };
     let plan = inputs.plan()?;
     let (mut training, mut held_out, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
-    for ((samples, of_drive), planned) in inputs.visit(&plan, &of_drive)?.into_iter().zip(&plan) {
+    let drives = inputs.visit(&plan, &|visit| of_drive(visit, negatives))?;
+    for ((samples, of_drive), planned) in drives.into_iter().zip(&plan) {
         if planned.held_out { &mut held_out } else { &mut training }.extend(samples);
         pairs.extend(of_drive);
     }
@@ -94,7 +108,7 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     let write = |provenance: &str| text("constancy", &[3, LEVELS], SCALE, &integers, provenance);
     let ours = measure("written", &write("untold"), &checked, &pairs)?;
     let provenance = format!(
-        "raywake-lab train constancy, {inputs}, logistic regression, held-out log loss {:.4}, AUC \
+        "raywake-lab train constancy{option}, {inputs}, logistic regression, held-out log loss {:.4}, AUC \
          {:.4}, true target first {:.3} standing {:.3} moving",
         ours.log_loss, ours.auc, ours.standing.first, ours.moving.first
     );
@@ -106,14 +120,14 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     Ok((write(&provenance), Report { inputs, training, held_out, progress, measured }))
 }
 
-fn of_drive(visit: Visit) -> Result<Yield, Error> {
+fn of_drive(mut visit: Visit, negatives: Negatives) -> Result<Yield, Error> {
     let (mut sweeps, mut of_drive, mut pairs) = (Sweeps::default(), Vec::new(), Vec::new());
     for index in visit.sweeps {
         if index + 1 == visit.drive.len() {
             break;
         }
         if let Some(pair) = pair(visit.grid, visit.drive, index, &mut sweeps)? {
-            samples(&pair, &mut of_drive);
+            samples(&pair, negatives, &mut visit.rng, &mut of_drive);
             if visit.held_out {
                 pairs.push(pair);
             }

@@ -2,7 +2,9 @@
 
 use super::features::LEVELS;
 use super::pairs::Pair;
+use raywake_core::params::REACH;
 use raywake_core::record::Column;
+use raywake_sim::Rng;
 
 /// Features of a pair: both free, both occupied, one of each (3.8-3.10), per level.
 pub const WIDTH: usize = 3 * LEVELS;
@@ -35,15 +37,39 @@ pub struct Sample {
 /// velocities of moving objects suffer; two serves both.
 const NEAR: i32 = 2;
 
-/// For every match of a pair the true column, and those around it as far as they lie in the window.
-pub fn samples(pair: &Pair, into: &mut Vec<Sample>) {
+/// Which columns the true one is told from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Negatives {
+    /// All that lie up to two cells from the true one.
+    Near,
+    /// One for each true one, drawn from the search neighbourhood about the source, as the text has
+    /// it and as many as the author's program draws.
+    Search,
+}
+
+/// For every match of a pair the true column and others, as far as they lie in the window.
+pub fn samples(pair: &Pair, negatives: Negatives, rng: &mut Rng, into: &mut Vec<Sample>) {
     for m in &pair.matches {
-        for n in 0..(2 * NEAR + 1).pow(2) {
-            let off = [n / (2 * NEAR + 1) - NEAR, n % (2 * NEAR + 1) - NEAR];
-            let displacement = [0, 1].map(|a| m.displacement[a] + off[a]);
+        let mut add = |displacement: [i32; 2]| {
             if let Some(target) = target(pair.step.side, m.source, displacement) {
                 let features = features(pair.before[m.source], pair.now[target]);
-                into.push(Sample { features, same: off == [0, 0] });
+                into.push(Sample { features, same: displacement == m.displacement });
+            }
+        };
+        match negatives {
+            Negatives::Near => {
+                for n in 0..(2 * NEAR + 1).pow(2) {
+                    let off = [n / (2 * NEAR + 1) - NEAR, n % (2 * NEAR + 1) - NEAR];
+                    add([0, 1].map(|a| m.displacement[a] + off[a]));
+                }
+            }
+            Negatives::Search => {
+                add(m.displacement);
+                let width = 2 * REACH as u64 + 1;
+                let other = [0; 2].map(|_| (rng.bits() % width) as i32 - REACH);
+                if other != m.displacement {
+                    add(other);
+                }
             }
         }
     }
@@ -85,8 +111,12 @@ mod tests {
         ];
         let step = SweepUniform { side: 61, levels: 14, ..Default::default() };
         let pair = Pair { step, before: columns.clone(), now: columns, matches };
-        let mut found = Vec::new();
-        samples(&pair, &mut found);
+        let sampled = |negatives| {
+            let mut found = Vec::new();
+            samples(&pair, negatives, &mut Rng::new(1), &mut found);
+            found
+        };
+        let found = sampled(Negatives::Near);
         let at = |source: usize, target: usize| Sample {
             features: features(mark(source), mark(target)),
             same: target == 34 * 61 + 27 || target == 0,
@@ -96,5 +126,10 @@ mod tests {
         assert_eq!(found[..25], wanted);
         // In a corner of the window a quarter is left.
         assert_eq!(found[25..], [0, 1, 2, 61, 62, 63, 122, 123, 124].map(|t| at(0, t)));
+        // The true one and another of the search, which from the corner may leave the window.
+        let found = sampled(Negatives::Search);
+        let same: Vec<bool> = found.iter().map(|s| s.same).collect();
+        assert!(same[..3] == [true, false, true] && same.len() <= 4, "{same:?}");
+        assert_eq!(found[0], at(30 * 61 + 30, 34 * 61 + 27));
     }
 }

@@ -1,4 +1,4 @@
-//! What the classifier sees of a column, with the symmetry of the square built in.
+//! What the classifier sees of a column, with or without the symmetry of the square built in.
 //!
 //! The lattice lies at any heading to the street, so a patch turned by a quarter or mirrored is as
 //! likely as the patch itself. The loss of a linear classifier is convex: averaged over the eight
@@ -10,13 +10,15 @@ use raywake_core::stages::background_filter::PATCH;
 
 /// Levels the filter is trained for.
 pub const LEVELS: usize = 14;
-/// Sets of patch columns that the square's symmetries map onto each other.
-const ORBITS: usize = 6;
-/// Counts per sample: orbit, then free and occupied, then level.
-pub const WIDTH: usize = ORBITS * 2 * LEVELS;
 
-/// How many voxels of an orbit are free, and occupied, at each level.
-pub type Features = [u8; WIDTH];
+/// Which columns of the patch share their weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WeightTying {
+    /// Those that the square's symmetries map onto each other.
+    Square,
+    /// None, as in (3.6): a weight for every voxel and state.
+    Untied,
+}
 
 /// Orbit of the patch column `n`, counted as in the weights file (`di` outermost).
 fn orbit(n: usize) -> usize {
@@ -28,35 +30,51 @@ fn orbit(n: usize) -> usize {
     }
 }
 
-/// Features of a column; what lies outside the window is unknown.
-pub fn features(step: &SweepUniform, columns: &[Column], index: usize) -> Features {
-    let side = step.side as usize;
-    let half = PATCH / 2;
-    let mut counts = [0; WIDTH];
-    for n in 0..PATCH * PATCH {
-        // Wraps below zero, and is then not within the window.
-        let i = (index / side + n / PATCH).wrapping_sub(half);
-        let j = (index % side + n % PATCH).wrapping_sub(half);
-        if i >= side || j >= side {
-            continue;
-        }
-        let of_orbit = &mut counts[orbit(n) * 2 * LEVELS..][..2 * LEVELS];
-        let mut state = columns[i * side + j][0];
-        while state != 0 {
-            let bit = state.trailing_zeros() as usize;
-            of_orbit[bit / 16 * LEVELS + bit % 16] += 1;
-            state &= state - 1;
+impl WeightTying {
+    /// Set of patch columns with the same weights that column `n` is in.
+    fn set(self, n: usize) -> usize {
+        match self {
+            WeightTying::Square => orbit(n),
+            WeightTying::Untied => n,
         }
     }
-    counts
-}
 
-/// Weights per orbit to weights per patch column, in the order of the weights file.
-pub fn expand<T: Copy>(weights: &[T]) -> Vec<T> {
-    (0..PATCH * PATCH)
-        .flat_map(|n| &weights[orbit(n) * 2 * LEVELS..][..2 * LEVELS])
-        .copied()
-        .collect()
+    /// Counts per sample: set, then free and occupied, then level.
+    pub fn width(self) -> usize {
+        (1 + self.set(PATCH * PATCH - 1)) * 2 * LEVELS
+    }
+
+    /// How many voxels of a set are free, and occupied, at each level around a column; what lies
+    /// outside the window is unknown.
+    pub fn features(self, step: &SweepUniform, columns: &[Column], index: usize) -> Vec<u8> {
+        let side = step.side as usize;
+        let half = PATCH / 2;
+        let mut counts = vec![0; self.width()];
+        for n in 0..PATCH * PATCH {
+            // Wraps below zero, and is then not within the window.
+            let i = (index / side + n / PATCH).wrapping_sub(half);
+            let j = (index % side + n % PATCH).wrapping_sub(half);
+            if i >= side || j >= side {
+                continue;
+            }
+            let of_set = &mut counts[self.set(n) * 2 * LEVELS..][..2 * LEVELS];
+            let mut state = columns[i * side + j][0];
+            while state != 0 {
+                let bit = state.trailing_zeros() as usize;
+                of_set[bit / 16 * LEVELS + bit % 16] += 1;
+                state &= state - 1;
+            }
+        }
+        counts
+    }
+
+    /// Weights per set to weights per patch column, in the order of the weights file.
+    pub fn expand<T: Copy>(self, weights: &[T]) -> Vec<T> {
+        (0..PATCH * PATCH)
+            .flat_map(|n| &weights[self.set(n) * 2 * LEVELS..][..2 * LEVELS])
+            .copied()
+            .collect()
+    }
 }
 
 #[cfg(test)]
@@ -65,10 +83,12 @@ mod tests {
 
     #[test]
     fn orbits_have_their_sizes() {
-        let mut sizes = [0; ORBITS];
+        let mut sizes = [0; 6];
         (0..25).for_each(|n| sizes[orbit(n)] += 1);
         assert_eq!(sizes, [1, 4, 4, 4, 8, 4]);
         assert_eq!(orbit(12), 0);
+        let widths = [WeightTying::Square, WeightTying::Untied].map(WeightTying::width);
+        assert_eq!(widths, [6 * 28, 700]);
     }
 
     #[test]
@@ -78,9 +98,14 @@ mod tests {
         columns[0] = [1 << 3 | 1 << (16 + 13), 1];
         columns[1] = [1, 0];
         columns[5] = [1, 0];
-        let counts = features(&step, &columns, 0);
+        let counts = WeightTying::Square.features(&step, &columns, 0);
         assert_eq!((counts[3], counts[2 * LEVELS - 1], counts[2 * LEVELS]), (1, 1, 2));
         assert_eq!(counts.iter().map(|c| *c as u32).sum::<u32>(), 4);
-        assert_eq!(features(&step, &columns, 24).iter().max(), Some(&0));
+        assert_eq!(WeightTying::Square.features(&step, &columns, 24).iter().max(), Some(&0));
+        // The corner is the patch's centre, column 12; the others are 13 and 17.
+        let bits = WeightTying::Untied.features(&step, &columns, 0);
+        let set: Vec<usize> = (0..700).filter(|n| bits[*n] == 1).collect();
+        let expected = [12 * 28 + 3, 12 * 28 + 27, 13 * 28, 17 * 28];
+        assert_eq!((set, bits.iter().max()), (expected.to_vec(), Some(&1)));
     }
 }

@@ -1,7 +1,7 @@
 //! Labelled columns for the background filter.
 
 use super::drives::{Labelled, LabelledSweep};
-use super::features::{Features, features};
+use super::features::WeightTying;
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
 use crate::labels::Kind;
@@ -11,9 +11,8 @@ use raywake_sim::Rng;
 /// Share of the background columns that is kept.
 pub const BACKGROUND_KEPT: f64 = 0.2;
 
-#[derive(Clone, Copy)]
 pub struct Sample {
-    pub features: Features,
+    pub features: Vec<u8>,
     /// What it belongs to, whether that moves or not; `None`: to the background.
     pub kind: Option<Kind>,
 }
@@ -25,26 +24,33 @@ impl Sample {
     }
 }
 
-pub fn of_sweep(
-    grid: &mut Grid,
-    drive: &mut dyn Labelled,
-    index: usize,
-    sweep: &mut LabelledSweep,
-    rng: &mut Rng,
-    samples: &mut Vec<Sample>,
-) -> Result<(), Error> {
-    drive.read(index, sweep)?;
-    let window = grid.sweep(drive.rig(), &sweep.data.sweep());
-    for (column, owner) in owners(grid, &window, drive, sweep) {
-        let kind = match owner {
-            Owner::Object(n) => Some(sweep.objects[n].kind),
-            Owner::Background if rng.chance(BACKGROUND_KEPT) => None,
-            _ => continue,
-        };
-        let features = features(&grid.step, &grid.columns, column);
-        samples.push(Sample { features, kind });
+/// Samples of one sweep after another.
+pub struct Sampling<'a> {
+    pub grid: &'a mut Grid,
+    pub rng: &'a mut Rng,
+    pub tying: WeightTying,
+    /// What is worked with, kept so that its memory is reused.
+    pub sweep: LabelledSweep,
+    pub samples: Vec<Sample>,
+}
+
+impl Sampling<'_> {
+    /// Adds those of a sweep of a drive.
+    pub fn add(&mut self, drive: &mut dyn Labelled, index: usize) -> Result<(), Error> {
+        let Sampling { grid, rng, tying, sweep, samples } = self;
+        drive.read(index, sweep)?;
+        let window = grid.sweep(drive.rig(), &sweep.data.sweep());
+        for (column, owner) in owners(grid, &window, drive, sweep) {
+            let kind = match owner {
+                Owner::Object(n) => Some(sweep.objects[n].kind),
+                Owner::Background if rng.chance(BACKGROUND_KEPT) => None,
+                _ => continue,
+            };
+            let features = tying.features(&grid.step, &grid.columns, column);
+            samples.push(Sample { features, kind });
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -68,10 +74,15 @@ mod tests {
             let options = Options { sweeps: 1, rig: SensorRig::ideal(), ..Options::default() };
             let path = Path::standing(0.0, 0.0, 0.0);
             let mut drive = Simulated::new(Drive::through(scene, path, 1, options));
-            let (mut grid, mut samples) = (Grid::new(Profile::hdl64()), Vec::new());
-            let mut sweep = LabelledSweep::default();
-            of_sweep(&mut grid, &mut drive, 0, &mut sweep, &mut Rng::new(1), &mut samples).unwrap();
-            samples
+            let mut sampling = Sampling {
+                grid: &mut Grid::new(Profile::hdl64()),
+                rng: &mut Rng::new(1),
+                tying: WeightTying::Square,
+                sweep: LabelledSweep::default(),
+                samples: Vec::new(),
+            };
+            sampling.add(&mut drive, 0).unwrap();
+            sampling.samples
         };
         let foreground = |samples: &[Sample]| samples.iter().filter(|s| s.foreground()).count();
         let (nothing, wall, car) = (of(false, false), of(false, true), of(true, false));

@@ -5,7 +5,7 @@ use super::recorded::Recorded;
 use super::simulated::Simulated;
 use crate::grid::Grid;
 use glam::DVec3;
-use raywake_core::params::Profile;
+use raywake_core::params::{Frame, Profile};
 use raywake_io::Error;
 use raywake_sim::{Rng, Scenery};
 use std::path::PathBuf;
@@ -37,6 +37,9 @@ pub struct Inputs {
     /// Whether every third simulated street is a cluttered one.
     #[arg(skip)]
     pub cluttered: bool,
+    /// Frame of the grid.
+    #[arg(skip)]
+    pub frame: Frame,
 }
 
 /// A drive that can be opened.
@@ -92,6 +95,14 @@ impl Inputs {
         Ok(plan)
     }
 
+    /// Profile of the grids.
+    fn profile(&self) -> Profile {
+        match self.frame {
+            Frame::Lattice => Profile::hdl64(),
+            Frame::Sensor => Profile::dissertation(),
+        }
+    }
+
     /// Calls `work` for every drive and returns the results in the drives' order; two threads, the
     /// number of which does not show. The first drive that fails ends it.
     pub fn visit<T: Send>(
@@ -100,7 +111,7 @@ impl Inputs {
         work: &(impl Fn(Visit) -> Result<T, Error> + Sync),
     ) -> Result<Vec<T>, Error> {
         let part = |first: usize| -> Vec<Result<T, Error>> {
-            let mut grid = Grid::new(Profile::hdl64());
+            let mut grid = Grid::new(self.profile());
             let numbers = (first..plan.len()).step_by(2);
             numbers.map(|n| self.visit_one(&mut grid, n, &plan[n], work)).collect()
         };

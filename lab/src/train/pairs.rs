@@ -1,8 +1,9 @@
-//! Two sweeps on one lattice, and where the columns of the first really went.
+//! Two sweeps in one window, and where the columns of the first really went.
 
 use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
 use crate::grid::Grid;
+use glam::DVec3;
 use raywake_core::continuity::ContinuityLimits;
 use raywake_core::frame::Window;
 use raywake_core::params::REACH;
@@ -62,36 +63,54 @@ pub fn pair(
         return Ok(None);
     }
     let then = grid.sweep(drive.rig(), &a.sweep());
-    let sources = displaced(grid, &then, drive, first, second, dt_s);
+    let places = places(grid, &then, drive, first, second, dt_s);
     let first_columns = grid.columns.clone();
     let now = grid.sweep(drive.rig(), &b.sweep());
-    let [shift_x, shift_y, shift_z] = [0, 1, 2].map(|n| now.corner[n] - then.corner[n]);
+    let shift_by = [0, 1, 2].map(|n| now.corner[n] - then.corner[n]);
+    let [shift_x, shift_y, shift_z] = shift_by;
     let step = SweepUniform { shift_x, shift_y, shift_z, ..grid.step };
     let mut before = vec![[0; 2]; first_columns.len()];
     shift(&step, &first_columns, &mut before);
     let side = step.side;
-    let inside = |i: i32, j: i32| (0..side).contains(&i) && (0..side).contains(&j);
-    let matches = sources.into_iter().filter_map(|m| {
-        let (i, j) = (m.source as i32 / side - shift_x, m.source as i32 % side - shift_y);
-        let [du, dv] = m.displacement;
-        let kept = inside(i, j) && inside(i + du, j + dv);
-        let source = (i * side + j) as usize;
-        (kept && before[source][1] != 0).then_some(Match { source, ..m })
+    let inside = |[i, j]: [i32; 2]| (0..side).contains(&i) && (0..side).contains(&j);
+    let matches = places.into_iter().filter_map(|p| {
+        let from = then.grid_from_vehicle.transform(p.from) / grid.voxel_m();
+        let to = now.grid_from_vehicle.transform(p.to) / grid.voxel_m();
+        let cells = (to - from).to_array();
+        let displacement = [0, 1].map(|n| (cells[n] + f64::from(shift_by[n])).round() as i32);
+        let source = [p.source as i32 / side - shift_x, p.source as i32 % side - shift_y];
+        let target = [0, 1].map(|n| source[n] + displacement[n]);
+        let near = displacement.iter().all(|d| d.abs() <= REACH);
+        let source_index = (source[0] * side + source[1]) as usize;
+        let kept = near && inside(source) && inside(target) && before[source_index][1] != 0;
+        kept.then_some(Match { source: source_index, displacement, moving: p.moving })
     });
     let matches = matches.collect();
     Ok(Some(Pair { step, before, now: grid.columns.clone(), matches }))
 }
 
+/// Where a solid column of an object was, and where it went.
+struct Place {
+    /// Its index in the window of the first sweep.
+    source: usize,
+    /// Its centre, in the vehicle's frame of the first sweep, m.
+    from: DVec3,
+    /// Where that went, in the vehicle's frame of the second sweep, m.
+    to: DVec3,
+    /// Whether the object moves.
+    moving: bool,
+}
+
 /// The solid columns of objects that both sweeps know, in the window of the first, which is in the
-/// grid; those that go farther than the search are left out.
-fn displaced(
+/// grid.
+fn places(
     grid: &Grid,
     window: &Window,
     drive: &dyn Labelled,
     first: &LabelledSweep,
     second: &LabelledSweep,
     dt_s: f64,
-) -> Vec<Match> {
+) -> Vec<Place> {
     let later: HashMap<usize, _> = second.objects.iter().map(|o| (o.id, o)).collect();
     let motions: Vec<_> = first
         .objects
@@ -100,22 +119,20 @@ fn displaced(
             let later = later.get(&o.id)?;
             let (from, to) = (first.world_from_box(o), second.world_from_box(later));
             let speed = (to.translation - from.translation).truncate().length() / dt_s;
-            Some((to * from.inverse(), speed > MOVING_MPS))
+            let moved = later.vehicle_from_box * o.vehicle_from_box.inverse();
+            Some((moved, speed > MOVING_MPS))
         })
         .collect();
-    let owned = owners(grid, window, drive, first);
-    let moved = owned.into_iter().filter_map(|(source, owner)| {
+    let owned = owners(grid, window, drive, first).into_iter();
+    let places = owned.filter_map(|(source, owner)| {
         let Owner::Object(object) = owner else {
             return None;
         };
-        let (motion, moving) = motions[object]?;
-        let at = first.data.world_from_vehicle.transform(grid.centre(window, source));
-        let by = (motion.transform(at) - at) / grid.voxel_m();
-        let displacement = [by.x, by.y].map(|d| d.round() as i32);
-        let near = displacement.iter().all(|d| d.abs() <= REACH);
-        near.then_some(Match { source, displacement, moving })
+        let (moved, moving) = motions[object]?;
+        let from = grid.centre(window, source);
+        Some(Place { source, from, to: moved.transform(from), moving })
     });
-    moved.collect()
+    places.collect()
 }
 
 #[cfg(test)]
@@ -135,6 +152,20 @@ mod tests {
         scene.add_car(way(-10.0, 6.0, 0.0, 55.0), 3);
         let options = Options { sweeps: 3, rig: SensorRig::ideal(), ..Options::default() };
         Simulated::new(Drive::through(scene, way(0.0, 0.0, 0.0, speed), 1, options))
+    }
+
+    #[test]
+    fn in_the_vehicles_frame_what_stands_comes_nearer() {
+        let mut grid = Grid::new(Profile::dissertation());
+        // 0.9 m a sweep are three cells.
+        let mut drive = scene(9.0);
+        let pair = pair(&mut grid, &mut drive, 1, &mut Sweeps::default()).unwrap().unwrap();
+        assert_eq!([pair.step.shift_x, pair.step.shift_y], [0; 2]);
+        let of = |moving| pair.matches.iter().filter(move |m| m.moving == moving);
+        assert!(of(true).count() > 8 && of(false).count() > 8);
+        assert!(of(false).all(|m| m.displacement == [-3, 0]));
+        // The third car is 46 m/s faster, which the search still reaches.
+        assert!(of(true).all(|m| [[-3, 3], [15, 0]].contains(&m.displacement)));
     }
 
     #[test]

@@ -7,6 +7,7 @@
 use std::path::Path;
 
 use raywake_core::encoder::ColumnClass;
+use raywake_core::map::occupancy_probability;
 use raywake_core::output::{ColumnFlow, FlowBasis, PointFlow, Status, TrackletState};
 use raywake_core::sweep::Point;
 
@@ -140,26 +141,29 @@ pub struct Voxel {
 }
 
 /// Writes a map of occupancy, one row per voxel: `i j k` int32, `log_odds` float32 (nats, positive
-/// is occupied).
+/// is occupied), `probability` float32 (of being occupied, the log-odds cut off at `clip_nats`).
 ///
 /// Voxel (i, j, k) spans from `origin_m + resolution_m * (i, j, k)` one resolution further along
 /// every axis of the world; both go to the metadata as `origin_x_m`, `origin_y_m`, `origin_z_m`,
-/// `resolution_m`.
+/// `resolution_m`, the limit as `clip_nats`.
 pub fn write_map(
     path: &Path,
     voxels: &[Voxel],
     origin_m: [f64; 3],
     resolution_m: f64,
+    clip_nats: f32,
     meta: Meta<'_>,
 ) -> Result<(), Error> {
     let mut t = TableWriter::default();
     t.array(["i", "j", "k"], voxels, |v| v.index);
     t.column("log_odds", voxels, |v| v.log_odds_tenths as f32 / 10.0);
+    t.column("probability", voxels, |v| occupancy_probability(v.log_odds_tenths, clip_nats));
     let place = [
         ("origin_x_m", origin_m[0].to_string()),
         ("origin_y_m", origin_m[1].to_string()),
         ("origin_z_m", origin_m[2].to_string()),
         ("resolution_m", resolution_m.to_string()),
+        ("clip_nats", clip_nats.to_string()),
     ];
     t.write(path, &[meta, &place].concat())
 }

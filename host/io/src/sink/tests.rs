@@ -119,9 +119,10 @@ mod tables {
         let of_cov = |f: &&std::sync::Arc<arrow_schema::Field>| f.name().starts_with("cov_");
         assert_eq!(b.schema().fields().iter().filter(of_cov).count(), 15);
         let voxel = feather::Voxel { index: [1, 2, -3], log_odds_tenths: -35 };
-        feather::write_map(&path, &[voxel], [1.0, 2.0, 3.0], 0.3, &[]).unwrap();
+        feather::write_map(&path, &[voxel], [1.0, 2.0, 3.0], 0.3, 3.0, &[]).unwrap();
         let b = back(&path);
         assert_eq!(f32s(&b, "log_odds"), [-3.5]);
+        assert!((f32s(&b, "probability")[0] - 0.0474).abs() < 1e-4);
         assert_eq!(b.schema().metadata["origin_y_m"], "2");
         assert_eq!(b.schema().metadata["resolution_m"], "0.3");
         let absent = t.path().join("no/p.feather");

@@ -12,11 +12,10 @@ use clap::builder::PossibleValuesParser;
 use raywake::args::Learned;
 use raywake::console::interrupted;
 use raywake::weight_files::WeightFiles;
-use raywake_core::params::Profile;
 use raywake_io::Error;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use variants::{BASE, Numbers, VARIANTS, Variant};
+use variants::{AUTHOR, BASE, Numbers, VARIANTS, Variant};
 
 /// `raywake-lab ablate`.
 #[derive(clap::Args)]
@@ -38,7 +37,7 @@ pub struct Args {
 /// Evaluates every variant, then writes and prints the table. Variants that fail are named at the
 /// end; the others are in the table.
 pub fn run(args: &Args) -> Result<(), Error> {
-    let (inputs, base) = (&args.inputs, args.inputs.settings()?);
+    let base = args.inputs.settings()?;
     let names = names(&args.drives)?;
     let (mut rows, mut failed) = (Vec::new(), Vec::new());
     let wanted = |v: &&Variant| args.only.is_empty() || args.only.iter().any(|n| n == v.name);
@@ -46,8 +45,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         eprintln!("{}: {}", variant.name, variant.what);
         let name = if variant.is_base(&base.profile) { BASE } else { variant.name };
         let out = args.out.join(name);
-        let row = settings(variant, &base, &inputs.learned)
-            .and_then(|settings| row(variant, &settings, &names, &out));
+        let row =
+            settings(variant, &base).and_then(|settings| row(variant, &settings, &names, &out));
         match row {
             Ok(row) => rows.push(row),
             Err(e) if interrupted() => return Err(e),
@@ -65,17 +64,17 @@ pub fn run(args: &Args) -> Result<(), Error> {
 }
 
 /// The base with a variant's change.
-fn settings(variant: &Variant, base: &Settings, learned: &Learned) -> Result<Settings, Error> {
+fn settings(variant: &Variant, base: &Settings) -> Result<Settings, Error> {
     let profile = variant.profile(&base.profile);
     profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.must)))?;
     let weights = match variant.numbers {
         Numbers::Base => base.weights.clone(),
         Numbers::NoFilter => base.weights.clone().without_filter(),
         Numbers::NoEncoder => base.weights.clone().without_encoder(),
-        // What is shipped for his profile is his.
-        Numbers::Author => {
-            let learned = Learned { constancy: None, ..learned.clone() };
-            WeightFiles::read(&learned, &Profile::dissertation())?
+        Numbers::Author => base.weights.clone().with_constancy(AUTHOR),
+        Numbers::AsPrinted => WeightFiles::read(&Learned::default(), &profile)?,
+        Numbers::AsPrintedAuthor => {
+            WeightFiles::read(&Learned::default(), &profile)?.with_constancy(AUTHOR)
         }
     };
     Ok(Settings { weights_digest: weights.digest(), weights, profile, ..base.clone() })

@@ -13,7 +13,14 @@ pub enum Numbers {
     NoEncoder,
     /// The same with the author's published occupancy constancy.
     Author,
+    /// Those shipped for the dissertation's profile, which its recipes trained.
+    AsPrinted,
+    /// The same with the author's published occupancy constancy.
+    AsPrintedAuthor,
 }
+
+/// The author's published constants of the occupancy constancy.
+pub const AUTHOR: &str = include_str!("../../../weights/author.txt");
 
 /// A change of the base.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +58,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
 }
 
 /// All of them, as they are listed.
-pub const VARIANTS: [Variant; 25] = [
+pub const VARIANTS: [Variant; 26] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
     of("refine-2", "refined by 2 sweeps", |p| Profile { refinement_sweeps: 2, ..p }),
@@ -75,8 +82,14 @@ pub const VARIANTS: [Variant; 25] = [
         ..p
     }),
     Variant {
-        numbers: Numbers::Author,
-        ..of("dissertation", "all of the author's choices", |_| Profile::dissertation())
+        numbers: Numbers::AsPrinted,
+        ..of("dissertation", "chapter 3 as printed", |_| Profile::dissertation())
+    },
+    Variant {
+        numbers: Numbers::AsPrintedAuthor,
+        ..of("dissertation-author", "as printed, the author's constants", |_| {
+            Profile::dissertation()
+        })
     },
     of("deskew-off", "lattice, returns as measured", |p| Profile { deskew: false, ..p }),
     of("cells-0.30-50m", "0.30 m, search 4.5 m, window 50 m", |p| cells(p, 0.30, 167)),
@@ -89,6 +102,7 @@ pub const VARIANTS: [Variant; 25] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raywake_core::stages::occupancy_constancy::{SCORES_MAX, WEIGHT_WORDS, load};
     use std::collections::BTreeSet;
 
     #[test]
@@ -113,6 +127,14 @@ mod tests {
     }
 
     #[test]
+    fn the_authors_constants_have_his_range() {
+        let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
+        let scores = load(AUTHOR, 14, &mut weights, &mut costs).unwrap();
+        // The figures published beside the constants: scores of -537 to 2052.
+        assert_eq!((scores.min, scores.min + scores.count - 1), (-537, 2052));
+    }
+
+    #[test]
     fn one_of_every_series_is_the_base() {
         let base = Profile::hdl64();
         for series in [BASE, "refine-", "smoothing-", "rounds-", "cells-"] {
@@ -125,6 +147,7 @@ mod tests {
             "author-constancy",
             "sensor-frame",
             "dissertation",
+            "dissertation-author",
             "deskew-off",
         ];
         for v in VARIANTS.iter().filter(|v| other.contains(&v.name)) {
