@@ -67,6 +67,8 @@ pub fn methods() -> [(&'static str, Method); 18] {
     ]
 }
 
+/// Index of the tracker as printed, of 300 points, in [`methods`].
+pub const PRINTED: usize = 1;
 /// Index of our tracker of 300 points in [`methods`].
 pub const OURS: usize = 3;
 /// The baseline and those as printed in [`methods`] that table 2.1 is taken apart with.

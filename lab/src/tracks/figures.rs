@@ -1,4 +1,4 @@
-//! Figures 2.1 and 2.5 to 2.8 of the dissertation.
+//! Figures 2.1 and 2.5 to 2.9 of the dissertation.
 
 use super::errors::Alignment;
 use super::evaluate::{MAIN, Method, OURS, Score, methods, track};
@@ -98,7 +98,7 @@ pub fn profile(object: &Object, estimator: &mut Estimator) -> Chart {
     Chart::small_multiples("figure-2-7", &caption, parts)
 }
 
-/// Figures 2.1, 2.6 and 2.8: the cloud of an object by each tracker and by its true motion.
+/// Figures 2.1, 2.6, 2.8 and 2.9: the cloud of an object by each tracker and by its true motion.
 ///
 /// Fails where a picture cannot be drawn.
 pub fn cloud(id: &str, object: &Object, estimator: &mut Estimator) -> Result<Picture, Error> {

@@ -23,7 +23,7 @@ mod tracker;
 use crate::labels::Kind;
 use crate::report::{Report, Results, Table};
 use errors::Errors;
-use evaluate::{OURS, evaluate, histories};
+use evaluate::{OURS, Outcome, PRINTED, evaluate, histories};
 use front_ends::Found;
 use object::Object;
 use raywake::args::{FlowChoice, FrontEndKind};
@@ -179,7 +179,7 @@ fn conclude(
     }
     report.section("Crispness").table(tables::entropies(sets)).table(tables::extents(sets));
     report.section("Convergence").chart(figures::convergence(sets));
-    pictures(&mut report, objects)?;
+    pictures(&mut report, objects, sets)?;
     report.section("What is counted").text(&choices());
     report.write(&args.out)
 }
@@ -214,8 +214,9 @@ fn headlines(report: &mut Report, sets: &[Set]) {
     }
 }
 
-/// Clouds and profiles of a parked car, a cyclist and a bus: of each the one of most returns.
-fn pictures(report: &mut Report, all: &[Objects]) -> Result<(), Error> {
+/// Clouds and profiles of a parked car, a cyclist and a bus: of each the one of most returns. Then
+/// the parked object that the estimate as printed is farthest off with.
+fn pictures(report: &mut Report, all: &[Objects], sets: &[Set]) -> Result<(), Error> {
     let find = |id: &str, kind: Kind| {
         let set = all.iter().find(|set| set.id == id)?;
         set.objects.iter().filter(|o| o.kind == kind).max_by_key(|o| o.returns.len())
@@ -227,6 +228,7 @@ fn pictures(report: &mut Report, all: &[Objects]) -> Result<(), Error> {
         ("figure-2-1", find("stationary", Kind::Car)),
         ("figure-2-6", find("moving", Kind::Cyclist)),
         ("figure-2-8", find("moving", Kind::Bus)),
+        ("figure-2-9", fault_case(all, sets)),
     ];
     for (id, object) in shown {
         if let Some(object) = object {
@@ -237,6 +239,16 @@ fn pictures(report: &mut Report, all: &[Objects]) -> Result<(), Error> {
         report.section("Profiles").chart(figures::profile(bus, &mut estimator));
     }
     Ok(())
+}
+
+/// The parked object that the estimate as printed is farthest off with: where it fails, it has seen
+/// the same face twice (figure 2.9).
+fn fault_case<'a>(all: &'a [Objects], sets: &[Set]) -> Option<&'a Object> {
+    let objects = &all.iter().find(|o| o.id == "stationary")?.objects;
+    let outcomes = &sets.iter().find(|s| s.id == "stationary")?.outcomes;
+    let off = |o: &Outcome| o.scores[PRINTED].errors.rmse().position;
+    let pairs = objects.iter().zip(outcomes);
+    pairs.max_by(|a, b| off(a.1).total_cmp(&off(b.1))).map(|(object, _)| object)
 }
 
 /// Every choice that decides what is counted.
