@@ -1,5 +1,5 @@
-//! A digest of results: 64-bit FNV-1a over little-endian bytes, returns in one step each. It tells whether two runs put out
-//! the same bits; it is no protection against anybody.
+//! A digest of results: 64-bit FNV-1a over little-endian bytes, returns in one step each. It tells
+//! whether two runs put out the same bits; it is no protection against anybody.
 
 #[cfg(feature = "pipeline")]
 use crate::output::{ColumnFlow, PointFlow, TrackletState};
@@ -7,8 +7,8 @@ use crate::output::{ColumnFlow, PointFlow, TrackletState};
 /// The prime of 64-bit FNV.
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
-/// Odd factors, one for each pair of a return's words, so that no two can trade places: the fraction
-/// of the golden ratio, times 1, 3 and 5.
+/// Odd factors, one for each pair of a return's words, so that no two can trade places: the golden
+/// ratio's fraction, times 1, 3 and 5.
 #[cfg(feature = "pipeline")]
 const ODD: [u64; 3] = [GOLDEN, GOLDEN.wrapping_mul(3), GOLDEN.wrapping_mul(5)];
 #[cfg(feature = "pipeline")]
@@ -82,9 +82,9 @@ impl Digest {
         self.float(c.probability);
     }
 
-    /// Adds a return's flow: velocity over ground, velocity relative to the vehicle, status, P(moves).
-    /// There are a hundred times as many returns as columns: each is summed up first, in two words
-    /// at a time that do not wait for each other, and enters in one step.
+    /// Adds a return's flow: velocity over ground, velocity relative to the vehicle, status,
+    /// P(moves). There are ten times as many returns as columns: each is summed up first, by
+    /// products that do not wait for each other, and enters in one step.
     #[inline]
     pub fn point(&mut self, p: &PointFlow) {
         let bits = |v: f32| u64::from((v + 0.0).to_bits());

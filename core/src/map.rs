@@ -7,7 +7,7 @@
 //! at most, so a band can always be made small enough. The map equals the dense window inside that,
 //! bit for bit.
 
-use crate::params::{BAND_UPDATES, POINTS_MAX, TILE};
+use crate::params::{BAND_UPDATES, LOG_ODDS_PER_NAT, POINTS_MAX, TILE};
 use crate::stages::{MAP_BAND, MAP_COUNT, MAP_RAYS, Storage, run};
 
 const _: () = assert!(POINTS_MAX <= BAND_UPDATES);
@@ -57,7 +57,7 @@ impl Bands {
 /// Probability that a voxel is occupied (B.2, B.3): its log-odds, tenths of nats, cut off at
 /// `clip_nats` either way (l_min and l_max of table B.1).
 pub fn occupancy_probability(log_odds_tenths: i32, clip_nats: f32) -> f32 {
-    let nats = (log_odds_tenths as f32 / 10.0).max(-clip_nats).min(clip_nats);
+    let nats = (log_odds_tenths as f32 / LOG_ODDS_PER_NAT).max(-clip_nats).min(clip_nats);
     1.0 / (1.0 + libm::expf(-nats))
 }
 

@@ -68,6 +68,8 @@ pub const TILE: usize = 1024;
 /// Digit values of one radix pass (4 bits).
 pub const RADIX: usize = 16;
 
+/// Units of log-odds in a nat: tenths, so that sums of updates are exact.
+pub const LOG_ODDS_PER_NAT: f32 = 10.0;
 /// Log-odds of a voxel a ray passes, tenths (Table B.1: -0.1).
 pub const LOG_ODDS_FREE: i32 = -1;
 /// Log-odds of a voxel a ray ends in, tenths (Table B.1: 1.0).

@@ -142,8 +142,8 @@ fn mark(
 /// The filter shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../../weights/background.txt");
 
-/// What is shipped for a frame: on the lattice ours; in the vehicle's frame, as section 3.4.2 trains
-/// it.
+/// What is shipped for a frame: on the lattice ours; in the vehicle's frame, as section 3.4.2
+/// trains it.
 pub fn shipped(frame: Frame) -> &'static str {
     match frame {
         Frame::Lattice => SHIPPED,

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use crate::args;
 use crate::choose;
-use crate::config;
+use crate::config::{self, Settings};
 use crate::console::{bytes, note, say};
 use crate::drive::Drive;
 use crate::error::RunError;
@@ -32,9 +32,7 @@ pub use tracker::{Ended, Tracker};
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
 /// the sweep in hand, and all tracks with it.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
-    let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
-    let mut settings = config::settings_over(&args.flow.profile, objects)?;
-    settings.profile.deskew |= args.recording.kind.deskew == Some(true);
+    let settings = settings(args)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
@@ -91,6 +89,14 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
     Ok(!end.interrupted)
+}
+
+/// Parameters of the flow and of tracking.
+fn settings(args: &args::TrackArgs) -> Result<Settings, RunError> {
+    let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
+    let mut settings = config::settings_over(&args.flow.profile, objects)?;
+    settings.profile.deskew |= args.recording.kind.deskew == Some(true);
+    Ok(settings)
 }
 
 /// The flow, for the front end that takes it.

@@ -108,8 +108,8 @@ fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report
     let write = |provenance: &str| text("constancy", &[3, LEVELS], SCALE, &integers, provenance);
     let ours = measure("written", &write("untold"), &checked, &pairs)?;
     let provenance = format!(
-        "raywake-lab train constancy{option}, {inputs}, logistic regression, held-out log loss {:.4}, AUC \
-         {:.4}, true target first {:.3} standing {:.3} moving",
+        "raywake-lab train constancy{option}, {inputs}, logistic regression, held-out log loss \
+         {:.4}, AUC {:.4}, true target first {:.3} standing {:.3} moving",
         ours.log_loss, ours.auc, ours.standing.first, ours.moving.first
     );
     let mut measured = vec![ours];

@@ -9,6 +9,7 @@ use std::path::Path;
 use raywake_core::encoder::ColumnClass;
 use raywake_core::map::occupancy_probability;
 use raywake_core::output::{ColumnFlow, FlowBasis, PointFlow, Status, TrackletState};
+use raywake_core::params::LOG_ODDS_PER_NAT;
 use raywake_core::sweep::Point;
 
 use super::Meta;
@@ -156,7 +157,7 @@ pub fn write_map(
 ) -> Result<(), Error> {
     let mut t = TableWriter::default();
     t.array(["i", "j", "k"], voxels, |v| v.index);
-    t.column("log_odds", voxels, |v| v.log_odds_tenths as f32 / 10.0);
+    t.column("log_odds", voxels, |v| v.log_odds_tenths as f32 / LOG_ODDS_PER_NAT);
     t.column("probability", voxels, |v| occupancy_probability(v.log_odds_tenths, clip_nats));
     let place = [
         ("origin_x_m", origin_m[0].to_string()),
