@@ -24,25 +24,110 @@ pub fn ray_trace(
     }
 }
 
-/// Adds the updates of a ray that counts `weight` times.
+/// Adds the updates of a ray that counts `weight` times: those of [`Walk`], clipped to the window
+/// first and then walked by index.
 #[inline]
 fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds: &mut [i32]) {
     let end = ray_end(ray);
-    let mut entered = false;
-    for voxel in Walk::new(start, end, sweep.range_steps) {
-        match inside(sweep, voxel) {
-            Some(index) => {
-                entered = true;
-                log_odds[index] += LOG_ODDS_FREE * weight;
-            }
-            // The window is convex: once left, it is never met again.
-            None if entered => break,
-            None => {}
-        }
-    }
+    let line = Line::new(sweep, start, end);
+    let (from, to) = line.clip(sweep, start);
+    line.walk(from, to, start, |index| log_odds[index] += LOG_ODDS_FREE * weight);
     let hit = ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps);
     if let (true, Some(index)) = (hit, inside(sweep, end)) {
         log_odds[index] += LOG_ODDS_OCCUPIED * weight;
+    }
+}
+
+/// A [`Walk`] in closed form: after `n` steps it has gone `(2 extent n + length) / (2 length)`
+/// voxels along an axis, rounded down, for the error that decides on a step of it is then
+/// `2 extent (n + 1) - length - 2 length gone`.
+struct Line {
+    /// Voxels along every axis, and along the one that steps every time.
+    extent: [i64; 3],
+    length: i64,
+    step: [i32; 3],
+    /// Between neighbours along every axis in the order of the grid.
+    stride: [i32; 3],
+}
+
+impl Line {
+    #[inline]
+    fn new(sweep: &SweepUniform, start: [i32; 3], end: [i32; 3]) -> Line {
+        let delta = [0, 1, 2].map(|a| end[a] - start[a]);
+        let extent = delta.map(|d| i64::from(d.abs()));
+        let length = extent[0].max(extent[1]).max(extent[2]);
+        let stride = [sweep.side * sweep.levels, sweep.levels, 1];
+        Line { extent, length, step: delta.map(i32::signum), stride }
+    }
+
+    /// Steps after which it has gone so many voxels along an axis: more than there are where it
+    /// never has.
+    #[inline]
+    fn steps_to(&self, voxels: i32, axis: usize) -> i64 {
+        let voxels = i64::from(voxels);
+        match voxels {
+            ..=0 => 0,
+            _ if voxels > self.extent[axis] => i64::MAX,
+            _ => {
+                (self.length * (2 * voxels - 1) + 2 * self.extent[axis] - 1)
+                    / (2 * self.extent[axis])
+            }
+        }
+    }
+
+    /// The steps before which it is inside the window: from the first to before the last, as far as
+    /// a ray reaches.
+    #[inline]
+    fn clip(&self, sweep: &SweepUniform, start: [i32; 3]) -> (i64, i64) {
+        let sizes = [sweep.side, sweep.side, sweep.levels];
+        let (mut from, mut to) = (0, self.length.min(i64::from(sweep.range_steps)));
+        for axis in 0..3 {
+            let (at, size) = (start[axis], sizes[axis]);
+            let (enters, leaves) = match self.step[axis] {
+                0 if (0..size).contains(&at) => continue,
+                0 => return (0, 0),
+                1 => (-at, size - at),
+                _ => (at - (size - 1), at + 1),
+            };
+            from = from.max(self.steps_to(enters, axis));
+            to = to.min(self.steps_to(leaves, axis));
+        }
+        (from, to)
+    }
+
+    /// Visits the voxels before these steps by their indices. No branch depends on the ray but the
+    /// loop's.
+    #[inline]
+    fn walk(&self, from: i64, to: i64, start: [i32; 3], mut visit: impl FnMut(usize)) {
+        if from >= to {
+            return;
+        }
+        let longest = (0..3).rev().find(|a| self.extent[*a] == self.length).unwrap_or(0);
+        let gone = match from {
+            0 => [0; 3],
+            _ => self.extent.map(|extent| (2 * extent * from + self.length) / (2 * self.length)),
+        };
+        let at = |axis: usize| start[axis] + self.step[axis] * gone[axis] as i32;
+        let mut index = (0..3).map(|axis| at(axis) * self.stride[axis]).sum::<i32>();
+        let by = |axis: usize| self.step[axis] * self.stride[axis];
+        // The others step where their error says.
+        let others = [(longest + 1) % 3, (longest + 2) % 3];
+        let rise = others.map(|axis| 2 * self.extent[axis] as i32);
+        let mut error = others.map(|axis| {
+            let error = 2 * self.extent[axis] * (from + 1) - self.length;
+            (error - 2 * self.length * gone[axis]) as i32
+        });
+        let (always, sometimes, fall) = (by(longest), others.map(by), 2 * self.length as i32);
+        for _ in from..to {
+            visit(index as usize);
+            index += always;
+            for n in 0..2 {
+                // All ones where the error is not negative.
+                let steps = !(error[n] >> 31);
+                index += sometimes[n] & steps;
+                error[n] += rise[n] - (fall & steps);
+            }
+        }
     }
 }
 
@@ -79,6 +164,32 @@ mod tests {
             }
         }
         map
+    }
+
+    #[test]
+    fn a_clipped_walk_is_what_the_walk_has_in_the_window() {
+        let mut rng = crate::random::Random(7);
+        let mut draw =
+            |least: i32, most: i32| least + rng.below((most - least + 1) as usize) as i32;
+        for n in 0..20_000 {
+            let sweep = SweepUniform {
+                side: draw(1, 40),
+                levels: draw(1, 12),
+                range_steps: draw(1, 300),
+                ..Default::default()
+            };
+            // Every fourth far away on all sides.
+            let reach = if n % 4 == 0 { 32_000 } else { 60 };
+            let mut place = || [0; 3].map(|_| draw(-reach, reach));
+            let (start, end) = (place(), place());
+            let walk = Walk::new(start, end, sweep.range_steps);
+            let wanted: Vec<usize> = walk.filter_map(|v| inside(&sweep, v)).collect();
+            let line = Line::new(&sweep, start, end);
+            let (from, to) = line.clip(&sweep, start);
+            let mut found = Vec::new();
+            line.walk(from, to, start, |index| found.push(index));
+            assert_eq!(found, wanted, "{start:?} to {end:?} in {sweep:?}");
+        }
     }
 
     #[test]
