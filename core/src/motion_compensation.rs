@@ -25,11 +25,13 @@ impl EgoMotion {
 
     /// Velocity (m/s) along vehicle axes at which a point that stands still at `at` (vehicle
     /// frame, m) seems to move: the odometry flow of section 3.4.2.
+    #[inline]
     pub fn odometry(&self, at: DVec3) -> DVec3 {
         -self.twist.linear - self.twist.angular.cross(at)
     }
 
     /// Velocity over ground (world axes) to velocity relative to the vehicle (vehicle axes).
+    #[inline]
     pub fn ego_from_world(&self, at: DVec3, velocity: [f32; 2]) -> [f32; 3] {
         let ground = DVec3::new(velocity[0] as f64, velocity[1] as f64, 0.0);
         let v = self.vehicle_from_world * ground + self.odometry(at);

@@ -211,9 +211,10 @@ impl<'a> Caster<'a> {
         if own {
             return Some(Cast { ray, column: NONE, placed: Placed::NOWHERE });
         }
-        let [i, j, k] = end.map(|v| v as u32);
+        let [i, j, k] = [end[0] as u32, end[1] as u32, end[2] as u32];
         let inside = i < self.side && j < self.side && k < self.levels;
-        let at = [0, 1, 2].map(|a| at[a] + self.centre[a] as f32);
+        let [cx, cy, cz] = self.centre;
+        let at = [at[0] + cx as f32, at[1] + cy as f32, at[2] + cz as f32];
         let at = self.drift.place(at, when - (slot as f32 + 0.5));
         let placed = Placed { at, offset_s: self.from_s + when * self.slot_s };
         Some(Cast { ray, column: if inside { i * self.side + j } else { NONE }, placed })
@@ -278,20 +279,22 @@ const FAR: f32 = 1e6;
 /// A point in voxels from the window's central one.
 #[inline]
 fn in_voxels(m: &ToVoxel, p: [f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|a| {
-        let v = m[a][0] * p[0] + m[a][1] * p[1] + m[a][2] * p[2] + m[a][3];
-        v.clamp(-FAR, FAR)
-    })
+    let along = |row: &[f32; 4]| {
+        (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]).clamp(-FAR, FAR)
+    };
+    // `map` of arrays is a call, here and below.
+    [along(&m[0]), along(&m[1]), along(&m[2])]
 }
 
 /// Voxel of a point in voxels.
 #[inline]
-fn voxel(at: [f32; 3]) -> [i32; 3] {
-    at.map(|v| {
+fn voxel([x, y, z]: [f32; 3]) -> [i32; 3] {
+    let floor = |v: f32| {
         let cut = v as i32;
         // Truncation rounds up below zero.
         cut - ((cut as f32) > v) as i32
-    })
+    };
+    [floor(x), floor(y), floor(z)]
 }
 
 /// The integer nearest to a coordinate, voxels.

@@ -204,9 +204,11 @@ impl Found<'_> {
             }
         }
         out.status = self.status(column, point, &out);
-        let [x, y, z] = point.position.map(|c| if c.is_finite() { c as f64 } else { 0.0 });
-        out.velocity_ego_mps =
-            self.pair.ego.ego_from_world(DVec3::new(x, y, z), out.velocity_world_mps);
+        let finite = |c: f32| if c.is_finite() { c as f64 } else { 0.0 };
+        let [x, y, z] = point.position;
+        // `map` of arrays is a call.
+        let at = DVec3::new(finite(x), finite(y), finite(z));
+        out.velocity_ego_mps = self.pair.ego.ego_from_world(at, out.velocity_world_mps);
         out
     }
 

@@ -83,10 +83,10 @@ impl<'a> Cluster<'a> {
         &self,
         motion: &Motion,
         visited: &mut VisitedColumns,
-    ) -> (heapless::Vec<u32, TARGET_COLUMNS_MAX>, usize) {
+        list: &mut heapless::Vec<u32, TARGET_COLUMNS_MAX>,
+    ) -> usize {
         let target = &self.scans.targets[0];
         let side = self.scans.first.side;
-        let mut list = heapless::Vec::new();
         let mut total = 0;
         'columns: for &c in self.columns {
             let at = [(c as usize / side) as f32 + 0.5, (c as usize % side) as f32 + 0.5];
@@ -107,14 +107,15 @@ impl<'a> Cluster<'a> {
                 }
             }
         }
-        visited.remove(&list);
-        (list, total)
+        visited.remove(list);
+        total
     }
 
     /// Returns of the second sweep where the cluster would be.
     pub fn target_samples(&self, motion: &Motion, visited: &mut VisitedColumns) -> CloudPoints {
         let cloud = self.scans.targets[0].cloud;
-        let (columns, total) = self.target_columns(motion, visited);
+        let mut columns = heapless::Vec::new();
+        let total = self.target_columns(motion, visited, &mut columns);
         let returns = columns.iter().flat_map(|c| cloud.column(*c as usize));
         let stride = total.div_ceil(SAMPLES_MAX).max(1);
         returns.step_by(stride).map(|n| cloud.sample(n)).collect()

@@ -5,7 +5,9 @@ use glam::DVec3;
 /// Index of the cube of a side that holds a place near enough to the origin.
 #[inline]
 pub fn index_of(at: DVec3, side_m: f64) -> [i32; 3] {
-    (at / side_m).to_array().map(floor)
+    let at = at / side_m;
+    // `map` of arrays is a call.
+    [floor(at.x), floor(at.y), floor(at.z)]
 }
 
 /// Rounded down. Without a function of `libm`: this is most of what thinning does.
