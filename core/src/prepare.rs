@@ -279,9 +279,8 @@ const FAR: f32 = 1e6;
 /// A point in voxels from the window's central one.
 #[inline]
 fn in_voxels(m: &ToVoxel, p: [f32; 3]) -> [f32; 3] {
-    let along = |row: &[f32; 4]| {
-        (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]).clamp(-FAR, FAR)
-    };
+    let along =
+        |row: &[f32; 4]| (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]).clamp(-FAR, FAR);
     // `map` of arrays is a call, here and below.
     [along(&m[0]), along(&m[1]), along(&m[2])]
 }

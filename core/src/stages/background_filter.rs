@@ -41,8 +41,9 @@ pub fn load(text: &str, levels: usize, table: &mut [i32]) -> Result<(), WeightsE
 /// `bytes[b]` becomes the sum of `bits[n]` over the set bits `n` of `b`.
 pub fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
     bytes[0] = 0;
-    for b in 1..256usize {
-        bytes[b] = bytes[b & (b - 1)] + bits[b.trailing_zeros() as usize];
+    for (n, bit) in bits.iter().enumerate() {
+        let (without, with) = bytes[..2 << n].split_at_mut(1 << n);
+        with.iter_mut().zip(without).for_each(|(with, without)| *with = *without + bit);
     }
 }
 

@@ -206,29 +206,32 @@ impl Search<'_> {
         (-REACH).max(-at)..=REACH.min(self.sweep.side - 1 - at)
     }
 
-    /// Every displacement, without smoothing. Returns the least energy, feasible or not, and where.
+    /// Every displacement, without smoothing. Returns the least energy, feasible or not, and where:
+    /// the first in scan order among equals.
     fn everywhere(&self, outside: i32, best: &mut Best) -> MinCost {
         let cost = self.sweep.displacement_cost;
         let mut least = [NONE; 2];
-        for du in self.reach(self.i) {
-            let line = (du + REACH) * LINE as i32 + REACH;
-            // No energy of the line is below this: most lines end here.
-            let at_least = lowest(&self.row[(line - REACH) as usize..][..LINE]) as i32;
-            let at_least = at_least + cost * du * du + outside;
-            if at_least as u32 >= least[0] && at_least >= best.energy {
+        // From the middle, where a displacement costs least, so that most lines end at the first
+        // look.
+        for n in 0..SIDE as i32 {
+            let du = if n % 2 == 0 { n / 2 } else { -(n / 2) - 1 };
+            if !self.reach(self.i).contains(&du) {
                 continue;
             }
-            let energy = |dv: i32| {
-                self.row[(line + dv) as usize] as i32 + cost * (du * du + dv * dv) + outside
-            };
-            let least_of_line = self.reach(self.j).map(energy).min().unwrap_or(i32::MAX);
-            if (least_of_line as u32) < least[0] {
-                let first = self.reach(self.j).find(|dv| energy(*dv) == least_of_line);
-                least = [least_of_line as u32, (line + first.unwrap_or(0)) as u32];
+            let line = (du + REACH) * LINE as i32 + REACH;
+            let of_line = cost * du * du + outside;
+            // No energy of the line is below this.
+            let floor = lowest(&self.row[(line - REACH) as usize..][..LINE]) as i32 + of_line;
+            if floor as u32 > least[0] && floor > best.energy {
+                continue;
             }
-            // A whole line above the best cannot win; candidates come in scan order, so neither
-            // can one that only ties.
-            if least_of_line < best.energy {
+            let energy = |dv: i32| self.row[(line + dv) as usize] as i32 + cost * dv * dv + of_line;
+            let least_of_line = self.reach(self.j).map(energy).min().unwrap_or(i32::MAX);
+            if least_of_line as u32 <= least[0] {
+                let first = self.reach(self.j).find(|dv| energy(*dv) == least_of_line);
+                least = least.min([least_of_line as u32, (line + first.unwrap_or(0)) as u32]);
+            }
+            if least_of_line <= best.energy {
                 self.reach(self.j).for_each(|dv| self.consider(line + dv, energy(dv), best));
             }
         }

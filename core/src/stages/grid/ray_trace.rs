@@ -17,12 +17,21 @@ pub fn ray_trace(
     distinct: &[u32],
     log_odds: &mut [i32],
 ) {
-    for &entry in distinct {
-        let (ray, weight) = merged(entry, rays, slots);
-        let [x, y, z, _] = origins[ray_origin(ray)];
-        trace(sweep, [x, y, z], ray, weight, log_odds);
+    // Looked up some at a time: the rays lie scattered, and a processor waits for several at once
+    // where no walk lies between.
+    let mut batch = [([0; 2], 0); BATCH];
+    for entries in distinct.chunks(BATCH) {
+        let batch = &mut batch[..entries.len()];
+        batch.iter_mut().zip(entries).for_each(|(to, entry)| *to = merged(*entry, rays, slots));
+        for &(ray, weight) in &*batch {
+            let [x, y, z, _] = origins[ray_origin(ray)];
+            trace(sweep, [x, y, z], ray, weight, log_odds);
+        }
     }
 }
+
+/// Rays that are looked up at once.
+const BATCH: usize = 64;
 
 /// Adds the updates of a ray that counts `weight` times: those of [`Walk`], clipped to the window
 /// first and then walked by index.
