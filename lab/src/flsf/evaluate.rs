@@ -23,6 +23,9 @@ pub struct Args {
     /// What `train flsf` wrote
     #[arg(long, value_name = "FILE")]
     weights: PathBuf,
+    /// Occupancy constancy to compare with [default: as section 3.5.1 trains it]
+    #[arg(long, value_name = "FILE")]
+    constancy: Option<PathBuf>,
     /// Folder of results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -37,7 +40,8 @@ const SOURCES: usize = 5000;
 /// Evaluates, writes and prints.
 pub fn run(args: &Args) -> Result<(), Error> {
     let profile = Profile::dissertation();
-    let tables = WeightFiles::read(&Learned::default(), &profile)?.tables(&profile)?;
+    let learned = Learned { constancy: args.constancy.clone(), ..Learned::default() };
+    let tables = WeightFiles::read(&learned, &profile)?.tables(&profile)?;
     let trained = TrainedNumbers::read(&args.weights, Flsf::new(false).numbers())?;
     let methods = (Constancy::new(tables), Features::new(trained.numbers));
     let mut outcome = Outcome::default();
