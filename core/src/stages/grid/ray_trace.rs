@@ -38,7 +38,7 @@ const BATCH: usize = 64;
 #[inline]
 fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds: &mut [i32]) {
     let end = ray_end(ray);
-    let line = Line::new(sweep, start, end);
+    let line = WalkInWindow::new(sweep, start, end);
     let (from, to) = line.clip(sweep, start);
     line.walk(from, to, start, |index| log_odds[index] += LOG_ODDS_FREE * weight);
     let hit = ray[1] & NO_END == 0 && !Walk::beyond(start, end, sweep.range_steps);
@@ -50,7 +50,7 @@ fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds:
 /// A [`Walk`] in closed form: after `n` steps it has gone `(2 extent n + length) / (2 length)`
 /// voxels along an axis, rounded down, for the error that decides on a step of it is then
 /// `2 extent (n + 1) - length - 2 length gone`.
-struct Line {
+struct WalkInWindow {
     /// Voxels along every axis, and along the one that steps every time.
     extent: [i64; 3],
     length: i64,
@@ -59,14 +59,14 @@ struct Line {
     stride: [i32; 3],
 }
 
-impl Line {
+impl WalkInWindow {
     #[inline]
-    fn new(sweep: &SweepUniform, start: [i32; 3], end: [i32; 3]) -> Line {
+    fn new(sweep: &SweepUniform, start: [i32; 3], end: [i32; 3]) -> WalkInWindow {
         let delta = [0, 1, 2].map(|a| end[a] - start[a]);
         let extent = delta.map(|d| i64::from(d.abs()));
         let length = extent[0].max(extent[1]).max(extent[2]);
         let stride = [sweep.side * sweep.levels, sweep.levels, 1];
-        Line { extent, length, step: delta.map(i32::signum), stride }
+        WalkInWindow { extent, length, step: delta.map(i32::signum), stride }
     }
 
     /// Steps after which it has gone so many voxels along an axis: more than there are where it
@@ -193,7 +193,7 @@ mod tests {
             let (start, end) = (place(), place());
             let walk = Walk::new(start, end, sweep.range_steps);
             let wanted: Vec<usize> = walk.filter_map(|v| inside(&sweep, v)).collect();
-            let line = Line::new(&sweep, start, end);
+            let line = WalkInWindow::new(&sweep, start, end);
             let (from, to) = line.clip(&sweep, start);
             let mut found = Vec::new();
             line.walk(from, to, start, |index| found.push(index));
