@@ -5,7 +5,7 @@ use super::drive::Settings;
 use super::facts::Facts;
 use super::flow_tables::Tallies;
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
-use super::moving::{self, ColumnVerdicts, FirstSights};
+use super::moving::{self, ColumnVerdicts, FirstSights, MovesReliability};
 use super::points::{DOUBT_M, GROUND_M};
 use super::statistics::Weight;
 use super::tally::Tally;
@@ -23,22 +23,25 @@ struct Evidence {
     calibration: Calibration,
     verdicts: ColumnVerdicts,
     sights: FirstSights,
+    reliability: MovesReliability,
 }
 
 impl Evidence {
     fn read(drives: &[Facts], pairs: &[Facts], out: &Path) -> Result<Evidence, Error> {
         let (mut tally, mut calibration) = (Tally::new(), Calibration::default());
         let (mut verdicts, mut sights) = (ColumnVerdicts::default(), FirstSights::default());
+        let mut reliability = MovesReliability::default();
         read_rows(drives, out, |facts, row| {
             tally.row(row);
             calibration.row(row, facts.exact);
             verdicts.row(row, facts.exact);
             sights.row(&facts.drive, row, facts.exact);
+            reliability.row(row, facts.exact);
         })?;
         let mut alone = Tally::new();
         read_rows(pairs, &out.join(PAIRS), |_, row| alone.row(row))?;
         let alone = Some(alone).filter(|_| !pairs.is_empty());
-        Ok(Evidence { tally, alone, calibration, verdicts, sights })
+        Ok(Evidence { tally, alone, calibration, verdicts, sights, reliability })
     }
 }
 
@@ -73,13 +76,15 @@ pub fn conclude(
 
 /// The sections that need labelled objects.
 fn of_boxes(report: &mut Report, drives: &[Facts], evidence: &Evidence, settings: &Settings) {
-    let Evidence { tally, alone, calibration, verdicts, sights } = evidence;
+    let Evidence { tally, alone, calibration, verdicts, sights, reliability } = evidence;
     report
         .section("Moving or not")
         .table(moving::table(verdicts, drives))
         .table(verdicts.by_kind())
         .table(verdicts.false_motion(drives))
-        .table(sights.table());
+        .table(sights.table())
+        .table(reliability.table())
+        .chart(reliability.chart());
     raw_flow(report, Tallies { run: tally, pairs: alone.as_ref() }, settings.profile.voxel_m);
     report
         .section("Temporal scene flow")

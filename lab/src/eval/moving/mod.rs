@@ -3,10 +3,12 @@
 mod columns;
 mod false_motion;
 mod first_sight;
+mod reliability;
 mod returns;
 
 pub use columns::ColumnVerdicts;
 pub use first_sight::FirstSights;
+pub use reliability::MovesReliability;
 pub use returns::{ReturnCounts, ReturnVerdicts, Semantic, semantic_kitti};
 
 use super::calibration::truth;
