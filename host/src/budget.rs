@@ -248,7 +248,11 @@ mod tests {
         assert!((1 << 20..64 << 20).contains(&device), "{device}");
         assert!(scalar < device && scalar > heap_bytes(Heap::Upload, &p), "{scalar}");
         let text = memory_layout(&shipped());
-        assert!(text.contains("| hdl64, dissertation | wide |"), "{text}");
+        assert!(text.contains("| hdl64 | wide |"), "{text}");
+        let mut renamed = p.clone();
+        renamed.name = "renamed".try_into().unwrap_or_default();
+        let shared = memory_layout(&[p, renamed, Profile::wide()]);
+        assert!(shared.contains("| hdl64, renamed | wide |"), "equal sizes, one column: {shared}");
         let named = |row: &BufferRow| text.contains(&format!("| `{}` |", row.name));
         assert!(BUFFERS.iter().all(named), "{text}");
         assert!(text.contains("\n## Sparse map\n") && text.contains("\n## Records\n"));
