@@ -292,7 +292,7 @@ fn an_interrupt_ends_the_run_in_order() {
 fn budgets() {
     let all = raywake(&["budget"]);
     all.succeeded();
-    assert!(all.stdout.contains("| hdl64, dissertation | wide |"));
+    assert!(all.stdout.contains("| hdl64 | wide | far | dissertation |"));
     let one = raywake(&["budget", "--profile", "wide", "--limit", "1000000000"]);
     one.succeeded();
     assert!(one.stdout.contains("`ray") && !one.stdout.contains("dissertation"));

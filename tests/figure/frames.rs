@@ -29,7 +29,7 @@ fn sweeps() -> Vec<SimSweep> {
 
 fn near_a_post(c: &&ColumnFlow) -> bool {
     let at = DVec2::from_array(c.position_world_m);
-    c.basis == FlowBasis::Matched && c.age >= 5 && posts().any(|p| p.distance(at) < 0.6)
+    c.basis == FlowBasis::Matched && c.age >= 4 && posts().any(|p| p.distance(at) < 0.6)
 }
 
 /// Median displacement (cells), velocity over ground and relative to the vehicle, along the road.
