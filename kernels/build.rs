@@ -157,8 +157,14 @@ fn write_static(
     let name = &entry.name;
     let mut list = String::new();
     for b in bindings {
-        let (binding, reads, writes) = (&b.name, b.reads, b.writes);
-        let _ = write!(list, "Binding {{ name: {binding:?}, reads: {reads}, writes: {writes} }}, ");
+        let _ = match b {
+            reflect::Bound { name, uniform: true, .. } => {
+                write!(list, "Binding::uniform({name:?}), ")
+            }
+            reflect::Bound { name, reads, writes, .. } => {
+                write!(list, "Binding::storage({name:?}, {reads}, {writes}), ")
+            }
+        };
     }
     let _ = writeln!(
         table,

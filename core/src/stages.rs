@@ -76,7 +76,6 @@ buffers! {
     foreground_index: u32 [Profile::columns] "position of a column in the foreground";
     foreground: u32 [|_| FOREGROUND_MAX] "foreground columns, ascending";
     pair_cost: u16 [|_| FOREGROUND_MAX * ROW] "costs of pairs of columns";
-    window_cost: u16 [|_| FOREGROUND_MAX * ROW] "costs summed over 3x3 columns (T, 3.13)";
     flow: Flow [Profile::columns] "flow of every column";
     target_energy: u32 [Profile::columns] "energy of the winner at every target";
     target_index: u32 [Profile::columns] "foreground index of the winner at every target";
@@ -221,16 +220,16 @@ pub const FLOW: &[StageOp] = &[
     )),
     Run(stage!(
         window in window,
-        (sweep, list foreground, foreground_index, quads pair_cost, mut quads window_cost),
+        (sweep, list foreground, foreground_index, quads pair_cost, mut min_cost),
         GroupPerColumn
     )),
     Fill(Buffer::flow, 0),
     Fill(Buffer::target_energy, NONE),
-    Fill(Buffer::min_cost, NONE),
     Rounds(&[
         Run(stage!(
             expectation in flow::expectation,
-            (sweep, list foreground, window_cost, flow, target_energy, mut min_cost, mut proposal),
+            (sweep, list foreground, foreground_index, quads pair_cost, flow, target_energy,
+                min_cost, mut proposal),
             scalar: flow::expectation::expectation_by_rings,
             ThreadPer(Foreground)
         )),

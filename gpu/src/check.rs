@@ -79,6 +79,9 @@ fn shader(limits: &Limits, kernel: &Kernel) -> Result<(), String> {
     })
 }
 
+/// Bytes of a uniform buffer that every Vulkan device binds.
+const UNIFORM_BYTES: u64 = 16 << 10;
+
 fn bound(
     limits: &Limits,
     table: &[Buffer],
@@ -89,11 +92,12 @@ fn bound(
     ensure(given == expected, || {
         format!("kernel {name} has {expected} bindings, {given} buffers are given")
     })?;
+    let storage = kernel.bindings.iter().filter(|b| !b.uniform).count();
     let most = limits.storage_buffers;
-    ensure(expected <= most as usize, || format!("binds {expected} buffers of {most} allowed"))?;
+    ensure(storage <= most as usize, || format!("binds {storage} buffers of {most} allowed"))?;
     for (i, (&buffer, binding)) in buffers.iter().zip(kernel.bindings).enumerate() {
         let row = find(table, buffer)?;
-        let most = limits.storage_buffer_bytes;
+        let most = if binding.uniform { UNIFORM_BYTES } else { limits.storage_buffer_bytes };
         let text = || format!("{} has {} bytes of {most} bindable", row.name, row.bytes);
         ensure(row.bytes <= most, text)?;
         if binding.writes {

@@ -72,7 +72,7 @@ pub struct Buffer {
     pub bytes: u64,
 }
 
-/// One storage buffer of a kernel: what the kernel does with it. Barriers derive from this.
+/// One buffer of a kernel: what the kernel does with it. Barriers derive from this.
 #[derive(Clone, Copy, Debug)]
 pub struct Binding {
     /// For messages.
@@ -81,6 +81,27 @@ pub struct Binding {
     pub reads: bool,
     /// The kernel may write it; atomics read and write.
     pub writes: bool,
+    /// A uniform buffer, not a storage buffer: the same for every invocation, and only read.
+    pub uniform: bool,
+}
+
+impl Binding {
+    /// A storage buffer.
+    pub const fn storage(name: &'static str, reads: bool, writes: bool) -> Binding {
+        Binding { name, reads, writes, uniform: false }
+    }
+
+    /// A uniform buffer.
+    pub const fn uniform(name: &'static str) -> Binding {
+        Binding { name, reads: true, writes: false, uniform: true }
+    }
+
+    fn descriptor(&self) -> ash::vk::DescriptorType {
+        match self.uniform {
+            true => ash::vk::DescriptorType::UNIFORM_BUFFER,
+            false => ash::vk::DescriptorType::STORAGE_BUFFER,
+        }
+    }
 }
 
 /// A compiled compute shader. Each has one static of its own: its address tells it from others.

@@ -127,7 +127,7 @@ mod tests {
             name: "k",
             spirv: &[],
             workgroup: [1; 3],
-            bindings: &[Binding { name: "b", reads: true, writes: true }],
+            bindings: &[Binding::storage("b", true, true)],
         };
         let fill = Op::Fill { buffer: 2, value: 0 };
         let indirect = Op::Dispatch {

@@ -2,7 +2,7 @@
 
 use crate::arena::Slot;
 use crate::owner::Gpu;
-use crate::{GpuError, Kernel, Op, Program};
+use crate::{Binding, GpuError, Kernel, Op, Program};
 use ash::vk;
 use std::ffi::CString;
 use std::ptr;
@@ -44,10 +44,13 @@ impl Pipelines {
                 wanted.push((pipeline, buffers));
             }
         }
-        let descriptors: usize = wanted.iter().map(|(_, buffers)| buffers.len()).sum();
-        let pool = gpu.descriptor_pool(wanted.len() as u32, descriptors as u32)?;
+        let bindings = wanted.iter().flat_map(|(p, _)| all.pipelines[*p].kernel.bindings);
+        let descriptors: Vec<_> = bindings.map(Binding::descriptor).collect();
+        let pool = gpu.descriptor_pool(wanted.len() as u32, &descriptors)?;
         for (pipeline, buffers) in wanted {
-            let handles: Vec<_> = buffers.iter().map(|&b| slots[b].handle).collect();
+            let handles = buffers.iter().map(|&b| slots[b].handle);
+            let kinds = all.pipelines[pipeline].kernel.bindings.iter().map(Binding::descriptor);
+            let handles: Vec<_> = handles.zip(kinds).collect();
             let layout = all.pipelines[pipeline].set_layout;
             all.sets.push(Set {
                 pipeline,
@@ -74,10 +77,10 @@ impl Pipelines {
         if let Some(known) = known {
             return Ok(known);
         }
-        let bindings = (0..kernel.bindings.len() as u32).map(|binding| {
+        let bindings = (0..).zip(kernel.bindings).map(|(n, binding)| {
             vk::DescriptorSetLayoutBinding::default()
-                .binding(binding)
-                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                .binding(n)
+                .descriptor_type(binding.descriptor())
                 .descriptor_count(1)
                 .stage_flags(vk::ShaderStageFlags::COMPUTE)
         });

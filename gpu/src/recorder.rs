@@ -110,7 +110,10 @@ impl Recorder<'_> {
     fn barrier(&self) {
         let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER | Stage::DRAW_INDIRECT;
         let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
-        let read = Touch::TRANSFER_READ | Touch::SHADER_READ | Touch::INDIRECT_COMMAND_READ;
+        let read = Touch::TRANSFER_READ
+            | Touch::SHADER_READ
+            | Touch::UNIFORM_READ
+            | Touch::INDIRECT_COMMAND_READ;
         self.memory_barrier(stages, written, stages, read | written);
     }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{CHANGE, READ, WRITE, dispatch, executor, kernel, present, row};
+use common::{CHANGE, READ, UNIFORM, WRITE, dispatch, executor, kernel, present, row};
 use raywake_gpu::{Executor, GpuError, Groups, Heap, Kernel, Op, Options, Program, devices};
 
 const WORDS: u64 = 1000;
@@ -52,6 +52,41 @@ fn upload_copy_dispatch_readback() {
         let names: Vec<_> = gpu.times(0).map(|(name, _)| name).collect();
         assert_eq!(names, ["copy", "double", "double", "copy"]);
         assert!(gpu.times(0).all(|(_, ms)| (0.0..10_000.0).contains(&ms)));
+    }
+}
+
+#[test]
+fn uniforms_are_of_their_run() {
+    let scaled = kernel(
+        "scaled",
+        "
+struct Scale { factor: u32, offset: u32 }
+@group(0) @binding(0) var<uniform> scale: Scale;
+@group(0) @binding(1) var<storage, read_write> to: Words;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    to.d[id.x] = scale.factor * id.x + scale.offset;
+}",
+        &[UNIFORM, WRITE],
+    );
+    let table = [
+        row("in", Heap::Upload, 2),
+        row("scale", Heap::Device, 2),
+        row("words", Heap::Device, 64),
+        row("out", Heap::Readback, 64),
+    ];
+    let ops = vec![
+        Op::Copy { from: 0, to: 1 },
+        dispatch(scaled, &[1, 2], 1),
+        Op::Copy { from: 2, to: 3 },
+    ];
+    let Some(mut gpu) = executor(&Options::default(), &table, ops) else {
+        return;
+    };
+    for scale in [[3, 5], [7, 0]] {
+        gpu.upload(0).copy_from_slice(&scale);
+        gpu.run(0).unwrap();
+        assert!((0..64).map(|n| scale[0] * n + scale[1]).eq(gpu.readback(3).iter().copied()));
     }
 }
 

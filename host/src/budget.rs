@@ -231,7 +231,7 @@ mod tests {
     fn the_map_alone() {
         let text = memory_layout(&[Profile::map()]);
         assert!(text.contains("\n### Totals\n") && !text.contains("\n## Totals\n"), "{text}");
-        assert!(text.contains("| `updates` |") && !text.contains("| `window_cost` |"), "{text}");
+        assert!(text.contains("| `updates` |") && !text.contains("| `pair_cost` |"), "{text}");
         assert!(device_bytes(&Profile::map()) >= Mapper::bytes(&Profile::map()) as u64);
         let named = |name: &str| {
             let profile = Some(name.to_string());

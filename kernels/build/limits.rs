@@ -17,8 +17,9 @@ const ITERATIONS_MAX: u64 = 50_000;
 /// Checks an entry point.
 pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &[Bound]) {
     let fail = |what: String| -> ! { panic!("{}, {}: {what}", file.display(), entry.name) };
-    if bindings.len() > BUFFERS_MAX {
-        fail(format!("{} storage buffers, {BUFFERS_MAX} allowed", bindings.len()));
+    let storage_buffers = bindings.iter().filter(|b| !b.uniform).count();
+    if storage_buffers > BUFFERS_MAX {
+        fail(format!("{storage_buffers} storage buffers, {BUFFERS_MAX} allowed"));
     }
     let invocations: u32 = entry.workgroup_size.iter().product();
     if invocations > INVOCATIONS_MAX {

@@ -23,13 +23,17 @@ pub fn bindings(arguments: &[Argument]) -> String {
     let mut text = String::new();
     for (n, a) in arguments.iter().enumerate() {
         let (name, access) = (a.name, if a.writes { "read_write" } else { "read" });
-        let kind = if a.buffer == Buffer::sweep {
-            a.buffer.row().wgsl.to_string()
+        let _ = write!(text, "@group(0) @binding({n}) ");
+        let _ = if a.buffer == Buffer::sweep {
+            writeln!(text, "var<uniform> {name}: {};", a.buffer.row().wgsl)
         } else {
-            let _ = writeln!(text, "struct Buffer_{name} {{ d: array<{}> }}", element(a));
-            format!("Buffer_{name}")
+            let kind = format!("Buffer_{name}");
+            writeln!(
+                text,
+                "var<storage, {access}> {name}: {kind};\nstruct {kind} {{ d: array<{}> }}",
+                element(a)
+            )
         };
-        let _ = writeln!(text, "@group(0) @binding({n}) var<storage, {access}> {name}: {kind};");
     }
     text
 }

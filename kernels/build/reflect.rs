@@ -3,7 +3,7 @@
 use naga::valid::{FunctionInfo, GlobalUse};
 use naga::{AddressSpace, Module, StorageAccess, TypeInner};
 
-/// A storage buffer of an entry point.
+/// A buffer of an entry point.
 pub struct Bound {
     /// Name of the variable.
     pub name: String,
@@ -13,23 +13,27 @@ pub struct Bound {
     pub reads: bool,
     /// Written; atomics are both.
     pub writes: bool,
+    /// A uniform buffer.
+    pub uniform: bool,
 }
 
 /// The buffers of the whole module in binding order, with the access of this entry point.
 pub fn bindings(module: &Module, info: &FunctionInfo) -> Vec<Bound> {
     let mut bound = Vec::new();
     for (handle, global) in module.global_variables.iter() {
-        let (AddressSpace::Storage { access }, Some(binding)) = (global.space, &global.binding)
-        else {
-            continue;
+        let Some(binding) = &global.binding else { continue };
+        let access = match global.space {
+            AddressSpace::Storage { access } => access,
+            _ => StorageAccess::LOAD,
         };
+        let uniform = global.space == AddressSpace::Uniform;
         let used = info[handle];
         let atomic = access.contains(StorageAccess::STORE) && is_atomic(module, global.ty);
         let writes = used.contains(GlobalUse::WRITE) || atomic && !used.is_empty();
         let reads = used.contains(GlobalUse::READ) || atomic && !used.is_empty();
         let name = global.name.clone().unwrap_or_default();
         let stride = stride(module, global.ty);
-        bound.push((binding.binding, Bound { name, stride, reads, writes }));
+        bound.push((binding.binding, Bound { name, stride, reads, writes, uniform }));
     }
     bound.sort_by_key(|(binding, _)| *binding);
     bound.into_iter().map(|(_, b)| b).collect()

@@ -1,8 +1,27 @@
-// Sums costs over the 3x3 window, one workgroup a column. Twin: core/src/stages/window.rs
+// The least energy of a column at any displacement, smoothing apart, one workgroup a column.
+// Twin: core/src/stages/window.rs
 
 const ROW_QUADS = ROW_WORDS / 4u;
 
 var<workgroup> rows: array<u32, 9>;
+var<workgroup> least: atomic<u32>;
+var<workgroup> place: atomic<u32>;
+
+fn inside(i: i32, j: i32) -> bool {
+    return i >= 0 && i < sweep.side && j >= 0 && j < sweep.side;
+}
+
+// Energy and place of the displacement at an element of the row, NONE where it leads outside.
+fn energy_at(i: i32, j: i32, at: u32, cost: u32, outside: i32) -> vec2<u32> {
+    let d = vec2<i32>(i32(at / LINE), i32(at % LINE)) - vec2<i32>(REACH);
+    let square = d.x * d.x + d.y * d.y;
+    let energy = u32(i32(cost) + sweep.displacement_cost * square + outside);
+    return vec2<u32>(select(NONE, energy, d.y <= REACH && inside(i + d.x, j + d.y)), at);
+}
+
+fn lesser(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    return select(a, b, b.x < a.x);
+}
 
 @compute @workgroup_size(ROW_WORKGROUP)
 fn window(
@@ -10,20 +29,29 @@ fn window(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let column = i32(foreground.d[group.x]);
+    let i = column / sweep.side;
+    let j = column % sweep.side;
     if lane < 9u {
-        let i = column / sweep.side + i32(lane) / 3 - 1;
-        let j = column % sweep.side + i32(lane) % 3 - 1;
-        // A neighbour outside costs nothing here: see `outside_cost`.
+        let ni = i + i32(lane) / 3 - 1;
+        let nj = j + i32(lane) % 3 - 1;
+        // A neighbour outside costs nothing here: it is the same at every displacement.
         rows[lane] = NONE - 1u;
-        if i >= 0 && i < sweep.side && j >= 0 && j < sweep.side {
-            rows[lane] = foreground_index.d[i * sweep.side + j];
+        if inside(ni, nj) {
+            rows[lane] = foreground_index.d[ni * sweep.side + nj];
         }
+    }
+    if lane == 0u {
+        atomicStore(&least, NONE);
+        atomicStore(&place, NONE);
     }
     workgroupBarrier();
     var unknown = 0u;
+    var outside = 0;
     for (var n = 0; n < 9; n += 1) {
         unknown += select(0u, COST_UNKNOWN, rows[n] == NONE);
+        outside += select(0, sweep.outside_cost, rows[n] == NONE - 1u);
     }
+    var mine = vec2<u32>(NONE);
     for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= ROW_QUADS / ROW_WORKGROUP + 1
         // Eight costs at once: nine of at most COST_MAX never carry.
         var sum = vec4<u32>(unknown | (unknown << 16u));
@@ -32,6 +60,18 @@ fn window(
                 sum += pair_cost.d[rows[n] * ROW_QUADS + quad];
             }
         }
-        window_cost.d[group.x * ROW_QUADS + quad] = sum;
+        for (var n = 0u; n < 8u; n += 1u) {
+            let cost = (sum[n / 2u] >> (16u * (n & 1u))) & 0xffffu;
+            mine = lesser(mine, energy_at(i, j, 8u * quad + n, cost, outside));
+        }
+    }
+    atomicMin(&least, mine.x);
+    workgroupBarrier();
+    if mine.x == atomicLoad(&least) {
+        atomicMin(&place, mine.y);
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        min_cost.d[group.x] = vec2<u32>(atomicLoad(&least), atomicLoad(&place));
     }
 }

@@ -32,7 +32,7 @@ pub const REACH: i32 = 15;
 pub const SIDE: usize = 2 * REACH as usize + 1;
 /// Elements from one line of the search to the next: [`SIDE`] and one of padding. Shifts and masks
 /// turn an index into its displacement, without a division, and a row is a whole number of `vec4`s.
-/// The padding costs at most 1.5 MB over both buffers of costs.
+/// The padding costs at most 0.8 MB.
 pub const LINE: usize = 32;
 /// Elements of a row of costs, one row per foreground column: displacement `(du, dv)` is element
 /// `(du + REACH) * LINE + dv + REACH`, the order in which ties are broken.

@@ -26,16 +26,11 @@ const fn row(name: &'static str, heap: Heap, bytes: u64) -> Buffer {
     Buffer { name, heap, bytes }
 }
 
+const IN_AND_OUT: [Binding; 2] =
+    [Binding::storage("in", true, false), Binding::storage("out", false, true)];
+
 const fn kernel(name: &'static str, spirv: &'static [u32], workgroup: [u32; 3]) -> Kernel {
-    Kernel {
-        name,
-        spirv,
-        workgroup,
-        bindings: &[
-            Binding { name: "in", reads: true, writes: false },
-            Binding { name: "out", reads: false, writes: true },
-        ],
-    }
+    Kernel { name, spirv, workgroup, bindings: &IN_AND_OUT }
 }
 
 static GOOD: Kernel = kernel("k", &[SPIRV_MAGIC], [64, 1, 1]);

@@ -11,6 +11,7 @@ impl Gpu {
         use vk::BufferUsageFlags as Usage;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(
             Usage::STORAGE_BUFFER
+                | Usage::UNIFORM_BUFFER
                 | Usage::TRANSFER_SRC
                 | Usage::TRANSFER_DST
                 | Usage::INDIRECT_BUFFER,
@@ -115,16 +116,19 @@ impl Gpu {
         Ok(self.own(made[0], Object::Pipeline))
     }
 
-    /// A pool for exactly `sets` sets with `buffers` storage buffers in all.
+    /// A pool for exactly `sets` sets with these descriptors in all.
     pub fn descriptor_pool(
         &mut self,
         sets: u32,
-        buffers: u32,
+        descriptors: &[vk::DescriptorType],
     ) -> Result<vk::DescriptorPool, GpuError> {
-        // Vulkan knows no empty pool.
-        let sizes = [vk::DescriptorPoolSize::default()
-            .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count(buffers.max(1))];
+        let of = |kind: vk::DescriptorType| {
+            let count = descriptors.iter().filter(|d| **d == kind).count() as u32;
+            // Vulkan knows no empty pool.
+            vk::DescriptorPoolSize::default().ty(kind).descriptor_count(count.max(1))
+        };
+        let sizes =
+            [of(vk::DescriptorType::STORAGE_BUFFER), of(vk::DescriptorType::UNIFORM_BUFFER)];
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets.max(1)).pool_sizes(&sizes);
         // SAFETY: the create info is valid and lives through the call.
         let pool = unsafe { self.raw.create_descriptor_pool(&info, None) }
@@ -132,12 +136,13 @@ impl Gpu {
         Ok(self.own(pool, Object::DescriptorPool))
     }
 
-    /// A set whose binding `i` is the whole of `buffers[i]`. It lives as long as its pool.
+    /// A set whose binding `i` is the whole of the buffer `buffers[i]`, bound as its kind. It lives
+    /// as long as its pool.
     pub fn descriptor_set(
         &mut self,
         pool: vk::DescriptorPool,
         layout: vk::DescriptorSetLayout,
-        buffers: &[vk::Buffer],
+        buffers: &[(vk::Buffer, vk::DescriptorType)],
     ) -> Result<vk::DescriptorSet, GpuError> {
         let layouts = [layout];
         let info =
@@ -145,18 +150,17 @@ impl Gpu {
         // SAFETY: pool and layout are of this device, and only this thread uses the pool.
         let set = unsafe { self.raw.allocate_descriptor_sets(&info) }
             .map_err(failed("vkAllocateDescriptorSets"))?[0];
-        let whole = |&buffer: &vk::Buffer| {
-            [vk::DescriptorBufferInfo::default().buffer(buffer).range(vk::WHOLE_SIZE)]
+        let whole = |(buffer, _): &(vk::Buffer, _)| {
+            [vk::DescriptorBufferInfo::default().buffer(*buffer).range(vk::WHOLE_SIZE)]
         };
         let infos: Vec<_> = buffers.iter().map(whole).collect();
-        let write = |(binding, info)| {
-            vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(binding as u32)
-                .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                .buffer_info(info)
-        };
-        let writes: Vec<_> = infos.iter().enumerate().map(|(i, b)| write((i, b))).collect();
+        let mut writes: Vec<_> = infos
+            .iter()
+            .map(|info| vk::WriteDescriptorSet::default().dst_set(set).buffer_info(info))
+            .collect();
+        for (write, (n, (_, kind))) in writes.iter_mut().zip((0..).zip(buffers)) {
+            *write = write.dst_binding(n).descriptor_type(*kind);
+        }
         // SAFETY: the set is new and in no command buffer yet; the buffers are of this device.
         unsafe { self.raw.update_descriptor_sets(&writes, &[]) };
         Ok(set)

@@ -9,13 +9,10 @@ use raywake_gpu::{
     Binding, Buffer, Executor, GpuError, Groups, Heap, Kernel, Op, Options, Program,
 };
 
-pub const READ: Binding = binding(true, false);
-pub const WRITE: Binding = binding(false, true);
-pub const CHANGE: Binding = binding(true, true);
-
-const fn binding(reads: bool, writes: bool) -> Binding {
-    Binding { name: "d", reads, writes }
-}
+pub const READ: Binding = Binding::storage("d", true, false);
+pub const WRITE: Binding = Binding::storage("d", false, true);
+pub const CHANGE: Binding = Binding::storage("d", true, true);
+pub const UNIFORM: Binding = Binding::uniform("u");
 
 /// What the kernels below are written in terms of.
 const PRELUDE: &str = "

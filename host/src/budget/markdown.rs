@@ -29,12 +29,6 @@ itself from start to end. Writers and readers are the steps of the schedule in t
 touch the buffer; `fill` sets every word, `copy` moves a whole buffer.
 ";
 
-/// Below the device's table of the flow pipeline; a test of [`traffic`] sees that it is so.
-const LIFETIME: &str = "
-The two largest tables, `pair_cost` and `window_cost`, are alive at the same time only in
-`window`, which reads the one and writes the other.
-";
-
 const MAP_HEAD: &str = "
 ## Sparse map
 
@@ -91,8 +85,6 @@ struct Layout<'a> {
     schedule: Schedule,
     sizes: Vec<Sizes<'a>>,
     traffic: Vec<Traffic>,
-    /// Below the device's table.
-    device: &'static str,
     /// Below the host's table.
     host: &'static str,
 }
@@ -124,7 +116,6 @@ fn flow<'a>(first: &Profile, profiles: &[&'a Profile]) -> Layout<'a> {
         sizes: sizes(profiles),
         traffic: traffic::of(&schedule(first)),
         schedule: schedule(first),
-        device: LIFETIME,
         host: "",
     }
 }
@@ -135,7 +126,6 @@ fn map<'a>(profiles: &[&'a Profile]) -> Layout<'a> {
         sizes: sizes(profiles),
         traffic: traffic::of(&schedule(profiles[0])),
         schedule: schedule(profiles[0]),
-        device: "",
         host: MAP_HOST,
     }
 }
@@ -192,7 +182,6 @@ fn heap_table(out: &mut String, heap: Heap, layout: &Layout) -> std::fmt::Result
     }
     let sums = cells(sizes, |s| grouped(heap_bytes(heap, s.profile)));
     writeln!(out, "| total, with padding | | {sums} | | | | |")?;
-    out.push_str(if heap == Heap::Device { layout.device } else { "" });
     Ok(())
 }
 

@@ -7,9 +7,40 @@ fn inside(i: i32, j: i32) -> bool {
     return i >= 0 && i < sweep.side && j >= 0 && j < sweep.side;
 }
 
-fn cost_of(rank: u32, index: i32) -> i32 {
-    let word = window_cost.d[rank * ROW_WORDS + u32(index) / 2u];
-    return i32((word >> (16u * (u32(index) & 1u))) & 0xffffu);
+// Rows of the column and its neighbours in `pair_cost`, NONE where there is none.
+var<private> rows: array<u32, 9>;
+// Cost of those without one: inside the window unknown, outside it a number of the profile.
+var<private> beside: i32;
+
+fn look_around(i: i32, j: i32) {
+    beside = 0;
+    for (var n = 0; n < 9; n += 1) {
+        let ni = i + n / 3 - 1;
+        let nj = j + n % 3 - 1;
+        var row = NONE;
+        if inside(ni, nj) {
+            row = foreground_index.d[ni * sweep.side + nj];
+            beside += select(0, i32(COST_UNKNOWN), row == NONE);
+        } else {
+            beside += sweep.outside_cost;
+        }
+        rows[n] = row;
+    }
+}
+
+// Eight costs of the window, two a word.
+fn costs_of(quad: u32) -> vec4<u32> {
+    var sum = vec4<u32>(0u);
+    for (var n = 0; n < 9; n += 1) {
+        if rows[n] < FOREGROUND_MAX {
+            sum += pair_cost.d[rows[n] * (ROW_WORDS / 4u) + quad];
+        }
+    }
+    return sum;
+}
+
+fn cost_in(costs: vec4<u32>, n: u32) -> i32 {
+    return i32((costs[n / 2u] >> (16u * (n & 1u))) & 0xffffu) + beside;
 }
 
 fn displacement(index: i32) -> vec2<i32> {
@@ -28,42 +59,20 @@ fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best 
     return best;
 }
 
-// Cost of the window neighbours that lie outside the grid.
-fn outside_cost(i: i32, j: i32) -> i32 {
-    let rows = 3 - select(0, 1, i == 0) - select(0, 1, i == sweep.side - 1);
-    let lines = 3 - select(0, 1, j == 0) - select(0, 1, j == sweep.side - 1);
-    return (9 - rows * lines) * sweep.outside_cost;
-}
-
-// The least energy without smoothing, feasible or not, and where: a word of two costs at a time.
-fn lowest(rank: u32, i: i32, j: i32, outside: i32) -> vec2<u32> {
-    var least = vec2<u32>(NONE);
-    for (var word = 0; word < i32(ROW_WORDS); word += 1) {
-        let costs = window_cost.d[rank * ROW_WORDS + u32(word)];
-        let first = displacement(2 * word);
-        for (var half = 0; half < 2; half += 1) {
-            let d = first + vec2<i32>(0, half);
-            let square = d.x * d.x + d.y * d.y;
-            let cost = i32((costs >> (16u * u32(half))) & 0xffffu);
-            let energy = u32(cost + sweep.displacement_cost * square + outside);
-            if d.y <= REACH && inside(i + d.x, j + d.y) && energy < least.x {
-                least = vec2<u32>(energy, u32(2 * word + half));
-            }
-        }
-    }
-    return least;
-}
-
 // Every displacement, without smoothing.
-fn everywhere(rank: u32, column: i32, i: i32, j: i32, outside: i32, own: u32) -> Best {
+fn everywhere(column: i32, i: i32, j: i32, own: u32) -> Best {
     var best = Best(I32_MAX, I32_MAX);
-    for (var index = 0; index < i32(ROW); index += 1) {
-        let d = displacement(index);
-        if d.y <= REACH && inside(i + d.x, j + d.y) {
-            let square = d.x * d.x + d.y * d.y;
-            let energy = cost_of(rank, index) + sweep.displacement_cost * square + outside;
-            if energy < best.energy {
-                best = consider(best, column, index, energy, own);
+    for (var quad = 0u; quad < ROW_WORDS / 4u; quad += 1u) {
+        let costs = costs_of(quad);
+        for (var n = 0u; n < 8u; n += 1u) {
+            let index = i32(8u * quad + n);
+            let d = displacement(index);
+            if d.y <= REACH && inside(i + d.x, j + d.y) {
+                let square = d.x * d.x + d.y * d.y;
+                let energy = cost_in(costs, n) + sweep.displacement_cost * square;
+                if energy < best.energy {
+                    best = consider(best, column, index, energy, own);
+                }
             }
         }
     }
@@ -83,7 +92,6 @@ fn rings(
     column: i32,
     i: i32,
     j: i32,
-    outside: i32,
     own: u32,
     n: i32,
     s: vec2<i32>,
@@ -106,7 +114,8 @@ fn rings(
                 let square = d.x * d.x + d.y * d.y;
                 let smoothness = squares + n * square - 2 * (d.x * s.x + d.y * s.y);
                 let index = (d.x + REACH) * i32(LINE) + d.y + REACH;
-                let energy = cost_of(rank, index) + outside
+                let cost = cost_in(costs_of(u32(index) / 8u), u32(index) % 8u);
+                let energy = cost
                     + sweep.displacement_cost * square + sweep.smoothing * smoothness;
                 best = consider(best, column, index, energy, own);
             }
@@ -154,21 +163,17 @@ fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     let own = flow.d[column];
-    let outside = outside_cost(i, j);
+    look_around(i, j);
     var best = Best(I32_MAX, I32_MAX);
     if count == 0 {
-        // Where it pays least, if it may: in every round the same.
-        var known = min_cost.d[rank];
-        if known.y == NONE {
-            known = lowest(rank, i, j, outside);
-            min_cost.d[rank] = known;
-        }
+        // Where it pays least, if it may.
+        let known = min_cost.d[rank];
         best = consider(best, column, i32(known.y), i32(known.x), own);
         if best.index == I32_MAX {
-            best = everywhere(rank, column, i, j, outside, own);
+            best = everywhere(column, i, j, own);
         }
     } else {
-        best = rings(rank, column, i, j, outside, own, count, sum, squares);
+        best = rings(rank, column, i, j, own, count, sum, squares);
     }
     if best.index == I32_MAX {
         proposal.d[rank] = vec2<u32>(0u, NONE);

@@ -83,7 +83,7 @@ impl Distances {
 
 impl Around {
     fn of(pair: &FlowPair, cell: usize, features: &Features, both: [&Encoded; 2]) -> Around {
-        let row = features.costs(both, &[cell as u32]);
+        let row = features.costs(both, &[cell as u32])[0];
         let steps =
             (0..SEARCH * SEARCH).map(|n| [n / SEARCH, n % SEARCH].map(|d| d as i32 - REACH));
         let index = |step: [i32; 2]| {

@@ -8,11 +8,11 @@ use crate::learning::FeatureMap;
 use raywake::backend::Tables;
 use raywake_core::params::{LINE, Profile, REACH, ROW, SIDE as SEARCH};
 use raywake_core::prepare::uniform_of;
-use raywake_core::record::{Flow, NONE, SweepUniform, VALID, flow_displacement};
+use raywake_core::record::{Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement};
 use raywake_core::stages::background_filter::background_filter_by_bytes;
-use raywake_core::stages::flow::{expectation::expectation_by_rings, maximisation::maximisation};
+use raywake_core::stages::flow::{expectation::propose, maximisation::maximisation};
 use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
-use raywake_core::stages::window::window;
+use raywake_core::stages::window::{Costs, WindowCosts, least};
 
 /// Rounds of either minimisation (n_em, sections 3.8.1 and 4.5).
 const ROUNDS: usize = 20;
@@ -41,23 +41,18 @@ impl Matched {
         self.foreground.binary_search(&(cell as u32)).is_ok()
     }
 
-    /// Of some cells with a row of [`ROW`] costs each.
-    fn minimised(foreground: Vec<u32>, costs: &[u16], step: &SweepUniform) -> Matched {
+    /// Of some cells with a row of costs each.
+    fn minimised(foreground: Vec<u32>, costs: &[[u16; ROW]], step: &SweepUniform) -> Matched {
         let mut flow = vec![0; SIDE * SIDE];
         let mut energies = vec![NONE; SIDE * SIDE];
         let mut winners = vec![NONE; SIDE * SIDE];
-        let mut least = vec![[NONE; 2]; foreground.len()];
-        let mut proposals = vec![[0; 2]; foreground.len()];
+        let cells = || foreground.iter().zip(costs);
+        let lowest: Vec<MinCost> = cells().map(|(n, row)| least(step, *n, row)).collect();
         for _ in 0..ROUNDS {
-            expectation_by_rings(
-                step,
-                &foreground,
-                costs,
-                &flow,
-                &energies,
-                &mut least,
-                &mut proposals,
-            );
+            let proposals: Vec<Proposal> = cells()
+                .zip(&lowest)
+                .map(|((n, row), lowest)| propose(step, *n, row, *lowest, &flow, &energies))
+                .collect();
             energies.fill(NONE);
             winners.fill(NONE);
             maximisation(step, &foreground, &proposals, &mut energies, &mut winners, &mut flow);
@@ -103,17 +98,18 @@ impl Constancy {
     }
 
     /// Costs of some columns, each alone and with its window (3.13).
-    pub fn costs(&self, pair: &FlowPair, foreground: &[u32]) -> [Vec<u16>; 2] {
+    pub fn costs(&self, pair: &FlowPair, foreground: &[u32]) -> [Vec<[u16; ROW]>; 2] {
         let mut rank = vec![NONE; SIDE * SIDE];
         (0..).zip(foreground).for_each(|(n, cell)| rank[*cell as usize] = n);
-        let mut alone = vec![0; foreground.len() * ROW];
+        let mut alone = vec![[0; ROW]; foreground.len()];
         let [before, now] = &pair.columns;
         let (weights, costs) = (&self.tables.constancy, &self.tables.costs);
-        occupancy_constancy_by_bytes(
-            &self.step, weights, costs, foreground, before, now, &mut alone,
-        );
-        let mut around = vec![0; foreground.len() * ROW];
-        window(&self.step, foreground, &rank, &alone, &mut around);
+        let pairs = alone.as_flattened_mut();
+        occupancy_constancy_by_bytes(&self.step, weights, costs, foreground, before, now, pairs);
+        let mut around = vec![[0; ROW]; foreground.len()];
+        for (row, cell) in around.iter_mut().zip(foreground) {
+            WindowCosts::of(&self.step, &rank, pairs, *cell).fill_row(row);
+        }
         [alone, around]
     }
 }
@@ -178,9 +174,9 @@ impl Features {
     }
 
     /// Costs of some cells: distances of features (4.9).
-    pub fn costs(&self, [first, second]: [&Encoded; 2], foreground: &[u32]) -> Vec<u16> {
-        let mut costs = vec![u16::MAX; foreground.len() * ROW];
-        for (row, &cell) in costs.chunks_exact_mut(ROW).zip(foreground) {
+    pub fn costs(&self, [first, second]: [&Encoded; 2], foreground: &[u32]) -> Vec<[u16; ROW]> {
+        let mut costs = vec![[u16::MAX; ROW]; foreground.len()];
+        for (row, &cell) in costs.iter_mut().zip(foreground) {
             let (cell, own) = (cell as usize, first.of(cell as usize));
             for n in 0..SEARCH * SEARCH {
                 let step = [n / SEARCH, n % SEARCH].map(|d| d as i32 - REACH);

@@ -7,7 +7,7 @@ use super::pairs::{CellOwner, FlowPair, TwoSweeps};
 use super::tally::{Errors, METHODS, Tally};
 use crate::labels::Kind;
 use crate::train::drives::Labelled;
-use raywake_core::params::{REACH, ROW, SIDE as SEARCH};
+use raywake_core::params::{REACH, SIDE as SEARCH};
 use raywake_io::Error;
 use raywake_sim::Rng;
 use std::collections::BTreeMap;
@@ -102,8 +102,7 @@ impl Outcome {
         self.look(pair, features, [&first, &second]);
         for (n, &source) in sources.iter().enumerate() {
             let Some((step, matching)) = drawn(pair, source as usize, rng) else { continue };
-            let at = n * ROW + place(step);
-            let costs = [costs[0][at], costs[1][at], distances[at]].map(f64::from);
+            let costs = [&costs[0], &costs[1], &distances].map(|c| c[n][place(step)].into());
             self.compared.push(Compared { matching, costs });
         }
         second

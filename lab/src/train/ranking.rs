@@ -3,12 +3,12 @@
 use super::pairs::{Match, Pair};
 use raywake::backend::Tables;
 use raywake_core::params::{FOREGROUND_MAX, LINE, REACH, ROW, TILE};
-use raywake_core::record::SweepUniform;
+use raywake_core::record::{NONE, SweepUniform};
 use raywake_core::stages::COUNTERS;
 use raywake_core::stages::compact::compact;
 use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
 use raywake_core::stages::prefix_sum::prefix_sum;
-use raywake_core::stages::window::window;
+use raywake_core::stages::window::{Costs, WindowCosts};
 use serde::Serialize;
 
 /// Counts over columns.
@@ -41,7 +41,6 @@ pub struct Ranker {
     rank: Vec<u32>,
     list: Vec<u32>,
     cost: Vec<u16>,
-    matching: Vec<u16>,
 }
 
 impl Ranker {
@@ -51,7 +50,6 @@ impl Ranker {
             rank: vec![0; columns],
             list: vec![0; FOREGROUND_MAX],
             cost: vec![0; FOREGROUND_MAX * ROW],
-            matching: vec![0; FOREGROUND_MAX * ROW],
         }
     }
 
@@ -68,13 +66,10 @@ impl Ranker {
         let (weights, costs) = (&tables.constancy, &tables.costs);
         let cost = &mut self.cost[..count * ROW];
         occupancy_constancy_by_bytes(&step, weights, costs, solid, &pair.before, &pair.now, cost);
-        window(&step, solid, &self.rank, cost, &mut self.matching[..count * ROW]);
-        for m in &pair.matches {
-            let Some(row) = self.matching.chunks_exact(ROW).nth(self.rank[m.source] as usize)
-            else {
-                continue;
-            };
-            counts[m.moving as usize].add(standing(&step, m, row));
+        let mut row = [0; ROW];
+        for m in pair.matches.iter().filter(|m| self.rank[m.source] != NONE) {
+            WindowCosts::of(&step, &self.rank, cost, m.source as u32).fill_row(&mut row);
+            counts[m.moving as usize].add(standing(&step, m, &row));
         }
     }
 }

@@ -4,46 +4,42 @@ use crate::params::{LINE, REACH, ROW, SIDE};
 use crate::record::{
     Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement, pack_flow,
 };
-use crate::stages::window::outside_cost;
+use crate::stages::window::{Costs, WindowCosts, outside_cost};
 
 /// Proposes a flow for every column of `foreground`: the displacement of least energy (3.14) among
 /// those that are feasible, the first in scan order among equals.
 ///
-/// `window_cost` holds a row of [`ROW`] costs for each of them, `min_cost` and `proposal` an
-/// element. A displacement is feasible where it would win its target, or keeps the column's own.
-/// `min_cost` becomes the least energy of any displacement, feasible or not, and its place in the
-/// row, for columns none of whose neighbours has a valid flow; it must start as [`NONE`].
+/// `pair_cost` holds a row of [`ROW`] costs for each of them, `min_cost` and `proposal` an element.
+/// A displacement is feasible where it would win its target, or keeps the column's own. `min_cost`,
+/// as [`window`](super::super::window::window) leaves it, spares whoever looks at less than
+/// everything; the formula looks at everything.
+#[expect(clippy::too_many_arguments, reason = "one for every buffer")]
 pub fn expectation(
     sweep: &SweepUniform,
     foreground: &[u32],
-    window_cost: &[u16],
+    foreground_index: &[u32],
+    pair_cost: &[u16],
     flow: &[Flow],
     target_energy: &[u32],
-    min_cost: &mut [MinCost],
+    _min_cost: &[MinCost],
     proposal: &mut [Proposal],
 ) {
-    for (n, &column) in foreground.iter().enumerate() {
-        let row = &window_cost[n * ROW..][..ROW];
+    let mut row = [0; ROW];
+    for (&column, proposal) in foreground.iter().zip(proposal) {
+        WindowCosts::of(sweep, foreground_index, pair_cost, column).fill_row(&mut row);
         let outside = outside_cost(sweep, column as usize);
         let around: heapless::Vec<[i32; 2], 24> = neighbours(sweep, flow, column).collect();
-        let (mut best, mut least) = ([0, NONE], [NONE; 2]);
+        *proposal = [0, NONE];
         for index in (0..ROW).filter(|index| index % LINE < SIDE) {
             let d = displacement(index as i32);
             let Some(target) = inside(sweep, column, d) else { continue };
             // Energies are never negative: unsigned order is theirs, and NONE is above all.
             let energy = (row[index] as i32 + outside + prior(sweep, &around, d)) as u32;
-            if energy < least[0] {
-                least = [energy, index as u32];
-            }
             let feasible = energy < target_energy[target] || flow[column as usize] == pack_flow(d);
-            if feasible && energy < best[1] {
-                best = [pack_flow(d), energy];
+            if feasible && energy < proposal[1] {
+                *proposal = [pack_flow(d), energy];
             }
         }
-        if around.is_empty() {
-            min_cost[n] = least;
-        }
-        proposal[n] = best;
     }
 }
 
@@ -85,37 +81,52 @@ struct Best {
     index: i32,
 }
 
-/// [`expectation`] for the scalar backend: one to nine candidates in the place of 961.
-///
-/// Smoothing over `n` valid neighbours with displacements `s` collapses to
-/// `w_p (S2 + n |d|² - 2 d.S1)` with `S1`, `S2` the sums of `s` and `|s|²`. A column without valid
-/// neighbours looks at every displacement once: should it be without neighbours again, the least of
-/// them wins if it is feasible. With neighbours, that least plus the smoothing term, a paraboloid
-/// around their mean, excludes all but a few: rings around the rounded mean are visited until no
-/// farther ring can win or tie.
+/// [`expectation`] for the scalar backend: see [`propose`].
+#[expect(clippy::too_many_arguments, reason = "one for every buffer")]
 pub fn expectation_by_rings(
     sweep: &SweepUniform,
     foreground: &[u32],
-    window_cost: &[u16],
+    foreground_index: &[u32],
+    pair_cost: &[u16],
     flow: &[Flow],
     target_energy: &[u32],
-    min_cost: &mut [MinCost],
+    min_cost: &[MinCost],
     proposal: &mut [Proposal],
 ) {
-    for (n, &column) in foreground.iter().enumerate() {
-        let search = Search {
-            sweep,
-            row: &window_cost[n * ROW..][..ROW],
-            target_energy,
-            own: flow[column as usize],
-            column,
-            i: column as i32 / sweep.side,
-            j: column as i32 % sweep.side,
-        };
-        let best = search.best(&Sums::of(sweep, flow, column), &mut min_cost[n]);
-        proposal[n] =
-            best.map_or([0, NONE], |b| [pack_flow(displacement(b.index)), b.energy as u32]);
+    for ((&column, &least), proposal) in foreground.iter().zip(min_cost).zip(proposal) {
+        let costs = WindowCosts::of(sweep, foreground_index, pair_cost, column);
+        *proposal = propose(sweep, column, &costs, least, flow, target_energy);
     }
+}
+
+/// What a column proposes: one to nine candidates in the place of 961.
+///
+/// `least` is the least energy of the column at any displacement, smoothing apart, and its place.
+/// Smoothing over `n` valid neighbours with displacements `s` collapses to
+/// `w_p (S2 + n |d|² - 2 d.S1)` with `S1`, `S2` the sums of `s` and `|s|²`. A column without valid
+/// neighbours takes the least if that is feasible, else looks at everything. With neighbours, the
+/// least plus the smoothing term, a paraboloid around their mean, excludes all but a few: rings
+/// around the rounded mean are visited until no farther ring can win or tie.
+pub fn propose(
+    sweep: &SweepUniform,
+    column: u32,
+    costs: &impl Costs,
+    least: MinCost,
+    flow: &[Flow],
+    target_energy: &[u32],
+) -> Proposal {
+    let search = Search {
+        sweep,
+        costs,
+        target_energy,
+        own: flow[column as usize],
+        column,
+        i: column as i32 / sweep.side,
+        j: column as i32 % sweep.side,
+        outside: outside_cost(sweep, column as usize),
+    };
+    let best = search.best(&Sums::of(sweep, flow, column), least);
+    best.map_or([0, NONE], |b| [pack_flow(displacement(b.index)), b.energy as u32])
 }
 
 /// Displacement at an index of a row.
@@ -158,30 +169,28 @@ impl Sums {
 }
 
 /// One column's view of its candidates.
-struct Search<'a> {
+struct Search<'a, C> {
     sweep: &'a SweepUniform,
-    row: &'a [u16],
+    costs: &'a C,
     target_energy: &'a [u32],
     own: Flow,
     column: u32,
     i: i32,
     j: i32,
+    /// Cost of its window neighbours outside the grid.
+    outside: i32,
 }
 
-impl Search<'_> {
+impl<C: Costs> Search<'_, C> {
     /// The best feasible candidate.
-    fn best(&self, around: &Sums, min_cost: &mut MinCost) -> Option<Best> {
-        let outside = outside_cost(self.sweep, self.column as usize);
+    fn best(&self, around: &Sums, [energy, index]: MinCost) -> Option<Best> {
         let mut best = Best { energy: i32::MAX, index: i32::MAX };
-        let [energy, index] = *min_cost;
         if around.count > 0 {
-            self.rings(outside, energy as i32, around, &mut best);
+            self.rings(energy as i32, around, &mut best);
         } else {
-            if index != NONE {
-                self.consider(index as i32, energy as i32, &mut best);
-            }
+            self.consider(index as i32, energy as i32, &mut best);
             if best.index == i32::MAX {
-                *min_cost = self.everywhere(outside, &mut best);
+                self.everywhere(&mut best);
             }
         }
         (best.index != i32::MAX).then_some(best)
@@ -206,46 +215,28 @@ impl Search<'_> {
         (-REACH).max(-at)..=REACH.min(self.sweep.side - 1 - at)
     }
 
-    /// Every displacement, without smoothing. Returns the least energy, feasible or not, and where:
-    /// the first in scan order among equals.
-    fn everywhere(&self, outside: i32, best: &mut Best) -> MinCost {
-        let cost = self.sweep.displacement_cost;
-        let mut least = [NONE; 2];
-        // From the middle, where a displacement costs least, so that most lines end at the first
-        // look.
-        for n in 0..SIDE as i32 {
-            let du = if n % 2 == 0 { n / 2 } else { -(n / 2) - 1 };
-            if !self.reach(self.i).contains(&du) {
-                continue;
-            }
+    /// Every displacement, without smoothing.
+    fn everywhere(&self, best: &mut Best) {
+        let (cost, mut row) = (self.sweep.displacement_cost, [0; ROW]);
+        self.costs.fill_row(&mut row);
+        for du in self.reach(self.i) {
             let line = (du + REACH) * LINE as i32 + REACH;
-            let of_line = cost * du * du + outside;
-            // No energy of the line is below this.
-            let floor = lowest(&self.row[(line - REACH) as usize..][..LINE]) as i32 + of_line;
-            if floor as u32 > least[0] && floor > best.energy {
-                continue;
-            }
-            let energy = |dv: i32| self.row[(line + dv) as usize] as i32 + cost * dv * dv + of_line;
-            let least_of_line = self.reach(self.j).map(energy).min().unwrap_or(i32::MAX);
-            if least_of_line as u32 <= least[0] {
-                let first = self.reach(self.j).find(|dv| energy(*dv) == least_of_line);
-                least = least.min([least_of_line as u32, (line + first.unwrap_or(0)) as u32]);
-            }
-            if least_of_line <= best.energy {
-                self.reach(self.j).for_each(|dv| self.consider(line + dv, energy(dv), best));
+            for dv in self.reach(self.j) {
+                let square = du * du + dv * dv;
+                let energy = row[(line + dv) as usize] as i32 + cost * square + self.outside;
+                self.consider(line + dv, energy, best);
             }
         }
-        least
     }
 
     /// Rings of growing distance around the mean of the neighbours' flows.
-    fn rings(&self, outside: i32, least: i32, around: &Sums, best: &mut Best) {
+    fn rings(&self, least: i32, around: &Sums, best: &mut Best) {
         let (n, [su, sv], smoothing) = (around.count, around.sum, self.sweep.smoothing);
         let mean = [round_div(su, n), round_div(sv, n)];
         let costs = |u: i32, v: i32| {
             let square = u * u + v * v;
             let smooth = around.squares + n * square - 2 * (u * su + v * sv);
-            outside + self.sweep.displacement_cost * square + smoothing * smooth
+            self.outside + self.sweep.displacement_cost * square + smoothing * smooth
         };
         // |s - mean|² summed: what the smoothing costs at the mean itself, rounded down.
         let spread = (n * around.squares - su * su - sv * sv) / n;
@@ -263,7 +254,7 @@ impl Search<'_> {
                     let v = mean[1] + dv;
                     if self.reach(self.i).contains(&u) && self.reach(self.j).contains(&v) {
                         let index = (u + REACH) * LINE as i32 + v + REACH;
-                        let energy = self.row[index as usize] as i32 + costs(u, v);
+                        let energy = self.costs.at(index as usize) as i32 + costs(u, v);
                         self.consider(index, energy, best);
                     }
                     dv += stride;
@@ -271,12 +262,6 @@ impl Search<'_> {
             }
         }
     }
-}
-
-/// The least cost of a line, its padding included; by lanes.
-#[inline]
-fn lowest(line: &[u16]) -> u16 {
-    line.iter().fold(u16::MAX, |least, cost| least.min(*cost))
 }
 
 /// `a / n` to the nearest integer, halves upwards; `n` is positive.

@@ -7,7 +7,7 @@ use crate::params::{LINE, REACH, ROW};
 use crate::record::{
     Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement, pack_flow,
 };
-use crate::stages::window::outside_cost;
+use crate::stages::window::{Costs, WindowCosts, outside_cost, window};
 use std::vec;
 use std::vec::Vec;
 
@@ -72,22 +72,23 @@ fn brute_force(
 }
 
 type Expectation =
-    fn(&SweepUniform, &[u32], &[u16], &[Flow], &[u32], &mut [MinCost], &mut [Proposal]);
+    fn(&SweepUniform, &[u32], &[u32], &[u16], &[Flow], &[u32], &[MinCost], &mut [Proposal]);
 
 /// The rounds as [`crate::stages::FLOW`] has them.
 fn run(
     step: Expectation,
     sweep: &SweepUniform,
     rounds: u32,
-    foreground: &[u32],
+    [foreground, rank]: [&[u32]; 2],
     costs: &[u16],
 ) -> Vec<Flow> {
     let columns = (sweep.side * sweep.side) as usize;
     let (mut flows, mut energy) = (vec![0; columns], vec![NONE; columns]);
     let mut proposal = vec![[0; 2]; foreground.len()];
-    let mut least = vec![[NONE; 2]; foreground.len()];
+    let mut least = vec![[0; 2]; foreground.len()];
+    window(sweep, foreground, rank, costs, &mut least);
     for _ in 0..rounds {
-        step(sweep, foreground, costs, &flows, &energy, &mut least, &mut proposal);
+        step(sweep, foreground, rank, costs, &flows, &energy, &least, &mut proposal);
         energy.fill(NONE);
         let mut index = vec![NONE; columns];
         maximisation(sweep, foreground, &proposal, &mut energy, &mut index, &mut flows);
@@ -111,18 +112,24 @@ fn equals_brute_force() {
             ..Default::default()
         };
         let foreground: Vec<u32> = (0..37 * 37).filter(|_| random(share) == 0).collect();
-        // Costs of few values, so that ties are common, with a preferred displacement.
-        let matching: Vec<u16> = (0..foreground.len() * ROW)
+        // Costs of few values, so that ties are common, with a preferred displacement a half.
+        let costs: Vec<u16> = (0..foreground.len() * ROW)
             .map(|n| {
-                let liked = n % ROW == 500 || ((n / ROW).is_multiple_of(5) && n % ROW == 333);
-                (if liked { random(3) * 900 } else { 2000 + random(12) * 700 }) as u16
+                let liked = n % ROW == if 2 * n < foreground.len() * ROW { 500 } else { 333 };
+                (if liked { random(3) * 200 } else { 500 + random(12) * 175 }) as u16
             })
             .collect();
+        let mut rank = vec![NONE; 37 * 37];
+        foreground.iter().enumerate().for_each(|(n, c)| rank[*c as usize] = n as u32);
+        let mut matching = vec![[0; ROW]; foreground.len()];
+        for (column, row) in foreground.iter().zip(&mut matching) {
+            WindowCosts::of(&sweep, &rank, &costs, *column).fill_row(row);
+        }
         let mut flows = vec![];
         for rounds in [1, 2, 6, 20] {
-            let wanted = brute_force(&sweep, rounds, &foreground, &matching);
+            let wanted = brute_force(&sweep, rounds, &foreground, matching.as_flattened());
             for step in [expectation as Expectation, expectation_by_rings] {
-                flows = run(step, &sweep, rounds, &foreground, &matching);
+                flows = run(step, &sweep, rounds, [&foreground, &rank], &costs);
                 assert!(flows == wanted, "seed {seed}, {rounds} rounds");
             }
         }
