@@ -7,9 +7,14 @@
 use crate::continuity::Reset;
 use crate::dropped::DroppedReturns;
 use crate::encoder::ColumnClass;
+use crate::motion_compensation::EgoMotion;
+use crate::params::COLUMNS_MAX;
+use crate::pose::{Pose, Twist};
 use crate::refinement::cues::Cues;
+use crate::sweep::Point;
 use crate::thinning::Thinning;
 use crate::tracklet::TrackletTurnover;
+use glam::DVec3;
 
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
 #[derive(Clone, Copy, Debug)]
@@ -30,17 +35,31 @@ pub struct PairFlows<'a> {
     pub foreground_dropped: usize,
 }
 
-/// Flow of every return of a sweep, in the source's order.
+/// Flow of every return of a sweep, in the source's order. Columns tell it: that of a return is made up
+/// when it is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct PointFlows<'a> {
-    taken: &'a [PointFlow],
-    thinning: Thinning,
+    /// Those of the solid columns, then those of others whose returns move with a cluster.
+    pub(crate) columns: &'a [ColumnFlow],
+    /// Of those that were taken.
+    pub(crate) taken: &'a [ReturnFlow],
+    /// The sweep.
+    pub(crate) points: &'a [Point],
+    pub(crate) thinning: Thinning,
+    pub(crate) ego: EgoMotion,
 }
 
 impl<'a> PointFlows<'a> {
-    /// Of those that were taken.
-    pub fn new(taken: &'a [PointFlow], thinning: Thinning) -> PointFlows<'a> {
-        PointFlows { taken, thinning }
+    /// Of a sweep taken whole by a vehicle that stands. `taken` has an element for each of
+    /// `points`.
+    pub fn at_rest(
+        columns: &'a [ColumnFlow],
+        taken: &'a [ReturnFlow],
+        points: &'a [Point],
+    ) -> PointFlows<'a> {
+        let thinning = Thinning::new(points.len(), taken.len());
+        let ego = EgoMotion::new(&Pose::IDENTITY, &Twist::default());
+        PointFlows { columns, taken, points, thinning, ego }
     }
 
     /// Returns of the sweep.
@@ -51,8 +70,30 @@ impl<'a> PointFlows<'a> {
     /// That of a return of the sweep.
     #[inline]
     pub fn get(self, index: usize) -> Option<PointFlow> {
-        let one = || self.taken.get(self.thinning.rank(index)?).copied();
-        (index < self.count()).then(|| one().unwrap_or(PointFlow::OVER_CAPACITY))
+        let point = self.points.get(index)?;
+        let taken = self.thinning.rank(index).and_then(|rank| self.taken.get(rank));
+        Some(taken.map_or(PointFlow::OVER_CAPACITY, |taken| self.of(*taken, point)))
+    }
+
+    /// A return moves with its column; outside the window, and where nothing is solid, with the
+    /// ground.
+    #[inline]
+    fn of(self, taken: ReturnFlow, point: &Point) -> PointFlow {
+        let mut out = PointFlow { status: taken.status(), ..PointFlow::default() };
+        if let Some(flow) = self.columns.get(taken.record()) {
+            out.velocity_world_mps = flow.velocity_world_mps;
+            out.covariance = flow.covariance;
+            out.age = flow.age;
+            out.basis = flow.basis;
+            out.probability = flow.probability;
+            out.class = flow.class;
+        }
+        let finite = |c: f32| if c.is_finite() { c as f64 } else { 0.0 };
+        let [x, y, z] = point.position;
+        // `map` of arrays is a call.
+        let at = DVec3::new(finite(x), finite(y), finite(z));
+        out.velocity_ego_mps = self.ego.ego_from_world(at, out.velocity_world_mps);
+        out
     }
 
     /// Those of all returns.
@@ -60,6 +101,37 @@ impl<'a> PointFlows<'a> {
         (0..self.count()).map(move |n| self.get(n).unwrap_or(PointFlow::OVER_CAPACITY))
     }
 }
+
+/// What is kept of a return: the record of its column, and what became of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReturnFlow(u32);
+
+impl ReturnFlow {
+    /// A return whose column has the record `record` of its sweep's; none moves with the ground.
+    pub const fn new(record: Option<u32>, status: Status) -> ReturnFlow {
+        let record = match record {
+            Some(record) if record < ReturnFlow::NO_RECORD => record,
+            _ => ReturnFlow::NO_RECORD,
+        };
+        ReturnFlow((status as u32) << ReturnFlow::RECORD_BITS | record)
+    }
+
+    #[inline]
+    fn record(self) -> usize {
+        (self.0 & ReturnFlow::NO_RECORD) as usize
+    }
+
+    #[inline]
+    fn status(self) -> Status {
+        Status::ALL[(self.0 >> ReturnFlow::RECORD_BITS) as usize % Status::ALL.len()]
+    }
+
+    const RECORD_BITS: u32 = 24;
+    /// Beyond all records.
+    const NO_RECORD: u32 = (1 << ReturnFlow::RECORD_BITS) - 1;
+}
+
+const _: () = assert!(COLUMNS_MAX < ReturnFlow::NO_RECORD as usize);
 
 /// What one sweep yields. Borrowed from the caller's [`Output`].
 #[derive(Clone, Copy, Debug)]
@@ -83,7 +155,7 @@ pub struct Output<'a> {
     /// [`crate::params::SOLID_MAX`] elements, or as many as the profile has columns.
     pub columns: &'a mut [ColumnFlow],
     /// As many as the profile takes returns.
-    pub points: &'a mut [PointFlow],
+    pub points: &'a mut [ReturnFlow],
 }
 
 /// What a column's flow rests on.

@@ -60,7 +60,7 @@ impl Pipeline {
         setup: &Setup,
         machine: Machine<P, impl Team, impl StageTimer + Send>,
         sweep: &Sweep,
-        before: &[Point],
+        before: &'o [Point],
         out: Output<'o>,
     ) -> Result<SweepOutput<'o>, P::Error> {
         let Machine { backend, team, timer } = machine;

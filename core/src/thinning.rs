@@ -39,6 +39,9 @@ impl Thinning {
     /// Where among those taken a return of the sweep is, if it is.
     #[inline]
     pub fn rank(self, index: usize) -> Option<usize> {
+        if self.of == self.taken {
+            return (index < self.taken).then_some(index);
+        }
         let rank = (index as u64 * self.taken as u64).div_ceil(self.of.max(1) as u64) as usize;
         (rank < self.taken && self.index(rank) == index).then_some(rank)
     }

@@ -3,7 +3,7 @@
 use crate::dropped::ReturnKind;
 use crate::encoder::{ColumnClass, ColumnScores, class_of};
 use crate::frame::{SweepPair, centre_of};
-use crate::output::{ColumnFlow, FlowBasis, Output, PairFlows, PointFlow, PointFlows, Status};
+use crate::output::{ColumnFlow, FlowBasis, Output, PairFlows, PointFlows, ReturnFlow, Status};
 use crate::params::COLUMNS_MAX;
 use crate::perceive::Perceived;
 use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
@@ -16,7 +16,7 @@ use crate::tracklet::observe::Observations;
 use crate::tracklet::{TrackletTurnover, Tracklets};
 use glam::DVec3;
 
-/// Index of the record of every column of the window, [`NONE`] where it has none.
+/// Index of the record of every column of the first sweep's window, [`NONE`] where it has none.
 pub(crate) struct FlowOfColumn([u32; COLUMNS_MAX]);
 
 impl FlowOfColumn {
@@ -45,25 +45,26 @@ impl Found<'_> {
     pub fn put_out<'o>(
         &self,
         team: &impl Team,
-        points: &[Point],
+        points: &'o [Point],
         turnover: TrackletTurnover,
         index: &mut FlowOfColumn,
         out: Output<'o>,
     ) -> PairFlows<'o> {
-        let (count, valid, unlisted) = self.columns(index, out.columns);
-        let columns = &out.columns[..count];
-        let thinning = self.pair.before.points;
-        let points = TakenPoints::new(points, thinning.taken());
-        self.points(team, points, columns, index, &mut out.points[..points.count()]);
+        let (solid, valid, unlisted) = self.columns(index, out.columns);
+        let (records, unplaced) = self.clusters(index, out.columns, solid);
+        let (columns, thinning) = (&out.columns[..records], self.pair.before.points);
+        let of_points = TakenPoints::new(points, thinning.taken());
+        let taken = &mut out.points[..of_points.count()];
+        self.points(team, of_points, columns, index, taken);
         let beyond = self.perceived.marked - self.perceived.foreground.len();
         let observed = self.observations.beyond_capacity + self.refinement.beyond_capacity();
         PairFlows {
-            columns,
-            points: PointFlows::new(&out.points[..points.count()], thinning),
+            columns: &columns[..solid],
+            points: PointFlows { columns, taken, points, thinning, ego: self.pair.ego },
             dt_s: self.pair.dt_s,
             turnover,
             valid,
-            foreground_dropped: beyond + observed + unlisted,
+            foreground_dropped: beyond + observed + unlisted + unplaced,
         }
     }
 
@@ -74,9 +75,9 @@ impl Found<'_> {
         let mut foreground = self.perceived.foreground.iter().enumerate().peekable();
         let mut observed = self.observations.all.iter().peekable();
         let (mut count, mut valid, mut beyond) = (0, 0, 0);
+        index.0[..self.perceived.columns_before.len()].fill(NONE);
         for (column, record) in self.perceived.columns_before.iter().enumerate() {
             let rank = foreground.next_if(|(_, c)| **c as usize == column).map(|(n, _)| n);
-            index.0[column] = NONE;
             if record[1] == 0 {
                 continue;
             }
@@ -101,13 +102,60 @@ impl Found<'_> {
             match out.get_mut(count) {
                 Some(out) => {
                     *out = flow;
-                    index.0[column] = count as u32;
+                    if let Some(column) = self.in_first_window(i, j) {
+                        index.0[column] = count as u32;
+                    }
                     count += 1;
                 }
                 None => beyond += 1,
             }
         }
         (count, valid, beyond)
+    }
+
+    /// Writes one record behind the `count` first per column that is not solid, but part of a
+    /// cluster that moves; returns how many there are then, and how many there was no room for.
+    fn clusters(
+        &self,
+        index: &mut FlowOfColumn,
+        out: &mut [ColumnFlow],
+        mut count: usize,
+    ) -> (usize, usize) {
+        let (mut beyond, columns) = (0, self.perceived.columns_before.len());
+        if self.pair.profile.refinement_sweeps == 0 {
+            return (count, beyond);
+        }
+        let (r, dt) = (self.pair.profile.voxel_m as f32, self.pair.dt_s as f32);
+        for (column, record) in (0..).zip(&mut index.0[..columns]) {
+            if *record != NONE {
+                continue;
+            }
+            let Some(found) = self.refinement.at(column) else { continue };
+            let probability = found.cues.probability(&self.pair.profile.moves);
+            let mut flow =
+                ColumnFlow { basis: FlowBasis::Joined, probability, ..Default::default() };
+            if self.moves(probability) {
+                flow.velocity_world_mps = found.by.map(|v| v * r / dt);
+                flow.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
+            }
+            match out.get_mut(count) {
+                Some(out) => {
+                    *out = flow;
+                    *record = count as u32;
+                    count += 1;
+                }
+                None => beyond += 1,
+            }
+        }
+        (count, beyond)
+    }
+
+    /// Index in the first sweep's window of a column of the new one.
+    fn in_first_window(&self, i: i32, j: i32) -> Option<usize> {
+        let [i, j] = [i + self.sweep.shift_x, j + self.sweep.shift_y];
+        let side = self.sweep.side;
+        let inside = (0..side).contains(&i) && (0..side).contains(&j);
+        inside.then_some((i * side + j) as usize)
     }
 
     /// Whether what moves with a probability is put out so. Whole cells have no other evidence.
@@ -131,11 +179,7 @@ impl Found<'_> {
 
     /// What a column is taken for that both windows have.
     fn class_at(&self, i: i32, j: i32) -> Option<ColumnClass> {
-        let [i, j] = [i + self.sweep.shift_x, j + self.sweep.shift_y];
-        let side = self.sweep.side;
-        let inside = (0..side).contains(&i) && (0..side).contains(&j);
-        let scores = self.scores.get((i * side + j) as usize).filter(|_| inside)?;
-        Some(class_of(scores))
+        Some(class_of(self.scores.get(self.in_first_window(i, j)?)?))
     }
 
     /// The match of a column that is `rank`-th of the foreground; whether it has one.
@@ -151,74 +195,39 @@ impl Found<'_> {
         true
     }
 
-    /// Writes one record per return taken of the first sweep, in its order.
+    /// Writes what is kept of every return taken of the first sweep, in its order.
     fn points(
         &self,
         team: &impl Team,
         points: TakenPoints,
         columns: &[ColumnFlow],
         index: &FlowOfColumn,
-        out: &mut [PointFlow],
+        out: &mut [ReturnFlow],
     ) {
         let half = out.len() / 2;
         let (first, second) = out.split_at_mut(half);
-        let part = |from: usize, out: &mut [PointFlow]| {
+        let part = |from: usize, out: &mut [ReturnFlow]| {
             let places = self.returns.before(from);
             let points = points.range(from..from + out.len());
             for (((column, is_apart), point), out) in places.zip(points).zip(out) {
-                *out = self.point(column, is_apart, point, columns, index);
+                let record = index.0.get(column as usize).filter(|r| !is_apart && **r != NONE);
+                let flow = record.and_then(|r| columns.get(*r as usize));
+                *out = ReturnFlow::new(record.copied(), self.status(column, point, flow));
             }
         };
         team.join(|| part(0, first), || part(half, second));
     }
 
-    /// A return moves with its column; outside the window, and where nothing is solid, with the
-    /// ground.
+    /// What became of a return with the flow of its column.
     #[inline]
-    fn point(
-        &self,
-        column: u32,
-        is_apart: bool,
-        point: &Point,
-        columns: &[ColumnFlow],
-        index: &FlowOfColumn,
-    ) -> PointFlow {
-        let mut out = PointFlow::default();
-        if let Some(flow) = columns.get(self.flow_at(column, index)).filter(|_| !is_apart) {
-            out.velocity_world_mps = flow.velocity_world_mps;
-            out.covariance = flow.covariance;
-            out.age = flow.age;
-            out.basis = flow.basis;
-            out.probability = flow.probability;
-            out.class = flow.class;
-        } else if self.pair.profile.refinement_sweeps > 0 && !is_apart && column != NONE {
-            // Its column is not solid, but part of a cluster.
-            if let Some(found) = self.refinement.at(column) {
-                let (r, dt) = (self.pair.profile.voxel_m as f32, self.pair.dt_s as f32);
-                out.probability = found.cues.probability(&self.pair.profile.moves);
-                out.basis = FlowBasis::Joined;
-                if self.moves(out.probability) {
-                    out.velocity_world_mps = found.by.map(|v| v * r / dt);
-                    out.covariance = found.covariance.map(|v| v * (r / dt) * (r / dt));
-                }
-            }
-        }
-        out.status = self.status(column, point, &out);
-        let finite = |c: f32| if c.is_finite() { c as f64 } else { 0.0 };
-        let [x, y, z] = point.position;
-        // `map` of arrays is a call.
-        let at = DVec3::new(finite(x), finite(y), finite(z));
-        out.velocity_ego_mps = self.pair.ego.ego_from_world(at, out.velocity_world_mps);
-        out
-    }
-
-    /// What became of a return with this flow.
-    fn status(&self, column: u32, point: &Point, flow: &PointFlow) -> Status {
+    fn status(&self, column: u32, point: &Point, flow: Option<&ColumnFlow>) -> Status {
         match ReturnKind::of(self.rig, point) {
             ReturnKind::Valid if column == NONE => Status::OutsideWindow,
-            ReturnKind::Valid if flow.basis == FlowBasis::Unmatched => Status::Unmatched,
-            ReturnKind::Valid if self.is_moving(flow) => Status::Moving,
-            ReturnKind::Valid => Status::Static,
+            ReturnKind::Valid => flow.map_or(Status::Static, |flow| match flow.basis {
+                FlowBasis::Unmatched => Status::Unmatched,
+                _ if self.is_moving(flow) => Status::Moving,
+                _ => Status::Static,
+            }),
             ReturnKind::OwnVehicle => Status::OwnVehicle,
             ReturnKind::NoEcho => Status::NoEcho,
             ReturnKind::NotFinite | ReturnKind::UnknownSensor => Status::Invalid,
@@ -226,18 +235,7 @@ impl Found<'_> {
     }
 
     /// Whether it is put out as moving. Whole cells, followed by a filter, are never quite at rest.
-    fn is_moving(&self, flow: &PointFlow) -> bool {
+    fn is_moving(&self, flow: &ColumnFlow) -> bool {
         flow.probability >= self.pair.profile.moves.moves_min && flow.velocity_world_mps != [0.0; 2]
-    }
-
-    /// Where the record is of a column of the window before; beyond all records where there is
-    /// none.
-    #[inline]
-    fn flow_at(&self, column: u32, index: &FlowOfColumn) -> usize {
-        let side = self.sweep.side;
-        let i = (column / side as u32) as i32 - self.sweep.shift_x;
-        let j = (column % side as u32) as i32 - self.sweep.shift_y;
-        let seen = column != NONE && (0..side).contains(&i) && (0..side).contains(&j);
-        if seen { index.0[(i * side + j) as usize] as usize } else { NONE as usize }
     }
 }

@@ -156,7 +156,7 @@ fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
         part("rest of the pipeline", "Pipeline", pipeline - tracklets - refinement),
         part(
             "flow of columns and returns",
-            "ColumnFlow, PointFlow",
+            "ColumnFlow, ReturnFlow",
             Drive::bytes(profile) - pipeline,
         ),
         part("two sweeps at capacity", "Point", 2 * profile.returns() * size_of::<Point>()),

@@ -1,7 +1,7 @@
 //! One sweep through figure 3.1 on the chosen backend. Nothing in here allocates.
 
 use raywake_alloc_guard::Sealed;
-use raywake_core::output::{self, ColumnFlow, Output, PointFlow, TrackletState};
+use raywake_core::output::{self, ColumnFlow, Output, ReturnFlow, TrackletState};
 use raywake_core::params::{Profile, SOLID_MAX};
 use raywake_core::perceive::Machine;
 use raywake_core::pipeline::Pipeline;
@@ -24,7 +24,7 @@ struct Parts {
     pipeline: Box<Pipeline>,
     backend: Backend,
     columns: Vec<ColumnFlow>,
-    points: Vec<PointFlow>,
+    points: Vec<ReturnFlow>,
 }
 
 /// Room for columns that are put out.
@@ -57,7 +57,7 @@ impl Drive {
             pipeline,
             backend,
             columns: vec![ColumnFlow::default(); solid(profile)],
-            points: vec![PointFlow::default(); profile.returns()],
+            points: vec![ReturnFlow::default(); profile.returns()],
         };
         Drive { parts: Sealed::new("sweep", parts) }
     }
@@ -66,7 +66,7 @@ impl Drive {
     pub fn bytes(profile: &Profile) -> usize {
         size_of::<Pipeline>()
             + solid(profile) * size_of::<ColumnFlow>()
-            + profile.returns() * size_of::<PointFlow>()
+            + profile.returns() * size_of::<ReturnFlow>()
     }
 
     /// The backend.
@@ -79,7 +79,11 @@ impl Drive {
     /// # Errors
     /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after
     /// which the next sweep may be given.
-    pub fn step(&mut self, sweep: &Sweep, before: &[Point]) -> Result<Stepped<'_>, RunError> {
+    pub fn step<'a>(
+        &'a mut self,
+        sweep: &Sweep,
+        before: &'a [Point],
+    ) -> Result<Stepped<'a>, RunError> {
         self.parts.step(|Parts { setup, pipeline, backend, columns, points }| {
             let mut laps = Laps::start();
             let machine = Machine { backend, team: &ThreadTeam, timer: &mut laps };

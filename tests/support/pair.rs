@@ -1,7 +1,7 @@
 //! Two backends side by side.
 
 use raywake::backend::{Backend, Tables};
-use raywake_core::output::{ColumnFlow, Output, PointFlow, TrackletState};
+use raywake_core::output::{ColumnFlow, Output, PointFlow, ReturnFlow, TrackletState};
 use raywake_core::params::POINTS_MAX;
 use raywake_core::perceive::{Machine, Perceive, Perceived, StageTimer};
 use raywake_core::pipeline::Pipeline;
@@ -103,7 +103,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
     /// One sweep; `before` is the sweep before it.
     pub fn step(&mut self, now: &SimSweep, before: Option<&SimSweep>) -> Stages {
         let mut columns = vec![ColumnFlow::default(); self.setup.profile.columns()];
-        let mut points = vec![PointFlow::default(); POINTS_MAX];
+        let mut points = vec![ReturnFlow::default(); POINTS_MAX];
         let out = Output { columns: &mut columns, points: &mut points };
         let seen = before.map_or(&[][..], |b| &b.points);
         let mut witness = Witness { backend: &mut self.backend, stages: Stages::default() };

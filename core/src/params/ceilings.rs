@@ -15,8 +15,8 @@ pub const COLUMNS_MAX: usize = (SIDE_MAX * SIDE_MAX).next_multiple_of(TILE);
 /// and counted. The busiest sweep seen has 8,795 in a window of 50 m.
 pub const SOLID_MAX: usize = 32_768;
 /// Clusters of one sweep, whole and in parts; columns of further ones are taken to stand, and
-/// counted. As many as columns that flow is put out of: most clusters have several.
-pub const CLUSTERS_MAX: usize = SOLID_MAX;
+/// counted. Eight times what every sweep seen has room in, in a window of 100 m too.
+pub const CLUSTERS_MAX: usize = 8192;
 /// Foreground columns of one sweep; further ones, in column order, are dropped and counted.
 /// The busiest sweep seen has 8,795 solid columns in a 50 m window.
 pub const FOREGROUND_MAX: usize = 12_288;
@@ -48,7 +48,7 @@ pub const EXTENT_VOXELS: i32 = 4095;
 /// Voxels a ray may be traced for.
 pub const RANGE_STEPS_MAX: i32 = 2000;
 /// Sweeps the refinement of the flow may look at.
-pub const REFINEMENT_SWEEPS_MAX: usize = 4;
+pub const REFINEMENT_SWEEPS_MAX: usize = 3;
 /// Levels above the ground that clusters may have: a column's share one 32-bit word.
 pub const CLUSTER_LEVELS_MAX: usize = 32;
 /// Sub-voxels along an axis of a voxel, each of which keeps one return.

@@ -8,10 +8,9 @@ use super::scene::{PARAMS, Run, Thing, ground, rig, seen};
 use super::*;
 use crate::centroid_ekf::CentroidEkf;
 use glam::DVec3;
-use raywake_core::output::{PointFlow, PointFlows};
+use raywake_core::output::{ColumnFlow, PointFlows, ReturnFlow, Status};
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
-use raywake_core::thinning::Thinning;
 use std::vec;
 use std::vec::Vec;
 
@@ -189,11 +188,10 @@ fn the_flow_tells_neighbours_apart() {
             let points = seen(&[car, person], stamp_s, 0.0, 0);
             let alone = seen(&[car], stamp_s, 0.0, 0).len();
             flows.clear();
-            flows.resize(alone, PointFlow::default());
-            let moving = PointFlow { velocity_world_mps: of_person, ..PointFlow::default() };
-            flows.resize(points.len(), moving);
-            let all = Thinning::new(points.len(), points.len());
-            let of = PointFlows::new(&flows, all);
+            flows.resize(alone, ReturnFlow::new(None, Status::Static));
+            let moving = [ColumnFlow { velocity_world_mps: of_person, ..ColumnFlow::default() }];
+            flows.resize(points.len(), ReturnFlow::new(Some(0), Status::Static));
+            let of = PointFlows::at_rest(&moving, &flows, &points);
             run.take(stamp_s, &points, Some(Flows { of, reach_m: 40.0 }));
             born += run.step().born;
         }

@@ -4,8 +4,7 @@ extern crate std;
 use super::super::scene::{PARAMS, Run, Thing, ground, seen};
 use super::super::*;
 use raywake_core::encoder::ColumnClass;
-use raywake_core::output::{PointFlow, PointFlows};
-use raywake_core::thinning::Thinning;
+use raywake_core::output::{ColumnFlow, PointFlows, ReturnFlow, Status};
 use std::vec;
 use std::vec::Vec;
 
@@ -21,19 +20,21 @@ fn objects_are_what_moves_and_what_could() {
         let (mut run, mut members) = (Run::new(1, 8), vec![0; 8]);
         for n in 0..20 {
             let stamp_s = n as f64 * 0.1;
-            let mut flows = vec![PointFlow::default(); ground().len()];
+            let mut columns = Vec::new();
+            let mut flows = vec![ReturnFlow::new(None, Status::Static); ground().len()];
             for (thing, class) in things.iter().zip(classes) {
                 let moves = thing.velocity[0] > 0.0 || thing.at[1] < -10.0 && n < 10;
-                let flow = PointFlow {
+                columns.push(ColumnFlow {
                     velocity_world_mps: thing.velocity.map(|v| v as f32),
                     probability: if moves { 0.9 } else { 0.0 },
                     class: class.filter(|_| encoder),
-                    ..PointFlow::default()
-                };
+                    ..ColumnFlow::default()
+                });
+                let flow = ReturnFlow::new(Some(columns.len() as u32 - 1), Status::Static);
                 flows.resize(flows.len() + thing.points(0.0).len(), flow);
             }
             let points = seen(&things, stamp_s, 0.0, 0);
-            let of = PointFlows::new(&flows, Thinning::new(points.len(), points.len()));
+            let of = PointFlows::at_rest(&columns, &flows, &points);
             run.take(stamp_s, &points, flow.then_some(Flows { of, reach_m: 40.0 }));
             run.step();
             run.front_end.members().for_each(|(index, slot)| {
