@@ -35,8 +35,8 @@ pub struct PairFlows<'a> {
     pub foreground_dropped: usize,
 }
 
-/// Flow of every return of a sweep, in the source's order. Columns tell it: that of a return is made
-/// up when it is asked for.
+/// Flow of every return of a sweep, in the source's order. It is that of a column, and made up when
+/// it is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct PointFlows<'a> {
     /// Those of the solid columns, then those of others whose returns move with a cluster.
