@@ -1,8 +1,9 @@
 //! Height of the ground under a window of square columns, from the returns in it.
 //!
 //! The third-lowest return of each cell, or of its neighbours where the ground descends that way:
-//! returns mirrored by glass or puddles come from below, but seldom together. Parameters are in
-//! metres, places and heights in the caller's unit, the edge of a column.
+//! returns mirrored by glass or puddles come from below, but seldom together. What rises from there,
+//! a bank or a kerb, is climbed column by column, as far as it is thin and no steeper than ground.
+//! Parameters are in metres, places and heights in the caller's unit, the edge of a column.
 
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 
@@ -12,8 +13,39 @@ const CELL_COLUMNS_MIN: usize = 4;
 const CELLS_SIDE_MAX: usize = SIDE_MAX.div_ceil(CELL_COLUMNS_MIN);
 const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
-/// Height of the ground in cells of several columns.
-pub struct GroundGrid {
+/// Returns so much higher than the lowest of their column hang over it, m. Not measured on its own.
+const OVERHANGING_M: f64 = 1.5;
+/// How often the columns are passed over, forth and back: a spiral takes more, a bank one.
+const CLIMBS: usize = 2;
+
+/// Height of the ground under every column; infinite where nothing tells it.
+pub struct GroundHeights([f32; COLUMNS_MAX]);
+
+impl Default for GroundHeights {
+    fn default() -> Self {
+        GroundHeights::new()
+    }
+}
+
+impl GroundHeights {
+    /// No ground.
+    pub const fn new() -> GroundHeights {
+        GroundHeights([0.0; COLUMNS_MAX])
+    }
+
+    /// Height of the ground under a column; infinite where nothing tells it.
+    pub fn height(&self, column: usize) -> f32 {
+        self.0[column]
+    }
+
+    /// Height above the ground of a place in a column.
+    pub fn above(&self, column: usize, z: f32) -> f32 {
+        z - self.height(column)
+    }
+}
+
+/// Estimates [`GroundHeights`]: its scratch.
+pub struct GroundEstimator {
     /// Columns along an axis of the window, and along an edge of a cell, that `cell` is for.
     columns: [usize; 2],
     /// Cells along an axis of the window.
@@ -23,24 +55,30 @@ pub struct GroundGrid {
     lowest: [[f32; 3]; CELLS_MAX],
     height: [f32; CELLS_MAX],
     extrapolated: [f32; CELLS_MAX],
+    /// The lowest return of every column; infinite where it has none.
+    low: [f32; COLUMNS_MAX],
+    /// Columns whose returns are too far apart for ground, a bit each.
+    thick: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
-impl Default for GroundGrid {
+impl Default for GroundEstimator {
     fn default() -> Self {
-        GroundGrid::new()
+        GroundEstimator::new()
     }
 }
 
-impl GroundGrid {
-    /// No ground.
-    pub const fn new() -> GroundGrid {
-        GroundGrid {
+impl GroundEstimator {
+    /// Before the first sweep.
+    pub const fn new() -> GroundEstimator {
+        GroundEstimator {
             columns: [0; 2],
             side: 0,
             cell: [0; COLUMNS_MAX],
             lowest: [[0.0; 3]; CELLS_MAX],
             height: [0.0; CELLS_MAX],
             extrapolated: [0.0; CELLS_MAX],
+            low: [0.0; COLUMNS_MAX],
+            thick: [0; COLUMNS_MAX.div_ceil(64)],
         }
     }
 
@@ -68,23 +106,80 @@ impl GroundGrid {
         column_m: f64,
         side: usize,
         under: [f32; 3],
-        returns: impl Iterator<Item = (usize, [f32; 3])>,
+        returns: impl Iterator<Item = (usize, [f32; 3])> + Clone,
+        ground: &mut GroundHeights,
     ) {
         let edge = libm::round(params.ground_cell_m / column_m);
         let edge = (edge as usize).max(CELL_COLUMNS_MIN);
         self.list_cells(side, edge);
-        let drop = (params.ground_drop_m / column_m) as f32;
-        self.lowest.fill([f32::INFINITY; 3]);
-        for (column, p) in returns {
+        let length = |metres: f64| (metres / column_m) as f32;
+        let drop = length(params.ground_drop_m);
+        let returns = returns.filter(|(_, p)| {
             let away = (p[0] - under[0]).abs().max((p[1] - under[1]).abs());
-            if p[2] < under[2] - drop - params.ground_drop_slope * away {
-                continue;
-            }
-            self.lower(column, p[2]);
+            p[2] >= under[2] - drop - params.ground_drop_slope * away
+        });
+        self.lowest.fill([f32::INFINITY; 3]);
+        self.low[..side * side].fill(f32::INFINITY);
+        for (column, [_, _, z]) in returns.clone() {
+            self.low[column] = self.low[column].min(z);
+            self.lower(column, z);
         }
         let fall = (params.ground_fall_slope * edge as f64) as f32;
         self.height.iter_mut().zip(&self.lowest).for_each(|(height, lowest)| *height = lowest[2]);
         (0..params.ground_passes).for_each(|_| self.extrapolate(fall));
+        for (height, cell) in ground.0.iter_mut().zip(&self.cell[..side * side]) {
+            *height = self.height[*cell as usize];
+        }
+        let thick = length(params.ground_thickness_m)..length(OVERHANGING_M);
+        self.find_thick(returns, thick);
+        let [tolerance, slope] = [length(params.ground_tolerance_m), params.ground_slope];
+        for _ in 0..CLIMBS {
+            (0..side * side).for_each(|c| self.climb(side, c, slope, tolerance, ground));
+            (0..side * side).rev().for_each(|c| self.climb(side, c, slope, tolerance, ground));
+        }
+    }
+
+    /// Columns with returns so much higher than their lowest.
+    fn find_thick(
+        &mut self,
+        returns: impl Iterator<Item = (usize, [f32; 3])>,
+        by: core::ops::Range<f32>,
+    ) {
+        self.thick.fill(0);
+        for (column, [_, _, z]) in returns {
+            let bit = u64::from(by.contains(&(z - self.low[column])));
+            self.thick[column / 64] |= bit << (column % 64);
+        }
+    }
+
+    /// Raises the ground of a thin column to its lowest return if the ground of a column beside it
+    /// goes on to there.
+    fn climb(
+        &self,
+        side: usize,
+        column: usize,
+        slope: f32,
+        tolerance: f32,
+        ground: &mut GroundHeights,
+    ) {
+        let is_thin = |c: usize| self.thick[c / 64] >> (c % 64) & 1 == 0;
+        let low = self.low[column];
+        if !(low > ground.0[column] + tolerance && low.is_finite() && is_thin(column)) {
+            return;
+        }
+        let (i, j) = (column / side, column % side);
+        for a in i.saturating_sub(1)..(i + 2).min(side) {
+            for b in j.saturating_sub(1)..(j + 2).min(side) {
+                let beside = a * side + b;
+                let rise = low - self.low[beside];
+                let run2 = (i.abs_diff(a) + j.abs_diff(b)) as f32;
+                let is_ground = self.low[beside] <= ground.0[beside] + tolerance && is_thin(beside);
+                if is_ground && rise * rise <= slope * slope * run2 {
+                    ground.0[column] = low;
+                    return;
+                }
+            }
+        }
     }
 
     /// Keeps the height of a return in a column if it is among the three lowest of its cell.
@@ -109,15 +204,5 @@ impl GroundGrid {
             }
         }
         core::mem::swap(&mut self.height, &mut self.extrapolated);
-    }
-
-    /// Height of the ground under a column; infinite where nothing tells it.
-    pub fn height(&self, column: usize) -> f32 {
-        self.height[self.cell[column] as usize]
-    }
-
-    /// Height above the ground of a place in a column.
-    pub fn above(&self, column: usize, z: f32) -> f32 {
-        z - self.height(column)
     }
 }

@@ -5,7 +5,7 @@ use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
 use super::surface::{self, LazyWeight};
 use crate::frame::central;
-use crate::ground::GroundGrid;
+use crate::ground::{GroundEstimator, GroundHeights};
 use crate::params::{
     ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, CLUSTER_LEVELS_MAX, COLUMNS_MAX, POINTS_MAX, Profile,
     SENSORS_MAX, SUBVOXELS_MAX,
@@ -35,13 +35,14 @@ pub struct SweepReturns<'a> {
 
 /// Scratch of [`Cloud::fill`]: indices of the returns above the ground, as they come and by column.
 pub struct Scratch {
+    ground: GroundEstimator,
     listed: [u32; POINTS_MAX],
     order: [u32; POINTS_MAX],
 }
 
 impl Scratch {
     pub(super) const fn new() -> Scratch {
-        Scratch { listed: [0; POINTS_MAX], order: [0; POINTS_MAX] }
+        Scratch { ground: GroundEstimator::new(), listed: [0; POINTS_MAX], order: [0; POINTS_MAX] }
     }
 }
 
@@ -53,7 +54,7 @@ pub struct Cloud {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
-    ground: GroundGrid,
+    ground: GroundHeights,
     places: Places,
     /// When each was, s after the sweep's stamp: seldom asked for.
     offset_s: [f32; CLOUD_MAX],
@@ -70,7 +71,7 @@ impl Cloud {
             side: 0,
             corner: [0; 3],
             stamp_s: 0.0,
-            ground: GroundGrid::new(),
+            ground: GroundHeights::new(),
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
             start: [0; COLUMNS_MAX + 1],
@@ -92,7 +93,7 @@ impl Cloud {
     ) -> usize {
         self.side = profile.side as usize;
         (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
-        self.find_ground(profile, returns);
+        self.find_ground(profile, returns, &mut scratch.ground);
         let (count, sensors) = self.count_columns(scaled, returns, apart, &mut scratch.listed);
         self.sort(returns.columns, &scratch.listed[..count], &mut scratch.order);
         let dropped = self.thin(scaled, returns, &scratch.order, sensors);
@@ -100,14 +101,20 @@ impl Cloud {
         dropped
     }
 
-    fn find_ground(&mut self, profile: &Profile, returns: SweepReturns) {
+    fn find_ground(
+        &mut self,
+        profile: &Profile,
+        returns: SweepReturns,
+        estimator: &mut GroundEstimator,
+    ) {
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
         let found = returns.columns.iter().zip(returns.placed);
         let found = found.filter(|(column, _)| **column != NONE);
         let found = found.map(|(column, placed)| (*column as usize, placed.at));
         let under = [middle[0], middle[1], level];
-        self.ground.estimate(&profile.ground, profile.voxel_m, self.side, under, found);
+        let (params, ground) = (&profile.ground, &mut self.ground);
+        estimator.estimate(params, profile.voxel_m, self.side, under, found, ground);
     }
 
     /// Lists the returns of clusters and counts them by column, one place farther in `start`.

@@ -251,7 +251,8 @@ impl Clusters {
         }
     }
 
-    /// The ground below a moving cluster, where nothing else stands, goes with it.
+    /// The ground below a moving cluster, where nothing else stands, goes with it, unless the
+    /// encoder takes it for road beside the cluster.
     fn cover_ground(&mut self, scans: Scans) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
         for c in 0..side * side {
@@ -268,7 +269,7 @@ impl Clusters {
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
                 if *of_column == NONE
                     && found.footprint.holds(at, margin)
-                    && found.may_take(&scans, column)
+                    && scans.may_cover(column)
                 {
                     *of_column = n as u32;
                 }

@@ -73,6 +73,11 @@ impl Scans<'_> {
         self.could_move(column) < self.scaled.params.could_move_min
     }
 
+    /// Whether ground in a column may be below a cluster that moves: encoded, it is rather like that.
+    pub fn may_cover(&self, column: usize) -> bool {
+        self.scores.is_empty() || self.could_move(column) > 0.0
+    }
+
     /// Whether rays passed through the voxel of a place of the second sweep's window, and none
     /// ended there: what was there is gone, or has come.
     pub fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {

@@ -41,6 +41,8 @@ pub(crate) struct Plan {
     pub(crate) path: Path,
     /// x of the crossing road's centre line, m.
     pub(crate) crossing: f64,
+    /// Whether traffic drives as on a road out of town.
+    pub(crate) fast: bool,
 }
 
 impl Ego {
@@ -50,14 +52,15 @@ impl Ego {
         let mut rng = Rng::split(seed, 0);
         let crossing = rng.sign() * rng.range(18.0, 60.0);
         let start = |speed: f64| Path::from(State { x: 0.0, y: -LANE, yaw: 0.0, speed });
+        let fast = false;
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
-            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing },
-            Ego::Straight { speed } => Plan { path: start(speed), crossing },
+            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing, fast },
+            Ego::Straight { speed } => Plan { path: start(speed), crossing, fast },
             Ego::StopAndGo { speed } => {
                 let path = start(speed).then(0.1 * duration_s, 0.0, 0.0);
                 let path = path.then_to_speed(0.0, 3.0, EASE_S).then(1.0, 0.0, 0.0);
-                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing }
+                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing, fast }
             }
             Ego::Turn { left, speed } => {
                 let before = (0.25 * duration_s).min(1.0);
@@ -66,8 +69,18 @@ impl Ego {
                 let path = path.then_turn(angle, radius, EASE_S);
                 // The turn ends in the right lane of the crossing road.
                 let crossing = path.end().x - LANE.copysign(angle);
-                Plan { path, crossing }
+                Plan { path, crossing, fast }
             }
+        }
+    }
+
+    /// What is drawn of a road out of town goes straight on, or stands in every sixth case.
+    pub(crate) fn out_of_town(self, seed: u64) -> Ego {
+        let mut rng = Rng::split(seed, 10);
+        match self {
+            Ego::Any if rng.chance(1.0 / 6.0) => Ego::Standing,
+            Ego::Any => Ego::Straight { speed: rng.range(15.0, 30.0) },
+            given => given,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Kinds of scenery to drive through.
 
-use crate::ego::Ego;
+use crate::ego::{Ego, Plan};
 use crate::outskirts::{self, Place};
 use crate::path::Path;
 use crate::scene::Scene;
@@ -15,6 +15,8 @@ pub enum Scenery {
     Street,
     /// The same with more that makes still things seem to move, to choose numbers on.
     StreetCluttered,
+    /// The same with the traffic of a road out of town, 15 to 36 m/s, to choose numbers on.
+    StreetFast,
     /// One of [`Place::ALL`], drawn by the seed: never trained or tuned on.
     Outskirts,
     /// This one of them.
@@ -38,7 +40,8 @@ impl Scenery {
     /// Every scenery.
     pub fn all() -> impl Iterator<Item = Scenery> {
         let places = Place::ALL.into_iter().map(Scenery::Only);
-        [Scenery::Street, Scenery::StreetCluttered, Scenery::Outskirts].into_iter().chain(places)
+        let streets = [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast];
+        streets.into_iter().chain([Scenery::Outskirts]).chain(places)
     }
 
     /// What [`Scenery::from_str`] understands.
@@ -46,6 +49,7 @@ impl Scenery {
         match self {
             Scenery::Street => "street",
             Scenery::StreetCluttered => "street-cluttered",
+            Scenery::StreetFast => "street-fast",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -54,7 +58,7 @@ impl Scenery {
     /// The place of the outskirts that a drive of this seed goes through.
     pub fn place(self, seed: u64) -> Option<Place> {
         match self {
-            Scenery::Street | Scenery::StreetCluttered => None,
+            Scenery::Street | Scenery::StreetCluttered | Scenery::StreetFast => None,
             Scenery::Outskirts => Some(Place::drawn(seed)),
             Scenery::Only(place) => Some(place),
         }
@@ -65,7 +69,12 @@ impl Scenery {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);
         }
-        let (plan, cluttered) = (ego.plan(seed, duration_s), self == Scenery::StreetCluttered);
+        let (ego, fast) = match self {
+            Scenery::StreetFast => (ego.out_of_town(seed), true),
+            _ => (ego, false),
+        };
+        let plan = Plan { fast, ..ego.plan(seed, duration_s) };
+        let cluttered = self == Scenery::StreetCluttered;
         (Scene::around(seed, &plan, duration_s, density, cluttered), plan.path)
     }
 }

@@ -114,7 +114,8 @@ impl<'a> Collector<'a> {
 
     /// Rows of the first sweep's solid columns. Where there is exact truth of returns, they belong
     /// to what those above the ground hit; without such, and without such truth, to the box that
-    /// their centre lies in.
+    /// their centre lies in: exact truth then says that they are of the road below
+    /// ([`Row::below`]).
     pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
         let columns = self.grid.columns.len();
@@ -131,7 +132,8 @@ impl<'a> Collector<'a> {
                 let [i, j] = [0, 1].map(|n| flow.cell[n] - window.corner[n]);
                 (i * step.side + j) as usize
             };
-            let owner = match owners.as_ref().and_then(|owners| owners[column(&window)]) {
+            let hit = owners.as_ref().map(|owners| owners[column(&window)]);
+            let owner = match hit.flatten() {
                 Some(id) => present.iter().find(|p| p.id == Some(id)),
                 None => present.iter().find(|p| p.footprint.holds(flat(flow), self.margin_m)),
             };
@@ -139,6 +141,7 @@ impl<'a> Collector<'a> {
             let occupied = self.before[column][0] >> 16;
             let score = score(&step, &self.filter, &self.before, column);
             let row = self.row(seen, flow, owner, occupied.count_ones() as u8, score);
+            let row = Row { below: hit == Some(None) && owner.is_some(), ..row };
             self.stands[here] = !row.is_put_out_moving();
             rows.push(row);
         }
@@ -179,6 +182,7 @@ impl<'a> Collector<'a> {
             track: object.map_or(0, |p| p.track + 1),
             in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
+            below: false,
             mover_m: Present::mover_m(self.present(seen), flat(flow)),
             voxels,
             score,
@@ -339,6 +343,7 @@ mod tests {
             |rows: &[Row]| rows.iter().map(|r| CLASSES[r.class as usize]).collect::<Vec<_>>();
         let rows = collector.rows(&seen, Some(&truth));
         assert_eq!(classes(&rows), ["Truck", "Truck", "Background", "Background"]);
+        assert!(rows.iter().map(|r| r.below).eq([true, false, false, false]));
         let motion: Vec<_> = rows.iter().map(|r| (r.motion, r.true_x.hypot(r.true_y))).collect();
         // The street slopes a little.
         for (class, by) in &motion[..2] {
@@ -348,5 +353,6 @@ mod tests {
         // By the boxes alone.
         let rows = collector.rows(&seen, None);
         assert_eq!(classes(&rows), ["Truck", "Truck", "Truck", "Background"]);
+        assert!(rows.iter().all(|r| !r.below));
     }
 }

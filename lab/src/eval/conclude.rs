@@ -33,7 +33,9 @@ impl Evidence {
         let mut reliability = MovesReliability::default();
         read_rows(drives, out, |facts, row| {
             tally.row(row);
-            calibration.row(row, facts.exact);
+            if !row.below {
+                calibration.row(row, facts.exact);
+            }
             verdicts.row(row, facts.exact);
             sights.row(&facts.drive, row, facts.exact);
             reliability.row(row, facts.exact);
@@ -246,6 +248,8 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
          most of its returns above the ground hit. Where it has none, and in the other drives, it \
          belongs to the first labelled box, in the order of the labels, that its centre lies in, \
          seen from above, with a margin of {} m: the road below a car is in the car's column. \
+         Where exact truth tells such columns of road apart, {} of them, they count nowhere but \
+         in one row of what moves. \
          {tracks} labelled objects have {boxes} boxes.\n\n\
          Columns count where labels are complete, at both ends of their true motion: in drives \
          labelled in a front camera's view, within {CAMERA_DEG} degrees of straight ahead; in the \
@@ -254,6 +258,7 @@ fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &T
          Columns without a valid match and columns that the filter rejects are scored with what \
          the program puts out for them: no motion over ground.",
         settings.margin_m,
+        tally.below,
         tally.out_of_view,
         crate::labels::trajectory::MOVING_MPS,
     ));

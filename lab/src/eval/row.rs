@@ -132,6 +132,8 @@ row! {
     in_view: bool,
     /// 0: parked, or of no object; 1: slow; 2: moving ([`crate::labels::Motion`]).
     motion: u8,
+    /// Whether exact truth says that nothing but the ground below the box of its object was hit.
+    below: bool,
     /// From the column's centre to the nearest box of an object that moves, seen from above, m: 0
     /// within it, infinite where nothing moves.
     mover_m: f32,
@@ -210,9 +212,14 @@ impl Row {
         self.motion == 2
     }
 
-    /// Whether it moves or stands; `None` where that cannot be told: out of view, and of what is
-    /// slow.
+    /// Whether it moves or stands; `None` where that cannot be told: out of view, of what is slow,
+    /// and of the ground below an object.
     pub fn moves(&self) -> Option<bool> {
+        self.moves_by_boxes().filter(|_| !self.below)
+    }
+
+    /// The same where what lies in a box moves with it, as labels of recorded drives have it.
+    pub fn moves_by_boxes(&self) -> Option<bool> {
         (self.in_view && self.motion != 1).then_some(self.is_moving())
     }
 

@@ -40,6 +40,8 @@ pub struct Tally {
     scores: Vec<(i32, bool)>,
     /// Rows that do not count because labels are not complete there.
     pub out_of_view: u64,
+    /// Rows that do not count because they are of the ground below an object.
+    pub below: u64,
 }
 
 fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
@@ -59,6 +61,10 @@ impl Tally {
     pub fn row(&mut self, row: &Row) {
         if !row.in_view {
             self.out_of_view += 1;
+            return;
+        }
+        if row.below {
+            self.below += 1;
             return;
         }
         let (class, motion) = (row.class as usize, row.motion as usize);
@@ -186,6 +192,7 @@ mod tests {
         tally.row(&Row { voxels: 5, basis: 1, ..row(7, 2, 0.0, 0.4) });
         tally.row(&row(0, 0, 0.3, 0.0));
         tally.row(&Row { in_view: false, ..row(1, 2, 9.0, 0.0) });
+        tally.row(&Row { below: true, ..row(1, 2, 9.0, 0.0) });
         let flow = |e, g, m| tally.flow(e, Truth::Raw, g, m, Weight::Column);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
         assert!(near(flow(Estimate::Ours, ClassGroup::Class(1), MotionGroup::Moving).mean(), 0.1));

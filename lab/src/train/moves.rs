@@ -4,7 +4,6 @@ use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
 use crate::curve::{Curve, Operating};
 use crate::eval::{Row, rows_of};
-use raywake_core::output::FlowBasis;
 use raywake_core::refinement::cues::Cues;
 use raywake_io::Error;
 use serde::Serialize;
@@ -21,7 +20,7 @@ const BINS: usize = 10;
 /// Options of `train moves`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folders of results of `raywake-lab eval`; every fifth drive is held out
+    /// Folders of results of `raywake-lab eval --moving 0`; every fifth drive is held out
     #[arg(required = true, value_name = "OUT")]
     results: Vec<PathBuf>,
     #[command(flatten)]
@@ -90,9 +89,9 @@ fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
     Ok(parts)
 }
 
-/// Whether something is known of the column, and it either moves or stands.
+/// Whether P(moves) decides of the column, and it either moves or stands.
 fn counts(row: &Row) -> bool {
-    row.in_view && row.basis >= FlowBasis::Matched as u8 && (row.is_moving() || row.motion == 0)
+    row.is_moving_by_flow() && row.moves().is_some()
 }
 
 /// Brier score and reliability of logits beside what is true.
@@ -124,10 +123,10 @@ mod tests {
 
     #[test]
     fn what_moves_and_what_stands_count() {
-        let row = Row { in_view: true, basis: 2, motion: 2, ..Row::default() };
+        let row = Row { in_view: true, motion: 2, flow_x: 0.3, dt: 0.1, ..Row::default() };
         assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
-        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { basis: 1, ..row }));
-        assert!(!counts(&Row { in_view: false, ..row }));
+        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { flow_x: 0.0, ..row }));
+        assert!(!counts(&Row { in_view: false, ..row }) && !counts(&Row { below: true, ..row }));
     }
 
     #[test]

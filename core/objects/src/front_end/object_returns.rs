@@ -2,7 +2,7 @@
 
 use super::batch::{Batch, BatchReturn};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
-use raywake_core::ground::GroundGrid;
+use raywake_core::ground::{GroundEstimator, GroundHeights};
 use raywake_core::params::{GroundParams, POINTS_MAX};
 
 /// Ground in cells of five columns.
@@ -55,7 +55,8 @@ impl HeightVariance {
 }
 
 pub(super) struct ObjectReturns {
-    ground: GroundGrid,
+    estimator: GroundEstimator,
+    ground: GroundHeights,
     /// Of the ground above the batch's corner, m; infinite where unknown.
     height: [f32; CELLS],
     variance: [HeightVariance; CELLS],
@@ -65,7 +66,8 @@ pub(super) struct ObjectReturns {
 impl ObjectReturns {
     pub const fn new() -> ObjectReturns {
         ObjectReturns {
-            ground: GroundGrid::new(),
+            estimator: GroundEstimator::new(),
+            ground: GroundHeights::new(),
             height: [0.0; CELLS],
             variance: [HeightVariance::NONE; CELLS],
             is_object: [false; POINTS_MAX],
@@ -108,7 +110,8 @@ impl ObjectReturns {
         let cells = batch.returns.iter().map(|r| (r.cell(), r.position.map(|v| v / CELL_M)));
         let middle = 0.5 * SIDE as f32;
         let under = [middle, middle, 0.0];
-        self.ground.estimate(&GROUND, f64::from(CELL_M), SIDE, under, cells);
+        let ground = &mut self.ground;
+        self.estimator.estimate(&GROUND, f64::from(CELL_M), SIDE, under, cells, ground);
         for cell in 0..CELLS {
             let centre = |n: usize| (n as f64 + 0.5) * CELL_M as f64;
             let at = [batch.corner.x + centre(cell / SIDE), batch.corner.y + centre(cell % SIDE)];

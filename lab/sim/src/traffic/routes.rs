@@ -26,6 +26,9 @@ impl Routes<'_> {
 
     /// In either lane of the main road, on the crossing road, or turning.
     pub(super) fn driver(&mut self) -> Path {
+        if self.plan.fast {
+            return self.fast(36.0);
+        }
         match (self.rng.unit() * 20.0) as u32 {
             0..10 => self.along(LANE, 2.0, 18.0),
             10..14 => self.changing(),
@@ -36,10 +39,22 @@ impl Routes<'_> {
 
     /// What is too long to turn stays on its road.
     pub(super) fn heavy(&mut self) -> Path {
+        if self.plan.fast {
+            return self.fast(25.0);
+        }
         match (self.rng.unit() * 20.0) as u32 {
             0..11 => self.along(LANE, 2.0, 13.0),
             11..16 => self.changing(),
             _ => self.crossing(LANE, 4.0, 10.0),
+        }
+    }
+
+    /// As out of town, on either road.
+    fn fast(&mut self, fastest: f64) -> Path {
+        if self.rng.chance(0.7) {
+            self.along(LANE, 15.0, fastest)
+        } else {
+            self.crossing(LANE, 15.0, fastest)
         }
     }
 

@@ -22,6 +22,8 @@ struct PutOut {
 #[derive(Clone, Debug, Default)]
 struct OfTruth {
     counts: MotionCounts,
+    /// With the ground below objects, as boxes have it.
+    by_boxes: MotionCounts,
     /// By class, then by [`Row::motion`].
     kinds: [[PutOut; 3]; COUNT],
     wrong: FalseMotion,
@@ -39,6 +41,12 @@ impl ColumnVerdicts {
         }
         let of = &mut self.0[usize::from(exact)];
         let put_out = row.is_put_out_moving();
+        if let Some(moves) = row.moves_by_boxes() {
+            of.by_boxes.add(moves, put_out, row.mover_m);
+        }
+        if row.below {
+            return;
+        }
         let kind = &mut of.kinds[row.class as usize][row.motion as usize];
         kind.columns += 1;
         kind.moving += u64::from(put_out);
@@ -60,6 +68,11 @@ impl ColumnVerdicts {
     /// Of one kind of truth.
     pub fn counts(&self, exact: bool) -> MotionCounts {
         self.0[usize::from(exact)].counts
+    }
+
+    /// The same with the ground below objects, as boxes have it.
+    pub fn counts_by_boxes(&self, exact: bool) -> MotionCounts {
+        self.0[usize::from(exact)].by_boxes
     }
 
     fn of(&self, exact: bool, group: ClassGroup, motion: MotionGroup) -> PutOut {
@@ -135,11 +148,14 @@ mod tests {
             row(0, 0, 0.04, 3.0, 0.2),
             row(8, 1, 0.1, 1.0, 0.0),
             Row { in_view: false, ..row(0, 0, 0.3, 3.0, 0.0) },
+            // The road below a car.
+            Row { below: true, ..row(1, 2, 0.0, 0.0, 0.0) },
         ] {
             verdicts.row(&row, true);
         }
         let found = MotionCounts { found: 1, missed: 1, wrong: [0, 1, 0] };
         assert_eq!(verdicts.counts(true), found);
+        assert_eq!(verdicts.counts_by_boxes(true), MotionCounts { missed: 2, ..found });
         let of = |group, motion| {
             let PutOut { columns, moving, by_flow } = verdicts.of(true, group, motion);
             [columns, moving, by_flow]

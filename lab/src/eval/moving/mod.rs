@@ -133,7 +133,12 @@ pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
         let mut returns = MotionCounts::default();
         let of = |d: &&Facts| d.exact == exact;
         drives.iter().filter(of).for_each(|d| returns.merge(&d.returns.in_boxes));
-        for (what, counts) in [("columns", columns.counts(exact)), ("returns", returns)] {
+        let [of_columns, by_boxes] = [columns.counts(exact), columns.counts_by_boxes(exact)];
+        let mut counted = vec![("columns", of_columns), ("returns", returns)];
+        if by_boxes != of_columns {
+            counted.insert(1, ("columns, with the road below objects", by_boxes));
+        }
+        for (what, counts) in counted {
             if sweeps > 0 {
                 let head = [what, truth(exact)].map(Cell::from).into_iter();
                 rows.push(TableRow::new(head.chain(counts.cells(sweeps))));
@@ -147,7 +152,9 @@ pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
     );
     let note = "Parked objects and whatever no label holds stand; slow objects do not count. IoU \
         is that of SemanticKITTI's moving object segmentation, over all returns in view. False \
-        motion is told apart by its distance from the nearest box of a mover, seen from above.";
+        motion is told apart by its distance from the nearest box of a mover, seen from above. The \
+        road below objects, which exact truth tells apart and boxes do not, counts in a row of its \
+        own.";
     Table::new("moving-or-not", caption, &COLUMNS, rows).note(note)
 }
 
