@@ -1,8 +1,10 @@
 //! Height of the ground under a window of square columns, from the returns in it.
 //!
 //! The third-lowest return of each cell, or of its neighbours where the ground descends that way:
-//! returns mirrored by glass or puddles come from below, but seldom together. What rises from there,
-//! a bank or a kerb, is climbed column by column, as far as it is thin and no steeper than ground.
+//! returns mirrored by glass or puddles come from below, but seldom together. What rises from
+//! there, a bank or a kerb, is climbed column by column, as far as it is thin and no steeper than
+//! ground is.
+//!
 //! Parameters are in metres, places and heights in the caller's unit, the edge of a column.
 
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
@@ -15,7 +17,8 @@ const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
 /// Returns so much higher than the lowest of their column hang over it, m. Not measured on its own.
 const OVERHANGING_M: f64 = 1.5;
-/// How often the columns are passed over, forth and back: a spiral takes more, a bank one.
+/// How often the columns are passed over, forth and back: one climbs a bank, a winding one takes
+/// more. Not measured on its own.
 const CLIMBS: usize = 2;
 
 /// Height of the ground under every column; infinite where nothing tells it.

@@ -269,7 +269,7 @@ impl Clusters {
                 let at = [i as f32 + 0.5, j as f32 + 0.5];
                 if *of_column == NONE
                     && found.footprint.holds(at, margin)
-                    && scans.may_cover(column)
+                    && scans.may_be_below(column)
                 {
                     *of_column = n as u32;
                 }

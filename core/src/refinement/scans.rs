@@ -73,9 +73,9 @@ impl Scans<'_> {
         self.could_move(column) < self.scaled.params.could_move_min
     }
 
-    /// Whether ground in a column may be below a cluster that moves: encoded, it is rather like that.
-    pub fn may_cover(&self, column: usize) -> bool {
-        self.scores.is_empty() || self.could_move(column) > 0.0
+    /// Whether ground in a column may be below a cluster that moves, not road beside it.
+    pub fn may_be_below(&self, column: usize) -> bool {
+        self.could_move(column) >= 0.0
     }
 
     /// Whether rays passed through the voxel of a place of the second sweep's window, and none

@@ -77,11 +77,9 @@ impl Ego {
     /// What is drawn of a road out of town goes straight on, or stands in every sixth case.
     pub(crate) fn out_of_town(self, seed: u64) -> Ego {
         let mut rng = Rng::split(seed, 10);
-        match self {
-            Ego::Any if rng.chance(1.0 / 6.0) => Ego::Standing,
-            Ego::Any => Ego::Straight { speed: rng.range(15.0, 30.0) },
-            given => given,
-        }
+        let (stands, speed) = (rng.chance(1.0 / 6.0), rng.range(15.0, 30.0));
+        let drawn = if stands { Ego::Standing } else { Ego::Straight { speed } };
+        if self == Ego::Any { drawn } else { self }
     }
 
     fn drawn(rng: &mut Rng) -> Ego {

@@ -210,6 +210,22 @@ fn slopes_are_ground_and_boxes_on_them_are_not() {
 }
 
 #[test]
+fn a_bank_is_ground_and_a_car_before_it_is_not() {
+    let bank = |x: f32| GROUND + 0.4 * (x - 40.0).clamp(0.0, 12.0);
+    let mut returns = Returns::ground(|x, _| bank(x));
+    assert_eq!(occupied(&returns.cloud()), BTreeSet::new());
+    let mut random = Random(7);
+    Car { centre: [32.0, 31.0], yaw: 0.5 }.add_to(&mut returns, &mut random);
+    let mut flat = Returns::flat();
+    Car { centre: [32.0, 31.0], yaw: 0.5 }.add_to(&mut flat, &mut Random(7));
+    assert_eq!(occupied(&returns.cloud()), occupied(&flat.cloud()));
+    // A wall is steeper.
+    let mut returns = Returns::ground(|x, _| bank(x));
+    (0..40).for_each(|n| returns.add([45.5, 30.5, bank(45.5) + 0.1 * n as f32], 0));
+    assert_eq!(occupied(&returns.cloud()).into_iter().collect::<Vec<_>>(), [45 * SIDE + 30]);
+}
+
+#[test]
 fn mirrored_returns_do_not_pull_the_ground_down() {
     let mut random = Random(8);
     let mut returns = Returns::flat();

@@ -102,14 +102,13 @@ impl Fill<'_> {
             left -= share;
             left < 0.0
         });
-        let (_, model, nimble) = *drawn.unwrap_or(&DRIVERS[0]);
-        (model, nimble)
+        drawn.map_or((models::car, true), |(_, model, nimble)| (*model, *nimble))
     }
 
     /// A vehicle on the main road, on the crossing road, or between the two.
     fn driver(&mut self) {
         let (model, nimble) = self.draw();
-        self.mover(model, |r| if nimble { r.driver() } else { r.heavy() });
+        self.mover(model, |r| r.driver(nimble));
     }
 
     /// Somebody slow and a car that passes it; in every third case the slow one is the vehicle

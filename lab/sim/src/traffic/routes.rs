@@ -24,11 +24,18 @@ impl Routes<'_> {
         (t, self.plan.path.at(t).x + self.rng.range(-reach, reach))
     }
 
-    /// In either lane of the main road, on the crossing road, or turning.
-    pub(super) fn driver(&mut self) -> Path {
-        if self.plan.fast {
-            return self.fast(36.0);
+    /// Of somebody who drives, in something short enough to turn (`nimble`) or not.
+    pub(super) fn driver(&mut self, nimble: bool) -> Path {
+        match (self.plan.fast, nimble) {
+            (true, true) => self.fast(36.0),
+            (true, false) => self.fast(25.0),
+            (false, true) => self.nimble(),
+            (false, false) => self.heavy(),
         }
+    }
+
+    /// In either lane of the main road, on the crossing road, or turning.
+    fn nimble(&mut self) -> Path {
         match (self.rng.unit() * 20.0) as u32 {
             0..10 => self.along(LANE, 2.0, 18.0),
             10..14 => self.changing(),
@@ -38,10 +45,7 @@ impl Routes<'_> {
     }
 
     /// What is too long to turn stays on its road.
-    pub(super) fn heavy(&mut self) -> Path {
-        if self.plan.fast {
-            return self.fast(25.0);
-        }
+    fn heavy(&mut self) -> Path {
         match (self.rng.unit() * 20.0) as u32 {
             0..11 => self.along(LANE, 2.0, 13.0),
             11..16 => self.changing(),
