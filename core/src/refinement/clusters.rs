@@ -53,7 +53,12 @@ impl Clusters {
 
     /// What tells whether a column moves.
     pub fn cues(&self, column: usize) -> Cues {
-        self.of(column).map_or(Cues::NONE, |found| found.cues.with(self.column_cues[column]))
+        let of_column = self.column_cues.get(column).unwrap_or(&ColumnCues::NONE);
+        match self.of(column) {
+            Some(found) if found.is_dynamic => found.cues.with(*of_column),
+            Some(found) => Cues::standing(found.cues.share, of_column.could_move),
+            None => Cues::standing(0.0, 0.0),
+        }
     }
 
     /// Whether a column is of a cluster that was seen to come from elsewhere.

@@ -70,6 +70,9 @@ cues! {
         pub misfit: moves_misfit,
         /// The encoder's score of what could move, nats: -4 to 4, 0 where it is not heard.
         pub could_move: moves_could_move,
+        /// 1 where the test found that it stands. Of the others only `share` and `could_move` tell
+        /// anything then.
+        pub stands: moves_stands,
     }
 }
 
@@ -100,7 +103,14 @@ impl Cues {
             fresh: 0.0,
             misfit: 0.0,
             could_move: 0.0,
+            stands: 0.0,
         }
+    }
+
+    /// Of what stands, with this [`Cues::share`] and [`Cues::could_move`].
+    pub(super) fn standing(share: f32, could_move: f32) -> Cues {
+        Cues { share, stands: 1.0, ..Cues::NONE }
+            .with(ColumnCues { could_move, ..ColumnCues::NONE })
     }
 
     /// The same with those of a column.
@@ -231,6 +241,7 @@ mod tests {
                 &mut cues.fresh,
                 &mut cues.misfit,
                 &mut cues.could_move,
+                &mut cues.stands,
             ];
             *all.into_iter().nth(n).unwrap() = 1.0;
             assert!((cues.probability(&params) - 0.75).abs() < 1e-6, "{name}");

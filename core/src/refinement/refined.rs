@@ -53,7 +53,7 @@ impl Refined {
 
     /// Where nothing is known.
     pub fn nothing() -> Refined {
-        let cues = Cues::NONE;
+        let cues = Cues::standing(0.0, 0.0);
         Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }
     }
 

@@ -217,6 +217,7 @@ impl<'a> Collector<'a> {
             fresh: flow.cues.fresh,
             misfit: flow.cues.misfit,
             could_move: flow.cues.could_move,
+            stands: flow.cues.stands,
         }
     }
 

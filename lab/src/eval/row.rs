@@ -204,6 +204,8 @@ row! {
     misfit: f32,
     /// See `margin`.
     could_move: f32,
+    /// See `margin`.
+    stands: f32,
 }
 
 impl Row {
@@ -256,9 +258,21 @@ impl Row {
             fresh,
             misfit,
             could_move,
+            stands,
             ..
         } = *self;
-        Cues { margin, share, residual, returns, certainty, worn, fresh, misfit, could_move }
+        Cues {
+            margin,
+            share,
+            residual,
+            returns,
+            certainty,
+            worn,
+            fresh,
+            misfit,
+            could_move,
+            stands,
+        }
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.

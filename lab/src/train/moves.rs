@@ -89,9 +89,9 @@ fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
     Ok(parts)
 }
 
-/// Whether P(moves) decides of the column, and it either moves or stands.
+/// Whether something is known of the column, and it either moves or stands.
 fn counts(row: &Row) -> bool {
-    row.is_moving_by_flow() && row.moves().is_some()
+    row.is_matched() && row.moves().is_some()
 }
 
 /// Brier score and reliability of logits beside what is true.
@@ -123,9 +123,9 @@ mod tests {
 
     #[test]
     fn what_moves_and_what_stands_count() {
-        let row = Row { in_view: true, motion: 2, flow_x: 0.3, dt: 0.1, ..Row::default() };
+        let row = Row { in_view: true, basis: 2, motion: 2, ..Row::default() };
         assert!(counts(&row) && counts(&Row { motion: 0, ..row }));
-        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { flow_x: 0.0, ..row }));
+        assert!(!counts(&Row { motion: 1, ..row }) && !counts(&Row { basis: 1, ..row }));
         assert!(!counts(&Row { in_view: false, ..row }) && !counts(&Row { below: true, ..row }));
     }
 
