@@ -1,10 +1,10 @@
 //! Parameters of whether a column moves: see [`crate::refinement::cues`].
 
 /// Where the weights come from.
-const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simulated drives (`raywake-lab sim`, each rig: `--drives 3 --sweeps 25 \
-                      --seed 9100`, `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, \
-                      `--drives 3 --sweeps 20 --seed 9300 --scenery street-cluttered`; \
-                      `eval --moving 0`).";
+const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simulated drives \
+                      (`raywake-lab sim`, each rig: `--drives 3 --sweeps 25 --seed 9100`, \
+                      `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, `--drives 3 \
+                      --sweeps 20 --seed 9300 --scenery street-cluttered`; `eval --moving 0`).";
 
 crate::params! {
     /// How cues become P(moves): logistic regression, one weight a cue.

@@ -182,7 +182,6 @@ impl<'a> Collector<'a> {
             track: object.map_or(0, |p| p.track + 1),
             in_view,
             motion: object.map_or(0, |p| motion(p.motion)),
-            below: false,
             mover_m: Present::mover_m(self.present(seen), flat(flow)),
             voxels,
             score,
@@ -208,16 +207,7 @@ impl<'a> Collector<'a> {
             age: flow.age,
             dt: seen.dt_s as f32,
             probability: flow.probability,
-            margin: flow.cues.margin,
-            share: flow.cues.share,
-            residual: flow.cues.residual,
-            returns: flow.cues.returns,
-            certainty: flow.cues.certainty,
-            worn: flow.cues.worn,
-            fresh: flow.cues.fresh,
-            misfit: flow.cues.misfit,
-            could_move: flow.cues.could_move,
-            stands: flow.cues.stands,
+            ..Row::told_by(flow.cues)
         }
     }
 

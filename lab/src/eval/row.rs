@@ -246,6 +246,25 @@ impl Row {
         f64::from(self.flow_x.hypot(self.flow_y)) >= MOVING_MPS * f64::from(self.dt)
     }
 
+    /// Nothing but what P(moves) was told by.
+    pub fn told_by(cues: Cues) -> Row {
+        let Cues { margin, share, residual, returns, certainty, worn, fresh, misfit, .. } = cues;
+        let Cues { could_move, stands, .. } = cues;
+        Row {
+            margin,
+            share,
+            residual,
+            returns,
+            certainty,
+            worn,
+            fresh,
+            misfit,
+            could_move,
+            stands,
+            ..Row::default()
+        }
+    }
+
     /// What its P(moves) was told by.
     pub fn cues(&self) -> Cues {
         let Row {
