@@ -248,49 +248,34 @@ impl Row {
 
     /// Nothing but what P(moves) was told by.
     pub fn told_by(cues: Cues) -> Row {
-        let Cues { margin, share, residual, returns, certainty, worn, fresh, misfit, .. } = cues;
-        let Cues { could_move, stands, .. } = cues;
         Row {
-            margin,
-            share,
-            residual,
-            returns,
-            certainty,
-            worn,
-            fresh,
-            misfit,
-            could_move,
-            stands,
+            margin: cues.margin,
+            share: cues.share,
+            residual: cues.residual,
+            returns: cues.returns,
+            certainty: cues.certainty,
+            worn: cues.worn,
+            fresh: cues.fresh,
+            misfit: cues.misfit,
+            could_move: cues.could_move,
+            stands: cues.stands,
             ..Row::default()
         }
     }
 
     /// What its P(moves) was told by.
     pub fn cues(&self) -> Cues {
-        let Row {
-            margin,
-            share,
-            residual,
-            returns,
-            certainty,
-            worn,
-            fresh,
-            misfit,
-            could_move,
-            stands,
-            ..
-        } = *self;
         Cues {
-            margin,
-            share,
-            residual,
-            returns,
-            certainty,
-            worn,
-            fresh,
-            misfit,
-            could_move,
-            stands,
+            margin: self.margin,
+            share: self.share,
+            residual: self.residual,
+            returns: self.returns,
+            certainty: self.certainty,
+            worn: self.worn,
+            fresh: self.fresh,
+            misfit: self.misfit,
+            could_move: self.could_move,
+            stands: self.stands,
         }
     }
 
