@@ -20,8 +20,8 @@
 //! 5. A static cluster may have a part that moves; what remains of it, fragments beside it and what
 //!    the encoder takes for the rest of its body may go with that ([`clusters`]).
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
-//!    that found no match, and the ground below it ([`footprint`]). Covariances are inflated by the
-//!    residual ([`refined`]).
+//!    that found no match, and the ground below it ([`footprint`]), unless the encoder takes that
+//!    for road beside it. Covariances are inflated by the residual ([`refined`]).
 //! 7. Cues tell how likely it is that a column moves ([`cues`]), among them what was hit before at
 //!    the places it came to ([`history`]).
 //!
