@@ -110,6 +110,8 @@ viewers() {
         mcap-ros2-support==0.6.0 numpy==2.4.6 rerun-sdk==0.41.0 2>/dev/null
 }
 if viewers; then
+    # Recordings of another build would be results of other settings.
+    rm -rf target/viewers/recordings
     target/viewers/bin/python tests/viewers.py target/release/raywake target/viewers/recordings
 else
     echo "skipped: mcap-ros2-support, numpy and rerun-sdk cannot be installed"
