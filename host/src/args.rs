@@ -5,6 +5,7 @@
 
 mod clean;
 mod flow;
+pub mod inputs;
 mod results;
 mod sweeps;
 mod track;

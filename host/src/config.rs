@@ -1,7 +1,6 @@
 //! Profiles: built-in ones, or files named on the command line.
 
 use std::borrow::Cow;
-use std::fs;
 use std::path::Path;
 
 use raywake_core::params::{Profile, ProfileError, Value};
@@ -11,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::args::ProfileChoice;
 use raywake_io::Error;
+use raywake_io::source::whole::read_text;
 
 /// The group of the parameters of tracking, which has groups of its own.
 const OBJECTS: &str = "objects";
@@ -42,7 +42,7 @@ pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
 /// The same where tracking starts from these parameters instead of the defaults.
 pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<Settings, Error> {
     let mut settings = match (&choice.config, &choice.profile) {
-        (Some(path), _) => parse(path, &read(path)?, objects)?,
+        (Some(path), _) => parse(path, &read_text(path)?, objects)?,
         (None, Some(name)) => {
             let profile = Profile::named(name).ok_or_else(|| Error::Usage(no_profile(name)))?;
             Settings { profile, objects }
@@ -179,15 +179,6 @@ fn value_of<'a>(value: &'a DeValue) -> Option<Value<'a>> {
         DeValue::Boolean(v) => Some(Value::Flag(*v)),
         _ => None,
     }
-}
-
-/// A text file. Errors name the byte that is not text.
-pub(crate) fn read(path: &Path) -> Result<String, Error> {
-    let bytes = fs::read(path).map_err(Error::reading(path))?;
-    String::from_utf8(bytes).map_err(|e| {
-        let place = format!("byte {}", e.utf8_error().valid_up_to());
-        Error::input(path, place, "is not UTF-8 text")
-    })
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::Duration;
+use std::{process, thread};
 
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
@@ -12,6 +12,9 @@ use serde::Serialize;
 /// How often it is asked whether a viewer is there.
 const VIEWER_POLL: Duration = Duration::from_millis(20);
 
+/// Exit code of a process ended by SIGINT, as shells have it.
+pub const INTERRUPTED_CODE: u8 = 130;
+
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// Whether a signal came.
@@ -19,10 +22,15 @@ pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// From now on SIGINT and SIGTERM end a command after the sweep in hand.
+/// From now on SIGINT and SIGTERM end a command after the sweep in hand, and a second one at once:
+/// a disk that does not answer may hold up the sweep for ever.
 pub fn listen() {
     // Fails where a handler is there already: another run's, which sets the same flag.
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+    let _ = ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            process::exit(INTERRUPTED_CODE.into());
+        }
+    });
 }
 
 /// Prints to standard output unless quiet. A reader that has gone away is not an error.

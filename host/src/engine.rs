@@ -83,7 +83,7 @@ pub fn execute<S: Source + ?Sized>(
         weights: &plan.weights.digest(),
     };
     // After all that can be wrong, and before anything there is replaced.
-    made.claim(root)?;
+    let _claim = made.claim(root)?;
     let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
     say(&format!("{}\n", source.describe()))?;

@@ -1,7 +1,7 @@
 //! The file of a command's figures: `--summary FILE`, or `summary.json` among the results.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::console::json;
@@ -24,6 +24,9 @@ impl FiguresFile {
         match path.as_deref().and_then(Path::parent) {
             Some(folder) if !folder.as_os_str().is_empty() => atomic::create_folder(folder)?,
             _ => (),
+        }
+        if let Some(folder) = path.as_deref().filter(|p| p.is_dir()) {
+            return Err(Error::writing(folder)(ErrorKind::IsADirectory.into()));
         }
         Ok(FiguresFile(path))
     }

@@ -6,9 +6,11 @@ use std::io::{Write, stderr};
 use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser;
 use clap::error::ErrorKind;
-use raywake::args::Args;
+use clap::{CommandFactory, FromArgMatches};
+use raywake::args::{self, Args};
+use raywake::console::INTERRUPTED_CODE;
+use raywake::error::RunError;
 use raywake::{execute, team};
 use raywake_alloc_guard::Guard;
 
@@ -30,7 +32,7 @@ fn explain(e: &clap::Error) -> ! {
 
 /// A decoder that panics has met a damaged file, and that is what is told. Where panics do not
 /// unwind, it is the end.
-#[cfg(feature = "parquet")]
+#[cfg(feature = "arrow")]
 fn tell_of_damaged_files() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| match raywake_io::source::decoder::damaged() {
@@ -43,19 +45,19 @@ fn tell_of_damaged_files() {
     }));
 }
 
-/// Exit code of a process ended by SIGINT, as shells have it.
-const INTERRUPTED: u8 = 130;
-
 #[global_allocator]
 static ALLOCATOR: Guard<System> = Guard(System);
 
 fn main() -> ExitCode {
-    #[cfg(feature = "parquet")]
+    #[cfg(feature = "arrow")]
     tell_of_damaged_files();
-    let command = Args::try_parse().unwrap_or_else(|e| explain(&e)).command;
-    match team::lead(team::available(), || execute(command)) {
+    let args = Args::command().try_get_matches().unwrap_or_else(|e| explain(&e));
+    let command = Args::from_arg_matches(&args).unwrap_or_else(|e| explain(&e)).command;
+    let run =
+        || args::inputs::protect(&args).map_err(RunError::from).and_then(|()| execute(command));
+    match team::lead(team::available(), run) {
         Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(INTERRUPTED),
+        Ok(false) => ExitCode::from(INTERRUPTED_CODE),
         Err(e) => {
             // Nobody is left to tell where standard error is closed.
             let _ = writeln!(stderr(), "raywake: {e}");

@@ -5,18 +5,18 @@
 //! takes only results that would leave the same one.
 
 use std::fmt::Write;
-use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
 use raywake_core::params::{Parameters, Profile, Value};
 use raywake_io::Error;
-use raywake_io::sink::atomic;
+use raywake_io::sink::atomic::{self, FolderClaim};
 use raywake_io::source::Overview;
+use raywake_io::source::whole::read_text;
 use raywake_objects::params::TrackingParams;
 
 /// Name of the file.
-const NAME: &str = "settings.toml";
+pub const NAME: &str = "settings.toml";
 /// Differences that an error tells, at most.
 const LINES_TOLD: usize = 3;
 
@@ -37,20 +37,25 @@ pub struct Made<'a> {
 }
 
 impl Made<'_> {
-    /// Writes the file into the folder of the results, where there is one.
+    /// Writes the file into the folder of the results, where there is one, and keeps other
+    /// processes from writing there while the value lives.
     ///
     /// # Errors
-    /// Where the folder has results of another recording or other settings, and where the file
-    /// cannot be written.
-    pub fn claim(&self, root: Option<&Path>) -> Result<(), Error> {
-        let Some(root) = root else { return Ok(()) };
+    /// Where the folder has results of another recording or other settings, where another process
+    /// writes to it, and where the file cannot be written.
+    pub fn claim(&self, root: Option<&Path>) -> Result<Option<FolderClaim>, Error> {
+        let Some(root) = root else { return Ok(None) };
+        let claim = atomic::claim_folder(root)?;
         let (path, text) = (root.join(NAME), self.text());
         if path.is_file() {
-            let there = fs::read_to_string(&path).map_err(Error::reading(&path))?;
-            return if there == text { Ok(()) } else { Err(different(root, &there, &text)) };
+            let there = read_text(&path)?;
+            return match there == text {
+                true => Ok(Some(claim)),
+                false => Err(different(root, &there, &text)),
+            };
         }
-        atomic::create_folder(root)?;
-        atomic::write(&path, |out| out.write_all(text.as_bytes()))
+        atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
+        Ok(Some(claim))
     }
 
     fn text(&self) -> String {
@@ -177,7 +182,7 @@ mod tests {
                 objects: None,
                 weights,
             };
-            made.claim(Some(folder.path())).map_err(|e| e.to_string())
+            made.claim(Some(folder.path())).map(|_| ()).map_err(|e| e.to_string())
         };
         assert_eq!((made(0, "0"), made(0, "0")), (Ok(()), Ok(())));
         let e = made(1, "0").unwrap_err();

@@ -10,8 +10,8 @@ use raywake_core::stages::occupancy_constancy;
 
 use crate::args::Learned;
 use crate::backend::{LearnedPart, Tables, TablesError};
-use crate::config::read;
 use raywake_io::Error;
+use raywake_io::source::whole::read_text;
 
 /// The texts of the weights files.
 #[derive(Clone)]
@@ -34,7 +34,7 @@ impl WeightFiles {
     /// Reads what the command line names, takes what is built in for the rest.
     pub fn read(learned: &Learned, profile: &Profile) -> Result<WeightFiles, Error> {
         let file = |path: &Option<PathBuf>, shipped: &str| match path {
-            Some(path) => Ok(WeightFile { path: Some(path.clone()), text: read(path)? }),
+            Some(path) => Ok(WeightFile { path: Some(path.clone()), text: read_text(path)? }),
             None => Ok(WeightFile { path: None, text: shipped.to_string() }),
         };
         let none = |path: &Option<PathBuf>| path.as_ref().is_some_and(|f| f.as_os_str() == "none");

@@ -3,7 +3,8 @@
 mod common;
 
 use std::fs;
-use std::process::Stdio;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -232,7 +233,60 @@ fn absurd_files_are_refused() {
     let cloud = t.path().join("drive/velodyne_points/data/0000000001.bin");
     std::fs::File::create(&cloud).unwrap().set_len(1 << 40).unwrap();
     let o = run(&t, &[]);
-    o.failed(3, &["0000000001.bin", "bytes are too many for a sweep"]);
+    o.failed(3, &["0000000001.bin", "1099511627776 bytes or more, at most 268435456 are read"]);
+}
+
+#[test]
+fn outputs_do_not_replace_inputs() {
+    let t = Temp::new();
+    t.drive(2);
+    let data = t.path().join("drive");
+    let poses = data.join("poses.txt");
+    let before = std::fs::read(&poses).unwrap();
+    run(&t, &["--summary", poses.to_str().unwrap()]).failed(2, &["--summary", "in the recording"]);
+    run(&t, &["--out", data.to_str().unwrap()]).failed(2, &["--out", "is an input"]);
+    let clouds = data.join("velodyne_points/data");
+    run(&t, &["--out", clouds.to_str().unwrap()]).failed(2, &["is a folder of the recording"]);
+    let config = t.path().join("small.toml");
+    run(&t, &["--mcap", config.to_str().unwrap()]).failed(2, &["--mcap", "is an input"]);
+    assert_eq!(std::fs::read(&poses).unwrap(), before);
+    // Results may lie in a folder of their own, again and again.
+    let out = data.join("results");
+    for _ in 0..2 {
+        run(&t, &["--out", out.to_str().unwrap()]).succeeded();
+    }
+    let folder = t.path().join("folder");
+    std::fs::create_dir(&folder).unwrap();
+    run(&t, &["--summary", folder.to_str().unwrap()]).failed(4, &["folder: is a directory"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_interrupt_ends_at_once() {
+    let t = Temp::new();
+    t.drive(3);
+    // Nobody reads the figures, so that the program waits for ever when it has said everything.
+    let pipe = t.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
+        .args(BACKEND)
+        .args(["--summary", pipe.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert!(said.any(|line| line.unwrap().starts_with("digest")));
+    let id = child.id().to_string();
+    let since = Instant::now();
+    let end = loop {
+        if let Some(end) = child.try_wait().unwrap() {
+            break end;
+        }
+        assert!(since.elapsed() < Duration::from_secs(30));
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        thread::sleep(Duration::from_millis(100));
+    };
+    assert_eq!(end.code(), Some(130));
 }
 
 #[test]
@@ -253,7 +307,7 @@ fn an_interrupt_ends_the_run_in_order() {
         assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
         thread::sleep(Duration::from_millis(2));
     }
-    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.unwrap().success());
     let o = Outcome::of(child.wait_with_output().unwrap());
     assert_eq!(o.code, Some(130), "{}", o.stderr);

@@ -44,10 +44,6 @@ const MOVING_MIN: f32 = 0.4;
 /// end.
 pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
-    if args.out.canonicalize().is_ok_and(|out| args.data.canonicalize().is_ok_and(|d| d == out)) {
-        let what = "--out is the recording: its own labels would be lost";
-        return Err(Error::Usage(what.into()).into());
-    }
     let profile = config::profile(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let sweeps = args.part.range(source.len())?;
@@ -59,7 +55,7 @@ pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
         objects: None,
         weights: &weights.digest(),
     };
-    made.claim(Some(&args.out))?;
+    let _claim = made.claim(Some(&args.out))?;
     atomic::create_folder(&args.out.join("labels"))?;
     let kept = KeptClouds::create(&args.out, source.extension(), source.overview())?;
     let mut cleaning = Cleaning {

@@ -27,7 +27,9 @@ use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::streams::{Content, StreamTargets};
-use raywake_io::source::{BinFields, SweepData, mounting, pose_row, read_cloud, read_pose};
+use raywake_io::source::{
+    BinFields, SweepData, mounting, plausible, pose_row, read_cloud, read_pose,
+};
 use raywake_registration::ground::ground_height;
 
 use rows::{Form, PointRow};
@@ -106,8 +108,7 @@ fn cloud(path: &Path, fields: Option<&BinFields>, stamp_s: f64) -> Result<SweepD
 /// Sensor and ground as the user says, or as the first cloud tells; and a line about them.
 fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error> {
     let (ground_m, how) = match args.ground {
-        Some(given) if given.is_finite() => (given, "given"),
-        Some(_) => return Err(Error::Usage("--ground must be finite".into())),
+        Some(given) => (given, "given"),
         None => {
             let found = ground_height(&first.points).ok_or_else(|| {
                 let what = "no ground found in this cloud: give its height with --ground";
@@ -123,6 +124,8 @@ fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error>
             Some(place) => (place, "assumed, as the origin is too close to the ground"),
         },
     };
+    plausible::ground(ground_m).map_err(Error::Usage)?;
+    plausible::place(place).map_err(|what| Error::Usage(format!("the sensor: {what}")))?;
     let rig = Rig {
         sensors: [Pose { translation: place, ..Pose::IDENTITY }].into_iter().collect(),
         timing: Timing::AtStamp,

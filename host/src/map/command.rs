@@ -38,7 +38,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
         objects: None,
         weights: "none",
     };
-    made.claim(Some(&args.out))?;
+    let _claim = made.claim(Some(&args.out))?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes().iter().chain(&wanted.note))?;
     let budget = bytes(Mapper::bytes(&profile) as u64);

@@ -9,7 +9,7 @@ use std::path::Path;
 use raywake_objects::front_end::GroundMap;
 
 use raywake_io::Error;
-use raywake_io::source::text;
+use raywake_io::source::{text, whole};
 
 /// Heights of the ground, with their memory.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub struct Ground {
 impl Ground {
     /// Reads a file; fails where it is no such grid.
     pub fn read(path: &Path) -> Result<Ground, Error> {
-        parse(path, &text::read(path)?)
+        parse(path, &whole::read_text(path)?)
     }
 
     /// As the front end takes it.

@@ -30,7 +30,7 @@ pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
-/// the sweep in hand, and all tracks with it.
+/// the sweep in hand: tracks that have not ended by then have no estimate and are left out.
 pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let settings = settings(args)?;
     let mut source = source::open(&args.data, &args.recording.options())?;
@@ -50,7 +50,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         objects: Some(&settings.objects),
         weights: &WeightFiles::read(&args.flow.learned, &settings.profile)?.digest(),
     };
-    made.claim(args.out.as_deref())?;
+    let _claim = made.claim(args.out.as_deref())?;
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
     say(args.quiet, &budget(args.fixed_lag))?;
     let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
@@ -65,7 +65,8 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
             // Flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
             files.sweep(stepped, &tracker, report.last_ms())?;
-            tracker.ended(|ended| report.track(ended, &mut files))?;
+            let left = tracker.ended(|ended| report.track(ended, &mut files))?;
+            report.unestimated += left;
         }
         Ok(())
     })?;
@@ -73,22 +74,25 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     if let Some(counts) = tracker.last(&end.last)? {
         report.step(&counts, clock);
         files.sweep(&end.last, &tracker, report.last_ms())?;
-        tracker.ended(|ended| report.track(ended, &mut files))?;
+        let left = tracker.ended(|ended| report.track(ended, &mut files))?;
+        report.unestimated += left;
     }
     report.counts.ended += tracker.finish()?;
     let mut progress = Progress::new("track", tracker.ended_objects(), args.quiet);
     let mut done = 0;
-    tracker.ended(|ended| {
+    let left = tracker.ended(|ended| {
         done += 1;
         progress.update(done);
         report.track(ended, &mut files)
     })?;
     progress.finish();
-    let summary = report.summary(source.name(), args.front_end, end.interrupted);
+    report.unestimated += left;
+    let interrupted = end.interrupted || report.unestimated > 0;
+    let summary = report.summary(source.name(), args.front_end, interrupted);
     files.finish(&summary.text())?;
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
-    Ok(!end.interrupted)
+    Ok(!interrupted)
 }
 
 /// Parameters of the flow and of tracking.

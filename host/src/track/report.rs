@@ -53,6 +53,8 @@ pub struct Line {
 #[derive(Default)]
 pub struct Report {
     pub counts: TrackingCounts,
+    /// Tracks that a signal left without an estimate.
+    pub unestimated: u64,
     dropped: Dropped,
     sweeps: u64,
     steps: Vec<f64>,
@@ -135,6 +137,7 @@ impl Report {
             step_ms: Spread::of(&self.steps),
             estimate_ms: Spread::of(&self.estimates),
             tally: self.counts,
+            unestimated: self.unestimated,
             dropped: self.dropped,
             tracks: self.lines,
         }
@@ -171,6 +174,8 @@ pub struct TrackSummary {
     /// Counts over all sweeps, but those of dropped returns.
     #[serde(serialize_with = "by_name")]
     pub tally: TrackingCounts,
+    /// Tracks left out, as a signal came before their estimate.
+    pub unestimated: u64,
     /// Left out.
     pub dropped: Dropped,
     /// Every track that was seen often enough, in the order of their ends.
@@ -187,8 +192,13 @@ impl TrackSummary {
     }
 
     fn print(&self, out: &mut String) -> std::fmt::Result {
-        let end = if self.interrupted { ", INTERRUPTED" } else { "" };
-        let brief = self.tally.ended.saturating_sub(self.tracks.len() as u64);
+        let end = match (self.interrupted, self.unestimated) {
+            (false, 0) => String::new(),
+            (true, 0) => ", INTERRUPTED".into(),
+            (_, left) => format!(", INTERRUPTED before {left} estimates"),
+        };
+        let listed = self.tracks.len() as u64 + self.unestimated;
+        let brief = self.tally.ended.saturating_sub(listed);
         writeln!(
             out,
             "\n{} sweeps, {} tracks ({brief} omitted as short, or as no object: see --all){end}",

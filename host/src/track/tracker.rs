@@ -18,6 +18,7 @@ use raywake_objects::{ObjectReturn, ObjectState};
 use super::Ground;
 use super::live::seen;
 use crate::config::Settings;
+use crate::console::interrupted;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::team::{THREADS_MAX, ThreadTeam};
@@ -237,11 +238,12 @@ impl Tracker {
 
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
     /// estimate of its trajectory and shape: those of objects, unless all are asked for. Those that
-    /// ended before they were sure are left out: there is little to estimate.
+    /// ended before they were sure are left out: there is little to estimate. After a signal no further
+    /// track is estimated, as that may take seconds each; returns how many are left.
     pub fn ended(
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,
-    ) -> Result<(), RunError> {
+    ) -> Result<u64, RunError> {
         self.ended.clear();
         for slot in 0..self.parts.tracks.len() {
             if self.is_shown_at_its_end(&self.parts.tracks[slot]) {
@@ -249,7 +251,11 @@ impl Tracker {
             }
         }
         let Tracker { parts, ended, params, .. } = self;
+        let mut left = ended.len() as u64;
         for group in ended.chunks(parts.solvers.len()) {
+            if interrupted() {
+                break;
+            }
             parts.step(|TrackerParts { solvers, tracks, .. }| {
                 solve(&params.estimate, solvers, tracks, group);
                 Ok::<_, RunError>(())
@@ -260,9 +266,10 @@ impl Tracker {
                 let (track, milliseconds) = (&tracks[slot], *milliseconds);
                 let shape = shape(params, track, estimator);
                 show(&Ended { track, estimator, shape, report, lag, milliseconds })?;
+                left -= 1;
             }
         }
-        Ok(())
+        Ok(left)
     }
 }
 

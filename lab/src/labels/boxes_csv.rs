@@ -4,7 +4,7 @@
 use super::gather::{Gather, LabelRow, heading};
 use super::{Error, Labels, View};
 use glam::DVec3;
-use raywake_io::source::text;
+use raywake_io::source::{text, whole};
 use std::path::Path;
 
 /// First columns, in this order; others may follow.
@@ -16,7 +16,7 @@ const COLUMNS: [&str; 10] = ["frame", "track_id", "class", "x", "y", "z", "l", "
 ///
 /// Fails where it cannot be read, lacks a column, or a line is no box.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let mut lines = text::lines(&text);
     let header = lines.next().map_or("", |(_, line)| line);
     if !header.split(',').map(str::trim).zip(COLUMNS).all(|(a, b)| a == b)

@@ -8,7 +8,7 @@ use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
-use raywake_io::source::text;
+use raywake_io::source::{text, whole};
 use std::path::Path;
 
 /// Fields of a line; results of trackers have a score after them.
@@ -20,7 +20,7 @@ const FIELDS: usize = 17;
 /// Fails where a file cannot be read, a line is no box, or the calibration lacks a transform.
 pub(super) fn read(path: &Path, calib: &Path) -> Result<Labels, Error> {
     let velodyne_from_camera = read_calib(calib)?;
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let mut gather = Gather::default();
     for (line, content) in text::lines(&text) {
         let fields: Vec<&str> = content.split_ascii_whitespace().collect();
@@ -66,7 +66,7 @@ fn camera_from_box(&[height, _, _, x, y, z, rotation_y]: &[f64; 7]) -> Pose {
 /// `velodyne_from_camera` of the rectified camera. Keys are with and without a colon, and of the
 /// tracking or the object benchmark.
 fn read_calib(path: &Path) -> Result<Pose, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let [a, b, c, d, e, f, g, h, i] = keyed::<9>(path, &text, ["R_rect", "R0_rect"])?.1;
     let rectified = [a, b, c, 0.0, d, e, f, 0.0, g, h, i, 0.0];
     let (line, rows) = keyed::<12>(path, &text, ["Tr_velo_cam", "Tr_velo_to_cam"])?;

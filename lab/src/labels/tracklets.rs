@@ -7,7 +7,7 @@
 use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::{DQuat, DVec3};
-use raywake_io::source::text;
+use raywake_io::source::whole;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 
@@ -19,7 +19,7 @@ const UNSET: u64 = 0;
 /// Fails where the file cannot be read, is no whole XML, lacks an element, or has another number of
 /// items than it says.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(&text, options)
         .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;

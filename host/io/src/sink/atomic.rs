@@ -1,8 +1,8 @@
 //! Files that are whole or absent.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use crate::Error;
@@ -22,21 +22,25 @@ pub fn write(
 }
 
 /// A temporary file `.NAME.partial` beside the file that it will be, which takes the name only when
-/// everything is in it; whatever has that name stays until then. Dropped before, it is removed.
-///
-/// Nothing is forced onto the disk: after a power failure a file just written may be empty or
-/// absent. Two writers of one path must not run at once, as they share the temporary name.
+/// everything is in it and on the disk; whatever has that name stays until then. Dropped before, it
+/// is removed; what a process that was killed has left is removed by the next one.
 pub struct Partial {
     path: PathBuf,
     partial: PathBuf,
+    /// The open file again, for what is done at the end. While it is open it is locked.
+    file: File,
 }
 
+/// How often another process may remove a temporary file just before it is locked.
+const ATTEMPTS: usize = 8;
+
 impl Partial {
-    /// Creates the temporary file of `path`.
+    /// Creates the temporary file of `path`. Fails where another process is writing it.
     pub fn create(path: &Path) -> Result<(Partial, BufWriter<File>), Error> {
         let partial = partial_path(path)?;
-        let file = File::create(&partial).map_err(Error::writing(path))?;
-        let this = Partial { path: path.to_path_buf(), partial };
+        let file = create_locked(&partial).map_err(Error::writing(path))?;
+        let again = file.try_clone().map_err(Error::writing(path))?;
+        let this = Partial { path: path.to_path_buf(), partial, file: again };
         Ok((this, BufWriter::with_capacity(1 << 18, file)))
     }
 
@@ -47,6 +51,13 @@ impl Partial {
 
     /// Gives it its name. All must have been written.
     pub fn keep(self) -> Result<(), Error> {
+        match self.file.sync_data() {
+            // Some file systems cannot.
+            Err(e) if !matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {
+                return Err(Error::writing(&self.path)(e));
+            }
+            _ => (),
+        }
         fs::rename(&self.partial, &self.path).map_err(Error::writing(&self.path))
     }
 }
@@ -56,6 +67,68 @@ impl Drop for Partial {
         // It has its name, or is of no use. The first failure is the one to tell.
         let _ = fs::remove_file(&self.partial);
     }
+}
+
+/// Creates a file that was not there and locks it. One that is there is left by a process that was
+/// killed, unless it is locked; it is removed, and not opened for writing: it may be a link.
+fn create_locked(path: &Path) -> io::Result<File> {
+    let busy = || io::Error::new(ErrorKind::ResourceBusy, "another process is writing it");
+    for _ in 0..ATTEMPTS {
+        match File::options().write(true).create_new(true).open(path) {
+            Ok(file) => {
+                if is_locked(&file) && is_at(&file, path) {
+                    return Ok(file);
+                }
+            }
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {
+                let there = File::open(path).ok().filter(|_| !path.is_symlink());
+                if there.is_some_and(|there| !is_locked(&there)) {
+                    return Err(busy());
+                }
+                fs::remove_file(path)?;
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    Err(busy())
+}
+
+/// Locks a file or folder. Whether no other process has locked it; where there are no locks, none
+/// has.
+fn is_locked(file: &File) -> bool {
+    !matches!(file.try_lock(), Err(TryLockError::WouldBlock))
+}
+
+/// Whether a file is still at the path where it was opened.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let of = |metadata: io::Result<fs::Metadata>| metadata.map(|m| (m.dev(), m.ino())).ok();
+    of(file.metadata()) == of(path.symlink_metadata())
+}
+
+/// Open files cannot be removed there.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// A folder that no other process writes results to, while this value lives.
+#[derive(Debug)]
+pub struct FolderClaim {
+    /// None where folders cannot be opened.
+    _locked: Option<File>,
+}
+
+/// Creates a folder, with those above it, and claims it. Fails where another process has.
+pub fn claim_folder(path: &Path) -> Result<FolderClaim, Error> {
+    create_folder(path)?;
+    let folder = File::open(path).ok();
+    if folder.as_ref().is_some_and(|folder| !is_locked(folder)) {
+        let what = "another process is writing results into it";
+        return Err(Error::writing(path)(io::Error::new(ErrorKind::ResourceBusy, what)));
+    }
+    Ok(FolderClaim { _locked: folder })
 }
 
 /// Creates a folder and those above it.

@@ -1,6 +1,5 @@
 //! The tables of a run's flow: a feather file each sweep, or a Parquet file for all.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
@@ -11,6 +10,7 @@ use super::parquet::ParquetFile;
 use super::table::TableWriter;
 use super::{Meta, atomic};
 use crate::Error;
+use crate::source::whole;
 
 /// The sweep that rows are of.
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +137,7 @@ impl Folders {
         if !is_there {
             return atomic::write(&path, |out| std::io::Write::write_all(out, &bytes));
         }
-        if fs::read(&path).map_err(Error::reading(&path))? != bytes {
+        if whole::read(&path)? != bytes {
             let what = "is not what this run finds: choose another folder, or delete it";
             return Err(Error::Usage(format!("{} {what}", path.display())));
         }

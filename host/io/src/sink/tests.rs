@@ -43,6 +43,43 @@ fn a_file_is_whole_or_absent() {
     assert!(atomic::create_folder(&path).is_err());
 }
 
+#[test]
+fn what_was_left_is_removed_and_what_is_written_is_not() {
+    let t = Temp::new();
+    let path = t.path().join("a.txt");
+    t.write(".a.txt.partial", "left");
+    atomic::write(&path, |w| w.write_all(b"one")).unwrap();
+    assert_eq!((fs::read(&path).unwrap(), names(t.path()).len()), (b"one".to_vec(), 1));
+    let (partial, mut writer) = atomic::Partial::create(&path).unwrap();
+    let e = atomic::write(&path, |w| w.write_all(b"two")).unwrap_err();
+    assert!(e.to_string().ends_with("a.txt: another process is writing it"), "{e}");
+    writer.write_all(b"three").and_then(|()| writer.flush()).unwrap();
+    partial.keep().unwrap();
+    assert_eq!((fs::read(&path).unwrap(), names(t.path()).len()), (b"three".to_vec(), 1));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_planted_link_is_not_followed() {
+    let t = Temp::new();
+    let target = t.write("target", "precious");
+    std::os::unix::fs::symlink(&target, t.path().join(".a.txt.partial")).unwrap();
+    atomic::write(&t.path().join("a.txt"), |w| w.write_all(b"one")).unwrap();
+    assert_eq!(fs::read(&target).unwrap(), b"precious");
+    assert_eq!(fs::read(t.path().join("a.txt")).unwrap(), b"one");
+}
+
+#[test]
+fn a_folder_has_one_writer() {
+    let t = Temp::new();
+    let folder = t.path().join("a/b");
+    let claim = atomic::claim_folder(&folder).unwrap();
+    let e = atomic::claim_folder(&folder).unwrap_err();
+    assert!(e.to_string().contains("another process is writing results into it"), "{e}");
+    drop(claim);
+    atomic::claim_folder(&folder).unwrap();
+}
+
 #[cfg(feature = "arrow")]
 mod tables {
     use super::*;

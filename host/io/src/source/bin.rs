@@ -4,8 +4,8 @@ use std::path::Path;
 
 use raywake_core::sweep::Point;
 
-use super::npy;
-use super::returns::{Fields, Number, load};
+use super::returns::{Fields, Number};
+use super::{npy, whole};
 use crate::Error;
 
 /// Bytes of a number.
@@ -62,7 +62,7 @@ pub(super) fn read(
     points: &mut Vec<Point>,
 ) -> Result<bool, Error> {
     points.clear();
-    let bytes = load(path)?;
+    let bytes = whole::read(path)?;
     let (usual, wrong) = (BinFields::usual(path), |what| Error::input(path, "", what));
     let fields = told.unwrap_or(&usual);
     let (numbers, rest) = bytes.as_chunks::<NUMBER>();

@@ -1,7 +1,8 @@
 //! Decoders of other people's that panic on damaged files.
 //!
-//! Parquet's does where a page's levels are cut short. What it decodes is named while it works, so
-//! that the program can say which file is damaged, however its panics end.
+//! Parquet's does where a page's levels are cut short, Arrow's where a buffer holds part of a number.
+//! What they decode is named while they work, so that the program can say which file is damaged,
+//! however its panics end.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};

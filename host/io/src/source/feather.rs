@@ -1,7 +1,6 @@
 //! Columns of a feather file (an Arrow IPC file), in any number of record batches, compressed or
 //! not.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
@@ -14,7 +13,8 @@ use arrow_array::{Array, RecordBatch};
 use arrow_ipc::reader::FileReaderBuilder;
 use arrow_schema::{ArrowError, DataType};
 
-use super::feather_check;
+use super::decoder::guarded;
+use super::{feather_check, whole};
 use crate::Error;
 
 /// The columns of a file that were asked for.
@@ -26,25 +26,13 @@ pub struct FeatherTable {
 impl FeatherTable {
     /// Reads `columns`. Fails where the file is unreadable or damaged, or lacks one of them.
     pub fn read(path: &Path, columns: &[&str]) -> Result<FeatherTable, Error> {
-        FeatherTable::parse(path, &fs::read(path).map_err(Error::reading(path))?, columns)
+        FeatherTable::parse(path, &whole::read(path)?, columns)
     }
 
     /// Takes `columns` from the content of the file at `path`.
     pub fn parse(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<FeatherTable, Error> {
         feather_check::check(bytes).map_err(|what| Error::input(path, "", what))?;
-        let damaged = |e: ArrowError| Error::input(path, "", format!("damaged: {e}"));
-        // Once for the schema, once with the columns: others may have types nobody here needs.
-        let all = FileReaderBuilder::new().build(Cursor::new(bytes)).map_err(damaged)?.schema();
-        let mut wanted = Vec::with_capacity(columns.len());
-        for name in columns {
-            let missing = |_| Error::input(path, "", format!("has no column `{name}`"));
-            wanted.push(all.index_of(name).map_err(missing)?);
-        }
-        let reader = FileReaderBuilder::new()
-            .with_projection(wanted)
-            .build(Cursor::new(bytes))
-            .map_err(damaged)?;
-        let batches = reader.collect::<Result<_, _>>().map_err(damaged)?;
+        let batches = guarded(path, || batches(path, bytes, columns))??;
         Ok(FeatherTable { path: path.to_path_buf(), batches })
     }
 
@@ -141,6 +129,23 @@ impl FeatherTable {
         }
         Ok(out)
     }
+}
+
+/// What a file has of some columns.
+fn batches(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<Vec<RecordBatch>, Error> {
+    let damaged = |e: ArrowError| Error::input(path, "", format!("damaged: {e}"));
+    // Once for the schema, once with the columns: others may have types nobody here needs.
+    let all = FileReaderBuilder::new().build(Cursor::new(bytes)).map_err(damaged)?.schema();
+    let mut wanted = Vec::with_capacity(columns.len());
+    for name in columns {
+        let missing = |_| Error::input(path, "", format!("has no column `{name}`"));
+        wanted.push(all.index_of(name).map_err(missing)?);
+    }
+    let reader = FileReaderBuilder::new()
+        .with_projection(wanted)
+        .build(Cursor::new(bytes))
+        .map_err(damaged)?;
+    reader.collect::<Result<_, _>>().map_err(damaged)
 }
 
 /// Appends the numbers of a column; none where a number is null or cannot be a `V`.

@@ -1,7 +1,9 @@
 //! Whether the bytes of a feather file are whole, before the Arrow reader sees them: that reader
 //! takes offsets and lengths in the file on trust and stops the process on some wrong ones.
 
-use arrow_ipc::{Block, Message, MessageHeader, RecordBatch, root_as_footer, root_as_message};
+use arrow_ipc::{Block, RecordBatch, root_as_footer, root_as_message};
+
+use super::whole::SIZE_MAX;
 
 /// First and last bytes of a feather file.
 const MAGIC: &[u8] = b"ARROW1";
@@ -9,8 +11,9 @@ const MAGIC: &[u8] = b"ARROW1";
 /// Length of the footer and [`MAGIC`], at the end of the file.
 const TRAILER: usize = 10;
 
-/// Largest column that is unpacked, bytes: what a file claims is allocated before it is verified.
-const UNPACKED_MAX: i64 = 1 << 30;
+/// Most that the columns of a file may unpack to, all together, bytes: as for any other file of a
+/// sweep. What a file claims is allocated before it is verified.
+const UNPACKED_MAX: u64 = SIZE_MAX;
 
 /// `Err` with what is wrong.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
@@ -26,17 +29,19 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let start = body.len().checked_sub(length as usize);
     let start = start.ok_or("damaged: the footer is longer than the file")?;
     let footer = root_as_footer(&body[start..]).map_err(|e| format!("damaged footer: {e}"))?;
-    for block in footer.recordBatches().into_iter().flatten() {
-        check_block(&body[..start], block)?;
+    // They are unpacked whether or not their column is asked for, and nobody here needs them.
+    if footer.dictionaries().is_some_and(|blocks| !blocks.is_empty()) {
+        return Err("has columns coded by dictionary: write them plainly".into());
     }
-    for block in footer.dictionaries().into_iter().flatten() {
-        check_block(&body[..start], block)?;
+    let mut unpacked = 0;
+    for block in footer.recordBatches().into_iter().flatten() {
+        check_block(&body[..start], block, &mut unpacked)?;
     }
     Ok(())
 }
 
-/// A block lies within the file and its message within the block.
-fn check_block(file: &[u8], block: &Block) -> Result<(), String> {
+/// A block lies within the file and its message within the block. Adds to the bytes unpacked.
+fn check_block(file: &[u8], block: &Block, unpacked: &mut u64) -> Result<(), String> {
     let outside = || format!("damaged: a record batch at byte {} is cut off", block.offset());
     let size = |v: i64| usize::try_from(v).map_err(|_| outside());
     let offset = size(block.offset())?;
@@ -50,20 +55,12 @@ fn check_block(file: &[u8], block: &Block) -> Result<(), String> {
     let message = head.get(skip..).ok_or_else(outside)?;
     let message = root_as_message(message)
         .map_err(|e| format!("damaged message at byte {}: {e}", block.offset()))?;
-    batch_of(&message).map_or(Ok(()), |batch| check_batch(&batch, body))
+    let batch = message.header_as_record_batch();
+    batch.map_or(Ok(()), |batch| check_batch(&batch, body, unpacked))
 }
 
-/// The record batch in a message, plain or of a dictionary.
-fn batch_of<'a>(message: &Message<'a>) -> Option<RecordBatch<'a>> {
-    match message.header_type() {
-        MessageHeader::RecordBatch => message.header_as_record_batch(),
-        MessageHeader::DictionaryBatch => message.header_as_dictionary_batch()?.data(),
-        _ => None,
-    }
-}
-
-/// Every buffer of a batch lies within its body, and no length is absurd.
-fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<(), String> {
+/// Every buffer of a batch lies within its body, and no length is absurd, nor their sum.
+fn check_batch(batch: &RecordBatch<'_>, body: &[u8], unpacked: &mut u64) -> Result<(), String> {
     let sensible = |rows: i64| (0..=i64::from(i32::MAX)).contains(&rows);
     let nodes = batch.nodes().into_iter().flatten();
     let mut counts = nodes.flat_map(|n| [n.length(), n.null_count()]);
@@ -75,10 +72,14 @@ fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<(), String> {
             usize::try_from(buffer.offset()).ok().zip(usize::try_from(buffer.length()).ok());
         let bytes = range.and_then(|(from, n)| body.get(from..)?.get(..n));
         let bytes = bytes.ok_or("damaged: a column reaches beyond its record batch")?;
-        let packed = batch.compression().is_some();
-        let unpacked = bytes.first_chunk().map_or(0, |b| i64::from_le_bytes(*b));
-        if packed && unpacked > UNPACKED_MAX {
-            return Err(format!("damaged: a column claims {unpacked} bytes"));
+        // Packed ones begin with their length; a negative one says that they are not packed.
+        let claimed = bytes.first_chunk().map(|b| i64::from_le_bytes(*b));
+        let claimed = claimed.filter(|_| batch.compression().is_some());
+        let length = claimed.and_then(|n| u64::try_from(n).ok()).unwrap_or(bytes.len() as u64);
+        *unpacked = unpacked.saturating_add(length);
+        if *unpacked > UNPACKED_MAX {
+            let most = UNPACKED_MAX;
+            return Err(format!("unpacks to {unpacked} bytes or more, at most {most} are read"));
         }
     }
     Ok(())

@@ -24,7 +24,7 @@ mod bin;
 #[cfg(feature = "pcap")]
 mod capture;
 mod clouds;
-#[cfg(feature = "parquet")]
+#[cfg(feature = "arrow")]
 pub mod decoder;
 #[cfg(feature = "arrow")]
 pub mod feather;
@@ -41,6 +41,7 @@ mod nuscenes;
 mod options;
 mod oxts;
 mod pcd;
+pub mod plausible;
 mod ply;
 mod pose_files;
 mod poses;
@@ -54,6 +55,7 @@ mod trajectory;
 mod viewpoints;
 #[cfg(feature = "parquet")]
 mod waymo;
+pub mod whole;
 
 #[cfg(test)]
 pub(crate) mod tests;
@@ -336,8 +338,8 @@ impl Format {
 /// calibration are missing, do not fit the sweeps or make no sense, and where this build cannot
 /// read the format.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
-    if options.ground_m.is_some_and(|g| !g.is_finite()) {
-        return Err(Error::Usage("the height of the ground is not finite".into()));
+    if let Some(ground_m) = options.ground_m {
+        plausible::ground(ground_m).map_err(Error::Usage)?;
     }
     let (format, root) = match options.format {
         Some(format) => (format, path.to_path_buf()),
@@ -352,7 +354,9 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
     if format != Format::Mcap && options.extrinsics.is_some() {
         return Err(Error::Usage("--extrinsics is for recordings in MCAP".into()));
     }
-    (format.row().open)(&root, options)
+    let source = (format.row().open)(&root, options)?;
+    plausible::check(source.overview()).map_err(|what| Error::input(&root, "", what))?;
+    Ok(source)
 }
 
 /// Last part of a path, resolved so that `.` has a name too.

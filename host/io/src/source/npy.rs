@@ -4,7 +4,7 @@ use std::path::Path;
 
 use half::f16;
 
-use super::returns::load;
+use super::whole;
 use crate::Error;
 
 /// First bytes of the format.
@@ -26,7 +26,7 @@ pub struct Array {
 /// # Errors
 /// Where the file cannot be read, is too large for a cloud, or holds something else.
 pub fn read(path: &Path) -> Result<Array, Error> {
-    parse(&load(path)?).map_err(|what| Error::input(path, "", what))
+    parse(&whole::read(path)?).map_err(|what| Error::input(path, "", what))
 }
 
 /// `Err` with what is wrong.

@@ -7,7 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
 
 use super::poses::{pose_from, shift};
-use super::text;
+use super::{text, whole};
 use crate::Error;
 
 /// Radius of the sphere of the Mercator projection, m.
@@ -24,7 +24,7 @@ pub(super) fn default_velo_from_imu() -> Pose {
 
 /// `velo_from_imu` from a `calib_imu_to_velo.txt` (lines `R:` of nine and `T:` of three numbers).
 pub(super) fn read_calibration(path: &Path) -> Result<Pose, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let rotation = text::keyed::<9>(path, &text, "R")?;
     let translation = text::keyed::<3>(path, &text, "T")?;
     let (Some((line, r)), Some((_, t))) = (rotation, translation) else {
@@ -36,7 +36,7 @@ pub(super) fn read_calibration(path: &Path) -> Result<Pose, Error> {
 
 /// One packet file: `lat lon alt roll pitch yaw` and more, which is not used.
 pub(super) fn read_packet(path: &Path) -> Result<[f64; FIELDS], Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let (line, content) =
         text::lines(&text).next().ok_or_else(|| Error::input(path, "", "is empty"))?;
     let all = text::numbers(path, line, content)?;

@@ -11,8 +11,8 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
 use super::poses::rigid;
-use super::returns::{Attribute, Fields, Head, Number, load, records, table};
-use super::{lzf, text};
+use super::returns::{Attribute, Fields, Head, Number, records, table};
+use super::{lzf, text, whole};
 use crate::Error;
 
 /// Replaces `points` by those of a file; returns whether they have times.
@@ -21,7 +21,7 @@ use crate::Error;
 /// ends early.
 pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
     points.clear();
-    let bytes = load(path)?;
+    let bytes = whole::read(path)?;
     let mut head = Head::new(path, &bytes);
     let header = PcdHeader::read(&mut head)?;
     let named: Vec<_> = header.fields.iter().map(|f| (f.name.clone(), f.number)).collect();

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use raywake_core::sweep::Point;
 
-use super::returns::{Attribute, Fields, Head, Number, load, records, table};
+use super::returns::{Attribute, Fields, Head, Number, records, table};
+use super::whole;
 use crate::Error;
 
 /// Replaces `points` by the vertices of a file; returns whether they have times.
@@ -15,7 +16,7 @@ use crate::Error;
 /// elements come before the vertices, or it ends early.
 pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
     points.clear();
-    let bytes = load(path)?;
+    let bytes = whole::read(path)?;
     let mut head = Head::new(path, &bytes);
     let header = PlyHeader::read(&mut head)?;
     let fields = Fields::find(&header.fields).map_err(|what| Error::input(path, "", what))?;

@@ -10,17 +10,14 @@ use std::path::Path;
 
 use raywake_core::pose::Pose;
 
+use super::plausible::{TIME_MAX_S, reach};
 use super::poses::{pose_from, rigid};
 use super::trajectory::Trajectory;
-use super::{npy, text};
+use super::{npy, text, whole};
 use crate::Error;
 
-/// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
-const REACH_MAX_M: f64 = 1e6;
 /// A stamp this little before the first pose or after the last one has that, ns: text rounds times.
 const SLACK_NS: i64 = 1_000_000;
-/// Largest time that is believed, s.
-const TIME_MAX_S: f64 = 1e10;
 
 /// A row of a file.
 struct PoseRow {
@@ -95,7 +92,7 @@ fn rows(path: &Path) -> Result<Vec<PoseRow>, Error> {
             rows.push(row(path, format!("row {n}"), numbers)?);
         }
     } else {
-        let text = text::read(path)?;
+        let text = whole::read_text(path)?;
         for (line, content) in text::lines(&text).filter(|(_, text)| !text.starts_with('#')) {
             let numbers = text::numbers(path, line, content)?;
             rows.push(row(path, format!("line {line}"), &numbers)?);
@@ -104,11 +101,7 @@ fn rows(path: &Path) -> Result<Vec<PoseRow>, Error> {
     let Some(first) = rows.first() else { return Ok(rows) };
     let (start, timed) = (first.pose.translation, first.time_s.is_some());
     for row in &rows {
-        let away_m = (row.pose.translation - start).length();
-        if away_m > REACH_MAX_M {
-            let what = format!("{away_m:.3e} m from the first pose, more than {REACH_MAX_M:.0e} m");
-            return Err(Error::input(path, &row.place, what));
-        }
+        reach(start, &row.pose).map_err(|what| Error::input(path, &row.place, what))?;
         if row.time_s.is_some() != timed {
             let what = "some rows have a time and others do not";
             return Err(Error::input(path, &row.place, what));

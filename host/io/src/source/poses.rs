@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use raywake_core::continuity::ContinuityLimits;
 use raywake_core::pose::{Pose, PoseError, Twist};
 
-use super::text;
+use super::{text, whole};
 use crate::Error;
 
 /// Interval between sweeps that is assumed where a source has no times, s.
@@ -104,7 +104,7 @@ pub fn pose_row(pose: &Pose) -> String {
 
 /// `camera_from_velodyne`, the line `Tr:` of an odometry sequence's `calib.txt`.
 pub(super) fn read_camera(path: &Path) -> Result<Pose, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     match text::keyed(path, &text, "Tr")? {
         Some((line, rows)) => pose_from(&rows, path, format!("line {line}")),
         None => Err(Error::input(path, "", "has no line `Tr:` (camera from Velodyne)")),
@@ -162,7 +162,7 @@ fn choose(all: &[(usize, f64)], frames: &[u64], path: &Path) -> Result<Vec<(usiz
 
 /// Every time of a file, with its line: seconds, or dates as seconds since the first date.
 fn read_stamps(path: &Path) -> Result<Vec<(usize, f64)>, Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let mut first_ns = None;
     let mut stamps = Vec::new();
     for (line, content) in text::lines(&text) {

@@ -12,17 +12,12 @@
 //! away from it they are of a clock, and count from that earliest, or from the stamp where that is
 //! of the same clock. Other fields, `ring` too, are passed over.
 
-use std::fs;
 use std::path::Path;
 
 use raywake_core::sweep::Point;
 
 use super::text;
 use crate::Error;
-
-/// Largest file that is read, bytes: 16 million returns of a `.bin`, a hundred times what a sweep
-/// has.
-const SIZE_MAX: u64 = 256 << 20;
 
 /// Seconds that no date has reached: times beyond are ns.
 const SECONDS_MAX: f64 = 1e12;
@@ -191,16 +186,6 @@ pub(super) fn table(
         return Err(Error::input(path, "", what));
     }
     Ok(numbers)
-}
-
-/// A file's content, no more than any sweep has.
-pub(super) fn load(path: &Path) -> Result<Vec<u8>, Error> {
-    let size = fs::metadata(path).map_err(Error::reading(path))?.len();
-    if size > SIZE_MAX {
-        let what = format!("{size} bytes are too many for a sweep (at most {SIZE_MAX})");
-        return Err(Error::input(path, "", what));
-    }
-    fs::read(path).map_err(Error::reading(path))
 }
 
 /// Lines of a header at the start of a file.

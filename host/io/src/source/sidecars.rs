@@ -19,7 +19,7 @@ use raywake_core::pose::Pose;
 use raywake_core::sweep::{Point, Rig, Timing};
 
 use super::poses::pose_from;
-use super::text;
+use super::{text, whole};
 use crate::Error;
 
 /// Longest sweep that is believed, s.
@@ -99,14 +99,14 @@ impl Sidecars {
             let what = format!("{size} bytes, {} expected for {returns} returns", returns * width);
             return Err(Error::input(&path, "", what));
         }
-        let bytes = fs::read(&path).map_err(Error::reading(&path))?;
+        let bytes = whole::read(&path)?;
         Ok((path, bytes))
     }
 }
 
 /// The rig of a `sensors.txt`, and the earliest offset and the duration of its sweeps, s.
 fn read_rig(path: &Path) -> Result<(Rig, [f64; 2]), Error> {
-    let text = text::read(path)?;
+    let text = whole::read_text(path)?;
     let (span, ground) = (text::keyed(path, &text, "span")?, text::keyed(path, &text, "ground")?);
     let (Some((span_line, [from_s, span_s])), Some((ground_line, [ground_m]))) = (span, ground)
     else {

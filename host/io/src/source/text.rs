@@ -1,14 +1,8 @@
 //! Small text files of numbers, read with the place of every mistake.
 
-use std::fs;
 use std::path::Path;
 
 use crate::Error;
-
-/// A text file as a string.
-pub fn read(path: &Path) -> Result<String, Error> {
-    fs::read_to_string(path).map_err(Error::reading(path))
-}
 
 /// The lines that hold something, each with its number counted from 1.
 pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {

@@ -6,7 +6,7 @@ use super::contents::{CloudTopic, Contents};
 use super::messages::Transform;
 use crate::Error;
 use crate::source::poses::rigid;
-use crate::source::text;
+use crate::source::{text, whole};
 
 /// Adds the links of a file to those of the recording, before which they count. A line each: the
 /// parent's frame, the child's, and the child's place (x y z, m) and quaternion (x y z w) in the
@@ -16,7 +16,7 @@ use crate::source::text;
 /// # Errors
 /// With the line where it is no such link, and where nothing is in the child's frame.
 pub(super) fn add(path: &Path, contents: &mut Contents) -> Result<(), Error> {
-    let content = text::read(path)?;
+    let content = whole::read_text(path)?;
     for (number, line) in text::lines(&content) {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use super::firing::{Firing, REFLECTIVITY_MAX, TURN};
 use crate::Error;
-use crate::source::returns::load;
+use crate::source::whole;
 
 /// Beams, columns of a turn and columns of a packet that are believed.
 const BEAMS: Range<usize> = 1..257;
@@ -123,7 +123,7 @@ impl Ouster {
     /// The sensor that a file of metadata tells of. Fails where it is none of a known profile.
     pub fn read(path: &Path) -> Result<Ouster, Error> {
         let wrong = |what: String| Error::input(path, "", what);
-        let json = serde_json::from_slice(&load(path)?).map_err(|e| wrong(e.to_string()))?;
+        let json = serde_json::from_slice(&whole::read(path)?).map_err(|e| wrong(e.to_string()))?;
         Ouster::of(&Metadata(&json)).map_err(wrong)
     }
 

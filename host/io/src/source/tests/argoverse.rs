@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use arrow_array::types::{ArrowPrimitiveType, Float16Type};
+use arrow_array::types::{ArrowPrimitiveType, Float16Type, Int8Type};
 use arrow_array::{
-    ArrayRef, BooleanArray, Float16Array, Float64Array, Int8Array, Int32Array, Int64Array,
-    RecordBatch, StringArray, UInt8Array,
+    ArrayRef, BooleanArray, DictionaryArray, Float16Array, Float64Array, Int8Array, Int32Array,
+    Int64Array, RecordBatch, StringArray, UInt8Array,
 };
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
@@ -203,6 +203,28 @@ fn no_cut_or_flipped_byte_panics() {
             }
         }
     }
+}
+
+#[test]
+fn dictionaries_are_refused() {
+    let names: DictionaryArray<Int8Type> = ["car", "bus", "car"].into_iter().collect();
+    let columns = vec![("class", Arc::new(names) as ArrayRef), ("x", floats(vec![1.0; 3]))];
+    let bytes = file(&[batch(columns)], None);
+    let e = FeatherTable::parse(Path::new("f.feather"), &bytes, &["x"]).err().unwrap();
+    assert_eq!(e.to_string(), "f.feather: has columns coded by dictionary: write them plainly");
+}
+
+#[test]
+fn what_unpacks_to_too_much_is_refused() {
+    let zeros: ArrayRef = Arc::new(UInt8Array::from(vec![0; 100 << 20]));
+    let batches = vec![batch(vec![("x", zeros)]); 3];
+    let bytes = file(&batches, Some(CompressionType::ZSTD));
+    assert!(bytes.len() < 100 << 10, "{} bytes", bytes.len());
+    let refused = |columns: &[&str]| {
+        FeatherTable::parse(Path::new("f.feather"), &bytes, columns).err().unwrap().to_string()
+    };
+    let wanted = "f.feather: unpacks to 314572800 bytes or more, at most 268435456 are read";
+    assert_eq!((refused(&["x"]), refused(&[])), (wanted.into(), wanted.into()));
 }
 
 #[test]

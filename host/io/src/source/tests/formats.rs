@@ -102,6 +102,21 @@ fn drive_with_oxts() {
 }
 
 #[test]
+fn oxts_beyond_any_drive() {
+    let t = Temp::new();
+    oxts_drive(&t, "day/drive");
+    let path = t.path().join("day/drive/oxts/data/0000000001.txt");
+    let packet = fs::read_to_string(&path).unwrap();
+    let mut numbers: Vec<&str> = packet.split_whitespace().collect();
+    numbers[2] = "1e308";
+    fs::write(&path, numbers.join(" ")).unwrap();
+    assert!(refused(&t.path().join("day/drive")).contains("the pose of frame 1: "));
+    fs::write(&path, packet).unwrap();
+    t.write("day/calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 1e308 1e308 0\n");
+    assert!(refused(&t.path().join("day/drive")).contains(" is at "));
+}
+
+#[test]
 fn oxts_with_calibration_of_the_day() {
     let t = Temp::new();
     oxts_drive(&t, "day/drive");

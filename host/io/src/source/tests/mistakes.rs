@@ -40,7 +40,7 @@ fn poses() {
             .contains("line 3: 12 numbers (a 3x4 matrix) or 8 (time and pose) expected, 4 found")
     );
     t.write("poses.txt", [0xff, 0xfe]);
-    assert!(refused(t.path()).contains("cannot read"));
+    assert!(refused(t.path()).contains("poses.txt, byte 0: is not UTF-8 text"));
     t.remove("poses.txt");
     assert!(refused(t.path()).contains("neither `poses.txt` nor `oxts/data`"));
     let absent = t.path().join("absent.txt");

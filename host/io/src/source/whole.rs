@@ -1,0 +1,86 @@
+//! Files that are read at once: ordinary ones, no longer than any of their kind is.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use crate::Error;
+
+/// Longest file that is read at once, bytes: 16 million returns of a `.bin`, a hundred times what a
+/// sweep has, and the poses of two million sweeps. It is kept while the file is read, too: a file
+/// may grow.
+pub(super) const SIZE_MAX: u64 = 256 << 20;
+
+/// The content of a file of at most [`SIZE_MAX`] bytes.
+///
+/// # Errors
+/// What is no ordinary file, and so may never end or never begin, and what is too long.
+pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
+    read_up_to(path, SIZE_MAX)
+}
+
+/// The same for at most so many bytes.
+pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    // Asked before it is opened: opening a pipe waits for its other end.
+    let metadata = path.metadata().map_err(Error::reading(path))?;
+    if metadata.is_dir() {
+        return Err(Error::reading(path)(io::ErrorKind::IsADirectory.into()));
+    }
+    if !metadata.is_file() {
+        return Err(Error::input(path, "", "is not an ordinary file, but a device or a pipe"));
+    }
+    let too_long = |size: u64| {
+        Error::input(path, "", format!("has {size} bytes or more, at most {most} are read"))
+    };
+    if metadata.len() > most {
+        return Err(too_long(metadata.len()));
+    }
+    let mut bytes = Vec::new();
+    let room = bytes.try_reserve_exact(metadata.len() as usize);
+    room.map_err(|_| Error::reading(path)(io::ErrorKind::OutOfMemory.into()))?;
+    let file = File::open(path).map_err(Error::reading(path))?;
+    file.take(most + 1).read_to_end(&mut bytes).map_err(Error::reading(path))?;
+    if bytes.len() as u64 > most {
+        return Err(too_long(most + 1));
+    }
+    Ok(bytes)
+}
+
+/// The content of a file of text.
+pub fn read_text(path: &Path) -> Result<String, Error> {
+    String::from_utf8(read(path)?).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        Error::input(path, format!("byte {at}"), "is not UTF-8 text")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::tests::Temp;
+
+    #[test]
+    fn files_of_any_kind() {
+        let t = Temp::new();
+        let path = t.write("a", [0x61; 10]);
+        assert_eq!(read_up_to(&path, 10).unwrap().len(), 10);
+        assert_eq!(read_text(&path).unwrap(), "aaaaaaaaaa");
+        let e = read_up_to(&path, 9).unwrap_err();
+        assert!(e.to_string().ends_with("a: has 10 bytes or more, at most 9 are read"), "{e}");
+        t.write("a", [0x61, 0xff]);
+        let e = read_text(&path).unwrap_err().to_string();
+        assert!(e.ends_with("a, byte 1: is not UTF-8 text"), "{e}");
+        assert!(matches!(read(t.path()), Err(Error::Read { .. })));
+        assert!(matches!(read(&t.path().join("absent")), Err(Error::Read { .. })));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_never_ends() {
+        let t = Temp::new();
+        let endless = t.path().join("a.bin");
+        std::os::unix::fs::symlink("/dev/zero", &endless).unwrap();
+        let e = read(&endless).unwrap_err();
+        assert!(e.to_string().ends_with("a device or a pipe") && e.exit_code() == 3, "{e}");
+    }
+}

@@ -1,0 +1,96 @@
+//! Outputs that would take the place of inputs.
+
+use std::any::TypeId;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgMatches, Command, CommandFactory};
+use raywake_io::Error;
+
+use super::Args;
+use crate::settings_file;
+
+/// Arguments of files and folders that are written; all others of their type are read.
+const OUTPUTS: [&str; 6] = ["out", "summary", "film", "page", "mcap", "png"];
+
+/// Fails where an output of a command is one of its inputs, or would replace a file of a recording.
+pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
+    let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
+    let program = Args::command();
+    let command = program.find_subcommand(name);
+    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+    for id in command.into_iter().flat_map(paths) {
+        let list = if OUTPUTS.contains(&id) { &mut outputs } else { &mut inputs };
+        // Fails for those that a command does not have.
+        let given = matches.try_get_raw(id).ok().flatten();
+        list.extend(given.into_iter().flatten().map(|text| (id, Path::new(text))));
+    }
+    for (id, output) in outputs {
+        for input in inputs.iter().filter_map(|(_, input)| input.canonicalize().ok()) {
+            if let Some(what) = harm(&resolved(output), &input) {
+                let text = format!("--{id} {} {what}: choose another place", output.display());
+                return Err(Error::Usage(text));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Names of a command's arguments that are paths.
+fn paths(command: &Command) -> impl Iterator<Item = &str> {
+    let is_path = |arg: &&clap::Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
+    command.get_arguments().filter(is_path).map(|arg| arg.get_id().as_str())
+}
+
+/// An output as it would lie, links resolved.
+fn resolved(output: &Path) -> PathBuf {
+    let beside = || {
+        let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
+        Some(folder.unwrap_or(Path::new(".")).canonicalize().ok()?.join(output.file_name()?))
+    };
+    output.canonicalize().ok().or_else(beside).unwrap_or_else(|| output.to_path_buf())
+}
+
+/// What an output does to an input, if it does harm. In a recording there may be results: in a
+/// folder that is new, empty or has results already.
+fn harm(output: &Path, input: &Path) -> Option<&'static str> {
+    if output == input {
+        return Some("is an input, which would be lost");
+    }
+    if !output.starts_with(input) {
+        return None;
+    }
+    let is_empty = |folder: &Path| folder.read_dir().is_ok_and(|mut list| list.next().is_none());
+    let of_results = |folder: &Path| is_empty(folder) || folder.join(settings_file::NAME).is_file();
+    match output {
+        output if output.is_file() => Some("is in the recording already"),
+        output if output.is_dir() && !of_results(output) => Some("is a folder of the recording"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_path_is_known_as_read_or_written() {
+        let program = Args::command();
+        let all: BTreeSet<&str> = program.get_subcommands().flat_map(paths).collect();
+        let read: BTreeSet<&str> = [
+            "config",
+            "constancy",
+            "data",
+            "encoder",
+            "extrinsics",
+            "filter",
+            "first",
+            "ground_map",
+            "pose",
+            "poses",
+            "second",
+        ]
+        .into();
+        assert_eq!(all, read.union(&OUTPUTS.into()).copied().collect());
+    }
+}
