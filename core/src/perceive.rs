@@ -1,7 +1,7 @@
 //! From rays to flow: the part of a sweep that a device may do.
 
 use crate::params::{FOREGROUND_MAX, Profile};
-use crate::record::{Column, Flow, Proposal, Ray, SweepUniform};
+use crate::record::{Column, Flow, Proposal, Ray, SweepUniform, is_flow};
 use crate::stages::{
     DISTINCT_COUNT, FLOW, FLOW_PROGRAMS, FOREGROUND_COUNT, FOREGROUND_MARKED, GRID, Storage, run,
 };
@@ -42,15 +42,45 @@ pub struct PerceptionBuffers<'a> {
     pub proposal: &'a [Proposal],
 }
 
+impl<'a> PerceptionBuffers<'a> {
+    /// What they hold, if that can be: a device that fails may leave anything behind. `Err` with
+    /// what cannot be.
+    pub fn checked(self, sweep: &SweepUniform) -> Result<Perceived<'a>, &'static str> {
+        let counter = |n: usize| self.counters[n] as usize;
+        let (count, marked) = (counter(FOREGROUND_COUNT), counter(FOREGROUND_MARKED));
+        let columns = self.flow.len();
+        if count > FOREGROUND_MAX || marked < count || marked > columns {
+            return Err("the number of foreground columns");
+        }
+        if counter(DISTINCT_COUNT) > sweep.rays as usize {
+            return Err("the number of distinct rays");
+        }
+        let foreground = &self.foreground[..count];
+        let in_window = foreground.last().is_none_or(|&last| (last as usize) < columns);
+        if !in_window || foreground.windows(2).any(|pair| pair[0] >= pair[1]) {
+            return Err("the list of foreground columns");
+        }
+        if !self.flow.iter().all(|&flow| is_flow(flow)) {
+            return Err("the flow of a column");
+        }
+        let levels = u32::MAX >> (32 - sweep.levels);
+        let beyond = [!(levels | levels << 16), !levels];
+        let fits = |column: &Column| (0..2).all(|n| column[n] & beyond[n] == 0);
+        if !self.columns_before.iter().chain(self.columns_now).all(fits) {
+            return Err("the voxels of a column");
+        }
+        Ok(self.into())
+    }
+}
+
 impl<'a> From<PerceptionBuffers<'a>> for Perceived<'a> {
     fn from(o: PerceptionBuffers<'a>) -> Perceived<'a> {
-        // A device that answers nonsense yields no flow, not a panic.
-        let count = (o.counters[FOREGROUND_COUNT] as usize).min(FOREGROUND_MAX);
+        let count = o.counters[FOREGROUND_COUNT] as usize;
         Perceived {
             columns_before: o.columns_before,
             columns_now: o.columns_now,
             foreground: &o.foreground[..count],
-            marked: (o.counters[FOREGROUND_MARKED] as usize).max(count),
+            marked: o.counters[FOREGROUND_MARKED] as usize,
             rays: o.counters[DISTINCT_COUNT] as usize,
             flow: o.flow,
             proposal: &o.proposal[..count],
@@ -77,6 +107,9 @@ impl StageTimer for () {
     fn measured(&mut self, _: &mut dyn Iterator<Item = (&'static str, f64)>, _: &'static str) {}
 }
 
+/// Where rays and the voxels of their origins go.
+pub type RayInput<'a> = (&'a mut [Ray], &'a mut [[i32; 4]]);
+
 /// A backend of perception: the twins on the CPU, or the kernels on a device.
 pub trait Perceive {
     /// Why it may fail.
@@ -84,7 +117,9 @@ pub trait Perceive {
 
     /// Where the rays and the voxels of their origins go: [`crate::params::Profile::returns`] and
     /// [`crate::params::ORIGINS_MAX`] elements, perhaps memory of a device that is slow to read.
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]);
+    ///
+    /// Fails where the backend has failed before.
+    fn input(&mut self) -> Result<RayInput<'_>, Self::Error>;
 
     /// From rays to flow. `meanwhile` is done while a device works, or by another thread of the
     /// team.
@@ -149,9 +184,9 @@ impl<M: AsMut<[u32]> + Send> ScalarBackend<M> {
 impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
     type Error = core::convert::Infallible;
 
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    fn input(&mut self) -> Result<RayInput<'_>, Self::Error> {
         let storage = self.storage();
-        (storage.rays, storage.origins)
+        Ok((storage.rays, storage.origins))
     }
 
     fn perceive(

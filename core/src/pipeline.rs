@@ -71,7 +71,7 @@ impl Pipeline {
             self.refinement.clear();
             self.encoder.clear();
         }
-        let sent = self.returns.send(setup, team, sweep, &arrival, backend.input());
+        let sent = self.returns.send(setup, team, sweep, &arrival, backend.input()?);
         timer.lap("rays");
 
         let (mut unrefined, corner) = (0, arrival.window.corner);

@@ -122,6 +122,13 @@ pub fn flow_displacement(f: Flow) -> [i32; 2] {
     [(f >> 8 & 0xff) as i32 - reach, (f & 0xff) as i32 - reach]
 }
 
+/// Whether a word is none, or one that [`pack_flow`] makes.
+pub fn is_flow(flow: Flow) -> bool {
+    let most = 2 * crate::params::REACH as u32;
+    let within = (flow >> 8 & 0x7f_ffff) <= most && (flow & 0xff) <= most;
+    flow == 0 || (flow & VALID != 0 && within)
+}
+
 /// No index, no cost yet.
 pub const NONE: u32 = u32::MAX;
 
@@ -136,6 +143,11 @@ mod tests {
         assert_eq!((ray_origin(r), r[1] & NO_END), (511, NO_END));
         for d in [[-15, 15], [0, 0], [7, -3]] {
             assert_eq!(flow_displacement(pack_flow(d)), d);
+            assert!(is_flow(pack_flow(d)));
+        }
+        assert!(is_flow(0));
+        for nonsense in [1, VALID | 31, VALID | 31 << 8, VALID | 1 << 16, u32::MAX] {
+            assert!(!is_flow(nonsense), "{nonsense:x}");
         }
     }
 }

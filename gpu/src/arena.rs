@@ -90,13 +90,13 @@ fn allocate_heap(
 }
 
 fn mapped_zeros(gpu: &Gpu, memory: vk::DeviceMemory, bytes: u64) -> Result<NonNull<u8>, GpuError> {
-    let base = gpu.map(memory)?;
-    // SAFETY: the whole block was just mapped, and nobody else knows of it yet.
-    unsafe { base.write_bytes(0, bytes as usize) };
-    NonNull::new(base).ok_or(GpuError::Vulkan {
+    let base = NonNull::new(gpu.map(memory)?).ok_or(GpuError::Vulkan {
         call: "vkMapMemory",
         result: vk::Result::ERROR_MEMORY_MAP_FAILED,
-    })
+    })?;
+    // SAFETY: the whole block was just mapped, and nobody else knows of it yet.
+    unsafe { base.write_bytes(0, bytes as usize) };
+    Ok(base)
 }
 
 fn fits(gpu: &Gpu, heap: Heap, bytes: u64, available: u64) -> Result<(), GpuError> {

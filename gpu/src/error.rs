@@ -44,6 +44,20 @@ pub enum GpuError {
         /// The deadline.
         after: Duration,
     },
+    /// What was done beside the device panicked, and nobody waited for the device. Final.
+    #[error("`{program}` was abandoned")]
+    Abandoned {
+        /// The program's name.
+        program: &'static str,
+    },
+    /// What a program left behind cannot be. Final.
+    #[error("`{program}` left nonsense behind: {what}")]
+    Nonsense {
+        /// The program's name.
+        program: &'static str,
+        /// What cannot be.
+        what: &'static str,
+    },
     /// The buffer table or a program contradicts itself or the device's limits.
     #[error("`{dispatch}` of `{program}`: {what}")]
     Schedule {

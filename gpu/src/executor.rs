@@ -63,19 +63,29 @@ impl Executor {
     }
 
     /// The words of a [`Heap::Upload`] buffer. The device reads them in later runs, as they are.
-    pub fn upload(&mut self, buffer: usize) -> &mut [u32] {
-        let slot = &mut self.slots[buffer];
-        assert_eq!(slot.row.heap, Heap::Upload, "{}", slot.row.name);
-        slot.mapped_mut().expect("upload buffers are mapped")
+    ///
+    /// # Errors
+    /// That of the run that failed, because the device may still be reading there.
+    pub fn upload(&mut self, buffer: usize) -> Result<&mut [u32], GpuError> {
+        self.uploads([buffer]).map(|[words]| words)
     }
 
     /// Several different [`Heap::Upload`] buffers at once.
-    pub fn uploads<const N: usize>(&mut self, buffers: [usize; N]) -> [&mut [u32]; N] {
+    ///
+    /// # Errors
+    /// As [`Executor::upload`].
+    pub fn uploads<const N: usize>(
+        &mut self,
+        buffers: [usize; N],
+    ) -> Result<[&mut [u32]; N], GpuError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
         let slots = self.slots.get_disjoint_mut(buffers).expect("different buffers of the table");
-        slots.map(|slot| {
+        Ok(slots.map(|slot| {
             assert_eq!(slot.row.heap, Heap::Upload, "{}", slot.row.name);
             slot.mapped_mut().expect("upload buffers are mapped")
-        })
+        }))
     }
 
     /// The words of a [`Heap::Readback`] buffer, as the last run left them.
@@ -116,8 +126,10 @@ impl Executor {
     fn submit_and_wait(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
         let commands = self.programs[program].commands;
         let submitted = self.gpu.submit(commands, self.fence);
-        submitted.map_err(|result| self.fault("vkQueueSubmit", result, program))?;
+        submitted.map_err(|(call, result)| self.fault(call, result, program))?;
         self.in_flight = true;
+        // Stays where `work` panics and somebody catches it.
+        self.failure = Some(GpuError::Abandoned { program: self.programs[program].name });
         work();
         let waited = self.gpu.wait(self.fence, self.timeout);
         let finished = waited.map_err(|result| self.fault("vkWaitForFences", result, program))?;
@@ -130,12 +142,10 @@ impl Executor {
     }
 
     fn fault(&mut self, call: &'static str, result: vk::Result, program: usize) -> GpuError {
-        if result != vk::Result::ERROR_DEVICE_LOST {
-            return failed(call)(result);
+        match result {
+            vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost { during: self.during(program) },
+            _ => failed(call)(result),
         }
-        // What a lost device was doing counts as finished; its objects may be destroyed.
-        self.in_flight = false;
-        GpuError::DeviceLost { during: self.during(program) }
     }
 
     fn during(&mut self, program: usize) -> During {
@@ -146,6 +156,14 @@ impl Executor {
             _ => timer.last_finished(&self.gpu),
         };
         During { program: name, last }
+    }
+
+    /// Gives the device up, as what a program left behind cannot be: from now on every run fails
+    /// with the error that is returned.
+    pub fn give_up(&mut self, program: usize, what: &'static str) -> GpuError {
+        let failure = GpuError::Nonsense { program: self.programs[program].name, what };
+        self.failure = Some(failure.clone());
+        failure
     }
 
     /// Name and duration in milliseconds of each step of the program's last run, in order.
@@ -184,6 +202,7 @@ impl Drop for Executor {
         let idle = !self.in_flight
             || match self.gpu.wait(self.fence, self.timeout.max(GRACE)) {
                 Ok(finished) => finished,
+                // What a lost device was doing counts as finished, once it has been waited for.
                 Err(result) => result == vk::Result::ERROR_DEVICE_LOST,
             };
         // What still runs uses the objects, and might never end: they are leaked, device and all.

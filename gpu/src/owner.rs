@@ -104,14 +104,20 @@ impl Gpu {
     }
 
     /// Starts recorded commands. Nothing else is running.
-    pub fn submit(&self, commands: vk::CommandBuffer, fence: vk::Fence) -> Result<(), vk::Result> {
+    /// Fails with the call that did.
+    pub fn submit(
+        &self,
+        commands: vk::CommandBuffer,
+        fence: vk::Fence,
+    ) -> Result<(), (&'static str, vk::Result)> {
         let commands = [commands];
         let submit = [vk::SubmitInfo::default().command_buffers(&commands)];
         // SAFETY: the executor runs one program at a time, so fence and commands are idle; all
         // that the commands refer to lives as long as `self`.
         unsafe {
-            self.raw.reset_fences(&[fence])?;
-            self.raw.queue_submit(self.queue, &submit, fence)
+            self.raw.reset_fences(&[fence]).map_err(|result| ("vkResetFences", result))?;
+            let submitted = self.raw.queue_submit(self.queue, &submit, fence);
+            submitted.map_err(|result| ("vkQueueSubmit", result))
         }
     }
 

@@ -30,7 +30,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) { words.d[id.x] += id.x; }",
         return;
     };
     let frame = |gpu: &mut Executor, value: u32| {
-        gpu.upload(0).fill(value);
+        gpu.upload(0).unwrap().fill(value);
         gpu.run(0).unwrap();
         assert_eq!(gpu.readback(2)[63], value + 63);
         gpu.times(0).map(|(_, ms)| ms).sum::<f64>()

@@ -41,7 +41,7 @@ fn upload_copy_dispatch_readback() {
     };
     assert_eq!(gpu.times(0).count(), 0);
     for run in 0..3 {
-        for (i, word) in gpu.upload(0).iter_mut().enumerate() {
+        for (i, word) in gpu.upload(0).unwrap().iter_mut().enumerate() {
             *word = i as u32 + run;
         }
         gpu.run(0).unwrap();
@@ -53,6 +53,26 @@ fn upload_copy_dispatch_readback() {
         assert_eq!(names, ["copy", "double", "double", "copy"]);
         assert!(gpu.times(0).all(|(_, ms)| (0.0..10_000.0).contains(&ms)));
     }
+}
+
+/// The device is waited for before its objects go, and nobody sees what it is still writing.
+#[test]
+fn work_that_panics_beside_the_device() {
+    let table = [
+        row("in", Heap::Upload, WORDS),
+        row("a", Heap::Device, WORDS),
+        row("out", Heap::Readback, WORDS),
+    ];
+    let ops = vec![Op::Copy { from: 0, to: 1 }, Op::Copy { from: 1, to: 2 }];
+    let Some(mut gpu) = executor(&Options::default(), &table, ops) else {
+        return;
+    };
+    let beside = || gpu.run_beside(0, || panic!("in the test"));
+    assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(beside)).is_err());
+    let abandoned = GpuError::Abandoned { program: "test" };
+    assert_eq!(gpu.run(0), Err(abandoned.clone()));
+    assert_eq!(gpu.upload(0).map(|_| ()), Err(abandoned));
+    assert!(gpu.readback(2).is_empty());
 }
 
 #[test]
@@ -84,7 +104,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     };
     for scale in [[3, 5], [7, 0]] {
-        gpu.upload(0).copy_from_slice(&scale);
+        gpu.upload(0).unwrap().copy_from_slice(&scale);
         gpu.run(0).unwrap();
         assert!((0..64).map(|n| scale[0] * n + scale[1]).eq(gpu.readback(3).iter().copied()));
     }

@@ -20,8 +20,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }",
         &[CHANGE],
     );
-    let table =
-        [row("words", Heap::Device, u64::from(groups) * 64), row("out", Heap::Readback, 16)];
+    let table = [
+        row("words", Heap::Device, u64::from(groups) * 64),
+        row("out", Heap::Readback, 16),
+        row("in", Heap::Upload, 16),
+    ];
     let options = Options { timeout: Duration::from_micros(100), ..Options::default() };
     executor(&options, &table, vec![dispatch(spin, &[0], groups)])
 }
@@ -39,6 +42,7 @@ fn give_up(groups: u32) -> Option<Duration> {
     assert_eq!((during.program, after.as_micros()), ("test", 100));
     assert_eq!(gpu.run(0), Err(error));
     assert!(gpu.readback(1).is_empty());
+    assert_eq!(gpu.upload(2).map(|_| ()), gpu.run(0));
     drop(gpu);
     Some(begin.elapsed())
 }

@@ -35,7 +35,7 @@ Exit codes:
     3  an input file is missing, unreadable or invalid
     4  an output file cannot be written
     5  Vulkan device error
-    6  more memory than `budget --limit` allows
+    6  more memory than `budget --limit` allows, or than there is
   130  interrupted; results so far are kept";
 
 /// Temporal scene flow from LIDAR sweeps and poses.

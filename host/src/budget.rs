@@ -193,6 +193,21 @@ pub fn host_bytes(profile: &Profile, scalar: bool) -> u64 {
     host_parts(profile, scalar).iter().map(|p| p.bytes).sum()
 }
 
+/// Asks the system for memory and gives it back: a refusal ends the process later, and here the
+/// command.
+///
+/// # Errors
+/// [`RunError::NoMemory`].
+pub fn ask_for(bytes: u64) -> Result<(), RunError> {
+    let mut room = Vec::<u8>::new();
+    let given = usize::try_from(bytes).is_ok_and(|bytes| room.try_reserve_exact(bytes).is_ok());
+    // Else the compiler may leave out what is not used.
+    match std::hint::black_box(&room).capacity() as u64 >= bytes && given {
+        true => Ok(()),
+        false => Err(RunError::NoMemory { bytes }),
+    }
+}
+
 /// What a run takes, for the head of its report.
 pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
     let scalar = matches!(backend, Backend::Scalar(_));

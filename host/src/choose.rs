@@ -7,6 +7,7 @@ use raywake_gpu::{DeviceInfo, DeviceKind, GpuError, Options, Validation, devices
 use crate::args::{BackendChoice, BackendKind, Validate};
 use crate::backend::Backend;
 use crate::backend::device::Device;
+use crate::budget;
 use crate::console;
 use crate::drive::Drive;
 use crate::error::RunError;
@@ -41,12 +42,13 @@ pub fn drive(
 ) -> Result<Chosen, RunError> {
     let tables = weights.tables(profile)?;
     let wanted = wanted(choice)?;
+    budget::ask_for(budget::host_bytes(profile, wanted.device.is_none()))?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
         None => Backend::scalar(profile, &tables),
     };
-    let drive = Drive::new(profile, rig, &tables, backend);
-    Ok(Chosen { drive, filter: tables.provenance, note: wanted.note })
+    let (drive, filter) = (Drive::new(profile, rig, &tables, backend), tables.provenance.clone());
+    Ok(Chosen { drive: drive.with_spare(tables), filter, note: wanted.note })
 }
 
 /// Decides between device and CPU.

@@ -47,6 +47,12 @@ pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
     }
 }
 
+/// Tells of what went wrong and does not end the command.
+pub fn warn(text: &str) {
+    // Nobody is left to tell where standard error is closed.
+    let _ = writeln!(io::stderr(), "raywake: {text}");
+}
+
 /// Prints what the user should know, a line each.
 pub fn note<'a>(quiet: bool, notes: impl IntoIterator<Item = &'a String>) -> Result<(), Error> {
     notes.into_iter().try_for_each(|note| say(quiet, &format!("note: {note}\n")))

@@ -1,4 +1,5 @@
-//! One sweep through figure 3.1 on the chosen backend. Nothing in here allocates.
+//! One sweep through figure 3.1 on the chosen backend. Nothing in a step allocates, but where a
+//! device fails and the CPU takes its place.
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::{self, ColumnFlow, Output, ReturnFlow, TrackletState};
@@ -7,15 +8,26 @@ use raywake_core::perceive::Machine;
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Rig, Sweep};
+use raywake_gpu::GpuError;
 
 use crate::backend::{Backend, Tables};
+use crate::console::warn;
 use crate::error::RunError;
 use crate::laps::Laps;
 use crate::team::ThreadTeam;
 
 /// The pipeline with its backend and the storage of its results. Nothing is allocated once it is
-/// made.
+/// made, unless a device fails.
 pub struct Drive {
+    parts: Sealed<Parts>,
+    /// What the scalar backend would be made of, should the device fail.
+    spare: Option<Tables>,
+    failover: Option<Failover>,
+}
+
+/// What came of a device that failed: it is kept, as waiting for its end may take long.
+struct Failover {
+    failure: GpuError,
     parts: Sealed<Parts>,
 }
 
@@ -43,6 +55,85 @@ pub struct Stepped<'a> {
 impl Drive {
     /// Allocates for a checked profile.
     pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
+        Drive { parts: Parts::new(profile, rig, tables, backend), spare: None, failover: None }
+    }
+
+    /// The same, with the scalar backend to go on with where a device fails.
+    pub fn with_spare(self, tables: Tables) -> Drive {
+        let on_device = matches!(self.parts.backend, Backend::Device(_));
+        Drive { spare: Some(tables).filter(|_| on_device), ..self }
+    }
+
+    /// Bytes of host memory held for a profile, the backend's apart.
+    pub fn bytes(profile: &Profile) -> usize {
+        size_of::<Pipeline>()
+            + solid(profile) * size_of::<ColumnFlow>()
+            + profile.returns() * size_of::<ReturnFlow>()
+    }
+
+    /// The backend, that of the device where it has failed.
+    pub fn backend(&self) -> &Backend {
+        &self.parts.backend
+    }
+
+    /// How the device failed, where the scalar backend has taken its place.
+    pub fn failure(&self) -> Option<&GpuError> {
+        self.failover.as_ref().map(|failover| &failover.failure)
+    }
+
+    /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
+    ///
+    /// Where the device fails and there is a spare, the user is told and the sweep is done again by
+    /// the scalar backend, as the first one.
+    ///
+    /// # Errors
+    /// [`RunError::Device`] without a spare, after which every later step fails;
+    /// [`RunError::Allocation`], after which the next sweep may be given.
+    pub fn step<'a>(
+        &'a mut self,
+        sweep: &Sweep,
+        before: &'a [Point],
+    ) -> Result<Stepped<'a>, RunError> {
+        let Drive { parts, spare, failover } = self;
+        if let Some(failover) = failover {
+            return step(&mut failover.parts, sweep, before);
+        }
+        let Setup { profile, rig, .. } = &parts.setup;
+        let (profile, rig) = (profile.clone(), rig.clone());
+        match (step(parts, sweep, before), spare.take()) {
+            (Err(RunError::Device(failure)), Some(tables)) => {
+                warn(&format!("device: {failure}: going on with the scalar backend"));
+                let backend = Backend::scalar(&profile, &tables);
+                let parts = Parts::new(&profile, &rig, &tables, backend);
+                let failover = failover.insert(Failover { failure, parts });
+                step(&mut failover.parts, sweep, &[])
+            }
+            (stepped, tables) => {
+                *spare = tables;
+                stepped
+            }
+        }
+    }
+
+    /// Those that are in use.
+    fn active(&self) -> &Parts {
+        self.failover.as_ref().map_or(&self.parts, |failover| &failover.parts)
+    }
+
+    /// Whether columns and returns come with a class.
+    pub fn tells_classes(&self) -> bool {
+        self.active().pipeline.encoder.is_on()
+    }
+
+    /// Tracklets after the last step.
+    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
+        let parts = self.active();
+        parts.pipeline.tracklets(&parts.setup.profile)
+    }
+}
+
+impl Parts {
+    fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Sealed<Parts> {
         // A constant is written to its place: by way of the stack it would need 30 MiB of it.
         let mut pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
         pipeline.encoder.set_weights(tables.encoder.as_deref());
@@ -59,47 +150,20 @@ impl Drive {
             columns: vec![ColumnFlow::default(); solid(profile)],
             points: vec![ReturnFlow::default(); profile.returns()],
         };
-        Drive { parts: Sealed::new("sweep", parts) }
+        Sealed::new("sweep", parts)
     }
+}
 
-    /// Bytes of host memory held for a profile, the backend's apart.
-    pub fn bytes(profile: &Profile) -> usize {
-        size_of::<Pipeline>()
-            + solid(profile) * size_of::<ColumnFlow>()
-            + profile.returns() * size_of::<ReturnFlow>()
-    }
-
-    /// The backend.
-    pub fn backend(&self) -> &Backend {
-        &self.parts.backend
-    }
-
-    /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
-    ///
-    /// # Errors
-    /// [`RunError::Device`], after which every later step fails; [`RunError::Allocation`], after
-    /// which the next sweep may be given.
-    pub fn step<'a>(
-        &'a mut self,
-        sweep: &Sweep,
-        before: &'a [Point],
-    ) -> Result<Stepped<'a>, RunError> {
-        self.parts.step(|Parts { setup, pipeline, backend, columns, points }| {
-            let mut laps = Laps::start();
-            let machine = Machine { backend, team: &ThreadTeam, timer: &mut laps };
-            let output =
-                pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
-            Ok(Stepped { output, laps })
-        })
-    }
-
-    /// Whether columns and returns come with a class.
-    pub fn tells_classes(&self) -> bool {
-        self.parts.pipeline.encoder.is_on()
-    }
-
-    /// Tracklets after the last step.
-    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
-        self.parts.pipeline.tracklets(&self.parts.setup.profile)
-    }
+/// One sweep by some parts.
+fn step<'a>(
+    parts: &'a mut Sealed<Parts>,
+    sweep: &Sweep,
+    before: &'a [Point],
+) -> Result<Stepped<'a>, RunError> {
+    parts.step(|Parts { setup, pipeline, backend, columns, points }| {
+        let mut laps = Laps::start();
+        let machine = Machine { backend, team: &ThreadTeam, timer: &mut laps };
+        let output = pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
+        Ok(Stepped { output, laps })
+    })
 }

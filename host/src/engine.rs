@@ -27,6 +27,7 @@ use crate::statistics::Statistics;
 use crate::summary::{Facts, RunSummary};
 use crate::team;
 use crate::weight_files::WeightFiles;
+use raywake_gpu::GpuError;
 use raywake_io::source::{Source, SweepData};
 
 /// What is to be done with a source.
@@ -115,6 +116,7 @@ pub fn execute<S: Source + ?Sized>(
         host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_)))
             + end.located.map_or(0, |_| Locator::BYTES),
         vulkan_allocations: census.memory_allocations,
+        device_failure: run.drive.failure().map(GpuError::to_string),
         validation_messages: plan.backend.validation.map(|_| backend.messages()),
     };
     let summary = RunSummary::new(facts, &run.statistics);

@@ -17,6 +17,12 @@ pub enum RunError {
     /// Memory allocated within a sweep.
     #[error("a defect of this program: {0}")]
     Allocation(#[from] Allocation),
+    /// More memory than the system gives.
+    #[error("{} needed, which the system does not give", console::bytes(*.bytes))]
+    NoMemory {
+        /// What is needed, bytes.
+        bytes: u64,
+    },
     /// More memory than the user allows.
     #[error("{} needed, over the limit of {}", console::bytes(*.bytes), console::bytes(*.limit))]
     OverBudget {
@@ -28,13 +34,13 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Exit code of the process: those of [`Error`], 5 for the device, 6 for memory over a limit,
-    /// 7 for memory allocated within a sweep.
+    /// Exit code of the process: those of [`Error`], 5 for the device, 6 for memory over a limit
+    /// or refused, 7 for memory allocated within a sweep.
     pub fn exit_code(&self) -> u8 {
         match self {
             RunError::Io(e) => e.exit_code(),
             RunError::Device(_) => 5,
-            RunError::OverBudget { .. } => 6,
+            RunError::OverBudget { .. } | RunError::NoMemory { .. } => 6,
             RunError::Allocation(_) => 7,
         }
     }
@@ -60,6 +66,7 @@ mod tests {
         assert!(device.to_string().starts_with("no Vulkan loader found: see"));
         assert_eq!(device.exit_code(), 5);
         assert_eq!(RunError::OverBudget { bytes: 2, limit: 1 }.exit_code(), 6);
+        assert_eq!(RunError::NoMemory { bytes: 1 }.exit_code(), 6);
         assert_eq!(RunError::from(Error::Usage("x".into())).exit_code(), 2);
     }
 }

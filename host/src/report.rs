@@ -28,6 +28,9 @@ fn write(out: &mut String, s: &RunSummary) -> std::fmt::Result {
         bytes(s.facts.host_bytes),
         s.facts.vulkan_allocations
     )?;
+    if let Some(failure) = &s.facts.device_failure {
+        writeln!(out, "device     {failure}: the scalar backend went on")?;
+    }
     if let Some(messages) = &s.facts.validation_messages {
         writeln!(out, "validation {} messages", messages.len())?;
         messages.iter().try_for_each(|m| writeln!(out, "  {m}"))?;

@@ -104,6 +104,9 @@ pub struct Facts {
     pub host_bytes: u64,
     /// Calls of vkAllocateMemory.
     pub vulkan_allocations: u64,
+    /// How the device failed, where it did, and the scalar backend took its place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device_failure: Option<String>,
     /// Messages of the validation layer, where it is on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_messages: Option<Vec<String>>,

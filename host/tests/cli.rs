@@ -260,6 +260,19 @@ fn outputs_do_not_replace_inputs() {
     run(&t, &["--summary", folder.to_str().unwrap()]).failed(4, &["folder: is a directory"]);
 }
 
+/// Where the shell can limit it.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_little_memory_is_told_before_the_first_sweep() {
+    let t = Temp::new();
+    t.drive(2);
+    let program = env!("CARGO_BIN_EXE_raywake");
+    let data = t.path().join("drive").display().to_string();
+    let line = format!("ulimit -v 70000; exec {program} run {data} --backend scalar");
+    let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+    o.failed(6, &["MB needed, which the system does not give"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_second_interrupt_ends_at_once() {

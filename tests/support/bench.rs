@@ -73,7 +73,7 @@ impl Bench {
             vulkan::expect(Executor::new(&Options::default(), &self.table(), &[self.program()]))?;
         let count = self.names.len();
         for (n, words) in self.contents.iter().enumerate() {
-            executor.upload(n).copy_from_slice(words);
+            executor.upload(n).expect("nothing has run").copy_from_slice(words);
         }
         executor.run(0).unwrap_or_else(|e| panic!("{e}"));
         let after = (0..count).map(|n| executor.readback(2 * count + n).to_vec()).collect();

@@ -3,10 +3,10 @@
 use raywake::backend::{Backend, Tables};
 use raywake_core::output::{ColumnFlow, Output, PointFlow, ReturnFlow, TrackletState};
 use raywake_core::params::POINTS_MAX;
-use raywake_core::perceive::{Machine, Perceive, Perceived, StageTimer};
+use raywake_core::perceive::{Machine, Perceive, Perceived, RayInput, StageTimer};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
-use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::record::SweepUniform;
 use raywake_core::team::{Alone, Team};
 use raywake_gpu::GpuError;
 use raywake_sim::SimSweep;
@@ -31,7 +31,7 @@ struct Witness<'a> {
 impl Perceive for Witness<'_> {
     type Error = GpuError;
 
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         self.backend.input()
     }
 
@@ -42,7 +42,7 @@ impl Perceive for Witness<'_> {
         timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
-        let (rays, origins) = self.backend.input();
+        let (rays, origins) = self.backend.input()?;
         let rays = rays[..sweep.rays as usize].as_flattened().to_vec();
         let origins = bytemuck::cast_slice(origins.as_flattened()).to_vec();
         self.stages.words.extend([("rays", rays), ("origins", origins)]);

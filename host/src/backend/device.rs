@@ -1,9 +1,9 @@
 //! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
 
 use raywake_core::params::Profile;
-use raywake_core::perceive::{Perceive, Perceived, PerceptionBuffers, StageTimer};
+use raywake_core::perceive::{Perceive, Perceived, PerceptionBuffers, RayInput, StageTimer};
 use raywake_core::prepare::uniform_of;
-use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::record::SweepUniform;
 use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
 use raywake_core::team::{Alone, Team};
 use raywake_gpu::{Census, Executor, GpuError, Heap, Options};
@@ -28,9 +28,9 @@ impl Device {
         let schedule = Schedule::new(FLOW_PROGRAMS, profile);
         let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
         let mut device = Device { executor, schedule };
-        device.upload(Buffer::filter_table, bytemuck::cast_slice(&tables.filter));
-        device.upload(Buffer::constancy_weights, bytemuck::cast_slice(&tables.constancy));
-        device.upload(Buffer::constancy_costs, &tables.costs);
+        device.upload(Buffer::filter_table, bytemuck::cast_slice(&tables.filter))?;
+        device.upload(Buffer::constancy_weights, bytemuck::cast_slice(&tables.constancy))?;
+        device.upload(Buffer::constancy_costs, &tables.costs)?;
         device.executor.run(LOAD)?;
         // Nothing of what the device held before comes into view.
         let empty = SweepUniform { shift_x: profile.side as i32, ..uniform_of(profile, 0) };
@@ -53,8 +53,21 @@ impl Device {
         &self.executor.info().name
     }
 
-    fn upload(&mut self, buffer: Buffer, words: &[u32]) {
-        self.executor.upload(self.schedule.index(Heap::Upload, buffer)).copy_from_slice(words);
+    fn upload(&mut self, buffer: Buffer, words: &[u32]) -> Result<(), GpuError> {
+        self.executor.upload(self.schedule.index(Heap::Upload, buffer))?.copy_from_slice(words);
+        Ok(())
+    }
+
+    /// What the last sweep left.
+    fn left(&self) -> PerceptionBuffers<'_> {
+        PerceptionBuffers {
+            counters: self.readback(Buffer::counters),
+            columns_before: bytemuck::cast_slice(self.readback(Buffer::columns_before)),
+            columns_now: bytemuck::cast_slice(self.readback(Buffer::columns_now)),
+            foreground: self.readback(Buffer::foreground),
+            flow: self.readback(Buffer::flow),
+            proposal: bytemuck::cast_slice(self.readback(Buffer::proposal)),
+        }
     }
 
     fn readback(&self, buffer: Buffer) -> &[u32] {
@@ -65,10 +78,10 @@ impl Device {
 impl Perceive for Device {
     type Error = GpuError;
 
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         let rows = [Buffer::rays, Buffer::origins].map(|b| self.schedule.index(Heap::Upload, b));
-        let [rays, origins] = self.executor.uploads(rows);
-        (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
+        let [rays, origins] = self.executor.uploads(rows)?;
+        Ok((bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins)))
     }
 
     fn perceive(
@@ -78,17 +91,12 @@ impl Perceive for Device {
         timer: &mut (impl StageTimer + Send),
         meanwhile: impl FnOnce() + Send,
     ) -> Result<Perceived<'_>, GpuError> {
-        sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep)));
+        sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep))?);
         self.executor.run_beside(FLOW, meanwhile)?;
         timer.measured(&mut self.executor.times(FLOW), "submit and wait");
-        Ok(PerceptionBuffers {
-            counters: self.readback(Buffer::counters),
-            columns_before: bytemuck::cast_slice(self.readback(Buffer::columns_before)),
-            columns_now: bytemuck::cast_slice(self.readback(Buffer::columns_now)),
-            foreground: self.readback(Buffer::foreground),
-            flow: self.readback(Buffer::flow),
-            proposal: bytemuck::cast_slice(self.readback(Buffer::proposal)),
+        if let Err(what) = self.left().checked(sweep) {
+            return Err(self.executor.give_up(FLOW, what));
         }
-        .into())
+        Ok(self.left().into())
     }
 }

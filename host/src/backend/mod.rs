@@ -4,8 +4,8 @@ pub mod device;
 
 use raywake_core::encoder::EncoderWeights;
 use raywake_core::params::Profile;
-use raywake_core::perceive::{self, Perceive, Perceived, StageTimer};
-use raywake_core::record::{Ray, SweepUniform};
+use raywake_core::perceive::{self, Perceive, Perceived, RayInput, StageTimer};
+use raywake_core::record::SweepUniform;
 use raywake_core::stages::background_filter::{self, TABLE_WORDS};
 use raywake_core::stages::occupancy_constancy::{self, SCORES_MAX, Scores, WEIGHT_WORDS};
 use raywake_core::team::Team;
@@ -114,9 +114,9 @@ pub enum Backend {
 impl Perceive for Backend {
     type Error = GpuError;
 
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         match self {
-            Backend::Scalar(b) => b.input(),
+            Backend::Scalar(b) => b.input().map_err(|e| match e {}),
             Backend::Device(b) => b.input(),
         }
     }

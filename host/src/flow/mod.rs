@@ -166,7 +166,12 @@ fn points(
     if let Some(flows) = &stepped.output.flows {
         show(args, png, profile, first, flows)?;
     }
-    let flows = stepped.output.flows.map_or_else(Vec::new, |f| f.points.iter().collect());
+    let flows = stepped.output.flows.as_ref();
+    let flows: Vec<PointFlow> = flows.map_or_else(Vec::new, |f| f.points.iter().collect());
+    // A device that fails between the two leaves nothing to put out.
+    if let Some(failure) = drive.failure().filter(|_| flows.len() < first.points.len()) {
+        return Err(RunError::Device(failure.clone()));
+    }
     Ok((flows, Dropped { returns, ..Dropped::default() }))
 }
 

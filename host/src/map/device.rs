@@ -2,8 +2,9 @@
 
 use raywake_core::map::Bands;
 use raywake_core::params::{BAND_UPDATES, Profile, TILE};
+use raywake_core::perceive::RayInput;
+use raywake_core::record::SweepUniform;
 use raywake_core::record::Update;
-use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::{Buffer, MAP_PROGRAMS};
 use raywake_gpu::{Executor, GpuError, Heap, Options};
 use raywake_kernels::schedule::Schedule;
@@ -36,10 +37,10 @@ impl DeviceMap {
     }
 
     /// Where the next sweep goes: mapped memory.
-    pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    pub fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         let rows = [Buffer::rays, Buffer::origins].map(|b| self.schedule.index(Heap::Upload, b));
-        let [rays, origins] = self.executor.uploads(rows);
-        (bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins))
+        let [rays, origins] = self.executor.uploads(rows)?;
+        Ok((bytemuck::cast_slice_mut(rays), bytemuck::cast_slice_mut(origins)))
     }
 
     /// Maps the sweep.
@@ -53,11 +54,11 @@ impl DeviceMap {
         let [count_tiles, run_tiles, voxels] =
             [Buffer::count_tiles, Buffer::run_tiles, Buffer::scratch]
                 .map(|b| self.schedule.index(Heap::Readback, b));
-        sweep.write(executor.upload(uniform));
+        sweep.write(executor.upload(uniform)?);
         executor.run(RAYS)?;
         self.bands.run(|from, to| {
             let band = SweepUniform { band_from: from as i32, band_to: to as i32, ..*sweep };
-            band.write(executor.upload(uniform));
+            band.write(executor.upload(uniform)?);
             executor.run(COUNT)?;
             if executor.readback(count_tiles)[TILE] as usize > BAND_UPDATES {
                 return Ok(false);

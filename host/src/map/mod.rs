@@ -7,9 +7,10 @@ pub mod scalar;
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::frame::{Window, place};
 use raywake_core::params::Profile;
+use raywake_core::perceive::RayInput;
 use raywake_core::prepare::{Placement, Preparation, RayBuffers, uniform_of};
 use raywake_core::record::Update;
-use raywake_core::record::{NONE, Ray, SweepUniform};
+use raywake_core::record::{NONE, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
@@ -32,9 +33,9 @@ impl MapBackend {
         }
     }
 
-    fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         match self {
-            MapBackend::Scalar(b) => b.input(),
+            MapBackend::Scalar(b) => Ok(b.input()),
             MapBackend::Device(b) => b.input(),
         }
     }
@@ -107,7 +108,7 @@ impl Mapper {
         let window =
             place(&self.profile, &self.rig, &sweep.world_from_vehicle, self.lattice_origin);
         self.lattice_origin.get_or_insert(window.lattice_origin);
-        let (rays, origins) = self.backend.input();
+        let (rays, origins) = self.backend.input()?;
         let (count, dropped) = self.preparation.prepare(
             &Alone,
             &Placement { profile: &self.profile, rig: &self.rig, window: &window, sweep },

@@ -2,8 +2,9 @@
 
 use raywake_core::map::{Bands, map};
 use raywake_core::params::Profile;
+use raywake_core::perceive::RayInput;
+use raywake_core::record::SweepUniform;
 use raywake_core::record::Update;
-use raywake_core::record::{Ray, SweepUniform};
 use raywake_core::stages::{MAP_PROGRAMS, Storage};
 
 use super::Mapper;
@@ -23,7 +24,7 @@ impl ScalarMap {
     }
 
     /// Where the next sweep goes.
-    pub fn input(&mut self) -> (&mut [Ray], &mut [[i32; 4]]) {
+    pub fn input(&mut self) -> RayInput<'_> {
         let storage = Storage::over(&mut self.words, MAP_PROGRAMS, &self.profile);
         (storage.rays, storage.origins)
     }

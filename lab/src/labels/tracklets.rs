@@ -11,6 +11,9 @@ use raywake_io::source::whole;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 
+/// Attributes of an element that are believed: boost writes four.
+const ATTRIBUTES_MAX: usize = 100;
+
 /// Value of `state` of a pose that nobody set.
 const UNSET: u64 = 0;
 
@@ -20,6 +23,7 @@ const UNSET: u64 = 0;
 /// items than it says.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
     let text = whole::read_text(path)?;
+    check_size(&text).map_err(|what| Error::input(path, "", what))?;
     let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(&text, options)
         .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;
@@ -30,6 +34,19 @@ pub(super) fn read(path: &Path) -> Result<Labels, Error> {
         file.track(item, &index.to_string(), &mut gather)?;
     }
     Ok(gather.finish(View::Camera))
+}
+
+/// What would take memory or time out of proportion to the file: text that is defined once and put
+/// in many times, and attributes, each of which is compared with those of its element before it.
+fn check_size(text: &str) -> Result<(), String> {
+    if text.contains("<!ENTITY") {
+        return Err("defines entities, which boost does not".into());
+    }
+    // In the value of an attribute there may be a `>`, but no `<`.
+    match text.split('<').map(|tag| tag.matches('=').count()).max() {
+        Some(most) if most > ATTRIBUTES_MAX => Err(format!("{most} attributes in one element")),
+        _ => Ok(()),
+    }
 }
 
 /// A parsed file with its name.
@@ -149,6 +166,13 @@ mod tests {
         assert!(cut.contains("tracklet_labels.xml, line ") && cut.contains("no XML"), "{cut}");
         assert!(refused("").contains("no XML"));
         let without = |part: &str, instead: &str| refused(&whole.replace(part, instead));
+        let entity = "<!DOCTYPE boost_serialization [<!ENTITY a \"b\">]>";
+        assert!(
+            without("<!DOCTYPE boost_serialization>", entity).ends_with("which boost does not")
+        );
+        let attributes: String = (0..200).map(|n| format!(" a{n}=\"&gt;\"")).collect();
+        let many = without("<finished>", &format!("<finished b=\">\"{attributes}>"));
+        assert!(many.ends_with("201 attributes in one element"), "{many}");
         assert!(without("<h>2</h>", "").ends_with("line 6: <item> has no <h>"));
         assert!(without("<h>2</h>", "<h>tall</h>").contains("<h>: `tall` is not a number"));
         assert!(

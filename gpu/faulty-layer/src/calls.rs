@@ -1,0 +1,217 @@
+//! The functions that may fail.
+
+use crate::{FAULT, GARBAGE, NULL};
+use ash::vk::{self, Handle};
+use std::collections::BTreeMap;
+use std::ffi::c_void;
+use std::ptr;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Bytes of allocations, and the addresses of those that are mapped, by handle.
+static ALLOCATED: Mutex<BTreeMap<u64, u64>> = Mutex::new(BTreeMap::new());
+static MAPPED: Mutex<BTreeMap<u64, usize>> = Mutex::new(BTreeMap::new());
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Counts a call of a function. What it is to return, if not what it returns.
+pub fn fault(name: &str) -> Option<i32> {
+    static CALLS: Mutex<u64> = Mutex::new(0);
+    let wanted = std::env::var(FAULT).ok()?;
+    let [function, from, result] = *wanted.split(' ').collect::<Vec<_>>() else { return None };
+    if function != name {
+        return None;
+    }
+    let mut calls = locked(&CALLS);
+    *calls += 1;
+    (*calls >= from.parse().ok()?).then(|| result.parse().ok())?
+}
+
+/// Fills all mapped memory with ones.
+fn litter() {
+    let allocated = locked(&ALLOCATED);
+    for (memory, &address) in &*locked(&MAPPED) {
+        let bytes = allocated.get(memory).copied().unwrap_or(0) as usize;
+        // SAFETY: the memory is mapped there as a whole, and the device has been waited for.
+        unsafe { (address as *mut u8).write_bytes(0xff, bytes) };
+    }
+}
+
+macro_rules! calls {
+    ($($name:ident($($arg:ident: $type:ty),*);)*) => {
+        /// Names of the functions that may fail, but for those that create what calls them.
+        pub const NAMES: &[&str] = &[$(stringify!($name)),*];
+
+        $(#[allow(non_snake_case)]
+        mod $name {
+            use super::*;
+
+            /// Address of the next function of this name.
+            pub static NEXT: AtomicUsize = AtomicUsize::new(0);
+            type Next = unsafe extern "system" fn($($type),*) -> vk::Result;
+
+            /// # Safety
+            /// As the function of that name.
+            pub unsafe extern "system" fn call($($arg: $type),*) -> vk::Result {
+                let name = stringify!($name);
+                let next = || {
+                    // SAFETY: `take` has put the address there.
+                    let next: Next = unsafe { std::mem::transmute(NEXT.load(Relaxed)) };
+                    // SAFETY: with what this one was called with.
+                    unsafe { next($($arg),*) }
+                };
+                match fault(name) {
+                    None => next(),
+                    Some(NULL) => vk::Result::SUCCESS,
+                    Some(GARBAGE) => {
+                        let result = next();
+                        litter();
+                        result
+                    }
+                    Some(result) => {
+                        if name == "vkWaitForFences" {
+                            let _ = next();
+                        }
+                        vk::Result::from_raw(result)
+                    }
+                }
+            }
+        })*
+
+        /// This layer's function of a name, or the next one's, whose address is kept.
+        pub fn take(name: &[u8], next: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
+            let own = match name {
+                b"vkAllocateMemory" => allocate as *const c_void,
+                b"vkMapMemory" => map as *const c_void,
+                $(name if name == stringify!($name).as_bytes() => $name::call as *const c_void,)*
+                _ => return next,
+            };
+            $(if name == stringify!($name).as_bytes() {
+                $name::NEXT.store(next? as usize, Relaxed);
+            })*
+            // SAFETY: who asks for a function by name casts it to the type of that name.
+            unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(own) }
+        }
+    };
+}
+
+type Allocator = *const vk::AllocationCallbacks<'static>;
+
+calls! {
+    vkEnumeratePhysicalDevices(
+        instance: vk::Instance, count: *mut u32, devices: *mut vk::PhysicalDevice
+    );
+    vkAllocateMemory(
+        device: vk::Device, info: *const vk::MemoryAllocateInfo<'static>, allocator: Allocator,
+        memory: *mut vk::DeviceMemory
+    );
+    vkMapMemory(
+        device: vk::Device, memory: vk::DeviceMemory, offset: u64, size: u64,
+        flags: vk::MemoryMapFlags, data: *mut *mut c_void
+    );
+    vkBindBufferMemory(
+        device: vk::Device, buffer: vk::Buffer, memory: vk::DeviceMemory, offset: u64
+    );
+    vkCreateBuffer(
+        device: vk::Device, info: *const vk::BufferCreateInfo<'static>, allocator: Allocator,
+        buffer: *mut vk::Buffer
+    );
+    vkCreateShaderModule(
+        device: vk::Device, info: *const vk::ShaderModuleCreateInfo<'static>, allocator: Allocator,
+        module: *mut vk::ShaderModule
+    );
+    vkCreateDescriptorSetLayout(
+        device: vk::Device, info: *const vk::DescriptorSetLayoutCreateInfo<'static>,
+        allocator: Allocator, layout: *mut vk::DescriptorSetLayout
+    );
+    vkCreatePipelineLayout(
+        device: vk::Device, info: *const vk::PipelineLayoutCreateInfo<'static>,
+        allocator: Allocator, layout: *mut vk::PipelineLayout
+    );
+    vkCreateComputePipelines(
+        device: vk::Device, cache: vk::PipelineCache, count: u32,
+        infos: *const vk::ComputePipelineCreateInfo<'static>, allocator: Allocator,
+        pipelines: *mut vk::Pipeline
+    );
+    vkCreateDescriptorPool(
+        device: vk::Device, info: *const vk::DescriptorPoolCreateInfo<'static>,
+        allocator: Allocator, pool: *mut vk::DescriptorPool
+    );
+    vkAllocateDescriptorSets(
+        device: vk::Device, info: *const vk::DescriptorSetAllocateInfo<'static>,
+        sets: *mut vk::DescriptorSet
+    );
+    vkCreateCommandPool(
+        device: vk::Device, info: *const vk::CommandPoolCreateInfo<'static>, allocator: Allocator,
+        pool: *mut vk::CommandPool
+    );
+    vkAllocateCommandBuffers(
+        device: vk::Device, info: *const vk::CommandBufferAllocateInfo<'static>,
+        buffers: *mut vk::CommandBuffer
+    );
+    vkBeginCommandBuffer(
+        commands: vk::CommandBuffer, info: *const vk::CommandBufferBeginInfo<'static>
+    );
+    vkEndCommandBuffer(commands: vk::CommandBuffer);
+    vkCreateQueryPool(
+        device: vk::Device, info: *const vk::QueryPoolCreateInfo<'static>, allocator: Allocator,
+        pool: *mut vk::QueryPool
+    );
+    vkCreateFence(
+        device: vk::Device, info: *const vk::FenceCreateInfo<'static>, allocator: Allocator,
+        fence: *mut vk::Fence
+    );
+    vkResetFences(device: vk::Device, count: u32, fences: *const vk::Fence);
+    vkQueueSubmit(
+        queue: vk::Queue, count: u32, submits: *const vk::SubmitInfo<'static>, fence: vk::Fence
+    );
+    vkWaitForFences(
+        device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64
+    );
+}
+
+/// `vkAllocateMemory`, remembered.
+///
+/// # Safety
+/// As that function.
+unsafe extern "system" fn allocate(
+    device: vk::Device,
+    info: *const vk::MemoryAllocateInfo<'static>,
+    allocator: Allocator,
+    memory: *mut vk::DeviceMemory,
+) -> vk::Result {
+    // SAFETY: as this one was called.
+    let result = unsafe { vkAllocateMemory::call(device, info, allocator, memory) };
+    if result == vk::Result::SUCCESS {
+        // SAFETY: both are valid, and the latter has been written.
+        let (bytes, memory) = unsafe { ((*info).allocation_size, (*memory).as_raw()) };
+        locked(&ALLOCATED).insert(memory, bytes);
+    }
+    result
+}
+
+/// `vkMapMemory`, remembered.
+///
+/// # Safety
+/// As that function.
+unsafe extern "system" fn map(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    offset: u64,
+    size: u64,
+    flags: vk::MemoryMapFlags,
+    data: *mut *mut c_void,
+) -> vk::Result {
+    // SAFETY: the caller's pointer, and then as this one was called.
+    let (result, address) = unsafe {
+        *data = ptr::null_mut();
+        let result = vkMapMemory::call(device, memory, offset, size, flags, data);
+        (result, *data)
+    };
+    if !address.is_null() {
+        locked(&MAPPED).insert(memory.as_raw(), address as usize);
+    }
+    result
+}

@@ -1,0 +1,45 @@
+#![deny(missing_docs)]
+//! A Vulkan layer that lets chosen calls fail, for tests of what a program does then.
+//!
+//! The loader's variables switch it on ([`environment`]), and [`FAULT`] says what fails:
+//! `vkQueueSubmit 3 -4` lets the third call and every later one return `VK_ERROR_DEVICE_LOST`.
+//! Waits are done all the same, so that nothing runs any more when it is said to be lost. It serves
+//! one instance and one device at a time.
+
+mod calls;
+mod chain;
+
+use std::io;
+use std::path::Path;
+
+/// Name of the layer.
+pub const NAME: &str = "VK_LAYER_RAYWAKE_faulty";
+
+/// The variable with the function that fails, the number of the first call that does, and what it
+/// returns: a negative or positive `VkResult`, or [`NULL`] or [`GARBAGE`].
+pub const FAULT: &str = "RAYWAKE_FAULT";
+
+/// In place of a result: `vkMapMemory` succeeds, with a null pointer.
+pub const NULL: i32 = 1000;
+
+/// In place of a result: the call succeeds, and all mapped memory is ones.
+pub const GARBAGE: i32 = 1001;
+
+/// Functions that may fail.
+pub use calls::NAMES;
+
+/// Writes the layer's manifest to a folder. Returns the variables that switch it on; `library` is
+/// the layer as cargo built it.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn environment(folder: &Path, library: &Path) -> io::Result<[(&'static str, String); 2]> {
+    let text = format!(
+        r#"{{"file_format_version": "1.2.0", "layer": {{"name": "{NAME}", "type": "GLOBAL",
+        "library_path": "{}", "api_version": "1.1.0", "implementation_version": "1",
+        "description": "Lets calls fail"}}}}"#,
+        library.display()
+    );
+    std::fs::write(folder.join("faulty.json"), text)?;
+    Ok([("VK_LAYER_PATH", folder.display().to_string()), ("VK_INSTANCE_LAYERS", NAME.into())])
+}

@@ -1,0 +1,128 @@
+//! A device that fails: at its set-up the program says which call did, and in a run the scalar
+//! backend goes on, with the bits it would have from there on.
+
+#![cfg(unix)]
+
+#[allow(dead_code)]
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{Outcome, Temp};
+use raywake_faulty_layer::{FAULT, GARBAGE, NAMES, NULL, environment};
+
+/// Results of Vulkan.
+const OUT_OF_HOST_MEMORY: i32 = -1;
+const OUT_OF_DEVICE_MEMORY: i32 = -2;
+const LOST: i32 = -4;
+const TIMEOUT: i32 = 2;
+
+/// Parameters of a small window.
+const SMALL: &str = "name = \"small\"\nside = 61\nem_rounds = 3\n";
+const SWEEPS: usize = 8;
+
+/// The layer, where cargo has put it: beside this test.
+fn library() -> PathBuf {
+    let folder = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
+    let name = format!(
+        "{}raywake_faulty_layer{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    );
+    folder.join(name)
+}
+
+/// `raywake run DRIVE` on the device, with a fault as [`FAULT`] has it, or without one.
+fn run(t: &Temp, fault: &str, more: &[&str]) -> Outcome {
+    let config = t.write("small.toml", SMALL);
+    let data = t.path().join("drive");
+    let mut command = common::command(&["run", data.to_str().unwrap()]);
+    command.args(["--config", config.to_str().unwrap(), "--backend", "vulkan"]).args(more);
+    command.envs(environment(t.path(), &library()).unwrap()).env(FAULT, fault);
+    Outcome::of(command.output().unwrap())
+}
+
+/// A drive, if there is a device to run on.
+fn drive() -> Option<Temp> {
+    let t = Temp::new();
+    t.drive(SWEEPS);
+    let o = run(&t, "", &[]);
+    if o.code == Some(5) && o.stderr.contains("Vulkan") {
+        eprintln!("skipped: {}", o.stderr);
+        return None;
+    }
+    o.succeeded();
+    Some(t)
+}
+
+#[test]
+fn every_call_of_the_set_up() {
+    let Some(t) = drive() else { return };
+    for name in NAMES.iter().chain(&["vkCreateDevice"]) {
+        for result in [OUT_OF_HOST_MEMORY, OUT_OF_DEVICE_MEMORY, LOST] {
+            let o = run(&t, &format!("{name} 1 {result}"), &[]);
+            assert_eq!(o.code, Some(5), "{name} {result}: {}{}", o.stdout, o.stderr);
+            let told = [*name, "heap cannot hold", "device lost during"];
+            assert!(told.iter().any(|text| o.stderr.contains(text)), "{name}: {}", o.stderr);
+        }
+    }
+    run(&t, &format!("vkMapMemory 1 {NULL}"), &[]).failed(5, &["vkMapMemory"]);
+}
+
+/// Tables of a run's results by name, from a frame on.
+fn tables(out: &Path, from: usize) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for kind in ["columns", "points", "tracklets"] {
+        for entry in fs::read_dir(out.join(kind)).unwrap() {
+            let path = entry.unwrap().path();
+            let frame: usize = path.file_stem().unwrap().to_str().unwrap().parse().unwrap();
+            // Tracklets are those of a pair's second sweep.
+            if frame >= from + usize::from(kind == "tracklets") {
+                found.insert(format!("{kind} {frame}"), fs::read(path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn in_a_run_the_scalar_backend_goes_on() {
+    let Some(t) = drive() else { return };
+    let json = t.path().join("s.json");
+    let results = |name: &str, fault: &str, from: usize| {
+        let (out, sweeps) = (t.path().join(name), format!("{from}.."));
+        let to = ["--out", out.to_str().unwrap(), "--summary", json.to_str().unwrap()];
+        let o = run(&t, fault, &[&to[..], &["--sweeps", &sweeps]].concat());
+        o.succeeded();
+        (out, o.summary(&json), o.stderr)
+    };
+    for failing in [0, 3] {
+        let (out, s, _) = results(&format!("from {failing}"), "", failing);
+        assert!(s["device_failure"].is_null());
+        let wanted = tables(&out, failing);
+        assert_eq!(wanted.len(), 3 * (SWEEPS - 1 - failing));
+        // Two programs have run before the first sweep.
+        let call = failing + 3;
+        for (n, (name, result, told)) in [
+            ("vkQueueSubmit", LOST, "device lost during `flow`"),
+            ("vkWaitForFences", LOST, "device lost during `flow`"),
+            ("vkWaitForFences", TIMEOUT, "no end of `flow` within 10s"),
+            ("vkResetFences", OUT_OF_HOST_MEMORY, "vkResetFences failed"),
+            ("vkWaitForFences", GARBAGE, "`flow` left nonsense behind"),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let fault = format!("{name} {call} {result}");
+            let (out, s, stderr) = results(&format!("{failing} {n}"), &fault, 0);
+            assert!(s["device_failure"].as_str().unwrap().contains(told), "{fault}: {s}");
+            assert!(stderr.contains(told) && stderr.contains("going on with the scalar backend"));
+            assert_eq!(tables(&out, failing), wanted, "{fault}");
+            // The pair that ends with the sweep in which it failed is lost.
+            let pairs = (SWEEPS - 1 - usize::from(failing > 0)) as u64;
+            assert_eq!(s["pairs"].as_u64(), Some(pairs), "{fault}");
+        }
+    }
+}
