@@ -16,6 +16,9 @@ use crate::thinning::Thinning;
 use crate::tracklet::TrackletTurnover;
 use glam::DVec3;
 
+/// Numbers beyond are no place that a lidar sees, m: the velocity there may not be finite.
+const FARTHEST_M: f32 = 1e6;
+
 /// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
 #[derive(Clone, Copy, Debug)]
 pub struct PairFlows<'a> {
@@ -88,7 +91,8 @@ impl<'a> PointFlows<'a> {
             out.probability = flow.probability;
             out.class = flow.class;
         }
-        let finite = |c: f32| if c.is_finite() { c as f64 } else { 0.0 };
+        let seen = |c: f32| (-FARTHEST_M..=FARTHEST_M).contains(&c);
+        let finite = |c: f32| if seen(c) { c as f64 } else { 0.0 };
         let [x, y, z] = point.position;
         // `map` of arrays is a call.
         let at = DVec3::new(finite(x), finite(y), finite(z));

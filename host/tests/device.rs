@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{Outcome, Temp};
+use common::{Outcome, SMALL, Temp};
 use raywake_faulty_layer::{FAULT, GARBAGE, NAMES, NULL, environment};
 
 /// Results of Vulkan.
@@ -19,8 +19,6 @@ const OUT_OF_DEVICE_MEMORY: i32 = -2;
 const LOST: i32 = -4;
 const TIMEOUT: i32 = 2;
 
-/// Parameters of a small window.
-const SMALL: &str = "name = \"small\"\nside = 61\nem_rounds = 3\n";
 const SWEEPS: usize = 8;
 
 /// The layer, where cargo has put it: beside this test.

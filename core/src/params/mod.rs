@@ -208,8 +208,9 @@ macro_rules! params {
         $crate::params!(@ $from as f64, true, $to as f64, false,
             concat!("above ", $from, ", at most ", $to))
     };
+    // Who says no more has a million in mind: squares of squares are finite.
     (@bounds above $from:literal) => {
-        $crate::params!(@ $from as f64, true, f32::MAX as f64, false, concat!("above ", $from))
+        $crate::params!(@bounds above $from to 1e6)
     };
     (@bounds at least $from:literal) => {
         $crate::params!(@ $from as f64, false, f64::INFINITY, false, concat!("at least ", $from))

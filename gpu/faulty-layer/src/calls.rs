@@ -16,27 +16,61 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What [`FAULT`] says: a function, the first call that fails, and what it returns.
+fn wanted() -> Option<(String, u64, i32)> {
+    let text = std::env::var(FAULT).ok()?;
+    let [function, from, result] = *text.split(' ').collect::<Vec<_>>() else { return None };
+    Some((function.into(), from.parse().ok()?, result.parse().ok()?))
+}
+
 /// Counts a call of a function. What it is to return, if not what it returns.
 pub fn fault(name: &str) -> Option<i32> {
     static CALLS: Mutex<u64> = Mutex::new(0);
-    let wanted = std::env::var(FAULT).ok()?;
-    let [function, from, result] = *wanted.split(' ').collect::<Vec<_>>() else { return None };
-    if function != name {
-        return None;
-    }
+    let (_, from, result) = wanted().filter(|(function, ..)| function == name)?;
     let mut calls = locked(&CALLS);
     *calls += 1;
-    (*calls >= from.parse().ok()?).then(|| result.parse().ok())?
+    (*calls >= from).then_some(result)
+}
+
+/// What a call of a function comes to; `next` is what it would be.
+fn call(name: &str, next: impl FnOnce() -> vk::Result) -> vk::Result {
+    match fault(name) {
+        None => next(),
+        Some(NULL) => vk::Result::SUCCESS,
+        Some(GARBAGE) => littered(next()),
+        Some(result) => {
+            let _ = (name == "vkWaitForFences").then(next);
+            vk::Result::from_raw(result)
+        }
+    }
+}
+
+/// A function as it is handed out.
+pub fn handed_out(function: *const c_void) -> vk::PFN_vkVoidFunction {
+    // SAFETY: who asks for a function by name casts it to the type of that name.
+    unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(function) }
+}
+
+/// Fills a mapped allocation with ones.
+fn litter(memory: u64, address: usize) {
+    let bytes = locked(&ALLOCATED).get(&memory).copied().unwrap_or(0) as usize;
+    // SAFETY: the memory is mapped there as a whole, and the device has been waited for.
+    unsafe { (address as *mut u8).write_bytes(0xff, bytes) };
 }
 
 /// Fills all mapped memory with ones.
-fn litter() {
-    let allocated = locked(&ALLOCATED);
-    for (memory, &address) in &*locked(&MAPPED) {
-        let bytes = allocated.get(memory).copied().unwrap_or(0) as usize;
-        // SAFETY: the memory is mapped there as a whole, and the device has been waited for.
-        unsafe { (address as *mut u8).write_bytes(0xff, bytes) };
-    }
+fn littered(result: vk::Result) -> vk::Result {
+    locked(&MAPPED).iter().for_each(|(&memory, &address)| litter(memory, address));
+    result
+}
+
+/// The function whose address is kept somewhere.
+///
+/// # Safety
+/// A function of this type is kept there.
+pub unsafe fn kept<F: Copy>(at: &AtomicUsize) -> F {
+    // SAFETY: the caller's promise; function pointers have the size of addresses.
+    unsafe { std::mem::transmute_copy(&at.load(Relaxed)) }
 }
 
 macro_rules! calls {
@@ -55,28 +89,12 @@ macro_rules! calls {
             /// # Safety
             /// As the function of that name.
             pub unsafe extern "system" fn call($($arg: $type),*) -> vk::Result {
-                let name = stringify!($name);
-                let next = || {
+                super::call(stringify!($name), || {
                     // SAFETY: `take` has put the address there.
-                    let next: Next = unsafe { std::mem::transmute(NEXT.load(Relaxed)) };
+                    let next: Next = unsafe { kept(&NEXT) };
                     // SAFETY: with what this one was called with.
                     unsafe { next($($arg),*) }
-                };
-                match fault(name) {
-                    None => next(),
-                    Some(NULL) => vk::Result::SUCCESS,
-                    Some(GARBAGE) => {
-                        let result = next();
-                        litter();
-                        result
-                    }
-                    Some(result) => {
-                        if name == "vkWaitForFences" {
-                            let _ = next();
-                        }
-                        vk::Result::from_raw(result)
-                    }
-                }
+                })
             }
         })*
 
@@ -91,8 +109,7 @@ macro_rules! calls {
             $(if name == stringify!($name).as_bytes() {
                 $name::NEXT.store(next? as usize, Relaxed);
             })*
-            // SAFETY: who asks for a function by name casts it to the type of that name.
-            unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(own) }
+            handed_out(own)
         }
     };
 }
@@ -186,8 +203,8 @@ unsafe extern "system" fn allocate(
     let result = unsafe { vkAllocateMemory::call(device, info, allocator, memory) };
     if result == vk::Result::SUCCESS {
         // SAFETY: both are valid, and the latter has been written.
-        let (bytes, memory) = unsafe { ((*info).allocation_size, (*memory).as_raw()) };
-        locked(&ALLOCATED).insert(memory, bytes);
+        let (bytes, memory) = unsafe { ((*info).allocation_size, *memory) };
+        locked(&ALLOCATED).insert(memory.as_raw(), bytes);
     }
     result
 }

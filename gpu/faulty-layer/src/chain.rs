@@ -1,10 +1,10 @@
 //! How the loader reaches this layer, and this layer the next one. Structures as in the loader's
 //! `vk_layer.h`.
 
-use crate::calls::{fault, take};
-use ash::vk;
+use crate::calls::{fault, handed_out, kept, take};
+use ash::vk::{self, Handle};
 use std::ffi::{CStr, c_char, c_void};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
 /// The interface of layers that this one has.
 const INTERFACE: u32 = 2;
@@ -44,7 +44,12 @@ struct Link {
 
 static NEXT_INSTANCE: AtomicUsize = AtomicUsize::new(0);
 static NEXT_DEVICE: AtomicUsize = AtomicUsize::new(0);
-static INSTANCE: AtomicUsize = AtomicUsize::new(0);
+static INSTANCE: AtomicU64 = AtomicU64::new(0);
+
+/// The instance that was created last.
+fn instance() -> vk::Instance {
+    vk::Instance::from_raw(INSTANCE.load(Relaxed))
+}
 
 /// Agrees with the loader.
 ///
@@ -80,6 +85,17 @@ unsafe fn advance<'a>(mut at: *mut Information, kind: i32) -> Option<&'a Link> {
     None
 }
 
+/// The next one's function of a name.
+fn next_of(
+    link: Option<&Link>,
+    owner: vk::Instance,
+    name: &CStr,
+) -> Result<vk::PFN_vkVoidFunction, vk::Result> {
+    let link = link.ok_or(vk::Result::ERROR_INITIALIZATION_FAILED)?;
+    // SAFETY: the loader's function.
+    Ok(unsafe { (link.instance)(owner, name.as_ptr()) })
+}
+
 /// # Safety
 /// As `vkCreateInstance`, called by the loader.
 unsafe extern "system" fn create_instance(
@@ -89,17 +105,16 @@ unsafe extern "system" fn create_instance(
 ) -> vk::Result {
     // SAFETY: the caller's promise throughout.
     unsafe {
-        let Some(link) = advance((*info).p_next.cast_mut().cast(), LOADER_INSTANCE) else {
-            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        let link = advance((*info).p_next.cast_mut().cast(), LOADER_INSTANCE);
+        NEXT_INSTANCE.store(link.map_or(0, |link| link.instance as usize), Relaxed);
+        let result = match next_of(link, vk::Instance::null(), c"vkCreateInstance") {
+            Ok(create) => {
+                let create: vk::PFN_vkCreateInstance = std::mem::transmute(create);
+                create(info, allocator, instance)
+            }
+            Err(result) => return result,
         };
-        let next = link.instance;
-        NEXT_INSTANCE.store(next as usize, Relaxed);
-        let Some(create) = next(vk::Instance::null(), c"vkCreateInstance".as_ptr()) else {
-            return vk::Result::ERROR_INITIALIZATION_FAILED;
-        };
-        let create: vk::PFN_vkCreateInstance = std::mem::transmute(create);
-        let result = create(info, allocator, instance);
-        INSTANCE.store(std::mem::transmute::<vk::Instance, usize>(*instance), Relaxed);
+        INSTANCE.store((*instance).as_raw(), Relaxed);
         result
     }
 }
@@ -117,17 +132,26 @@ unsafe extern "system" fn create_device(
     }
     // SAFETY: the caller's promise throughout.
     unsafe {
-        let Some(link) = advance((*info).p_next.cast_mut().cast(), LOADER_DEVICE) else {
-            return vk::Result::ERROR_INITIALIZATION_FAILED;
-        };
-        let next = link.instance;
-        NEXT_DEVICE.store(link.device as usize, Relaxed);
-        let owner = std::mem::transmute::<usize, vk::Instance>(INSTANCE.load(Relaxed));
-        let Some(create) = next(owner, c"vkCreateDevice".as_ptr()) else {
-            return vk::Result::ERROR_INITIALIZATION_FAILED;
-        };
-        let create: vk::PFN_vkCreateDevice = std::mem::transmute(create);
-        create(physical, info, allocator, device)
+        let link = advance((*info).p_next.cast_mut().cast(), LOADER_DEVICE);
+        NEXT_DEVICE.store(link.map_or(0, |link| link.device as usize), Relaxed);
+        match next_of(link, instance(), c"vkCreateDevice") {
+            Ok(create) => {
+                let create: vk::PFN_vkCreateDevice = std::mem::transmute(create);
+                create(physical, info, allocator, device)
+            }
+            Err(result) => result,
+        }
+    }
+}
+
+/// Functions of this layer that are no others' with a fault.
+fn of_the_chain(name: &[u8]) -> Option<*const c_void> {
+    match name {
+        b"vkGetInstanceProcAddr" => Some(instance_function as *const c_void),
+        b"vkGetDeviceProcAddr" => Some(device_function as *const c_void),
+        b"vkCreateInstance" => Some(create_instance as *const c_void),
+        b"vkCreateDevice" => Some(create_device as *const c_void),
+        _ => None,
     }
 }
 
@@ -137,40 +161,34 @@ unsafe extern "system" fn instance_function(
     instance: vk::Instance,
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
-    // SAFETY: the caller's promise; functions are cast to the types of their names by who asks.
-    unsafe {
-        let own = match CStr::from_ptr(name).to_bytes() {
-            b"vkGetInstanceProcAddr" => instance_function as *const c_void,
-            b"vkGetDeviceProcAddr" => device_function as *const c_void,
-            b"vkCreateInstance" => create_instance as *const c_void,
-            b"vkCreateDevice" => create_device as *const c_void,
-            name_bytes => {
-                let next = NEXT_INSTANCE.load(Relaxed);
-                if next == 0 {
-                    return None;
-                }
-                let next: vk::PFN_vkGetInstanceProcAddr = std::mem::transmute(next);
-                return take(name_bytes, next(instance, name));
-            }
-        };
-        std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(own)
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { CStr::from_ptr(name) }.to_bytes();
+    match of_the_chain(bytes) {
+        Some(own) => handed_out(own),
+        // Asked before there is an instance.
+        None if NEXT_INSTANCE.load(Relaxed) == 0 => None,
+        None => {
+            // SAFETY: put there by `create_instance`.
+            let next: vk::PFN_vkGetInstanceProcAddr = unsafe { kept(&NEXT_INSTANCE) };
+            // SAFETY: as this one was called.
+            take(bytes, unsafe { next(instance, name) })
+        }
     }
 }
 
 /// # Safety
-/// As `vkGetDeviceProcAddr`.
+/// As `vkGetDeviceProcAddr`, with a device of this layer.
 unsafe extern "system" fn device_function(
     device: vk::Device,
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
-    // SAFETY: the caller's promise; functions are cast to the types of their names by who asks.
-    unsafe {
-        let bytes = CStr::from_ptr(name).to_bytes();
-        if bytes == b"vkGetDeviceProcAddr" {
-            let own = device_function as *const c_void;
-            return std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(own);
-        }
-        let next: vk::PFN_vkGetDeviceProcAddr = std::mem::transmute(NEXT_DEVICE.load(Relaxed));
-        take(bytes, next(device, name))
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { CStr::from_ptr(name) }.to_bytes();
+    if bytes == b"vkGetDeviceProcAddr" {
+        return handed_out(device_function as *const c_void);
     }
+    // SAFETY: put there by `create_device`.
+    let next: vk::PFN_vkGetDeviceProcAddr = unsafe { kept(&NEXT_DEVICE) };
+    // SAFETY: as this one was called.
+    take(bytes, unsafe { next(device, name) })
 }

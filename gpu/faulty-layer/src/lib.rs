@@ -34,12 +34,16 @@ pub use calls::NAMES;
 /// # Errors
 /// Where the file cannot be written.
 pub fn environment(folder: &Path, library: &Path) -> io::Result<[(&'static str, String); 2]> {
-    let text = format!(
+    std::fs::write(folder.join("faulty.json"), manifest(library))?;
+    Ok([("VK_LAYER_PATH", folder.display().to_string()), ("VK_INSTANCE_LAYERS", NAME.into())])
+}
+
+/// How the loader is told of it.
+fn manifest(library: &Path) -> String {
+    format!(
         r#"{{"file_format_version": "1.2.0", "layer": {{"name": "{NAME}", "type": "GLOBAL",
         "library_path": "{}", "api_version": "1.1.0", "implementation_version": "1",
         "description": "Lets calls fail"}}}}"#,
         library.display()
-    );
-    std::fs::write(folder.join("faulty.json"), text)?;
-    Ok([("VK_LAYER_PATH", folder.display().to_string()), ("VK_INSTANCE_LAYERS", NAME.into())])
+    )
 }

@@ -65,8 +65,7 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
             // Flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
             files.sweep(stepped, &tracker, report.last_ms())?;
-            let left = tracker.ended(|ended| report.track(ended, &mut files))?;
-            report.unestimated += left;
+            report.ended(&mut tracker, &mut files, || ())?;
         }
         Ok(())
     })?;
@@ -74,25 +73,21 @@ pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     if let Some(counts) = tracker.last(&end.last)? {
         report.step(&counts, clock);
         files.sweep(&end.last, &tracker, report.last_ms())?;
-        let left = tracker.ended(|ended| report.track(ended, &mut files))?;
-        report.unestimated += left;
+        report.ended(&mut tracker, &mut files, || ())?;
     }
     report.counts.ended += tracker.finish()?;
     let mut progress = Progress::new("track", tracker.ended_objects(), args.quiet);
     let mut done = 0;
-    let left = tracker.ended(|ended| {
+    report.ended(&mut tracker, &mut files, || {
         done += 1;
         progress.update(done);
-        report.track(ended, &mut files)
     })?;
     progress.finish();
-    report.unestimated += left;
-    let interrupted = end.interrupted || report.unestimated > 0;
-    let summary = report.summary(source.name(), args.front_end, interrupted);
+    let summary = report.summary(source.name(), args.front_end, end.interrupted);
     files.finish(&summary.text())?;
     say(args.quiet, &summary.text())?;
     figures.write(&summary)?;
-    Ok(!interrupted)
+    Ok(!summary.interrupted)
 }
 
 /// Parameters of the flow and of tracking.

@@ -9,9 +9,10 @@ use raywake_objects::ObjectState;
 use raywake_objects::front_end::TrackingCounts;
 use serde::{Serialize, Serializer};
 
-use super::tracker::{Ended, moved_m};
+use super::tracker::{Ended, Tracker, moved_m};
 use super::write::Files;
 use crate::args::FrontEndKind;
+use crate::error::RunError;
 use crate::order_statistics::Spread;
 use crate::statistics::Dropped;
 use raywake_io::Error;
@@ -54,7 +55,7 @@ pub struct Line {
 pub struct Report {
     pub counts: TrackingCounts,
     /// Tracks that a signal left without an estimate.
-    pub unestimated: u64,
+    unestimated: u64,
     dropped: Dropped,
     sweeps: u64,
     steps: Vec<f64>,
@@ -85,9 +86,24 @@ impl Report {
         self.sweeps += 1;
     }
 
+    /// The tracks that ended in the last step, with their files; `tell` hears of each.
+    pub fn ended(
+        &mut self,
+        tracker: &mut Tracker,
+        files: &mut Files,
+        mut tell: impl FnMut(),
+    ) -> Result<(), RunError> {
+        let left = tracker.ended(|ended| {
+            tell();
+            self.track(ended, files)
+        })?;
+        self.unestimated += left;
+        Ok(())
+    }
+
     /// A track at its end, with its files. The digest is over its number, anchor and start, and at
     /// each state of its history this and the estimate; then the estimates of every sweep.
-    pub fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
+    fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
         let Ended { track, estimator, shape, report, lag, milliseconds } = *ended;
         self.estimates.push(milliseconds);
         self.digest.word(track.id);
@@ -123,7 +139,7 @@ impl Report {
     }
 
     /// Puts the figures together.
-    pub fn summary(self, source: &str, kind: FrontEndKind, interrupted: bool) -> TrackSummary {
+    pub fn summary(self, source: &str, kind: FrontEndKind, stopped: bool) -> TrackSummary {
         TrackSummary {
             version: env!("CARGO_PKG_VERSION"),
             source: source.to_string(),
@@ -131,7 +147,7 @@ impl Report {
                 FrontEndKind::Variance => "variance",
                 FrontEndKind::Flow => "flow",
             },
-            interrupted,
+            interrupted: stopped || self.unestimated > 0,
             sweeps: self.sweeps,
             digest: format!("{:016x}", self.digest.value()),
             step_ms: Spread::of(&self.steps),

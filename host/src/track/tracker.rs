@@ -238,8 +238,8 @@ impl Tracker {
 
     /// Shows the tracks that ended in the last step, in the order of their room, each with the
     /// estimate of its trajectory and shape: those of objects, unless all are asked for. Those that
-    /// ended before they were sure are left out: there is little to estimate. After a signal no further
-    /// track is estimated, as that may take seconds each; returns how many are left.
+    /// ended before they were sure are left out: there is little to estimate. After a signal no
+    /// further track is estimated, as that may take seconds each; returns how many are left.
     pub fn ended(
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,

@@ -122,3 +122,15 @@ pub fn command(arguments: &[&str]) -> Command {
 pub fn raywake(arguments: &[&str]) -> Outcome {
     Outcome::of(command(arguments).output().unwrap())
 }
+
+/// Parameters of a small window.
+pub const SMALL: &str = "name = \"small\"\nside = 61\nem_rounds = 3\n";
+pub const BACKEND: [&str; 2] = ["--backend", "scalar"];
+
+/// `raywake run DRIVE` with more arguments, on a small window.
+pub fn run(t: &Temp, more: &[&str]) -> Outcome {
+    let config = t.write("small.toml", SMALL);
+    let data = t.path().join("drive");
+    let head = ["run", data.to_str().unwrap(), "--config", config.to_str().unwrap()];
+    raywake(&[&head, &BACKEND[..], more].concat())
+}

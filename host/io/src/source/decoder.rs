@@ -1,6 +1,6 @@
 //! Decoders of other people's that panic on damaged files.
 //!
-//! Parquet's does where a page's levels are cut short, Arrow's where a buffer holds part of a number.
+//! Parquet's does where a page's levels are cut short, Arrow's where a buffer ends within a number.
 //! What they decode is named while they work, so that the program can say which file is damaged,
 //! however its panics end.
 

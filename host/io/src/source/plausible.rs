@@ -1,5 +1,5 @@
-//! What no vehicle does: numbers of a recording that are finite and still cannot be, whatever format
-//! they come from. Beyond them arithmetic overflows, and returns fall where they are not.
+//! What no vehicle does: numbers of a recording that are finite and still cannot be, whatever
+//! format they come from. Beyond them arithmetic overflows, and returns fall where they are not.
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
@@ -8,8 +8,8 @@ use super::Overview;
 
 /// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
 const REACH_MAX_M: f64 = 1e6;
-/// Farthest the first pose lies from the origin of the world, m: grids of maps have origins that are
-/// some thousands of kilometres away.
+/// Farthest the first pose lies from the origin of the world, m: grids of maps have origins some
+/// thousands of kilometres away.
 const WORLD_MAX_M: f64 = 1e8;
 /// Farthest a sensor or the ground lies from the origin of the returns, m: there the numbers of a
 /// return are 1 mm apart.

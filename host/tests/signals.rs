@@ -1,0 +1,108 @@
+//! The program and its system: signals, and memory that there is not.
+
+#![cfg(unix)]
+
+#[allow(dead_code)]
+mod common;
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use common::{BACKEND, Outcome, SMALL, Temp, run};
+
+/// Where the shell can limit it.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_little_memory_is_told_before_the_first_sweep() {
+    let t = Temp::new();
+    t.drive(2);
+    let program = env!("CARGO_BIN_EXE_raywake");
+    let data = t.path().join("drive").display().to_string();
+    let line = format!("ulimit -v 70000; exec {program} run {data} --backend scalar");
+    let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+    o.failed(6, &["MB needed, which the system does not give"]);
+}
+
+#[test]
+fn a_second_interrupt_ends_at_once() {
+    let t = Temp::new();
+    t.drive(3);
+    // Nobody reads the figures, so that the program waits for ever when it has said everything.
+    let pipe = t.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
+        .args(BACKEND)
+        .args(["--summary", pipe.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert!(said.any(|line| line.unwrap().starts_with("digest")));
+    let id = child.id().to_string();
+    let since = Instant::now();
+    let end = loop {
+        if let Some(end) = child.try_wait().unwrap() {
+            break end;
+        }
+        assert!(since.elapsed() < Duration::from_secs(30));
+        assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+        thread::sleep(Duration::from_millis(100));
+    };
+    assert_eq!(end.code(), Some(130));
+}
+
+#[test]
+fn an_interrupt_ends_the_run_in_order() {
+    let t = Temp::new();
+    t.drive(1200);
+    let out = t.path().join("out");
+    let config = t.write("small.toml", SMALL);
+    let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
+        .args(BACKEND)
+        .args(["--out", out.to_str().unwrap(), "--config", config.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let since = Instant::now();
+    while !out.join("columns/0000000001.feather").exists() {
+        assert!(since.elapsed() < Duration::from_secs(30) && child.try_wait().unwrap().is_none());
+        thread::sleep(Duration::from_millis(2));
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    let o = Outcome::of(child.wait_with_output().unwrap());
+    assert_eq!(o.code, Some(130), "{}", o.stderr);
+    assert!(o.stdout.contains("INTERRUPTED") && o.stdout.contains("digest"), "{}", o.stdout);
+    let s = o.summary(&out.join("summary.json"));
+    assert_eq!(s["interrupted"], true);
+    let (sweeps, pairs) = (s["sweeps"].as_u64().unwrap(), s["pairs"].as_u64().unwrap());
+    assert!(sweeps > 1 && sweeps < 1200 && pairs == sweeps - 1, "{sweeps}");
+    for folder in ["columns", "points", "tracklets"] {
+        let names: Vec<_> = fs::read_dir(out.join(folder)).unwrap().collect();
+        assert_eq!(names.len() as u64, pairs, "{folder}");
+        let whole = |name: &str| !name.ends_with(".partial");
+        assert!(names.iter().all(|n| whole(n.as_ref().unwrap().file_name().to_str().unwrap())));
+    }
+    // It goes on where it was, and leaves what one run leaves.
+    let kept = out.join("points/0000000000.feather");
+    let written = fs::metadata(&kept).unwrap().modified().unwrap();
+    let count = (sweeps + 3).to_string();
+    let whole = t.path().join("whole");
+    for out in [&out, &whole] {
+        run(&t, &["--out", out.to_str().unwrap(), "-n", &count]).succeeded();
+    }
+    assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), written);
+    for folder in ["columns", "points", "tracklets"] {
+        let files: Vec<_> = fs::read_dir(whole.join(folder)).unwrap().collect();
+        assert_eq!(files.len() as u64, sweeps + 2, "{folder}");
+        for file in files {
+            let path = file.unwrap().path();
+            let same = out.join(folder).join(path.file_name().unwrap());
+            assert!(fs::read(&path).unwrap() == fs::read(&same).unwrap(), "{}", path.display());
+        }
+    }
+}
