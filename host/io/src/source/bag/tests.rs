@@ -117,6 +117,11 @@ pub(super) fn rig(count: u64) -> Vec<Message> {
     all
 }
 
+/// A file whose damage no checksum finds.
+pub(crate) fn recording() -> Vec<u8> {
+    file(&rig(3), options().compression(None).use_chunks(false))
+}
+
 pub(super) fn accept() -> OpenOptions {
     OpenOptions { unlocated: Unlocated::Accept, ..OpenOptions::default() }
 }

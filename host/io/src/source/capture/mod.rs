@@ -15,7 +15,7 @@ mod ouster;
 mod sensor;
 mod streams;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod velodyne;
 
 use std::ops::ControlFlow;

@@ -82,7 +82,7 @@ const FIRST: &str = "val/log/sensors/lidar/315966265259836000.feather";
 const CITY: &str = "val/log/city_SE3_egovehicle.feather";
 const CALIBRATION: &str = "val/log/calibration/egovehicle_SE3_sensor.feather";
 
-fn log() -> Temp {
+pub(super) fn log() -> Temp {
     let t = Temp::new();
     // Two batches, compressed.
     let batches = [sweep(10.0, &[0, 40]), sweep(20.0, &[31])];

@@ -17,8 +17,15 @@ fn fields() -> [Vec<Vec<u8>>; 2] {
     })
 }
 
-fn binary() -> Vec<u8> {
+pub(super) fn binary() -> Vec<u8> {
     [HEAD.as_bytes(), b"DATA binary\n", &fields().concat().concat()].concat()
+}
+
+/// A compressed file.
+pub(super) fn compressed_file() -> Vec<u8> {
+    let [a, b] = fields();
+    let by_field = a.into_iter().zip(b).map(|(a, b)| [a, b].concat()).collect::<Vec<_>>();
+    compressed(&by_field.concat())
 }
 
 /// As it is, packed without any repetition.
@@ -60,9 +67,7 @@ fn pcd_of_every_kind() {
     assert_eq!(cloud(&t, "a.pcd", text()).unwrap(), expected(true));
     assert_eq!(cloud(&t, "a.pcd", text().replace('\n', "\r\n")).unwrap(), expected(true));
     assert_eq!(cloud(&t, "a.pcd", binary()).unwrap(), expected(true));
-    let [a, b] = fields();
-    let by_field = a.into_iter().zip(b).map(|(a, b)| [a, b].concat()).collect::<Vec<_>>();
-    assert_eq!(cloud(&t, "a.pcd", compressed(&by_field.concat())).unwrap(), expected(true));
+    assert_eq!(cloud(&t, "a.pcd", compressed_file()).unwrap(), expected(true));
     // Neither COUNT nor POINTS, no time; NaN stays.
     let old = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\nnan 2 3\n";
     let (points, timed) = cloud(&t, "a.pcd", old).unwrap();
@@ -133,12 +138,12 @@ const PLY: &str = "ply\nformat FORMAT 1.0\ncomment made by hand\nelement vertex 
     property double x\nproperty float y\nproperty float z\nproperty uchar intensity\n\
     property int t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
 
-fn ply(format: &str, body: &[u8]) -> Vec<u8> {
+pub(super) fn ply(format: &str, body: &[u8]) -> Vec<u8> {
     [PLY.replace("FORMAT", format).as_bytes(), body].concat()
 }
 
 /// The vertices in an order of bytes, the faces cut off.
-fn vertices(big: bool) -> Vec<u8> {
+pub(super) fn vertices(big: bool) -> Vec<u8> {
     let order = |mut bytes: Vec<u8>| {
         if big {
             bytes.reverse();

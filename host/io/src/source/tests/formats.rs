@@ -64,7 +64,7 @@ fn a_sweep_of_many_chunks_and_an_empty_one() {
 }
 
 /// A drive with OXTS packets: frames 0, 1, 3 of 5 m north each, heading north.
-fn oxts_drive(t: &Temp, folder: &str) {
+pub(super) fn oxts_drive(t: &Temp, folder: &str) {
     let mut stamps = String::new();
     for frame in 0..4 {
         let second = 25.95 + 0.1 * f64::from(frame);

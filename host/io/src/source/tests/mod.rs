@@ -4,6 +4,7 @@
 mod argoverse;
 mod files;
 mod formats;
+mod fuzz;
 mod mistakes;
 #[cfg(feature = "nuscenes")]
 mod nuscenes;

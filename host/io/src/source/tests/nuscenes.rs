@@ -8,7 +8,7 @@ const SWEEPS: usize = 3;
 
 /// A scene of three sweeps, another of one, and a camera; 2 m to the vehicle's right of the origin,
 /// the lidar is turned by a right angle and 1.8 m up. A sweep lies 0.5 m further along +x.
-fn scenes() -> Temp {
+pub(super) fn scenes() -> Temp {
     let t = Temp::new();
     let table = |name: &str, rows: Vec<String>| {
         t.write(&format!("v1.0-mini/{name}.json"), format!("[\n{}\n]", rows.join(",\n")));
@@ -56,7 +56,7 @@ fn scenes() -> Temp {
     t
 }
 
-fn asked(scene: &str) -> OpenOptions {
+pub(super) fn asked(scene: &str) -> OpenOptions {
     OpenOptions { topics: vec![scene.into()], ..OpenOptions::default() }
 }
 

@@ -8,7 +8,7 @@ const SENSORS: &str = "span: -0.05 0.1\nground: -0.3\n\
                        sensor: 1 0 0 1.5 0 1 0 0 0 0 1 1.6\nsensor: 1 0 0 0 0 1 0 0.7 0 0 1 1.5\n";
 
 /// The drive of two returns a sweep, with sidecars.
-fn with_sidecars() -> Temp {
+pub(super) fn with_sidecars() -> Temp {
     let t = drive();
     t.write("velodyne_points/sensors.txt", SENSORS);
     for frame in [3, 4, 6] {

@@ -68,7 +68,7 @@ fn keys(lasers: &[i8]) -> Vec<(String, ArrayRef)> {
 
 /// Three sweeps of the laser on the roof and one at the left, turned by a right angle; the vehicle
 /// drives 1 m a sweep, and was half a metre further on at every pixel of the one on the roof.
-fn segment(channels: usize) -> Temp {
+pub(super) fn segment(channels: usize) -> Temp {
     let t = Temp::new();
     let named = |group: &str, name: &str| format!("[{group}].{name}");
     let calibration = |name: &str| named("LiDARCalibrationComponent", name);

@@ -118,6 +118,11 @@ fn turns(packets: std::ops::Range<u32>) -> Vec<Vec<u8>> {
     packets.map(vlp16).collect()
 }
 
+/// The file of three turns of a sensor.
+pub(crate) fn recording() -> Vec<u8> {
+    pcap(&from_one(&turns(0..230)))
+}
+
 /// A capture of packets of one sensor, with a floor found by the user.
 fn made(frames: &[Vec<u8>]) -> (Temp, Result<Capture, Error>) {
     let folder = Temp::new();

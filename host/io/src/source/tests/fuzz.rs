@@ -1,0 +1,241 @@
+//! Recordings of every format, damaged at random: an error or other numbers, never a panic, and
+//! never longer than a second.
+//!
+//! `RAYWAKE_FUZZ` is how many recordings of each format are damaged; what breaks a reader is kept
+//! beside the temporary files, and named.
+
+use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use super::super::Unlocated;
+use super::*;
+
+/// Damaged recordings of a format where nobody says how many.
+const USUAL: usize = 200;
+/// Longest that a recording may take.
+const LONGEST: Duration = Duration::from_secs(1);
+/// Sweeps that are read of each.
+const SWEEPS: usize = 3;
+/// Numbers that readers have stumbled over.
+const NUMBERS: [&str; 12] = [
+    "0",
+    "-1",
+    "nan",
+    "-inf",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "4294967296",
+    "9223372036854775807",
+    "18446744073709551616",
+    "0x10",
+    "",
+];
+
+/// A recording in a folder.
+struct Seed {
+    folder: Temp,
+    options: OpenOptions,
+    files: Vec<(PathBuf, Vec<u8>)>,
+    /// Below the folder.
+    root: &'static str,
+}
+
+impl Seed {
+    fn new(folder: Temp, root: &'static str, options: OpenOptions) -> Seed {
+        let (mut files, mut folders) = (Vec::new(), vec![folder.path().to_path_buf()]);
+        while let Some(next) = folders.pop() {
+            for entry in fs::read_dir(next).unwrap() {
+                let path = entry.unwrap().path();
+                match path.is_dir() {
+                    true => folders.push(path),
+                    false => files.push((path.clone(), fs::read(path).unwrap())),
+                }
+            }
+        }
+        files.sort();
+        Seed { folder, options, files, root }
+    }
+
+    /// Opens the recording and reads some of it. Whether that went well.
+    fn read(&self) -> bool {
+        let Ok(mut source) = open(&self.folder.path().join(self.root), &self.options) else {
+            return false;
+        };
+        let mut sweep = SweepData::default();
+        (0..source.len().min(SWEEPS)).all(|index| {
+            let read = source.read(index, &mut sweep);
+            assert!(read.is_ok() || sweep.points.is_empty(), "returns of a sweep that failed");
+            let pose = &sweep.world_from_vehicle;
+            assert!(pose.rotation.is_finite() && pose.translation.is_finite(), "{pose:?}");
+            let twist = &sweep.twist;
+            assert!(twist.linear.is_finite() && twist.angular.is_finite(), "{twist:?}");
+            read.is_ok()
+        })
+    }
+
+    /// Damages files of the recording `times` over. Returns how often it could still be read.
+    fn damage(&self, times: usize, random: &mut Random) -> usize {
+        assert!(self.read(), "the recording itself");
+        let once = |random: &mut Random| {
+            let (path, whole) = &self.files[random.below(self.files.len())];
+            let bytes = damaged(whole, random);
+            fs::write(path, &bytes).unwrap();
+            let since = Instant::now();
+            let read = catch_unwind(AssertUnwindSafe(|| self.read()));
+            let took = since.elapsed();
+            fs::write(path, whole).unwrap();
+            if read.is_err() || took > LONGEST {
+                let kept = std::env::temp_dir().join(format!("raywake-{}", bytes.len()));
+                let _ = fs::File::create(&kept).and_then(|mut file| file.write_all(&bytes));
+                panic!("{} in place of {}: {took:?}", kept.display(), path.display());
+            }
+            read.is_ok_and(|read| read)
+        };
+        (0..times).filter(|_| once(random)).count()
+    }
+}
+
+/// Numbers that look random and are always the same ones.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        // Knuth's MMIX generator, by its upper half.
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 32) * limit as u64 >> 32) as usize
+    }
+}
+
+/// A file with up to four kinds of damage.
+fn damaged(whole: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = whole.to_vec();
+    for _ in 0..=random.below(4) {
+        if bytes.is_empty() {
+            break;
+        }
+        let at = random.below(bytes.len());
+        match random.below(7) {
+            0 => bytes[at] ^= 1 << random.below(8),
+            1 => bytes[at] = [0, 1, 0x7f, 0x80, 0xff][random.below(5)],
+            2 => bytes.truncate(at),
+            3 => word(&mut bytes, at, random),
+            4 => number(&mut bytes, at, random),
+            5 => {
+                let copied = bytes[at..(at + 1 + random.below(64)).min(bytes.len())].to_vec();
+                let to = random.below(bytes.len());
+                bytes.splice(to..to, copied);
+            }
+            _ => {
+                let end = (at + 1 + random.below(64)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+        }
+    }
+    bytes
+}
+
+/// A word of four or eight bytes becomes an extreme one.
+fn word(bytes: &mut [u8], at: usize, random: &mut Random) {
+    let extreme = [0, 1, u64::MAX, 1 << 31, (1 << 31) - 1, 1 << 63, 1 << 40][random.below(7)];
+    let word = extreme.to_le_bytes();
+    let length = [4, 8][random.below(2)].min(bytes.len() - at);
+    bytes[at..at + length].copy_from_slice(&word[..length]);
+}
+
+/// The number in a text that follows a place becomes another.
+fn number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
+    let digit = |byte: &u8| byte.is_ascii_digit() || b"+-.e".contains(byte);
+    let Some(from) = bytes[at..].iter().position(digit).map(|n| at + n) else { return };
+    let length = bytes[from..].iter().take_while(|byte| digit(byte)).count();
+    let other = NUMBERS[random.below(NUMBERS.len())].bytes();
+    bytes.splice(from..from + length, other);
+}
+
+/// Damages a recording of a format.
+fn fuzz(name: &str, seed: Seed) {
+    let times = std::env::var("RAYWAKE_FUZZ").ok().and_then(|n| n.parse().ok());
+    let times = times.unwrap_or(USUAL);
+    // A stream of its own for each format, and another one for another number of recordings.
+    let number = name.bytes().fold(times as u64, |n, byte| n.wrapping_mul(31) + u64::from(byte));
+    let read = seed.damage(times, &mut Random(number));
+    println!("{name}: {times} damaged, {read} of them read");
+    // Most damage is to numbers of returns, which may be any.
+    assert!(times < 50 || (1..times).contains(&read), "{name}: {read} of {times} were read");
+}
+
+/// Without poses, for what has none.
+fn unlocated() -> OpenOptions {
+    OpenOptions { unlocated: Unlocated::Accept, ground_m: Some(-1.7), ..OpenOptions::default() }
+}
+
+#[test]
+fn kitti() {
+    fuzz("poses.txt", Seed::new(drive(), "", OpenOptions::default()));
+    let t = Temp::new();
+    formats::oxts_drive(&t, "day/drive");
+    t.write("day/calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 0.8 -0.3 0.8\n");
+    fuzz("oxts", Seed::new(t, "day/drive", OpenOptions::default()));
+    fuzz("sensors.txt", Seed::new(sidecars::with_sidecars(), "", OpenOptions::default()));
+    let t = Temp::new();
+    t.write("velodyne/000000.bin", bin(&[[1.0, -2.0, 0.5, 0.25]; 3]));
+    t.write("velodyne/000001.bin", bin(&[[2.0, -2.0, 0.5, 0.25]; 3]));
+    t.write("poses.txt", row(0.0, 0.0, 0.0) + &row(1.0, 0.0, 0.0));
+    t.write("times.txt", "0\n0.1\n");
+    t.write("calib.txt", "P0: 1 2 3\nTr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n");
+    fuzz("odometry", Seed::new(t, "", OpenOptions::default()));
+}
+
+#[test]
+fn folders_of_clouds() {
+    let two = |name: &str, content: &[u8]| {
+        let t = Temp::new();
+        t.write(&format!("0.{name}"), content);
+        t.write(&format!("1.{name}"), content);
+        t.write("times.txt", "0\n0.1\n");
+        Seed::new(t, "", unlocated())
+    };
+    fuzz("pcd binary", two("pcd", &files::binary()));
+    fuzz("pcd compressed", two("pcd", &files::compressed_file()));
+    fuzz("ply binary", two("ply", &files::ply("binary_little_endian", &files::vertices(false))));
+    let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 4), }\n";
+    let length = (header.len() as u16).to_le_bytes();
+    let numbers: Vec<u8> = (0..8).flat_map(|n| (n as f32 * 0.5).to_le_bytes()).collect();
+    let npy = [&b"\x93NUMPY\x01\x00"[..], &length, header, &numbers].concat();
+    fuzz("npy", two("npy", &npy));
+}
+
+#[cfg(feature = "arrow")]
+#[test]
+fn argoverse_logs() {
+    fuzz("argoverse", Seed::new(argoverse::log(), "", OpenOptions::default()));
+}
+
+#[cfg(feature = "nuscenes")]
+#[test]
+fn nuscenes_scenes() {
+    fuzz("nuscenes", Seed::new(nuscenes::scenes(), "", nuscenes::asked("scene-0061")));
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn waymo_segments() {
+    fuzz("waymo", Seed::new(waymo::segment(4), "", OpenOptions::default()));
+}
+
+#[cfg(feature = "mcap")]
+#[test]
+fn bags() {
+    let t = Temp::new();
+    t.write("a.mcap", crate::source::bag::tests::recording());
+    fuzz("mcap", Seed::new(t, "", unlocated()));
+}
+
+#[cfg(feature = "pcap")]
+#[test]
+fn captures() {
+    let t = Temp::new();
+    t.write("a.pcap", crate::source::capture::tests::recording());
+    fuzz("pcap", Seed::new(t, "a.pcap", unlocated()));
+}
