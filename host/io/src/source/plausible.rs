@@ -39,9 +39,11 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
             return Err(format!("frame {frame} has a time of {stamp_s:e} s"));
         }
     }
-    match track.stamps_s.windows(2).position(|pair| !(pair[1] - pair[0] >= STEP_MIN_S)) {
+    // The stamps are finite by now.
+    match track.stamps_s.windows(2).position(|pair| pair[1] - pair[0] < STEP_MIN_S) {
         Some(n) => {
-            Err(format!("frame {} comes no {STEP_MIN_S} s after the one before", frames[n + 1]))
+            let frame = frames[n + 1];
+            Err(format!("frame {frame} comes less than {STEP_MIN_S} s after the one before"))
         }
         None => Ok(()),
     }

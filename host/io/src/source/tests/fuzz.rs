@@ -104,7 +104,7 @@ impl Random {
     fn below(&mut self, limit: usize) -> usize {
         // Knuth's MMIX generator, by its upper half.
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 32) * limit as u64 >> 32) as usize
+        (((self.0 >> 32) * limit as u64) >> 32) as usize
     }
 }
 
