@@ -17,10 +17,10 @@ const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
 const PERIOD_NS: u64 = 100_000_000;
 
 /// A message: topic, schema, time, content.
-pub(super) type Message = (&'static str, &'static str, u64, Vec<u8>);
+pub(crate) type Message = (&'static str, &'static str, u64, Vec<u8>);
 
 /// A file of some messages.
-pub(super) fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
+pub(crate) fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer: Writer<_> = options.create(Cursor::new(&mut bytes)).unwrap();
     for (topic, name, log_time, data) in messages {
@@ -36,7 +36,7 @@ pub(super) fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
 }
 
 /// Small chunks.
-pub(super) fn options() -> WriteOptions {
+pub(crate) fn options() -> WriteOptions {
     WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(50_000))
 }
 
@@ -98,7 +98,7 @@ fn sweeps(sweeps: u64) -> Vec<Message> {
 }
 
 /// Those and a second lidar behind, 20 ms later, on a vehicle that drives 1 m a sweep.
-pub(super) fn rig(count: u64) -> Vec<Message> {
+pub(crate) fn rig(count: u64) -> Vec<Message> {
     let mut all = vec![
         ("/tf_static", TF, BEGIN_NS, transform(0, ["base_link", "lidar"], 1.0, 1.8)),
         ("/tf_static", TF, BEGIN_NS, transform(0, ["base_link", "rear"], -2.0, 0.9)),
@@ -115,11 +115,6 @@ pub(super) fn rig(count: u64) -> Vec<Message> {
         (0..count).map(pose).map(|(ns, x)| ("/odom", ODOMETRY, ns, odometry(ns, "lidar", x))),
     );
     all
-}
-
-/// A file whose damage no checksum finds.
-pub(crate) fn recording() -> Vec<u8> {
-    file(&rig(3), options().compression(None).use_chunks(false))
 }
 
 pub(super) fn accept() -> OpenOptions {
