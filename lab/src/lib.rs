@@ -2,6 +2,7 @@
 #![deny(missing_docs)]
 //! Everything off-board: simulated drives, training of the learned numbers, and evaluation.
 
+pub mod bench;
 mod curve;
 pub mod eval;
 pub mod flsf;

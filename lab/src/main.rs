@@ -4,7 +4,7 @@
 use clap::Parser;
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
-use raywake_lab::{eval, flsf, matching, results, simulate, toy, tracks, train};
+use raywake_lab::{bench, eval, flsf, matching, results, simulate, toy, tracks, train};
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -27,6 +27,8 @@ enum Command {
     Results(results::Args),
     /// Feature learning on digits (section 4.3): table 4.1, figures 4.2 and 4.3.
     Toy(toy::Args),
+    /// Time two builds of the program in turn: ratios of sweeps, CPU and wall time.
+    Bench(bench::Args),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
 }
@@ -71,6 +73,7 @@ fn main() -> ExitCode {
         Command::Match(args) => matching::run(&args),
         Command::Sim(args) => simulate::run(&args),
         Command::Toy(args) => toy::run(&args).map_err(Into::into),
+        Command::Bench(args) => bench::run(&args).map_err(Into::into),
         Command::Results(args) => results::run(&args).map_err(Into::into),
     };
     match done {
