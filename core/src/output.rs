@@ -332,3 +332,22 @@ pub struct TrackletState {
     /// P(moves), as last observed.
     pub probability: f32,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn velocities_of_returns_at_no_place_are_finite() {
+        let points = [f32::MAX, -3.4e38, f32::NAN, f32::INFINITY, 5.0]
+            .map(|x| Point { position: [x, x, 0.0], ..Point::default() });
+        let taken = [ReturnFlow::default(); 5];
+        let turning = Twist { linear: DVec3::ZERO, angular: DVec3::new(0.0, 0.0, 3.0) };
+        let ego = EgoMotion::new(&Pose::IDENTITY, &turning);
+        let flows = PointFlows { ego, ..PointFlows::at_rest(&[], &taken, &points) };
+        for flow in flows.iter() {
+            assert!(flow.velocity_ego_mps.iter().all(|v| v.is_finite()), "{flow:?}");
+        }
+        assert_eq!(flows.get(4).map(|flow| flow.velocity_ego_mps[1]), Some(-15.0));
+    }
+}

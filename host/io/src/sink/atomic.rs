@@ -76,13 +76,13 @@ fn create_locked(path: &Path) -> io::Result<File> {
     for _ in 0..ATTEMPTS {
         match File::options().write(true).create_new(true).open(path) {
             Ok(file) => {
-                if is_locked(&file) && is_at(&file, path) {
+                if lock(&file) && is_at(&file, path) {
                     return Ok(file);
                 }
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
                 let there = File::open(path).ok().filter(|_| !path.is_symlink());
-                if there.is_some_and(|there| !is_locked(&there)) {
+                if there.is_some_and(|there| !lock(&there)) {
                     return Err(busy());
                 }
                 fs::remove_file(path)?;
@@ -93,9 +93,9 @@ fn create_locked(path: &Path) -> io::Result<File> {
     Err(busy())
 }
 
-/// Locks a file or folder. Whether no other process has locked it; where there are no locks, none
+/// Locks a file or folder, unless another process has: then `false`. Where there are no locks, none
 /// has.
-fn is_locked(file: &File) -> bool {
+fn lock(file: &File) -> bool {
     !matches!(file.try_lock(), Err(TryLockError::WouldBlock))
 }
 
@@ -124,7 +124,7 @@ pub struct FolderClaim {
 pub fn claim_folder(path: &Path) -> Result<FolderClaim, Error> {
     create_folder(path)?;
     let folder = File::open(path).ok();
-    if folder.as_ref().is_some_and(|folder| !is_locked(folder)) {
+    if folder.as_ref().is_some_and(|folder| !lock(folder)) {
         let what = "another process is writing results into it";
         return Err(Error::writing(path)(io::Error::new(ErrorKind::ResourceBusy, what)));
     }
