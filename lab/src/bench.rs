@@ -42,8 +42,11 @@ pub struct Args {
     setting: Vec<String>,
 }
 
-/// What is compared: name, what goes before the program, and arguments.
-const SETTINGS: [(&str, &[&str], &[&str]); 5] = [
+/// Name, what goes before the program, and arguments.
+type Setting = (&'static str, &'static [&'static str], &'static [&'static str]);
+
+/// What is compared.
+const SETTINGS: [Setting; 5] = [
     ("one core", &["taskset", "-c", "0"], &["--backend", "scalar"]),
     ("all cores", &[], &["--backend", "scalar"]),
     ("filter off", &[], &["--backend", "scalar", "--filter", "none"]),
@@ -79,9 +82,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-fn settings(
-    names: &[String],
-) -> Result<Vec<(&'static str, &'static [&'static str], &'static [&'static str])>, Error> {
+fn settings(names: &[String]) -> Result<Vec<Setting>, Error> {
     if names.is_empty() {
         return Ok(SETTINGS[..4].to_vec());
     }
