@@ -42,10 +42,10 @@ pub struct PerceptionBuffers<'a> {
     pub proposal: &'a [Proposal],
 }
 
-impl<'a> PerceptionBuffers<'a> {
-    /// What they hold, if that can be: a device that fails may leave anything behind. `Err` with
+impl PerceptionBuffers<'_> {
+    /// Whether what they hold can be: a device that fails may leave anything behind. `Err` with
     /// what cannot be.
-    pub fn checked(self, sweep: &SweepUniform) -> Result<Perceived<'a>, &'static str> {
+    pub fn check(&self, sweep: &SweepUniform) -> Result<(), &'static str> {
         let counter = |n: usize| self.counters[n] as usize;
         let (count, marked) = (counter(FOREGROUND_COUNT), counter(FOREGROUND_MARKED));
         let columns = self.flow.len();
@@ -66,10 +66,10 @@ impl<'a> PerceptionBuffers<'a> {
         let levels = u32::MAX >> (32 - sweep.levels);
         let beyond = [!(levels | levels << 16), !levels];
         let fits = |column: &Column| (0..2).all(|n| column[n] & beyond[n] == 0);
-        if !self.columns_before.iter().chain(self.columns_now).all(fits) {
-            return Err("the voxels of a column");
+        match self.columns_before.iter().chain(self.columns_now).all(fits) {
+            true => Ok(()),
+            false => Err("the voxels of a column"),
         }
-        Ok(self.into())
     }
 }
 

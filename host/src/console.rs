@@ -47,7 +47,7 @@ pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
     }
 }
 
-/// Tells of what went wrong and does not end the command.
+/// Tells of what went wrong.
 pub fn warn(text: &str) {
     // Nobody is left to tell where standard error is closed.
     let _ = writeln!(io::stderr(), "raywake: {text}");

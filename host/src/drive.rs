@@ -20,9 +20,15 @@ use crate::team::ThreadTeam;
 /// made, unless a device fails.
 pub struct Drive {
     parts: Sealed<Parts>,
-    /// What the scalar backend would be made of, should the device fail.
-    spare: Option<Tables>,
+    spare: Option<Spare>,
     failover: Option<Failover>,
+}
+
+/// What the scalar backend would be made of, should the device fail.
+struct Spare {
+    profile: Profile,
+    rig: Rig,
+    tables: Tables,
 }
 
 /// What came of a device that failed: it is kept, as waiting for its end may take long.
@@ -60,8 +66,10 @@ impl Drive {
 
     /// The same, with the scalar backend to go on with where a device fails.
     pub fn with_spare(self, tables: Tables) -> Drive {
+        let Setup { profile, rig, .. } = &self.parts.setup;
+        let spare = Spare { profile: profile.clone(), rig: rig.clone(), tables };
         let on_device = matches!(self.parts.backend, Backend::Device(_));
-        Drive { spare: Some(tables).filter(|_| on_device), ..self }
+        Drive { spare: on_device.then_some(spare), ..self }
     }
 
     /// Bytes of host memory held for a profile, the backend's apart.
@@ -98,20 +106,13 @@ impl Drive {
         if let Some(failover) = failover {
             return step(&mut failover.parts, sweep, before);
         }
-        let Setup { profile, rig, .. } = &parts.setup;
-        let (profile, rig) = (profile.clone(), rig.clone());
-        match (step(parts, sweep, before), spare.take()) {
-            (Err(RunError::Device(failure)), Some(tables)) => {
+        match (step(parts, sweep, before), spare) {
+            (Err(RunError::Device(failure)), Some(spare)) => {
                 warn(&format!("device: {failure}: going on with the scalar backend"));
-                let backend = Backend::scalar(&profile, &tables);
-                let parts = Parts::new(&profile, &rig, &tables, backend);
-                let failover = failover.insert(Failover { failure, parts });
+                let failover = failover.insert(Failover { failure, parts: spare.parts() });
                 step(&mut failover.parts, sweep, &[])
             }
-            (stepped, tables) => {
-                *spare = tables;
-                stepped
-            }
+            (stepped, _) => stepped,
         }
     }
 
@@ -129,6 +130,13 @@ impl Drive {
     pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
         let parts = self.active();
         parts.pipeline.tracklets(&parts.setup.profile)
+    }
+}
+
+impl Spare {
+    fn parts(&self) -> Sealed<Parts> {
+        let Spare { profile, rig, tables } = self;
+        Parts::new(profile, rig, tables, Backend::scalar(profile, tables))
     }
 }
 

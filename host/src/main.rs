@@ -2,14 +2,13 @@
 //! The command line program; see `raywake --help`.
 
 use std::alloc::System;
-use std::io::{Write, stderr};
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
 use raywake::args::{self, Args};
-use raywake::console::INTERRUPTED_CODE;
+use raywake::console::{INTERRUPTED_CODE, warn};
 use raywake::error::RunError;
 use raywake::{execute, team};
 use raywake_alloc_guard::Guard;
@@ -19,12 +18,10 @@ fn explain(e: &clap::Error) -> ! {
     let first = std::env::args_os().nth(1).filter(|first| Path::new(first).exists());
     if let Some(path) = first.filter(|_| e.kind() == ErrorKind::InvalidSubcommand) {
         let path = Path::new(&path).display();
-        // Nobody is left to tell where standard error is closed.
-        let _ = writeln!(
-            stderr(),
-            "raywake: a command is missing; to see what moves in it:\n\n    \
+        warn(&format!(
+            "a command is missing; to see what moves in it:\n\n    \
              raywake run {path} --out results --png\n"
-        );
+        ));
         std::process::exit(e.exit_code());
     }
     e.exit()
@@ -37,7 +34,7 @@ fn tell_of_damaged_files() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| match raywake_io::source::decoder::damaged() {
         Some(e) if cfg!(panic = "abort") => {
-            let _ = writeln!(stderr(), "raywake: {e}");
+            warn(&e.to_string());
             std::process::exit(e.exit_code().into());
         }
         Some(_) => {}
@@ -59,8 +56,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(INTERRUPTED_CODE),
         Err(e) => {
-            // Nobody is left to tell where standard error is closed.
-            let _ = writeln!(stderr(), "raywake: {e}");
+            warn(&e.to_string());
             ExitCode::from(e.exit_code())
         }
     }

@@ -47,15 +47,14 @@ impl Made<'_> {
         let Some(root) = root else { return Ok(None) };
         let claim = atomic::claim_folder(root)?;
         let (path, text) = (root.join(NAME), self.text());
-        if path.is_file() {
-            let there = read_text(&path)?;
-            return match there == text {
-                true => Ok(Some(claim)),
-                false => Err(different(root, &there, &text)),
-            };
+        if !path.is_file() {
+            atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
+            return Ok(Some(claim));
         }
-        atomic::write(&path, |out| out.write_all(text.as_bytes()))?;
-        Ok(Some(claim))
+        match read_text(&path)? {
+            there if there == text => Ok(Some(claim)),
+            there => Err(different(root, &there, &text)),
+        }
     }
 
     fn text(&self) -> String {

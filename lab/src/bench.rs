@@ -8,8 +8,8 @@ use raywake::error::RunError;
 use raywake::order_statistics::Spread;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
+use raywake_io::source::whole;
 use serde_json::Value;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -103,27 +103,36 @@ fn measure(
 ) -> Result<Figures, Error> {
     let failed = |what: String| Error::Usage(format!("{}: {what}", program.display()));
     let summary = args.out.join("summary.json");
-    let mut words: Vec<OsString> = before.iter().map(OsString::from).collect();
-    words.extend([program.into(), "run".into(), args.data.clone().into(), "--quiet".into()]);
-    words.extend(["-n".into(), args.sweeps.to_string().into()]);
-    words.extend(["--summary".into(), summary.clone().into()]);
-    words.extend(arguments.iter().map(OsString::from));
     let begin = Instant::now();
-    let script = "\"$@\" && times";
-    let done = Command::new("sh").args(["-c", script, "sh"]).args(words).output();
+    let mut shell = Command::new("sh");
+    shell
+        .args(["-c", "\"$@\" && times", "sh"])
+        .args(before)
+        .arg(program)
+        .arg("run")
+        .arg(&args.data);
+    shell.args(["--quiet", "-n", &args.sweeps.to_string(), "--summary"]).arg(&summary);
+    let done = shell.args(arguments).output();
     let done = done.map_err(|e| failed(format!("cannot be run: {e}")))?;
     let wall_s = begin.elapsed().as_secs_f64();
     if !done.status.success() {
         return Err(failed(String::from_utf8_lossy(&done.stderr).trim().to_owned()));
     }
-    let text = std::fs::read_to_string(&summary).map_err(Error::reading(&summary))?;
-    let read: Value = serde_json::from_str(&text)
-        .map_err(|e| Error::input(&summary, format!("line {}", e.line()), e.to_string()))?;
-    let total = |name: &str| read["total_ms"][name].as_f64();
-    let median = total("median").ok_or_else(|| failed("no pair of sweeps, no time".into()))?;
+    let [median, mean] = sweep_ms(&summary)?;
     let times = String::from_utf8_lossy(&done.stdout).into_owned();
     let cpu_s = cpu_s(&times).ok_or_else(|| failed(format!("`times` says {times}")))?;
-    Ok([median, total("mean").unwrap_or(f64::NAN), cpu_s, wall_s])
+    Ok([median, mean, cpu_s, wall_s])
+}
+
+/// Median and mean time of a sweep, ms, of the summary of a run.
+fn sweep_ms(summary: &Path) -> Result<[f64; 2], Error> {
+    let text = whole::read_text(summary)?;
+    let read: Value = serde_json::from_str(&text)
+        .map_err(|e| Error::input(summary, format!("line {}", e.line()), e.to_string()))?;
+    let total = |name: &str| read["total_ms"][name].as_f64();
+    let both = total("median").zip(total("mean"));
+    let none = || Error::input(summary, "", "no pair of sweeps, no time");
+    both.map(|(median, mean)| [median, mean]).ok_or_else(none)
 }
 
 /// CPU time of a shell's children, s: the second line of `times`, user and system, as `0m1.25s`.

@@ -74,7 +74,7 @@ pub unsafe fn kept<F: Copy>(at: &AtomicUsize) -> F {
 }
 
 macro_rules! calls {
-    ($($name:ident($($arg:ident: $type:ty),*);)*) => {
+    ($($name:ident($($arg:ident: $type:ty),*) $(before $before:block after $after:block)?;)*) => {
         /// Names of the functions that may fail, but for those that create what calls them.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
@@ -89,20 +89,21 @@ macro_rules! calls {
             /// # Safety
             /// As the function of that name.
             pub unsafe extern "system" fn call($($arg: $type),*) -> vk::Result {
-                super::call(stringify!($name), || {
+                $($before)?
+                let result = super::call(stringify!($name), || {
                     // SAFETY: `take` has put the address there.
                     let next: Next = unsafe { kept(&NEXT) };
                     // SAFETY: with what this one was called with.
                     unsafe { next($($arg),*) }
-                })
+                });
+                $(if result == vk::Result::SUCCESS $after)?
+                result
             }
         })*
 
         /// This layer's function of a name, or the next one's, whose address is kept.
         pub fn take(name: &[u8], next: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
             let own = match name {
-                b"vkAllocateMemory" => allocate as *const c_void,
-                b"vkMapMemory" => map as *const c_void,
                 $(name if name == stringify!($name).as_bytes() => $name::call as *const c_void,)*
                 _ => return next,
             };
@@ -123,11 +124,24 @@ calls! {
     vkAllocateMemory(
         device: vk::Device, info: *const vk::MemoryAllocateInfo<'static>, allocator: Allocator,
         memory: *mut vk::DeviceMemory
-    );
+    ) before {} after {
+        // SAFETY: both are valid, and the latter has been written.
+        let (bytes, memory) = unsafe { ((*info).allocation_size, *memory) };
+        locked(&ALLOCATED).insert(memory.as_raw(), bytes);
+    };
     vkMapMemory(
         device: vk::Device, memory: vk::DeviceMemory, offset: u64, size: u64,
         flags: vk::MemoryMapFlags, data: *mut *mut c_void
-    );
+    ) before {
+        // SAFETY: the caller's place for it.
+        unsafe { *data = ptr::null_mut() };
+    } after {
+        // SAFETY: the same.
+        let address = unsafe { *data } as usize;
+        if address != 0 {
+            locked(&MAPPED).insert(memory.as_raw(), address);
+        }
+    };
     vkBindBufferMemory(
         device: vk::Device, buffer: vk::Buffer, memory: vk::DeviceMemory, offset: u64
     );
@@ -187,48 +201,4 @@ calls! {
     vkWaitForFences(
         device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64
     );
-}
-
-/// `vkAllocateMemory`, remembered.
-///
-/// # Safety
-/// As that function.
-unsafe extern "system" fn allocate(
-    device: vk::Device,
-    info: *const vk::MemoryAllocateInfo<'static>,
-    allocator: Allocator,
-    memory: *mut vk::DeviceMemory,
-) -> vk::Result {
-    // SAFETY: as this one was called.
-    let result = unsafe { vkAllocateMemory::call(device, info, allocator, memory) };
-    if result == vk::Result::SUCCESS {
-        // SAFETY: both are valid, and the latter has been written.
-        let (bytes, memory) = unsafe { ((*info).allocation_size, *memory) };
-        locked(&ALLOCATED).insert(memory.as_raw(), bytes);
-    }
-    result
-}
-
-/// `vkMapMemory`, remembered.
-///
-/// # Safety
-/// As that function.
-unsafe extern "system" fn map(
-    device: vk::Device,
-    memory: vk::DeviceMemory,
-    offset: u64,
-    size: u64,
-    flags: vk::MemoryMapFlags,
-    data: *mut *mut c_void,
-) -> vk::Result {
-    // SAFETY: the caller's pointer, and then as this one was called.
-    let (result, address) = unsafe {
-        *data = ptr::null_mut();
-        let result = vkMapMemory::call(device, memory, offset, size, flags, data);
-        (result, *data)
-    };
-    if !address.is_null() {
-        locked(&MAPPED).insert(memory.as_raw(), address as usize);
-    }
-    result
 }

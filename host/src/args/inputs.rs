@@ -17,13 +17,10 @@ pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let program = Args::command();
     let command = program.find_subcommand(name);
-    let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
-    for id in command.into_iter().flat_map(paths) {
-        let list = if OUTPUTS.contains(&id) { &mut outputs } else { &mut inputs };
-        // Fails for those that a command does not have.
-        let given = matches.try_get_raw(id).ok().flatten();
-        list.extend(given.into_iter().flatten().map(|text| (id, Path::new(text))));
-    }
+    let given = |id| matches.get_raw(id).into_iter().flatten().map(Path::new);
+    let given =
+        command.into_iter().flat_map(paths).flat_map(|id| given(id).map(move |at| (id, at)));
+    let (outputs, inputs): (Vec<_>, Vec<_>) = given.partition(|(id, _)| OUTPUTS.contains(id));
     for (id, output) in outputs {
         for input in inputs.iter().filter_map(|(_, input)| input.canonicalize().ok()) {
             if let Some(what) = harm(&resolved(output), &input) {

@@ -94,7 +94,7 @@ impl Perceive for Device {
         sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep))?);
         self.executor.run_beside(FLOW, meanwhile)?;
         timer.measured(&mut self.executor.times(FLOW), "submit and wait");
-        if let Err(what) = self.left().checked(sweep) {
+        if let Err(what) = self.left().check(sweep) {
             return Err(self.executor.give_up(FLOW, what));
         }
         Ok(self.left().into())

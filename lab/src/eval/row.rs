@@ -208,6 +208,25 @@ row! {
     stands: f32,
 }
 
+/// Declares which columns are cues; the compiler knows whether all are.
+macro_rules! told {
+    ($($cue:ident),*) => {
+        impl Row {
+            /// Nothing but what P(moves) was told by.
+            pub fn told_by(cues: Cues) -> Row {
+                Row { $($cue: cues.$cue,)* ..Row::default() }
+            }
+
+            /// What its P(moves) was told by.
+            pub fn cues(&self) -> Cues {
+                Cues { $($cue: self.$cue),* }
+            }
+        }
+    };
+}
+
+told!(margin, share, residual, returns, certainty, worn, fresh, misfit, could_move, stands);
+
 impl Row {
     /// Whether the labelled object moves.
     pub fn is_moving(&self) -> bool {
@@ -244,39 +263,6 @@ impl Row {
     /// Whether its displacement alone is one of [`MOVING_MPS`] over the time between the sweeps.
     pub fn is_moving_by_flow(&self) -> bool {
         f64::from(self.flow_x.hypot(self.flow_y)) >= MOVING_MPS * f64::from(self.dt)
-    }
-
-    /// Nothing but what P(moves) was told by.
-    pub fn told_by(cues: Cues) -> Row {
-        Row {
-            margin: cues.margin,
-            share: cues.share,
-            residual: cues.residual,
-            returns: cues.returns,
-            certainty: cues.certainty,
-            worn: cues.worn,
-            fresh: cues.fresh,
-            misfit: cues.misfit,
-            could_move: cues.could_move,
-            stands: cues.stands,
-            ..Row::default()
-        }
-    }
-
-    /// What its P(moves) was told by.
-    pub fn cues(&self) -> Cues {
-        Cues {
-            margin: self.margin,
-            share: self.share,
-            residual: self.residual,
-            returns: self.returns,
-            certainty: self.certainty,
-            worn: self.worn,
-            fresh: self.fresh,
-            misfit: self.misfit,
-            could_move: self.could_move,
-            stands: self.stands,
-        }
     }
 
     /// Whether class and motion are among those there are; those read from a file need not be.

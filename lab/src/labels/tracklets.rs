@@ -11,7 +11,7 @@ use raywake_io::source::whole;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::path::Path;
 
-/// Attributes of an element that are believed: boost writes four.
+/// Attributes of an element that are believed: those of KITTI's files have three at most.
 const ATTRIBUTES_MAX: usize = 100;
 
 /// Value of `state` of a pose that nobody set.

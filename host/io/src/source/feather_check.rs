@@ -33,15 +33,18 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     if footer.dictionaries().is_some_and(|blocks| !blocks.is_empty()) {
         return Err("has columns coded by dictionary: write them plainly".into());
     }
-    let mut unpacked = 0;
+    let mut unpacked = 0u64;
     for block in footer.recordBatches().into_iter().flatten() {
-        check_block(&body[..start], block, &mut unpacked)?;
+        unpacked = unpacked.saturating_add(check_block(&body[..start], block)?);
     }
-    Ok(())
+    match unpacked {
+        0..=UNPACKED_MAX => Ok(()),
+        _ => Err(format!("unpacks to {unpacked} bytes, at most {UNPACKED_MAX} are read")),
+    }
 }
 
-/// A block lies within the file and its message within the block. Adds to the bytes unpacked.
-fn check_block(file: &[u8], block: &Block, unpacked: &mut u64) -> Result<(), String> {
+/// A block lies within the file and its message within the block. Returns the bytes it unpacks to.
+fn check_block(file: &[u8], block: &Block) -> Result<u64, String> {
     let outside = || format!("damaged: a record batch at byte {} is cut off", block.offset());
     let size = |v: i64| usize::try_from(v).map_err(|_| outside());
     let offset = size(block.offset())?;
@@ -55,18 +58,19 @@ fn check_block(file: &[u8], block: &Block, unpacked: &mut u64) -> Result<(), Str
     let message = head.get(skip..).ok_or_else(outside)?;
     let message = root_as_message(message)
         .map_err(|e| format!("damaged message at byte {}: {e}", block.offset()))?;
-    let batch = message.header_as_record_batch();
-    batch.map_or(Ok(()), |batch| check_batch(&batch, body, unpacked))
+    message.header_as_record_batch().map_or(Ok(0), |batch| check_batch(&batch, body))
 }
 
-/// Every buffer of a batch lies within its body, and no length is absurd, nor their sum.
-fn check_batch(batch: &RecordBatch<'_>, body: &[u8], unpacked: &mut u64) -> Result<(), String> {
+/// Every buffer of a batch lies within its body, and no length is absurd. Returns the bytes they
+/// unpack to.
+fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<u64, String> {
     let sensible = |rows: i64| (0..=i64::from(i32::MAX)).contains(&rows);
     let nodes = batch.nodes().into_iter().flatten();
     let mut counts = nodes.flat_map(|n| [n.length(), n.null_count()]);
     if !sensible(batch.length()) || !counts.all(sensible) {
         return Err("damaged: invalid number of rows".into());
     }
+    let mut unpacked = 0u64;
     for buffer in batch.buffers().into_iter().flatten() {
         let range =
             usize::try_from(buffer.offset()).ok().zip(usize::try_from(buffer.length()).ok());
@@ -76,11 +80,7 @@ fn check_batch(batch: &RecordBatch<'_>, body: &[u8], unpacked: &mut u64) -> Resu
         let claimed = bytes.first_chunk().map(|b| i64::from_le_bytes(*b));
         let claimed = claimed.filter(|_| batch.compression().is_some());
         let length = claimed.and_then(|n| u64::try_from(n).ok()).unwrap_or(bytes.len() as u64);
-        *unpacked = unpacked.saturating_add(length);
-        if *unpacked > UNPACKED_MAX {
-            let most = UNPACKED_MAX;
-            return Err(format!("unpacks to {unpacked} bytes or more, at most {most} are read"));
-        }
+        unpacked = unpacked.saturating_add(length);
     }
-    Ok(())
+    Ok(unpacked)
 }

@@ -28,7 +28,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
     }
     let first = track.poses.first().map_or(DVec3::ZERO, |pose| pose.translation);
     if !within(first, WORLD_MAX_M) {
-        return Err(format!("the first pose is at {first:?} m"));
+        return Err(format!("the first pose is at {:?} m", first.to_array()));
     }
     for (frame, pose) in frames.iter().zip(&track.poses) {
         reach(first, pose).map_err(|what| format!("the pose of frame {frame}: {what}"))?;
@@ -67,7 +67,7 @@ pub fn ground(height_m: f64) -> Result<(), String> {
 pub fn place(place: DVec3) -> Result<(), String> {
     match within(place, FRAME_MAX_M) {
         true => Ok(()),
-        false => Err(format!("at {place:?} m, {FRAME_MAX_M:e} m at most")),
+        false => Err(format!("at {:?} m, {FRAME_MAX_M:e} m at most", place.to_array())),
     }
 }
 

@@ -11,7 +11,6 @@
 //! height of the ground in the vehicle frame, m; then one `sensor:` with the 3x4 row-major
 //! `vehicle_from_sensor` of each sensor. A drive has all three or none.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use raywake_core::params::SENSORS_MAX;
@@ -93,13 +92,12 @@ impl Sidecars {
         width: usize,
     ) -> Result<(PathBuf, Vec<u8>), Error> {
         let path = self.folder.join(name).join(cloud.file_name().unwrap_or_default());
-        let size = fs::metadata(&path).map_err(Error::reading(&path))?.len();
-        // Before it is read, so that nothing absurd is allocated.
-        if size != (returns * width) as u64 {
-            let what = format!("{size} bytes, {} expected for {returns} returns", returns * width);
+        let bytes = whole::read(&path)?;
+        if bytes.len() != returns * width {
+            let (size, wanted) = (bytes.len(), returns * width);
+            let what = format!("{size} bytes, {wanted} expected for {returns} returns");
             return Err(Error::input(&path, "", what));
         }
-        let bytes = whole::read(&path)?;
         Ok((path, bytes))
     }
 }
