@@ -74,7 +74,7 @@ pub unsafe fn kept<F: Copy>(at: &AtomicUsize) -> F {
 }
 
 macro_rules! calls {
-    ($($name:ident($($arg:ident: $type:ty),*) $(before $before:block after $after:block)?;)*) => {
+    ($($name:ident($($arg:ident: $type:ty),*) $(before $before:block)? $(after $after:block)?;)*) => {
         /// Names of the functions that may fail, but for those that create what calls them.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
@@ -103,14 +103,11 @@ macro_rules! calls {
 
         /// This layer's function of a name, or the next one's, whose address is kept.
         pub fn take(name: &[u8], next: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
-            let own = match name {
-                $(name if name == stringify!($name).as_bytes() => $name::call as *const c_void,)*
-                _ => return next,
-            };
             $(if name == stringify!($name).as_bytes() {
                 $name::NEXT.store(next? as usize, Relaxed);
+                return handed_out($name::call as *const c_void);
             })*
-            handed_out(own)
+            next
         }
     };
 }
@@ -124,7 +121,7 @@ calls! {
     vkAllocateMemory(
         device: vk::Device, info: *const vk::MemoryAllocateInfo<'static>, allocator: Allocator,
         memory: *mut vk::DeviceMemory
-    ) before {} after {
+    ) after {
         // SAFETY: both are valid, and the latter has been written.
         let (bytes, memory) = unsafe { ((*info).allocation_size, *memory) };
         locked(&ALLOCATED).insert(memory.as_raw(), bytes);
