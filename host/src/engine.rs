@@ -114,6 +114,7 @@ pub fn execute<S: Source + ?Sized>(
         registration: end.located,
         device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
         host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_)))
+            + run.drive.failure().map_or(0, |_| budget::host_bytes(profile, true))
             + end.located.map_or(0, |_| Locator::BYTES),
         vulkan_allocations: census.memory_allocations,
         device_failure: run.drive.failure().map(GpuError::to_string),

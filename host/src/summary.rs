@@ -100,7 +100,7 @@ pub struct Facts {
     pub registration: Option<LocatedSweeps>,
     /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
     pub device_bytes: u64,
-    /// Bytes of host memory held throughout.
+    /// Bytes of host memory held: throughout, or from the failure of a device on.
     pub host_bytes: u64,
     /// Calls of vkAllocateMemory.
     pub vulkan_allocations: u64,

@@ -99,6 +99,7 @@ fn in_a_run_the_scalar_backend_goes_on() {
     for failing in [0, 3] {
         let (out, s, _) = results(&format!("from {failing}"), "", failing);
         assert!(s["device_failure"].is_null());
+        let host_bytes = s["host_bytes"].as_u64();
         let wanted = tables(&out, failing);
         assert_eq!(wanted.len(), 3 * (SWEEPS - 1 - failing));
         // Two programs have run before the first sweep.
@@ -118,6 +119,8 @@ fn in_a_run_the_scalar_backend_goes_on() {
             assert!(s["device_failure"].as_str().unwrap().contains(told), "{fault}: {s}");
             assert!(stderr.contains(told) && stderr.contains("going on with the scalar backend"));
             assert_eq!(tables(&out, failing), wanted, "{fault}");
+            // Both are there then.
+            assert!(s["host_bytes"].as_u64() > host_bytes.map(|bytes| 2 * bytes), "{fault}: {s}");
             // The pair that ends with the sweep in which it failed is lost.
             let pairs = (SWEEPS - 1 - usize::from(failing > 0)) as u64;
             assert_eq!(s["pairs"].as_u64(), Some(pairs), "{fault}");

@@ -74,7 +74,9 @@ pub unsafe fn kept<F: Copy>(at: &AtomicUsize) -> F {
 }
 
 macro_rules! calls {
-    ($($name:ident($($arg:ident: $type:ty),*) $(before $before:block)? $(after $after:block)?;)*) => {
+    ($(
+        $name:ident($($arg:ident: $type:ty),*) $(before $before:block)? $(after $after:block)?;
+    )*) => {
         /// Names of the functions that may fail, but for those that create what calls them.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
