@@ -72,7 +72,7 @@ fn the_team_is_watched() {
         assert!([section, "helper thread"].contains(&e.section) && e.bytes == 100, "{e}");
     };
     told("alone", &allocate);
-    told("shared", &|| ThreadTeam.join(|| (), allocate));
+    told("shared", &|| ThreadTeam::new(None).join(|| (), allocate));
     println!("an allocation in a step is an error ... ok");
 }
 

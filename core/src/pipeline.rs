@@ -77,7 +77,7 @@ impl Pipeline {
         let (mut unrefined, corner) = (0, arrival.window.corner);
         let Pipeline { returns, refinement, encoder, .. } = self;
         let meanwhile = || {
-            unrefined = returns.insert(refinement, profile, corner, sweep);
+            unrefined = returns.insert(refinement, profile, team.simd(), corner, sweep);
             encoder.encode(team);
         };
         let perceived = backend.perceive(&sent.uniform, team, timer, meanwhile)?;

@@ -9,6 +9,7 @@ use crate::refinement::{Refinement, SweepReturns};
 use crate::sweep::{Placed, Sweep};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
+use raywake_simd::Simd;
 
 /// Where the returns of the last two sweeps are.
 pub(crate) struct Returns {
@@ -72,6 +73,7 @@ impl Returns {
         &mut self,
         refinement: &mut Refinement,
         profile: &Profile,
+        simd: Simd,
         corner: [i32; 3],
         sweep: &Sweep,
     ) -> usize {
@@ -97,7 +99,7 @@ impl Returns {
             placed: &self.placed[..taken],
             columns,
         };
-        refinement.insert_cloud(profile, returns, &mut self.is_apart[0][..taken])
+        refinement.insert_cloud(profile, simd, returns, &mut self.is_apart[0][..taken])
     }
 
     /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are

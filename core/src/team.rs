@@ -2,12 +2,19 @@
 //!
 //! Clusters are registered independently of each other, each into a slot of its own; the rays of a
 //! sweep and the velocities of its points are computed in two halves. The number of threads
-//! therefore changes no bit of the results.
+//! therefore changes no bit of the results, nor do the instructions they use.
+
+use raywake_simd::Simd;
 
 /// Threads that share work by fork and join.
 pub trait Team: Sync {
     /// Runs both, perhaps at the same time, and returns when both are done.
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send);
+
+    /// The instructions they use.
+    fn simd(&self) -> Simd {
+        Simd::BASELINE
+    }
 }
 
 /// One thread.

@@ -20,13 +20,14 @@ use clap::{Parser, Subcommand, ValueEnum};
 
 use raywake_io::Error;
 use raywake_io::source::{BinFields, Format, OpenOptions, PosesFrame, Unlocated};
+use raywake_simd::Simd;
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
 pub use results::{Export, PictureFrame, Results, StreamArgs, Views};
 pub use sweeps::SweepRange;
 pub use track::{EstimateKind, FrontEndKind, TrackArgs};
-use values::{count, nats, seconds, size, vehicle_box};
+use values::{count, nats, seconds, simd, size, vehicle_box};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -244,6 +245,10 @@ pub struct BackendChoice {
     /// Compute backend
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub backend: BackendKind,
+    /// Instruction set of what the CPU does: sse2 or avx2, on Arm neon; the widest that it has
+    /// unless given. Results are the same
+    #[arg(long, value_name = "NAME", value_parser = simd)]
+    pub simd: Option<Simd>,
     /// Device index, see `raywake devices`
     #[arg(long, value_name = "N")]
     pub device: Option<usize>,

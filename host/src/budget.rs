@@ -207,7 +207,8 @@ pub fn ask_for(bytes: u64) -> Result<(), RunError> {
 }
 
 /// What a run takes, for the head of its report.
-pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
+pub fn paragraph(profile: &Profile, drive: &Drive, filter: &str) -> String {
+    let backend = drive.backend();
     let scalar = matches!(backend, Backend::Scalar(_));
     let device = match backend.census() {
         None => "no device memory".to_string(),
@@ -225,13 +226,14 @@ pub fn paragraph(profile: &Profile, backend: &Backend, filter: &str) -> String {
     format!(
         "profile {}, {} backend ({}), background filter: {filter}\n\
          memory budget: {device}; host {} ({})\n\
-         time budget: {BUDGET_MS:.0} ms per sweep; threads on the CPU: {}\n",
+         time budget: {BUDGET_MS:.0} ms per sweep; threads on the CPU: {}, {}\n",
         profile.name,
         backend.name(),
         backend.device(),
         bytes(host_bytes(profile, scalar)),
         parts.collect::<Vec<_>>().join(", "),
-        team::threads()
+        team::threads(),
+        drive.simd().name()
     )
 }
 

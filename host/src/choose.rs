@@ -47,7 +47,8 @@ pub fn drive(
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
         None => Backend::scalar(profile, &tables),
     };
-    let (drive, filter) = (Drive::new(profile, rig, &tables, backend), tables.provenance.clone());
+    let drive = Drive::new(profile, rig, &tables, backend, choice.simd);
+    let filter = tables.provenance.clone();
     Ok(Chosen { drive: drive.with_spare(tables), filter, note: wanted.note })
 }
 

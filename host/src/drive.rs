@@ -8,7 +8,9 @@ use raywake_core::perceive::Machine;
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Rig, Sweep};
+use raywake_core::team::Team;
 use raywake_gpu::GpuError;
+use raywake_simd::Simd;
 
 use crate::backend::{Backend, Tables};
 use crate::console::warn;
@@ -29,6 +31,7 @@ struct Spare {
     profile: Profile,
     rig: Rig,
     tables: Tables,
+    team: ThreadTeam,
 }
 
 /// What came of a device that failed: it is kept, as waiting for its end may take long.
@@ -41,6 +44,7 @@ struct Parts {
     setup: Setup,
     pipeline: Box<Pipeline>,
     backend: Backend,
+    team: ThreadTeam,
     columns: Vec<ColumnFlow>,
     points: Vec<ReturnFlow>,
 }
@@ -59,15 +63,23 @@ pub struct Stepped<'a> {
 }
 
 impl Drive {
-    /// Allocates for a checked profile.
-    pub fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Drive {
-        Drive { parts: Parts::new(profile, rig, tables, backend), spare: None, failover: None }
+    /// Allocates for a checked profile. `simd` as of [`ThreadTeam::new`].
+    pub fn new(
+        profile: &Profile,
+        rig: &Rig,
+        tables: &Tables,
+        backend: Backend,
+        simd: Option<Simd>,
+    ) -> Drive {
+        let parts = Parts::new(profile, rig, tables, backend, ThreadTeam::new(simd));
+        Drive { parts, spare: None, failover: None }
     }
 
     /// The same, with the scalar backend to go on with where a device fails.
     pub fn with_spare(self, tables: Tables) -> Drive {
         let Setup { profile, rig, .. } = &self.parts.setup;
-        let spare = Spare { profile: profile.clone(), rig: rig.clone(), tables };
+        let (profile, rig) = (profile.clone(), rig.clone());
+        let spare = Spare { profile, rig, tables, team: self.parts.team };
         let on_device = matches!(self.parts.backend, Backend::Device(_));
         Drive { spare: on_device.then_some(spare), ..self }
     }
@@ -121,6 +133,11 @@ impl Drive {
         self.failover.as_ref().map_or(&self.parts, |failover| &failover.parts)
     }
 
+    /// The instructions that the CPU's part of a step uses.
+    pub fn simd(&self) -> Simd {
+        self.parts.team.simd()
+    }
+
     /// Whether columns and returns come with a class.
     pub fn tells_classes(&self) -> bool {
         self.active().pipeline.encoder.is_on()
@@ -135,13 +152,19 @@ impl Drive {
 
 impl Spare {
     fn parts(&self) -> Sealed<Parts> {
-        let Spare { profile, rig, tables } = self;
-        Parts::new(profile, rig, tables, Backend::scalar(profile, tables))
+        let Spare { profile, rig, tables, team } = self;
+        Parts::new(profile, rig, tables, Backend::scalar(profile, tables), *team)
     }
 }
 
 impl Parts {
-    fn new(profile: &Profile, rig: &Rig, tables: &Tables, backend: Backend) -> Sealed<Parts> {
+    fn new(
+        profile: &Profile,
+        rig: &Rig,
+        tables: &Tables,
+        backend: Backend,
+        team: ThreadTeam,
+    ) -> Sealed<Parts> {
         // A constant is written to its place: by way of the stack it would need 30 MiB of it.
         let mut pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
         pipeline.encoder.set_weights(tables.encoder.as_deref());
@@ -155,6 +178,7 @@ impl Parts {
             },
             pipeline,
             backend,
+            team,
             columns: vec![ColumnFlow::default(); solid(profile)],
             points: vec![ReturnFlow::default(); profile.returns()],
         };
@@ -168,9 +192,9 @@ fn step<'a>(
     sweep: &Sweep,
     before: &'a [Point],
 ) -> Result<Stepped<'a>, RunError> {
-    parts.step(|Parts { setup, pipeline, backend, columns, points }| {
+    parts.step(|Parts { setup, pipeline, backend, team, columns, points }| {
         let mut laps = Laps::start();
-        let machine = Machine { backend, team: &ThreadTeam, timer: &mut laps };
+        let machine = Machine { backend, team, timer: &mut laps };
         let output = pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
         Ok(Stepped { output, laps })
     })

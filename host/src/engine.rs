@@ -89,7 +89,7 @@ pub fn execute<S: Source + ?Sized>(
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
     say(&format!("{}\n", source.describe()))?;
     note(plan.quiet, source.notes().iter().chain(&chosen.note))?;
-    say(&budget::paragraph(profile, chosen.drive.backend(), &chosen.filter))?;
+    say(&budget::paragraph(profile, &chosen.drive, &chosen.filter))?;
     outputs.await_viewer(plan.quiet)?;
     let mut run = Running {
         drive: chosen.drive,
@@ -109,13 +109,12 @@ pub fn execute<S: Source + ?Sized>(
         backend: backend.name(),
         device: backend.device().to_string(),
         threads: team::threads(),
+        simd: run.drive.simd().name(),
         filter: chosen.filter,
         interrupted: end.interrupted,
         registration: end.located,
         device_bytes: census.upload_bytes + census.device_bytes + census.readback_bytes,
-        host_bytes: budget::host_bytes(profile, matches!(backend, Backend::Scalar(_)))
-            + run.drive.failure().map_or(0, |_| budget::host_bytes(profile, true))
-            + end.located.map_or(0, |_| Locator::BYTES),
+        host_bytes: host_bytes(&run.drive, profile) + end.located.map_or(0, |_| Locator::BYTES),
         vulkan_allocations: census.memory_allocations,
         device_failure: run.drive.failure().map(GpuError::to_string),
         validation_messages: plan.backend.validation.map(|_| backend.messages()),
@@ -126,6 +125,12 @@ pub fn execute<S: Source + ?Sized>(
     say(&text)?;
     figures.write(&summary)?;
     Ok(summary)
+}
+
+/// Bytes of host memory that are held for a pipeline: where its device failed, for both backends.
+fn host_bytes(drive: &Drive, profile: &Profile) -> u64 {
+    budget::host_bytes(profile, matches!(drive.backend(), Backend::Scalar(_)))
+        + drive.failure().map_or(0, |_| budget::host_bytes(profile, true))
 }
 
 /// A run under way.

@@ -91,6 +91,8 @@ pub struct Facts {
     pub device: String,
     /// Threads that share the CPU's part of a sweep.
     pub threads: usize,
+    /// Instruction set of what the CPU did.
+    pub simd: &'static str,
     /// Where the background filter comes from.
     pub filter: String,
     /// Whether the run was ended by a signal.

@@ -8,20 +8,36 @@ use std::thread;
 
 use rayon_core::ThreadPoolBuilder;
 use raywake_alloc_guard::watch;
+use raywake_core::team::Team;
+use raywake_simd::Simd;
 
 /// Threads at most: more would wait for the longest piece of work.
 pub const THREADS_MAX: usize = 4;
 
 /// Whoever belongs to the thread that asks.
-pub struct ThreadTeam;
+#[derive(Clone, Copy)]
+pub struct ThreadTeam {
+    simd: Simd,
+}
 
-impl raywake_core::team::Team for ThreadTeam {
+impl ThreadTeam {
+    /// With these instructions, the widest that there are if none are given.
+    pub fn new(simd: Option<Simd>) -> ThreadTeam {
+        ThreadTeam { simd: simd.unwrap_or_else(Simd::widest) }
+    }
+}
+
+impl Team for ThreadTeam {
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
         if threads() > 1 {
             rayon_core::join(a, b);
         } else {
             raywake_core::team::Alone.join(a, b);
         }
+    }
+
+    fn simd(&self) -> Simd {
+        self.simd
     }
 }
 

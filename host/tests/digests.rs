@@ -11,6 +11,7 @@ use std::sync::OnceLock;
 
 use common::{Outcome, Temp};
 use raywake_sim::{Drive, Ego, Options, SimSweep};
+use raywake_simd::Simd;
 
 /// Widths of software Vulkan's vectors, bits.
 const WIDTHS: [u32; 3] = [128, 256, 512];
@@ -171,6 +172,27 @@ fn widths_and_threads() {
     for way in widths.into_iter().chain(threads) {
         assert_eq!(digest(&t, own(), way, &[]), scalar, "{way:?}");
     }
+}
+
+#[test]
+fn instruction_sets() {
+    let t = Temp::new();
+    drive(&t);
+    let run = |more: &[&str]| {
+        let found = digest(&t, own(), Way::Scalar, more);
+        let summary = std::fs::read(t.path().join("summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+        (found, summary["simd"].clone())
+    };
+    let (wanted, widest) = run(&[]);
+    assert_eq!(widest, Simd::widest().name());
+    for simd in Simd::available() {
+        let (found, told) = run(&["--simd", simd.name()]);
+        assert_eq!((found, told), (wanted.clone(), simd.name().into()));
+    }
+    let mut command = Way::Scalar.command(own(), "run", &t.path().join("drive"));
+    let refused = Outcome::of(command.args(["--simd", "avx3"]).output().unwrap());
+    assert!(refused.stderr.contains(Simd::BASELINE.name()), "{}", refused.stderr);
 }
 
 #[test]

@@ -51,7 +51,7 @@ impl Setup {
 
     /// The pipeline with a backend.
     pub fn drive(&self, backend: Backend) -> raywake::drive::Drive {
-        raywake::drive::Drive::new(&self.profile, &self.rig, &self.tables(), backend)
+        raywake::drive::Drive::new(&self.profile, &self.rig, &self.tables(), backend, None)
     }
 }
 

@@ -31,10 +31,24 @@ pub const SCORES: usize = 9;
 /// Products of a channel with its 3 x 3 neighbours (depthwise), or of all channels with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layer {
-    /// Numbers that enter one output: 9 in a depthwise layer.
+    /// Numbers that enter one output: [`TAPS`] in a depthwise layer, else an even number.
     pub inputs: usize,
     /// Channels that come out.
     pub outputs: usize,
+}
+
+/// Inputs of a depthwise layer's output: the 3 x 3 cells around it.
+pub const TAPS: usize = 9;
+
+impl Layer {
+    /// Where the weight of an input to an output lies among the layer's: outputs side by side, so
+    /// that a processor works on several at once, and a dense layer's inputs by pairs.
+    pub const fn place(self, output: usize, input: usize) -> usize {
+        match self.inputs {
+            TAPS => input * self.outputs + output,
+            _ => (input / 2 * self.outputs + output) * 2 + input % 2,
+        }
+    }
 }
 
 /// Place of a layer in [`LAYERS`].
@@ -70,7 +84,7 @@ const fn layer(inputs: usize, outputs: usize) -> Layer {
 
 /// Layers in the order of the weights file.
 pub const LAYERS: [Layer; 25] = {
-    let mut all = [layer(9, 0); 25];
+    let mut all = [layer(TAPS, 0); 25];
     all[COLUMN] = layer(BITS, COLUMN_CHANNELS);
     all[DOWN_FINE] = layer(4 * COLUMN_CHANNELS, FINE_CHANNELS);
     all = with_blocks(all, &BLOCKS_FINE, FINE_CHANNELS);
@@ -90,7 +104,7 @@ pub const LAYERS: [Layer; 25] = {
 const fn with_blocks(mut all: [Layer; 25], firsts: &[usize], channels: usize) -> [Layer; 25] {
     let mut n = 0;
     while n < firsts.len() {
-        all[firsts[n]] = layer(9, channels);
+        all[firsts[n]] = layer(TAPS, channels);
         all[firsts[n] + 1] = layer(channels, channels);
         n += 1;
     }
@@ -116,7 +130,7 @@ pub const TOTAL: [usize; 2] = before(LAYERS.len());
 pub const NUMBERS: usize = TOTAL[0] + 2 * TOTAL[1];
 
 /// The activation of a sum, its bias and its shift.
-#[inline]
+#[inline(always)]
 pub fn activation(sum: i32, bias: i32, shift: u32) -> u8 {
     ((sum + bias) >> shift).clamp(0, TOP) as u8
 }

@@ -8,6 +8,7 @@
 //! shift per channel that brings a sum back to an activation. The result is the same on every
 //! machine and for any number of threads. It runs on the CPU beside whatever device perceives.
 
+mod forward;
 pub mod layers;
 mod load;
 mod rows;
@@ -194,17 +195,25 @@ impl Encoder {
         let mut levels = self.activations.levels((side + OCTET - 1).next_multiple_of(OCTET) / 2);
         levels.fill(team, weights, &window);
         let around = levels.around_columns(team, weights);
-        each_row(team, &mut self.scores[..side * side], side, &|i, out| {
-            for (j, scores) in out.iter_mut().enumerate() {
-                *scores = match columns[i * side + j] {
-                    [_, 0] => [0; SCORES],
-                    [masks, _] => {
-                        let cell = around.at((i + phase[0]) / 2, (j + phase[1]) / 2);
-                        weights.head(cell, &weights.column(masks))
-                    }
-                };
-            }
-        });
+        each_row(
+            team,
+            &mut self.scores[..side * side],
+            side,
+            #[inline(always)]
+            move |i, out| {
+                let row = &columns[i * side..][..side];
+                out.fill([0; SCORES]);
+                let (mut solid, mut count) = ([0u16; SIDE_MAX], 0);
+                for (j, _) in row.iter().enumerate().filter(|(_, [_, solid])| *solid != 0) {
+                    solid[count] = j as u16;
+                    count += 1;
+                }
+                let at = |n: usize| usize::from(solid[n]);
+                let around = |n| around.at((i + phase[0]) / 2, (at(n) + phase[1]) / 2);
+                let done = |n, scores| out[at(n)] = scores;
+                weights.head(count, |n| row[at(n)][0], around, done);
+            },
+        );
     }
 }
 
@@ -241,24 +250,30 @@ impl Levels<'_> {
         for first in BLOCKS_FINE {
             weights.block::<FINE_CHANNELS>(team, first, n, fine, beside_fine);
         }
-        let from = Plane::<FINE_CHANNELS> { side: n, cells: fine };
-        weights.down::<DOWN_MIDDLE, FINE_CHANNELS, { 4 * FINE_CHANNELS }, MIDDLE_CHANNELS>(
-            team, &from, middle,
+        let from = Plane { side: n, cells: fine };
+        weights.down::<FINE_CHANNELS, { 4 * FINE_CHANNELS }, MIDDLE_CHANNELS>(
+            team,
+            DOWN_MIDDLE,
+            from,
+            middle,
         );
         for first in BLOCKS_MIDDLE {
             weights.block::<MIDDLE_CHANNELS>(team, first, n / 2, middle, beside_middle);
         }
-        let from = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
-        weights.down::<DOWN_COARSE, MIDDLE_CHANNELS, { 4 * MIDDLE_CHANNELS }, COARSE_CHANNELS>(
-            team, &from, coarse,
+        let from = Plane { side: n / 2, cells: middle };
+        weights.down::<MIDDLE_CHANNELS, { 4 * MIDDLE_CHANNELS }, COARSE_CHANNELS>(
+            team,
+            DOWN_COARSE,
+            from,
+            coarse,
         );
         for first in BLOCKS_COARSE {
             weights.block::<COARSE_CHANNELS>(team, first, n / 4, coarse, beside_coarse);
         }
-        let from = Plane::<COARSE_CHANNELS> { side: n / 4, cells: coarse };
-        weights.up::<UP_MIDDLE, COARSE_CHANNELS, MIDDLE_CHANNELS>(team, &from, middle);
-        let from = Plane::<MIDDLE_CHANNELS> { side: n / 2, cells: middle };
-        weights.up::<UP_FINE, MIDDLE_CHANNELS, FINE_CHANNELS>(team, &from, fine);
+        let from = Plane { side: n / 4, cells: coarse };
+        weights.up::<COARSE_CHANNELS, MIDDLE_CHANNELS>(team, UP_MIDDLE, from, middle);
+        let from = Plane { side: n / 2, cells: middle };
+        weights.up::<MIDDLE_CHANNELS, FINE_CHANNELS>(team, UP_FINE, from, fine);
         weights.block::<FINE_CHANNELS>(team, BLOCK_AFTER, n, fine, beside_fine);
     }
 
@@ -270,14 +285,8 @@ impl Levels<'_> {
     ) -> Plane<'_, COLUMN_CHANNELS> {
         let side = self.side;
         let [fine, beside] = &mut self.fine;
-        let from = Plane::<FINE_CHANNELS> { side, cells: fine };
         let around = &mut beside[..side * side * COLUMN_CHANNELS];
-        each_row(team, around, side * COLUMN_CHANNELS, &|row, out| {
-            for (at, cell) in out.as_chunks_mut::<COLUMN_CHANNELS>().0.iter_mut().enumerate() {
-                let x = from.at(row, at).map(i16::from);
-                *cell = weights.dense::<UP_COLUMN, FINE_CHANNELS, COLUMN_CHANNELS>(&x);
-            }
-        });
+        weights.around_columns(team, Plane { side, cells: fine }, around);
         Plane { side, cells: around }
     }
 }

@@ -3,45 +3,59 @@
 use crate::team::Team;
 
 /// A square level, all channels of a cell together.
+#[derive(Clone, Copy)]
 pub struct Plane<'a, const CHANNELS: usize> {
     /// Cells along an axis.
     pub side: usize,
     pub cells: &'a [u8],
 }
 
-impl<const CHANNELS: usize> Plane<'_, CHANNELS> {
-    #[inline]
-    pub fn at(&self, row: usize, at: usize) -> &[u8; CHANNELS] {
-        let first = (row * self.side + at) * CHANNELS;
-        self.cells[first..][..CHANNELS].as_array().expect("as many as are asked for")
+impl<'a, const CHANNELS: usize> Plane<'a, CHANNELS> {
+    /// The cells of a row.
+    #[inline(always)]
+    pub fn row(&self, row: usize) -> &'a [[u8; CHANNELS]] {
+        &self.cells.as_chunks().0[row * self.side..][..self.side]
+    }
+
+    #[inline(always)]
+    pub fn at(&self, row: usize, at: usize) -> &'a [u8; CHANNELS] {
+        &self.row(row)[at]
     }
 }
 
 /// The 2 x 2 cells below one of the next level, one after another.
-#[inline]
+#[inline(always)]
 pub fn gathered<const CHANNELS: usize, const ALL: usize>(
     below: &Plane<CHANNELS>,
     row: usize,
     at: usize,
-) -> [i16; ALL] {
+) -> [u8; ALL] {
     let mut all = [0; ALL];
     for (n, x) in all.as_chunks_mut::<CHANNELS>().0.iter_mut().enumerate() {
-        *x = below.at(2 * row + n / 2, 2 * at + n % 2).map(i16::from);
+        *x = *below.at(2 * row + n / 2, 2 * at + n % 2);
     }
     all
 }
 
-/// Fills rows of `length`, perhaps several at a time.
+/// Fills rows of `length`, perhaps several at a time. `fill` is inlined: its instructions are the
+/// team's.
+#[inline(always)]
 pub fn each_row<T: Send>(
     team: &impl Team,
     out: &mut [T],
     length: usize,
-    fill: &(impl Fn(usize, &mut [T]) + Sync),
+    fill: impl Fn(usize, &mut [T]) + Sync + Copy,
 ) {
-    from(team, 0, out, length, fill);
+    let simd = team.simd();
+    split(team, 0, out, length, &move |row: usize, out: &mut [T]| {
+        simd.run(
+            #[inline(always)]
+            move || fill(row, out),
+        );
+    });
 }
 
-fn from<T: Send>(
+fn split<T: Send>(
     team: &impl Team,
     first: usize,
     out: &mut [T],
@@ -54,7 +68,7 @@ fn from<T: Send>(
     }
     let (a, b) = out.split_at_mut(rows / 2 * length);
     team.join(
-        || from(team, first, a, length, fill),
-        || from(team, first + rows / 2, b, length, fill),
+        || split(team, first, a, length, fill),
+        || split(team, first + rows / 2, b, length, fill),
     );
 }

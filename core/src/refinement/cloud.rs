@@ -14,6 +14,7 @@ use crate::record::NONE;
 use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
 use core::ops::Range;
+use raywake_simd::Simd;
 
 /// Words of a mask of the sub-voxels of a column.
 const MASK_WORDS: usize =
@@ -54,6 +55,8 @@ pub struct Cloud {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
+    /// The instructions it is searched with.
+    pub simd: Simd,
     ground: GroundHeights,
     places: Places,
     /// When each was, s after the sweep's stamp: seldom asked for.
@@ -71,6 +74,7 @@ impl Cloud {
             side: 0,
             corner: [0; 3],
             stamp_s: 0.0,
+            simd: Simd::BASELINE,
             ground: GroundHeights::new(),
             places: Places::new(),
             offset_s: [0.0; CLOUD_MAX],
@@ -256,12 +260,21 @@ impl Cloud {
     /// The nearest return of a sensor closer than `reach` to `at`, 1 at most: its squared distance
     /// (voxels²) and itself; of several as near, always the same. The first one found within
     /// `enough` will do.
-    pub fn nearest(
+    pub fn nearest(&self, at: [f32; 3], sensor: u32, reach: [f32; 2]) -> Option<(f32, CloudPoint)> {
+        let found = self.simd.run(
+            #[inline(always)]
+            move || self.find_nearest(at, sensor, reach),
+        );
+        found.map(|(d2, n)| (d2, self.sample(n)))
+    }
+
+    #[inline(always)]
+    fn find_nearest(
         &self,
         at: [f32; 3],
         sensor: u32,
         [reach, enough]: [f32; 2],
-    ) -> Option<(f32, CloudPoint)> {
+    ) -> Option<(f32, usize)> {
         let side = self.side as f32;
         let near = |v: f32| v > -1.0 && v < side + 1.0;
         if !(near(at[0]) && near(at[1])) {
@@ -291,7 +304,7 @@ impl Cloud {
                 }
             }
         }
-        best.map(|n| (least, self.sample(n)))
+        best.map(|n| (least, n))
     }
 
     /// A return.

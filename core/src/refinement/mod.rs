@@ -60,6 +60,7 @@ use clusters::Clusters;
 pub(crate) use cues::Prediction;
 use history::History;
 use motion::TARGETS_MAX;
+use raywake_simd::Simd;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
 use scans::{Scans, Target};
@@ -102,17 +103,21 @@ impl Refinement {
     }
 
     /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or
-    /// higher than clusters are. Returns how many returns had no room.
+    /// higher than clusters are; `simd` are the instructions it is searched with. Returns how many
+    /// returns had no room.
     pub(crate) fn insert_cloud(
         &mut self,
         profile: &Profile,
+        simd: Simd,
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
         let scaled = self.scaled.insert(Scaled::new(profile));
         self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
-        self.clouds[self.newest].fill(profile, scaled, returns, apart, &mut self.scratch)
+        let cloud = &mut self.clouds[self.newest];
+        cloud.simd = simd;
+        cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's of its columns,

@@ -71,6 +71,7 @@ impl Places {
 
     /// The return of a sensor, among some, that is nearest to a place, the first of such: squared
     /// distance and index, if that distance is less than `least`.
+    #[inline(always)]
     pub fn nearest(
         &self,
         range: Range<usize>,

@@ -6,6 +6,7 @@
 
 use super::{Buffer, Storage};
 use crate::params::Profile;
+use raywake_simd::Simd;
 
 /// An argument of a stage as the kernel binds it.
 macro_rules! argument {
@@ -141,8 +142,8 @@ pub struct Stage {
     pub kernels: &'static [(&'static str, GroupCount)],
     /// Arguments of the twin.
     pub arguments: &'static [Argument],
-    /// What the scalar backend runs.
-    pub scalar: fn(&mut Storage),
+    /// What the scalar backend runs. Those that wider instructions help are inlined, and use them.
+    pub scalar: fn(&mut Storage, Simd),
 }
 
 impl Stage {
@@ -267,7 +268,7 @@ macro_rules! stage {
             name: stringify!($name),
             kernels: &[(stringify!($name), $groups)],
             arguments: &[$(argument!($($a)+)),*],
-            scalar: |_| (),
+            scalar: |_, _| (),
         }
     };
     (@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*], $twin:path) => {
@@ -275,7 +276,12 @@ macro_rules! stage {
             name: stringify!($name),
             kernels: &[$((stringify!($kernel), $groups)),*],
             arguments: &[$(argument!($($a)+)),*],
-            scalar: |storage| $twin($(passed!(storage, $($a)+)),*),
+            scalar: |storage, simd| {
+                simd.run(
+                    #[inline(always)]
+                    || $twin($(passed!(storage, $($a)+)),*),
+                )
+            },
         }
     };
 }

@@ -2,6 +2,7 @@
 
 use super::{Buffer, Stage, Storage};
 use crate::params::Profile;
+use raywake_simd::Simd;
 
 /// A step of a program.
 #[derive(Clone, Copy, Debug)]
@@ -63,11 +64,17 @@ pub fn walk(ops: &[StageOp], runner: Runner, rounds: u32, each: &mut dyn FnMut(S
 }
 
 /// Runs steps on the CPU. `lap` is called with the name of each stage when it is done.
-pub fn run(ops: &[StageOp], storage: &mut Storage, rounds: u32, lap: &mut dyn FnMut(&'static str)) {
+pub fn run(
+    ops: &[StageOp],
+    storage: &mut Storage,
+    rounds: u32,
+    simd: Simd,
+    lap: &mut dyn FnMut(&'static str),
+) {
     walk(ops, Runner::Scalar, rounds, &mut |op| match op {
         StageOp::Fill(buffer, word) => storage.fill(buffer, word),
         StageOp::Run(stage) => {
-            (stage.scalar)(storage);
+            (stage.scalar)(storage, simd);
             lap(stage.name);
         }
         // The storage is the host's own memory.

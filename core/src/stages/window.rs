@@ -35,7 +35,7 @@ pub struct WindowCosts<'a> {
 impl<'a> WindowCosts<'a> {
     /// Around `column`. Row `n` of `pair_cost` belongs to the column whose `foreground_index` is
     /// `n`; [`NONE`] has none.
-    #[inline]
+    #[inline(always)]
     pub fn of(
         sweep: &SweepUniform,
         foreground_index: &[u32],
@@ -58,11 +58,12 @@ impl<'a> WindowCosts<'a> {
 }
 
 impl Costs for WindowCosts<'_> {
-    #[inline]
+    #[inline(always)]
     fn at(&self, index: usize) -> u16 {
         self.rows.iter().fold(self.unknown, |sum, row| sum + row[index])
     }
 
+    #[inline(always)]
     fn fill_row(&self, row: &mut [u16; ROW]) {
         row.fill(self.unknown);
         for costs in &self.rows {
@@ -73,6 +74,7 @@ impl Costs for WindowCosts<'_> {
 
 /// The least energy of every column of `foreground` at any displacement, smoothing apart, and its
 /// place: what a column pays at least, whatever its neighbours do.
+#[inline(always)]
 pub fn window(
     sweep: &SweepUniform,
     foreground: &[u32],
@@ -89,6 +91,7 @@ pub fn window(
 
 /// The least energy of a column with these costs, and its place: the first in scan order among
 /// equals.
+#[inline(always)]
 pub fn least(sweep: &SweepUniform, column: u32, row: &[u16; ROW]) -> MinCost {
     let (outside, cost) = (outside_cost(sweep, column as usize), sweep.displacement_cost);
     let [lines, places] = [column as i32 / sweep.side, column as i32 % sweep.side]
@@ -116,7 +119,7 @@ pub fn least(sweep: &SweepUniform, column: u32, row: &[u16; ROW]) -> MinCost {
 }
 
 /// The least cost of a line, its padding included; by lanes.
-#[inline]
+#[inline(always)]
 fn lowest(line: &[u16]) -> u16 {
     line.iter().fold(u16::MAX, |least, cost| least.min(*cost))
 }

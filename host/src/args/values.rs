@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use raywake_simd::Simd;
+
 /// A number of at least one.
 pub(super) fn count(text: &str) -> Result<usize, String> {
     let count = text.parse().map_err(|_| "not a number")?;
@@ -36,6 +38,15 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     };
     let bytes = number.parse::<u64>().ok().and_then(|n| n.checked_mul(unit));
     bytes.ok_or_else(|| "not a number of bytes".into())
+}
+
+/// An instruction set that this processor has.
+pub(super) fn simd(text: &str) -> Result<Simd, String> {
+    let found = Simd::available().find(|simd| simd.name() == text);
+    found.ok_or_else(|| {
+        let names: Vec<&str> = Simd::available().map(Simd::name).collect();
+        format!("this processor has {}", names.join(", "))
+    })
 }
 
 /// A duration.

@@ -79,7 +79,8 @@ fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slot
         (solvers, slots) => {
             let half = slots.len() / 2;
             let ((a, b), (c, d)) = (solvers.split_at_mut(half), slots.split_at(half));
-            ThreadTeam.join(|| solve(params, a, tracks, c), || solve(params, b, tracks, d));
+            ThreadTeam::new(None)
+                .join(|| solve(params, a, tracks, c), || solve(params, b, tracks, d));
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::record::{Column, NONE, Proposal, pack_flow};
 use crate::sweep::{Placed, Point};
 use crate::team::Alone;
 use crate::thinning::TakenPoints;
+use raywake_simd::Simd;
 use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
@@ -136,7 +137,7 @@ fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, 
     let (corner, stamp_s) = ([0; 3], n as f64 * 0.1);
     let mut apart = vec![false; points.len()];
     let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
-    refinement.insert_cloud(profile, returns, &mut apart);
+    refinement.insert_cloud(profile, Simd::BASELINE, returns, &mut apart);
 }
 
 fn all(points: &[Point]) -> TakenPoints<'_> {

@@ -83,6 +83,7 @@ struct Best {
 
 /// [`expectation`] for the scalar backend: see [`propose`].
 #[expect(clippy::too_many_arguments, reason = "one for every buffer")]
+#[inline(always)]
 pub fn expectation_by_rings(
     sweep: &SweepUniform,
     foreground: &[u32],
@@ -107,6 +108,7 @@ pub fn expectation_by_rings(
 /// neighbours takes the least if that is feasible, else looks at everything. With neighbours, the
 /// least plus the smoothing term, a paraboloid around their mean, excludes all but a few: rings
 /// around the rounded mean are visited until no farther ring can win or tie.
+#[inline(always)]
 pub fn propose(
     sweep: &SweepUniform,
     column: u32,
@@ -144,6 +146,7 @@ struct Sums {
 
 impl Sums {
     /// The same as of [`neighbours`], without a branch for each of them.
+    #[inline(always)]
     fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
         let (side, column) = (sweep.side, column as i32);
         let (i, j) = (column / side, column % side);
@@ -158,7 +161,7 @@ impl Sums {
     }
 
     /// Adds a flow so many times if it is valid.
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, flow: Flow, times: i32) {
         let times = if flow & VALID != 0 { times } else { 0 };
         let [u, v] = flow_displacement(flow);

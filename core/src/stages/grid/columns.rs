@@ -5,6 +5,7 @@ use crate::record::{Column, SweepUniform};
 
 /// Log-odds to masks: free where negative, occupied where positive (3.4, 3.5 with epsilon = 0),
 /// solid from [`LOG_ODDS_SOLID`] on. `log_odds` must hold `levels` elements per column.
+#[inline(always)]
 pub fn columns(sweep: &SweepUniform, log_odds: &[i32], columns_now: &mut [Column]) {
     let levels = sweep.levels as usize;
     assert!(log_odds.len() >= columns_now.len() * levels);

@@ -1,0 +1,342 @@
+//! The layers, many cells at a time.
+//!
+//! Sums lie in memory, those of a cell side by side, and every loop over them has a fixed length:
+//! compilers make vectors of that for every instruction set, which they do not reliably do of sums
+//! that they have put into registers one by one.
+
+use super::layers::*;
+use super::load::EncoderWeights;
+use super::rows::{Plane, each_row, gathered};
+use super::{ColumnScores, FINE, PaddedWindow};
+use crate::team::Team;
+
+/// Cells whose sums are formed together: more than 8 gain a tenth, more than 16 nothing.
+const CELLS: usize = 16;
+/// Inputs that a sum takes in at a time.
+const INPUTS: usize = 8;
+
+/// Sums of a cell with their biases, and what brings them back to activations.
+struct CellSums<'a, const OUT: usize> {
+    sums: &'a [i32; OUT],
+    shifts: &'a [u8; OUT],
+}
+
+impl<const OUT: usize> CellSums<'_, OUT> {
+    #[inline(always)]
+    fn activations(&self) -> [u8; OUT] {
+        core::array::from_fn(|n| activation(self.sums[n], 0, u32::from(self.shifts[n])))
+    }
+
+    /// Adds them to the activations of a cell.
+    #[inline(always)]
+    fn add_to(&self, cell: &mut [u8; OUT]) {
+        for (n, value) in cell.iter_mut().enumerate() {
+            let sum = i32::from(*value) + (self.sums[n] >> self.shifts[n]);
+            *value = sum.clamp(0, TOP) as u8;
+        }
+    }
+
+    #[inline(always)]
+    fn scores(&self) -> [i8; OUT] {
+        core::array::from_fn(|n| (self.sums[n] >> self.shifts[n]).clamp(-TOP, TOP) as i8)
+    }
+}
+
+/// The cells of a row.
+#[inline(always)]
+fn cells<const CHANNELS: usize>(row: &mut [u8]) -> &mut [[u8; CHANNELS]] {
+    row.as_chunks_mut().0
+}
+
+impl EncoderWeights {
+    /// What a column is.
+    #[inline(always)]
+    fn column(&self, masks: u32) -> [u8; COLUMN_CHANNELS] {
+        let bytes = masks.to_le_bytes();
+        core::array::from_fn(|channel| {
+            let mut sum = 0;
+            for (table, byte) in self.bytes.iter().zip(bytes) {
+                sum += i32::from(table[byte as usize][channel]);
+            }
+            activation(sum, self.biases[channel], u32::from(self.shifts[channel]))
+        })
+    }
+
+    /// Weights, biases and shifts of a layer.
+    #[inline(always)]
+    fn layer<const IN: usize, const OUT: usize>(
+        &self,
+        layer: usize,
+    ) -> (&[i16], &[i32; OUT], &[u8; OUT]) {
+        assert!(LAYERS[layer] == Layer { inputs: IN, outputs: OUT });
+        let [first, output] = before(layer);
+        let biases = self.biases[output..].first_chunk().expect("as many");
+        let shifts = self.shifts[output..].first_chunk().expect("as many");
+        (&self.weights[first..][..IN * OUT], biases, shifts)
+    }
+
+    /// A dense layer of `count` cells: `input` is what enters one, `done` takes what comes out.
+    #[inline(always)]
+    fn dense<const IN: usize, const OUT: usize>(
+        &self,
+        layer: usize,
+        count: usize,
+        input: impl Fn(usize) -> [u8; IN],
+        mut done: impl FnMut(usize, CellSums<OUT>),
+    ) {
+        let (weights, biases, shifts) = self.layer::<IN, OUT>(layer);
+        let weights = weights.as_chunks().0.as_chunks::<OUT>().0;
+        let (mut inputs, mut sums) = ([[0; IN]; CELLS], [[0; OUT]; CELLS]);
+        for from in (0..count).step_by(CELLS) {
+            let cells = CELLS.min(count - from);
+            inputs[..cells].iter_mut().enumerate().for_each(|(n, x)| *x = input(from + n));
+            sums[..cells].fill(*biases);
+            for (at, weights) in weights.as_chunks().0.iter().enumerate() {
+                for (sums, x) in sums[..cells].iter_mut().zip(&inputs) {
+                    add_dense(sums, &x.as_chunks().0[at], weights);
+                }
+            }
+            sums[..cells].iter().enumerate().for_each(|(n, sums)| {
+                done(from + n, CellSums { sums, shifts });
+            });
+        }
+    }
+
+    /// A depthwise layer: a row of its outputs.
+    #[inline(always)]
+    fn depthwise<const CHANNELS: usize>(
+        &self,
+        layer: usize,
+        level: Plane<CHANNELS>,
+        row: usize,
+        out: &mut [[u8; CHANNELS]],
+    ) {
+        let (weights, biases, shifts) = self.layer::<TAPS, CHANNELS>(layer);
+        let weights = weights.as_chunks().0.as_chunks().0;
+        let (mut sums, side) = ([[0; CHANNELS]; FINE], level.side);
+        let sums = &mut sums[..side];
+        sums.fill(*biases);
+        for (tap, weights) in weights.iter().enumerate() {
+            // Wraps below zero, and is then not within the level, which zeros surround.
+            let i = (row + tap).wrapping_sub(1);
+            if i < side {
+                add_depthwise(sums, level.row(i), weights);
+            }
+        }
+        for (cell, sums) in out.iter_mut().zip(sums) {
+            *cell = CellSums { sums, shifts }.activations();
+        }
+    }
+
+    /// The finest level, of 2 x 2 columns a cell.
+    pub(super) fn down_from_columns(
+        &self,
+        team: &impl Team,
+        window: &PaddedWindow,
+        side: usize,
+        to: &mut [u8],
+    ) {
+        each_row(
+            team,
+            to,
+            side * FINE_CHANNELS,
+            #[inline(always)]
+            move |row, out| {
+                let (out, input) = (cells::<FINE_CHANNELS>(out), |at| {
+                    let mut x = [0; 4 * COLUMN_CHANNELS];
+                    for (n, x) in cells(&mut x).iter_mut().enumerate() {
+                        *x = self.column(window.masks(2 * row + n / 2, 2 * at + n % 2));
+                    }
+                    x
+                });
+                self.dense(DOWN_FINE, side, input, |at, sums| out[at] = sums.activations());
+            },
+        );
+    }
+
+    /// From a level to the next coarser one, `ALL` numbers of 2 x 2 cells to a cell.
+    pub(super) fn down<const IN: usize, const ALL: usize, const OUT: usize>(
+        &self,
+        team: &impl Team,
+        layer: usize,
+        from: Plane<IN>,
+        to: &mut [u8],
+    ) {
+        let side = from.side / 2;
+        each_row(
+            team,
+            to,
+            side * OUT,
+            #[inline(always)]
+            move |row, out| {
+                let out = cells::<OUT>(out);
+                let input = |at| gathered::<IN, ALL>(&from, row, at);
+                self.dense(layer, side, input, |at, sums| out[at] = sums.activations());
+            },
+        );
+    }
+
+    /// A block on a level: depthwise into `beside`, then dense, added to the level.
+    pub(super) fn block<const CHANNELS: usize>(
+        &self,
+        team: &impl Team,
+        first: usize,
+        side: usize,
+        level: &mut [u8],
+        beside: &mut [u8],
+    ) {
+        let from = Plane::<CHANNELS> { side, cells: level };
+        each_row(
+            team,
+            beside,
+            side * CHANNELS,
+            #[inline(always)]
+            move |row, out| self.depthwise(first, from, row, cells(out)),
+        );
+        self.add_dense_layer(team, first + 1, Plane::<CHANNELS> { side, cells: beside }, level);
+    }
+
+    /// Adds a dense layer's outputs to a level of as many cells.
+    fn add_dense_layer<const CHANNELS: usize>(
+        &self,
+        team: &impl Team,
+        layer: usize,
+        from: Plane<CHANNELS>,
+        to: &mut [u8],
+    ) {
+        each_row(
+            team,
+            to,
+            from.side * CHANNELS,
+            #[inline(always)]
+            move |row, out| {
+                let (out, input) = (cells::<CHANNELS>(out), |at| *from.at(row, at));
+                self.dense(layer, from.side, input, |at, sums| sums.add_to(&mut out[at]));
+            },
+        );
+    }
+
+    /// From a level to the one before it, to whose cells the result is added.
+    pub(super) fn up<const IN: usize, const OUT: usize>(
+        &self,
+        team: &impl Team,
+        layer: usize,
+        from: Plane<IN>,
+        to: &mut [u8],
+    ) {
+        let length = 2 * from.side * OUT;
+        each_row(
+            team,
+            to,
+            2 * length,
+            #[inline(always)]
+            move |row, out| {
+                let (upper, lower) = out.split_at_mut(length);
+                let mut lines = [cells::<OUT>(upper), cells::<OUT>(lower)];
+                self.dense(
+                    layer,
+                    from.side,
+                    |at| *from.at(row, at),
+                    |at, sums| {
+                        for line in &mut lines {
+                            line[2 * at..][..2].iter_mut().for_each(|cell| sums.add_to(cell));
+                        }
+                    },
+                );
+            },
+        );
+    }
+
+    /// What is around the columns of each pair.
+    pub(super) fn around_columns(
+        &self,
+        team: &impl Team,
+        from: Plane<FINE_CHANNELS>,
+        to: &mut [u8],
+    ) {
+        each_row(
+            team,
+            to,
+            from.side * COLUMN_CHANNELS,
+            #[inline(always)]
+            move |row, out| {
+                let out = cells::<COLUMN_CHANNELS>(out);
+                let input = |at| *from.at(row, at);
+                self.dense(UP_COLUMN, from.side, input, |at, sums| out[at] = sums.activations());
+            },
+        );
+    }
+
+    /// The scores of some columns from their masks and from what is around them.
+    #[inline(always)]
+    pub(super) fn head<'a>(
+        &self,
+        count: usize,
+        masks: impl Fn(usize) -> u32,
+        around: impl Fn(usize) -> &'a [u8; COLUMN_CHANNELS],
+        mut done: impl FnMut(usize, ColumnScores),
+    ) {
+        let mut hidden = [[0; HEAD_CHANNELS]; CELLS];
+        for from in (0..count).step_by(CELLS) {
+            let columns = CELLS.min(count - from);
+            let input = |n| {
+                let mut x = [0; 2 * COLUMN_CHANNELS];
+                let own = self.column(masks(from + n));
+                cells(&mut x).copy_from_slice(&[*around(from + n), own]);
+                x
+            };
+            self.dense(HEAD, columns, input, |n, sums| hidden[n] = sums.activations());
+            self.dense(SCORE, columns, |n| hidden[n], |n, sums| done(from + n, sums.scores()));
+        }
+    }
+}
+
+/// Adds products of some inputs of a cell to its sums: pairs of products, which processors form at
+/// once.
+#[inline(always)]
+fn add_dense<const OUT: usize>(
+    sums: &mut [i32; OUT],
+    x: &[u8; INPUTS],
+    weights: &[[[i16; 2]; OUT]; INPUTS / 2],
+) {
+    let x = x.map(i32::from);
+    let [v, w, y, z] = weights;
+    for n in 0..OUT {
+        let pair = |at: usize, of: &[[i16; 2]; OUT]| {
+            x[at] * i32::from(of[n][0]) + x[at + 1] * i32::from(of[n][1])
+        };
+        sums[n] += pair(0, v) + pair(2, w) + pair(4, y) + pair(6, z);
+    }
+}
+
+/// Adds products of a line of cells, and of those before and after each, to the sums of a row.
+#[inline(always)]
+fn add_depthwise<const CHANNELS: usize>(
+    sums: &mut [[i32; CHANNELS]],
+    line: &[[u8; CHANNELS]],
+    weights: &[[i16; CHANNELS]; 3],
+) {
+    let [left, middle, right] = weights;
+    let last = line.len() - 1;
+    add_products(&mut sums[0], &line[0], middle);
+    if last > 0 {
+        add_products(&mut sums[0], &line[1], right);
+        add_products(&mut sums[last], &line[last - 1], left);
+        add_products(&mut sums[last], &line[last], middle);
+    }
+    for (sums, around) in sums[1..].iter_mut().zip(line.array_windows()) {
+        let [a, b, c] = around;
+        for n in 0..CHANNELS {
+            sums[n] += i32::from(a[n]) * i32::from(left[n])
+                + i32::from(b[n]) * i32::from(middle[n])
+                + i32::from(c[n]) * i32::from(right[n]);
+        }
+    }
+}
+
+#[inline(always)]
+fn add_products<const N: usize>(sums: &mut [i32; N], x: &[u8; N], weights: &[i16; N]) {
+    for n in 0..N {
+        sums[n] += i32::from(x[n]) * i32::from(weights[n]);
+    }
+}
