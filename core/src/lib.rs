@@ -68,7 +68,6 @@ pub mod returns;
 pub mod stages;
 #[cfg(feature = "pipeline")]
 pub mod sweep;
-#[cfg(feature = "pipeline")]
 pub mod team;
 #[cfg(feature = "pipeline")]
 pub mod thinning;

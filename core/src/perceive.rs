@@ -199,8 +199,8 @@ impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
         let rounds = self.profile.em_rounds;
         let mut s = self.storage();
         s.sweep = *sweep;
-        let (lap, simd) = (&mut |stage| timer.lap(stage), team.simd());
-        let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, simd, lap));
+        let lap = &mut |stage| timer.lap(stage);
+        let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, team, lap));
         team.join(stages, meanwhile);
         Ok(PerceptionBuffers {
             counters: s.counters,

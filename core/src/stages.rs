@@ -44,6 +44,7 @@ pub mod map {
 pub mod occupancy_constancy;
 pub mod prefix_sum;
 mod program;
+mod shared;
 pub mod window;
 
 pub use declare::{Argument, BufferElement, BufferRow, GroupCount, List, Stage, View};
@@ -201,7 +202,7 @@ pub const FLOW: &[StageOp] = &[
     Run(stage!(
         background_filter in background_filter,
         (sweep, filter_table, columns_before, mut foreground_marks),
-        scalar: background_filter::background_filter_by_bytes,
+        scalar: shared::background_filter,
         Tiles(Profile::columns)
     )),
     Run(prefix_sum!(foreground_marks, tiles, foreground_index, Profile::columns)),
@@ -215,12 +216,13 @@ pub const FLOW: &[StageOp] = &[
         occupancy_constancy in occupancy_constancy,
         (sweep, constancy_weights, constancy_costs, list foreground, columns_before, columns_now,
             mut pair_cost),
-        scalar: occupancy_constancy::occupancy_constancy_by_bytes,
+        scalar: shared::occupancy_constancy,
         GroupPerColumn
     )),
     Run(stage!(
         window in window,
         (sweep, list foreground, foreground_index, quads pair_cost, mut min_cost),
+        scalar: shared::least_of_window,
         GroupPerColumn
     )),
     Fill(Buffer::flow, 0),
@@ -230,7 +232,7 @@ pub const FLOW: &[StageOp] = &[
             expectation in flow::expectation,
             (sweep, list foreground, foreground_index, quads pair_cost, flow, target_energy,
                 min_cost, mut proposal),
-            scalar: flow::expectation::expectation_by_rings,
+            scalar: shared::expectation,
             ThreadPer(Foreground)
         )),
         Fill(Buffer::target_energy, NONE),

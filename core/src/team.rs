@@ -17,6 +17,25 @@ pub trait Team: Sync {
     }
 }
 
+/// A team behind a pointer, for stages, which are called through one.
+pub trait Workers: Sync {
+    /// [`Team::join`].
+    fn join_both(&self, a: &mut (dyn FnMut() + Send), b: &mut (dyn FnMut() + Send));
+
+    /// [`Team::simd`].
+    fn simd(&self) -> Simd;
+}
+
+impl<T: Team> Workers for T {
+    fn join_both(&self, a: &mut (dyn FnMut() + Send), b: &mut (dyn FnMut() + Send)) {
+        self.join(a, b);
+    }
+
+    fn simd(&self) -> Simd {
+        Team::simd(self)
+    }
+}
+
 /// One thread.
 pub struct Alone;
 
@@ -29,6 +48,7 @@ impl Team for Alone {
 
 /// Fills each slot with the value of its index, counted from `first`. By recursive halving, so that
 /// idle threads can steal work.
+#[cfg(feature = "pipeline")]
 pub(crate) fn fill<T: Send>(
     team: &impl Team,
     first: usize,

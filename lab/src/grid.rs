@@ -9,7 +9,6 @@ use raywake_core::stages::{GRID, StageProgram, Storage, run};
 use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
 use raywake_core::thinning::Thinning;
-use raywake_simd::Simd;
 
 /// All that a grid runs, and so all that its storage holds.
 const GRID_ALONE: &[StageProgram] = &[StageProgram { name: "grid", ops: GRID }];
@@ -85,7 +84,7 @@ impl Grid {
         self.of_point.clear();
         self.of_point.extend((0..thinning.of()).map(column));
         storage.sweep = self.step;
-        run(GRID, &mut storage, 0, Simd::BASELINE, &mut |_| ());
+        run(GRID, &mut storage, 0, &Alone, &mut |_| ());
         self.columns.copy_from_slice(storage.columns_now);
         window
     }

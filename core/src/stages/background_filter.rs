@@ -111,7 +111,7 @@ pub fn background_filter(
     columns_before: &[Column],
     foreground_marks: &mut [u32],
 ) {
-    mark(sweep, columns_before, foreground_marks, |column| {
+    mark(sweep, columns_before, 0, foreground_marks, |column| {
         score(sweep, filter_table, columns_before, column)
     });
 }
@@ -123,7 +123,18 @@ pub fn background_filter_by_bytes(
     columns_before: &[Column],
     foreground_marks: &mut [u32],
 ) {
-    mark(sweep, columns_before, foreground_marks, |column| {
+    mark_by_bytes(sweep, filter_table, columns_before, 0, foreground_marks);
+}
+
+/// The same for the columns from `first` on.
+pub(super) fn mark_by_bytes(
+    sweep: &SweepUniform,
+    filter_table: &[i32],
+    columns_before: &[Column],
+    first: usize,
+    foreground_marks: &mut [u32],
+) {
+    mark(sweep, columns_before, first, foreground_marks, |column| {
         score_by_bytes(sweep, filter_table, columns_before, column)
     });
 }
@@ -131,10 +142,11 @@ pub fn background_filter_by_bytes(
 fn mark(
     sweep: &SweepUniform,
     columns_before: &[Column],
+    first: usize,
     foreground_marks: &mut [u32],
     score: impl Fn(usize) -> i32,
 ) {
-    for (column, mark) in foreground_marks.iter_mut().enumerate() {
+    for (column, mark) in (first..).zip(foreground_marks) {
         let solid = columns_before[column][1] != 0;
         *mark = (solid && (sweep.unfiltered != 0 || score(column) > 0)) as u32;
     }

@@ -6,7 +6,7 @@
 
 use super::{Buffer, Storage};
 use crate::params::Profile;
-use raywake_simd::Simd;
+use crate::team::Workers;
 
 /// An argument of a stage as the kernel binds it.
 macro_rules! argument {
@@ -142,8 +142,8 @@ pub struct Stage {
     pub kernels: &'static [(&'static str, GroupCount)],
     /// Arguments of the twin.
     pub arguments: &'static [Argument],
-    /// What the scalar backend runs. Those that wider instructions help are inlined, and use them.
-    pub scalar: fn(&mut Storage, Simd),
+    /// What the scalar backend runs. Twins that wider instructions help are inlined, and use them.
+    pub scalar: fn(&mut Storage, &dyn Workers),
 }
 
 impl Stage {
@@ -251,11 +251,12 @@ macro_rules! buffers {
 /// the module, its kernel the entry point of that name. An argument is
 /// `[mut] [atomic|quads] BUFFER`, `[mut] NAME is BUFFER` where the stage serves several
 /// buffers, or `list BUFFER` where `counters` says how many elements of it there are.
-/// `scalar: FUNCTION` names what the scalar backend runs in the twin's place, `[ENTRY: GROUPS, ..]`
+/// `scalar: FUNCTION` names what the scalar backend runs in the twin's place on the whole
+/// [`Storage`], `[ENTRY: GROUPS, ..]`
 /// the entry points where there are several.
 macro_rules! stage {
-    ($name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr) => {
-        stage!(@ $name, $args, [($name, $groups)], $fast)
+    ($name:ident in $($seg:ident)::+, ($($($a:ident)+),*), scalar: $fast:path, $groups:expr) => {
+        stage!(@@ $name, ($($($a)+),*), [($name, $groups)], $fast)
     };
     ($name:ident in $($seg:ident)::+, $args:tt, [$($kernel:ident: $groups:expr),*]) => {
         stage!(@ $name, $args, [$(($kernel, $groups)),*], $($seg)::+::$name)
@@ -263,25 +264,23 @@ macro_rules! stage {
     ($name:ident in $($seg:ident)::+, $args:tt, $groups:expr) => {
         stage!(@ $name, $args, [($name, $groups)], $($seg)::+::$name)
     };
-    (device $name:ident, ($($($a:ident)+),*), $groups:expr) => {
-        &Stage {
-            name: stringify!($name),
-            kernels: &[(stringify!($name), $groups)],
-            arguments: &[$(argument!($($a)+)),*],
-            scalar: |_, _| (),
-        }
+    (device $name:ident, $args:tt, $groups:expr) => {
+        stage!(@@ $name, $args, [($name, $groups)], |_, _| ())
     };
-    (@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*], $twin:path) => {
+    (@ $name:ident, ($($($a:ident)+),*), $kernels:tt, $twin:path) => {
+        stage!(@@ $name, ($($($a)+),*), $kernels, |storage, workers| {
+            workers.simd().run(
+                #[inline(always)]
+                || $twin($(passed!(storage, $($a)+)),*),
+            )
+        })
+    };
+    (@@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*], $scalar:expr) => {
         &Stage {
             name: stringify!($name),
             kernels: &[$((stringify!($kernel), $groups)),*],
             arguments: &[$(argument!($($a)+)),*],
-            scalar: |storage, simd| {
-                simd.run(
-                    #[inline(always)]
-                    || $twin($(passed!(storage, $($a)+)),*),
-                )
-            },
+            scalar: $scalar,
         }
     };
 }

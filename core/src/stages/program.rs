@@ -2,7 +2,7 @@
 
 use super::{Buffer, Stage, Storage};
 use crate::params::Profile;
-use raywake_simd::Simd;
+use crate::team::Workers;
 
 /// A step of a program.
 #[derive(Clone, Copy, Debug)]
@@ -68,13 +68,13 @@ pub fn run(
     ops: &[StageOp],
     storage: &mut Storage,
     rounds: u32,
-    simd: Simd,
+    workers: &dyn Workers,
     lap: &mut dyn FnMut(&'static str),
 ) {
     walk(ops, Runner::Scalar, rounds, &mut |op| match op {
         StageOp::Fill(buffer, word) => storage.fill(buffer, word),
         StageOp::Run(stage) => {
-            (stage.scalar)(storage, simd);
+            (stage.scalar)(storage, workers);
             lap(stage.name);
         }
         // The storage is the host's own memory.

@@ -1,0 +1,87 @@
+//! Stages of the scalar backend whose rows the threads of a team share.
+//!
+//! A row is a foreground column with its costs, or a line of the window. Each is written by one
+//! thread and reads what no thread writes: how they are shared makes no difference.
+
+use super::background_filter::mark_by_bytes;
+use super::flow::expectation::expectation_by_rings;
+use super::occupancy_constancy::occupancy_constancy_by_bytes;
+use super::window::window;
+use super::{FOREGROUND_COUNT, Storage};
+use crate::params::ROW;
+use crate::team::Workers;
+use core::ops::Range;
+
+/// Rows that are not split further: a few microseconds of work.
+const ROWS_MIN: usize = 32;
+
+/// Calls `work` with some rows and what is written of them, `length` elements each, until all are
+/// done.
+fn by_rows<T: Send>(
+    workers: &dyn Workers,
+    rows: Range<usize>,
+    out: &mut [T],
+    length: usize,
+    work: &(dyn Fn(Range<usize>, &mut [T]) + Sync),
+) {
+    if rows.len() <= ROWS_MIN {
+        return work(rows, out);
+    }
+    let middle = rows.start + rows.len() / 2;
+    let (first, second) = out.split_at_mut((middle - rows.start) * length);
+    workers
+        .join_both(&mut || by_rows(workers, rows.start..middle, first, length, work), &mut || {
+            by_rows(workers, middle..rows.end, second, length, work)
+        });
+}
+
+/// See [`super::background_filter::background_filter`].
+pub fn background_filter(s: &mut Storage, workers: &dyn Workers) {
+    let Storage { sweep, filter_table, columns_before, foreground_marks, .. } = s;
+    let side = sweep.side as usize;
+    let marks = &mut foreground_marks[..side * side];
+    by_rows(workers, 0..side, marks, side, &|rows, marks| {
+        mark_by_bytes(sweep, filter_table, columns_before, rows.start * side, marks);
+    });
+}
+
+/// See [`super::occupancy_constancy::occupancy_constancy`].
+pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
+    let count = s.counters[FOREGROUND_COUNT] as usize;
+    let (sweep, weights, costs) = (&s.sweep, &*s.constancy_weights, &*s.constancy_costs);
+    let (foreground, before, now) = (&*s.foreground, &*s.columns_before, &*s.columns_now);
+    by_rows(workers, 0..count, &mut s.pair_cost[..count * ROW], ROW, &|rows, costs_of_rows| {
+        let foreground = &foreground[rows];
+        occupancy_constancy_by_bytes(sweep, weights, costs, foreground, before, now, costs_of_rows);
+    });
+}
+
+/// See [`super::window::window`].
+pub fn least_of_window(s: &mut Storage, workers: &dyn Workers) {
+    let count = s.counters[FOREGROUND_COUNT] as usize;
+    let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
+    let (pairs, simd) = (&*s.pair_cost, workers.simd());
+    by_rows(workers, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
+        simd.run(
+            #[inline(always)]
+            move || window(sweep, &foreground[rows], index, pairs, least),
+        );
+    });
+}
+
+/// See [`super::flow::expectation::expectation`].
+pub fn expectation(s: &mut Storage, workers: &dyn Workers) {
+    let count = s.counters[FOREGROUND_COUNT] as usize;
+    let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
+    let (pairs, flow, targets) = (&*s.pair_cost, &*s.flow, &*s.target_energy);
+    let (least, simd) = (&*s.min_cost, workers.simd());
+    by_rows(workers, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
+        let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
+        simd.run(
+            #[inline(always)]
+            move || {
+                expectation_by_rings(sweep, of_rows, index, pairs, flow, targets, least, proposal);
+            },
+        );
+    });
+}
