@@ -1,6 +1,6 @@
 //! The returns of a sweep that rise above the ground, thinned and sorted by column.
 
-use super::places::Places;
+use super::places::{Nearest, Places};
 use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
 use super::surface::{self, LazyWeight};
@@ -283,7 +283,8 @@ impl Cloud {
         // One beyond the window on either side would still have neighbours inside.
         let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
-        let (mut least, mut best) = (reach * reach, None);
+        let mut nearest = Nearest::within(reach * reach);
+        let mut least = reach * reach;
         let (in_row, in_column) = (at[0] + 1.0 - i as f32, at[1] + 1.0 - j as f32);
         // The row it lies in first: what is found there often excludes the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
@@ -297,14 +298,13 @@ impl Cloud {
             let from = if left { j_from } else { j.saturating_sub(1).max(j_from) };
             let to = if right { j_to } else { j.min(j_to) };
             let row = self.row(row, from, to.max(from));
-            if let Some((d2, n)) = self.places.nearest(row, at, sensor, least) {
-                (least, best) = (d2, Some(n));
-                if d2 < enough * enough {
-                    break;
-                }
+            self.places.look(row, at, sensor, &mut nearest);
+            least = nearest.squared_distance();
+            if least < enough * enough {
+                break;
             }
         }
-        best.map(|n| (least, n))
+        nearest.found()
     }
 
     /// A return.

@@ -23,6 +23,54 @@ pub struct Places {
     sensor: [u32; ROOM],
 }
 
+/// Added to an index for each look before it.
+const LOOK: u32 = 1 << 24;
+const _: () = assert!(CLOUD_MAX < LOOK as usize);
+
+/// The nearest return so far. Each lane has its own, so that none waits for another.
+pub struct Nearest {
+    /// Squared distances.
+    least: [f32; LANES],
+    /// Their indices, and in which look they were found, or [`NONE`].
+    best: [u32; LANES],
+    /// How many looks there were.
+    looks: u32,
+}
+
+impl Nearest {
+    /// Nothing within this squared distance.
+    #[inline(always)]
+    pub fn within(d2: f32) -> Nearest {
+        Nearest { least: [d2; LANES], best: [NONE; LANES], looks: 0 }
+    }
+
+    /// Its squared distance, or that within which there is none.
+    #[inline(always)]
+    pub fn squared_distance(&self) -> f32 {
+        let mut least = self.least[0];
+        for of_lane in self.least {
+            least = if of_lane < least { of_lane } else { least };
+        }
+        least
+    }
+
+    /// Its squared distance and index: of several as near, the first of the first look.
+    #[inline(always)]
+    pub fn found(&self) -> Option<(f32, usize)> {
+        // Bits of numbers that are not negative are in their order.
+        let mut keys = [0; LANES];
+        for (l, key) in keys.iter_mut().enumerate() {
+            *key = (self.least[l].to_bits() as u64) << 32 | self.best[l] as u64;
+        }
+        let mut key = u64::MAX;
+        for k in keys {
+            key = if k < key { k } else { key };
+        }
+        let best = key as u32;
+        (best != NONE).then(|| (f32::from_bits((key >> 32) as u32), (best % LOOK) as usize))
+    }
+}
+
 /// Blocks of those in a range.
 #[inline(always)]
 fn blocks<'a, T>(of: &'a [T; ROOM], range: &Range<usize>) -> &'a [[T; LANES]] {
@@ -69,25 +117,15 @@ impl Places {
         self.sensor[n]
     }
 
-    /// The return of a sensor, among some, that is nearest to a place, the first of such: squared
-    /// distance and index, if that distance is less than `least`.
+    /// Looks for the return of a sensor that is nearest to a place among some.
     #[inline(always)]
-    pub fn nearest(
-        &self,
-        range: Range<usize>,
-        at: [f32; 3],
-        sensor: u32,
-        least: f32,
-    ) -> Option<(f32, usize)> {
-        if range.is_empty() {
-            return None;
-        }
+    pub fn look(&self, range: Range<usize>, at: [f32; 3], sensor: u32, nearest: &mut Nearest) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
         let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
-        let (mut n, end) = (range.start as u32, range.end as u32);
-        // Each lane has its own, so that none waits for another.
-        let (mut least, mut best) = ([least; LANES], [NONE; LANES]);
+        let (mut n, end) = (range.start as u32 | nearest.looks, range.end as u32 | nearest.looks);
+        nearest.looks += LOOK;
+        let (mut least, mut best) = (nearest.least, nearest.best);
         for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
@@ -99,17 +137,7 @@ impl Places {
             }
             n = n.wrapping_add(LANES as u32);
         }
-        // Bits of numbers that are not negative are in their order.
-        let mut keys = [0; LANES];
-        for l in 0..LANES {
-            keys[l] = (least[l].to_bits() as u64) << 32 | best[l] as u64;
-        }
-        let mut key = u64::MAX;
-        for k in keys {
-            key = if k < key { k } else { key };
-        }
-        let best = key as u32;
-        (best != NONE).then(|| (f32::from_bits((key >> 32) as u32), best as usize))
+        (nearest.least, nearest.best) = (least, best);
     }
 
     /// Adds those returns of a sensor, among some, that are closer to a place than `radius`, in
