@@ -41,10 +41,10 @@ pub mod map {
     pub mod radix_sort;
     pub mod reduce_by_key;
 }
+mod by_rows;
 pub mod occupancy_constancy;
 pub mod prefix_sum;
 mod program;
-mod shared;
 pub mod window;
 
 pub use declare::{Argument, BufferElement, BufferRow, GroupCount, List, Stage, View};
@@ -202,7 +202,7 @@ pub const FLOW: &[StageOp] = &[
     Run(stage!(
         background_filter in background_filter,
         (sweep, filter_table, columns_before, mut foreground_marks),
-        scalar: shared::background_filter,
+        scalar: by_rows::background_filter,
         Tiles(Profile::columns)
     )),
     Run(prefix_sum!(foreground_marks, tiles, foreground_index, Profile::columns)),
@@ -216,13 +216,13 @@ pub const FLOW: &[StageOp] = &[
         occupancy_constancy in occupancy_constancy,
         (sweep, constancy_weights, constancy_costs, list foreground, columns_before, columns_now,
             mut pair_cost),
-        scalar: shared::occupancy_constancy,
+        scalar: by_rows::occupancy_constancy,
         GroupPerColumn
     )),
     Run(stage!(
         window in window,
         (sweep, list foreground, foreground_index, quads pair_cost, mut min_cost),
-        scalar: shared::least_of_window,
+        scalar: by_rows::least_of_window,
         GroupPerColumn
     )),
     Fill(Buffer::flow, 0),
@@ -232,7 +232,7 @@ pub const FLOW: &[StageOp] = &[
             expectation in flow::expectation,
             (sweep, list foreground, foreground_index, quads pair_cost, flow, target_energy,
                 min_cost, mut proposal),
-            scalar: shared::expectation,
+            scalar: by_rows::expectation,
             ThreadPer(Foreground)
         )),
         Fill(Buffer::target_energy, NONE),

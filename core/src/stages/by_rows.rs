@@ -17,7 +17,7 @@ const ROWS_MIN: usize = 32;
 
 /// Calls `work` with some rows and what is written of them, `length` elements each, until all are
 /// done.
-fn by_rows<T: Send>(
+fn share<T: Send>(
     workers: &dyn Workers,
     rows: Range<usize>,
     out: &mut [T],
@@ -29,10 +29,9 @@ fn by_rows<T: Send>(
     }
     let middle = rows.start + rows.len() / 2;
     let (first, second) = out.split_at_mut((middle - rows.start) * length);
-    workers
-        .join_both(&mut || by_rows(workers, rows.start..middle, first, length, work), &mut || {
-            by_rows(workers, middle..rows.end, second, length, work)
-        });
+    workers.join_both(&mut || share(workers, rows.start..middle, first, length, work), &mut || {
+        share(workers, middle..rows.end, second, length, work)
+    });
 }
 
 /// See [`super::background_filter::background_filter`].
@@ -40,7 +39,7 @@ pub fn background_filter(s: &mut Storage, workers: &dyn Workers) {
     let Storage { sweep, filter_table, columns_before, foreground_marks, .. } = s;
     let side = sweep.side as usize;
     let marks = &mut foreground_marks[..side * side];
-    by_rows(workers, 0..side, marks, side, &|rows, marks| {
+    share(workers, 0..side, marks, side, &|rows, marks| {
         mark_by_bytes(sweep, filter_table, columns_before, rows.start * side, marks);
     });
 }
@@ -50,7 +49,7 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, weights, costs) = (&s.sweep, &*s.constancy_weights, &*s.constancy_costs);
     let (foreground, before, now) = (&*s.foreground, &*s.columns_before, &*s.columns_now);
-    by_rows(workers, 0..count, &mut s.pair_cost[..count * ROW], ROW, &|rows, costs_of_rows| {
+    share(workers, 0..count, &mut s.pair_cost[..count * ROW], ROW, &|rows, costs_of_rows| {
         let foreground = &foreground[rows];
         occupancy_constancy_by_bytes(sweep, weights, costs, foreground, before, now, costs_of_rows);
     });
@@ -61,7 +60,7 @@ pub fn least_of_window(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, simd) = (&*s.pair_cost, workers.simd());
-    by_rows(workers, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
+    share(workers, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
         simd.run(
             #[inline(always)]
             move || window(sweep, &foreground[rows], index, pairs, least),
@@ -75,7 +74,7 @@ pub fn expectation(s: &mut Storage, workers: &dyn Workers) {
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, flow, targets) = (&*s.pair_cost, &*s.flow, &*s.target_energy);
     let (least, simd) = (&*s.min_cost, workers.simd());
-    by_rows(workers, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
+    share(workers, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
         let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
         simd.run(
             #[inline(always)]
