@@ -3,9 +3,11 @@
 //! A return is moved by the vehicle's pose at its own time slot (motion compensation, "deskewing")
 //! and quantised relative to the window's central voxel.
 
+mod batch;
+
 use crate::dropped::DroppedReturns;
 use crate::frame::{Window, central};
-use crate::params::{EXTENT_VOXELS, ORIGINS_MAX, Profile, SENSORS_MAX, SLOTS};
+use crate::params::{ORIGINS_MAX, Profile, SENSORS_MAX, SLOTS};
 use crate::pose::Pose;
 use crate::record::{NONE, Ray, SweepUniform, ray};
 use crate::return_clock::{ReturnClock, slot_of};
@@ -13,6 +15,8 @@ use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
+use batch::{Batch, Lattice};
+use raywake_simd::Simd;
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
@@ -75,7 +79,7 @@ impl Preparation {
         let points = TakenPoints::new(sweep.points, profile.returns());
         let count = points.count();
         assert!(rays.len() >= count && columns.len() >= count);
-        let caster = Caster::new(&self.clock, placement, origins);
+        let caster = Caster::new(&self.clock, team.simd(), placement, origins);
         // Two parts, the rays of the second behind those that the first may have.
         let [first, second] = [points.range(0..count / 2), points.range(count / 2..count)];
         let is_ray = |p: &&Point| DroppedReturns::default().admit(rig, p).is_some();
@@ -83,11 +87,12 @@ impl Preparation {
         let (of_first, of_second) = rays.split_at_mut(admitted);
         let (columns, more_columns) = columns.split_at_mut(count / 2);
         let (placed, more_placed) = placed.split_at_mut((count / 2).min(placed.len()));
+        let of_second = Castings::new(of_second, more_columns, more_placed);
         let mut found = [(0, DroppedReturns::default()); 2];
         let [one, other] = &mut found;
         team.join(
-            || *one = caster.cast_all(first, of_first, columns, placed),
-            || *other = caster.cast_all(second, of_second, more_columns, more_placed),
+            || *one = caster.cast_all(first, Castings::new(of_first, columns, placed)),
+            || *other = caster.cast_all(second, of_second),
         );
         let [(count, mut dropped), (more, more_dropped)] = found;
         dropped += more_dropped;
@@ -129,14 +134,11 @@ pub struct RayBuffers<'a> {
 struct Caster<'a> {
     clock: &'a ReturnClock,
     rig: &'a Rig,
-    side: u32,
-    levels: u32,
-    centre: [i32; 3],
+    simd: Simd,
+    lattice: Lattice,
     /// The vehicle's motion within the sweep counts.
     moving: bool,
-    to_voxel: [ToVoxel; SLOTS],
     origin_ids: OriginIds,
-    drift: Drift,
     /// Begin of the sweep after the stamp, and length of a slot, s.
     from_s: f32,
     slot_s: f32,
@@ -145,6 +147,7 @@ struct Caster<'a> {
 impl<'a> Caster<'a> {
     fn new(
         clock: &'a ReturnClock,
+        simd: Simd,
         placement: &Placement<'a>,
         origins: &mut [[i32; 4]],
     ) -> Caster<'a> {
@@ -158,13 +161,16 @@ impl<'a> Caster<'a> {
         Caster {
             clock,
             rig,
-            side: profile.side,
-            levels: profile.levels,
-            centre: central(profile),
+            simd,
+            lattice: Lattice {
+                side: profile.side,
+                levels: profile.levels,
+                centre: central(profile),
+                to_voxel: core::array::from_fn(matrix),
+                drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
+            },
             moving,
-            to_voxel: core::array::from_fn(matrix),
             origin_ids: place_origins(placement, moving, origins),
-            drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
             from_s,
             slot_s,
         }
@@ -174,59 +180,79 @@ impl<'a> Caster<'a> {
     fn cast_all<'p>(
         &self,
         points: impl Iterator<Item = &'p Point>,
-        rays: &mut [Ray],
-        columns: &mut [u32],
-        placed: &mut [Placed],
+        mut out: Castings,
     ) -> (usize, DroppedReturns) {
-        let mut dropped = DroppedReturns::default();
-        let mut count = 0;
-        for (n, (point, column)) in points.zip(columns).enumerate() {
-            let cast = self.cast(point, &mut dropped);
-            *column = cast.map_or(NONE, |c| c.column);
-            if let Some(placed) = placed.get_mut(n) {
-                *placed = cast.map_or(Placed::NOWHERE, |c| c.placed);
-            }
-            if let Some(cast) = cast {
-                rays[count] = cast.ray;
-                count += 1;
+        let mut batch = Batch::new();
+        let count = out.columns.len();
+        for (n, point) in points.take(count).enumerate() {
+            let Some(own) = out.dropped.admit(self.rig, point) else {
+                out.leave_out(n);
+                continue;
+            };
+            let when = self.clock.slots(self.rig, point);
+            let slot = if self.moving { slot_of(when) } else { 0 };
+            if batch.push(n, point, own, when, slot) {
+                self.cast(&mut batch, &mut out);
             }
         }
-        (count, dropped)
+        self.cast(&mut batch, &mut out);
+        (out.count, out.dropped)
     }
 
-    /// One return; nothing where it is left out.
-    #[inline]
-    fn cast(&self, point: &Point, dropped: &mut DroppedReturns) -> Option<Cast> {
-        let own = dropped.admit(self.rig, point)?;
-        let when = self.clock.slots(self.rig, point);
-        let slot = if self.moving { slot_of(when) } else { 0 };
-        let at = in_voxels(&self.to_voxel[slot], point.position);
-        let end = add(voxel(at), self.centre);
-        if end.iter().any(|v| v.abs() > EXTENT_VOXELS) {
-            dropped.too_far += 1;
-            return None;
+    /// Rays of a batch, which is empty then.
+    fn cast(&self, batch: &mut Batch, out: &mut Castings) {
+        let lattice = &self.lattice;
+        let found = self.simd.run(
+            #[inline(always)]
+            || lattice.place(batch),
+        );
+        for l in 0..core::mem::take(&mut batch.len) {
+            let (n, own) = (batch.index[l], batch.own[l]);
+            if found.far[l] {
+                out.dropped.too_far += 1;
+                out.leave_out(n);
+                continue;
+            }
+            out.dropped.own_vehicle += u64::from(own);
+            let end = [found.end[0][l], found.end[1][l], found.end[2][l]];
+            let origin = self.origin_ids[batch.sensor[l]][batch.slot[l]];
+            out.rays[out.count] = ray(end, origin, own);
+            out.count += 1;
+            if own {
+                out.leave_out(n);
+                continue;
+            }
+            out.columns[n] = found.column[l];
+            if let Some(placed) = out.placed.get_mut(n) {
+                let at = [found.at[0][l], found.at[1][l], found.at[2][l]];
+                *placed = Placed { at, offset_s: self.from_s + batch.when[l] * self.slot_s };
+            }
         }
-        dropped.own_vehicle += own as u64;
-        let ray = ray(end, self.origin_ids[point.sensor as usize][slot], own);
-        if own {
-            return Some(Cast { ray, column: NONE, placed: Placed::NOWHERE });
-        }
-        let [i, j, k] = [end[0] as u32, end[1] as u32, end[2] as u32];
-        let inside = i < self.side && j < self.side && k < self.levels;
-        let [cx, cy, cz] = self.centre;
-        let at = [at[0] + cx as f32, at[1] + cy as f32, at[2] + cz as f32];
-        let at = self.drift.place(at, when - (slot as f32 + 0.5));
-        let placed = Placed { at, offset_s: self.from_s + when * self.slot_s };
-        Some(Cast { ray, column: if inside { i * self.side + j } else { NONE }, placed })
     }
 }
 
-/// What becomes of a return.
-#[derive(Clone, Copy)]
-struct Cast {
-    ray: Ray,
-    column: u32,
-    placed: Placed,
+/// What is cast of some returns.
+struct Castings<'a> {
+    rays: &'a mut [Ray],
+    /// Rays so far.
+    count: usize,
+    columns: &'a mut [u32],
+    placed: &'a mut [Placed],
+    dropped: DroppedReturns,
+}
+
+impl<'a> Castings<'a> {
+    fn new(rays: &'a mut [Ray], columns: &'a mut [u32], placed: &'a mut [Placed]) -> Castings<'a> {
+        Castings { rays, count: 0, columns, placed, dropped: DroppedReturns::ZERO }
+    }
+
+    /// A return that ends nowhere.
+    fn leave_out(&mut self, n: usize) {
+        self.columns[n] = NONE;
+        if let Some(placed) = self.placed.get_mut(n) {
+            *placed = Placed::NOWHERE;
+        }
+    }
 }
 
 /// What the vehicle's motion within a slot does to its returns: translation and yaw.
@@ -252,7 +278,7 @@ impl Drift {
     }
 
     /// The position `after` slots later.
-    #[inline]
+    #[inline(always)]
     fn place(&self, [x, y, z]: [f32; 3], after: f32) -> [f32; 3] {
         let ([dx, dy, dz], [cx, cy]) = (self.by, self.centre);
         [
@@ -275,26 +301,6 @@ fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
 
 /// Beyond any window, voxels: coordinates saturate there.
 const FAR: f32 = 1e6;
-
-/// A point in voxels from the window's central one.
-#[inline]
-fn in_voxels(m: &ToVoxel, p: [f32; 3]) -> [f32; 3] {
-    let along =
-        |row: &[f32; 4]| (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]).clamp(-FAR, FAR);
-    // `map` of arrays is a call, here and below.
-    [along(&m[0]), along(&m[1]), along(&m[2])]
-}
-
-/// Voxel of a point in voxels.
-#[inline]
-fn voxel([x, y, z]: [f32; 3]) -> [i32; 3] {
-    let floor = |v: f32| {
-        let cut = v as i32;
-        // Truncation rounds up below zero.
-        cut - ((cut as f32) > v) as i32
-    };
-    [floor(x), floor(y), floor(z)]
-}
 
 /// The integer nearest to a coordinate, voxels.
 fn nearest(coordinate: f64) -> i32 {
