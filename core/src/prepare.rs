@@ -15,7 +15,7 @@ use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
-use batch::{Batch, Lattice};
+use batch::{RayLattice, ReturnBatch};
 use raywake_simd::Simd;
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
@@ -135,7 +135,7 @@ struct Caster<'a> {
     clock: &'a ReturnClock,
     rig: &'a Rig,
     simd: Simd,
-    lattice: Lattice,
+    lattice: RayLattice,
     /// The vehicle's motion within the sweep counts.
     moving: bool,
     origin_ids: OriginIds,
@@ -162,7 +162,7 @@ impl<'a> Caster<'a> {
             clock,
             rig,
             simd,
-            lattice: Lattice {
+            lattice: RayLattice {
                 side: profile.side,
                 levels: profile.levels,
                 centre: central(profile),
@@ -182,7 +182,7 @@ impl<'a> Caster<'a> {
         points: impl Iterator<Item = &'p Point>,
         mut out: Castings,
     ) -> (usize, DroppedReturns) {
-        let mut batch = Batch::new();
+        let mut batch = ReturnBatch::new();
         let count = out.columns.len();
         for (n, point) in points.take(count).enumerate() {
             let Some(own) = out.dropped.admit(self.rig, point) else {
@@ -200,7 +200,7 @@ impl<'a> Caster<'a> {
     }
 
     /// Rays of a batch, which is empty then.
-    fn cast(&self, batch: &mut Batch, out: &mut Castings) {
+    fn cast(&self, batch: &mut ReturnBatch, out: &mut Castings) {
         let lattice = &self.lattice;
         let found = self.simd.run(
             #[inline(always)]

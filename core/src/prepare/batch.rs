@@ -10,7 +10,7 @@ use core::array::from_fn;
 pub(super) const LANES: usize = 8;
 
 /// Returns that wait to be placed.
-pub(super) struct Batch {
+pub(super) struct ReturnBatch {
     pub len: usize,
     /// Position of each in the vehicle frame by axis, m.
     position: [[f32; LANES]; 3],
@@ -38,7 +38,7 @@ pub(super) struct PlacedBatch {
 }
 
 /// The window that returns are placed in.
-pub(super) struct Lattice {
+pub(super) struct RayLattice {
     pub side: u32,
     pub levels: u32,
     /// Its central voxel.
@@ -48,9 +48,9 @@ pub(super) struct Lattice {
     pub drift: Drift,
 }
 
-impl Batch {
-    pub const fn new() -> Batch {
-        Batch {
+impl ReturnBatch {
+    pub const fn new() -> ReturnBatch {
+        ReturnBatch {
             len: 0,
             position: [[0.0; LANES]; 3],
             when: [0.0; LANES],
@@ -75,10 +75,10 @@ impl Batch {
     }
 }
 
-impl Lattice {
+impl RayLattice {
     /// Places a batch. What lies beyond its length is of no meaning.
     #[inline(always)]
-    pub fn place(&self, batch: &Batch) -> PlacedBatch {
+    pub fn place(&self, batch: &ReturnBatch) -> PlacedBatch {
         let mut out = PlacedBatch {
             end: [[0; LANES]; 3],
             far: [false; LANES],
