@@ -2,6 +2,7 @@
 //! `raywake-lab`: one command per experiment.
 
 use clap::Parser;
+use raywake::console::{INTERRUPTED_CODE, interrupted};
 use raywake::error::RunError;
 use raywake_lab::metrics::grade;
 use raywake_lab::{bench, eval, flsf, matching, results, simulate, toy, tracks, train};
@@ -80,13 +81,16 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("raywake-lab: {error}");
-            ExitCode::from(exit_code(error.as_ref()))
+            ExitCode::from(exit_code(error.as_ref(), interrupted()))
         }
     }
 }
 
 /// That of the program for the same error; 1 for those that only the lab has.
-fn exit_code(error: &(dyn Error + 'static)) -> u8 {
+fn exit_code(error: &(dyn Error + 'static), interrupted: bool) -> u8 {
+    if interrupted {
+        return INTERRUPTED_CODE;
+    }
     let io = error.downcast_ref::<raywake_io::Error>().map(raywake_io::Error::exit_code);
     let run = error.downcast_ref::<RunError>().map(RunError::exit_code);
     io.or(run).unwrap_or(1)
@@ -95,6 +99,14 @@ fn exit_code(error: &(dyn Error + 'static)) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_has_the_programs_exit_code() {
+        let missing = raywake_io::Error::Usage("no such drive".into());
+        let codes = [exit_code(&missing, false), exit_code(&std::fmt::Error, false)];
+        assert_eq!(codes, [missing.exit_code(), 1]);
+        assert_eq!(exit_code(&missing, true), 130);
+    }
 
     #[test]
     fn eval_takes_drives_or_a_chapter() {
