@@ -10,8 +10,8 @@ use super::rows::{Plane, each_row, gathered};
 use super::{ColumnScores, FINE, PaddedWindow};
 use crate::team::Team;
 
-/// Cells whose sums are formed together. With 8, layers take up to a fifth longer (AVX2, one core of
-/// an AMD EPYC, each layer alone).
+/// Cells whose sums are formed together. With 8, layers take up to a fifth longer (AVX2, one core
+/// of an AMD EPYC, each layer alone).
 const CELLS: usize = 16;
 /// Inputs that a sum takes in at a time.
 const INPUTS: usize = 8;

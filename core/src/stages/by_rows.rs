@@ -12,8 +12,7 @@ use crate::params::ROW;
 use crate::team::Workers;
 use core::ops::Range;
 
-/// Rows that are not split further: up to 50 microseconds of work, of which splitting takes less than
-/// one. Not measured on its own.
+/// Rows that are not split further: up to 50 microseconds of work. Not measured on its own.
 const ROWS_MIN: usize = 32;
 
 /// Calls `work` with some rows and what is written of them, `length` elements each, until all are
