@@ -4,6 +4,7 @@
 //! sweep and the velocities of its points are computed in two halves. The number of threads
 //! therefore changes no bit of the results, nor do the instructions they use.
 
+use core::ops::Range;
 use raywake_simd::Simd;
 
 /// Threads that share work by fork and join.
@@ -64,4 +65,25 @@ pub(crate) fn fill<T: Send>(
             team.join(|| fill(team, first, a, value), || fill(team, first + half, b, value));
         }
     }
+}
+
+/// Calls `work` with some rows and what is written of them, `length` elements each, until all are
+/// done; no more than `least` are not split further.
+pub(crate) fn share<T: Send>(
+    workers: &dyn Workers,
+    least: usize,
+    rows: Range<usize>,
+    out: &mut [T],
+    length: usize,
+    work: &(dyn Fn(Range<usize>, &mut [T]) + Sync),
+) {
+    if rows.len() <= least {
+        return work(rows, out);
+    }
+    let middle = rows.start + rows.len() / 2;
+    let (first, second) = out.split_at_mut((middle - rows.start) * length);
+    workers.join_both(
+        &mut || share(workers, least, rows.start..middle, first, length, work),
+        &mut || share(workers, least, middle..rows.end, second, length, work),
+    );
 }

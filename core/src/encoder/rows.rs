@@ -1,6 +1,6 @@
 //! Levels of the pyramid as rows of cells.
 
-use crate::team::Team;
+use crate::team::{Team, share};
 
 /// A square level, all channels of a cell together.
 #[derive(Clone, Copy)]
@@ -46,29 +46,11 @@ pub fn each_row<T: Send>(
     length: usize,
     fill: impl Fn(usize, &mut [T]) + Sync + Copy,
 ) {
-    let simd = team.simd();
-    split(team, 0, out, length, &move |row: usize, out: &mut [T]| {
+    let (simd, rows) = (team.simd(), out.len() / length);
+    share(team, 1, 0..rows, out, length, &move |rows, out| {
         simd.run(
             #[inline(always)]
-            move || fill(row, out),
+            move || fill(rows.start, out),
         );
     });
-}
-
-fn split<T: Send>(
-    team: &impl Team,
-    first: usize,
-    out: &mut [T],
-    length: usize,
-    fill: &(impl Fn(usize, &mut [T]) + Sync),
-) {
-    let rows = out.len() / length;
-    if rows <= 1 {
-        return fill(first, out);
-    }
-    let (a, b) = out.split_at_mut(rows / 2 * length);
-    team.join(
-        || split(team, first, a, length, fill),
-        || split(team, first + rows / 2, b, length, fill),
-    );
 }

@@ -9,37 +9,17 @@ use super::occupancy_constancy::occupancy_constancy_by_bytes;
 use super::window::window;
 use super::{FOREGROUND_COUNT, Storage};
 use crate::params::ROW;
-use crate::team::Workers;
-use core::ops::Range;
+use crate::team::{Workers, share};
 
 /// Rows that are not split further: up to 50 microseconds of work. Not measured on its own.
 const ROWS_MIN: usize = 32;
-
-/// Calls `work` with some rows and what is written of them, `length` elements each, until all are
-/// done.
-fn share<T: Send>(
-    workers: &dyn Workers,
-    rows: Range<usize>,
-    out: &mut [T],
-    length: usize,
-    work: &(dyn Fn(Range<usize>, &mut [T]) + Sync),
-) {
-    if rows.len() <= ROWS_MIN {
-        return work(rows, out);
-    }
-    let middle = rows.start + rows.len() / 2;
-    let (first, second) = out.split_at_mut((middle - rows.start) * length);
-    workers.join_both(&mut || share(workers, rows.start..middle, first, length, work), &mut || {
-        share(workers, middle..rows.end, second, length, work)
-    });
-}
 
 /// See [`super::background_filter::background_filter`].
 pub fn background_filter(s: &mut Storage, workers: &dyn Workers) {
     let Storage { sweep, filter_table, columns_before, foreground_marks, .. } = s;
     let side = sweep.side as usize;
     let marks = &mut foreground_marks[..side * side];
-    share(workers, 0..side, marks, side, &|rows, marks| {
+    share(workers, ROWS_MIN, 0..side, marks, side, &|rows, marks| {
         mark_by_bytes(sweep, filter_table, columns_before, rows.start * side, marks);
     });
 }
@@ -49,10 +29,25 @@ pub fn occupancy_constancy(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, weights, costs) = (&s.sweep, &*s.constancy_weights, &*s.constancy_costs);
     let (foreground, before, now) = (&*s.foreground, &*s.columns_before, &*s.columns_now);
-    share(workers, 0..count, &mut s.pair_cost[..count * ROW], ROW, &|rows, costs_of_rows| {
-        let foreground = &foreground[rows];
-        occupancy_constancy_by_bytes(sweep, weights, costs, foreground, before, now, costs_of_rows);
-    });
+    share(
+        workers,
+        ROWS_MIN,
+        0..count,
+        &mut s.pair_cost[..count * ROW],
+        ROW,
+        &|rows, costs_of_rows| {
+            let foreground = &foreground[rows];
+            occupancy_constancy_by_bytes(
+                sweep,
+                weights,
+                costs,
+                foreground,
+                before,
+                now,
+                costs_of_rows,
+            );
+        },
+    );
 }
 
 /// See [`super::window::window`].
@@ -60,7 +55,7 @@ pub fn least_of_window(s: &mut Storage, workers: &dyn Workers) {
     let count = s.counters[FOREGROUND_COUNT] as usize;
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, simd) = (&*s.pair_cost, workers.simd());
-    share(workers, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
+    share(workers, ROWS_MIN, 0..count, &mut s.min_cost[..count], 1, &move |rows, least| {
         simd.run(
             #[inline(always)]
             move || window(sweep, &foreground[rows], index, pairs, least),
@@ -74,7 +69,7 @@ pub fn expectation(s: &mut Storage, workers: &dyn Workers) {
     let (sweep, foreground, index) = (&s.sweep, &*s.foreground, &*s.foreground_index);
     let (pairs, flow, targets) = (&*s.pair_cost, &*s.flow, &*s.target_energy);
     let (least, simd) = (&*s.min_cost, workers.simd());
-    share(workers, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
+    share(workers, ROWS_MIN, 0..count, &mut s.proposal[..count], 1, &move |rows, proposal| {
         let (of_rows, least) = (&foreground[rows.clone()], &least[rows]);
         simd.run(
             #[inline(always)]
