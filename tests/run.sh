@@ -30,7 +30,8 @@ install() {
 }
 
 if command -v apt-get >/dev/null; then
-    install libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools gcc
+    install libvulkan1 mesa-vulkan-drivers vulkan-validationlayers spirv-tools gcc g++ \
+        pkg-config valgrind
 fi
 # Opens a report; nothing else needs it.
 browser() { [ -n "${RAYWAKE_BROWSER:-}" ] || command -v chromium chromium-browser google-chrome; }
@@ -51,7 +52,7 @@ RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
 say "core without an operating system"
 if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
     cargo check --quiet --target thumbv7em-none-eabihf \
-        -p raywake-core -p raywake-objects -p raywake-registration
+        -p raywake-core -p raywake-objects -p raywake-registration -p raywake-embed
     echo "checks for thumbv7em-none-eabihf"
 else
     echo "skipped: the target thumbv7em-none-eabihf cannot be installed"
@@ -100,6 +101,9 @@ fi
 
 say "tests of what is compiled unless more is asked for"
 cargo test --quiet -p raywake -p raywake-io --no-default-features --features raywake/demo,raywake/png
+
+say "the library for C"
+host/capi/tests/run.sh target/release/raywake
 
 say "other programs' recordings in, ours into theirs"
 # Wheels that are there or can be had; a failure of what they run is a failure.

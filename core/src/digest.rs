@@ -20,11 +20,19 @@ pub struct Digest(u64);
 
 impl Default for Digest {
     fn default() -> Self {
-        Digest(0xcbf2_9ce4_8422_2325)
+        Digest::START
     }
 }
 
 impl Digest {
+    /// Of nothing.
+    pub const START: Digest = Digest(0xcbf2_9ce4_8422_2325);
+
+    /// From [`Digest::value`], to go on with.
+    pub const fn resume(value: u64) -> Digest {
+        Digest(value)
+    }
+
     /// Digest of some bytes.
     pub fn of(bytes: &[u8]) -> u64 {
         let mut d = Digest::default();
@@ -59,7 +67,7 @@ impl Digest {
     }
 
     /// The digest so far.
-    pub fn value(&self) -> u64 {
+    pub const fn value(&self) -> u64 {
         self.0
     }
 }

@@ -100,9 +100,43 @@ impl<'a> PointFlows<'a> {
         out
     }
 
+    /// All but the slices, to be kept beside them.
+    pub fn keep(self) -> KeptPoints {
+        let PointFlows { columns, taken, thinning, ego, .. } = self;
+        KeptPoints { columns: columns.len(), taken: taken.len(), thinning, ego }
+    }
+
     /// Those of all returns.
     pub fn iter(self) -> impl ExactSizeIterator<Item = PointFlow> + 'a {
         (0..self.count()).map(move |n| self.get(n).unwrap_or(PointFlow::OVER_CAPACITY))
+    }
+}
+
+/// [`PointFlows`] without the slices, for whoever keeps those.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptPoints {
+    columns: usize,
+    taken: usize,
+    thinning: Thinning,
+    ego: EgoMotion,
+}
+
+impl KeptPoints {
+    /// With the slices: of columns and returns those given to the step, of points its `before`.
+    /// Shorter ones have no flow.
+    pub fn over<'a>(
+        &self,
+        columns: &'a [ColumnFlow],
+        taken: &'a [ReturnFlow],
+        points: &'a [Point],
+    ) -> PointFlows<'a> {
+        PointFlows {
+            columns: columns.get(..self.columns).unwrap_or_default(),
+            taken: taken.get(..self.taken).unwrap_or_default(),
+            points,
+            thinning: self.thinning,
+            ego: self.ego,
+        }
     }
 }
 

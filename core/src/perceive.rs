@@ -2,10 +2,13 @@
 
 use crate::params::{FOREGROUND_MAX, Profile};
 use crate::record::{Column, Flow, Proposal, Ray, SweepUniform, is_flow};
+use crate::stages::background_filter;
+use crate::stages::occupancy_constancy::{self, Scores};
 use crate::stages::{
     DISTINCT_COUNT, FLOW, FLOW_PROGRAMS, FOREGROUND_COUNT, FOREGROUND_MARKED, GRID, Storage, run,
 };
 use crate::team::Team;
+use crate::weights::WeightsError;
 
 /// What perception finds in a pair of sweeps.
 #[derive(Clone, Copy, Debug)]
@@ -173,6 +176,24 @@ impl<M: AsMut<[u32]> + Send> ScalarBackend<M> {
         storage.constancy_weights.copy_from_slice(tables.constancy_weights);
         storage.constancy_costs.copy_from_slice(tables.constancy_costs);
         scalar
+    }
+
+    /// The same with the shipped weights, read into their place; and the range of their scores.
+    ///
+    /// # Errors
+    /// They are of another shape than the profile needs.
+    pub fn shipped(
+        memory: M,
+        profile: &Profile,
+    ) -> Result<(ScalarBackend<M>, Scores), WeightsError> {
+        let mut scalar = ScalarBackend { memory, profile: profile.clone() };
+        let Storage { filter_table, constancy_weights, constancy_costs, .. } = scalar.storage();
+        let levels = profile.levels as usize;
+        background_filter::load(background_filter::shipped(profile.frame), levels, filter_table)?;
+        let constancy = occupancy_constancy::shipped(profile.frame);
+        let scores =
+            occupancy_constancy::load(constancy, levels, constancy_weights, constancy_costs)?;
+        Ok((scalar, scores))
     }
 
     /// The buffers as the last sweep left them.

@@ -64,6 +64,21 @@ pub enum Timing {
     },
 }
 
+impl Timing {
+    /// Whether its times are finite, and the sweep takes some.
+    pub fn is_sound(&self) -> bool {
+        match *self {
+            Timing::AtStamp => true,
+            Timing::Offset { from_s, span_s } => from_s.is_finite() && is_span(span_s),
+            Timing::Azimuth { span_s } => is_span(span_s),
+        }
+    }
+}
+
+fn is_span(span_s: f64) -> bool {
+    span_s.is_finite() && span_s > 0.0
+}
+
 /// What is fixed about a source of sweeps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {

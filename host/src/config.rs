@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use raywake_core::params::{Profile, ProfileError, Value};
+use raywake_core::params::{AssignError, ParameterSetting, Profile, ProfileError, Value};
 use raywake_objects::params::TrackingParams;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -68,19 +68,9 @@ fn no_profile(name: &str) -> String {
 
 /// Sets a parameter from `name=value` or `group.name=value`. The profile's name gets an asterisk.
 fn assign(settings: &mut Settings, assignment: &str) -> Result<(), String> {
-    let (name, text) = assignment.split_once('=').ok_or("NAME=VALUE is needed")?;
-    let (name, text) = (name.trim(), text.trim());
-    let (group, name) = match name.split_once('.') {
-        Some((group, name)) => (Some(group), name),
-        None => (None, name),
-    };
-    let value = match (text.parse(), text.parse()) {
-        (Ok(flag), _) => Value::Flag(flag),
-        (_, Ok(number)) => Value::Number(number),
-        _ => Value::Word(text),
-    };
-    set(settings, group, name, value)?;
-    if group != Some(OBJECTS) && !settings.profile.name.ends_with('*') {
+    let to = ParameterSetting::parse(assignment).ok_or("NAME=VALUE is needed")?;
+    set(settings, &to)?;
+    if to.group != Some(OBJECTS) && !settings.profile.name.ends_with('*') {
         // Where there is no room for it, the name stays.
         let _ = settings.profile.name.push('*');
     }
@@ -88,18 +78,18 @@ fn assign(settings: &mut Settings, assignment: &str) -> Result<(), String> {
 }
 
 /// Sets a parameter of a group, or of the one that has it. Parameters have different names.
-fn set(s: &mut Settings, group: Option<&str>, name: &str, value: Value) -> Result<(), String> {
+fn set(s: &mut Settings, to: &ParameterSetting) -> Result<(), String> {
+    let ParameterSetting { group, name, value } = *to;
     if group == Some(OBJECTS) {
         return set_of_objects(&mut s.objects, name, value);
     }
-    let p = &mut s.profile;
-    let groups = p.groups().map(|(g, of)| (g, of.get(name).is_some()));
-    let found = groups.iter().find(|(g, has)| *has && group.is_none_or(|group| *g == group));
-    let Some((group, _)) = found else {
-        let place = group.map_or(String::new(), |g| format!(" in `{g}`"));
-        return Err(format!("there is no parameter `{name}`{place} (see PARAMETERS.md)"));
-    };
-    p.group_mut(group).set(name, value).map_err(|must| format!("`{name}` must be {must}"))
+    s.profile.assign(to).map_err(|e| match e {
+        AssignError::Unknown => {
+            let place = group.map_or(String::new(), |g| format!(" in `{g}`"));
+            format!("there is no parameter `{name}`{place} (see PARAMETERS.md)")
+        }
+        AssignError::Must(must) => format!("`{name}` must be {must}"),
+    })
 }
 
 /// Sets a parameter of tracking by `name` or `group.name`.
@@ -142,7 +132,7 @@ fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, E
             let mut one = |name: &str, value: &DeValue| {
                 let value = value_of(value).ok_or_else(|| format!("`{name}` is no value"));
                 value
-                    .and_then(|v| set(&mut settings, group, name, v))
+                    .and_then(|value| set(&mut settings, &ParameterSetting { group, name, value }))
                     .map_err(|e| Error::input(path, line(key.span().start), e))
             };
             match value {

@@ -49,9 +49,10 @@ mod settings_file;
 mod shell;
 pub mod statistics;
 pub mod summary;
-pub mod team;
 pub mod track;
 pub mod weight_files;
+
+pub use raywake_team as team;
 
 use args::Command;
 use error::RunError;

@@ -158,6 +158,18 @@ impl Encoder {
         self.weights = weights.cloned().unwrap_or_default();
     }
 
+    /// Encodes with the weights that `load` reads into their place from now on; with none where it
+    /// fails.
+    pub fn load_weights<E>(
+        &mut self,
+        load: impl FnOnce(&mut EncoderWeights) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.clear();
+        let loaded = load(&mut self.weights);
+        self.is_on = loaded.is_ok();
+        loaded
+    }
+
     /// Whether it has weights.
     pub fn is_on(&self) -> bool {
         self.is_on

@@ -5,12 +5,14 @@
 //! was declared. The table serves the keys of a configuration file, `--set name=value` and
 //! `PARAMETERS.md`. [`ceilings`] holds what sizes storage and therefore cannot be set.
 
+mod assignment;
 mod ceilings;
 mod moves;
 mod profile;
 mod refinement;
 mod tracklet;
 
+pub use assignment::{AssignError, ParameterSetting};
 pub use ceilings::*;
 pub use moves::MovesParams;
 pub use profile::{Frame, Profile};

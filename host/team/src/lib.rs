@@ -1,3 +1,5 @@
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
 //! The threads that share the work within a sweep.
 //!
 //! The program's working thread leads a team of one thread per core, at most [`THREADS_MAX`]. Every

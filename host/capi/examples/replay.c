@@ -1,0 +1,142 @@
+/* Replays a file of `dump_sweeps` and prints what moves, and the digest that the program
+ * `raywake` prints for the same sweeps.
+ *
+ *     cc replay.c $(pkg-config --cflags --libs raywake) -o replay
+ *     ./replay FILE [THREADS]
+ */
+#define _POSIX_C_SOURCE 200809L
+#include <math.h>
+#include <raywake.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+/* A return as it lies in the file. */
+typedef struct {
+    float xyz[3];
+    float time_s;
+    uint32_t sensor;
+} file_point;
+
+static void *room_for(size_t bytes) {
+    void *memory = malloc(bytes ? bytes : 1);
+    if (!memory) {
+        fprintf(stderr, "no memory for %zu bytes\n", bytes);
+        exit(6);
+    }
+    return memory;
+}
+
+static void must(raywake_status status, const char *what, const raywake_error *error) {
+    if (status != RAYWAKE_STATUS_OK) {
+        fprintf(stderr, "%s: %s: %s\n", what, raywake_status_text(status), error ? error->text : "");
+        exit(1);
+    }
+}
+
+static int take(FILE *file, void *to, size_t bytes) { return fread(to, 1, bytes, file) == bytes; }
+
+static void need(FILE *file, void *to, size_t bytes) {
+    if (!take(file, to, bytes)) {
+        fprintf(stderr, "the file ends too early\n");
+        exit(3);
+    }
+}
+
+/* The rig at the start of the file. */
+static raywake_options rig_of(FILE *file) {
+    raywake_options options = {.abi_version = RAYWAKE_ABI_VERSION};
+    uint64_t sensors = 0;
+    need(file, &options.timing, 4);
+    need(file, &options.distorted, 4);
+    need(file, &options.from_s, 8);
+    need(file, &options.span_s, 8);
+    need(file, &options.ground_m, 8);
+    need(file, options.own_vehicle_m, sizeof options.own_vehicle_m);
+    need(file, &sensors, 8);
+    if (sensors > RAYWAKE_SENSORS_MAX) {
+        fprintf(stderr, "%llu sensors are too many\n", (unsigned long long)sensors);
+        exit(3);
+    }
+    options.sensor_count = (uint32_t)sensors;
+    need(file, options.sensors, sensors * sizeof options.sensors[0]);
+    return options;
+}
+
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static int by_size(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+int main(int argc, char **argv) {
+    enum { STEPS_MAX = 10000 };
+    static double times[STEPS_MAX];
+    FILE *file = argc > 1 ? fopen(argv[1], "rb") : NULL;
+    if (!file) {
+        fprintf(stderr, "replay FILE [THREADS]\n");
+        return 2;
+    }
+    raywake_options options = rig_of(file);
+    options.threads = argc > 2 ? (uint32_t)strtoul(argv[2], NULL, 10) : 0;
+
+    raywake_error error;
+    size_t bytes = 0;
+    must(raywake_memory_needed(&options, &bytes, &error), "memory", &error);
+    void *memory = room_for(bytes);
+    raywake_estimator *estimator = NULL;
+    must(raywake_create(&options, memory, bytes, &estimator, &error), "create", &error);
+
+    uint64_t digest = RAYWAKE_DIGEST_START, count = 0;
+    size_t room = 0, steps = 0;
+    file_point *points = NULL;
+    raywake_point *flow = NULL;
+    raywake_pose pose;
+    raywake_twist twist;
+    raywake_sweep sweep = {.world_from_vehicle = &pose, .twist = &twist};
+    while (take(file, &sweep.stamp_s, 8)) {
+        need(file, &pose, sizeof pose);
+        need(file, &twist, sizeof twist);
+        need(file, &count, 8);
+        if (count > room) {
+            room = count;
+            free(points);
+            free(flow);
+            points = room_for(room * sizeof *points);
+            flow = room_for(room * sizeof *flow);
+        }
+        need(file, points, count * sizeof *points);
+        sweep.count = count;
+        sweep.xyz = points[0].xyz;
+        sweep.time_s = &points[0].time_s;
+        sweep.sensor = &points[0].sensor; /* the low byte */
+        sweep.xyz_stride = sweep.time_stride = sweep.sensor_stride = sizeof *points;
+        raywake_result result;
+        double start = seconds();
+        must(raywake_step(estimator, &sweep, &result, &error), "step", &error);
+        if (steps < STEPS_MAX) times[steps++] = 1e3 * (seconds() - start);
+
+        size_t moving = 0;
+        must(raywake_points(estimator, flow, room, &count), "points", NULL);
+        for (size_t n = 0; n < count && n < room; n++) moving += flow[n].status == 1;
+        must(raywake_add_to_digest(estimator, &digest), "digest", NULL);
+        printf("%.3f s: %zu columns, %zu returns, %zu of them moving, %zu tracklets\n",
+               sweep.stamp_s, result.columns, result.points, moving, result.tracklets);
+    }
+    must(raywake_destroy(estimator), "destroy", NULL);
+    free(flow);
+    free(points);
+    free(memory);
+    fclose(file);
+    if (steps > 1) {
+        qsort(times + 1, steps - 1, sizeof times[0], by_size);
+        printf("median     %.2f ms a step, %zu bytes\n", times[steps / 2], bytes);
+    }
+    printf("digest     %016llx\n", (unsigned long long)digest);
+    return 0;
+}

@@ -1,0 +1,135 @@
+//! Results out.
+
+use raywake_core::digest::Digest;
+use raywake_embed::{ColumnRecord, FlowEstimator, PointRecord, TrackletRecord};
+
+use crate::handle::Handle;
+use crate::status::{CallStatus, Refusal};
+
+/// Where a digest begins.
+pub const RAYWAKE_DIGEST_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Writes records to the caller's array.
+///
+/// # Safety
+/// `to` is null or has room for `room` elements; `count` is null or can be written.
+unsafe fn write<T>(
+    records: impl ExactSizeIterator<Item = T>,
+    to: *mut T,
+    room: usize,
+    count: *mut usize,
+) -> Result<(), Refusal> {
+    if to.is_null() && room > 0 {
+        return Err(Refusal::null("records"));
+    }
+    if !count.is_null() {
+        // SAFETY: the caller's promise.
+        unsafe { count.write_unaligned(records.len()) };
+    }
+    for (n, record) in records.take(room).enumerate() {
+        // SAFETY: the caller's promise.
+        unsafe { to.add(n).write_unaligned(record) };
+    }
+    Ok(())
+}
+
+/// # Safety
+/// `estimator` as of every function.
+unsafe fn read(
+    estimator: *mut Handle,
+    read: impl FnOnce(&FlowEstimator) -> Result<(), Refusal>,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    let result = unsafe { Handle::enter(estimator) }
+        .and_then(|mut turn| turn.team().read(read).map_err(Refusal::from)?);
+    CallStatus::of(result)
+}
+
+/// Flow of the solid columns of the sweep before the last: the first `room` of them to `records`,
+/// which may be null where that is 0; to `count`, which may be null, how many there are.
+///
+/// # Safety
+/// Pointers are null or to what they are of; `estimator` is null, or was one once, and its memory
+/// is still there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_columns(
+    estimator: *mut Handle,
+    records: *mut ColumnRecord,
+    room: usize,
+    count: *mut usize,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        read(estimator, |found| {
+            write(found.columns().iter().map(ColumnRecord::from), records, room, count)
+        })
+    }
+}
+
+/// Flow of the returns of the sweep before the last, in their order. As `raywake_columns`.
+///
+/// # Safety
+/// As of `raywake_columns`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_points(
+    estimator: *mut Handle,
+    records: *mut PointRecord,
+    room: usize,
+    count: *mut usize,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        read(estimator, |found| match found.points() {
+            Some(points) => write(points.iter().map(PointRecord::from), records, room, count),
+            None => write(std::iter::empty(), records, room, count),
+        })
+    }
+}
+
+/// Tracklets at the time of the last sweep. As `raywake_columns`.
+///
+/// # Safety
+/// As of `raywake_columns`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_tracklets(
+    estimator: *mut Handle,
+    records: *mut TrackletRecord,
+    room: usize,
+    count: *mut usize,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        read(estimator, |found| {
+            let total = found.tracklets().count();
+            let mut tracklets = found.tracklets().map(TrackletRecord::from);
+            let records_of = (0..total).map(|_| tracklets.next().unwrap_or_default());
+            write(records_of, records, room, count)
+        })
+    }
+}
+
+/// Adds all that can be read to a digest, which begins as `RAYWAKE_DIGEST_START`. After every sweep
+/// of a recording it is the digest that the program `raywake` prints.
+///
+/// # Safety
+/// As of `raywake_columns`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_add_to_digest(
+    estimator: *mut Handle,
+    digest: *mut u64,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        read(estimator, |found| {
+            if digest.is_null() {
+                return Err(Refusal::null("digest"));
+            }
+            let mut sum = Digest::resume(digest.read_unaligned());
+            found.add_to(&mut sum);
+            digest.write_unaligned(sum.value());
+            Ok(())
+        })
+    }
+}
+
+const _: () = assert!(Digest::START.value() == RAYWAKE_DIGEST_START);

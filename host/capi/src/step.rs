@@ -1,0 +1,287 @@
+//! A sweep in.
+
+use std::ffi::c_void;
+
+use glam::DVec3;
+use raywake_core::continuity::Reset;
+use raywake_core::pose::Twist;
+use raywake_core::sweep::Point;
+use raywake_embed::{StepSummary, SweepPlace};
+use raywake_registration::odometry::Locating;
+
+use crate::create::CPose;
+use crate::handle::Handle;
+use crate::status::{CallStatus, ErrorText, Refusal, put, told};
+
+/// Velocity of the vehicle, along its own axes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CTwist {
+    /// m/s.
+    pub linear: [f64; 3],
+    /// Axis times rate, rad/s.
+    pub angular: [f64; 3],
+}
+
+/// One sweep. Numbers of returns may lie anywhere, `..._stride` bytes apart, as the fields of a
+/// `PointCloud2` do; the sweep is copied.
+#[repr(C)]
+pub struct SweepInput {
+    /// Time of the stamp, s.
+    pub stamp_s: f64,
+    /// Pose of the vehicle at the stamp; null where poses are found.
+    pub world_from_vehicle: *const CPose,
+    /// Its velocity at the stamp; null: what leads from the pose before to this one.
+    pub twist: *const CTwist,
+    /// Returns.
+    pub count: usize,
+    /// Three `float` each: x, y, z in the vehicle frame, m. (0, 0, 0) is no return.
+    pub xyz: *const c_void,
+    /// Bytes from one to the next; 0: 12.
+    pub xyz_stride: usize,
+    /// A `float` each: time after the stamp, s; null: 0.
+    pub time_s: *const c_void,
+    /// Bytes from one to the next; 0: 4.
+    pub time_stride: usize,
+    /// A byte each: index of the sensor; null: 0.
+    pub sensor: *const c_void,
+    /// Bytes from one to the next; 0: 1.
+    pub sensor_stride: usize,
+}
+
+/// It continues the one before.
+pub const RAYWAKE_RESET_NONE: u32 = 0;
+/// It is the first one.
+pub const RAYWAKE_RESET_FIRST: u32 = 1;
+/// Time stood still or went backwards.
+pub const RAYWAKE_RESET_BACKWARDS: u32 = 2;
+/// Too much time has passed.
+pub const RAYWAKE_RESET_GAP: u32 = 3;
+/// The vehicle cannot have gone there so fast.
+pub const RAYWAKE_RESET_JUMP: u32 = 4;
+/// The vehicle cannot have turned so fast.
+pub const RAYWAKE_RESET_SPIN: u32 = 5;
+
+/// The pose was given.
+pub const RAYWAKE_POSE_GIVEN: u32 = 0;
+/// Of the first sweep.
+pub const RAYWAKE_POSE_START: u32 = 1;
+/// By registration.
+pub const RAYWAKE_POSE_REGISTERED: u32 = 2;
+/// The sweep shows too little: a part of the motion is that of the sweep before.
+pub const RAYWAKE_POSE_DEGENERATE: u32 = 3;
+/// The sweep fits nothing known: its motion is that of the sweep before.
+pub const RAYWAKE_POSE_LOST: u32 = 4;
+
+/// What a sweep came to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepResult {
+    /// Time from the sweep before to this one, s; 0 where they are no pair: then there is no flow.
+    pub dt_s: f64,
+    /// Solid columns of the sweep before, whose flow can be read.
+    pub columns: usize,
+    /// Returns of the sweep before, whose flow can be read.
+    pub points: usize,
+    /// Tracklets that can be read.
+    pub tracklets: usize,
+    /// Columns with a valid match.
+    pub matched: usize,
+    /// Foreground columns of the sweep.
+    pub foreground: usize,
+    /// Foreground columns beyond the capacity.
+    pub foreground_dropped: usize,
+    /// Distinct rays of the sweep.
+    pub rays: usize,
+    /// Returns left out, as the sweep has more than the profile takes.
+    pub over_capacity: u64,
+    /// Returns left out that have a NaN or an infinity.
+    pub not_finite: u64,
+    /// Returns left out at (0, 0, 0).
+    pub no_return: u64,
+    /// Returns left out that are too far away.
+    pub too_far: u64,
+    /// Returns left out of a sensor that the rig does not have.
+    pub unknown_sensor: u64,
+    /// Returns of the own vehicle.
+    pub own_vehicle: u64,
+    /// Returns that the refinement had no room for.
+    pub unrefined: u64,
+    /// `RAYWAKE_RESET_...`: why the sweep does not continue the one before.
+    pub reset: u32,
+    /// `RAYWAKE_POSE_...`: where its pose is from.
+    pub pose_from: u32,
+    /// Pose of the vehicle at the stamp.
+    pub world_from_vehicle: CPose,
+}
+
+/// Numbers of the caller's, evenly spaced.
+#[derive(Clone, Copy)]
+struct Column {
+    start: *const u8,
+    stride: usize,
+}
+
+impl Column {
+    fn new(
+        start: *const c_void,
+        stride: usize,
+        bytes: usize,
+        count: usize,
+        what: &str,
+    ) -> Result<Column, Refusal> {
+        let stride = if stride == 0 { bytes } else { stride };
+        if count > 0 && start.is_null() {
+            return Err(Refusal::null(what));
+        }
+        if stride < bytes {
+            let why =
+                format_args!("`{what}_stride` is {stride}: less than the {bytes} bytes of one");
+            return Err(Refusal::invalid(why));
+        }
+        let all = stride.checked_mul(count).filter(|all| *all <= isize::MAX as usize);
+        all.ok_or_else(|| {
+            Refusal::invalid(format_args!("`count` times `{what}_stride` is no size"))
+        })?;
+        Ok(Column { start: start.cast(), stride })
+    }
+
+    /// # Safety
+    /// There is such an element.
+    #[inline]
+    unsafe fn get<T: Copy>(self, n: usize) -> T {
+        // SAFETY: the caller's promise.
+        unsafe { self.start.add(n * self.stride).cast::<T>().read_unaligned() }
+    }
+}
+
+/// # Safety
+/// `from` is null or can be read.
+unsafe fn get<T: Copy>(from: *const T) -> Option<T> {
+    // SAFETY: the caller's promise.
+    (!from.is_null()).then(|| unsafe { from.read_unaligned() })
+}
+
+impl CTwist {
+    fn twist(&self) -> Twist {
+        let [linear, angular] = [self.linear, self.angular].map(DVec3::from_array);
+        Twist { linear, angular }
+    }
+}
+
+impl SweepInput {
+    /// # Safety
+    /// As of [`raywake_step`].
+    unsafe fn place(&self) -> SweepPlace {
+        // SAFETY: the caller's promise.
+        let (pose, twist) = unsafe { (get(self.world_from_vehicle), get(self.twist)) };
+        SweepPlace {
+            stamp_s: self.stamp_s,
+            pose: pose.map(|pose| pose.pose()),
+            twist: twist.map(|twist| twist.twist()),
+        }
+    }
+
+    /// # Safety
+    /// As of [`raywake_step`].
+    unsafe fn points(&self) -> Result<impl ExactSizeIterator<Item = Point> + use<>, Refusal> {
+        let count = self.count;
+        let xyz = Column::new(self.xyz, self.xyz_stride, 12, count, "xyz")?;
+        let optional = |start: *const c_void, stride, bytes, what| {
+            (!start.is_null()).then(|| Column::new(start, stride, bytes, count, what)).transpose()
+        };
+        let time = optional(self.time_s, self.time_stride, 4, "time")?;
+        let sensor = optional(self.sensor, self.sensor_stride, 1, "sensor")?;
+        // SAFETY, of the three: the caller's promise.
+        Ok((0..count).map(move |n| Point {
+            position: unsafe { xyz.get(n) },
+            intensity: 0.0,
+            offset_s: time.map_or(0.0, |time| unsafe { time.get(n) }),
+            sensor: sensor.map_or(0, |sensor| u32::from(unsafe { sensor.get::<u8>(n) })),
+        }))
+    }
+}
+
+const fn reset_code(reset: Option<Reset>) -> u32 {
+    match reset {
+        None => RAYWAKE_RESET_NONE,
+        Some(Reset::First) => RAYWAKE_RESET_FIRST,
+        Some(Reset::Backwards(_)) => RAYWAKE_RESET_BACKWARDS,
+        Some(Reset::Gap(_)) => RAYWAKE_RESET_GAP,
+        Some(Reset::Jump(_)) => RAYWAKE_RESET_JUMP,
+        Some(Reset::Spin(_)) => RAYWAKE_RESET_SPIN,
+    }
+}
+
+const fn pose_code(locating: Option<Locating>) -> u32 {
+    match locating {
+        None => RAYWAKE_POSE_GIVEN,
+        Some(Locating::Start) => RAYWAKE_POSE_START,
+        Some(Locating::Registered) => RAYWAKE_POSE_REGISTERED,
+        Some(Locating::Degenerate) => RAYWAKE_POSE_DEGENERATE,
+        Some(Locating::Lost) => RAYWAKE_POSE_LOST,
+    }
+}
+
+impl StepResult {
+    fn new(summary: &StepSummary, tracklets: usize) -> StepResult {
+        let (dropped, pair) = (&summary.dropped, summary.pair);
+        StepResult {
+            dt_s: pair.map_or(0.0, |pair| pair.dt_s),
+            columns: pair.map_or(0, |pair| pair.columns),
+            points: pair.map_or(0, |pair| pair.points),
+            tracklets,
+            matched: pair.map_or(0, |pair| pair.valid),
+            foreground: summary.foreground,
+            foreground_dropped: pair.map_or(0, |pair| pair.foreground_dropped),
+            rays: summary.rays,
+            over_capacity: dropped.over_capacity,
+            not_finite: dropped.not_finite,
+            no_return: dropped.no_return,
+            too_far: dropped.too_far,
+            unknown_sensor: dropped.unknown_sensor,
+            own_vehicle: dropped.own_vehicle,
+            unrefined: summary.unrefined as u64,
+            reset: reset_code(summary.reset),
+            pose_from: pose_code(summary.locating),
+            world_from_vehicle: CPose::from(&summary.pose),
+        }
+    }
+}
+
+/// One sweep. The flow of the one before can be read until the next call of this function.
+///
+/// A sweep that is refused is as if it had not been given.
+///
+/// # Safety
+/// Pointers are null or to what they are of, with `count` elements; `estimator` is null, or was
+/// one once, and its memory is still there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_step(
+    estimator: *mut Handle,
+    sweep: *const SweepInput,
+    result: *mut StepResult,
+    error: *mut ErrorText,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    let stepped = unsafe { Handle::enter(estimator) }.and_then(|mut turn| {
+        if sweep.is_null() {
+            return Err(Refusal::null("sweep"));
+        }
+        // SAFETY: the caller's promise.
+        let sweep = unsafe { sweep.read_unaligned() };
+        // SAFETY: the caller's promise.
+        let (place, points) = unsafe { (sweep.place(), sweep.points()?) };
+        let team = turn.team();
+        let summary = team.step(&place, points)?;
+        Ok(StepResult::new(&summary, team.read(|e| e.tracklets().count())?))
+    });
+    // SAFETY: the caller's promise.
+    unsafe {
+        let stepped = stepped.and_then(|found| match result.is_null() {
+            true => Ok(()),
+            false => put(found, result, "result"),
+        });
+        told(stepped, error)
+    }
+}

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# libraywake from C and C++: the program's digest, and calls that cannot be right, counted, under
+# the address sanitizer and under Valgrind. `run.sh PROGRAM` compares with the program `raywake`.
+set -euo pipefail
+program=$(realpath "$1")
+cd "$(dirname "$0")/../../.."
+out=$PWD/target/capi
+mkdir -p "$out"
+
+host/capi/install.sh "$out"
+export PKG_CONFIG_PATH=$out/lib/pkgconfig
+flags=(-std=c11 -Wall -Wextra -Werror -pedantic -O2 -g)
+static=(-I"$out/include" "$out/lib/libraywake.a" -lm -lpthread -ldl)
+# shellcheck disable=SC2207
+shared=($(pkg-config --cflags --libs raywake) -Wl,-rpath,"$out/lib")
+source=host/capi/examples/replay.c
+
+dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$@"; }
+dump demo "$out/demo.sweeps" 20
+dump demo "$out/short.sweeps" 3
+
+digest_of() { sed -n 's/^digest *//p'; }
+expected=$("$program" demo --backend scalar --out "$out/demo" | digest_of)
+compare() {
+    local found
+    found=$("${@:2}" | digest_of)
+    echo "$1: $found"
+    [ -n "$found" ] && [ "$found" = "$expected" ] || { echo "the program: $expected"; exit 1; }
+}
+gcc "${flags[@]}" "$source" -o "$out/replay" "${static[@]}"
+gcc "${flags[@]}" "$source" -o "$out/replay-shared" "${shared[@]}"
+compare "C, two threads" "$out/replay" "$out/demo.sweeps" 2
+compare "C, one thread, shared library" "$out/replay-shared" "$out/demo.sweeps" 1
+
+# The header is one of C++, too; and the shared library is found by its ABI.
+echo '#include <raywake.h>
+int main() { return raywake_abi_version() - RAYWAKE_ABI_VERSION; }' >"$out/abi.cc"
+g++ -std=c++11 -Wall -Wextra -Werror -pedantic "$out/abi.cc" -o "$out/abi" "${shared[@]}"
+"$out/abi"
+readelf -d "$out/abi" | grep -q 'NEEDED.*libraywake.so.1'
+exported=$(nm -D --defined-only "$out/lib/libraywake.so" | awk '$2 == "T" {print $3}')
+[ -z "$(grep -v '^raywake_' <<<"$exported")" ] || { echo "exported: $exported"; exit 1; }
+
+misuse() { gcc "${flags[@]}" "$@" host/capi/tests/misuse.c -o "$out/misuse" "${static[@]}"; }
+misuse -DCOUNT_ALLOCATIONS
+echo "nothing allocated: $("$out/misuse" "$out/short.sweeps")"
+misuse -fsanitize=address,undefined -fno-sanitize-recover=all
+echo "address sanitizer: $("$out/misuse" "$out/short.sweeps")"
+misuse
+# Threads share one core there: fairly, or whoever disturbs keeps it.
+valgrind --quiet --error-exitcode=1 --fair-sched=yes \
+    --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite \
+    "$out/misuse" "$out/short.sweeps" | sed 's/^/valgrind: /'

@@ -1,0 +1,244 @@
+//! The pipeline with all it works in, in memory of the caller's.
+
+use raywake_core::digest::Digest;
+use raywake_core::encoder::{self, EncoderWeights};
+use raywake_core::output::{ColumnFlow, KeptPoints, Output, PointFlows, ReturnFlow, TrackletState};
+use raywake_core::params::{Profile, SOLID_MAX};
+use raywake_core::perceive::{Machine, ScalarBackend};
+use raywake_core::pipeline::Pipeline;
+use raywake_core::pose::{Pose, Twist};
+use raywake_core::prepare::{Preparation, Setup};
+use raywake_core::sweep::{Point, Sweep};
+use raywake_core::team::Team;
+use raywake_core::weights::WeightsError;
+use raywake_registration::Odometry;
+use raywake_registration::odometry::Locating;
+
+use crate::memory::{AtRest, Memory, array, bytes_of, state};
+use crate::options::{CreateError, EstimatorOptions};
+use crate::place::{SweepError, SweepPlace, normalised};
+use crate::summary::StepSummary;
+
+impl AtRest for Pipeline {
+    const REST: Pipeline = Pipeline::new();
+}
+
+impl AtRest for Odometry {
+    const REST: Odometry = Odometry::new();
+}
+
+/// A pair's flow, but for its slices.
+#[derive(Clone, Copy)]
+struct KeptPair {
+    columns: usize,
+    points: KeptPoints,
+}
+
+/// Chapter 3, refined, a sweep at a time on the CPU: a pipeline, the storage of its results and the
+/// two sweeps that it looks at.
+pub struct FlowEstimator {
+    setup: Setup,
+    pipeline: &'static mut Pipeline,
+    odometry: Option<&'static mut Odometry>,
+    backend: ScalarBackend<&'static mut [u32]>,
+    columns: &'static mut [ColumnFlow],
+    taken: &'static mut [ReturnFlow],
+    /// Returns of the last sweep, and of the one before.
+    sweeps: [SweepRoom; 2],
+    pair: Option<KeptPair>,
+    before: Option<(f64, Pose)>,
+}
+
+/// Returns of a sweep.
+struct SweepRoom {
+    points: &'static mut [Point],
+    count: usize,
+}
+
+/// Room for columns that are put out.
+fn solid(profile: &Profile) -> usize {
+    profile.columns().min(SOLID_MAX)
+}
+
+/// Words that perception works in.
+fn words(profile: &Profile) -> usize {
+    ScalarBackend::<&mut [u32]>::words(profile)
+}
+
+impl EstimatorOptions {
+    /// Bytes that an estimator needs, wherever they begin: what [`FlowEstimator::new`] cuts off.
+    pub fn bytes(&self) -> Result<usize, CreateError> {
+        self.check()?;
+        let EstimatorOptions { profile, points_max, registers, .. } = self;
+        Ok(bytes_of::<Pipeline>(1)
+            + bytes_of::<Odometry>(usize::from(*registers))
+            + bytes_of::<u32>(words(profile))
+            + bytes_of::<ColumnFlow>(solid(profile))
+            + bytes_of::<ReturnFlow>(profile.returns())
+            + 2 * bytes_of::<Point>(*points_max))
+    }
+}
+
+impl SweepRoom {
+    fn new(memory: &mut Memory, most: usize) -> Option<SweepRoom> {
+        Some(SweepRoom { points: array(memory, most, Point::default())?, count: 0 })
+    }
+
+    fn points(&self) -> &[Point] {
+        &self.points[..self.count]
+    }
+}
+
+/// Loads the encoder where something is refined, as nothing else asks it.
+fn load_encoder(pipeline: &mut Pipeline, profile: &Profile) -> Result<(), WeightsError> {
+    if profile.refinement_sweeps == 0 {
+        return Ok(());
+    }
+    let load = |to: &mut EncoderWeights| to.load(encoder::SHIPPED, profile.levels as usize);
+    pipeline.encoder.load_weights(load)
+}
+
+impl FlowEstimator {
+    /// In memory of at least [`EstimatorOptions::bytes`]. It allocates nothing, here or later.
+    pub fn new(
+        options: &EstimatorOptions,
+        mut memory: Memory,
+    ) -> Result<FlowEstimator, CreateError> {
+        let EstimatorOptions { profile, rig, points_max, registers } = options;
+        let bytes = options.bytes()?;
+        let lacking = || CreateError::Memory(bytes);
+        if memory.len() < bytes {
+            return Err(lacking());
+        }
+        let rest = &mut memory;
+        let pipeline = state::<Pipeline>(rest).ok_or_else(lacking)?;
+        let odometry =
+            registers.then(|| state::<Odometry>(rest).ok_or_else(lacking)).transpose()?;
+        let words = array(rest, words(profile), 0).ok_or_else(lacking)?;
+        let columns = array(rest, solid(profile), ColumnFlow::default()).ok_or_else(lacking)?;
+        let taken = array(rest, profile.returns(), ReturnFlow::default()).ok_or_else(lacking)?;
+        let mut room = || SweepRoom::new(rest, *points_max).ok_or_else(lacking);
+        let sweeps = [room()?, room()?];
+        let (backend, scores) =
+            ScalarBackend::shipped(words, profile).map_err(CreateError::Weights)?;
+        load_encoder(pipeline, profile).map_err(CreateError::Weights)?;
+        let setup = Setup {
+            profile: profile.clone(),
+            rig: rig.clone(),
+            scores,
+            unfiltered: false,
+            preparation: Preparation::new(),
+        };
+        let (pair, before) = (None, None);
+        Ok(FlowEstimator {
+            setup,
+            pipeline,
+            odometry,
+            backend,
+            columns,
+            taken,
+            sweeps,
+            pair,
+            before,
+        })
+    }
+
+    /// One sweep. What was to be read of the pair before is gone.
+    ///
+    /// # Errors
+    /// The sweep cannot be one; it is as if it had not been given.
+    pub fn step(
+        &mut self,
+        team: &impl Team,
+        place: &SweepPlace,
+        points: impl ExactSizeIterator<Item = Point>,
+    ) -> Result<StepSummary, SweepError> {
+        self.receive(place, points)?;
+        Ok(self.advance(team, place))
+    }
+
+    /// Takes the returns of a sweep.
+    pub(crate) fn receive(
+        &mut self,
+        place: &SweepPlace,
+        points: impl ExactSizeIterator<Item = Point>,
+    ) -> Result<(), SweepError> {
+        self.admit(place, points.len())?;
+        self.pair = None;
+        self.sweeps.swap(0, 1);
+        let SweepRoom { points: room, count } = &mut self.sweeps[0];
+        // An iterator that errs about its length gives what it has, within the room.
+        *count = room.iter_mut().zip(points).map(|(to, point)| *to = point).count();
+        Ok(())
+    }
+
+    /// Does the work of the sweep received.
+    pub(crate) fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
+        let (pose, twist, locating) = self.locate(place);
+        let [now, before] = &self.sweeps;
+        let sweep =
+            Sweep { stamp_s: place.stamp_s, points: now.points(), world_from_vehicle: pose, twist };
+        let machine = Machine { backend: &mut self.backend, team, timer: &mut () };
+        let room = Output { columns: self.columns, points: self.taken };
+        let step = self.pipeline.step(&self.setup, machine, &sweep, before.points(), room);
+        let output = step.unwrap_or_else(|never| match never {});
+        let summary = StepSummary::new(&output, pose, locating);
+        self.pair = output
+            .flows
+            .map(|flows| KeptPair { columns: flows.columns.len(), points: flows.points.keep() });
+        self.before = Some((place.stamp_s, pose));
+        summary
+    }
+
+    fn admit(&self, place: &SweepPlace, points: usize) -> Result<(), SweepError> {
+        let most = self.sweeps[0].points.len();
+        if points > most {
+            return Err(SweepError::Points(most));
+        }
+        if place.pose.is_some() == self.odometry.is_some() {
+            return Err(SweepError::Pose);
+        }
+        if place.is_sound() { Ok(()) } else { Err(SweepError::NotFinite) }
+    }
+
+    /// Pose and twist of the sweep that has just come.
+    fn locate(&mut self, place: &SweepPlace) -> (Pose, Twist, Option<Locating>) {
+        let stamp_s = place.stamp_s;
+        if let Some(odometry) = &mut self.odometry {
+            place.twist.into_iter().for_each(|twist| odometry.expect(twist));
+            let found = odometry.locate(stamp_s, self.sweeps[0].points(), &self.setup.rig);
+            return (found.world_from_vehicle, found.twist, Some(found.locating));
+        }
+        let pose = normalised(place.pose.unwrap_or(Pose::IDENTITY));
+        let steady = self.before.filter(|(at_s, before)| {
+            self.setup.profile.limits.broken(before, &pose, stamp_s - at_s).is_none()
+        });
+        let from_poses = steady
+            .map_or(Twist::ZERO, |(at_s, before)| (pose.inverse() * before).twist(at_s - stamp_s));
+        (pose, place.twist.unwrap_or(from_poses), None)
+    }
+
+    /// Flow of the solid columns of the pair's first sweep; empty where the last sweep made no
+    /// pair.
+    pub fn columns(&self) -> &[ColumnFlow] {
+        self.pair.map_or(&[], |pair| &self.columns[..pair.columns])
+    }
+
+    /// Flow of the returns of the pair's first sweep, in their order.
+    pub fn points(&self) -> Option<PointFlows<'_>> {
+        let pair = self.pair.as_ref()?;
+        Some(pair.points.over(self.columns, self.taken, self.sweeps[1].points()))
+    }
+
+    /// Tracklets after the last sweep, at its time.
+    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
+        self.pipeline.tracklets(&self.setup.profile)
+    }
+
+    /// Adds all that can be read now to a digest: after every sweep, that of the program.
+    pub fn add_to(&self, digest: &mut Digest) {
+        self.columns().iter().for_each(|c| digest.column(c));
+        self.points().into_iter().flat_map(PointFlows::iter).for_each(|p| digest.point(&p));
+        self.tracklets().for_each(|t| digest.tracklet(&t));
+    }
+}

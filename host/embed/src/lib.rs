@@ -1,0 +1,27 @@
+#![cfg_attr(not(feature = "std"), no_std)]
+#![deny(missing_docs)]
+//! Temporal scene flow for other programs: a [`FlowEstimator`] lives in memory that it is given,
+//! keeps the two sweeps that it looks at, and hands out the flow from the one to the other.
+//!
+//! The library for C, the module for Python and programs without an operating system are built on
+//! it. It runs on the CPU, with the shipped weights. With the feature `std` a [`TeamEstimator`]
+//! brings threads of its own and the widest instructions of the processor; without it the package
+//! is `no_std`. Neither allocates after it is made; the plain one not even then.
+
+mod estimator;
+mod memory;
+mod options;
+mod place;
+mod records;
+mod summary;
+#[cfg(feature = "std")]
+mod team_estimator;
+
+pub use estimator::FlowEstimator;
+pub use memory::Memory;
+pub use options::{CreateError, EstimatorOptions};
+pub use place::{SweepError, SweepPlace};
+pub use records::{ColumnRecord, NO_CLASS, PointRecord, TrackletRecord};
+pub use summary::{PairSummary, StepSummary};
+#[cfg(feature = "std")]
+pub use team_estimator::{StepError, TeamEstimator};

@@ -1,0 +1,63 @@
+//! When and where a sweep was made, and what cannot be.
+
+use core::fmt;
+
+use raywake_core::pose::{Pose, Twist};
+
+/// When and where a sweep was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SweepPlace {
+    /// Time of the stamp, s.
+    pub stamp_s: f64,
+    /// `world_from_vehicle` at the stamp; none where it is to be found.
+    pub pose: Option<Pose>,
+    /// Velocity of the vehicle at the stamp; without it, what leads from the pose before to this.
+    pub twist: Option<Twist>,
+}
+
+/// Why a sweep was not taken. Nothing has changed: the next one may be given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SweepError {
+    /// It has more returns than [`points_max`](crate::EstimatorOptions::points_max).
+    Points(usize),
+    /// Its stamp, pose or twist is not finite, or its rotation no unit quaternion.
+    NotFinite,
+    /// There is no pose, and none is to be found; or there is one, and it was to be found.
+    Pose,
+}
+
+impl fmt::Display for SweepError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            SweepError::Points(most) => write!(f, "a sweep may have {most} returns"),
+            SweepError::NotFinite => {
+                write!(f, "stamp, pose and twist must be finite, the rotation a unit quaternion")
+            }
+            SweepError::Pose => {
+                write!(f, "poses are given with every sweep, or found for every sweep")
+            }
+        }
+    }
+}
+
+impl SweepPlace {
+    /// Whether its numbers can be those of a sweep.
+    pub(crate) fn is_sound(&self) -> bool {
+        let moves = self.twist.unwrap_or(Twist::ZERO);
+        self.stamp_s.is_finite()
+            && self.pose.iter().all(is_pose)
+            && moves.linear.is_finite()
+            && moves.angular.is_finite()
+    }
+}
+
+/// Finite, and of a quaternion of unit length to within a thousandth.
+pub(crate) fn is_pose(pose: &Pose) -> bool {
+    pose.translation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-3
+}
+
+/// What is of unit length but for rounding keeps its bits.
+pub(crate) fn normalised(pose: Pose) -> Pose {
+    let off = (pose.rotation.length_squared() - 1.0).abs();
+    if off <= 4.0 * f64::EPSILON { pose } else { Pose::new(pose.rotation, pose.translation) }
+}

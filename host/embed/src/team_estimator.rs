@@ -1,0 +1,204 @@
+//! An estimator with threads of its own.
+//!
+//! Threads that share work allocate where others hand them some. So one of the team leads it: it
+//! waits for sweeps, and whoever gives one waits for it.
+
+use std::fmt;
+use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+
+use rayon_core::{ThreadPool, ThreadPoolBuilder};
+use raywake_core::sweep::Point;
+use raywake_team::ThreadTeam;
+
+use crate::{FlowEstimator, StepSummary, SweepError, SweepPlace};
+
+/// Why a step has no result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepError {
+    /// The sweep was not taken.
+    Sweep(SweepError),
+    /// A defect of this library: the step did not come to its end, nor will a later one.
+    Failed,
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            StepError::Sweep(e) => e.fmt(f),
+            StepError::Failed => write!(f, "a defect: a sweep was not finished"),
+        }
+    }
+}
+
+impl std::error::Error for StepError {}
+
+/// An estimator, and the threads that share its work. Any thread may give it sweeps.
+pub struct TeamEstimator {
+    desk: Arc<Desk>,
+    threads: Vec<JoinHandle<()>>,
+    pool: Option<ThreadPool>,
+}
+
+/// Where the caller and the leader of the team meet.
+struct Desk {
+    work: Mutex<Work>,
+    changed: Condvar,
+}
+
+struct Work {
+    estimator: FlowEstimator,
+    order: StepOrder,
+    /// A step did not come to its end.
+    failed: bool,
+}
+
+enum StepOrder {
+    None,
+    /// The returns have been put in.
+    Step(SweepPlace),
+    Done(Result<StepSummary, StepError>),
+    Quit,
+}
+
+impl TeamEstimator {
+    /// With so many threads, that which gives a sweep not counted while it waits; 0: as many as
+    /// pay. With one, the thread that gives a sweep does the work.
+    ///
+    /// # Errors
+    /// The system has no more threads.
+    pub fn new(estimator: FlowEstimator, threads: usize) -> io::Result<TeamEstimator> {
+        let threads = paying(threads);
+        let work = Work { estimator, order: StepOrder::None, failed: false };
+        let desk = Arc::new(Desk { work: Mutex::new(work), changed: Condvar::new() });
+        let mut made = TeamEstimator { desk, threads: Vec::new(), pool: None };
+        if threads > 1 {
+            made.gather(threads)?;
+        }
+        Ok(made)
+    }
+
+    fn gather(&mut self, threads: usize) -> io::Result<()> {
+        let running = &mut self.threads;
+        let pool = ThreadPoolBuilder::new().num_threads(threads).spawn_handler(|member| {
+            let name = format!("raywake {}", member.index());
+            running.push(thread::Builder::new().name(name).spawn(|| member.run())?);
+            Ok(())
+        });
+        let pool = pool.build().map_err(io::Error::other)?;
+        // What a thread allocates when it first looks for work.
+        pool.broadcast(|_| ());
+        let desk = self.desk.clone();
+        pool.spawn(move || desk.lead());
+        self.pool = Some(pool);
+        Ok(())
+    }
+
+    /// Threads that share the work.
+    pub fn threads(&self) -> usize {
+        self.threads.len().max(1)
+    }
+
+    /// One sweep. See [`FlowEstimator::step`].
+    ///
+    /// # Errors
+    /// The sweep was not taken, or a step failed, this one or an earlier one.
+    pub fn step(
+        &mut self,
+        place: &SweepPlace,
+        points: impl ExactSizeIterator<Item = Point>,
+    ) -> Result<StepSummary, StepError> {
+        let mut work = self.desk.work();
+        if work.failed {
+            return Err(StepError::Failed);
+        }
+        work.estimator.receive(place, points).map_err(StepError::Sweep)?;
+        match self.pool {
+            None => work.step(place),
+            Some(_) => self.desk.order(work, place),
+        }
+    }
+
+    /// Reads what the last sweep came to.
+    ///
+    /// # Errors
+    /// A step failed.
+    pub fn read<R>(&self, read: impl FnOnce(&FlowEstimator) -> R) -> Result<R, StepError> {
+        let work = self.desk.work();
+        if work.failed { Err(StepError::Failed) } else { Ok(read(&work.estimator)) }
+    }
+}
+
+/// As many as pay, or fewer.
+fn paying(asked: usize) -> usize {
+    match asked {
+        0 => raywake_team::available(),
+        n => n.min(raywake_team::THREADS_MAX),
+    }
+}
+
+impl Desk {
+    fn work(&self) -> MutexGuard<'_, Work> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, work: MutexGuard<'a, Work>) -> MutexGuard<'a, Work> {
+        self.changed.wait(work).unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has the leader do a step.
+    fn order(
+        &self,
+        mut work: MutexGuard<Work>,
+        place: &SweepPlace,
+    ) -> Result<StepSummary, StepError> {
+        work.order = StepOrder::Step(*place);
+        self.changed.notify_all();
+        loop {
+            if let StepOrder::Done(result) = work.order {
+                work.order = StepOrder::None;
+                return result;
+            }
+            work = self.wait(work);
+        }
+    }
+
+    /// The leader's life.
+    fn lead(&self) {
+        let mut work = self.work();
+        loop {
+            match work.order {
+                StepOrder::Step(place) => {
+                    let result = work.step(&place);
+                    work.order = StepOrder::Done(result);
+                    self.changed.notify_all();
+                }
+                StepOrder::Quit => return,
+                StepOrder::None | StepOrder::Done(_) => work = self.wait(work),
+            }
+        }
+    }
+}
+
+impl Work {
+    fn step(&mut self, place: &SweepPlace) -> Result<StepSummary, StepError> {
+        let team = ThreadTeam::new(None);
+        let work = AssertUnwindSafe(|| self.estimator.advance(&team, place));
+        let result = catch_unwind(work).map_err(|_| StepError::Failed);
+        self.failed = result.is_err();
+        result
+    }
+}
+
+impl Drop for TeamEstimator {
+    /// Waits for all threads: the code they run may be unloaded next.
+    fn drop(&mut self) {
+        self.desk.work().order = StepOrder::Quit;
+        self.desk.changed.notify_all();
+        self.pool = None;
+        // One that panicked has ended, too.
+        self.threads.drain(..).for_each(|thread| drop(thread.join()));
+    }
+}
