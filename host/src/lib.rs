@@ -32,7 +32,7 @@ pub mod drive;
 pub mod engine;
 pub mod error;
 mod figures;
-mod flow;
+pub mod flow;
 pub mod laps;
 pub mod locate;
 pub mod map;

@@ -24,4 +24,4 @@ pub use place::{SweepError, SweepPlace};
 pub use records::{ColumnRecord, NO_CLASS, PointRecord, TrackletRecord};
 pub use summary::{PairSummary, StepSummary};
 #[cfg(feature = "std")]
-pub use team_estimator::{StepError, TeamEstimator};
+pub use team_estimator::{StepError, TeamError, TeamEstimator};

@@ -1,10 +1,45 @@
-//! Memory that somebody else gave, cut into the parts that are needed. All that this package does
+//! Memory that somebody else gave, cut into the parts that are needed. What this package does
 //! unsafely is here.
 
 use core::mem::MaybeUninit;
 
 /// Memory for the rest of the program, or for as long as its owner says.
 pub type Memory = &'static mut [MaybeUninit<u8>];
+
+/// Memory of the heap, freed with this.
+#[cfg(feature = "std")]
+pub(crate) struct HeapMemory(*mut [MaybeUninit<u8>]);
+
+// SAFETY: all that is done to it is that it is freed, once.
+#[cfg(feature = "std")]
+unsafe impl Send for HeapMemory {}
+// SAFETY: as above.
+#[cfg(feature = "std")]
+unsafe impl Sync for HeapMemory {}
+
+#[cfg(feature = "std")]
+impl HeapMemory {
+    /// So many bytes, and the right to them; none where the system does not give them.
+    ///
+    /// # Safety
+    /// Whatever is made of the memory is dropped before this.
+    pub(crate) unsafe fn new(bytes: usize) -> Option<(HeapMemory, Memory)> {
+        let mut place = Vec::<MaybeUninit<u8>>::new();
+        place.try_reserve_exact(bytes).ok()?;
+        place.resize(bytes, MaybeUninit::uninit());
+        let place = Box::into_raw(place.into_boxed_slice());
+        // SAFETY: it has just been allocated; the caller promises how long it is used.
+        Some((HeapMemory(place), unsafe { &mut *place }))
+    }
+}
+
+#[cfg(feature = "std")]
+impl Drop for HeapMemory {
+    fn drop(&mut self) {
+        // SAFETY: it was a box; nobody uses it any more, as `new` was promised.
+        drop(unsafe { Box::from_raw(self.0) });
+    }
+}
 
 /// What a place is filled with at the start. A constant is written to its place: by way of the
 /// stack, states of tens of MiB would need as much of that.

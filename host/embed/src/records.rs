@@ -1,5 +1,6 @@
 //! What is read out of an estimator, as plain records: the same in C and in NumPy.
 
+use bytemuck::{Pod, Zeroable};
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
 
@@ -8,7 +9,7 @@ pub const NO_CLASS: u8 = 255;
 
 /// Flow of one solid column of a pair's first sweep.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ColumnRecord {
     /// Centre in the world (the frame of the poses), m.
     pub position_world_m: [f64; 2],
@@ -41,7 +42,7 @@ pub struct ColumnRecord {
 
 /// Flow of one return of a pair's first sweep.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct PointRecord {
     /// Velocity over ground along world axes, m/s.
     pub velocity_world_mps: [f32; 2],
@@ -66,7 +67,7 @@ pub struct PointRecord {
 
 /// A flow tracklet, at the time of the last sweep.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct TrackletRecord {
     /// Position in the world, m.
     pub position_world_m: [f64; 2],

@@ -13,7 +13,8 @@ use rayon_core::{ThreadPool, ThreadPoolBuilder};
 use raywake_core::sweep::Point;
 use raywake_team::ThreadTeam;
 
-use crate::{FlowEstimator, StepSummary, SweepError, SweepPlace};
+use crate::memory::HeapMemory;
+use crate::{CreateError, EstimatorOptions, FlowEstimator, StepSummary, SweepError, SweepPlace};
 
 /// Why a step has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +41,17 @@ pub struct TeamEstimator {
     desk: Arc<Desk>,
     threads: Vec<JoinHandle<()>>,
     pool: Option<ThreadPool>,
+    /// Of the estimator, where it is not the caller's. Dropped last.
+    memory: Option<HeapMemory>,
+}
+
+/// Why there is no estimator with threads.
+#[derive(Debug)]
+pub enum TeamError {
+    /// There is no estimator.
+    Create(CreateError),
+    /// The system has no more threads.
+    Threads(io::Error),
 }
 
 /// Where the caller and the leader of the team meet.
@@ -63,6 +75,15 @@ enum StepOrder {
     Quit,
 }
 
+impl fmt::Display for TeamError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            TeamError::Create(e) => e.fmt(f),
+            TeamError::Threads(e) => e.fmt(f),
+        }
+    }
+}
+
 impl TeamEstimator {
     /// With so many threads, that which gives a sweep not counted while it waits; 0: as many as
     /// pay. With one, the thread that gives a sweep does the work.
@@ -73,10 +94,25 @@ impl TeamEstimator {
         let threads = paying(threads);
         let work = Work { estimator, order: StepOrder::None, failed: false };
         let desk = Arc::new(Desk { work: Mutex::new(work), changed: Condvar::new() });
-        let mut made = TeamEstimator { desk, threads: Vec::new(), pool: None };
+        let mut made = TeamEstimator { desk, threads: Vec::new(), pool: None, memory: None };
         if threads > 1 {
             made.gather(threads)?;
         }
+        Ok(made)
+    }
+
+    /// The same in memory of its own.
+    ///
+    /// # Errors
+    /// As of [`FlowEstimator::new`] and [`TeamEstimator::new`].
+    pub fn on_heap(options: &EstimatorOptions, threads: usize) -> Result<TeamEstimator, TeamError> {
+        let bytes = options.bytes().map_err(TeamError::Create)?;
+        // SAFETY: it is kept until after the estimator.
+        let housed = unsafe { HeapMemory::new(bytes) };
+        let (memory, place) = housed.ok_or(TeamError::Create(CreateError::Memory(bytes)))?;
+        let estimator = FlowEstimator::new(options, place).map_err(TeamError::Create)?;
+        let mut made = TeamEstimator::new(estimator, threads).map_err(TeamError::Threads)?;
+        made.memory = Some(memory);
         Ok(made)
     }
 

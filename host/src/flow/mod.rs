@@ -3,8 +3,8 @@
 //! The second cloud is registered with the first, then both go through the pipeline as the two
 //! sweeps of a drive whose world is the first cloud's frame.
 
-mod motion;
-mod rows;
+pub mod motion;
+pub mod rows;
 
 use std::path::{Path, PathBuf};
 

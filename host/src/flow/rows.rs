@@ -25,7 +25,9 @@ pub struct PointRow {
     pub motion: [f32; 3],
     /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
     pub covariance: [f32; 3],
+    /// Whence the flow.
     pub basis: FlowBasis,
+    /// What became of it.
     pub status: Status,
 }
 

@@ -155,7 +155,7 @@ impl Overview {
 }
 
 /// A recording. Indices of sweeps are below [`Source::len`].
-pub trait Source {
+pub trait Source: Send {
     /// What is known before a cloud is read.
     fn overview(&self) -> &Overview;
 

@@ -1,0 +1,295 @@
+//! A sweep at a time.
+
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use raywake_core::continuity::Reset;
+use raywake_core::digest::Digest;
+use raywake_core::params::{AssignError, ParameterSetting, Profile, Value};
+use raywake_core::sweep::Point;
+use raywake_embed::{
+    ColumnRecord, CreateError, EstimatorOptions, FlowEstimator, PointRecord, StepError,
+    StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
+};
+
+use crate::arrays::{self, array};
+use crate::poses::{matrix, pose, twist};
+use crate::recording::PySweep;
+use crate::rig::PyRig;
+
+/// Temporal scene flow, a sweep at a time, on the CPU.
+///
+/// profile: "hdl64" (a window of +-25 m), "wide" (+-35 m), "far" (+-50 m) or "dissertation".
+/// rig: where the sensors sit; see Rig.
+/// settings: parameters of the profile, by the names of PARAMETERS.md.
+/// find_poses: no poses will be given; they are found by registration.
+/// points_max: returns that a sweep has at most; 0: as many as the profile takes.
+/// threads: 0: as many as pay.
+///
+/// All memory is allocated here.
+#[pyclass(module = "raywake", name = "Pipeline")]
+pub struct PyPipeline {
+    team: TeamEstimator,
+    /// Returns of the sweep in hand.
+    points: Vec<Point>,
+    /// Steps so far.
+    steps: u64,
+    digest: Digest,
+    find_poses: bool,
+    /// Bytes that it works in.
+    #[pyo3(get)]
+    memory: usize,
+}
+
+/// A profile with some of its parameters set.
+pub fn profile(name: &str, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Profile> {
+    let mut profile = Profile::named(name)
+        .ok_or_else(|| PyValueError::new_err(format!("there is no profile {name:?}")))?;
+    for (key, value) in settings.into_iter().flat_map(|settings| settings.iter()) {
+        set(&mut profile, &key.extract::<String>()?, &value)?;
+    }
+    Ok(profile)
+}
+
+fn set(profile: &mut Profile, path: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let word: String;
+    let value = if let Ok(flag) = value.extract::<bool>() {
+        Value::Flag(flag)
+    } else if let Ok(number) = value.extract::<f64>() {
+        Value::Number(number)
+    } else {
+        word = value.extract()?;
+        Value::Word(&word)
+    };
+    let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
+    profile.assign(&ParameterSetting { group, name, value }).map_err(|e| match e {
+        AssignError::Unknown => PyValueError::new_err(format!("there is no parameter {path:?}")),
+        AssignError::Must(must) => PyValueError::new_err(format!("{path} must be {must}")),
+    })
+}
+
+/// An estimator in memory of its own.
+pub fn estimator(options: &EstimatorOptions, threads: usize) -> PyResult<TeamEstimator> {
+    TeamEstimator::on_heap(options, threads).map_err(|e| match e {
+        TeamError::Create(CreateError::Memory(_)) => PyMemoryError::new_err(e.to_string()),
+        TeamError::Create(_) => PyValueError::new_err(e.to_string()),
+        TeamError::Threads(e) => e.into(),
+    })
+}
+
+#[pymethods]
+impl PyPipeline {
+    #[new]
+    #[pyo3(signature = (profile="hdl64", rig=None, *, settings=None, find_poses=false, points_max=0,
+        threads=0))]
+    fn new(
+        profile: &str,
+        rig: Option<&PyRig>,
+        settings: Option<&Bound<'_, PyDict>>,
+        find_poses: bool,
+        points_max: usize,
+        threads: usize,
+    ) -> PyResult<PyPipeline> {
+        let profile = self::profile(profile, settings)?;
+        let rig = rig.map_or_else(PyRig::alone, |rig| Ok(rig.clone()))?.0;
+        let points_max = if points_max == 0 { profile.returns() } else { points_max };
+        let options = EstimatorOptions { profile, rig, points_max, registers: find_poses };
+        let team = estimator(&options, threads)?;
+        let memory = options.bytes().map_err(|e| PyValueError::new_err(e.to_string()))?;
+        let (points, digest) = (Vec::with_capacity(points_max), Digest::default());
+        Ok(PyPipeline { team, points, steps: 0, digest, find_poses, memory })
+    }
+
+    /// One sweep; returns what is known of the pair of the sweep before and this one.
+    ///
+    /// points: N x 3 or more numbers, x, y, z in the vehicle frame, m; (0, 0, 0) and NaN are no
+    ///     returns. Or a Sweep of a Recording, which comes with all that follows.
+    /// stamp: time of the sweep, s.
+    /// pose: world_from_vehicle; not with find_poses.
+    /// twist: vx, vy, vz, wx, wy, wz of the vehicle along its own axes; without: from the poses.
+    /// time: time of every return after the stamp, s.
+    /// sensor: index of every return's sensor.
+    #[pyo3(signature = (points, stamp=None, pose=None, *, twist=None, time=None, sensor=None))]
+    fn step(
+        mut slf: PyRefMut<'_, Self>,
+        points: &Bound<'_, PyAny>,
+        stamp: Option<f64>,
+        pose: Option<&Bound<'_, PyAny>>,
+        twist: Option<&Bound<'_, PyAny>>,
+        time: Option<&Bound<'_, PyAny>>,
+        sensor: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Step> {
+        let this = &mut *slf;
+        let place = if let Ok(sweep) = points.cast::<PySweep>() {
+            if stamp.or(pose.map(|_| 0.0)).or(time.or(sensor).map(|_| 0.0)).is_some() {
+                return Err(PyTypeError::new_err(
+                    "a Sweep comes with stamp, pose, time and sensor",
+                ));
+            }
+            let PySweep { data, located } = sweep.get();
+            this.points.clone_from(&data.points);
+            let given = *located && !this.find_poses;
+            SweepPlace {
+                stamp_s: data.stamp_s,
+                pose: given.then_some(data.world_from_vehicle),
+                twist: given.then_some(data.twist),
+            }
+        } else {
+            arrays::points(&mut this.points, points, time, sensor)?;
+            SweepPlace {
+                stamp_s: stamp.ok_or_else(|| PyTypeError::new_err("stamp is missing"))?,
+                pose: pose.map(|value| self::pose(value, "pose")).transpose()?,
+                twist: twist.map(self::twist).transpose()?,
+            }
+        };
+        let py = points.py();
+        let (team, points) = (&mut this.team, &this.points);
+        let stepped = py.detach(|| team.step(&place, points.iter().copied()));
+        let summary = stepped.map_err(refused)?;
+        this.steps += 1;
+        let number = this.steps;
+        Ok(Step { pipeline: slf.into(), number, summary, arrays: [const { None }; 3] })
+    }
+
+    /// Adds all that the last step found to the digest and returns that: of a recording stepped
+    /// through it is the digest that `raywake run` prints.
+    fn update_digest(&mut self) -> PyResult<String> {
+        let digest = &mut self.digest;
+        self.team.read(|found| found.add_to(digest)).map_err(refused)?;
+        Ok(format!("{:016x}", self.digest.value()))
+    }
+
+    /// Threads that share the work.
+    #[getter]
+    fn threads(&self) -> usize {
+        self.team.threads()
+    }
+}
+
+fn refused(e: StepError) -> PyErr {
+    match e {
+        StepError::Sweep(e) => PyValueError::new_err(e.to_string()),
+        StepError::Failed => PyRuntimeError::new_err(e.to_string()),
+    }
+}
+
+/// What a step found: the flow of the sweep before, and tracklets at the time of this one.
+///
+/// Arrays are made when they are first asked for, before the pipeline's next step.
+#[pyclass(module = "raywake")]
+pub struct Step {
+    pipeline: Py<PyPipeline>,
+    number: u64,
+    summary: StepSummary,
+    /// Of columns, points and tracklets.
+    arrays: [Option<Py<PyAny>>; 3],
+}
+
+impl Step {
+    /// An array that has been made, or is made now.
+    fn array(
+        &mut self,
+        py: Python<'_>,
+        which: usize,
+        make: impl FnOnce(&FlowEstimator) -> PyResult<Py<PyAny>>,
+    ) -> PyResult<Py<PyAny>> {
+        if let Some(array) = &self.arrays[which] {
+            return Ok(array.clone_ref(py));
+        }
+        let pipeline = self.pipeline.try_borrow(py)?;
+        if pipeline.steps != self.number {
+            let why = "the pipeline has gone on: ask for arrays of a step before the next one";
+            return Err(PyRuntimeError::new_err(why));
+        }
+        let array = pipeline.team.read(make).map_err(refused)??;
+        self.arrays[which] = Some(array.clone_ref(py));
+        Ok(array)
+    }
+}
+
+#[pymethods]
+impl Step {
+    /// Solid columns of the sweep before: an array of COLUMN_DTYPE.
+    #[getter]
+    fn columns(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.array(py, 0, |found| {
+            let columns = found.columns();
+            Ok(array(py, columns.len(), columns.iter().map(ColumnRecord::from))?.unbind())
+        })
+    }
+
+    /// Returns of the sweep before, in their order: an array of POINT_DTYPE.
+    #[getter]
+    fn points(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.array(py, 1, |found| {
+            let count = found.points().map_or(0, |points| points.count());
+            let points = found.points().into_iter().flat_map(|points| points.iter());
+            Ok(array(py, count, points.map(PointRecord::from))?.unbind())
+        })
+    }
+
+    /// Tracklets at the time of this sweep: an array of TRACKLET_DTYPE.
+    #[getter]
+    fn tracklets(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.array(py, 2, |found| {
+            let count = found.tracklets().count();
+            Ok(array(py, count, found.tracklets().map(TrackletRecord::from))?.unbind())
+        })
+    }
+
+    /// Time from the sweep before to this one, s; None where they are no pair.
+    #[getter]
+    fn dt(&self) -> Option<f64> {
+        self.summary.pair.map(|pair| pair.dt_s)
+    }
+
+    /// Why this sweep does not continue the one before: "first", "backwards", "gap", "jump" or
+    /// "spin"; None where it does.
+    #[getter]
+    fn reset(&self) -> Option<&'static str> {
+        self.summary.reset.map(|reset| match reset {
+            Reset::First => "first",
+            Reset::Backwards(_) => "backwards",
+            Reset::Gap(_) => "gap",
+            Reset::Jump(_) => "jump",
+            Reset::Spin(_) => "spin",
+        })
+    }
+
+    /// world_from_vehicle of this sweep, 4x4.
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(matrix(py, &self.summary.pose)?.into_any())
+    }
+
+    /// How the pose was found: "start", "registered", "degenerate" or "lost"; None where it was
+    /// given.
+    #[getter]
+    fn located(&self) -> Option<String> {
+        self.summary.locating.map(|locating| format!("{locating:?}").to_lowercase())
+    }
+
+    /// Returns of this sweep that were left out, by reason.
+    #[getter]
+    fn dropped<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (dropped, reasons) = (&self.summary.dropped, PyDict::new(py));
+        reasons.set_item("over_capacity", dropped.over_capacity)?;
+        reasons.set_item("not_finite", dropped.not_finite)?;
+        reasons.set_item("no_return", dropped.no_return)?;
+        reasons.set_item("too_far", dropped.too_far)?;
+        reasons.set_item("unknown_sensor", dropped.unknown_sensor)?;
+        reasons.set_item("own_vehicle", dropped.own_vehicle)?;
+        reasons.set_item("unrefined", self.summary.unrefined)?;
+        Ok(reasons)
+    }
+
+    fn __repr__(&self) -> String {
+        match (self.summary.pair, self.reset()) {
+            (Some(pair), _) => format!(
+                "<raywake.Step: {} columns, {} points, {:.3} s>",
+                pair.columns, pair.points, pair.dt_s
+            ),
+            (None, reset) => format!("<raywake.Step: no pair: {}>", reset.unwrap_or("none")),
+        }
+    }
+}

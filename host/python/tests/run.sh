@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# The wheel, built and put into a fresh environment, against the program and against what it cannot
+# take. `run.sh PROGRAM` compares with the program `raywake`; exit code 77: no tools to be had.
+set -euo pipefail
+program=$(realpath "$1")
+cd "$(dirname "$0")/../../.."
+out=$PWD/target/python
+python=$out/fresh/bin/python
+mkdir -p "$out"
+
+python3 -m venv "$out/tools" &&
+    "$out/tools/bin/pip" install --quiet --disable-pip-version-check maturin==1.16.0 || exit 77
+
+# The program's profile: its dependencies are compiled already.
+rm -rf "$out/wheels" "$out/fresh"
+PATH=$out/tools/bin:$PATH "$out/tools/bin/maturin" build --quiet --profile release \
+    --manifest-path host/python/Cargo.toml --target-dir target --out "$out/wheels"
+
+python3 -m venv "$out/fresh"
+start=$SECONDS
+"$out/fresh/bin/pip" install --quiet --disable-pip-version-check "$out"/wheels/raywake-*.whl || exit 77
+"$python" -c 'import numpy, raywake
+wall = numpy.stack(numpy.meshgrid([8.0], numpy.arange(-9, 9, 0.1), numpy.arange(-1.7, 3, 0.1)), -1)
+ground = numpy.stack(numpy.meshgrid(numpy.arange(-9, 9, 0.1), numpy.arange(-9, 9, 0.1), [-1.7]), -1)
+side = numpy.stack(numpy.meshgrid(numpy.arange(-9, 8, 0.1), [9.0], numpy.arange(-1.7, 3, 0.1)), -1)
+cloud = numpy.concatenate([part.reshape(-1, 3) for part in (wall, ground, side)])
+print(raywake.flow(cloud, cloud))'
+echo "from pip install to the flow of two arrays: $((SECONDS - start)) s"
+
+dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$@"; }
+dump demo "$out/demo.sweeps" 20
+RAYWAKE_SWEEPS=$out/demo.sweeps \
+    RAYWAKE_DIGEST=$("$program" demo --backend scalar --out "$out/demo" | sed -n 's/^digest *//p') \
+    "$python" host/python/tests/test_raywake.py

@@ -1,0 +1,293 @@
+"""The wheel against the program, and against what it cannot take.
+
+Run with RAYWAKE_SWEEPS=FILE, of dump_sweeps, and RAYWAKE_DIGEST=what the program prints for it.
+"""
+
+import ast
+import gc
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import numpy as np
+import raywake
+
+
+class Flat:
+    """A file of dump_sweeps."""
+
+    RETURN = np.dtype([("xyz", "<f4", 3), ("time", "<f4"), ("sensor", "<u4")])
+
+    def __init__(self, path):
+        self.data = Path(path).read_bytes()
+        timing, distorted, start, span, ground = struct.unpack_from("<2I3d", self.data)
+        own = struct.unpack_from("<4f", self.data, 32)
+        (count,) = struct.unpack_from("<Q", self.data, 48)
+        sensors = np.frombuffer(self.data, "<f8", 7 * count, 56).reshape(count, 7)
+        self.rig = raywake.Rig(
+            list(sensors),
+            timing=["stamp", "offset", "azimuth"][timing],
+            start=start,
+            span=span or 0.1,
+            distorted=bool(distorted),
+            ground=ground,
+            own_vehicle=own if any(own) else None,
+        )
+        self.start = 56 + sensors.nbytes
+
+    def __iter__(self):
+        at = self.start
+        while at < len(self.data):
+            stamp, *numbers = struct.unpack_from("<14d", self.data, at)
+            (count,) = struct.unpack_from("<Q", self.data, at + 112)
+            returns = np.frombuffer(self.data, self.RETURN, count, at + 120)
+            yield stamp, numbers[:7], numbers[7:], returns
+            at += 120 + returns.nbytes
+
+
+SWEEPS = Flat(os.environ["RAYWAKE_SWEEPS"])
+
+
+def drive(points=lambda xyz: xyz, most=None, **options):
+    """Steps through the sweeps; returns the digest and the last step."""
+    pipeline = raywake.Pipeline(rig=SWEEPS.rig, **options)
+    for n, (stamp, pose, twist, returns) in enumerate(SWEEPS):
+        if n == most:
+            break
+        arrays = {"time": returns["time"], "sensor": returns["sensor"]}
+        step = pipeline.step(points(returns["xyz"]), stamp, pose, twist=twist, **arrays)
+        digest = pipeline.update_digest()
+    return digest, step
+
+
+class Same(unittest.TestCase):
+    def test_digest_of_the_program(self):
+        for threads in (1, 2):
+            digest, step = drive(threads=threads)
+            self.assertEqual(digest, os.environ["RAYWAKE_DIGEST"])
+        self.assertGreater(np.count_nonzero(step.points["status"] == raywake.MOVING), 100)
+
+    def test_arrays_of_any_kind(self):
+        expected, _ = drive(most=3)
+        wide = lambda xyz: np.hstack([xyz, np.ones((len(xyz), 2), "f4")])
+        kinds = {
+            "double": lambda xyz: xyz.astype("f8"),
+            "big-endian": lambda xyz: xyz.astype(">f4"),
+            "Fortran": np.asfortranarray,
+            "strided": lambda xyz: np.repeat(xyz, 2, axis=0)[::2],
+            "backwards": lambda xyz: xyz[::-1].copy()[::-1],
+            "wide": wide,
+            "part of wide": lambda xyz: wide(xyz)[:, :3],
+            "packed": lambda xyz: np.frombuffer(b"x" + xyz.tobytes(), "f4", xyz.size, 1).reshape(
+                xyz.shape
+            ),
+            "list": lambda xyz: [list(row) for row in xyz[:]],
+        }
+        for name, kind in kinds.items():
+            with self.subTest(name):
+                self.assertEqual(drive(kind, most=3)[0], expected)
+
+    def test_records_outlive_all(self):
+        pipeline = raywake.Pipeline(rig=SWEEPS.rig)
+        kept = []
+        for stamp, pose, twist, returns in SWEEPS:
+            step = pipeline.step(returns["xyz"].copy(), stamp, pose, twist=twist)
+            kept.append((step.points, step.points.copy()))
+            if len(kept) == 4:
+                break
+        columns, tracklets = step.columns, step.tracklets
+        self.assertIs(step.columns, columns)
+        del step, pipeline, returns
+        gc.collect()
+        for array, copy in kept:
+            self.assertTrue((array == copy).all())
+        self.assertEqual(columns.dtype, raywake.COLUMN_DTYPE)
+        self.assertEqual(tracklets["covariance"].shape, (len(tracklets), 25))
+        view = columns["velocity_world_mps"]
+        self.assertTrue(view.shape == (len(columns), 2) and np.shares_memory(view, columns))
+        self.assertTrue(0 <= columns["probability"].min() <= columns["probability"].max() <= 1)
+
+    def test_flow_without_poses(self):
+        (_, pose_a, _, a), (_, pose_b, _, b) = list(SWEEPS)[4:6]
+        found = raywake.flow(a["xyz"], b["xyz"])
+        self.assertEqual(found.points.dtype, raywake.FLOW_DTYPE)
+        self.assertEqual(len(found.points), len(a))
+        given = raywake.flow(a["xyz"], b["xyz"], pose=found.pose, ground=found.ground)
+        for field in ("flow_m", "status"):
+            self.assertTrue((given.points[field] == found.points[field]).all())
+        there = np.hypot(*(np.subtract(pose_b[:2], pose_a[:2])))
+        self.assertAlmostEqual(np.hypot(*found.pose[:2, 3]), there, delta=0.1)
+
+    def test_poses_are_found(self):
+        pipeline = raywake.Pipeline(rig=SWEEPS.rig, find_poses=True)
+        found = []
+        for stamp, _, _, returns in list(SWEEPS)[:4]:
+            step = pipeline.step(returns["xyz"], stamp, time=returns["time"])
+            found.append(step.located)
+        self.assertEqual(found, ["start", "registered", "registered", "registered"])
+        self.assertEqual(step.pose.shape, (4, 4))
+
+    def test_recordings(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for n, (_, _, _, returns) in enumerate(list(SWEEPS)[:3]):
+                rows = np.hstack([returns["xyz"], np.zeros((len(returns), 1), "f4")])
+                Path(folder, f"{n:06}.bin").write_bytes(rows.tobytes())
+            recording = raywake.Recording(folder, ground=-1.7)
+            self.assertEqual((len(recording), recording.located), (3, False))
+            self.assertAlmostEqual(recording.rig.ground, -1.7)
+            last = recording[-1]
+            self.assertIsNone(last.pose)
+            with self.assertRaisesRegex(ValueError, "poses are given"):
+                raywake.Pipeline(rig=recording.rig).step(last)
+            self.assertEqual(last.points.tobytes(), returns["xyz"].tobytes())
+            self.assertEqual((len(last), last.time.shape), (len(returns), last.intensity.shape))
+            pipeline = raywake.Pipeline(rig=recording.rig, find_poses=True)
+            self.assertEqual([pipeline.step(s).reset for s in recording], ["first", None, None])
+            self.assertEqual(raywake.odometry(folder).shape, (3, 4, 4))
+            out = Path(folder, "out")
+            self.assertIn("map.ply", raywake.clean(folder, out, "--ground", "-1.7"))
+            self.assertEqual(len(list(out.glob("labels/*.label"))), 3)
+            with self.assertRaises(IndexError):
+                recording[3]
+
+
+class Refused(unittest.TestCase):
+    def setUp(self):
+        self.pipeline = raywake.Pipeline(threads=1)
+        self.points = np.zeros((5, 3), "f4")
+
+    def refuses(self, error, words, *args, call=None, **named):
+        with self.assertRaisesRegex(error, words):
+            (call or self.pipeline.step)(*args, **named)
+
+    def test_points(self):
+        eye = np.eye(4)
+        cases = [
+            (ValueError, "N x 3", np.zeros(3)),
+            (ValueError, "N x 3", np.zeros((2, 3, 3))),
+            (ValueError, "N x 3", 5.0),
+            (ValueError, "3 numbers", np.zeros((2, 2))),
+            (TypeError, "real numbers", np.zeros((2, 3), complex)),
+            (TypeError, "real numbers", np.zeros((2, 3), object)),
+            (TypeError, "real numbers", np.zeros((2, 3), bool)),
+            (TypeError, "real numbers", [["a", "b", "c"]]),
+            (TypeError, "real numbers", None),
+            (ValueError, "inhomogeneous|sequence", [[1, 2, 3], [4]]),
+        ]
+        for error, words, points in cases:
+            with self.subTest(words=words, points=points):
+                self.refuses(error, words, points, 0.0, eye)
+
+    def test_what_comes_with_points(self):
+        eye = np.eye(4)
+        self.refuses(TypeError, "stamp", self.points)
+        self.refuses(ValueError, "given with every", self.points, 0.0)
+        self.refuses(ValueError, "finite", self.points, np.nan, eye)
+        self.refuses(ValueError, "not finite", self.points, 0.0, np.full((4, 4), np.nan))
+        self.refuses(ValueError, "rotation", self.points, 0.0, 2 * np.diag([1, 1, 1, 0.5]))
+        self.refuses(ValueError, "matrix", self.points, 0.0, np.eye(3))
+        self.refuses(ValueError, "matrix", self.points, 0.0, np.ones((4, 4)))
+        self.refuses(ValueError, "unit", self.points, 0.0, np.ones(7))
+        self.refuses(ValueError, "vx", self.points, 0.0, eye, twist=[1, 2])
+        self.refuses(ValueError, "one number", self.points, 0.0, eye, time=np.zeros(4))
+        self.refuses(ValueError, "one number", self.points, 0.0, eye, sensor=np.zeros((5, 1)))
+        self.refuses(TypeError, "real", self.points, 0.0, eye, time=["x"] * 5)
+        # None of them was taken.
+        self.assertEqual(self.pipeline.step(self.points, 0.0, eye).reset, "first")
+
+    def test_what_is_counted(self):
+        points = np.full((6, 3), 5.0)
+        points[0, 1], points[1, 2], points[2] = np.nan, 1e300, 0
+        step = self.pipeline.step(points, 0.0, np.eye(4), sensor=[0, 0, 0, 1, -1, np.nan])
+        dropped = step.dropped
+        self.assertEqual((dropped["not_finite"], dropped["no_return"]), (2, 1))
+        self.assertEqual(dropped["unknown_sensor"], 3)
+        self.assertEqual((len(step.points), step.dt), (0, None))
+        empty = self.pipeline.step(np.zeros((0, 3)), 0.1, np.eye(4))
+        self.assertEqual((len(empty.points), empty.dt), (6, 0.1))
+
+    def test_options(self):
+        make = raywake.Pipeline
+        self.refuses(ValueError, "no profile", "hdl65", call=make)
+        self.refuses(ValueError, "no parameter", settings={"sied": 3}, call=make)
+        self.refuses(ValueError, "whole number", settings={"side": 1.5}, call=make)
+        self.refuses(ValueError, "odd", settings={"side": 100}, call=make)
+        self.refuses(ValueError, "weights", settings={"levels": 12}, call=make)
+        self.refuses(MemoryError, "bytes", points_max=1 << 48, call=make)
+        self.refuses(MemoryError, "bytes", points_max=1 << 62, call=make)
+        self.refuses(ValueError, "timing", timing="x", call=raywake.Rig)
+        self.refuses(ValueError, "at most 8", [np.eye(4)] * 9, call=raywake.Rig)
+        self.refuses(ValueError, "rig", rig=raywake.Rig([]), call=make)
+        self.refuses(ValueError, "rig", rig=raywake.Rig(ground=np.inf), call=make)
+        lower = raywake.Pipeline(settings={"moves_min": 0.3, "tracklet.gate_d2": 9.0})
+        self.assertGreater(lower.memory, 1 << 20)
+        few = raywake.Pipeline(points_max=4)
+        self.refuses(ValueError, "4 returns", self.points, 0.0, np.eye(4), call=few.step)
+
+    def test_a_step_that_is_past(self):
+        first = self.pipeline.step(self.points, 0.0, np.eye(4))
+        self.pipeline.step(self.points, 0.1, np.eye(4))
+        self.refuses(RuntimeError, "gone on", call=lambda: first.points)
+
+    def test_two_threads(self):
+        points = np.random.default_rng(1).normal(0, 10, (100_000, 3))
+        errors, done = [], threading.Event()
+
+        def steps():
+            for n in range(20):
+                try:
+                    self.pipeline.step(points, float(n), np.eye(4))
+                except RuntimeError as e:
+                    errors.append(str(e))
+                except ValueError as e:
+                    errors.append(str(e))
+            done.set()
+
+        threads = [threading.Thread(target=steps) for _ in range(2)]
+        [t.start() for t in threads]
+        [t.join() for t in threads]
+        self.assertTrue(done.is_set())
+        self.assertTrue(all("borrowed" in e for e in errors), errors)
+
+    def test_clouds_and_recordings(self):
+        noise = np.random.default_rng(2).normal(0, 10, (2, 5000, 3))
+        self.refuses(ValueError, "registered|ground", *noise, call=raywake.flow)
+        self.refuses(ValueError, "dt", *noise, dt=0, call=raywake.flow)
+        self.refuses(OSError, "No such file", "/nonexistent", call=raywake.Recording)
+        with self.assertRaises(raywake.CommandError) as caught:
+            raywake.clean("/nonexistent", "/nonexistent")
+        self.assertEqual(caught.exception.code, 3)
+
+
+class Package(unittest.TestCase):
+    def test_stubs_name_what_is_there(self):
+        module = raywake._raywake
+        tree = ast.parse(Path(module.__file__).with_name("_raywake.pyi").read_text())
+        named = {n.name for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+        named |= {n.target.id for n in tree.body if isinstance(n, ast.AnnAssign)}
+        there = {n for n in vars(module) if not n.startswith("__") or n == "__version__"}
+        self.assertEqual(named, there)
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                members = {n.name for n in node.body if isinstance(n, ast.FunctionDef)}
+                members |= {n.target.id for n in node.body if isinstance(n, ast.AnnAssign)}
+                real = {n for n in vars(getattr(module, node.name)) if not n.startswith("__")}
+                self.assertEqual({m for m in members if not m.startswith("__")}, real, node.name)
+
+    def test_everything_says_what_it_is(self):
+        for name in raywake.__all__:
+            self.assertTrue(getattr(raywake, name).__doc__, name)
+
+    def test_program(self):
+        for call in ([sys.executable, "-m", "raywake"], [Path(sys.executable).with_name("raywake")]):
+            said = subprocess.run([*call, "--version"], capture_output=True, text=True, check=True)
+            self.assertEqual(said.stdout.strip(), f"raywake {raywake.__version__}")
+
+
+if __name__ == "__main__":
+    unittest.main()
