@@ -143,6 +143,11 @@ impl Pipeline {
         self.tracklets.update(profile, sweep, dt, turned, left, &mut observed.all)
     }
 
+    /// How many tracklets there are after the last step.
+    pub fn tracklet_count(&self) -> usize {
+        self.sides.current.map_or(0, |_| self.tracklets.all().len())
+    }
+
     /// The tracklets after the last step, at the time of its sweep.
     pub fn tracklets(&self, profile: &Profile) -> impl Iterator<Item = TrackletState> {
         let current = self.sides.current;

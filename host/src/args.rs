@@ -6,6 +6,7 @@
 mod clean;
 mod flow;
 pub mod inputs;
+mod recordings;
 mod results;
 mod sweeps;
 mod track;
@@ -24,6 +25,7 @@ use raywake_simd::Simd;
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
+pub use recordings::{Recordings, Shard};
 pub use results::{Export, PictureFrame, Results, StreamArgs, Views};
 pub use sweeps::SweepRange;
 pub use track::{EstimateKind, FrontEndKind, TrackArgs};
@@ -86,17 +88,17 @@ pub enum Command {
     },
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct DevicesArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct RunArgs {
-    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
-    pub data: PathBuf,
+    #[command(flatten)]
+    pub recordings: Recordings,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -110,7 +112,7 @@ pub struct RunArgs {
     pub part: Selection,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct OdometryArgs {
     /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
@@ -127,7 +129,7 @@ pub struct OdometryArgs {
     pub part: Selection,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct Recording {
     #[command(flatten)]
@@ -146,7 +148,7 @@ pub struct Recording {
 }
 
 /// What a recording is.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct RecordingKind {
     /// Recording format [default: detected]
@@ -178,7 +180,7 @@ pub struct RecordingKind {
 }
 
 /// What the flow is computed with.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 pub struct FlowChoice {
     #[command(flatten)]
     pub profile: ProfileChoice,
@@ -188,7 +190,7 @@ pub struct FlowChoice {
     pub backend: BackendChoice,
 }
 
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Profile")]
 pub struct ProfileChoice {
     /// Built-in profile: hdl64 (window of ±25 m, the default), wide (±35 m), far (±50 m) or
@@ -260,7 +262,7 @@ pub struct BackendChoice {
     pub validation: Option<Validate>,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct MapArgs {
     /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     pub data: PathBuf,
@@ -287,7 +289,7 @@ pub struct MapArgs {
     pub part: Selection,
 }
 
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Sweeps")]
 pub struct Selection {
     /// Process at most this many sweeps
@@ -298,7 +300,7 @@ pub struct Selection {
     pub sweeps: Option<SweepRange>,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct DemoArgs {
     /// Output folder
     #[arg(short, long, value_name = "DIR", default_value = "raywake-demo")]
@@ -310,7 +312,7 @@ pub struct DemoArgs {
     pub backend: BackendChoice,
 }
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct BudgetArgs {
     /// Exit with code 6 if device and host memory together exceed this, for example 64MiB or 128MB
     #[arg(long, value_name = "SIZE", value_parser = size)]

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | [`args`] | the command line |
 //! | [`config`], [`weight_files`], [`choose`] | profile, model weights and backend it asks for |
+//! | `batch` | many recordings, shared among machines |
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
 //! | [`track`], [`map`], `flow`, `clean`, `odometry`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
@@ -21,6 +22,7 @@
 
 pub mod args;
 pub mod backend;
+mod batch;
 pub mod budget;
 pub mod choose;
 mod clean;
@@ -60,10 +62,10 @@ use error::RunError;
 /// Carries out a command. Returns whether it got to the end: a signal ends it early.
 pub fn execute(command: Command) -> Result<bool, RunError> {
     match command {
-        Command::Run(args) => Ok(!run::run(&args)?.facts.interrupted),
+        Command::Run(args) => batch::each(&*args),
         Command::Flow(args) => flow::flow(&args).map(|()| true),
-        Command::Track(args) => track::track(&args),
-        Command::Clean(args) => clean::clean(&args),
+        Command::Track(args) => batch::each(&*args),
+        Command::Clean(args) => batch::each(&*args),
         Command::Map(args) => map::command::map(&args),
         Command::Odometry(args) => odometry::odometry(&args),
         #[cfg(feature = "demo")]

@@ -1,6 +1,9 @@
 //! `raywake run`.
 
-use crate::args;
+use std::path::{Path, PathBuf};
+
+use crate::args::{self, FlowChoice, Recordings};
+use crate::batch::RecordingCommand;
 use crate::config;
 use crate::console::note;
 use crate::engine::{self, RunPlan};
@@ -11,12 +14,12 @@ use crate::weight_files::WeightFiles;
 use raywake_io::source;
 
 /// Estimates the flow of a recorded drive.
-pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
+fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
     let mut profile = config::profile(&args.flow.profile)?;
     // Asked for by name, it is wanted under every profile.
     profile.deskew |= args.recording.kind.deskew == Some(true);
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
-    let mut source = source::open(&args.data, &args.recording.options())?;
+    let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let plan = RunPlan {
         sweeps: args.part.range(source.len())?,
         profile,
@@ -31,4 +34,36 @@ pub fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
         note(plan.quiet, [&what.to_owned()])?;
     }
     engine::execute(&plan, source.as_mut(), &mut |_, _| ())
+}
+
+impl RecordingCommand for args::RunArgs {
+    const NAME: &'static str = "run";
+
+    fn recordings(&mut self) -> &mut Recordings {
+        &mut self.recordings
+    }
+
+    fn flow(&mut self) -> &mut FlowChoice {
+        &mut self.flow
+    }
+
+    fn out(&self) -> Option<&Path> {
+        self.results.out.as_deref()
+    }
+
+    fn set_out(&mut self, out: PathBuf) {
+        self.results.out = Some(out);
+    }
+
+    fn single_file(&self) -> Option<&'static str> {
+        self.results.single_file()
+    }
+
+    fn quiet(&self) -> bool {
+        self.quiet
+    }
+
+    fn carry_out(&self) -> Result<bool, RunError> {
+        Ok(!run(self)?.facts.interrupted)
+    }
 }

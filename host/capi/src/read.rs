@@ -100,7 +100,7 @@ pub unsafe extern "C" fn raywake_tracklets(
     // SAFETY: the caller's promise.
     unsafe {
         read(estimator, |found| {
-            let total = found.tracklets().count();
+            let total = found.tracklet_count();
             let mut tracklets = found.tracklets().map(TrackletRecord::from);
             let records_of = (0..total).map(|_| tracklets.next().unwrap_or_default());
             write(records_of, records, room, count)

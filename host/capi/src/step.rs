@@ -122,7 +122,12 @@ struct Column {
     stride: usize,
 }
 
+static ZERO: f32 = 0.0;
+
 impl Column {
+    /// One zero again and again.
+    const ZEROS: Column = Column { start: (&raw const ZERO).cast(), stride: 0 };
+
     fn new(
         start: *const c_void,
         stride: usize,
@@ -187,8 +192,9 @@ impl SweepInput {
     unsafe fn points(&self) -> Result<impl ExactSizeIterator<Item = Point> + use<>, Refusal> {
         let count = self.count;
         let xyz = Column::new(self.xyz, self.xyz_stride, 12, count, "xyz")?;
-        let optional = |start: *const c_void, stride, bytes, what| {
-            (!start.is_null()).then(|| Column::new(start, stride, bytes, count, what)).transpose()
+        let optional = |start: *const c_void, stride, bytes, what| match start.is_null() {
+            true => Ok(Column::ZEROS),
+            false => Column::new(start, stride, bytes, count, what),
         };
         let time = optional(self.time_s, self.time_stride, 4, "time")?;
         let sensor = optional(self.sensor, self.sensor_stride, 1, "sensor")?;
@@ -196,8 +202,8 @@ impl SweepInput {
         Ok((0..count).map(move |n| Point {
             position: unsafe { xyz.get(n) },
             intensity: 0.0,
-            offset_s: time.map_or(0.0, |time| unsafe { time.get(n) }),
-            sensor: sensor.map_or(0, |sensor| u32::from(unsafe { sensor.get::<u8>(n) })),
+            offset_s: unsafe { time.get(n) },
+            sensor: u32::from(unsafe { sensor.get::<u8>(n) }),
         }))
     }
 }
@@ -274,7 +280,7 @@ pub unsafe extern "C" fn raywake_step(
         let (place, points) = unsafe { (sweep.place(), sweep.points()?) };
         let team = turn.team();
         let summary = team.step(&place, points)?;
-        Ok(StepResult::new(&summary, team.read(|e| e.tracklets().count())?))
+        Ok(StepResult::new(&summary, team.read(|e| e.tracklet_count())?))
     });
     // SAFETY: the caller's promise.
     unsafe {

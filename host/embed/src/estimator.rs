@@ -230,6 +230,11 @@ impl FlowEstimator {
         Some(pair.points.over(self.columns, self.taken, self.sweeps[1].points()))
     }
 
+    /// How many tracklets there are.
+    pub fn tracklet_count(&self) -> usize {
+        self.pipeline.tracklet_count()
+    }
+
     /// Tracklets after the last sweep, at its time.
     pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
         self.pipeline.tracklets(&self.setup.profile)

@@ -232,7 +232,7 @@ impl Step {
     #[getter]
     fn tracklets(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.array(py, 2, |found| {
-            let count = found.tracklets().count();
+            let count = found.tracklet_count();
             Ok(array(py, count, found.tracklets().map(TrackletRecord::from))?.unbind())
         })
     }

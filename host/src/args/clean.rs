@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{FlowChoice, Recording, Selection};
+use super::{FlowChoice, Recording, Recordings, Selection};
 
 const ABOUT: &str = "\
 Remove what moves from a recording: labels, clouds and a map of what stands
@@ -23,11 +23,11 @@ Files of --out DIR:
     map.ply              what stands, in the world of the poses: a point per voxel in which more
                          returns were static than moving";
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct CleanArgs {
-    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
-    pub data: PathBuf,
+    #[command(flatten)]
+    pub recordings: Recordings,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,

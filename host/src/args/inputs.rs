@@ -32,6 +32,17 @@ pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
     Ok(())
 }
 
+/// Fails where a folder of results is a recording, or would lie among its files.
+pub fn spare(output: &Path, recording: &Path) -> Result<(), Error> {
+    let input = recording.canonicalize().ok();
+    match input.and_then(|input| harm(&resolved(output), &input)) {
+        Some(what) => {
+            Err(Error::Usage(format!("--out {} {what}: choose another place", output.display())))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Names of a command's arguments that are paths.
 fn paths(command: &Command) -> impl Iterator<Item = &str> {
     let is_path = |arg: &&clap::Arg| arg.get_value_parser().type_id() == TypeId::of::<PathBuf>();
@@ -83,6 +94,7 @@ mod tests {
             "filter",
             "first",
             "ground_map",
+            "list",
             "pose",
             "poses",
             "second",

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use raywake_io::sink::streams::StreamTargets;
 
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Results {
     /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`. Tables
@@ -37,7 +37,7 @@ pub struct Results {
 }
 
 /// What there is to look at besides pictures of single sweeps.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Views {
     /// Also write a film at the recording's pace: an animated PNG, which browsers play
@@ -49,7 +49,7 @@ pub struct Views {
 }
 
 /// Messages of ROS 2.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct StreamArgs {
     /// Also write an MCAP file for Foxglove, Rerun, rviz or Autoware: points, what moves, poses
@@ -84,4 +84,28 @@ pub enum PictureFrame {
 pub enum Export {
     /// Argoverse 2 scene flow
     Argoverse,
+}
+
+impl Views {
+    /// A file of all sweeps that was asked for.
+    pub fn single_file(&self) -> Option<&'static str> {
+        let page = self.page.is_some().then_some("page");
+        self.film.is_some().then_some("film").or(page)
+    }
+}
+
+impl StreamArgs {
+    /// A file, or viewers, of all sweeps that was asked for.
+    pub fn single_file(&self) -> Option<&'static str> {
+        let live = self.live.is_some().then_some("live");
+        self.mcap.is_some().then_some("mcap").or(live)
+    }
+}
+
+impl Results {
+    /// A file of all sweeps that was asked for.
+    pub fn single_file(&self) -> Option<&'static str> {
+        let summary = self.summary.is_some().then_some("summary");
+        self.streams.single_file().or(self.views.single_file()).or(summary)
+    }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use raywake_objects::estimate::EstimateParams;
 
-use super::{FlowChoice, Recording, Selection, StreamArgs, Views};
+use super::{FlowChoice, Recording, Recordings, Selection, StreamArgs, Views};
 
 const ABOUT: &str = "\
 Track the objects of a recorded drive: trajectory and shape
@@ -32,11 +32,11 @@ Files of --out DIR:
                      of the track)
     summary.json     statistics of the run";
 
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct TrackArgs {
-    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
-    pub data: PathBuf,
+    #[command(flatten)]
+    pub recordings: Recordings,
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,

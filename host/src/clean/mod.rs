@@ -10,13 +10,15 @@ mod kept;
 mod still_map;
 
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use raywake_core::params::Profile;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::return_clock::ReturnClock;
 use raywake_core::sweep::{Point, Rig};
 
-use crate::args;
+use crate::args::{self, FlowChoice, Recordings};
+use crate::batch::RecordingCommand;
 use crate::choose;
 use crate::config;
 use crate::console::{interrupted, note, say};
@@ -42,8 +44,8 @@ const MOVING_MIN: f32 = 0.4;
 
 /// Reads a recording three times and writes it without what moves. Returns whether it got to the
 /// end.
-pub fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
-    let mut source = source::open(&args.data, &args.recording.options())?;
+fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
+    let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let profile = config::profile(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let sweeps = args.part.range(source.len())?;
@@ -229,4 +231,36 @@ fn place(clock: &ReturnClock, rig: &Rig, sweep: &SweepData, point: &Point) -> gl
     let at = glam::DVec3::from_array(point.position.map(f64::from));
     let offset_s = if rig.distorted { clock.offset_s(rig, point) } else { 0.0 };
     sweep.world_from_vehicle.transform(sweep.twist.over(offset_s).transform(at))
+}
+
+impl RecordingCommand for args::CleanArgs {
+    const NAME: &'static str = "clean";
+
+    fn recordings(&mut self) -> &mut Recordings {
+        &mut self.recordings
+    }
+
+    fn flow(&mut self) -> &mut FlowChoice {
+        &mut self.flow
+    }
+
+    fn out(&self) -> Option<&Path> {
+        Some(&self.out)
+    }
+
+    fn set_out(&mut self, out: PathBuf) {
+        self.out = out;
+    }
+
+    fn single_file(&self) -> Option<&'static str> {
+        None
+    }
+
+    fn quiet(&self) -> bool {
+        self.quiet
+    }
+
+    fn carry_out(&self) -> Result<bool, RunError> {
+        clean(self)
+    }
 }

@@ -6,9 +6,11 @@ mod report;
 mod tracker;
 mod write;
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::args;
+use crate::args::{self, FlowChoice, Recordings};
+use crate::batch::RecordingCommand;
 use crate::choose;
 use crate::config::{self, Settings};
 use crate::console::{bytes, note, say};
@@ -31,9 +33,9 @@ pub use tracker::{Ended, Tracker};
 
 /// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
 /// the sweep in hand: tracks that have not ended by then have no estimate and are left out.
-pub fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
+fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let settings = settings(args)?;
-    let mut source = source::open(&args.data, &args.recording.options())?;
+    let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let ground = args.ground_map.as_deref().map(Ground::read).transpose()?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
@@ -117,4 +119,37 @@ fn budget(fixed_lag: bool) -> String {
         );
     }
     text
+}
+
+impl RecordingCommand for args::TrackArgs {
+    const NAME: &'static str = "track";
+
+    fn recordings(&mut self) -> &mut Recordings {
+        &mut self.recordings
+    }
+
+    fn flow(&mut self) -> &mut FlowChoice {
+        &mut self.flow
+    }
+
+    fn out(&self) -> Option<&Path> {
+        self.out.as_deref()
+    }
+
+    fn set_out(&mut self, out: PathBuf) {
+        self.out = Some(out);
+    }
+
+    fn single_file(&self) -> Option<&'static str> {
+        let streams = self.streams.single_file().or(self.views.single_file());
+        streams.or(self.summary.is_some().then_some("summary"))
+    }
+
+    fn quiet(&self) -> bool {
+        self.quiet
+    }
+
+    fn carry_out(&self) -> Result<bool, RunError> {
+        track(self)
+    }
 }

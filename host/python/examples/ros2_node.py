@@ -1,0 +1,163 @@
+"""A ROS 2 node: PointCloud2 in, PointCloud2 with velocity, P(moves) and status of every point out.
+
+    pip install raywake
+    python ros2_node.py --ros-args -r points:=/lidar/points -p ground:=-1.8
+
+Poses come from tf (`world_frame` to the cloud's frame) where there are any, else from registration
+(`find_poses:=true`, the default). What is put out is of the cloud before the last.
+"""
+
+import numpy as np
+import raywake
+
+#: Types of sensor_msgs/PointField.
+TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+
+
+def as_array(cloud):
+    """The points of a PointCloud2 as a structured array; its memory is the message's."""
+    order = ">" if cloud.is_bigendian else "<"
+    fields = [field for field in cloud.fields if field.count <= 1]
+    row = np.dtype(
+        {
+            "names": [field.name for field in fields],
+            "formats": [order + TYPES[field.datatype] for field in fields],
+            "offsets": [field.offset for field in fields],
+            "itemsize": cloud.point_step,
+        }
+    )
+    data = np.frombuffer(memoryview(cloud.data), np.uint8)
+    rows = data[: cloud.height * cloud.row_step].reshape(cloud.height, cloud.row_step)
+    rows = np.ascontiguousarray(rows[:, : cloud.width * cloud.point_step])
+    return rows.view(row).reshape(-1)
+
+
+def times_of(points, stamp):
+    """Time of every point after the stamp, s; none where the cloud does not tell."""
+    for name in ("t", "time", "timestamp", "time_offset", "offset_time"):
+        if name in (points.dtype.names or ()):
+            time = points[name].astype(np.float64)
+            if points.dtype[name].kind in "iu":
+                time *= 1e-9
+            return time - stamp if time.size and abs(time).max() > 1e6 else time
+    return None
+
+
+def positions_of(points):
+    """N x 3."""
+    return np.stack([points[axis] for axis in "xyz"], axis=1)
+
+
+#: What is put out for a point.
+OUT = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("velocity_x", "<f4"),
+        ("velocity_y", "<f4"),
+        ("velocity_z", "<f4"),
+        ("p_moves", "<f4"),
+        ("status", "u1"),
+    ]
+)
+
+
+def with_velocity(positions, flow):
+    """Positions and, relative to the sensor, what was found, as an array of OUT."""
+    out = np.zeros(len(positions), OUT)
+    for n, axis in enumerate("xyz"):
+        out[axis] = positions[:, n]
+        out["velocity_" + axis] = flow["velocity_ego_mps"][:, n]
+    out["p_moves"], out["status"] = flow["probability"], flow["status"]
+    return out
+
+
+class Flow:
+    """What the node does with a cloud, without ROS."""
+
+    def __init__(self, ground, find_poses, timed):
+        timing = dict(timing="offset", distorted=True, start=-0.1, span=0.2) if timed else {}
+        rig = raywake.Rig(ground=ground, **timing)
+        self.pipeline = raywake.Pipeline(rig=rig, find_poses=find_poses)
+        self.before = None
+
+    def step(self, points, stamp, pose=None):
+        """Takes a cloud. Returns the cloud before as an array of OUT, or None."""
+        positions = positions_of(points)
+        step = self.pipeline.step(positions, stamp, pose, time=times_of(points, stamp))
+        before, self.before = self.before, positions
+        return None if step.dt is None else with_velocity(before, step.points)
+
+
+def main():
+    import rclpy
+    from rclpy.node import Node
+    from rclpy.qos import qos_profile_sensor_data
+    from rclpy.time import Time
+    from sensor_msgs.msg import PointCloud2, PointField
+    from tf2_ros import Buffer, TransformException, TransformListener
+
+    class FlowNode(Node):
+        def __init__(self):
+            super().__init__("raywake")
+            self.ground = self.declare_parameter("ground", -1.73).value
+            self.find_poses = self.declare_parameter("find_poses", True).value
+            self.world = self.declare_parameter("world_frame", "odom").value
+            self.flow, self.header = None, None
+            self.tf = Buffer()
+            self.listener = TransformListener(self.tf, self)
+            self.out = self.create_publisher(PointCloud2, "points_with_velocity", 10)
+            self.create_subscription(
+                PointCloud2, "points", self.on_cloud, qos_profile_sensor_data
+            )
+
+        def pose(self, header):
+            if self.find_poses:
+                return None
+            at = self.tf.lookup_transform(self.world, header.frame_id, Time.from_msg(header.stamp))
+            t, r = at.transform.translation, at.transform.rotation
+            return [t.x, t.y, t.z, r.x, r.y, r.z, r.w]
+
+        def on_cloud(self, cloud):
+            points = as_array(cloud)
+            stamp = cloud.header.stamp.sec + 1e-9 * cloud.header.stamp.nanosec
+            if self.flow is None:
+                timed = times_of(points, stamp) is not None
+                self.flow = Flow(self.ground, self.find_poses, timed)
+            try:
+                found = self.flow.step(points, stamp, self.pose(cloud.header))
+            except (TransformException, ValueError) as e:
+                self.get_logger().warning(f"cloud left out: {e}")
+                return
+            header, self.header = self.header, cloud.header
+            if found is not None:
+                self.out.publish(self.message(header, found))
+
+        def message(self, header, found):
+            fields = [
+                PointField(
+                    name=name,
+                    offset=OUT.fields[name][1],
+                    datatype=PointField.UINT8 if OUT[name].kind == "u" else PointField.FLOAT32,
+                    count=1,
+                )
+                for name in OUT.names
+            ]
+            return PointCloud2(
+                header=header,
+                height=1,
+                width=len(found),
+                fields=fields,
+                point_step=OUT.itemsize,
+                row_step=found.nbytes,
+                data=found.tobytes(),
+                is_dense=False,
+            )
+
+    rclpy.init()
+    rclpy.spin(FlowNode())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+//! One recording, or many, shared among machines.
+
+use std::path::{Path, PathBuf};
+
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Recordings {
+    /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
+    #[arg(required_unless_present = "list")]
+    pub data: Option<PathBuf>,
+    /// Do so with every recording of a list, a path a line: results of PATH go to DIR/PATH. What
+    /// was done before with the same settings and weights is left as it is
+    #[arg(long, value_name = "FILE", conflicts_with = "data", requires = "out")]
+    #[arg(help_heading = "Many recordings")]
+    pub list: Option<PathBuf>,
+    /// Only every N-th recording of the list, from the I-th on (0 to N-1) [default: by the array or
+    /// the tasks of Slurm, or by JOB_COMPLETION_INDEX of Kubernetes and RAYWAKE_SHARDS]
+    #[arg(long, value_name = "I/N", requires = "list", value_parser = Shard::parse)]
+    #[arg(help_heading = "Many recordings")]
+    pub shard: Option<Shard>,
+}
+
+impl Recordings {
+    /// A single one.
+    pub fn one(data: PathBuf) -> Recordings {
+        Recordings { data: Some(data), ..Recordings::default() }
+    }
+
+    /// The only one: there is one unless there is a list.
+    pub fn path(&self) -> &Path {
+        self.data.as_deref().unwrap_or(Path::new(""))
+    }
+}
+
+/// A part of a list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// Parts in all, at least one.
+    pub of: usize,
+}
+
+/// Names of the variables in which a scheduler tells a process its part.
+struct Scheduler {
+    /// Its number.
+    index: &'static str,
+    /// Number of the first part; 0 without.
+    first: Option<&'static str>,
+    /// From one number to the next; 1 without.
+    step: Option<&'static str>,
+    /// How many parts there are.
+    count: &'static str,
+}
+
+/// In order of preference: tasks of an array are more than processes of a task.
+const SCHEDULERS: [Scheduler; 3] = [
+    Scheduler {
+        index: "SLURM_ARRAY_TASK_ID",
+        first: Some("SLURM_ARRAY_TASK_MIN"),
+        step: Some("SLURM_ARRAY_TASK_STEP"),
+        count: "SLURM_ARRAY_TASK_COUNT",
+    },
+    Scheduler { index: "SLURM_PROCID", first: None, step: None, count: "SLURM_NTASKS" },
+    Scheduler { index: "JOB_COMPLETION_INDEX", first: None, step: None, count: "RAYWAKE_SHARDS" },
+];
+
+impl Shard {
+    /// From `I/N`.
+    fn parse(text: &str) -> Result<Shard, String> {
+        let numbers =
+            text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let (index, of) = numbers.ok_or("expected I/N, for example 0/16")?;
+        Shard::new(index, of).ok_or_else(|| format!("I of {text} must be 0 to N-1"))
+    }
+
+    fn new(index: usize, of: usize) -> Option<Shard> {
+        (index < of).then_some(Shard { index, of })
+    }
+
+    /// What a scheduler says in its variables; all where none does.
+    ///
+    /// # Errors
+    /// With what is wrong with them.
+    pub fn of_scheduler(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+        let scheduler = SCHEDULERS.iter().find(|of| variable(of.index).is_some());
+        scheduler.map_or(Ok(Shard { index: 0, of: 1 }), |scheduler| scheduler.shard(&variable))
+    }
+}
+
+impl Scheduler {
+    fn shard(&self, variable: &impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+        let number = |name: &str| {
+            let text = variable(name).ok_or_else(|| format!("{name} is not set"))?;
+            text.parse().map_err(|_| format!("{name} is `{text}`"))
+        };
+        let or = |name: Option<&str>, unless: usize| name.map_or(Ok(unless), number);
+        let read = || {
+            let index: usize = number(self.index)?;
+            Ok((index, or(self.first, 0)?, or(self.step, 1)?, number(self.count)?))
+        };
+        let wrong = |what: String| format!("{} is set, but {what}: give --shard I/N", self.index);
+        let (index, first, step, of): (usize, usize, usize, usize) = read().map_err(wrong)?;
+        let ahead = index.checked_sub(first).and_then(|ahead| ahead.checked_div(step));
+        let shard = ahead.and_then(|ahead| Shard::new(ahead, of));
+        shard.ok_or_else(|| wrong(format!("it is {index} of {of}, from {first} on by {step}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shard(variables: &[(&str, &str)]) -> Result<(usize, usize), String> {
+        let of = |name: &str| variables.iter().find(|v| v.0 == name).map(|v| v.1.to_string());
+        Shard::of_scheduler(of).map(|shard| (shard.index, shard.of))
+    }
+
+    #[test]
+    fn of_the_command_line() {
+        let parse = |text: &str| Shard::parse(text).map(|s| (s.index, s.of));
+        assert_eq!((parse("0/1"), parse("15/16")), (Ok((0, 1)), Ok((15, 16))));
+        for wrong in ["1/1", "0/0", "3", "-1/2", "a/2", "1/b", "1/2/3", ""] {
+            assert!(parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn of_schedulers() {
+        assert_eq!(shard(&[]), Ok((0, 1)));
+        let array = |id, min, step, count| {
+            shard(&[
+                ("SLURM_ARRAY_TASK_ID", id),
+                ("SLURM_ARRAY_TASK_MIN", min),
+                ("SLURM_ARRAY_TASK_STEP", step),
+                ("SLURM_ARRAY_TASK_COUNT", count),
+                ("SLURM_PROCID", "0"),
+                ("SLURM_NTASKS", "1"),
+            ])
+        };
+        assert_eq!(array("7", "1", "2", "4"), Ok((3, 4)));
+        assert_eq!(array("0", "0", "1", "8"), Ok((0, 8)));
+        assert!(array("9", "0", "1", "8").unwrap_err().contains("9 of 8"));
+        assert!(array("0", "1", "1", "8").is_err() && array("1", "0", "0", "8").is_err());
+        assert!(array("x", "0", "1", "8").unwrap_err().contains("is `x`"));
+        assert_eq!(shard(&[("SLURM_PROCID", "2"), ("SLURM_NTASKS", "4")]), Ok((2, 4)));
+        let index = ("JOB_COMPLETION_INDEX", "5");
+        assert_eq!(shard(&[index, ("RAYWAKE_SHARDS", "6")]), Ok((5, 6)));
+        assert!(shard(&[index]).unwrap_err().contains("RAYWAKE_SHARDS is not set"));
+    }
+}

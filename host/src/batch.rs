@@ -1,0 +1,355 @@
+//! Many recordings, one after another, each with results of its own: what `--list` does.
+//!
+//! Results of a recording lie at its path below the folder of results. A file [`DONE`] beside them
+//! tells with what they were finished: settings, weights and version. Whoever comes back, on
+//! whatever machine, leaves them as they are. A part that was interrupted goes on, as a single
+//! recording does; where two do the same one, the later is told.
+
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::io::Write;
+use std::path::{Component, Path, PathBuf};
+
+use raywake_core::digest::Digest;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
+use raywake_io::source::whole::read_text;
+
+use crate::args::{BackendChoice, FlowChoice, Recordings, Shard, inputs};
+use crate::config;
+use crate::console::{interrupted, say, warn};
+use crate::error::RunError;
+use crate::weight_files::WeightFiles;
+
+/// Name of the file beside results that are whole.
+const DONE: &str = "done";
+
+/// What is asked of a command that works on a recording.
+pub trait RecordingCommand: Clone + Debug {
+    /// Its name.
+    const NAME: &'static str;
+
+    /// Which recordings.
+    fn recordings(&mut self) -> &mut Recordings;
+
+    /// What the flow is computed with.
+    fn flow(&mut self) -> &mut FlowChoice;
+
+    /// Where results go, unless nowhere.
+    fn out(&self) -> Option<&Path>;
+
+    /// Has the results go elsewhere.
+    fn set_out(&mut self, out: PathBuf);
+
+    /// An option for a single file, which many recordings cannot share, if one was given.
+    fn single_file(&self) -> Option<&'static str>;
+
+    /// Errors only.
+    fn quiet(&self) -> bool;
+
+    /// Does it with one recording. Returns whether it got to the end.
+    fn carry_out(&self) -> Result<bool, RunError>;
+}
+
+/// A recording, and where its results go, below the folder of results.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct ListedRecording {
+    data: PathBuf,
+    place: PathBuf,
+}
+
+/// What became of recordings.
+#[derive(Default)]
+struct Tally {
+    done: usize,
+    before: usize,
+    failures: Vec<RunError>,
+}
+
+/// Does it with the recording, or with those of the list. Returns whether it got to the end.
+///
+/// # Errors
+/// Of several that fail the first, after all others were tried.
+pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
+    let Recordings { list, shard, .. } = command.clone().recordings().clone();
+    let Some(list) = list else { return command.carry_out() };
+    if let Some(option) = command.single_file() {
+        let what = format!("--{option} is for one recording, not for those of --list");
+        return Err(Error::Usage(what).into());
+    }
+    let of_environment = || Shard::of_scheduler(|name| std::env::var(name).ok());
+    let shard = shard.map_or_else(of_environment, Ok).map_err(Error::Usage)?;
+    let all = listed(&list)?;
+    let mine: Vec<_> = all.iter().skip(shard.index).step_by(shard.of).collect();
+    say(command.quiet(), &head(&shard, mine.len(), all.len()))?;
+    let mut tally = Tally::default();
+    for (n, recording) in mine.iter().enumerate() {
+        if interrupted() {
+            break;
+        }
+        let line = format!("\n{} of {}: {}\n", n + 1, mine.len(), recording.data.display());
+        say(command.quiet(), &line)?;
+        tally.one(command, recording)?;
+    }
+    say(command.quiet(), &tally.line())?;
+    let whole = tally.done + tally.before + tally.failures.len() == mine.len();
+    tally.end().map(|()| whole)
+}
+
+fn head(shard: &Shard, mine: usize, all: usize) -> String {
+    format!("part {} of {}: {mine} of {all} recordings\n", shard.index, shard.of)
+}
+
+impl Tally {
+    /// One recording. Fails where no other needs to be tried.
+    fn one(&mut self, command: &impl RecordingCommand, at: &ListedRecording) -> Result<(), Error> {
+        let command = command_for(command, at);
+        match finish(&command) {
+            Ok(Some(true)) => self.done += 1,
+            Ok(Some(false)) => {}
+            Ok(None) => {
+                self.before += 1;
+                say(command.quiet(), "done before\n")?;
+            }
+            Err(RunError::Io(Error::Usage(what))) if self.failures.is_empty() && self.done == 0 => {
+                // The command itself is wrong, and so it will be for every other.
+                return Err(Error::Usage(what));
+            }
+            Err(e) => {
+                let (text, path) = (e.to_string(), at.data.display().to_string());
+                // Most say where they are from.
+                warn(&if text.contains(&path) { text } else { format!("{path}: {text}") });
+                self.failures.push(e);
+            }
+        }
+        Ok(())
+    }
+
+    fn line(&self) -> String {
+        let Tally { done, before, failures } = self;
+        format!("\n{done} done, {before} done before, {} failed\n", failures.len())
+    }
+
+    fn end(self) -> Result<(), RunError> {
+        self.failures.into_iter().next().map_or(Ok(()), Err)
+    }
+}
+
+/// The command for one recording of the list.
+fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
+    let mut one = command.clone();
+    let out = command.out().map(|out| out.join(&at.place));
+    out.into_iter().for_each(|out| one.set_out(out));
+    *one.recordings() = Recordings::one(at.data.clone());
+    one
+}
+
+/// Does it unless it was done before: then there is none. Returns whether it got to the end.
+fn finish(command: &impl RecordingCommand) -> Result<Option<bool>, RunError> {
+    let seal = seal(command)?;
+    let Some(out) = command.out() else { return command.carry_out().map(Some) };
+    let done = out.join(DONE);
+    if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
+        return Ok(None);
+    }
+    let whole = inputs::spare(out, command.clone().recordings().path())
+        .map_err(RunError::from)
+        .and_then(|()| command.carry_out())?;
+    if whole {
+        atomic::write(&done, |to| to.write_all(seal.as_bytes()))?;
+    }
+    Ok(Some(whole))
+}
+
+/// With what results are made, but for the recording: a line.
+fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
+    let mut plain = command.clone();
+    *plain.recordings() = Recordings::default();
+    plain.set_out(PathBuf::new());
+    let flow = plain.flow();
+    // Results are the same on each.
+    flow.backend = BackendChoice::default();
+    let settings = config::settings(&flow.profile)?;
+    let weights = WeightFiles::read(&flow.learned, &settings.profile)?.digest();
+    let all = format!("{plain:?} {:?} {:?} {weights}", settings.profile, settings.objects);
+    let (digest, version) = (Digest::of(all.as_bytes()), env!("CARGO_PKG_VERSION"));
+    Ok(format!("raywake {version} {} {digest:016x}\n", C::NAME))
+}
+
+/// Recordings of a list: a path a line; empty lines and those that begin with `#` count for none.
+fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
+    let text = read_text(list)?;
+    let mut places = BTreeMap::new();
+    let mut found = Vec::new();
+    for (n, line) in (1..).zip(text.lines()) {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let wrong = |what: &str| Error::input(list, format!("line {n}"), format!("{line}: {what}"));
+        let data = PathBuf::from(line);
+        let place = place(&data).ok_or_else(|| wrong("`..` leads out of the results"))?;
+        if let Err(e) = data.metadata() {
+            return Err(wrong(&e.to_string()));
+        }
+        // File systems there are to which letters of both cases are one.
+        let key = place.display().to_string().to_lowercase();
+        if let Some(other) = places.insert(key, n) {
+            let what = format!("its results would replace those of line {other}");
+            return Err(wrong(&what));
+        }
+        found.push(ListedRecording { data, place });
+    }
+    apart(list, &places)?;
+    Ok(found)
+}
+
+/// Fails where results of one recording would lie within those of another.
+fn apart(list: &Path, places: &BTreeMap<String, usize>) -> Result<(), Error> {
+    for (place, line) in places {
+        for above in Path::new(place).ancestors().skip(1) {
+            if let Some(other) = places.get(&above.display().to_string()) {
+                let what = format!("its results would lie within those of line {other}");
+                return Err(Error::input(list, format!("line {line}"), what));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Where results of a recording go: its path, without a root. None where that leads upwards.
+fn place(data: &Path) -> Option<PathBuf> {
+    let mut place = PathBuf::new();
+    for part in data.components() {
+        match part {
+            Component::Normal(name) => place.push(name),
+            Component::ParentDir => return None,
+            Component::CurDir | Component::RootDir | Component::Prefix(_) => {}
+        }
+    }
+    Some(place).filter(|place| place.components().next().is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn list_of(lines: &[&str]) -> Result<Vec<PathBuf>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a", "A", "a/b", "c"] {
+            fs::create_dir_all(folder.path().join(name)).unwrap();
+        }
+        let root = folder.path().display().to_string();
+        let text: Vec<String> = lines.iter().map(|line| line.replace("ROOT", &root)).collect();
+        let list = folder.path().join("list");
+        fs::write(&list, text.join("\n")).unwrap();
+        let relative = root.trim_start_matches('/').to_string();
+        let listed = listed(&list).map_err(|e| e.to_string())?;
+        let place = |r: ListedRecording| r.place.strip_prefix(&relative).map(Path::to_path_buf);
+        Ok(listed.into_iter().map(|r| place(r).unwrap()).collect())
+    }
+
+    #[test]
+    fn lists() {
+        let found = list_of(&["# both", "ROOT/a", "", "  ROOT/./c/\r"]).unwrap();
+        assert_eq!(found, [PathBuf::from("a"), PathBuf::from("c")]);
+        assert_eq!(list_of(&["# none"]), Ok(Vec::new()));
+        for (lines, words) in [
+            (&["ROOT/a", "ROOT/missing"][..], "line 2: "),
+            (&["ROOT/a", "ROOT/a/"][..], "replace those of line 1"),
+            (&["ROOT/a", "ROOT/A"][..], "replace those of line 1"),
+            (&["ROOT/a/b", "ROOT/a"][..], "within those of line 2"),
+            (&["ROOT/a/../c"][..], "leads out"),
+            (&["/"][..], "leads out"),
+        ] {
+            let e = list_of(lines).unwrap_err();
+            assert!(e.contains(words), "{e}");
+        }
+    }
+
+    /// Notes what it is asked to do; fails where the recording is called `c`.
+    #[derive(Clone, Debug)]
+    struct Noted {
+        recordings: Recordings,
+        flow: FlowChoice,
+        out: Option<PathBuf>,
+    }
+
+    impl RecordingCommand for Noted {
+        const NAME: &'static str = "note";
+
+        fn recordings(&mut self) -> &mut Recordings {
+            &mut self.recordings
+        }
+
+        fn flow(&mut self) -> &mut FlowChoice {
+            &mut self.flow
+        }
+
+        fn out(&self) -> Option<&Path> {
+            self.out.as_deref()
+        }
+
+        fn set_out(&mut self, out: PathBuf) {
+            self.out = Some(out);
+        }
+
+        fn single_file(&self) -> Option<&'static str> {
+            None
+        }
+
+        fn quiet(&self) -> bool {
+            true
+        }
+
+        fn carry_out(&self) -> Result<bool, RunError> {
+            let out = self.out.clone().unwrap();
+            fs::create_dir_all(&out).unwrap();
+            fs::OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(out.join("times"))
+                .and_then(|mut file| file.write_all(b"x"))
+                .unwrap();
+            match self.recordings.path().ends_with("c") {
+                true => Err(Error::input(self.recordings.path(), "", "is no recording").into()),
+                false => Ok(true),
+            }
+        }
+    }
+
+    #[test]
+    fn all_are_tried_and_none_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["a", "b", "c", "d", "e"].map(|name| folder.path().join(name));
+        names.iter().for_each(|name| fs::create_dir(name).unwrap());
+        let list = folder.path().join("list");
+        let text: Vec<String> = names.iter().map(|name| name.display().to_string()).collect();
+        fs::write(&list, text.join("\n")).unwrap();
+        let mut command = Noted {
+            recordings: Recordings { list: Some(list), ..Recordings::default() },
+            flow: FlowChoice::default(),
+            out: Some(folder.path().join("out")),
+        };
+        let times = |name: &Path| {
+            let below = folder.path().join("out").join(place(name).unwrap());
+            fs::read(below.join("times")).map_or(0, |text| text.len())
+        };
+        for index in [0, 1, 1] {
+            command.recordings.shard = Some(Shard { index, of: 2 });
+            let ended = each(&command);
+            assert_eq!(ended.is_err(), index == 0, "{ended:?}");
+        }
+        assert_eq!(names.clone().map(|name| times(&name)), [1, 1, 1, 1, 1]);
+        command.recordings.shard = Some(Shard { index: 900, of: 1000 });
+        assert!(matches!(each(&command), Ok(true)));
+        // Other settings are other work; what failed is tried again.
+        command.recordings.shard = None;
+        command.flow.profile.moving = Some(0.4);
+        assert_eq!(each(&command).unwrap_err().exit_code(), 3);
+        command.flow.backend.simd = Some(raywake_simd::Simd::BASELINE);
+        assert!(each(&command).is_err());
+        assert_eq!(names.map(|name| times(&name)), [2, 2, 3, 2, 2]);
+    }
+}
