@@ -39,6 +39,8 @@ if ! browser >/dev/null && command -v apt-get >/dev/null; then
     install chromium || echo "chromium cannot be installed"
 fi
 export RAYWAKE_VULKAN=${RAYWAKE_VULKAN:-required}
+# The module for Python is for any interpreter; none is needed to compile it.
+export PYO3_NO_PYTHON=1
 
 say "format and lints"
 cargo fmt --all --check
@@ -68,17 +70,28 @@ echo "onboard binary: $bytes bytes"
 [ "$bytes" -le 4000000 ] || { echo "larger than 4,000,000 bytes"; exit 1; }
 others=(target/release/raywake target/onboard/raywake target/restrict/release/raywake)
 
+# As one file that needs nothing else.
+static() {
+    rustup target add "$1-unknown-linux-musl" >/dev/null 2>&1 || return 1
+    local bytes
+    program=$(host/package/static.sh "$1" 2>/dev/null) || return 1
+    bytes=$(wc -c <"$program")
+    echo "static binary for $1: $bytes bytes"
+    [ "$bytes" -le 6000000 ] || { echo "larger than 6,000,000 bytes"; exit 1; }
+}
+if static "$(uname -m)"; then
+    others+=("$program")
+else
+    echo "skipped: no static binary, as its target cannot be installed"
+fi
+
 # The same bits on another instruction set: an emulator wrapped up as one more program.
 aarch64() {
     [ "$(uname -m)" = x86_64 ] || return 1
     command -v apt-get >/dev/null || return 1
     install gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || return 1
-    rustup target add aarch64-unknown-linux-gnu >/dev/null 2>&1 || return 1
-    CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
-        cargo build --quiet --release -p raywake --target aarch64-unknown-linux-gnu || return 1
-    local program=$PWD/target/aarch64-unknown-linux-gnu/release/raywake
-    printf '#!/bin/sh\nexec qemu-aarch64-static -L /usr/aarch64-linux-gnu %s "$@"\n' "$program" \
-        >target/raywake-aarch64
+    static aarch64 || return 1
+    printf '#!/bin/sh\nexec qemu-aarch64-static %s "$@"\n' "$PWD/$program" >target/raywake-aarch64
     chmod +x target/raywake-aarch64
     others+=(target/raywake-aarch64)
 }
@@ -120,6 +133,28 @@ if viewers; then
 else
     echo "skipped: mcap-ros2-support, numpy and rerun-sdk cannot be installed"
 fi
+
+say "the module for Python"
+if ! command -v apt-get >/dev/null || install python3-venv; then
+    code=0
+    host/python/tests/run.sh target/release/raywake || code=$?
+    case $code in
+        0) ;;
+        77) echo "skipped: maturin and numpy cannot be installed" ;;
+        *) exit "$code" ;;
+    esac
+else
+    echo "skipped: python3-venv cannot be installed"
+fi
+
+say "many recordings, many processes"
+if command -v apt-get >/dev/null; then
+    # What cannot be had is skipped there.
+    install slurm-wlm munge || true
+    install parallel || true
+fi
+cargo build --quiet -p raywake-lab
+tests/shards.sh target/release/raywake target/debug/raywake-lab
 
 say "variants side by side, two sweeps each"
 cargo test --quiet -p raywake-tests --benches

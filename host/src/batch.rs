@@ -53,9 +53,11 @@ pub trait RecordingCommand: Clone + Debug {
 
 /// A recording, and where its results go, below the folder of results.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct ListedRecording {
-    data: PathBuf,
-    place: PathBuf,
+pub struct ListedRecording {
+    /// As it is listed.
+    pub data: PathBuf,
+    /// The same without a root: no other's but for the case of letters.
+    pub place: PathBuf,
 }
 
 /// What became of recordings.
@@ -77,11 +79,9 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
         let what = format!("--{option} is for one recording, not for those of --list");
         return Err(Error::Usage(what).into());
     }
-    let of_environment = || Shard::of_scheduler(|name| std::env::var(name).ok());
-    let shard = shard.map_or_else(of_environment, Ok).map_err(Error::Usage)?;
-    let all = listed(&list)?;
-    let mine: Vec<_> = all.iter().skip(shard.index).step_by(shard.of).collect();
-    say(command.quiet(), &head(&shard, mine.len(), all.len()))?;
+    let shard = shard.map_or_else(Shard::of_environment, Ok)?;
+    let (mine, line) = part(&list, shard)?;
+    say(command.quiet(), &line)?;
     let mut tally = Tally::default();
     for (n, recording) in mine.iter().enumerate() {
         if interrupted() {
@@ -96,8 +96,17 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     tally.end().map(|()| whole)
 }
 
-fn head(shard: &Shard, mine: usize, all: usize) -> String {
-    format!("part {} of {}: {mine} of {all} recordings\n", shard.index, shard.of)
+/// Recordings of a part of a list, and a line about them.
+///
+/// # Errors
+/// The list has what is no recording's path, or two whose results would be in each other's way.
+pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String), Error> {
+    let Shard { index, of } = shard;
+    let all = listed(list)?;
+    let count = all.len();
+    let mine: Vec<_> = all.into_iter().skip(index).step_by(of).collect();
+    let line = format!("part {index} of {of}: {} of {count} recordings\n", mine.len());
+    Ok((mine, line))
 }
 
 impl Tally {

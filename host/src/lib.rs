@@ -22,7 +22,7 @@
 
 pub mod args;
 pub mod backend;
-mod batch;
+pub mod batch;
 pub mod budget;
 pub mod choose;
 mod clean;

@@ -27,6 +27,17 @@ cloud = numpy.concatenate([part.reshape(-1, 3) for part in (wall, ground, side)]
 print(raywake.flow(cloud, cloud))'
 echo "from pip install to the flow of two arrays: $((SECONDS - start)) s"
 
+# The example for Rerun, where that is installed: beside recordings of the program.
+viewers=$PWD/target/viewers/bin
+if [ -x "$viewers/rerun" ]; then
+    "$viewers/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall \
+        "$out"/wheels/raywake-*.whl
+    recording=target/viewers/recordings/two.mcap
+    "$viewers/python" host/python/examples/rerun_flow.py "$recording" --save "$out/flow.rrd"
+    "$viewers/rerun" rrd stats "$out/flow.rrd" | grep -q motion
+    echo "the example for Rerun: $recording"
+fi
+
 dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$@"; }
 dump demo "$out/demo.sweeps" 20
 RAYWAKE_SWEEPS=$out/demo.sweeps \

@@ -5,12 +5,14 @@ Run with RAYWAKE_SWEEPS=FILE, of dump_sweeps, and RAYWAKE_DIGEST=what the progra
 
 import ast
 import gc
+import importlib.util
 import os
 import struct
 import subprocess
 import sys
 import tempfile
 import threading
+import types
 import unittest
 from pathlib import Path
 
@@ -287,6 +289,64 @@ class Package(unittest.TestCase):
         for call in ([sys.executable, "-m", "raywake"], [Path(sys.executable).with_name("raywake")]):
             said = subprocess.run([*call, "--version"], capture_output=True, text=True, check=True)
             self.assertEqual(said.stdout.strip(), f"raywake {raywake.__version__}")
+
+
+class Node(unittest.TestCase):
+    """What the example for ROS 2 does with messages."""
+
+    def setUp(self):
+        path = Path(__file__).parents[1] / "examples/ros2_node.py"
+        spec = importlib.util.spec_from_file_location("ros2_node", path)
+        self.node = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(self.node)
+
+    def cloud(self, returns, order="<", stamp_ns=0):
+        """A cloud of two rows, with padding after each point and each row."""
+        row = np.dtype(
+            {
+                "names": ["x", "y", "z", "t"],
+                "formats": [order + "f4"] * 3 + [order + "u4"],
+                "offsets": [0, 4, 8, 20],
+                "itemsize": 26,
+            }
+        )
+        points = np.zeros(len(returns) // 2 * 2, row)
+        for n, axis in enumerate("xyz"):
+            points[axis] = returns["xyz"][: len(points), n]
+        points["t"] = (returns["time"][: len(points)] * 1e9 + 1e8).astype("u4")
+        rows = points.reshape(2, -1).view(np.uint8).reshape(2, -1)
+        data = np.pad(rows, ((0, 0), (0, 5)))
+        field = lambda name, n, type: types.SimpleNamespace(
+            name=name, offset=n, datatype=type, count=1
+        )
+        return types.SimpleNamespace(
+            fields=[field("x", 0, 7), field("y", 4, 7), field("z", 8, 7), field("t", 20, 6)],
+            is_bigendian=order == ">",
+            point_step=26,
+            height=2,
+            width=len(points) // 2,
+            row_step=data.shape[1],
+            data=data.tobytes(),
+        )
+
+    def test_clouds_of_messages(self):
+        returns = next(iter(SWEEPS))[3]
+        for order in "<>":
+            points = self.node.as_array(self.cloud(returns, order))
+            places = self.node.positions_of(points)
+            self.assertTrue((places == returns["xyz"][: len(places)]).all())
+            times = self.node.times_of(points, 0.0)
+            self.assertLess(np.abs(times - returns["time"][: len(times)] - 0.1).max(), 1e-6)
+
+    def test_velocities_of_messages(self):
+        flow = self.node.Flow(ground=SWEEPS.rig.ground, find_poses=True, timed=False)
+        found = []
+        for stamp, _, _, returns in list(SWEEPS)[:3]:
+            found.append(flow.step(self.node.as_array(self.cloud(returns)), stamp))
+        self.assertIsNone(found[0])
+        self.assertEqual([f.dtype for f in found[1:]], [self.node.OUT] * 2)
+        moving = found[2]["status"] == raywake.MOVING
+        self.assertTrue(moving.any() and found[2]["p_moves"][moving].min() >= 0.5)
 
 
 if __name__ == "__main__":

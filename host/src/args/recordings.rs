@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use raywake_io::Error;
+
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct Recordings {
     /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
@@ -66,7 +68,7 @@ const SCHEDULERS: [Scheduler; 3] = [
 
 impl Shard {
     /// From `I/N`.
-    fn parse(text: &str) -> Result<Shard, String> {
+    pub fn parse(text: &str) -> Result<Shard, String> {
         let numbers =
             text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         let (index, of) = numbers.ok_or("expected I/N, for example 0/16")?;
@@ -77,11 +79,15 @@ impl Shard {
         (index < of).then_some(Shard { index, of })
     }
 
-    /// What a scheduler says in its variables; all where none does.
+    /// What a scheduler says in the variables of the environment; all where none does.
     ///
     /// # Errors
-    /// With what is wrong with them.
-    pub fn of_scheduler(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+    /// They say what cannot be.
+    pub fn of_environment() -> Result<Shard, Error> {
+        Shard::of_scheduler(|name| std::env::var(name).ok()).map_err(Error::Usage)
+    }
+
+    fn of_scheduler(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let scheduler = SCHEDULERS.iter().find(|of| variable(of.index).is_some());
         scheduler.map_or(Ok(Shard { index: 0, of: 1 }), |scheduler| scheduler.shard(&variable))
     }

@@ -34,7 +34,8 @@ mod tests;
 use conclude::conclude;
 use drive::{Files, Settings};
 use facts::Facts;
-use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording};
+use raywake::args::{BackendChoice, Learned, ProfileChoice, Recording, Shard};
+use raywake::batch::{self, ListedRecording};
 use raywake::config;
 use raywake::console::interrupted;
 use raywake::error::RunError;
@@ -96,8 +97,16 @@ const PAIRS: &str = "pairs";
 #[derive(clap::Args)]
 pub struct Args {
     /// Labelled drives: simulated, KITTI or Argoverse 2
-    #[arg(required = true, value_name = "DRIVE")]
+    #[arg(required_unless_present = "list", value_name = "DRIVE")]
     drives: Vec<PathBuf>,
+    /// Drives of a list, a path a line, whose results are named after their whole paths. Of a part
+    /// of the list rows and facts only: the report comes of the list without --shard, once all
+    /// parts are done
+    #[arg(long, value_name = "FILE", conflicts_with = "drives")]
+    list: Option<PathBuf>,
+    /// Only every N-th drive of the list, as of `raywake run`
+    #[arg(long, value_name = "I/N", requires = "list", value_parser = Shard::parse)]
+    shard: Option<Shard>,
     /// Folder of results
     #[arg(long, required = true, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -122,7 +131,10 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Error> {
     let settings = Settings { all_columns: args.all_columns, ..args.inputs.settings()? };
     let out = args.out.as_deref().ok_or_else(|| Error::Usage("--out is missing".into()))?;
-    let names = names(&args.drives)?;
+    let (names, whole) = match &args.list {
+        None => (names(&args.drives)?, true),
+        Some(list) => names_of_list(list, args.shard)?,
+    };
     let (done, mut failed) = all(&names, &settings, out, args.jobs.max(1))?;
     let mut pairs = Vec::new();
     if args.pairs {
@@ -131,7 +143,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         pairs = done;
         failed.extend(more.into_iter().map(|(name, e)| (format!("{name}, pair by pair"), e)));
     }
-    if !done.is_empty() && !args.rows_only {
+    if !done.is_empty() && !args.rows_only && whole {
         conclude(&done, &pairs, &settings, out)?.print(out);
     }
     failures("drives", &failed)
@@ -174,17 +186,34 @@ pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<usize, E
 }
 
 /// A name for every drive: its folder's.
-fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, &Path>, Error> {
+fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, Error> {
     let mut names = BTreeMap::new();
     for path in drives {
         let full = path.canonicalize().map_err(Error::reading(path))?;
         let name = full.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if let Some(other) = names.insert(name, path.as_path()) {
+        if let Some(other) = names.insert(name, path.clone()) {
             let what = format!("has the same name as {}", other.display());
             return Err(Error::input(path, "", what));
         }
     }
     Ok(names)
+}
+
+/// A name for every drive of a part of a list: its path, in one piece. And whether that is all.
+fn names_of_list(
+    list: &Path,
+    shard: Option<Shard>,
+) -> Result<(BTreeMap<String, PathBuf>, bool), Error> {
+    let shard = shard.map_or_else(Shard::of_environment, Ok)?;
+    let mut names = BTreeMap::new();
+    for ListedRecording { data, place } in batch::part(list, shard)?.0 {
+        let name = place.to_string_lossy().replace(['/', '\\'], "+");
+        if let Some(other) = names.insert(name, data.clone()) {
+            let what = format!("has the same name as {}", other.display());
+            return Err(Error::input(&data, "", what));
+        }
+    }
+    Ok((names, shard.of == 1))
 }
 
 /// Drives that were evaluated, and those that failed.
@@ -193,7 +222,7 @@ type Outcome = (Vec<Facts>, Vec<(String, RunError)>);
 /// Evaluates all drives into the folder `out`, `jobs` at a time. Fails where the folder cannot be
 /// made, and after a signal: the drives that were finished stay.
 fn all(
-    names: &BTreeMap<String, &Path>,
+    names: &BTreeMap<String, PathBuf>,
     settings: &Settings,
     out: &Path,
     jobs: usize,

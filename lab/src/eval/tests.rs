@@ -230,6 +230,27 @@ fn drives_that_fail_are_named() {
 }
 
 #[test]
+fn parts_of_a_list() {
+    let folder = Scratch::new();
+    let good = drive(folder.path());
+    let name = good.file_name().unwrap();
+    // Another of the same name.
+    let twin = folder.path().join("twin").join(name);
+    fs::create_dir_all(twin.parent().unwrap()).unwrap();
+    let copy = std::process::Command::new("cp").arg("-r").arg(&good).arg(&twin).status().unwrap();
+    assert!(copy.success());
+    let (list, out) = (folder.path().join("list"), folder.path().join("out"));
+    fs::write(&list, format!("{}\n{}\n", good.display(), twin.display())).unwrap();
+    let [list_flag, flag] = ["--list", "--out"].map(Path::new);
+    for (shard, rows, report) in [("0/2", 1, false), ("1/2", 2, false), ("0/1", 2, true)] {
+        eval(&[list_flag, &list, flag, &out], &["-n", "2", "--shard", shard]).unwrap();
+        assert_eq!(fs::read_dir(out.join("rows")).unwrap().count(), rows, "{shard}");
+        assert_eq!(out.join("report.html").is_file(), report, "{shard}");
+    }
+    eval(&[list_flag, &list, flag, &out], &["--shard", "7/9"]).unwrap();
+}
+
+#[test]
 fn a_moving_vehicle() {
     let folder = Scratch::new();
     let drive = drive_of(folder.path(), Motion::Straight, 4);

@@ -84,7 +84,7 @@ fn settings(variant: &Variant, base: &Settings) -> Result<Settings, Error> {
 fn row(
     variant: &Variant,
     settings: &Settings,
-    names: &BTreeMap<String, &Path>,
+    names: &BTreeMap<String, PathBuf>,
     out: &Path,
 ) -> Result<report::TableRow, Error> {
     let (done, failed) = all(names, settings, out, 1)?;
@@ -99,7 +99,7 @@ fn row(
 
 fn write(
     base: &Settings,
-    names: &BTreeMap<String, &Path>,
+    names: &BTreeMap<String, PathBuf>,
     table: report::Table,
     out: &Path,
 ) -> Result<Results, Error> {

@@ -1,0 +1,47 @@
+"""Labels many recordings on a Ray cluster: share of returns that move, per recording and sweep.
+
+    pip install raywake "ray[data]"
+    python ray_label.py drives.txt labels.csv
+"""
+
+import csv
+import sys
+
+import numpy as np
+import ray
+import raywake
+
+
+@ray.remote(num_cpus=2)
+def label(path):
+    """A row per pair of sweeps: recording, stamp, returns, returns that move, fastest, m/s."""
+    recording = raywake.Recording(path)
+    pipeline = raywake.Pipeline(
+        rig=recording.rig, find_poses=not recording.located, threads=2
+    )
+    rows = []
+    for sweep in recording:
+        step = pipeline.step(sweep)
+        if step.dt is None:
+            continue
+        moving = step.points["status"] == raywake.MOVING
+        speed = np.hypot(*step.points["velocity_world_mps"][moving].T)
+        rows.append((path, sweep.stamp - step.dt, len(moving), moving.sum(), speed.max(initial=0)))
+    return rows
+
+
+def main(listed, out):
+    """Labels all recordings of a list."""
+    paths = [line.strip() for line in open(listed) if line.strip() and line[0] != "#"]
+    waiting = [label.remote(path) for path in paths]
+    with open(out, "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["recording", "stamp_s", "returns", "moving", "fastest_mps"])
+        while waiting:
+            done, waiting = ray.wait(waiting)
+            for task in done:
+                rows.writerows(ray.get(task))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Builds the Debian package, with all formats, manual pages and completions, by cargo-deb. It prints
+# where that is.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+cargo build --quiet --profile onboard -p raywake --all-features >&2
+program=target/onboard/raywake
+shell=target/package
+mkdir -p "$shell"
+for command in "" run flow track clean map odometry demo budget devices; do
+    # shellcheck disable=SC2086
+    "$program" man $command | gzip -9n >"$shell/raywake${command:+-$command}.1.gz"
+done
+"$program" completions bash >"$shell/raywake.bash"
+"$program" completions zsh >"$shell/_raywake"
+"$program" completions fish >"$shell/raywake.fish"
+cargo deb --quiet --no-build --profile onboard -p raywake --output target/package/
+ls -t target/package/raywake_*.deb | head -1

@@ -1,0 +1,109 @@
+#!/usr/bin/env bash
+# Many recordings on many machines: the same bytes as from one process, whoever hands out the parts,
+# and where a task is killed and comes back. `shards.sh PROGRAM LAB`; parts without GNU parallel or
+# Slurm (Debian's slurm-wlm and munge, run here for the while, as root) are skipped, and say so.
+set -euo pipefail
+program=$(realpath "$1")
+lab=$(realpath "$2")
+cd "$(dirname "$0")/.."
+work=$PWD/target/shards
+rm -rf "$work"
+mkdir -p "$work"
+
+"$lab" sim "$work/drives" --drives 8 --sweeps 3 --seed 5 >/dev/null
+find "$work/drives" -name '*_sync' -type d | sort >"$work/list"
+[ "$(wc -l <"$work/list")" = 8 ] || { echo "8 drives were to be simulated"; exit 1; }
+cat >"$work/task" <<EOF
+#!/bin/sh
+exec "$program" run --list "$work/list" --out "\$1" --parquet --backend scalar --quiet \${2:-}
+EOF
+chmod +x "$work/task"
+
+# Times are not the same; nor is what says them.
+bytes_of() { (cd "$1" && find . -name '*.parquet' -exec sha256sum {} + | sort -k 2); }
+compare() {
+    local found
+    found=$(bytes_of "$work/$1")
+    [ "$found" = "$expected" ] || { diff <(echo "$expected") <(echo "$found"); exit 1; }
+    [ "$(find "$work/$1" -name done | wc -l)" = 8 ] || { echo "$1: not all are done"; exit 1; }
+    echo "$1: the same bytes"
+}
+
+"$work/task" "$work/one"
+expected=$(bytes_of "$work/one")
+[ "$(wc -l <<<"$expected")" = 24 ] || { echo "24 tables were to be written"; exit 1; }
+
+# Killed where it will, and started again.
+for delay in 0.2 0.5 0.9; do
+    { timeout -s KILL "$delay" "$work/task" "$work/killed" "--shard=0/2" || true; } 2>/dev/null
+done
+"$work/task" "$work/killed" "--shard=0/2"
+"$work/task" "$work/killed" "--shard=1/2"
+compare killed
+before=$(find "$work/killed" -name '*.parquet' -newer "$work/task" -printf '%p %T@\n' | sort)
+"$work/task" "$work/killed"
+after=$(find "$work/killed" -name '*.parquet' -newer "$work/task" -printf '%p %T@\n' | sort)
+[ "$before" = "$after" ] || { echo "what was done was done again"; exit 1; }
+
+start=$SECONDS
+seq 8 1000 | xargs -I {} "$work/task" "$work/none" "--shard={}/1001"
+echo "993 empty parts: $((SECONDS - start)) s"
+
+if command -v parallel >/dev/null; then
+    parallel --will-cite -j 2 "$work/task" "$work/parallel" --shard={}/4 ::: 0 1 2 3
+    compare parallel
+else
+    echo "skipped: GNU parallel cannot be installed"
+fi
+
+slurm() {
+    local daemons=$work/slurm cores
+    cores=$(nproc)
+    mkdir -p "$daemons/state" "$daemons/spool" /run/munge
+    chown munge: /run/munge
+    pgrep munged >/dev/null || { [ -f /etc/munge/munge.key ] || mungekey; runuser -u munge munged; }
+    cat >"$daemons/slurm.conf" <<EOF
+ClusterName=raywake
+SlurmctldHost=$(hostname)(127.0.0.1)
+SlurmUser=root
+AuthType=auth/munge
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+StateSaveLocation=$daemons/state
+SlurmdSpoolDir=$daemons/spool
+SlurmctldPidFile=$daemons/slurmctld.pid
+SlurmdPidFile=$daemons/slurmd.pid
+JobRequeue=1
+MinJobAge=3600
+NodeName=$(hostname) NodeAddr=127.0.0.1 CPUs=$cores State=UNKNOWN
+PartitionName=all Nodes=$(hostname) Default=YES MaxTime=INFINITE State=UP
+EOF
+    export SLURM_CONF=$daemons/slurm.conf
+    slurmctld && slurmd
+}
+stop_slurm() { pkill -F "$work/slurm/slurmd.pid"; pkill -F "$work/slurm/slurmctld.pid"; } 2>/dev/null
+if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
+    trap 'stop_slurm || true' EXIT
+    job=$(sbatch --parsable --array=0-3 --requeue --output="$work/slurm/%a.log" \
+        "$work/task" "$work/slurm/out")
+    # One task is killed at work, with all that it runs, and handed out anew.
+    for _ in $(seq 100); do
+        squeue --noheader --states=RUNNING --job "${job}_1" | grep -q . && break
+        sleep 0.1
+    done
+    scontrol requeue "${job}_1"
+    for _ in $(seq 240); do
+        [ -z "$(squeue --noheader --job "$job")" ] && break
+        # Slurm holds back what it requeues for two minutes, unless told.
+        scontrol update JobId="${job}_1" StartTime=now >/dev/null 2>&1 || true
+        sleep 0.5
+    done
+    echo "restarts of the task that was killed: $(scontrol show job "${job}_1" |
+        grep -o 'Restarts=[0-9]*' || true)"
+    mv "$work/slurm/out" "$work/array"
+    compare array
+else
+    echo "skipped: Slurm cannot be run here"
+fi
