@@ -10,6 +10,7 @@ use glam::DVec3;
 use raywake::map::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
 use raywake_core::params::Profile;
 use raywake_core::stages::background_filter;
+use raywake_embed::{EstimatorOptions, FlowEstimator, SweepPlace, TeamEstimator};
 use raywake_gpu::Options;
 use raywake_objects::centroid_ekf::{CentroidEkf, CentroidParams};
 use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag, MODEL_MAX};
@@ -54,6 +55,47 @@ fn flow(sweeps: &[SimSweep]) {
     }
     let title = "flow, profile hdl64, ms a sweep";
     table(title, &variants, &[(0, 2), (1, 3), (0, 1), (2, 3)], &[(0, 2), (1, 3)]);
+}
+
+/// A step of the program beside one of the estimator that the libraries for C and Python have:
+/// that copies the sweep, and is called through its desk. Sweep by sweep, first the one and then
+/// the other.
+fn embedded(sweeps: &[SimSweep]) {
+    let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
+    let mut drive = setup.drive(setup.scalar());
+    let options = EstimatorOptions {
+        profile: setup.profile.clone(),
+        rig: setup.rig.clone(),
+        points_max: setup.profile.returns(),
+        registers: false,
+    };
+    let mut team = TeamEstimator::on_heap(&options, 1).unwrap_or_else(|e| panic!("{e}"));
+    let mut variants = ["program", "library"].map(|name| Variant::new(format!("step, {name}")));
+    for (n, (now, before)) in pairs(sweeps).enumerate() {
+        for turn in 0..2 {
+            let which = (n + turn) % 2;
+            let variant = &mut variants[which];
+            let clock = Instant::now();
+            if which == 0 {
+                let points = before.map_or(&[][..], |b| &b.points);
+                let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
+                variant.add(n, "total", milliseconds(clock));
+                let columns = stepped.output.flows.iter().flat_map(|f| f.columns);
+                columns.for_each(|c| variant.digest.column(c));
+            } else {
+                let pose = Some(now.world_from_vehicle);
+                let place = SweepPlace { stamp_s: now.stamp_s, pose, twist: Some(now.twist) };
+                let stepped = team.step(&place, now.points.iter().copied());
+                variant.add(n, "total", milliseconds(clock));
+                stepped.unwrap_or_else(|e| panic!("{e}"));
+                let columns = |e: &FlowEstimator| {
+                    e.columns().iter().for_each(|c| variant.digest.column(c));
+                };
+                team.read(columns).unwrap_or_else(|e| panic!("{e}"));
+            }
+        }
+    }
+    table("libraries, profile hdl64, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
 }
 
 /// The sparse map on either backend.
@@ -203,6 +245,7 @@ fn main() {
     let points = sweeps.iter().map(|s| s.points.len()).sum::<usize>() / sweeps.len();
     println!("{count} simulated sweeps of {points} returns; medians; a/b: a divided by b");
     flow(&sweeps);
+    embedded(&sweeps);
     map(&sweeps);
     tracks(&sweeps);
 }

@@ -163,7 +163,10 @@ impl TeamEstimator {
     /// A step failed.
     pub fn read<R>(&self, read: impl FnOnce(&FlowEstimator) -> R) -> Result<R, StepError> {
         let work = self.desk.work();
-        if work.failed { Err(StepError::Failed) } else { Ok(read(&work.estimator)) }
+        if work.failed {
+            return Err(StepError::Failed);
+        }
+        catch_unwind(AssertUnwindSafe(|| read(&work.estimator))).map_err(|_| StepError::Failed)
     }
 }
 
