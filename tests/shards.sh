@@ -81,11 +81,16 @@ NodeName=$(hostname) NodeAddr=127.0.0.1 CPUs=$cores State=UNKNOWN
 PartitionName=all Nodes=$(hostname) Default=YES MaxTime=INFINITE State=UP
 EOF
     export SLURM_CONF=$daemons/slurm.conf
-    slurmctld && slurmd
+    slurmctld && slurmd || return 1
+    for _ in $(seq 100); do
+        sinfo --noheader --format=%T | grep -q idle && return 0
+        sleep 0.2
+    done
+    return 1
 }
 stop_slurm() { pkill -F "$work/slurm/slurmd.pid"; pkill -F "$work/slurm/slurmctld.pid"; } 2>/dev/null
+trap 'stop_slurm || true' EXIT
 if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
-    trap 'stop_slurm || true' EXIT
     job=$(sbatch --parsable --array=0-3 --requeue --output="$work/slurm/%a.log" \
         "$work/task" "$work/slurm/out")
     # One task is killed at work, with all that it runs, and handed out anew.
