@@ -60,6 +60,20 @@ else
     echo "skipped: the target thumbv7em-none-eabihf cannot be installed"
 fi
 
+# As on the host, bit for bit.
+bare() {
+    rustup target add aarch64-unknown-none >/dev/null 2>&1 || return 1
+    command -v qemu-system-aarch64 >/dev/null || { command -v apt-get >/dev/null &&
+        install qemu-system-arm; } || return 1
+    cargo build --quiet --release -p raywake-bare --target aarch64-unknown-none
+    timeout 120 qemu-system-aarch64 -machine virt -cpu cortex-a72 -m 256M -nographic -nic none \
+        -kernel target/aarch64-unknown-none/release/raywake-bare </dev/null | tr -d '\r' >target/bare
+    cargo run --quiet --release -p raywake-bare >target/hosted
+    cmp <(grep digest target/bare) <(grep digest target/hosted) || exit 1
+    echo "on a bare aarch64 machine and here: $(grep digest target/bare)"
+}
+bare || echo "skipped: no target or emulator for a bare aarch64 machine to be had"
+
 say "the program alone, onboard, with every index clamped, and for aarch64"
 cargo build --quiet --release -p raywake --all-features
 cargo build --quiet --profile onboard -p raywake --no-default-features

@@ -161,7 +161,8 @@ fn groups<'a>(edges: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> Vec<Vec<&'a str>>
     let reached: BTreeMap<_, _> = edges.keys().map(|file| (*file, reach(edges, file))).collect();
     let mut groups = BTreeSet::new();
     for (file, others) in &reached {
-        let group: Vec<_> = others.iter().copied().filter(|o| reached[o].contains(file)).collect();
+        let back = |other: &&str| reached.get(other).is_some_and(|from| from.contains(file));
+        let group: Vec<_> = others.iter().copied().filter(back).collect();
         if group.len() > 1 {
             groups.insert(group);
         }
