@@ -1,4 +1,4 @@
-//! A yard with a box that slides along a wall, as a spinning sensor sees it. Of plain arithmetic, so
+//! A yard with a box that slides along a wall, as a spinning sensor sees it. Plain arithmetic, so
 //! that every machine sees the same.
 
 use raywake_core::sweep::Point;
@@ -16,15 +16,15 @@ const YARD_M: f64 = 10.0;
 const OWN_MPS: f64 = 1.0;
 const BOX_MPS: f64 = 5.0;
 
-/// An obstacle: least and greatest x, y and z in the world, m.
-type Block = [[f64; 2]; 3];
+/// Least and greatest x, y and z in the world, m.
+type Obstacle = [[f64; 2]; 3];
 
 /// Returns of the sweep at a time, in the frame of the sensor.
 pub fn returns(time_s: f64) -> impl ExactSizeIterator<Item = Point> {
     let sensor = [OWN_MPS * time_s, 0.0, HEIGHT_M];
     let ahead = -4.0 + BOX_MPS * time_s;
-    let sliding: Block = [[ahead, ahead + 3.0], [4.0, 5.6], [0.1, 1.6]];
-    let standing: Block = [[-1.0, 1.5], [-6.5, -5.0], [0.0, 1.4]];
+    let sliding: Obstacle = [[ahead, ahead + 3.0], [4.0, 5.6], [0.1, 1.6]];
+    let standing: Obstacle = [[-1.0, 1.5], [-6.5, -5.0], [0.0, 1.4]];
     (0..RETURNS).map(move |n| {
         let (column, beam) = (n as u32 / BEAMS, n as u32 % BEAMS);
         let ray = direction(column, beam);
@@ -61,7 +61,7 @@ fn walls(from: &[f64; 3], ray: &[f64; 3]) -> f64 {
 }
 
 /// How far it is to a block, if it is hit.
-fn hit(block: &Block, from: &[f64; 3], ray: &[f64; 3]) -> Option<f64> {
+fn hit(block: &Obstacle, from: &[f64; 3], ray: &[f64; 3]) -> Option<f64> {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {
         let [a, b] = block[axis].map(|bound| (bound - from[axis]) / ray[axis]);
