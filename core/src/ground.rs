@@ -206,6 +206,6 @@ impl GroundEstimator {
                 self.extrapolated[i * n + j] = height;
             }
         }
-        core::mem::swap(&mut self.height, &mut self.extrapolated);
+        self.height[..n * n].copy_from_slice(&self.extrapolated[..n * n]);
     }
 }

@@ -13,7 +13,10 @@ use raywake_simd::Simd;
 
 /// Where the returns of the last two sweeps are.
 pub(crate) struct Returns {
-    /// Column of every return, of the sweep and of the one before.
+    /// Which of two is of the sweep, and not of the one before. Swapped, both would be copied, by
+    /// way of a stack of more than a megabyte.
+    now: usize,
+    /// Column of every return, of two sweeps.
     column: [[u32; POINTS_MAX]; 2],
     /// Whether a return belongs to none of the clusters that its column is part of.
     is_apart: [[bool; POINTS_MAX]; 2],
@@ -30,6 +33,7 @@ impl Returns {
     /// Of no sweep.
     pub const fn new() -> Returns {
         Returns {
+            now: 0,
             column: [[0; POINTS_MAX]; 2],
             is_apart: [[false; POINTS_MAX]; 2],
             placed: [const { Placed { at: [0.0; 3], offset_s: 0.0 } }; POINTS_MAX],
@@ -46,10 +50,9 @@ impl Returns {
         (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
     ) -> Sent {
         let Setup { profile, rig, .. } = setup;
-        self.column.swap(0, 1);
-        self.is_apart.swap(0, 1);
+        self.now = 1 - self.now;
         let placement = Placement { profile, rig, window: &arrival.window, sweep };
-        let (columns, placed) = (&mut self.column[0], &mut self.placed);
+        let (columns, placed) = (&mut self.column[self.now], &mut self.placed);
         let buffers = RayBuffers { rays, origins, columns, placed };
         let (count, dropped) = setup.preparation.prepare(team, &placement, buffers);
         let [shift_x, shift_y, shift_z] = arrival.shift;
@@ -84,7 +87,7 @@ impl Returns {
         let taken = points.count();
         let side = profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
-        let columns = &mut self.column[0][..taken];
+        let columns = &mut self.column[self.now][..taken];
         // Clusters on slopes reach out of the window's levels: their returns belong to its columns
         // all the same.
         for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
@@ -99,12 +102,13 @@ impl Returns {
             placed: &self.placed[..taken],
             columns,
         };
-        refinement.insert_cloud(profile, simd, returns, &mut self.is_apart[0][..taken])
+        refinement.insert_cloud(profile, simd, returns, &mut self.is_apart[self.now][..taken])
     }
 
     /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are
     /// apart.
     pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
-        self.column[1][from..].iter().copied().zip(self.is_apart[1][from..].iter().copied())
+        let (column, is_apart) = (&self.column[1 - self.now], &self.is_apart[1 - self.now]);
+        column[from..].iter().copied().zip(is_apart[from..].iter().copied())
     }
 }

@@ -191,7 +191,9 @@ impl Tracklets {
             o.slot = self.put(step, o.column, by, t, &mut turnover);
         }
         self.coast(profile, step, dt, &mut turnover);
-        core::mem::swap(&mut self.now, &mut self.next);
+        // Swapped, the whole of both would go by way of the stack.
+        self.now.clear();
+        self.now.extend(self.next.iter().copied());
         turnover
     }
 

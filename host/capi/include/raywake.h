@@ -13,7 +13,8 @@
  *
  * Frames: x forward, y left, z up; the world is the frame of the poses. Nothing is allocated after
  * raywake_create. An estimator may be used from any thread, by one at a time; several estimators
- * are independent of each other. After fork() it is of use in the parent alone.
+ * are independent of each other. After fork() it is of use in the parent alone. Where no threads are
+ * wanted, that which calls needs 512 KiB of stack.
  *
  * Made by cbindgen of host/capi: change it there. */
 

@@ -31,6 +31,8 @@ gcc "${flags[@]}" "$source" -o "$out/replay" "${static[@]}"
 gcc "${flags[@]}" "$source" -o "$out/replay-shared" "${shared[@]}"
 compare "C, two threads" "$out/replay" "$out/demo.sweeps" 2
 compare "C, one thread, shared library" "$out/replay-shared" "$out/demo.sweeps" 1
+small_stack() { (ulimit -s 512 && "$@"); }
+compare "C, one thread, 512 KiB of stack" small_stack "$out/replay" "$out/demo.sweeps" 1
 
 # The header is one of C++, too; and the shared library is found by its ABI.
 echo '#include <raywake.h>
