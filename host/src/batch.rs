@@ -44,8 +44,11 @@ pub trait RecordingCommand: Clone + Debug {
     /// An option for a single file, which many recordings cannot share, if one was given.
     fn single_file(&self) -> Option<&'static str>;
 
-    /// Errors only.
+    /// Whether errors alone are printed.
     fn quiet(&self) -> bool;
+
+    /// Has errors alone printed.
+    fn hush(&mut self);
 
     /// Does it with one recording. Returns whether it got to the end.
     fn carry_out(&self) -> Result<bool, RunError>;
@@ -81,6 +84,7 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     }
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
     let (mine, line) = part(&list, shard)?;
+    let seal = seal(command)?;
     say(command.quiet(), &line)?;
     let mut tally = Tally::default();
     for (n, recording) in mine.iter().enumerate() {
@@ -89,7 +93,7 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
         }
         let line = format!("\n{} of {}: {}\n", n + 1, mine.len(), recording.data.display());
         say(command.quiet(), &line)?;
-        tally.one(command, recording)?;
+        tally.one(command, recording, &seal)?;
     }
     say(command.quiet(), &tally.line())?;
     let whole = tally.done + tally.before + tally.failures.len() == mine.len();
@@ -110,19 +114,20 @@ pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String),
 }
 
 impl Tally {
-    /// One recording. Fails where no other needs to be tried.
-    fn one(&mut self, command: &impl RecordingCommand, at: &ListedRecording) -> Result<(), Error> {
+    /// One recording.
+    fn one(
+        &mut self,
+        command: &impl RecordingCommand,
+        at: &ListedRecording,
+        seal: &str,
+    ) -> Result<(), Error> {
         let command = command_for(command, at);
-        match finish(&command) {
+        match finish(&command, seal) {
             Ok(Some(true)) => self.done += 1,
             Ok(Some(false)) => {}
             Ok(None) => {
                 self.before += 1;
                 say(command.quiet(), "done before\n")?;
-            }
-            Err(RunError::Io(Error::Usage(what))) if self.failures.is_empty() && self.done == 0 => {
-                // The command itself is wrong, and so it will be for every other.
-                return Err(Error::Usage(what));
             }
             Err(e) => {
                 let (text, path) = (e.to_string(), at.data.display().to_string());
@@ -154,8 +159,7 @@ fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
 }
 
 /// Does it unless it was done before: then there is none. Returns whether it got to the end.
-fn finish(command: &impl RecordingCommand) -> Result<Option<bool>, RunError> {
-    let seal = seal(command)?;
+fn finish(command: &impl RecordingCommand, seal: &str) -> Result<Option<bool>, RunError> {
     let Some(out) = command.out() else { return command.carry_out().map(Some) };
     let done = out.join(DONE);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
@@ -170,11 +174,13 @@ fn finish(command: &impl RecordingCommand) -> Result<Option<bool>, RunError> {
     Ok(Some(whole))
 }
 
-/// With what results are made, but for the recording: a line.
+/// With what results are made, but for the recording: a line. Fails where nothing can be made with
+/// that.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
     *plain.recordings() = Recordings::default();
     plain.set_out(PathBuf::new());
+    plain.hush();
     let flow = plain.flow();
     // Results are the same on each.
     flow.backend = BackendChoice::default();
@@ -311,6 +317,8 @@ mod tests {
         fn quiet(&self) -> bool {
             true
         }
+
+        fn hush(&mut self) {}
 
         fn carry_out(&self) -> Result<bool, RunError> {
             let out = self.out.clone().unwrap();

@@ -63,6 +63,10 @@ impl RecordingCommand for args::RunArgs {
         self.quiet
     }
 
+    fn hush(&mut self) {
+        self.quiet = true;
+    }
+
     fn carry_out(&self) -> Result<bool, RunError> {
         Ok(!run(self)?.facts.interrupted)
     }

@@ -69,6 +69,37 @@ fn ranges_of_sweeps() {
 }
 
 #[test]
+fn many_recordings() {
+    let t = Temp::new();
+    t.drive(2);
+    let (drive, out) = (t.path().join("drive"), t.path().join("out"));
+    let list = t.write("list", format!("# one\n{}\n", drive.display()));
+    let [list, to] = [&list, &out].map(|path| path.to_str().unwrap());
+    let with = |more: &[&str]| {
+        raywake(&[&["run", "--list", list, "--out", to], &BACKEND[..], more].concat())
+    };
+    with(&["--shard", "1/2"]).succeeded();
+    assert!(!out.exists());
+    let first = with(&["--shard", "0/2"]);
+    first.succeeded();
+    assert!(first.stdout.contains("1 of 1 recordings") || first.stdout.contains("1 done, 0"));
+    let place = out.join(drive.strip_prefix("/").unwrap());
+    assert!(place.join("done").is_file() && place.join("summary.json").is_file());
+    assert!(with(&["--quiet"]).stdout.is_empty());
+    assert!(with(&[]).stdout.contains("0 done, 1 done before"));
+    with(&["-n", "9", "--filter", "none"]).failed(2, &["holds other results"]);
+    with(&["--set", "side=100"]).failed(2, &["must be odd"]);
+    with(&["--mcap", "x.mcap"]).failed(2, &["--mcap is for one recording"]);
+    with(&["--shard", "2/2"]).failed(2, &["0 to N-1"]);
+    raywake(&["run", "--list", list]).failed(2, &["--out"]);
+    raywake(&["run", list, "--shard", "0/2"]).failed(2, &["--list"]);
+    raywake(&["run"]).failed(2, &["<DATA>"]);
+    let missing = t.write("missing", "/nowhere/drive\n");
+    let missing = missing.to_str().unwrap();
+    raywake(&["clean", "--list", missing, "--out", to]).failed(3, &["line 1", "/nowhere/drive"]);
+}
+
+#[test]
 fn mistakes_in_profiles() {
     let t = Temp::new();
     t.drive(2);

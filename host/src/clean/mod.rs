@@ -260,6 +260,10 @@ impl RecordingCommand for args::CleanArgs {
         self.quiet
     }
 
+    fn hush(&mut self) {
+        self.quiet = true;
+    }
+
     fn carry_out(&self) -> Result<bool, RunError> {
         clean(self)
     }

@@ -149,6 +149,10 @@ impl RecordingCommand for args::TrackArgs {
         self.quiet
     }
 
+    fn hush(&mut self) {
+        self.quiet = true;
+    }
+
     fn carry_out(&self) -> Result<bool, RunError> {
         track(self)
     }
