@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Everything that must hold, in one command. Installs the software Vulkan device, the validation
-# layers, spirv-val and a browser on Debian where they are missing, so that nothing is skipped.
+# Everything that must hold, in one command. On Debian it installs what is missing, so that nothing
+# is skipped: the software Vulkan device, validation layers, spirv-val, a browser, compilers and
+# emulators for aarch64, Valgrind, Python's venv, Slurm and GNU parallel.
 #
 #   RAYWAKE_DATA=FOLDER   also run the tests on recorded drives found there
 set -euo pipefail
@@ -65,10 +66,11 @@ bare() {
     rustup target add aarch64-unknown-none >/dev/null 2>&1 || return 1
     command -v qemu-system-aarch64 >/dev/null || { command -v apt-get >/dev/null &&
         install qemu-system-arm; } || return 1
-    cargo build --quiet --release -p raywake-bare --target aarch64-unknown-none
+    cargo build --quiet --release -p raywake-bare --target aarch64-unknown-none || exit 1
     timeout 120 qemu-system-aarch64 -machine virt -cpu cortex-a72 -m 256M -nographic -nic none \
         -kernel target/aarch64-unknown-none/release/raywake-bare </dev/null | tr -d '\r' >target/bare
-    cargo run --quiet --release -p raywake-bare >target/hosted
+    cargo run --quiet --release -p raywake-bare >target/hosted || exit 1
+    grep -q digest target/hosted || exit 1
     cmp <(grep digest target/bare) <(grep digest target/hosted) || exit 1
     echo "on a bare aarch64 machine and here: $(grep digest target/bare)"
 }
@@ -88,7 +90,7 @@ others=(target/release/raywake target/onboard/raywake target/restrict/release/ra
 static() {
     rustup target add "$1-unknown-linux-musl" >/dev/null 2>&1 || return 1
     local bytes
-    program=$(host/package/static.sh "$1" 2>/dev/null) || return 1
+    program=$(host/package/static.sh "$1") || exit 1
     bytes=$(wc -c <"$program")
     echo "static binary for $1: $bytes bytes"
     [ "$bytes" -le 6000000 ] || { echo "larger than 6,000,000 bytes"; exit 1; }

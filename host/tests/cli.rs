@@ -82,7 +82,8 @@ fn many_recordings() {
     assert!(!out.exists());
     let first = with(&["--shard", "0/2"]);
     first.succeeded();
-    assert!(first.stdout.contains("1 of 1 recordings") || first.stdout.contains("1 done, 0"));
+    assert!(first.stdout.contains("part 0 of 2: 1 of 1 recordings"), "{}", first.stdout);
+    assert!(first.stdout.contains("1 done, 0 done before, 0 failed"), "{}", first.stdout);
     let place = out.join(drive.strip_prefix("/").unwrap());
     assert!(place.join("done").is_file() && place.join("summary.json").is_file());
     assert!(with(&["--quiet"]).stdout.is_empty());

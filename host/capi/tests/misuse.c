@@ -277,6 +277,7 @@ int main(int argc, char **argv) {
     sweeps_that_are_none();
     CHECK(drive(argv[1], 0) == drive(argv[1], 0));
     drive(argv[1], 1);
+    CHECK(busy > 0);
     printf("%s; %d calls at the same time were refused\n", failed ? "FAILED" : "passed", busy);
     return failed;
 }
