@@ -24,16 +24,34 @@ use crate::weight_files::WeightFiles;
 /// Name of the file beside results that are whole.
 const DONE: &str = "done";
 
+/// Arguments of every command that works on a recording.
+pub struct SharedArgs<'a> {
+    /// Which recordings.
+    pub recordings: &'a mut Recordings,
+    /// What the flow is computed with.
+    pub flow: &'a mut FlowChoice,
+    /// Whether errors alone are printed.
+    pub quiet: &'a mut bool,
+}
+
+/// [`SharedArgs`] of fields of these names.
+macro_rules! shared_args {
+    () => {
+        fn shared(&mut self) -> crate::batch::SharedArgs<'_> {
+            let Self { recordings, flow, quiet, .. } = self;
+            crate::batch::SharedArgs { recordings, flow, quiet }
+        }
+    };
+}
+pub(crate) use shared_args;
+
 /// What is asked of a command that works on a recording.
 pub trait RecordingCommand: Clone + Debug {
     /// Its name.
     const NAME: &'static str;
 
-    /// Which recordings.
-    fn recordings(&mut self) -> &mut Recordings;
-
-    /// What the flow is computed with.
-    fn flow(&mut self) -> &mut FlowChoice;
+    /// What every such command has.
+    fn shared(&mut self) -> SharedArgs<'_>;
 
     /// Where results go, unless nowhere.
     fn out(&self) -> Option<&Path>;
@@ -43,12 +61,6 @@ pub trait RecordingCommand: Clone + Debug {
 
     /// An option for a single file, which many recordings cannot share, if one was given.
     fn single_file(&self) -> Option<&'static str>;
-
-    /// Whether errors alone are printed.
-    fn quiet(&self) -> bool;
-
-    /// Has errors alone printed.
-    fn hush(&mut self);
 
     /// Does it with one recording. Returns whether it got to the end.
     fn carry_out(&self) -> Result<bool, RunError>;
@@ -76,26 +88,30 @@ struct Tally {
 /// # Errors
 /// Of several that fail the first, after all others were tried.
 pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
-    let Recordings { list, shard, .. } = command.clone().recordings().clone();
+    let mut own = command.clone();
+    let SharedArgs { recordings: Recordings { list, shard, .. }, quiet, .. } = own.shared();
+    let (shard, quiet) = (*shard, *quiet);
     let Some(list) = list else { return command.carry_out() };
     if let Some(option) = command.single_file() {
         let what = format!("--{option} is for one recording, not for those of --list");
         return Err(Error::Usage(what).into());
     }
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
-    let (mine, line) = part(&list, shard)?;
+    let (mine, line) = part(list, shard)?;
     let seal = seal(command)?;
-    say(command.quiet(), &line)?;
+    say(quiet, &line)?;
     let mut tally = Tally::default();
     for (n, recording) in mine.iter().enumerate() {
         if interrupted() {
             break;
         }
         let line = format!("\n{} of {}: {}\n", n + 1, mine.len(), recording.data.display());
-        say(command.quiet(), &line)?;
-        tally.one(command, recording, &seal)?;
+        say(quiet, &line)?;
+        if let Some(line) = tally.one(command, recording, &seal) {
+            say(quiet, line)?;
+        }
     }
-    say(command.quiet(), &tally.line())?;
+    say(quiet, &tally.line())?;
     let whole = tally.done + tally.before + tally.failures.len() == mine.len();
     tally.end().map(|()| whole)
 }
@@ -114,20 +130,19 @@ pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String),
 }
 
 impl Tally {
-    /// One recording.
+    /// One recording. Returns what is to be said of it.
     fn one(
         &mut self,
         command: &impl RecordingCommand,
         at: &ListedRecording,
         seal: &str,
-    ) -> Result<(), Error> {
-        let command = command_for(command, at);
-        match finish(&command, seal) {
+    ) -> Option<&'static str> {
+        match finish(&command_for(command, at), &at.data, seal) {
             Ok(Some(true)) => self.done += 1,
             Ok(Some(false)) => {}
             Ok(None) => {
                 self.before += 1;
-                say(command.quiet(), "done before\n")?;
+                return Some("done before\n");
             }
             Err(e) => {
                 let (text, path) = (e.to_string(), at.data.display().to_string());
@@ -136,7 +151,7 @@ impl Tally {
                 self.failures.push(e);
             }
         }
-        Ok(())
+        None
     }
 
     fn line(&self) -> String {
@@ -154,18 +169,22 @@ fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
     let mut one = command.clone();
     let out = command.out().map(|out| out.join(&at.place));
     out.into_iter().for_each(|out| one.set_out(out));
-    *one.recordings() = Recordings::one(at.data.clone());
+    *one.shared().recordings = Recordings::one(at.data.clone());
     one
 }
 
 /// Does it unless it was done before: then there is none. Returns whether it got to the end.
-fn finish(command: &impl RecordingCommand, seal: &str) -> Result<Option<bool>, RunError> {
+fn finish(
+    command: &impl RecordingCommand,
+    data: &Path,
+    seal: &str,
+) -> Result<Option<bool>, RunError> {
     let Some(out) = command.out() else { return command.carry_out().map(Some) };
     let done = out.join(DONE);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
-    let whole = inputs::spare(out, command.clone().recordings().path())
+    let whole = inputs::spare("out", out, data)
         .map_err(RunError::from)
         .and_then(|()| command.carry_out())?;
     if whole {
@@ -178,12 +197,10 @@ fn finish(command: &impl RecordingCommand, seal: &str) -> Result<Option<bool>, R
 /// that.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
-    *plain.recordings() = Recordings::default();
     plain.set_out(PathBuf::new());
-    plain.hush();
-    let flow = plain.flow();
-    // Results are the same on each.
-    flow.backend = BackendChoice::default();
+    let SharedArgs { recordings, flow, quiet } = plain.shared();
+    // Results are the same on each backend.
+    (*recordings, flow.backend, *quiet) = (Recordings::default(), BackendChoice::default(), true);
     let settings = config::settings(&flow.profile)?;
     let weights = WeightFiles::read(&flow.learned, &settings.profile)?.digest();
     let all = format!("{plain:?} {:?} {:?} {weights}", settings.profile, settings.objects);
@@ -289,18 +306,13 @@ mod tests {
         recordings: Recordings,
         flow: FlowChoice,
         out: Option<PathBuf>,
+        quiet: bool,
     }
 
     impl RecordingCommand for Noted {
         const NAME: &'static str = "note";
 
-        fn recordings(&mut self) -> &mut Recordings {
-            &mut self.recordings
-        }
-
-        fn flow(&mut self) -> &mut FlowChoice {
-            &mut self.flow
-        }
+        shared_args!();
 
         fn out(&self) -> Option<&Path> {
             self.out.as_deref()
@@ -313,12 +325,6 @@ mod tests {
         fn single_file(&self) -> Option<&'static str> {
             None
         }
-
-        fn quiet(&self) -> bool {
-            true
-        }
-
-        fn hush(&mut self) {}
 
         fn carry_out(&self) -> Result<bool, RunError> {
             let out = self.out.clone().unwrap();
@@ -348,6 +354,7 @@ mod tests {
             recordings: Recordings { list: Some(list), ..Recordings::default() },
             flow: FlowChoice::default(),
             out: Some(folder.path().join("out")),
+            quiet: true,
         };
         let times = |name: &Path| {
             let below = folder.path().join("out").join(place(name).unwrap());

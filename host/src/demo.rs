@@ -18,11 +18,9 @@ use crate::picture::PictureFiles;
 use crate::summary::RunSummary;
 use crate::weight_files::WeightFiles;
 use raywake_io::sink::streams::StreamTargets;
-use raywake_io::source::SweepData;
 use raywake_io::source::simulated::Simulated;
+use raywake_io::source::{Source, SweepData};
 
-const SEED: u64 = 1;
-const SWEEPS: usize = 20;
 /// Observations of a tracklet before its velocity is compared with the truth.
 const AGE: u32 = 5;
 /// Objects slower than this do not count as moving, m/s.
@@ -31,16 +29,16 @@ const MOVING_MPS: f32 = 1.0;
 /// Runs on the simulated drive, writes flow and pictures, prints the accuracy.
 pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
     let profile = Profile::hdl64();
+    let mut source = Simulated::demo();
     let plan = RunPlan {
         weights: WeightFiles::read(&Learned::default(), &profile)?,
         backend: &args.backend,
-        sweeps: 0..SWEEPS,
+        sweeps: 0..source.len(),
         files: files(&args.out),
         summary: None,
         quiet: args.quiet,
         profile,
     };
-    let mut source = Simulated::new(SEED, SWEEPS);
     let mut errors = SpeedErrors::default();
     let voxel_m = plan.profile.voxel_m;
     let summary = engine::execute(&plan, &mut source, &mut |source, pair| {

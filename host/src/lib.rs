@@ -56,8 +56,28 @@ pub mod weight_files;
 
 pub use raywake_team as team;
 
-use args::Command;
+use args::{Args, Command};
+use clap::{ArgMatches, FromArgMatches};
 use error::RunError;
+
+/// Carries out a command line, on as many threads as pay, and tells what went wrong. Returns the
+/// exit code of the process.
+///
+/// # Errors
+/// The command line is none.
+pub fn carry_out(line: &ArgMatches) -> Result<u8, clap::Error> {
+    let command = Args::from_arg_matches(line)?.command;
+    let run =
+        || args::inputs::protect(line).map_err(RunError::from).and_then(|()| execute(command));
+    Ok(match team::lead(team::available(), run) {
+        Ok(true) => 0,
+        Ok(false) => console::INTERRUPTED_CODE,
+        Err(e) => {
+            console::warn(&e.to_string());
+            e.exit_code()
+        }
+    })
+}
 
 /// Carries out a command. Returns whether it got to the end: a signal ends it early.
 pub fn execute(command: Command) -> Result<bool, RunError> {

@@ -5,12 +5,10 @@ use std::alloc::System;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::CommandFactory;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches};
-use raywake::args::{self, Args};
-use raywake::console::{INTERRUPTED_CODE, warn};
-use raywake::error::RunError;
-use raywake::{execute, team};
+use raywake::args::Args;
+use raywake::console::warn;
 use raywake_alloc_guard::Guard;
 
 /// Ends with what clap says, or with the command for a recording that stands where one is missing.
@@ -49,15 +47,5 @@ fn main() -> ExitCode {
     #[cfg(feature = "arrow")]
     tell_of_damaged_files();
     let args = Args::command().try_get_matches().unwrap_or_else(|e| explain(&e));
-    let command = Args::from_arg_matches(&args).unwrap_or_else(|e| explain(&e)).command;
-    let run =
-        || args::inputs::protect(&args).map_err(RunError::from).and_then(|()| execute(command));
-    match team::lead(team::available(), run) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(INTERRUPTED_CODE),
-        Err(e) => {
-            warn(&e.to_string());
-            ExitCode::from(e.exit_code())
-        }
-    }
+    ExitCode::from(raywake::carry_out(&args).unwrap_or_else(|e| explain(&e)))
 }

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::args::{self, FlowChoice, Recordings};
-use crate::batch::RecordingCommand;
+use crate::args;
+use crate::batch::{RecordingCommand, shared_args};
 use crate::config;
 use crate::console::note;
 use crate::engine::{self, RunPlan};
@@ -39,13 +39,7 @@ fn run(args: &args::RunArgs) -> Result<RunSummary, RunError> {
 impl RecordingCommand for args::RunArgs {
     const NAME: &'static str = "run";
 
-    fn recordings(&mut self) -> &mut Recordings {
-        &mut self.recordings
-    }
-
-    fn flow(&mut self) -> &mut FlowChoice {
-        &mut self.flow
-    }
+    shared_args!();
 
     fn out(&self) -> Option<&Path> {
         self.results.out.as_deref()
@@ -57,14 +51,6 @@ impl RecordingCommand for args::RunArgs {
 
     fn single_file(&self) -> Option<&'static str> {
         self.results.single_file()
-    }
-
-    fn quiet(&self) -> bool {
-        self.quiet
-    }
-
-    fn hush(&mut self) {
-        self.quiet = true;
     }
 
     fn carry_out(&self) -> Result<bool, RunError> {

@@ -27,13 +27,18 @@ impl<'a> ParameterSetting<'a> {
     pub fn parse(text: &'a str) -> Option<ParameterSetting<'a>> {
         let (path, word) = text.split_once('=')?;
         let (path, word) = (path.trim(), word.trim());
-        let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
         let value = match (word.parse(), word.parse()) {
             (Ok(flag), _) => Value::Flag(flag),
             (_, Ok(number)) => Value::Number(number),
             _ => Value::Word(word),
         };
-        Some(ParameterSetting { group, name, value })
+        Some(ParameterSetting::new(path, value))
+    }
+
+    /// Of `NAME` or `GROUP.NAME`.
+    pub fn new(path: &'a str, value: Value<'a>) -> ParameterSetting<'a> {
+        let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
+        ParameterSetting { group, name, value }
     }
 }
 

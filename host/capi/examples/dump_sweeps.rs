@@ -15,17 +15,13 @@ use raywake_core::sweep::{Rig, Timing};
 use raywake_io::source::simulated::Simulated;
 use raywake_io::source::{OpenOptions, Source, SweepData, open};
 
-/// The demo's drive.
-const SEED: u64 = 1;
-const SWEEPS: usize = 20;
-
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [data, out, most] = args.as_slice() else {
         return Err("dump_sweeps RECORDING|demo OUT SWEEPS".into());
     };
     let mut source: Box<dyn Source> = match data.as_str() {
-        "demo" => Box::new(Simulated::new(SEED, SWEEPS)),
+        "demo" => Box::new(Simulated::demo()),
         path => open(Path::new(path), &OpenOptions::default())?,
     };
     let mut to = BufWriter::new(File::create(out)?);

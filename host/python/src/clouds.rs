@@ -1,16 +1,13 @@
 //! Flow from one cloud to the next.
 
-use glam::DVec3;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use raywake::flow::motion;
 use raywake::flow::rows::PointRow;
+use raywake::flow::{motion, place};
 use raywake_core::pose::Pose;
-use raywake_core::sweep::{Point, Rig, Timing};
+use raywake_core::sweep::Point;
 use raywake_embed::{EstimatorOptions, SweepPlace};
-use raywake_io::source::mounting;
-use raywake_registration::ground::ground_height;
 
 use crate::arrays::{self, array};
 use crate::flow_record::FlowRecord;
@@ -72,7 +69,8 @@ pub fn flow(
     arrays::points(&mut first, a, None, None)?;
     arrays::points(&mut second, b, None, None)?;
     let pose = pose.map(|value| self::pose(value, "pose")).transpose()?;
-    let rig = py.detach(|| rig(&first, ground, sensor))?;
+    let placed = py.detach(|| place::rig(&first, ground, sensor));
+    let (rig, _) = placed.map_err(|e| PyValueError::new_err(e.to_string()))?;
     let ground = rig.ground_m;
     let (rows, motion) = py.detach(|| {
         let motion = match pose {
@@ -85,23 +83,6 @@ pub fn flow(
     })?;
     let points = array(py, rows.len(), rows.into_iter())?.unbind();
     Ok(CloudFlow { points, pose: matrix(py, &motion)?.into_any().unbind(), ground })
-}
-
-/// Sensor and ground, as given or as the first cloud tells.
-fn rig(first: &[Point], ground: Option<f64>, sensor: Option<[f64; 3]>) -> PyResult<Rig> {
-    let missing = || PyValueError::new_err("no ground found in cloud a: give its height");
-    let ground_m = ground.or_else(|| ground_height(first)).ok_or_else(missing)?;
-    let translation = match sensor {
-        Some(place) => DVec3::from_array(place),
-        None => mounting::above(ground_m).unwrap_or(DVec3::ZERO),
-    };
-    Ok(Rig {
-        sensors: [Pose { translation, ..Pose::IDENTITY }].into_iter().collect(),
-        timing: Timing::AtStamp,
-        distorted: false,
-        ground_m,
-        own_vehicle: None,
-    })
 }
 
 fn rows(

@@ -2,15 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{CommandFactory, FromArgMatches};
+use clap::CommandFactory;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use raywake::args::{self, Args};
-use raywake::console::{INTERRUPTED_CODE, warn};
-use raywake::error::RunError;
+use raywake::args::Args;
 use raywake::locate::Locator;
-use raywake::{execute, team};
 use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
 
 use crate::recording::failed;
@@ -18,34 +15,14 @@ use crate::recording::failed;
 /// The program: carries out a command line and returns its exit code.
 #[pyfunction]
 pub fn main(py: Python<'_>, args: Vec<String>) -> u8 {
-    py.detach(|| match Args::command().try_get_matches_from(args) {
-        Ok(matches) => carry_out(&matches),
-        Err(e) => {
+    py.detach(|| {
+        let line = Args::command().try_get_matches_from(args);
+        line.and_then(|line| raywake::carry_out(&line)).unwrap_or_else(|e| {
             // Where it cannot be printed, nothing can.
             let _ = e.print();
             e.exit_code() as u8
-        }
+        })
     })
-}
-
-fn carry_out(matches: &clap::ArgMatches) -> u8 {
-    let command = match Args::from_arg_matches(matches) {
-        Ok(args) => args.command,
-        Err(e) => {
-            let _ = e.print();
-            return e.exit_code() as u8;
-        }
-    };
-    let run =
-        || args::inputs::protect(matches).map_err(RunError::from).and_then(|()| execute(command));
-    match team::lead(team::available(), run) {
-        Ok(true) => 0,
-        Ok(false) => INTERRUPTED_CODE,
-        Err(e) => {
-            warn(&e.to_string());
-            e.exit_code()
-        }
-    }
 }
 
 /// Poses of a recording from its sweeps alone: N x 4 x 4, world_from_vehicle, where the world is

@@ -3,7 +3,7 @@
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use raywake_core::continuity::Reset;
+use raywake::statistics::in_words;
 use raywake_core::digest::Digest;
 use raywake_core::params::{AssignError, ParameterSetting, Profile, Value};
 use raywake_core::sweep::Point;
@@ -11,6 +11,8 @@ use raywake_embed::{
     ColumnRecord, CreateError, EstimatorOptions, FlowEstimator, PointRecord, StepError,
     StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
 };
+
+use raywake_registration::odometry::Locating;
 
 use crate::arrays::{self, array};
 use crate::poses::{matrix, pose, twist};
@@ -61,8 +63,7 @@ fn set(profile: &mut Profile, path: &str, value: &Bound<'_, PyAny>) -> PyResult<
         word = value.extract()?;
         Value::Word(&word)
     };
-    let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
-    profile.assign(&ParameterSetting { group, name, value }).map_err(|e| match e {
+    profile.assign(&ParameterSetting::new(path, value)).map_err(|e| match e {
         AssignError::Unknown => PyValueError::new_err(format!("there is no parameter {path:?}")),
         AssignError::Must(must) => PyValueError::new_err(format!("{path} must be {must}")),
     })
@@ -247,13 +248,7 @@ impl Step {
     /// "spin"; None where it does.
     #[getter]
     fn reset(&self) -> Option<&'static str> {
-        self.summary.reset.map(|reset| match reset {
-            Reset::First => "first",
-            Reset::Backwards(_) => "backwards",
-            Reset::Gap(_) => "gap",
-            Reset::Jump(_) => "jump",
-            Reset::Spin(_) => "spin",
-        })
+        self.summary.reset.map(|reset| in_words(reset).0)
     }
 
     /// world_from_vehicle of this sweep, 4x4.
@@ -265,8 +260,8 @@ impl Step {
     /// How the pose was found: "start", "registered", "degenerate" or "lost"; None where it was
     /// given.
     #[getter]
-    fn located(&self) -> Option<String> {
-        self.summary.locating.map(|locating| format!("{locating:?}").to_lowercase())
+    fn located(&self) -> Option<&'static str> {
+        self.summary.locating.map(Locating::name)
     }
 
     /// Returns of this sweep that were left out, by reason.

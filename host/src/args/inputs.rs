@@ -22,25 +22,19 @@ pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
         command.into_iter().flat_map(paths).flat_map(|id| given(id).map(move |at| (id, at)));
     let (outputs, inputs): (Vec<_>, Vec<_>) = given.partition(|(id, _)| OUTPUTS.contains(id));
     for (id, output) in outputs {
-        for input in inputs.iter().filter_map(|(_, input)| input.canonicalize().ok()) {
-            if let Some(what) = harm(&resolved(output), &input) {
-                let text = format!("--{id} {} {what}: choose another place", output.display());
-                return Err(Error::Usage(text));
-            }
-        }
+        inputs.iter().try_for_each(|(_, input)| spare(id, output, input))?;
     }
     Ok(())
 }
 
-/// Fails where a folder of results is a recording, or would lie among its files.
-pub fn spare(output: &Path, recording: &Path) -> Result<(), Error> {
-    let input = recording.canonicalize().ok();
-    match input.and_then(|input| harm(&resolved(output), &input)) {
-        Some(what) => {
-            Err(Error::Usage(format!("--out {} {what}: choose another place", output.display())))
-        }
-        None => Ok(()),
-    }
+/// Fails where the output of an option is an input, or would replace a file of it.
+pub fn spare(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
+    let input = input.canonicalize().ok();
+    let harm = input.and_then(|input| harm(&resolved(output), &input));
+    harm.map_or(Ok(()), |what| {
+        let place = output.display();
+        Err(Error::Usage(format!("--{option} {place} {what}: choose another place")))
+    })
 }
 
 /// Names of a command's arguments that are paths.

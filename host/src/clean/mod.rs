@@ -17,8 +17,8 @@ use raywake_core::pose::{Pose, Twist};
 use raywake_core::return_clock::ReturnClock;
 use raywake_core::sweep::{Point, Rig};
 
-use crate::args::{self, FlowChoice, Recordings};
-use crate::batch::RecordingCommand;
+use crate::args;
+use crate::batch::{RecordingCommand, shared_args};
 use crate::choose;
 use crate::config;
 use crate::console::{interrupted, note, say};
@@ -236,13 +236,7 @@ fn place(clock: &ReturnClock, rig: &Rig, sweep: &SweepData, point: &Point) -> gl
 impl RecordingCommand for args::CleanArgs {
     const NAME: &'static str = "clean";
 
-    fn recordings(&mut self) -> &mut Recordings {
-        &mut self.recordings
-    }
-
-    fn flow(&mut self) -> &mut FlowChoice {
-        &mut self.flow
-    }
+    shared_args!();
 
     fn out(&self) -> Option<&Path> {
         Some(&self.out)
@@ -254,14 +248,6 @@ impl RecordingCommand for args::CleanArgs {
 
     fn single_file(&self) -> Option<&'static str> {
         None
-    }
-
-    fn quiet(&self) -> bool {
-        self.quiet
-    }
-
-    fn hush(&mut self) {
-        self.quiet = true;
     }
 
     fn carry_out(&self) -> Result<bool, RunError> {

@@ -4,16 +4,15 @@
 //! sweeps of a drive whose world is the first cloud's frame.
 
 pub mod motion;
+pub mod place;
 pub mod rows;
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use raywake_core::output::{FlowBasis, PairFlows, PointFlow};
 use raywake_core::params::Profile;
 use raywake_core::perceive::StageTimer;
-use raywake_core::pose::Pose;
-use raywake_core::sweep::{Rig, Timing};
+use raywake_core::sweep::Rig;
 
 use crate::args::{self, PictureFrame};
 use crate::choose;
@@ -27,11 +26,9 @@ use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::streams::{Content, StreamTargets};
-use raywake_io::source::{
-    BinFields, SweepData, mounting, plausible, pose_row, read_cloud, read_pose,
-};
-use raywake_registration::ground::ground_height;
+use raywake_io::source::{BinFields, SweepData, pose_row, read_cloud, read_pose};
 
+use place::Unplaced;
 use rows::{Form, PointRow};
 
 /// From this speed over ground on a point counts as moving, m/s.
@@ -105,39 +102,13 @@ fn cloud(path: &Path, fields: Option<&BinFields>, stamp_s: f64) -> Result<SweepD
     }
 }
 
-/// Sensor and ground as the user says, or as the first cloud tells; and a line about them.
 fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error> {
-    let (ground_m, how) = match args.ground {
-        Some(given) => (given, "given"),
-        None => {
-            let found = ground_height(&first.points).ok_or_else(|| {
-                let what = "no ground found in this cloud: give its height with --ground";
-                Error::input(&args.first, "", what)
-            })?;
-            (found, "estimated")
+    place::rig(&first.points, args.ground, args.sensor).map_err(|e| match e {
+        Unplaced::NoGround => {
+            Error::input(&args.first, "", format!("{e}: give its height with --ground"))
         }
-    };
-    let (place, why) = match args.sensor {
-        Some(place) => (DVec3::from_array(place), "given"),
-        None => match mounting::above(ground_m) {
-            None => (DVec3::ZERO, "assumed at the origin of the clouds"),
-            Some(place) => (place, "assumed, as the origin is too close to the ground"),
-        },
-    };
-    plausible::ground(ground_m).map_err(Error::Usage)?;
-    plausible::place(place).map_err(|what| Error::Usage(format!("the sensor: {what}")))?;
-    let rig = Rig {
-        sensors: [Pose { translation: place, ..Pose::IDENTITY }].into_iter().collect(),
-        timing: Timing::AtStamp,
-        distorted: false,
-        ground_m,
-        own_vehicle: None,
-    };
-    let DVec3 { x, y, z } = place;
-    let text = format!(
-        "ground     at {ground_m:.2} m ({how})\nsensor     at ({x:.2}, {y:.2}, {z:.2}) m ({why})\n"
-    );
-    Ok((rig, text))
+        Unplaced::Implausible(what) => Error::Usage(what),
+    })
 }
 
 /// Flow of every point of the first sweep, those over the pipeline's capacity included, and what

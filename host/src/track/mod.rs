@@ -9,8 +9,8 @@ mod write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::args::{self, FlowChoice, Recordings};
-use crate::batch::RecordingCommand;
+use crate::args;
+use crate::batch::{RecordingCommand, shared_args};
 use crate::choose;
 use crate::config::{self, Settings};
 use crate::console::{bytes, note, say};
@@ -124,13 +124,7 @@ fn budget(fixed_lag: bool) -> String {
 impl RecordingCommand for args::TrackArgs {
     const NAME: &'static str = "track";
 
-    fn recordings(&mut self) -> &mut Recordings {
-        &mut self.recordings
-    }
-
-    fn flow(&mut self) -> &mut FlowChoice {
-        &mut self.flow
-    }
+    shared_args!();
 
     fn out(&self) -> Option<&Path> {
         self.out.as_deref()
@@ -143,14 +137,6 @@ impl RecordingCommand for args::TrackArgs {
     fn single_file(&self) -> Option<&'static str> {
         let streams = self.streams.single_file().or(self.views.single_file());
         streams.or(self.summary.is_some().then_some("summary"))
-    }
-
-    fn quiet(&self) -> bool {
-        self.quiet
-    }
-
-    fn hush(&mut self) {
-        self.quiet = true;
     }
 
     fn carry_out(&self) -> Result<bool, RunError> {

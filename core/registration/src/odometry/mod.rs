@@ -62,6 +62,18 @@ pub enum Locating {
     Lost,
 }
 
+impl Locating {
+    /// In a word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Locating::Start => "start",
+            Locating::Registered => "registered",
+            Locating::Degenerate => "degenerate",
+            Locating::Lost => "lost",
+        }
+    }
+}
+
 /// Where a sweep was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {

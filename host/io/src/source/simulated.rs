@@ -33,6 +33,11 @@ impl Simulated {
         Simulated { overview, drive, seed, truth: [none(), none()] }
     }
 
+    /// The drive of `raywake demo`.
+    pub fn demo() -> Simulated {
+        Simulated::new(1, 20)
+    }
+
     /// The simulator.
     pub fn drive(&self) -> &Drive {
         &self.drive
