@@ -11,6 +11,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "../examples/sweeps.h"
+
 #ifdef COUNT_ALLOCATIONS
 /* In the place of libc's: counts what the whole process asks for. */
 extern void *__libc_malloc(size_t);
@@ -213,25 +215,17 @@ static void *disturb(void *nothing) {
     return nothing;
 }
 
-static void need(FILE *file, void *to, size_t bytes) {
-    if (fread(to, 1, bytes, file) != bytes) printf("the file ends too early\n"), exit(3);
-}
-
 /* A drive with two threads; with `disturbed`, a third calls all the while. Returns its digest. */
 static uint64_t drive(const char *path, int disturbed) {
     FILE *file = fopen(path, "rb");
     if (!file) exit(3);
-    raywake_options o = {.abi_version = RAYWAKE_ABI_VERSION, .threads = 2};
-    uint64_t sensors, count, digest = RAYWAKE_DIGEST_START;
-    need(file, &o.timing, 4), need(file, &o.distorted, 4);
-    need(file, &o.from_s, 8), need(file, &o.span_s, 8), need(file, &o.ground_m, 8);
-    need(file, o.own_vehicle_m, 16), need(file, &sensors, 8);
-    o.sensor_count = (uint32_t)sensors;
-    need(file, o.sensors, sensors * sizeof o.sensors[0]);
+    raywake_options o = rig_of(file);
+    o.threads = 2;
+    uint64_t count, digest = RAYWAKE_DIGEST_START;
     size_t bytes = 0, room = 262144;
     EXPECT(raywake_memory_needed(&o, &bytes, NULL), OK);
     void *memory = malloc(bytes);
-    char *points = malloc(20 * room);
+    file_point *points = malloc(room * sizeof *points);
     raywake_point *flow = malloc(room * sizeof *flow);
     raywake_estimator *e = NULL;
     EXPECT(raywake_create(&o, memory, bytes, &e, NULL), OK);
@@ -242,12 +236,13 @@ static uint64_t drive(const char *path, int disturbed) {
     raywake_twist twist;
     raywake_result result;
     raywake_sweep s = {.world_from_vehicle = &pose, .twist = &twist, .xyz = points};
-    s.time_s = points + 12, s.sensor = points + 16;
-    s.xyz_stride = s.time_stride = s.sensor_stride = 20;
+    s.time_s = &points->time_s, s.sensor = &points->sensor; /* the low byte */
+    s.xyz_stride = s.time_stride = s.sensor_stride = sizeof *points;
     int sweeps = 0;
-    while (fread(&s.stamp_s, 8, 1, file) == 1) {
+    while (take(file, &s.stamp_s, 8)) {
         need(file, &pose, sizeof pose), need(file, &twist, sizeof twist), need(file, &count, 8);
-        need(file, points, 20 * count);
+        CHECK(count <= room);
+        need(file, points, count * sizeof *points);
         s.count = count;
         long before = allocated();
         raywake_status status;
