@@ -22,7 +22,7 @@ mod argoverse;
 mod bag;
 mod bin;
 #[cfg(feature = "pcap")]
-mod capture;
+pub mod capture;
 mod clouds;
 #[cfg(feature = "arrow")]
 pub mod decoder;

@@ -9,9 +9,12 @@
 //! is asked for. Left out, and told: packets of others, with a wrong check sum or late, and turns
 //! at the ends of which a part is missing.
 
+pub mod assembly;
 mod datagrams;
 mod firing;
+pub mod live;
 mod ouster;
+pub mod replay;
 mod sensor;
 mod streams;
 #[cfg(test)]
@@ -37,8 +40,6 @@ use streams::{Cut, Stream};
 
 /// Longest time between two sweeps that is believed, ns: an hour.
 const STEP_MAX_NS: i64 = 3_600_000_000_000;
-/// Clocks beyond this count from 1970, ns: 2001.
-const EPOCH_MIN_NS: u64 = 1_000_000_000_000_000_000;
 
 /// An open capture.
 pub(super) struct Capture {
@@ -106,9 +107,7 @@ impl Capture {
             let turns = libm::round(step as f64 / usual - within).max(1.0);
             frames.push(frames[frames.len() - 1] + turns as u64);
         }
-        let first = &cuts[0];
-        let told = first.clock_ns >= EPOCH_MIN_NS;
-        *epoch_ns = if told { first.clock_ns } else { first.time_ns };
+        *epoch_ns = self.sensor.epoch_ns(cuts[0].clock_ns, cuts[0].time_ns).0;
     }
 
     fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {

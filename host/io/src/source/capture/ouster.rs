@@ -22,6 +22,8 @@ use crate::source::whole;
 const BEAMS: Range<usize> = 1..257;
 const COLUMNS: Range<usize> = 1..8193;
 const PACKET_COLUMNS: Range<usize> = 1..65;
+/// Turns a second that are believed.
+const TURNS_HZ: Range<f64> = 1.0..100.0;
 const M_OF_MM: f64 = 1e-3;
 /// Bytes of the check sum at the end of a packet's foot, and what stands there without one (in
 /// captures of firmware 2.3).
@@ -111,8 +113,10 @@ pub(super) struct Ouster {
     /// Directions of the beams of a column at the angle 0.
     beams: Vec<DVec3>,
     /// Columns of a turn, and of a packet.
-    columns: usize,
+    pub columns: usize,
     pub packet_columns: usize,
+    /// Time of a turn, ns.
+    pub turn_ns: f64,
     /// Where beams leave the axis: outwards and up, m.
     origin_m: [f64; 2],
     /// From the frame of beams to that of the sensor: x ahead, y to the left, z up.
@@ -146,9 +150,15 @@ impl Ouster {
             beams: elevations.iter().zip(&azimuths).map(beam).collect(),
             columns,
             packet_columns,
+            turn_ns: metadata.turn_ns(),
             origin_m: metadata.origin_m()?,
             sensor_from_lidar: metadata.sensor_from_lidar()?,
         })
+    }
+
+    /// Beams of a column.
+    pub fn beams(&self) -> usize {
+        self.beams.len()
     }
 
     pub fn name(&self) -> &str {
@@ -278,6 +288,13 @@ impl Metadata<'_> {
             return Err(format!("{of_turn} columns a turn, {of_packet} a packet"));
         }
         Ok([of_turn, of_packet])
+    }
+
+    /// Time of a turn by the mode, `COLUMNSxHZ`: ten turns a second unless it says otherwise, ns.
+    fn turn_ns(&self) -> f64 {
+        let mode = self.text("lidar_mode").ok().and_then(|mode| mode.split('x').nth(1));
+        let hz = mode.and_then(|hz| hz.parse().ok()).filter(|hz| TURNS_HZ.contains(hz));
+        1e9 / hz.unwrap_or(10.0)
     }
 
     fn profile(&self) -> Result<&'static Profile, String> {

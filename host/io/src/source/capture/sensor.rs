@@ -12,7 +12,13 @@ use super::velodyne::{self, Velodyne};
 /// its turns, ns: a turn of the fastest sensor.
 const PAUSE_NS: i64 = 50_000_000;
 /// A firing not after the one before is late or a copy; this far from it, ns, the clock was set.
-const SET_NS: u64 = 1_000_000_000;
+pub(super) const SET_NS: u64 = 1_000_000_000;
+
+/// Clocks beyond this count from 1970, ns: 2001.
+const EPOCH_MIN_NS: u64 = 1_000_000_000_000_000_000;
+/// A Velodyne's clock, which counts from the full hour, is set where it differs from that of the
+/// arrival by less, ns: packets come within a second.
+const SYNCHRONISED_NS: i64 = 1_000_000_000;
 
 /// Where a firing belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +77,54 @@ impl Sensor {
             Sensor::Velodyne(sensor) => sensor.returns(packet, firing, offset_ns, into),
             Sensor::Ouster(sensor) => sensor.returns(packet, firing, offset_ns, into),
         }
+    }
+
+    /// Returns of a firing at most.
+    pub fn returns_of_firing(&self) -> usize {
+        match self {
+            Sensor::Velodyne(_) => velodyne::MEASUREMENTS,
+            Sensor::Ouster(sensor) => sensor.beams(),
+        }
+    }
+
+    /// Returns of a turn at most.
+    pub fn returns_max(&self) -> usize {
+        match self {
+            Sensor::Velodyne(sensor) => sensor.returns_max(),
+            Sensor::Ouster(sensor) => sensor.beams() * (sensor.columns + 1),
+        }
+    }
+
+    /// From the first firing of a packet to that of the next, ns.
+    pub fn packet_ns(&self, packet: &[u8]) -> f64 {
+        match self {
+            Sensor::Velodyne(sensor) => sensor.packet_ns(packet),
+            Sensor::Ouster(sensor) => {
+                sensor.turn_ns * sensor.packet_columns as f64 / sensor.columns as f64
+            }
+        }
+    }
+
+    /// Time of a turn, ns, where its settings tell it.
+    pub fn turn_ns(&self) -> Option<f64> {
+        match self {
+            Sensor::Velodyne(_) => None,
+            Sensor::Ouster(sensor) => Some(sensor.turn_ns),
+        }
+    }
+
+    /// A time of its clock, ns since 1970, of what arrived at `now_ns`, and whether its clock is
+    /// set: otherwise the time is that of the arrival.
+    pub fn epoch_ns(&self, clock_ns: u64, now_ns: u64) -> (u64, bool) {
+        let set = match self {
+            Sensor::Ouster(_) => Some(clock_ns).filter(|ns| *ns >= EPOCH_MIN_NS),
+            Sensor::Velodyne(_) => {
+                let since_ns = self.since(now_ns % velodyne::CLOCK_NS, clock_ns);
+                let set = since_ns.abs() < SYNCHRONISED_NS;
+                set.then(|| now_ns.wrapping_sub(since_ns as u64))
+            }
+        };
+        (set.unwrap_or(now_ns), set.is_some())
     }
 
     /// From one time of its clock to another, ns.

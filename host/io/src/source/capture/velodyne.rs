@@ -17,7 +17,7 @@ const PACKET: usize = 1206;
 pub(super) const BLOCKS: usize = 12;
 const BLOCK: usize = 100;
 /// Measurements of a block, and bytes before them and of each.
-const MEASUREMENTS: usize = 32;
+pub(super) const MEASUREMENTS: usize = 32;
 const BLOCK_HEAD: usize = 4;
 const MEASUREMENT: usize = 3;
 /// First bytes of a block.
@@ -33,6 +33,14 @@ const AZIMUTHS: u32 = 36_000;
 const NS_OF_US: u64 = 1000;
 /// Its clock counts to this, ns: an hour.
 pub(super) const CLOCK_NS: u64 = 3_600_000_000_000;
+
+/// Numbers of models in their packets.
+pub(super) const VLP_16: u8 = 0x22;
+pub(super) const PUCK_HI_RES: u8 = 0x24;
+pub(super) const HDL_32E: u8 = 0x21;
+pub(super) const VLP_32C: u8 = 0x28;
+/// Longest turn, ns: five a second.
+const TURN_MAX_NS: f64 = 2e8;
 
 /// What is fixed about a model.
 struct Model {
@@ -57,7 +65,7 @@ struct Model {
 /// 86-0106 and that of the VLP-32C).
 static MODELS: [Model; 4] = [
     Model {
-        code: 0x22,
+        code: VLP_16,
         name: "VLP-16",
         lasers: &straight([
             -15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0,
@@ -70,7 +78,7 @@ static MODELS: [Model; 4] = [
         together: 1,
     },
     Model {
-        code: 0x24,
+        code: PUCK_HI_RES,
         name: "Puck Hi-Res",
         lasers: &straight([
             -10.0, 0.667, -8.667, 2.0, -7.333, 3.333, -6.0, 4.667, -4.667, 6.0, -3.333, 7.333,
@@ -83,7 +91,7 @@ static MODELS: [Model; 4] = [
         together: 1,
     },
     Model {
-        code: 0x21,
+        code: HDL_32E,
         name: "HDL-32E",
         lasers: &straight([
             -30.67, -9.33, -29.33, -8.0, -28.0, -6.67, -26.67, -5.33, -25.33, -4.0, -24.0, -2.67,
@@ -97,7 +105,7 @@ static MODELS: [Model; 4] = [
         together: 1,
     },
     Model {
-        code: 0x28,
+        code: VLP_32C,
         name: "VLP-32C",
         lasers: &[
             [-25.0, 1.4],
@@ -181,7 +189,13 @@ pub(super) struct Velodyne {
 impl Velodyne {
     /// The sensor that sent a packet; `None` where it is none of a known model.
     pub fn of(packet: &[u8]) -> Option<Velodyne> {
-        let model = MODELS.iter().find(|model| is_of(packet, model.code))?;
+        let code = *packet.get(MODEL_AT)?;
+        Velodyne::coded(code).filter(|sensor| sensor.is_mine(packet))
+    }
+
+    /// The sensor whose packets have this number; `None` where no model has.
+    pub fn coded(code: u8) -> Option<Velodyne> {
+        let model = MODELS.iter().find(|model| model.code == code)?;
         let laser = |[elevation, azimuth]: &[f64; 2]| {
             let angle = elevation.to_radians();
             Laser {
@@ -191,6 +205,18 @@ impl Velodyne {
             }
         };
         Some(Velodyne { model, lasers: model.lasers.iter().map(laser).collect() })
+    }
+
+    /// Returns of a turn at most: those of the slowest.
+    pub fn returns_max(&self) -> usize {
+        let cycles = (TURN_MAX_NS / self.model.cycle_ns) as usize;
+        cycles * self.lasers.len() + BLOCKS * MEASUREMENTS
+    }
+
+    /// From the first firing of a packet to that of the next, ns.
+    pub fn packet_ns(&self, packet: &[u8]) -> f64 {
+        let blocks = if is_dual(packet) { BLOCKS / 2 } else { BLOCKS };
+        (blocks * MEASUREMENTS / self.lasers.len()) as f64 * self.model.cycle_ns
     }
 
     pub fn name(&self) -> &'static str {

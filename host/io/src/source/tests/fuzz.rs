@@ -104,10 +104,10 @@ impl Seed {
 }
 
 /// Numbers that look random and are always the same ones.
-struct Random(u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
-    fn below(&mut self, limit: usize) -> usize {
+    pub fn below(&mut self, limit: usize) -> usize {
         // Knuth's MMIX generator, by its upper half.
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (((self.0 >> 32) * limit as u64) >> 32) as usize
@@ -115,7 +115,7 @@ impl Random {
 }
 
 /// A file with up to four kinds of damage.
-fn damaged(whole: &[u8], random: &mut Random) -> Vec<u8> {
+pub(crate) fn damaged(whole: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = whole.to_vec();
     for _ in 0..=random.below(4) {
         if bytes.is_empty() {

@@ -4,7 +4,7 @@
 mod argoverse;
 mod files;
 mod formats;
-mod fuzz;
+pub(crate) mod fuzz;
 mod mistakes;
 #[cfg(feature = "nuscenes")]
 mod nuscenes;

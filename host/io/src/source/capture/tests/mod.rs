@@ -1,5 +1,6 @@
 //! Packets of real sensors, and captures made here.
 
+mod arriving;
 mod disorder;
 
 use std::fs;

@@ -1,0 +1,232 @@
+//! Packets as they come, put together to sweeps. Nothing is allocated.
+
+use std::time::Instant;
+
+use super::firing::{Firing, TURN};
+use super::live::LiveSensor;
+use super::sensor::{Order, SET_NS};
+use crate::source::{SourceGaps, SweepData};
+
+/// Longest time between two turns that is believed, ns: the slowest sensor's, several of which were
+/// lost. After a longer one its clock was set, or it stood still.
+const STEP_MAX_NS: i64 = 10_000_000_000;
+/// Packets among which one that comes late is looked for: a copy, or out of order.
+const RECENT: usize = 64;
+/// Before the first of them.
+const NEVER: u64 = u64::MAX;
+/// Share of a new step in the time of a turn: it drifts by parts in a thousand.
+const TURN_SHARE: f64 = 0.125;
+
+/// A sweep from packets.
+pub struct LiveSweep {
+    /// Its returns; the pose is the identity.
+    pub data: SweepData,
+    /// When its last packet arrived.
+    pub arrived: Instant,
+    /// Packets that are missing in it.
+    pub lost_packets: u64,
+}
+
+impl LiveSweep {
+    /// An empty one with room for a turn of a sensor.
+    pub fn of(sensor: &LiveSensor) -> LiveSweep {
+        let points = Vec::with_capacity(sensor.returns_max());
+        let data = SweepData { points, ..SweepData::default() };
+        LiveSweep { data, arrived: Instant::now(), lost_packets: 0 }
+    }
+}
+
+/// What became of datagrams.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct PacketCounts {
+    /// Packets of the sensor.
+    pub packets: u64,
+    /// Datagrams that are no packets of the sensor, or of another sender.
+    pub foreign: u64,
+    /// Packets with a wrong check sum: left out.
+    pub unsound: u64,
+    /// Packets that came again: left out.
+    pub duplicates: u64,
+    /// Packets that came after later ones: left out.
+    pub reordered: u64,
+    /// Packets that are missing between others: lost on the way, or reordered.
+    pub missing: u64,
+    /// Returns for which a turn has no room: the sensor stands still, or its clock does.
+    pub over_capacity: u64,
+    /// Times that the sensor's clock was set, or it paused.
+    pub clock_set: u64,
+}
+
+/// Where the turn in hand began.
+struct Begun {
+    firing: Firing,
+    /// Since the first whole turn began, ns.
+    stamp_ns: i64,
+    number: u64,
+}
+
+/// Puts sweeps together.
+pub struct Assembler {
+    sensor: LiveSensor,
+    counts: PacketCounts,
+    /// None until a turn begins: the one that is come in upon is left out.
+    begun: Option<Begun>,
+    last: Option<Firing>,
+    /// Time of the first firing of the last packets, the newest at `at`, by the sensor's clock, ns.
+    recent: [u64; RECENT],
+    at: usize,
+    /// Time of a turn, ns, once one has been seen.
+    turn_ns: Option<f64>,
+    epoch_ns: u64,
+    filling: LiveSweep,
+}
+
+impl Assembler {
+    /// Before the first packet.
+    pub fn new(sensor: LiveSensor) -> Assembler {
+        Assembler {
+            filling: LiveSweep::of(&sensor),
+            turn_ns: sensor.turn_ns(),
+            sensor,
+            counts: PacketCounts::default(),
+            begun: None,
+            last: None,
+            recent: [NEVER; RECENT],
+            at: 0,
+            epoch_ns: 0,
+        }
+    }
+
+    /// What became of datagrams so far.
+    pub fn counts(&self) -> PacketCounts {
+        self.counts
+    }
+
+    /// Time of the first stamp since 1970, ns: by the sensor's clock where that is set, else by the
+    /// arrival of its packet.
+    pub fn epoch_ns(&self) -> u64 {
+        self.epoch_ns
+    }
+
+    /// Counts a datagram of another sender.
+    pub fn foreign(&mut self) {
+        self.counts.foreign += 1;
+    }
+
+    /// Takes a datagram that arrived at a moment, in ns since 1970 `now_ns`. Hands every sweep that
+    /// it ends to `complete`, which leaves an empty one, or any other, in its place.
+    pub fn take(
+        &mut self,
+        datagram: &[u8],
+        arrived: Instant,
+        now_ns: u64,
+        mut complete: impl FnMut(&mut LiveSweep),
+    ) {
+        let sensor = self.sensor.0.clone();
+        if !sensor.is_mine(datagram) {
+            return self.foreign();
+        }
+        if !sensor.is_sound(datagram) {
+            self.counts.unsound += 1;
+            return;
+        }
+        self.counts.packets += 1;
+        if !self.in_order(datagram) {
+            return;
+        }
+        for (number, firing) in sensor.firings(datagram) {
+            match sensor.order(&firing, self.last.as_ref()) {
+                Order::Late => continue,
+                Order::Begins => self.begin(firing, (arrived, now_ns), &mut complete),
+                Order::GoesOn => {}
+            }
+            self.last = Some(firing);
+            let Some(begun) = &self.begun else { continue };
+            let points = &mut self.filling.data.points;
+            let room = points.capacity() - points.len();
+            if room < sensor.returns_of_firing() {
+                self.counts.over_capacity += sensor.returns_of_firing() as u64;
+                continue;
+            }
+            let offset_ns = sensor.since(firing.clock_ns, begun.firing.clock_ns);
+            sensor.returns(datagram, number, offset_ns, points);
+        }
+    }
+
+    /// Whether a packet comes after those before it; counts those that do not, and those that are
+    /// missing before it.
+    fn in_order(&mut self, packet: &[u8]) -> bool {
+        let sensor = &self.sensor.0;
+        let Some((_, first)) = sensor.firings(packet).next() else { return true };
+        let before = Some(self.recent[self.at]).filter(|ns| *ns != NEVER);
+        let since_ns = before.map(|before| sensor.since(first.clock_ns, before));
+        // Farther back, or ahead, the clock was set.
+        let since_ns = since_ns.filter(|ns| (-(SET_NS as i64)..STEP_MAX_NS).contains(ns));
+        if since_ns.is_some_and(|ns| ns <= 0) {
+            let again = self.recent.contains(&first.clock_ns);
+            let count =
+                if again { &mut self.counts.duplicates } else { &mut self.counts.reordered };
+            *count += 1;
+            return false;
+        }
+        if let Some(since_ns) = since_ns {
+            let packets = since_ns as f64 / sensor.packet_ns(packet);
+            let missing = (packets.round() as u64).saturating_sub(1);
+            self.counts.missing += missing;
+            self.filling.lost_packets += missing;
+        }
+        self.at = (self.at + 1) % RECENT;
+        self.recent[self.at] = first.clock_ns;
+        true
+    }
+
+    /// Ends the turn in hand and begins another.
+    fn begin(
+        &mut self,
+        firing: Firing,
+        (arrived, now_ns): (Instant, u64),
+        complete: &mut impl FnMut(&mut LiveSweep),
+    ) {
+        // Nothing is known of where the first firing of all lies in its turn.
+        if self.last.is_none() {
+            return;
+        }
+        let (begun, sweeps_before) = match self.begun.take() {
+            None => {
+                self.epoch_ns = self.sensor.0.epoch_ns(firing.clock_ns, now_ns).0;
+                (Begun { firing, stamp_ns: 0, number: 0 }, 0)
+            }
+            Some(begun) => {
+                self.filling.arrived = arrived;
+                complete(&mut self.filling);
+                let next = self.after(&begun, firing);
+                let sweeps_before = next.number - begun.number - 1;
+                (next, sweeps_before)
+            }
+        };
+        let data = &mut self.filling.data;
+        data.points.clear();
+        data.dropped = SourceGaps { sweeps_before, null_rows: 0 };
+        data.frame = begun.number;
+        data.stamp_s = begun.stamp_ns as f64 * 1e-9;
+        self.filling.lost_packets = 0;
+        self.begun = Some(begun);
+    }
+
+    /// Stamp and number of a turn that follows another.
+    fn after(&mut self, begun: &Begun, firing: Firing) -> Begun {
+        let mut step_ns = self.sensor.0.since(firing.clock_ns, begun.firing.clock_ns);
+        if !(1..=STEP_MAX_NS).contains(&step_ns) {
+            self.counts.clock_set += 1;
+            step_ns = self.turn_ns.unwrap_or(1.0).clamp(1.0, STEP_MAX_NS as f64) as i64;
+        }
+        // A sweep may begin within a turn, where packets are missing.
+        let within = (f64::from(firing.angle) - f64::from(begun.firing.angle)) / TURN as f64;
+        let turn_ns = self.turn_ns.unwrap_or(step_ns as f64);
+        let turns = (step_ns as f64 / turn_ns - within).round().max(1.0);
+        let seen_ns = step_ns as f64 / (turns + within);
+        self.turn_ns = Some(turn_ns + TURN_SHARE * (seen_ns - turn_ns));
+        let (stamp_ns, number) = (begun.stamp_ns + step_ns, begun.number + turns as u64);
+        Begun { firing, stamp_ns, number }
+    }
+}

@@ -1,0 +1,102 @@
+//! Sensors whose packets are taken as they come.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use clap::ValueEnum;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Rig;
+
+use super::ouster::Ouster;
+use super::sensor::Sensor;
+use super::velodyne::{self, Velodyne};
+use crate::Error;
+use crate::source::{OpenOptions, Overview, SweepData, first_sweep, plausible};
+
+/// Sensors that are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SensorModel {
+    /// Velodyne's VLP-16 (Puck)
+    Vlp16,
+    /// Velodyne's Puck Hi-Res
+    PuckHiRes,
+    /// Velodyne's VLP-32C (Ultra Puck)
+    Vlp32c,
+    /// Velodyne's HDL-32E
+    Hdl32e,
+    /// Ouster's OS0, OS1 or OS2; needs --metadata
+    #[value(alias = "os1-128")]
+    Ouster,
+}
+
+/// A sensor, known before its first packet.
+#[derive(Clone)]
+pub struct LiveSensor(pub(super) Sensor);
+
+impl LiveSensor {
+    /// A sensor of a model. Fails where an Ouster's metadata are missing or make no sense, or where
+    /// there are some of a Velodyne.
+    pub fn of(model: SensorModel, metadata: Option<&Path>) -> Result<LiveSensor, Error> {
+        let code = match (model, metadata) {
+            (SensorModel::Ouster, Some(path)) => {
+                return Ok(LiveSensor(Sensor::Ouster(Arc::new(Ouster::read(path)?))));
+            }
+            (SensorModel::Ouster, None) => {
+                let what = "an Ouster's packets need --metadata, the JSON that the sensor gives of \
+                            itself (http://SENSOR/api/v1/sensor/metadata)";
+                return Err(Error::Usage(what.into()));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Usage("--metadata is for Ouster's sensors".into()));
+            }
+            (SensorModel::Vlp16, _) => velodyne::VLP_16,
+            (SensorModel::PuckHiRes, _) => velodyne::PUCK_HI_RES,
+            (SensorModel::Vlp32c, _) => velodyne::VLP_32C,
+            (SensorModel::Hdl32e, _) => velodyne::HDL_32E,
+        };
+        let sensor = Velodyne::coded(code).expect("every model has its numbers");
+        Ok(LiveSensor(Sensor::Velodyne(Arc::new(sensor))))
+    }
+
+    /// Its model.
+    pub fn name(&self) -> &str {
+        self.0.name()
+    }
+
+    /// Whether a datagram is a packet of its.
+    pub fn is_mine(&self, datagram: &[u8]) -> bool {
+        self.0.is_mine(datagram)
+    }
+
+    /// Returns of a turn at most.
+    pub fn returns_max(&self) -> usize {
+        self.0.returns_max()
+    }
+
+    /// Time of a turn, ns, where the sensor's settings tell it.
+    pub(super) fn turn_ns(&self) -> Option<f64> {
+        self.0.turn_ns()
+    }
+
+    /// What the first sweep tells: when returns were measured, where the ground is. The vehicle's
+    /// frame is that of the sensor. Fails where no ground is found and none is given.
+    pub fn learn(&self, first: &SweepData, options: &OpenOptions) -> Result<LiveRig, Error> {
+        let sensors = core::iter::once(Pose::IDENTITY).collect();
+        let mut overview = first_sweep::before(String::new(), sensors, Vec::new(), options);
+        if let Some(ground_m) = options.ground_m {
+            plausible::ground(ground_m).map_err(Error::Usage)?;
+        }
+        first_sweep::learn(&mut overview, (&first.points, true), &[self.name()], options)
+            .map_err(|what| Error::Usage(format!("{}: {what}", self.name())))?;
+        let Overview { rig, notes, .. } = overview;
+        Ok(LiveRig { rig, notes })
+    }
+}
+
+/// Where a sensor sits.
+pub struct LiveRig {
+    /// Sensors, timing and ground.
+    pub rig: Rig,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
+}
