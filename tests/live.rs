@@ -61,7 +61,7 @@ fn seen(address: SocketAddr) -> (Vec<String>, Duration) {
 #[test]
 fn a_viewer_sees_all_of_it() {
     let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    let streams = StreamTargets { mcap: None, live: Some(free) };
+    let streams = StreamTargets { live: Some(free), ..StreamTargets::default() };
     let mut sink = BagSink::create(&streams, 0, Content::Objects).unwrap().unwrap();
     assert!(!sink.is_watched());
     let taken = BagSink::create(&streams, 0, Content::Flow).err().unwrap().to_string();

@@ -100,6 +100,11 @@ impl<'a> PointFlows<'a> {
         out
     }
 
+    /// What it is made of besides, to be copied: columns, and what is kept of returns.
+    pub fn slices(self) -> (&'a [ColumnFlow], &'a [ReturnFlow]) {
+        (self.columns, self.taken)
+    }
+
     /// All but the slices, to be kept beside them.
     pub fn keep(self) -> KeptPoints {
         let PointFlows { columns, taken, thinning, ego, .. } = self;

@@ -149,7 +149,7 @@ impl Pipeline {
     }
 
     /// The tracklets after the last step, at the time of its sweep.
-    pub fn tracklets(&self, profile: &Profile) -> impl Iterator<Item = TrackletState> {
+    pub fn tracklets(&self, profile: &Profile) -> impl Iterator<Item = TrackletState> + Clone {
         let current = self.sides.current;
         self.tracklets.all().iter().filter_map(move |t| Some(state_of(profile, t, &current?)))
     }

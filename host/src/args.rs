@@ -6,6 +6,8 @@
 mod clean;
 mod flow;
 pub mod inputs;
+#[cfg(feature = "pcap")]
+mod live;
 mod recordings;
 mod results;
 mod sweeps;
@@ -25,6 +27,8 @@ use raywake_simd::Simd;
 
 pub use clean::CleanArgs;
 pub use flow::FlowArgs;
+#[cfg(feature = "pcap")]
+pub use live::{LiveArgs, PosesFrom};
 pub use recordings::{Recordings, Shard};
 pub use results::{Export, PictureFrame, Results, StreamArgs, Views};
 pub use sweeps::SweepRange;
@@ -60,6 +64,9 @@ pub enum Command {
     Track(Box<TrackArgs>),
     #[command(after_help = EXIT_CODES, after_long_help = clean::after_help(EXIT_CODES))]
     Clean(Box<CleanArgs>),
+    #[cfg(feature = "pcap")]
+    #[command(after_help = EXIT_CODES)]
+    Live(Box<LiveArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
     Map(Box<MapArgs>),
     /// Find the poses of a recording by registration of its sweeps

@@ -59,7 +59,7 @@ fn files(out: &Path) -> RunFiles {
         kinds: Kinds { columns: cfg!(feature = "arrow"), ..Kinds::default() },
         streams: StreamTargets {
             mcap: cfg!(feature = "mcap").then(|| out.join("demo.mcap")),
-            live: None,
+            ..StreamTargets::default()
         },
         pictures: PictureFiles { folder: png("png"), film: None, page: png("demo.html") },
     }

@@ -144,7 +144,7 @@ impl Drive {
     }
 
     /// Tracklets after the last step.
-    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> {
+    pub fn tracklets(&self) -> impl Iterator<Item = TrackletState> + Clone {
         let parts = self.active();
         parts.pipeline.tracklets(&parts.setup.profile)
     }

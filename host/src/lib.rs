@@ -13,6 +13,7 @@
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
 //! | [`track`], [`map`], `flow`, `clean`, `odometry`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
+//! | `live` | a sensor's packets as they come |
 //! | [`locate`] | sweeps without poses, by registration |
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
 //! | [`outputs`], [`summary`], `figures`, `settings_file` | files of a run, its figures, settings |
@@ -36,6 +37,8 @@ pub mod error;
 mod figures;
 pub mod flow;
 pub mod laps;
+#[cfg(feature = "pcap")]
+mod live;
 pub mod locate;
 pub mod map;
 mod odometry;
@@ -86,6 +89,8 @@ pub fn execute(command: Command) -> Result<bool, RunError> {
         Command::Flow(args) => flow::flow(&args).map(|()| true),
         Command::Track(args) => batch::each(&*args),
         Command::Clean(args) => batch::each(&*args),
+        #[cfg(feature = "pcap")]
+        Command::Live(args) => live::live(&args).map(|()| true),
         Command::Map(args) => map::command::map(&args),
         Command::Odometry(args) => odometry::odometry(&args),
         #[cfg(feature = "demo")]

@@ -28,7 +28,7 @@ use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::flow_tables::{FlowTables, SweepMark};
-use raywake_io::sink::streams::{Content, StreamTargets};
+use raywake_io::sink::streams::{Content, Pace, StreamTargets};
 use raywake_io::sink::{argoverse, atomic};
 use raywake_io::source::{Overview, SweepData};
 
@@ -65,13 +65,13 @@ impl RunFiles {
     pub fn of(results: &Results) -> RunFiles {
         let root = results.out.clone();
         let png = root.as_ref().filter(|_| results.png.is_some()).map(|root| root.join("png"));
-        let (streams, kinds) = (results.streams.sinks(), Kinds::of(results));
+        let (streams, kinds) = (results.streams.sinks(Pace::Recorded), Kinds::of(results));
         RunFiles { root, kinds, streams, pictures: PictureFiles::of(&results.views, png) }
     }
 
     /// Whether nothing will be written.
     pub fn is_empty(&self) -> bool {
-        self.root.is_none() && self.streams == StreamTargets::default() && self.pictures.is_empty()
+        self.root.is_none() && self.streams.is_empty() && self.pictures.is_empty()
     }
 }
 

@@ -32,6 +32,8 @@ enum Command {
     Bench(bench::Args),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
+    /// Write the packets that a simulated sensor sends, as a capture.
+    Packets(simulate::packets::PacketsArgs),
 }
 
 /// `eval DRIVE...` for chapter 3, `eval tracks` for chapter 2, `eval clean` for `raywake clean`.
@@ -73,6 +75,7 @@ fn main() -> ExitCode {
         Command::Grade(args) => grade::run(&args),
         Command::Match(args) => matching::run(&args),
         Command::Sim(args) => simulate::run(&args),
+        Command::Packets(args) => simulate::packets::packets(&args).map_err(Into::into),
         Command::Toy(args) => toy::run(&args).map_err(Into::into),
         Command::Bench(args) => bench::run(&args).map_err(Into::into),
         Command::Results(args) => results::run(&args).map_err(Into::into),

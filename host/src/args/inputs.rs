@@ -89,8 +89,12 @@ mod tests {
             "first",
             "ground_map",
             "list",
+            #[cfg(feature = "pcap")]
+            "metadata",
             "pose",
             "poses",
+            #[cfg(feature = "pcap")]
+            "replay",
             "second",
         ]
         .into();

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use raywake_io::sink::streams::StreamTargets;
+use raywake_io::sink::streams::{Pace, StreamTargets};
 
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
@@ -64,8 +64,8 @@ pub struct StreamArgs {
 
 impl StreamArgs {
     /// For [`raywake_io::sink::bag`].
-    pub fn sinks(&self) -> StreamTargets {
-        StreamTargets { mcap: self.mcap.clone(), live: self.live }
+    pub fn sinks(&self, pace: Pace) -> StreamTargets {
+        StreamTargets { mcap: self.mcap.clone(), live: self.live, pace }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Values of options.
 
+#[cfg(feature = "pcap")]
+use std::net::{Ipv4Addr, SocketAddr};
 use std::time::Duration;
 
 use raywake_simd::Simd;
@@ -56,6 +58,29 @@ pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
 }
 
+/// An address to listen at; of a port alone, that of this machine's loopback.
+#[cfg(feature = "pcap")]
+pub(super) fn listen(text: &str) -> Result<SocketAddr, String> {
+    let port = text.parse().map(|port: u16| (Ipv4Addr::LOCALHOST, port).into());
+    port.or_else(|_| text.parse()).map_err(|_| "expected ADDRESS:PORT, or a PORT".into())
+}
+
+/// A duration in ms, at most a minute.
+#[cfg(feature = "pcap")]
+pub(super) fn milliseconds(text: &str) -> Result<Duration, String> {
+    let ms: f64 = text.parse().map_err(|_| "not a number")?;
+    let believed = (0.1..=60_000.0).contains(&ms);
+    believed.then(|| Duration::from_secs_f64(ms * 1e-3)).ok_or("must be 0.1 to 60000".into())
+}
+
+/// A factor of a pace.
+#[cfg(feature = "pcap")]
+pub(super) fn factor(text: &str) -> Result<f64, String> {
+    let factor: f64 = text.parse().map_err(|_| "not a number")?;
+    let believed = (0.01..=1000.0).contains(&factor);
+    believed.then_some(factor).ok_or("must be 0.01 to 1000".into())
+}
+
 /// Log-odds that probabilities are cut off at. Beyond 20 a probability is 1 in single precision.
 pub(super) fn nats(text: &str) -> Result<f32, String> {
     let nats: f32 = text.parse().map_err(|_| "not a number")?;
@@ -65,6 +90,17 @@ pub(super) fn nats(text: &str) -> Result<f32, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(feature = "pcap")]
+    fn of_live_input() {
+        let listens = ["2368", "0.0.0.0:99", "[::1]:5"].map(|s| listen(s).unwrap().to_string());
+        assert_eq!(listens, ["127.0.0.1:2368", "0.0.0.0:99", "[::1]:5"]);
+        assert!(["", "x", "70000", "1.2.3.4"].iter().all(|s| listen(s).is_err()));
+        assert_eq!(milliseconds("50"), Ok(Duration::from_millis(50)));
+        assert!(["0", "-1", "nan", "1e9"].iter().all(|s| milliseconds(s).is_err()));
+        assert!(factor("2") == Ok(2.0) && ["0", "-1", "nan"].iter().all(|s| factor(s).is_err()));
+    }
 
     #[test]
     fn numbers() {

@@ -32,7 +32,7 @@ impl KeptClouds {
         let Some(extension) = extension else {
             let bag = |name| {
                 let mcap = Some(root.join(format!("{name}.mcap")));
-                let targets = StreamTargets { mcap, live: None };
+                let targets = StreamTargets { mcap, ..StreamTargets::default() };
                 BagSink::create(&targets, of.epoch_ns, Content::Clouds)
             };
             let [still, moving] = NAMES.map(bag);

@@ -158,7 +158,7 @@ fn show(
         let (columns, frame) = (flows.columns, PictureFrame::World);
         picture::write_one(png, first, &Subject::Flow { columns, profile, frame }, &title(args))?;
     }
-    let streams = StreamTargets { mcap: args.mcap.clone(), live: None };
+    let streams = StreamTargets { mcap: args.mcap.clone(), ..StreamTargets::default() };
     let Some(mut bag) = BagSink::create(&streams, 0, Content::Flow)? else { return Ok(()) };
     bag.pair(first, flows)?;
     bag.finish()

@@ -13,7 +13,7 @@ use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::objects::TrackedObject;
-use raywake_io::sink::streams::Content;
+use raywake_io::sink::streams::{Content, Pace};
 use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{atomic, clouds, feather};
 use raywake_io::source::{Overview, SweepData};
@@ -65,7 +65,7 @@ impl Files {
         }
         let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
         let pictures = Pictures::create(&PictureFiles::of(&args.views, png), &of.name, sweeps)?;
-        let bag = BagSink::create(&args.streams.sinks(), of.epoch_ns, Content::Objects)?;
+        let bag = BagSink::create(&args.streams.sinks(Pace::Recorded), of.epoch_ns, Content::Objects)?;
         await_viewer(args.quiet, bag.as_ref())?;
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
     }

@@ -25,6 +25,7 @@ mod ground;
 pub mod models;
 mod object;
 mod outskirts;
+pub mod packets;
 mod path;
 mod relief;
 mod rig;

@@ -10,6 +10,7 @@ mod drive;
 mod gnss;
 mod layout;
 mod oxts;
+pub mod packets;
 mod tracklets;
 pub mod truth;
 

@@ -19,7 +19,7 @@ impl Absent {
     /// # Errors
     /// [`Error::Unsupported`] where one is.
     pub fn create(streams: &StreamTargets, _: u64, _: Content) -> Result<Option<Absent>, Error> {
-        match *streams == StreamTargets::default() {
+        match streams.is_empty() {
             true => Ok(None),
             false => Err(Error::lacking("a stream of messages", "mcap")),
         }

@@ -10,6 +10,25 @@ pub struct StreamTargets {
     pub mcap: Option<PathBuf>,
     /// Address of this machine at which viewers connect.
     pub live: Option<SocketAddr>,
+    /// When viewers are sent a message.
+    pub pace: Pace,
+}
+
+impl StreamTargets {
+    /// Whether they go nowhere.
+    pub fn is_empty(&self) -> bool {
+        self.mcap.is_none() && self.live.is_none()
+    }
+}
+
+/// When viewers are sent a message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// When it is time for it, as the stamps of a recording have it.
+    #[default]
+    Recorded,
+    /// At once.
+    AtOnce,
 }
 
 /// What the messages of a stream are of.

@@ -73,7 +73,7 @@ pub use clouds::read_cloud;
 use options::apply;
 pub use options::{OpenOptions, PosesFrame, Unlocated};
 pub use pose_files::read_pose;
-pub use poses::{PoseTrack, pose_row};
+pub use poses::{PoseTrack, pose_row, rigid};
 pub use recognise::recognise;
 
 /// One sweep in memory; keep it and read into it again, so that its memory is reused.

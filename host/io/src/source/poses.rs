@@ -70,7 +70,7 @@ pub(super) fn check_rising(
 const UNIT_TOLERANCE: f64 = 1e-2;
 
 /// A pose from a place and a quaternion x, y, z, w, or what is wrong with it.
-pub(super) fn rigid(place: [f64; 3], [x, y, z, w]: [f64; 4]) -> Result<Pose, &'static str> {
+pub fn rigid(place: [f64; 3], [x, y, z, w]: [f64; 4]) -> Result<Pose, &'static str> {
     let (rotation, place) = (DQuat::from_xyzw(x, y, z, w), DVec3::from_array(place));
     if !rotation.is_finite() || !place.is_finite() {
         return Err("a pose with a NaN or infinite number");

@@ -10,6 +10,7 @@ use foxglove::{
 };
 
 use super::Topic;
+use super::super::streams::Pace;
 use crate::Error;
 
 /// The longest wait for the time of a message, s: where times of a recording jump, it goes on.
@@ -24,13 +25,14 @@ pub(super) struct LiveServer {
     /// What connects them: channels and server hold it weakly.
     _context: Arc<Context>,
     channels: Vec<Arc<RawChannel>>,
+    pace: Pace,
     /// When the last message was sent, and its time, ns.
     last: Option<(Instant, u64)>,
 }
 
 impl LiveServer {
     /// Begins to listen. Fails where the address is not to be had.
-    pub fn start(address: SocketAddr, topics: &[Topic]) -> Result<LiveServer, Error> {
+    pub fn start(address: SocketAddr, pace: Pace, topics: &[Topic]) -> Result<LiveServer, Error> {
         let failed = |e| Error::Unsupported(format!("--live {address}: {e}"));
         let context = Context::new();
         let channel = |(topic, schema): &Topic| {
@@ -43,7 +45,7 @@ impl LiveServer {
         let server = WebSocketServer::new().name("raywake").context(&context);
         let server = server.bind(address.ip().to_string(), address.port());
         let server = server.start_blocking().map_err(failed)?;
-        Ok(LiveServer { server, _context: context, channels, last: None })
+        Ok(LiveServer { server, _context: context, channels, pace, last: None })
     }
 
     /// Whether a viewer has asked for a topic.
@@ -53,6 +55,14 @@ impl LiveServer {
 
     /// Sends a message of a topic when it is time for it.
     pub fn write(&mut self, topic: usize, time_ns: u64, message: &[u8]) {
+        if self.pace == Pace::Recorded {
+            self.wait(time_ns);
+        }
+        self.channels[topic].log_with_meta(message, PartialMetadata::with_log_time(time_ns));
+    }
+
+    /// Waits until it is time for a message.
+    fn wait(&mut self, time_ns: u64) {
         if self.last.is_none() {
             thread::sleep(GRACE);
         }
@@ -64,7 +74,6 @@ impl LiveServer {
         if self.last.is_none_or(|(_, last_ns)| last_ns != time_ns) {
             self.last = Some((Instant::now(), time_ns));
         }
-        self.channels[topic].log_with_meta(message, PartialMetadata::with_log_time(time_ns));
     }
 
     /// Closes the connections, after what was sent last.

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 
 use super::Topic;
+use super::super::streams::Pace;
 use crate::Error;
 
 /// No server.
@@ -12,7 +13,7 @@ pub(super) use NoServer as LiveServer;
 
 impl NoServer {
     /// Fails with [`Error::Unsupported`].
-    pub fn start(_: SocketAddr, _: &[Topic]) -> Result<NoServer, Error> {
+    pub fn start(_: SocketAddr, _: Pace, _: &[Topic]) -> Result<NoServer, Error> {
         Err(Error::lacking("--live", "live"))
     }
 

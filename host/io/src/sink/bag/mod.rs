@@ -106,7 +106,9 @@ impl BagSink {
         let topics = topics(content);
         let file =
             streams.mcap.as_ref().map(|path| MessageFile::create(path, topics)).transpose()?;
-        let live = streams.live.map(|address| LiveServer::start(address, topics)).transpose()?;
+        let live = streams.live;
+        let live = live.map(|address| LiveServer::start(address, streams.pace, topics));
+        let live = live.transpose()?;
         let is_wanted = file.is_some() || live.is_some();
         Ok(is_wanted.then_some(BagSink { file, live, topics, epoch_ns }))
     }

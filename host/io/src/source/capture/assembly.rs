@@ -21,6 +21,9 @@ const TURN_SHARE: f64 = 0.125;
 pub struct LiveSweep {
     /// Its returns; the pose is the identity.
     pub data: SweepData,
+    /// Its stamp since 1970, ns: by the sensor's clock where that is set, else by the arrival of
+    /// its first packet.
+    pub stamp_ns: u64,
     /// When its last packet arrived.
     pub arrived: Instant,
     /// Packets that are missing in it.
@@ -32,7 +35,7 @@ impl LiveSweep {
     pub fn of(sensor: &LiveSensor) -> LiveSweep {
         let points = Vec::with_capacity(sensor.returns_max());
         let data = SweepData { points, ..SweepData::default() };
-        LiveSweep { data, arrived: Instant::now(), lost_packets: 0 }
+        LiveSweep { data, stamp_ns: 0, arrived: Instant::now(), lost_packets: 0 }
     }
 }
 
@@ -102,10 +105,14 @@ impl Assembler {
         self.counts
     }
 
-    /// Time of the first stamp since 1970, ns: by the sensor's clock where that is set, else by the
-    /// arrival of its packet.
+    /// [`LiveSweep::stamp_ns`] of the first sweep.
     pub fn epoch_ns(&self) -> u64 {
         self.epoch_ns
+    }
+
+    /// Time of a turn, ns; 0 until it is known.
+    pub fn turn_ns(&self) -> f64 {
+        self.turn_ns.unwrap_or(0.0)
     }
 
     /// Counts a datagram of another sender.
@@ -191,9 +198,10 @@ impl Assembler {
         if self.last.is_none() {
             return;
         }
+        let stamp_ns = self.sensor.0.epoch_ns(firing.clock_ns, now_ns).0;
         let (begun, sweeps_before) = match self.begun.take() {
             None => {
-                self.epoch_ns = self.sensor.0.epoch_ns(firing.clock_ns, now_ns).0;
+                self.epoch_ns = stamp_ns;
                 (Begun { firing, stamp_ns: 0, number: 0 }, 0)
             }
             Some(begun) => {
@@ -209,7 +217,7 @@ impl Assembler {
         data.dropped = SourceGaps { sweeps_before, null_rows: 0 };
         data.frame = begun.number;
         data.stamp_s = begun.stamp_ns as f64 * 1e-9;
-        self.filling.lost_packets = 0;
+        (self.filling.stamp_ns, self.filling.lost_packets) = (stamp_ns, 0);
         self.begun = Some(begun);
     }
 

@@ -1,0 +1,135 @@
+//! `raywake live`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::builder::BoolishValueParser;
+use raywake_io::source::capture::live::SensorModel;
+use raywake_io::source::{OpenOptions, Unlocated};
+
+use super::results::StreamArgs;
+use super::FlowChoice;
+use super::values::{count, factor, listen, milliseconds, vehicle_box};
+
+const ABOUT: &str = "\
+Estimate the scene flow of a sensor's packets as they come
+
+Every sweep is worked on as soon as its last packet is there. Of sweeps that come while one is in \
+hand the newest is kept; older ones are left out and counted. Nothing else is made cheaper: half \
+the rounds of the energy minimisation, or of the refinement, save a twentieth of a sweep's time, \
+where a sweep left out saves all of it. Tracks go on over a sweep that is missing. A device that \
+fails, or does not answer within ten deadlines, is given up, and the CPU goes on. Messages are \
+written by a thread of their own, and those that it has no time for are left out. SIGINT or SIGTERM \
+end it. Under systemd it says when it is ready, and that it is alive.";
+
+#[derive(Clone, Debug, clap::Args)]
+#[command(about = ABOUT.lines().next(), long_about = ABOUT)]
+pub struct LiveArgs {
+    /// Address and port that packets arrive at, or a port of this machine's loopback [default:
+    /// 127.0.0.1:2368, or a free port for a replay]
+    #[arg(long, value_name = "ADDRESS:PORT", value_parser = listen)]
+    pub listen: Option<SocketAddr>,
+    /// Model of the sensor [default: that of the replay]
+    #[arg(long, required_unless_present = "replay", conflicts_with = "replay")]
+    pub model: Option<SensorModel>,
+    /// What an Ouster says of itself: JSON, as from http://SENSOR/api/v1/sensor/metadata
+    #[arg(long, value_name = "FILE", conflicts_with = "replay")]
+    pub metadata: Option<PathBuf>,
+    /// Where poses come from: `register`, by registration of the sweeps, or an address and port
+    /// that they arrive at as datagrams
+    #[arg(long, value_name = "ADDRESS:PORT|register", default_value = "register")]
+    #[arg(value_parser = poses_from)]
+    pub poses_from: PosesFrom,
+    /// Latency from a sweep's last packet to its flow beyond which it counts as late, ms [default:
+    /// a turn of the sensor]
+    #[arg(long, value_name = "MS", value_parser = milliseconds)]
+    pub deadline: Option<Duration>,
+    /// End after so many sweeps
+    #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
+    pub count: Option<usize>,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub place: PlaceArgs,
+    #[command(flatten)]
+    pub flow: FlowChoice,
+    #[command(flatten)]
+    pub results: LiveResults,
+    #[command(flatten)]
+    pub replay: ReplayArgs,
+}
+
+/// Where the sensor sits.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Sensor")]
+pub struct PlaceArgs {
+    /// Ground height in the sensor's frame, m [default: found in the first sweep]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub ground: Option<f64>,
+    /// Box around the own vehicle in the sensor's frame, m: returns in it are left out
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = vehicle_box)]
+    pub own_vehicle: Option<[[f32; 2]; 2]>,
+    /// Whether the vehicle moves while the sensor turns
+    #[arg(long, value_name = "on|off", hide_possible_values = true)]
+    #[arg(value_parser = BoolishValueParser::new())]
+    pub deskew: Option<bool>,
+}
+
+/// Where results go.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Results")]
+pub struct LiveResults {
+    /// Send what moves to this address as datagrams (see README.md)
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    pub send: Option<SocketAddr>,
+    #[command(flatten)]
+    pub streams: StreamArgs,
+    /// Write counts and latencies as JSON, at the end
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+}
+
+/// A capture in place of a sensor.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Replay")]
+pub struct ReplayArgs {
+    /// Send the packets of a capture (.pcap, .pcapng) here, as its sensor did
+    #[arg(long, value_name = "FILE")]
+    pub replay: Option<PathBuf>,
+    /// How much faster than it did
+    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "replay")]
+    #[arg(value_parser = factor)]
+    pub speed: f64,
+    /// Sensor of the capture, where it has several
+    #[arg(long, value_name = "ADDRESS:PORT", requires = "replay")]
+    pub topic: Option<String>,
+}
+
+/// Where poses come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PosesFrom {
+    Register,
+    Address(SocketAddr),
+}
+
+fn poses_from(text: &str) -> Result<PosesFrom, String> {
+    match text {
+        "register" => Ok(PosesFrom::Register),
+        _ => listen(text).map(PosesFrom::Address),
+    }
+}
+
+impl PlaceArgs {
+    /// What the user says of a sensor.
+    pub fn options(&self) -> OpenOptions {
+        OpenOptions {
+            ground_m: self.ground,
+            own_vehicle: self.own_vehicle,
+            deskew: self.deskew,
+            unlocated: Unlocated::Always,
+            ..OpenOptions::default()
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Where the vehicle is: by registration, or by poses that come.
+
+use raywake_alloc_guard::Sealed;
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Rig;
+use raywake_io::source::capture::assembly::LiveSweep;
+use raywake_registration::Odometry;
+use raywake_registration::odometry::Locating;
+use serde::Serialize;
+
+use super::poses::PoseReceiver;
+use crate::error::RunError;
+
+/// How sweeps were located.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LocatedCounts {
+    /// By poses that came.
+    pub by_poses: u64,
+    /// Left out for want of a pose.
+    pub without_pose: u64,
+    /// By registration, the first one among them.
+    pub registered: u64,
+    /// Sweeps that show too little: a part of their motion is that of the sweep before.
+    pub degenerate: u64,
+    /// Sweeps that fit nothing known: their motion is that of the sweep before.
+    pub lost: u64,
+}
+
+/// Locates one sweep after the other.
+pub struct LiveLocator<'a> {
+    by: By<'a>,
+    counts: LocatedCounts,
+}
+
+enum By<'a> {
+    Registration(Sealed<Box<Odometry>>),
+    Poses(&'a PoseReceiver),
+}
+
+impl<'a> LiveLocator<'a> {
+    /// By poses, or by registration where none come.
+    pub fn new(poses: Option<&'a PoseReceiver>) -> LiveLocator<'a> {
+        let registration = || {
+            let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+            By::Registration(Sealed::new("registration", odometry))
+        };
+        let by = poses.map_or_else(registration, By::Poses);
+        LiveLocator { by, counts: LocatedCounts::default() }
+    }
+
+    /// How it went so far.
+    pub fn counts(&self) -> LocatedCounts {
+        self.counts
+    }
+
+    /// Gives a sweep its pose and twist; `sweep_ns` is the time that one takes. Returns whether it
+    /// has one.
+    ///
+    /// # Errors
+    /// [`RunError::Allocation`].
+    pub fn locate(
+        &mut self,
+        rig: &Rig,
+        sweep: &mut LiveSweep,
+        sweep_ns: u64,
+    ) -> Result<bool, RunError> {
+        let (counts, data) = (&mut self.counts, &mut sweep.data);
+        let (pose, twist) = match &mut self.by {
+            By::Poses(poses) => match poses.at(sweep.stamp_ns, sweep_ns) {
+                Some(found) => {
+                    counts.by_poses += 1;
+                    found
+                }
+                None => {
+                    counts.without_pose += 1;
+                    data.world_from_vehicle = Pose::IDENTITY;
+                    return Ok(false);
+                }
+            },
+            By::Registration(odometry) => {
+                let (stamp_s, points) = (data.stamp_s, &data.points);
+                let found = odometry
+                    .step(|odometry| Ok::<_, RunError>(odometry.locate(stamp_s, points, rig)))?;
+                *match found.locating {
+                    Locating::Start | Locating::Registered => &mut counts.registered,
+                    Locating::Degenerate => &mut counts.degenerate,
+                    Locating::Lost => &mut counts.lost,
+                } += 1;
+                (found.world_from_vehicle, found.twist)
+            }
+        };
+        (data.world_from_vehicle, data.twist) = (pose, twist);
+        Ok(true)
+    }
+}

@@ -1,0 +1,224 @@
+//! `raywake live`: a sensor's packets as they come, flow at the pace of its turns.
+//!
+//! | thread | does | hands on |
+//! |---|---|---|
+//! | receiver | packets to returns, returns to sweeps ([`receiver`]) | the newest sweep |
+//! | poses | keeps the last ones ([`poses`]) | the pose at a stamp |
+//! | worker, with its team | locates, computes flow, sends datagrams ([`worker`]) | a pair |
+//! | recorder | writes messages to a file and to viewers ([`recorder`]) | |
+//! | replay | sends a capture's packets, where there is no sensor | |
+//!
+//! What is handed on waits in a queue of one ([`handover`]), where the newest takes the place of
+//! what nobody has fetched: nothing grows, and nobody waits for whoever is slower. After the start
+//! receiver, poses and worker allocate nothing; messages and replay do.
+
+mod handover;
+mod latency;
+mod locating;
+mod poses;
+mod receiver;
+mod recorder;
+mod stream;
+mod summary;
+mod worker;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use raywake_core::params::Profile;
+use raywake_io::sink::bag::BagSink;
+use raywake_io::sink::streams::{Content, Pace, StreamTargets};
+use raywake_io::source::capture::assembly::LiveSweep;
+use raywake_io::source::capture::live::{LiveRig, LiveSensor};
+use raywake_io::source::capture::replay::Replay;
+
+use crate::args::{BackendChoice, LiveArgs, PosesFrom};
+use crate::budget;
+use crate::choose::{self, Chosen};
+use crate::config;
+use crate::console::{interrupted, listen, note, say};
+use crate::error::RunError;
+use crate::figures::FiguresFile;
+use crate::weight_files::WeightFiles;
+use handover::{Fetched, Handover};
+use poses::PoseReceiver;
+use receiver::Receiver;
+use recorder::{KeptPair, Recorded, record};
+use stream::FlowStream;
+use summary::LiveSummary;
+use worker::{Ended, Worker};
+
+/// Where packets arrive unless something else is said: the port that Velodyne's sensors send to.
+const PORT: u16 = 2368;
+/// After the last packet of a replay: what is on its way arrives.
+const REPLAY_TAIL: Duration = Duration::from_millis(300);
+/// How often is asked whether the first sweep is there, and how long until that is told.
+const POLL: Duration = Duration::from_millis(100);
+const PATIENCE: Duration = Duration::from_secs(5);
+/// A device has this many deadlines to answer.
+const DEVICE_DEADLINES: u32 = 10;
+
+/// What a run needs, checked before anything is opened.
+struct Plan<'a> {
+    args: &'a LiveArgs,
+    profile: Profile,
+    weights: WeightFiles,
+    streams: StreamTargets,
+}
+
+/// Runs until a signal, or the end of a replay.
+pub fn live(args: &LiveArgs) -> Result<(), RunError> {
+    listen();
+    let profile = config::profile(&args.flow.profile)?;
+    let weights = WeightFiles::read(&args.flow.learned, &profile)?;
+    let streams = args.results.streams.sinks(Pace::AtOnce);
+    let plan = Plan { args, profile, weights, streams };
+    let replay = &args.replay;
+    let open = |path| Replay::open(path, replay.topic.as_deref());
+    let replay = replay.replay.as_deref().map(open).transpose()?;
+    let sensor = match (&replay, args.model) {
+        (Some(replay), _) => replay.sensor().clone(),
+        (None, Some(model)) => LiveSensor::of(model, args.metadata.as_deref())?,
+        (None, None) => unreachable!("the command line has one of them"),
+    };
+    let port = if replay.is_some() { 0 } else { PORT };
+    let address = args.listen.unwrap_or_else(|| ([127, 0, 0, 1], port).into());
+    let receiver = Receiver::bind(address, sensor)?;
+    let poses = match args.poses_from {
+        PosesFrom::Register => None,
+        PosesFrom::Address(address) => Some(PoseReceiver::bind(address)?),
+    };
+    say(args.quiet, &format!("{} at {}\n", receiver.sensor().name(), receiver.address()))?;
+    note(args.quiet, &receiver.note())?;
+    let (sweeps, stop) = (Handover::new(LiveSweep::of(receiver.sensor())), AtomicBool::new(false));
+    thread::scope(|scope| {
+        scope.spawn(|| receiver.run(&sweeps, &stop));
+        if let Some(poses) = &poses {
+            scope.spawn(|| poses.run(&stop));
+        }
+        let replaying = replay.as_ref().map(|replay| {
+            scope.spawn(|| {
+                let over = || stop.load(Ordering::Relaxed);
+                let sent = replay.send(receiver.address(), args.replay.speed, over);
+                thread::sleep(REPLAY_TAIL);
+                stop.store(true, Ordering::Relaxed);
+                sent
+            })
+        });
+        let result = plan.work(&receiver, &sweeps, poses.as_ref());
+        stop.store(true, Ordering::Relaxed);
+        let sent = replaying.map(|thread| thread.join().expect("a replay does not panic"));
+        result.and(sent.transpose().map(|_| ()).map_err(RunError::from))
+    })
+}
+
+impl Plan<'_> {
+    /// From the first sweep to the end.
+    fn work(
+        &self,
+        receiver: &Receiver,
+        sweeps: &Handover<LiveSweep>,
+        poses: Option<&PoseReceiver>,
+    ) -> Result<(), RunError> {
+        let (args, sensor) = (self.args, receiver.sensor());
+        let figures = FiguresFile::create(args.results.summary.as_deref(), None)?;
+        let mut first = LiveSweep::of(sensor);
+        if !self.first_sweep(receiver, sweeps, &mut first)? {
+            return Ok(());
+        }
+        let LiveRig { rig, notes } = sensor.learn(&first.data, &args.place.options())?;
+        note(args.quiet, &notes)?;
+        let state = receiver.state();
+        let turn = Duration::from_nanos(state.turn_ns as u64);
+        let deadline = args.deadline.unwrap_or(turn);
+        let backend = &args.flow.backend;
+        let timeout = backend.timeout.min(deadline * DEVICE_DEADLINES);
+        let backend = BackendChoice { timeout, ..backend.clone() };
+        let Chosen { drive, filter, note: lacking } =
+            choose::drive(&backend, &self.weights, &self.profile, &rig)?;
+        note(args.quiet, &lacking)?;
+        say(args.quiet, &budget::paragraph(&self.profile, &drive, &filter))?;
+        let sink = BagSink::create(&self.streams, state.epoch_ns, Content::Flow)?;
+        let pairs = sink.is_some().then(|| {
+            let spare = || KeptPair::of(sensor, &self.profile);
+            (Handover::new(spare()), spare())
+        });
+        let spare = pairs.as_ref().map(|_| KeptPair::of(sensor, &self.profile));
+        let (pairs, kept) = pairs.unzip();
+        let worker = Worker {
+            profile: &self.profile,
+            rig: &rig,
+            turn,
+            deadline,
+            drive,
+            locator: locating::LiveLocator::new(poses),
+            stream: args.results.send.map(FlowStream::to).transpose()?,
+            recording: pairs.as_ref().zip(kept),
+            digests: args.replay.replay.is_some(),
+            quiet: args.quiet,
+            most: args.count.map_or(u64::MAX, |count| count as u64),
+        };
+        thread::scope(|scope| {
+            let recorder = sink.zip(pairs.as_ref()).zip(spare).map(|((sink, pairs), spare)| {
+                scope.spawn(move || record(sink, pairs, spare))
+            });
+            let ended = worker.run(receiver, sweeps, first);
+            pairs.iter().for_each(Handover::close);
+            let recorded = recorder.map(|thread| thread.join().expect("a recorder does not panic"));
+            self.finish(&figures, receiver, poses, ended?, recorded.unwrap_or_default())
+        })
+    }
+
+    /// Waits for the first sweep. Returns whether there is one: a signal may come first.
+    fn first_sweep(
+        &self,
+        receiver: &Receiver,
+        sweeps: &Handover<LiveSweep>,
+        into: &mut LiveSweep,
+    ) -> Result<bool, RunError> {
+        let (began, mut told) = (Instant::now(), false);
+        loop {
+            match sweeps.fetch(into, POLL) {
+                Fetched::Value => return Ok(true),
+                Fetched::Nothing if !interrupted() => {}
+                Fetched::Nothing | Fetched::Closed => {
+                    say(self.args.quiet, "no whole sweep arrived\n")?;
+                    return Ok(false);
+                }
+            }
+            if !told && began.elapsed() > PATIENCE {
+                told = true;
+                let counts = receiver.state().counts;
+                let what = format!(
+                    "no whole sweep yet: {} packets of a {}, {} other datagrams",
+                    counts.packets,
+                    receiver.sensor().name(),
+                    counts.foreign
+                );
+                note(self.args.quiet, &[what])?;
+            }
+        }
+    }
+
+    /// Tells how it went. Fails where recording did.
+    fn finish(
+        &self,
+        figures: &FiguresFile,
+        receiver: &Receiver,
+        poses: Option<&PoseReceiver>,
+        ended: Ended,
+        recorded: Recorded,
+    ) -> Result<(), RunError> {
+        let failure = recorded.failure.as_ref().map(ToString::to_string);
+        let mut summary = LiveSummary {
+            poses: poses.map(PoseReceiver::counts),
+            recording_failure: failure,
+            ..ended.summary(&self.profile, receiver)
+        };
+        summary.sweeps.recorded = recorded.pairs;
+        say(self.args.quiet, &summary.text())?;
+        figures.write(&summary)?;
+        recorded.failure.map_or(Ok(()), |e| Err(e.into()))
+    }
+}

@@ -1,0 +1,213 @@
+//! Poses that come as datagrams.
+//!
+//! A datagram has 72 bytes, little-endian: `RWP1`, four bytes of zero, a u64, the time since 1970
+//! in ns, and seven f64: x, y, z (m) and the quaternion x, y, z, w of the vehicle in the world,
+//! that is of the sensor, whose frame the vehicle's is.
+
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use glam::{DQuat, DVec3};
+use raywake_core::pose::{Pose, Twist};
+use raywake_io::Error;
+use raywake_io::source::rigid;
+use serde::Serialize;
+
+use super::receiver::{bind, each_datagram};
+
+/// First bytes of a datagram, and its length.
+const MAGIC: &[u8] = b"RWP1\0\0\0\0";
+const DATAGRAM: usize = 72;
+/// Poses that are kept: 2.5 s of 200 a second.
+const KEPT: usize = 512;
+/// How far a pose reaches beyond the last one that came, ns: two sweeps of most sensors.
+const BEYOND_MAX_NS: u64 = 200_000_000;
+const S_OF_NS: f64 = 1e-9;
+
+/// What became of datagrams.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PoseCounts {
+    /// Poses.
+    pub poses: u64,
+    /// Datagrams that are no poses.
+    pub foreign: u64,
+    /// Poses that are not later than those before: left out.
+    pub late: u64,
+}
+
+/// A pose and its time since 1970, ns.
+type Timed = (u64, Pose);
+
+/// The last poses, rising in time.
+struct Track {
+    poses: heapless::Deque<Timed, KEPT>,
+    counts: PoseCounts,
+}
+
+/// A socket that poses arrive at.
+pub struct PoseReceiver {
+    socket: UdpSocket,
+    track: Mutex<Track>,
+}
+
+impl PoseReceiver {
+    /// Opens a socket. Fails where the address is not to be had.
+    pub fn bind(address: SocketAddr) -> Result<PoseReceiver, Error> {
+        let socket = bind(address, "poses-from")?;
+        let track = Track { poses: heapless::Deque::new(), counts: PoseCounts::default() };
+        Ok(PoseReceiver { socket, track: Mutex::new(track) })
+    }
+
+    fn track(&self) -> MutexGuard<'_, Track> {
+        self.track.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What became of datagrams so far.
+    pub fn counts(&self) -> PoseCounts {
+        self.track().counts
+    }
+
+    /// Receives poses until `stop`.
+    pub fn run(&self, stop: &AtomicBool) {
+        raywake_alloc_guard::watch("poses", || {
+            each_datagram(&self.socket, stop, |datagram, _| self.track().take(datagram));
+        });
+    }
+
+    /// Where the vehicle was at a time since 1970, ns, and how it moved in the time that a sweep
+    /// takes from there on. `None` where poses before and after are missing.
+    pub fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
+        self.track().at(stamp_ns, sweep_ns)
+    }
+}
+
+/// The pose of a datagram.
+fn parse(datagram: &[u8]) -> Option<Timed> {
+    let numbers = datagram.strip_prefix(MAGIC).filter(|_| datagram.len() == DATAGRAM)?;
+    let (stamp, numbers) = numbers.split_first_chunk()?;
+    let number = |n: usize| f64::from_le_bytes(numbers[8 * n..][..8].try_into().unwrap_or([0; 8]));
+    let place = [0, 1, 2].map(number);
+    Some((u64::from_le_bytes(*stamp), rigid(place, [3, 4, 5, 6].map(number)).ok()?))
+}
+
+impl Track {
+    fn take(&mut self, datagram: &[u8]) {
+        let Some(timed) = parse(datagram) else {
+            self.counts.foreign += 1;
+            return;
+        };
+        if self.poses.back().is_some_and(|(last_ns, _)| timed.0 <= *last_ns) {
+            self.counts.late += 1;
+            return;
+        }
+        self.counts.poses += 1;
+        if self.poses.is_full() {
+            self.poses.pop_front();
+        }
+        // There is room.
+        let _ = self.poses.push_back(timed);
+    }
+
+    fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
+        let pose = self.pose(stamp_ns)?;
+        let newest_ns = self.poses.back()?.0;
+        // How it moves is told by what has come, where that is later than the stamp.
+        let until_ns = match newest_ns > stamp_ns {
+            true => newest_ns.min(stamp_ns + sweep_ns),
+            false => stamp_ns + sweep_ns,
+        };
+        let span_s = (until_ns - stamp_ns) as f64 * S_OF_NS;
+        let then = self.pose(until_ns).or_else(|| self.beyond(until_ns))?;
+        (span_s > 0.0).then(|| (pose, (pose.inverse() * then).twist(span_s)))
+    }
+
+    fn pose(&self, at_ns: u64) -> Option<Pose> {
+        let after = self.poses.iter().position(|(ns, _)| *ns >= at_ns);
+        let Some(after) = after else { return self.beyond(at_ns) };
+        let [(to_ns, to), (from_ns, from)] = [after, after.checked_sub(1).unwrap_or(after)]
+            .map(|n| self.poses.iter().nth(n).copied().unwrap_or((0, Pose::IDENTITY)));
+        match (at_ns == to_ns, to_ns > from_ns) {
+            (true, _) => Some(to),
+            (_, false) => None,
+            _ => {
+                let share = (at_ns - from_ns) as f64 / (to_ns - from_ns) as f64;
+                Some(between(&from, &to, share))
+            }
+        }
+    }
+
+    /// After the last pose, where the last two lead.
+    fn beyond(&self, at_ns: u64) -> Option<Pose> {
+        let mut newest = self.poses.iter().rev();
+        let ((to_ns, to), (from_ns, from)) = (newest.next()?, newest.next()?);
+        let beyond_ns = at_ns.checked_sub(*to_ns).filter(|ns| *ns <= BEYOND_MAX_NS)?;
+        let twist = (from.inverse() * *to).twist((to_ns - from_ns) as f64 * S_OF_NS);
+        Some(*to * twist.over(beyond_ns as f64 * S_OF_NS))
+    }
+}
+
+/// A share of the way from one pose to another.
+fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let place = |a: DVec3, b: DVec3| a + share * (b - a);
+    let turned: DQuat = from.rotation.slerp(to.rotation, share);
+    Pose::new(turned, place(from.translation, to.translation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    fn datagram(ns: u64, numbers: [f64; 7]) -> Vec<u8> {
+        let numbers = numbers.iter().flat_map(|n| n.to_le_bytes());
+        MAGIC.iter().copied().chain(ns.to_le_bytes()).chain(numbers).collect()
+    }
+
+    fn track() -> Track {
+        Track { poses: heapless::Deque::new(), counts: PoseCounts::default() }
+    }
+
+    /// Ten metres a second ahead, turning by 0.2 rad/s.
+    fn moving(seconds: std::ops::Range<u64>) -> Track {
+        let mut track = track();
+        for tenth in seconds.start * 10..seconds.end * 10 {
+            let t = tenth as f64 / 10.0;
+            let (sin, cos) = (0.1 * t).sin_cos();
+            track.take(&datagram(tenth * SECOND / 10, [10.0 * t, 0.0, 0.0, 0.0, 0.0, sin, cos]));
+        }
+        track
+    }
+
+    #[test]
+    fn between_and_beyond_poses() {
+        let track = moving(10..12);
+        let (pose, twist) = track.at(10 * SECOND + SECOND / 20, SECOND / 10).unwrap();
+        assert!((pose.translation.x - 100.5).abs() < 1e-9);
+        assert!((pose.yaw_rad() - 2.01).abs() < 1e-9, "{}", pose.yaw_rad());
+        assert!((twist.angular.z - 0.2).abs() < 1e-9 && (twist.linear.length() - 10.0).abs() < 0.1);
+        // The last pose is that of 11.9 s.
+        let (pose, _) = track.at(12 * SECOND, SECOND / 10).unwrap();
+        assert!((pose.translation - DVec3::new(120.0, 0.0, 0.0)).length() < 0.1, "{pose:?}");
+        assert!(track.at(13 * SECOND, SECOND / 10).is_none());
+        assert!(track.at(9 * SECOND, SECOND / 10).is_none());
+    }
+
+    #[test]
+    fn what_is_no_pose_is_counted() {
+        let mut track = track();
+        assert!(track.at(0, 1).is_none());
+        track.take(b"RWP1");
+        track.take(&datagram(5, [0.0; 7]));
+        track.take(&datagram(5, [f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        track.take(&datagram(5, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        track.take(&datagram(5, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        assert_eq!(track.counts, PoseCounts { poses: 1, foreign: 3, late: 1 });
+        (6..2000).for_each(|ns| track.take(&datagram(ns, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])));
+        assert_eq!(track.poses.len(), KEPT);
+        let mut jump = moving(1..2);
+        jump.take(&datagram(u64::MAX, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        assert!(jump.at(u64::MAX, SECOND).is_none());
+    }
+}

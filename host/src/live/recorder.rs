@@ -1,0 +1,120 @@
+//! The thread that writes messages: a disk or a viewer that is slow holds up nothing but itself.
+
+use std::time::Duration;
+
+use raywake_core::output::{ColumnFlow, KeptPoints, PairFlows, ReturnFlow};
+use raywake_core::params::{Profile, SOLID_MAX};
+use raywake_core::tracklet::TrackletTurnover;
+use raywake_io::Error;
+use raywake_io::sink::bag::BagSink;
+use raywake_io::source::SweepData;
+use raywake_io::source::capture::assembly::LiveSweep;
+use raywake_io::source::capture::live::LiveSensor;
+
+use super::handover::{Fetched, Handover};
+use crate::console::warn;
+
+/// How often is asked whether there is something to write.
+const POLL: Duration = Duration::from_secs(1);
+
+/// A pair of sweeps, kept to be written.
+pub struct KeptPair {
+    first: LiveSweep,
+    columns: Vec<ColumnFlow>,
+    returns: Vec<ReturnFlow>,
+    /// What else is known; none before the first pair.
+    rest: Option<Rest>,
+}
+
+struct Rest {
+    points: KeptPoints,
+    solid: usize,
+    dt_s: f64,
+    turnover: TrackletTurnover,
+    valid: usize,
+    foreground_dropped: usize,
+}
+
+impl KeptPair {
+    /// Room for a pair.
+    pub fn of(sensor: &LiveSensor, profile: &Profile) -> KeptPair {
+        KeptPair {
+            first: LiveSweep::of(sensor),
+            columns: Vec::with_capacity(profile.columns().min(SOLID_MAX)),
+            returns: Vec::with_capacity(profile.returns()),
+            rest: None,
+        }
+    }
+
+    /// Copies a pair's flow.
+    pub fn keep(&mut self, flows: &PairFlows) {
+        let (columns, returns) = flows.points.slices();
+        self.columns.clear();
+        self.columns.extend_from_slice(columns);
+        self.returns.clear();
+        self.returns.extend_from_slice(returns);
+        let &PairFlows { dt_s, turnover, valid, foreground_dropped, .. } = flows;
+        let (points, solid) = (flows.points.keep(), flows.columns.len());
+        self.rest = Some(Rest { points, solid, dt_s, turnover, valid, foreground_dropped });
+    }
+
+    /// Takes the pair's first sweep, for another of no meaning.
+    pub fn take_first(&mut self, sweep: &mut LiveSweep) {
+        std::mem::swap(&mut self.first, sweep);
+    }
+
+    /// Shows the pair.
+    fn show<R>(&self, see: impl FnOnce(&SweepData, &PairFlows) -> R) -> Option<R> {
+        let Rest { points, solid, dt_s, turnover, valid, foreground_dropped } =
+            *self.rest.as_ref()?;
+        let first = &self.first.data;
+        let flows = PairFlows {
+            columns: self.columns.get(..solid)?,
+            points: points.over(&self.columns, &self.returns, &first.points),
+            dt_s,
+            turnover,
+            valid,
+            foreground_dropped,
+        };
+        Some(see(first, &flows))
+    }
+}
+
+/// What came of recording.
+#[derive(Debug, Default)]
+pub struct Recorded {
+    /// Pairs that were written.
+    pub pairs: u64,
+    /// Why no more were.
+    pub failure: Option<Error>,
+}
+
+/// Writes pairs until no more come. A failure, as of a full disk, ends the recording alone.
+pub fn record(sink: BagSink, pairs: &Handover<KeptPair>, mut spare: KeptPair) -> Recorded {
+    let (mut recorded, mut sink) = (Recorded::default(), Some(sink));
+    loop {
+        match pairs.fetch(&mut spare, POLL) {
+            Fetched::Value => {
+                let Some(open) = &mut sink else { continue };
+                match spare.show(|first, flows| open.pair(first, flows)) {
+                    Some(Err(e)) => {
+                        sink = None;
+                        fail(&mut recorded, e);
+                    }
+                    _ => recorded.pairs += 1,
+                }
+            }
+            Fetched::Nothing => {}
+            Fetched::Closed => break,
+        }
+    }
+    if let Some(Err(e)) = sink.map(BagSink::finish) {
+        fail(&mut recorded, e);
+    }
+    recorded
+}
+
+fn fail(recorded: &mut Recorded, error: Error) {
+    warn(&format!("{error}: nothing is recorded any more"));
+    recorded.failure = Some(error);
+}

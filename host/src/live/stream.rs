@@ -1,0 +1,261 @@
+//! What comes out as datagrams: a small format for whoever acts on what moves.
+//!
+//! Little-endian. A datagram has a head of 24 bytes and up to 40 records of one kind:
+//!
+//! | byte | type | what |
+//! |--:|---|---|
+//! | 0 | 4 bytes | `RWF1` |
+//! | 4 | u16 | kind of the records: 0 sweep, 1 column, 2 tracklet |
+//! | 6 | u16 | records in this datagram |
+//! | 8 | u16 | number of this datagram among those of its kind and sweep |
+//! | 10 | u16 | how many there are |
+//! | 12 | u32 | number of the sweep, whose frame positions and axes are of |
+//! | 16 | u64 | its stamp since 1970, ns |
+//!
+//! | kind | bytes | record |
+//! |---|--:|---|
+//! | sweep | 88 | f64 x, y, z, quaternion x, y, z, w of the vehicle in the world; f32 time since the sweep before, s (0: no flow), latency from the last packet, ms; u64 sweeps left out so far; u32 columns, tracklets that were sent; u64 stamp of the sweep before, ns |
+//! | column | 32 | f32 x, y, velocity x, y over ground, its covariance xx, xy, yy, P(moves) |
+//! | tracklet | 32 | f32 x, y, velocity x, y over ground, turn rate; u32 observations; f32 standard deviation of the speed, P(moves) |
+//!
+//! Columns are those that move in the sweep before, tracklets those that move in the sweep; m, m/s,
+//! rad/s along the vehicle's axes. For every sweep there is a datagram of kind 0, after the others.
+
+use std::net::{SocketAddr, UdpSocket};
+
+use glam::dvec3;
+use raywake_core::output::{ColumnFlow, TrackletState};
+use raywake_core::pose::Pose;
+use raywake_io::Error;
+
+const MAGIC: &[u8; 4] = b"RWF1";
+const HEAD: usize = 24;
+/// Bytes of a column and of a tracklet.
+const RECORD: usize = 32;
+/// Records of a datagram: it fits an Ethernet frame.
+const RECORDS: usize = 40;
+
+/// Kinds of records.
+#[derive(Clone, Copy)]
+enum RecordKind {
+    Sweep = 0,
+    Column = 1,
+    Tracklet = 2,
+}
+
+/// A sweep that is sent.
+#[derive(Clone, Copy, Debug)]
+pub struct SentSweep {
+    pub number: u64,
+    pub stamp_ns: u64,
+    pub pose: Pose,
+}
+
+/// What else is told of a sweep.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepFacts {
+    /// Since the sweep before, s; 0 where there is no flow.
+    pub dt_s: f64,
+    pub latency_ms: f64,
+    /// Sweeps left out so far.
+    pub left_out: u64,
+    /// Columns and tracklets that were sent.
+    pub sent: [usize; 2],
+    /// Stamp of the sweep before, ns.
+    pub before_ns: u64,
+}
+
+/// A socket that datagrams leave by, and the one in hand.
+pub struct FlowStream {
+    socket: UdpSocket,
+    to: SocketAddr,
+    datagram: heapless::Vec<u8, { HEAD + RECORDS * RECORD }>,
+    unsent: u64,
+}
+
+impl FlowStream {
+    /// Opens a socket. Fails where the system has none.
+    pub fn to(to: SocketAddr) -> Result<FlowStream, Error> {
+        let any: SocketAddr = match to {
+            SocketAddr::V4(_) => ([0; 4], 0).into(),
+            SocketAddr::V6(_) => ([0; 16], 0).into(),
+        };
+        let open = || {
+            let socket = UdpSocket::bind(any)?;
+            socket.set_nonblocking(true).map(|()| socket)
+        };
+        let socket = open()
+            .map_err(|e: std::io::Error| Error::Usage(format!("--send {to}: {e}")))?;
+        Ok(FlowStream { socket, to, datagram: heapless::Vec::new(), unsent: 0 })
+    }
+
+    /// Datagrams that the system did not take.
+    pub fn unsent(&self) -> u64 {
+        self.unsent
+    }
+
+    /// Sends columns of a sweep. Returns how many.
+    pub fn columns<'a>(
+        &mut self,
+        sweep: &SentSweep,
+        columns: impl Iterator<Item = &'a ColumnFlow> + Clone,
+    ) -> usize {
+        self.all(RecordKind::Column, sweep, columns, |this, column| {
+            this.floats(&column.position_vehicle_m);
+            this.floats(&along(&sweep.pose, column.velocity_world_mps));
+            this.floats(&turned_covariance(&sweep.pose, column.covariance));
+            this.floats(&[column.probability]);
+        })
+    }
+
+    /// Sends tracklets of a sweep. Returns how many.
+    pub fn tracklets(
+        &mut self,
+        sweep: &SentSweep,
+        tracklets: impl Iterator<Item = TrackletState> + Clone,
+    ) -> usize {
+        self.all(RecordKind::Tracklet, sweep, tracklets, |this, tracklet| {
+            this.floats(&tracklet.position_vehicle_m);
+            this.floats(&along(&sweep.pose, tracklet.velocity_world_mps));
+            this.floats(&[tracklet.turn_rate_radps]);
+            this.bytes(&tracklet.age.to_le_bytes());
+            this.floats(&[tracklet.covariance[3][3].max(0.0).sqrt(), tracklet.probability]);
+        })
+    }
+
+    /// Sends a sweep, after all else of it.
+    pub fn sweep(&mut self, sweep: &SentSweep, facts: &SweepFacts) {
+        self.begin(RecordKind::Sweep, sweep, [0, 1, 1]);
+        let (place, turned) = (sweep.pose.translation, sweep.pose.rotation);
+        [place.x, place.y, place.z, turned.x, turned.y, turned.z, turned.w]
+            .iter()
+            .for_each(|number| self.bytes(&number.to_le_bytes()));
+        self.floats(&[facts.dt_s as f32, facts.latency_ms as f32]);
+        self.bytes(&facts.left_out.to_le_bytes());
+        facts.sent.iter().for_each(|count| self.bytes(&(*count as u32).to_le_bytes()));
+        self.bytes(&facts.before_ns.to_le_bytes());
+        self.finish();
+    }
+
+    /// Sends records of one kind, as many a datagram as fit. Returns how many.
+    fn all<R>(
+        &mut self,
+        kind: RecordKind,
+        sweep: &SentSweep,
+        records: impl Iterator<Item = R> + Clone,
+        write: impl Fn(&mut FlowStream, R),
+    ) -> usize {
+        let count = records.clone().count();
+        let parts = count.div_ceil(RECORDS);
+        for (n, record) in records.enumerate() {
+            if n % RECORDS == 0 {
+                let part = n / RECORDS;
+                self.begin(kind, sweep, [part, parts, (count - n).min(RECORDS)]);
+            }
+            write(self, record);
+            if n % RECORDS == RECORDS - 1 || n + 1 == count {
+                self.finish();
+            }
+        }
+        count
+    }
+
+    fn begin(&mut self, kind: RecordKind, sweep: &SentSweep, [part, parts, records]: [usize; 3]) {
+        self.datagram.clear();
+        self.bytes(MAGIC);
+        let head = [kind as usize, records, part, parts];
+        head.iter().for_each(|word| self.bytes(&(*word as u16).to_le_bytes()));
+        self.bytes(&(sweep.number as u32).to_le_bytes());
+        self.bytes(&sweep.stamp_ns.to_le_bytes());
+    }
+
+    fn finish(&mut self) {
+        let sent = self.socket.send_to(&self.datagram, self.to).is_ok();
+        self.unsent += u64::from(!sent);
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        // The records were counted.
+        let _ = self.datagram.extend_from_slice(bytes);
+    }
+
+    fn floats(&mut self, numbers: &[f32]) {
+        numbers.iter().for_each(|number| self.bytes(&number.to_le_bytes()));
+    }
+}
+
+/// A velocity of the world along the vehicle's axes.
+fn along(pose: &Pose, [x, y]: [f32; 2]) -> [f32; 2] {
+    let v = pose.rotation.conjugate() * dvec3(x.into(), y.into(), 0.0);
+    [v.x as f32, v.y as f32]
+}
+
+/// A covariance (xx, xy, yy) of the world along the vehicle's axes, in the plane.
+fn turned_covariance(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
+    let (sin, cos) = libm::sincosf(pose.yaw_rad() as f32);
+    let (cc, ss, cs) = (cos * cos, sin * sin, cos * sin);
+    let turned = cs * (yy - xx) + (cc - ss) * xy;
+    [cc * xx + 2.0 * cs * xy + ss * yy, turned, ss * xx - 2.0 * cs * xy + cc * yy]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn float(bytes: &[u8], at: usize) -> f32 {
+        f32::from_le_bytes(bytes[at..][..4].try_into().unwrap())
+    }
+
+    fn word(bytes: &[u8], at: usize) -> u16 {
+        u16::from_le_bytes(bytes[at..][..2].try_into().unwrap())
+    }
+
+    /// By the table above.
+    #[test]
+    fn what_is_sent() {
+        let here = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let mut stream = FlowStream::to(here.local_addr().unwrap()).unwrap();
+        let column = ColumnFlow {
+            position_vehicle_m: [3.0, 4.0],
+            velocity_world_mps: [1.0, 0.0],
+            covariance: [4.0, 0.0, 1.0],
+            probability: 0.75,
+            ..ColumnFlow::default()
+        };
+        let mut tracklet = TrackletState { age: 7, probability: 0.5, ..TrackletState::default() };
+        tracklet.covariance[3][3] = 0.25;
+        // It looks along y.
+        let pose = Pose::planar(1.0, 2.0, 0.0, std::f64::consts::FRAC_PI_2);
+        let sweeps = [8, 9].map(|number| SentSweep { number, stamp_ns: 100 + number, pose });
+        let columns = vec![column; 41];
+        let sent = [
+            stream.columns(&sweeps[0], columns.iter()),
+            stream.tracklets(&sweeps[1], std::iter::once(tracklet)),
+        ];
+        let facts =
+            SweepFacts { dt_s: 0.1, latency_ms: 12.5, left_out: 3, sent, before_ns: 108 };
+        stream.sweep(&sweeps[1], &facts);
+        let mut got = Vec::new();
+        for _ in 0..4 {
+            let mut datagram = vec![0; 2000];
+            let length = here.recv(&mut datagram).unwrap();
+            datagram.truncate(length);
+            assert_eq!(&datagram[..4], b"RWF1");
+            got.push(datagram);
+        }
+        got.rotate_right(1);
+        let heads: Vec<_> = got.iter().map(|d| [4, 6, 8, 10].map(|at| word(d, at))).collect();
+        assert_eq!(heads, [[0, 1, 0, 1], [1, 40, 0, 2], [1, 1, 1, 2], [2, 1, 0, 1]]);
+        assert_eq!(got.iter().map(Vec::len).collect::<Vec<_>>(), [24 + 88, 24 + 40 * 32, 56, 56]);
+        assert_eq!([&got[0], &got[1], &got[3]].map(|d| (d[12], d[16])), [(9, 109), (8, 108), (9, 109)]);
+        assert_eq!(f64::from_le_bytes(got[0][24..32].try_into().unwrap()), 1.0);
+        assert_eq!((float(&got[0], 80), float(&got[0], 84)), (0.1, 12.5));
+        assert_eq!((got[0][88], got[0][96], got[0][100], got[0][104]), (3, 41, 1, 108));
+        let numbers: Vec<f32> = (0..8).map(|n| float(&got[2], 24 + 4 * n)).collect();
+        for (number, expected) in numbers.iter().zip([3.0, 4.0, 0.0, -1.0, 1.0, 0.0, 4.0, 0.75]) {
+            assert!((number - expected).abs() < 1e-6, "{numbers:?}");
+        }
+        assert_eq!((got[3][44], float(&got[3], 48), float(&got[3], 52)), (7, 0.5, 0.5));
+        assert_eq!(stream.unsent(), 0);
+    }
+}

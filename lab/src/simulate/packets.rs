@@ -1,0 +1,61 @@
+//! `raywake-lab packets`: the packets of a simulated sensor, for `raywake live --replay` and `run`.
+
+use super::sceneries;
+use raywake::progress::Progress;
+use raywake_io::Error;
+use raywake_io::sink::atomic;
+use raywake_sim::packets::{OusterPackets, begin_capture, capture};
+use raywake_sim::{Drive, Options, Scenery, Sensor, SensorRig};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Height of the sensor above the ground, m.
+const HEIGHT_M: f64 = 1.9;
+
+/// Options of `packets`.
+#[derive(clap::Args)]
+pub struct PacketsArgs {
+    /// Capture to write, `.pcap`; what the sensor says of itself goes beside it, as `.json`.
+    out: PathBuf,
+    /// Turns, 10 a second.
+    #[arg(long, default_value_t = 100)]
+    sweeps: usize,
+    /// Columns of a turn, of 128 beams each.
+    #[arg(long, default_value_t = 1024, value_parser = columns)]
+    columns: usize,
+    /// Seed of the drive.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// What is driven through.
+    #[arg(long, default_value = "street", value_parser = sceneries())]
+    scenery: Scenery,
+}
+
+fn columns(text: &str) -> Result<usize, String> {
+    let of_sensors = ["512", "1024", "2048"].contains(&text);
+    of_sensors.then(|| text.parse().ok()).flatten().ok_or("512, 1024 or 2048".into())
+}
+
+/// Writes capture and metadata.
+pub fn packets(args: &PacketsArgs) -> Result<(), Error> {
+    let sensor = Sensor { columns: args.columns, ..Sensor::os1_128() };
+    let rig = SensorRig::single(sensor.clone(), HEIGHT_M);
+    let (scenery, sweeps) = (args.scenery, args.sweeps);
+    let drive = Drive::new(args.seed, Options { sweeps, rig, scenery, ..Options::default() });
+    let packets = OusterPackets::of(&sensor);
+    let metadata = packets.metadata();
+    let json = args.out.with_extension("json");
+    atomic::write(&json, |out| out.write_all(metadata.as_bytes()))?;
+    let mut progress = Progress::new("sweep", sweeps, false);
+    atomic::write(&args.out, |out| {
+        begin_capture(out)?;
+        for (number, sweep) in drive.enumerate() {
+            let turn = packets.turn(number, &sweep.points);
+            // It begins within a turn, as those of a sensor that runs do.
+            let from = if number == 0 { turn.len() / 2 } else { 0 };
+            turn[from..].iter().try_for_each(|(time_ns, packet)| capture(out, *time_ns, packet))?;
+            progress.update(number + 1);
+        }
+        Ok(())
+    })
+}
