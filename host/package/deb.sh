@@ -7,7 +7,7 @@ cargo build --quiet --profile onboard -p raywake --all-features >&2
 program=target/onboard/raywake
 shell=target/package
 mkdir -p "$shell"
-for command in "" run flow track clean map odometry demo budget devices; do
+for command in "" run live flow track clean map odometry demo budget devices; do
     # shellcheck disable=SC2086
     "$program" man $command | gzip -9n >"$shell/raywake${command:+-$command}.1.gz"
 done

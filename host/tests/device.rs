@@ -8,7 +8,7 @@ mod common;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use common::{Outcome, SMALL, Temp};
 use raywake_faulty_layer::{FAULT, GARBAGE, NAMES, NULL, environment};
@@ -21,24 +21,13 @@ const TIMEOUT: i32 = 2;
 
 const SWEEPS: usize = 8;
 
-/// The layer, where cargo has put it: beside this test.
-fn library() -> PathBuf {
-    let folder = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
-    let name = format!(
-        "{}raywake_faulty_layer{}",
-        std::env::consts::DLL_PREFIX,
-        std::env::consts::DLL_SUFFIX
-    );
-    folder.join(name)
-}
-
 /// `raywake run DRIVE` on the device, with a fault as [`FAULT`] has it, or without one.
 fn run(t: &Temp, fault: &str, more: &[&str]) -> Outcome {
     let config = t.write("small.toml", SMALL);
     let data = t.path().join("drive");
     let mut command = common::command(&["run", data.to_str().unwrap()]);
     command.args(["--config", config.to_str().unwrap(), "--backend", "vulkan"]).args(more);
-    command.envs(environment(t.path(), &library()).unwrap()).env(FAULT, fault);
+    command.envs(environment(t.path(), &common::faulty_layer()).unwrap()).env(FAULT, fault);
     Outcome::of(command.output().unwrap())
 }
 

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::builder::BoolishValueParser;
+use raywake_io::Error;
 use raywake_io::source::capture::live::SensorModel;
 use raywake_io::source::{OpenOptions, Unlocated};
 
-use super::results::StreamArgs;
 use super::FlowChoice;
+use super::results::StreamArgs;
 use super::values::{count, factor, listen, milliseconds, vehicle_box};
 
 const ABOUT: &str = "\
@@ -20,8 +21,8 @@ hand the newest is kept; older ones are left out and counted. Nothing else is ma
 the rounds of the energy minimisation, or of the refinement, save a twentieth of a sweep's time, \
 where a sweep left out saves all of it. Tracks go on over a sweep that is missing. A device that \
 fails, or does not answer within ten deadlines, is given up, and the CPU goes on. Messages are \
-written by a thread of their own, and those that it has no time for are left out. SIGINT or SIGTERM \
-end it. Under systemd it says when it is ready, and that it is alive.";
+written by a thread of their own, and those that it has no time for are left out. SIGINT or \
+SIGTERM end it. Under systemd it says when it is ready, and that it is alive.";
 
 #[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
@@ -81,7 +82,8 @@ pub struct PlaceArgs {
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct LiveResults {
-    /// Send what moves to this address as datagrams (see README.md)
+    /// Send what moves to this address as datagrams (examples/live_receiver.py
+    /// reads them)
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub send: Option<SocketAddr>,
     #[command(flatten)]
@@ -98,13 +100,21 @@ pub struct ReplayArgs {
     /// Send the packets of a capture (.pcap, .pcapng) here, as its sensor did
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
-    /// How much faster than it did
-    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "replay")]
-    #[arg(value_parser = factor)]
-    pub speed: f64,
+    /// How much faster than it did [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    pub speed: Option<f64>,
     /// Sensor of the capture, where it has several
-    #[arg(long, value_name = "ADDRESS:PORT", requires = "replay")]
+    #[arg(long, value_name = "ADDRESS:PORT")]
     pub topic: Option<String>,
+}
+
+impl ReplayArgs {
+    /// The parser asks for no replay where there is a model, which excludes one.
+    pub fn check(&self) -> Result<(), Error> {
+        let given = [("speed", self.speed.is_some()), ("topic", self.topic.is_some())];
+        let alone = given.iter().find(|(_, given)| *given).filter(|_| self.replay.is_none());
+        alone.map_or(Ok(()), |(name, _)| Err(Error::Usage(format!("--{name} is for a --replay"))))
+    }
 }
 
 /// Where poses come from.

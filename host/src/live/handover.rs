@@ -6,11 +6,11 @@ use std::time::Duration;
 
 /// A queue of one value.
 pub struct Handover<T> {
-    slot: Mutex<Slot<T>>,
+    slot: Mutex<HandoverSlot<T>>,
     changed: Condvar,
 }
 
-struct Slot<T> {
+struct HandoverSlot<T> {
     value: T,
     full: bool,
     closed: bool,
@@ -31,11 +31,11 @@ pub enum Fetched {
 impl<T> Handover<T> {
     /// An empty queue, with a value for whoever puts in the first one.
     pub fn new(spare: T) -> Handover<T> {
-        let slot = Slot { value: spare, full: false, closed: false, replaced: 0 };
+        let slot = HandoverSlot { value: spare, full: false, closed: false, replaced: 0 };
         Handover { slot: Mutex::new(slot), changed: Condvar::new() }
     }
 
-    fn slot(&self) -> MutexGuard<'_, Slot<T>> {
+    fn slot(&self) -> MutexGuard<'_, HandoverSlot<T>> {
         // Values change places whole.
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -52,7 +52,7 @@ impl<T> Handover<T> {
 
     /// Fetches the value, for one of no meaning.
     pub fn fetch(&self, value: &mut T, within: Duration) -> Fetched {
-        let waits = |slot: &mut Slot<T>| !slot.full && !slot.closed;
+        let waits = |slot: &mut HandoverSlot<T>| !slot.full && !slot.closed;
         let waited = self.changed.wait_timeout_while(self.slot(), within, waits);
         let (mut slot, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if slot.full {

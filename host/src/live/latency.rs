@@ -54,8 +54,7 @@ impl Latencies {
             });
             step.map_or(self.max_ms, |step| ((step + 1) as f64 / STEPS_OF_MS).min(self.max_ms))
         };
-        let figures =
-            || LatencyFigures { median: share(0.5), p99: share(0.99), max: self.max_ms };
+        let figures = || LatencyFigures { median: share(0.5), p99: share(0.99), max: self.max_ms };
         (total > 0).then(figures)
     }
 }

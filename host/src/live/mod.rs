@@ -44,10 +44,10 @@ use crate::weight_files::WeightFiles;
 use handover::{Fetched, Handover};
 use poses::PoseReceiver;
 use receiver::Receiver;
-use recorder::{KeptPair, Recorded, record};
+use recorder::{RecordedPair, RecordingOutcome, record};
 use stream::FlowStream;
 use summary::LiveSummary;
-use worker::{Ended, Worker};
+use worker::{LiveEnd, Worker};
 
 /// Where packets arrive unless something else is said: the port that Velodyne's sensors send to.
 const PORT: u16 = 2368;
@@ -69,6 +69,7 @@ struct Plan<'a> {
 
 /// Runs until a signal, or the end of a replay.
 pub fn live(args: &LiveArgs) -> Result<(), RunError> {
+    args.replay.check()?;
     listen();
     let profile = config::profile(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
@@ -100,7 +101,7 @@ pub fn live(args: &LiveArgs) -> Result<(), RunError> {
         let replaying = replay.as_ref().map(|replay| {
             scope.spawn(|| {
                 let over = || stop.load(Ordering::Relaxed);
-                let sent = replay.send(receiver.address(), args.replay.speed, over);
+                let sent = replay.send(receiver.address(), args.replay.speed.unwrap_or(1.0), over);
                 thread::sleep(REPLAY_TAIL);
                 stop.store(true, Ordering::Relaxed);
                 sent
@@ -141,10 +142,10 @@ impl Plan<'_> {
         say(args.quiet, &budget::paragraph(&self.profile, &drive, &filter))?;
         let sink = BagSink::create(&self.streams, state.epoch_ns, Content::Flow)?;
         let pairs = sink.is_some().then(|| {
-            let spare = || KeptPair::of(sensor, &self.profile);
+            let spare = || RecordedPair::of(sensor, &self.profile);
             (Handover::new(spare()), spare())
         });
-        let spare = pairs.as_ref().map(|_| KeptPair::of(sensor, &self.profile));
+        let spare = pairs.as_ref().map(|_| RecordedPair::of(sensor, &self.profile));
         let (pairs, kept) = pairs.unzip();
         let worker = Worker {
             profile: &self.profile,
@@ -160,9 +161,10 @@ impl Plan<'_> {
             most: args.count.map_or(u64::MAX, |count| count as u64),
         };
         thread::scope(|scope| {
-            let recorder = sink.zip(pairs.as_ref()).zip(spare).map(|((sink, pairs), spare)| {
-                scope.spawn(move || record(sink, pairs, spare))
-            });
+            let recorder = sink
+                .zip(pairs.as_ref())
+                .zip(spare)
+                .map(|((sink, pairs), spare)| scope.spawn(move || record(sink, pairs, spare)));
             let ended = worker.run(receiver, sweeps, first);
             pairs.iter().for_each(Handover::close);
             let recorded = recorder.map(|thread| thread.join().expect("a recorder does not panic"));
@@ -207,8 +209,8 @@ impl Plan<'_> {
         figures: &FiguresFile,
         receiver: &Receiver,
         poses: Option<&PoseReceiver>,
-        ended: Ended,
-        recorded: Recorded,
+        ended: LiveEnd,
+        recorded: RecordingOutcome,
     ) -> Result<(), RunError> {
         let failure = recorded.failure.as_ref().map(ToString::to_string);
         let mut summary = LiveSummary {

@@ -23,6 +23,8 @@ const DATAGRAM: usize = 72;
 const KEPT: usize = 512;
 /// How far a pose reaches beyond the last one that came, ns: two sweeps of most sensors.
 const BEYOND_MAX_NS: u64 = 200_000_000;
+/// A pose this far from the last one, ns, is of a clock that was set.
+const SET_NS: u64 = 10_000_000_000;
 const S_OF_NS: f64 = 1e-9;
 
 /// What became of datagrams.
@@ -40,7 +42,7 @@ pub struct PoseCounts {
 type Timed = (u64, Pose);
 
 /// The last poses, rising in time.
-struct Track {
+struct RecentPoses {
     poses: heapless::Deque<Timed, KEPT>,
     counts: PoseCounts,
 }
@@ -48,18 +50,18 @@ struct Track {
 /// A socket that poses arrive at.
 pub struct PoseReceiver {
     socket: UdpSocket,
-    track: Mutex<Track>,
+    track: Mutex<RecentPoses>,
 }
 
 impl PoseReceiver {
     /// Opens a socket. Fails where the address is not to be had.
     pub fn bind(address: SocketAddr) -> Result<PoseReceiver, Error> {
         let socket = bind(address, "poses-from")?;
-        let track = Track { poses: heapless::Deque::new(), counts: PoseCounts::default() };
+        let track = RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() };
         Ok(PoseReceiver { socket, track: Mutex::new(track) })
     }
 
-    fn track(&self) -> MutexGuard<'_, Track> {
+    fn track(&self) -> MutexGuard<'_, RecentPoses> {
         self.track.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -88,16 +90,22 @@ fn parse(datagram: &[u8]) -> Option<Timed> {
     let (stamp, numbers) = numbers.split_first_chunk()?;
     let number = |n: usize| f64::from_le_bytes(numbers[8 * n..][..8].try_into().unwrap_or([0; 8]));
     let place = [0, 1, 2].map(number);
-    Some((u64::from_le_bytes(*stamp), rigid(place, [3, 4, 5, 6].map(number)).ok()?))
+    let stamp_ns = u64::from_le_bytes(*stamp);
+    let pose = rigid(place, [3, 4, 5, 6].map(number)).ok()?;
+    (stamp_ns > 0).then_some((stamp_ns, pose))
 }
 
-impl Track {
+impl RecentPoses {
     fn take(&mut self, datagram: &[u8]) {
         let Some(timed) = parse(datagram) else {
             self.counts.foreign += 1;
             return;
         };
-        if self.poses.back().is_some_and(|(last_ns, _)| timed.0 <= *last_ns) {
+        let last_ns = self.poses.back().map_or(timed.0 - 1, |(last_ns, _)| *last_ns);
+        if timed.0.abs_diff(last_ns) > SET_NS {
+            // The clock was set; of what was before nothing can be told.
+            self.poses.clear();
+        } else if timed.0 <= last_ns {
             self.counts.late += 1;
             return;
         }
@@ -114,8 +122,8 @@ impl Track {
         let newest_ns = self.poses.back()?.0;
         // How it moves is told by what has come, where that is later than the stamp.
         let until_ns = match newest_ns > stamp_ns {
-            true => newest_ns.min(stamp_ns + sweep_ns),
-            false => stamp_ns + sweep_ns,
+            true => newest_ns.min(stamp_ns.saturating_add(sweep_ns)),
+            false => stamp_ns.saturating_add(sweep_ns),
         };
         let span_s = (until_ns - stamp_ns) as f64 * S_OF_NS;
         let then = self.pose(until_ns).or_else(|| self.beyond(until_ns))?;
@@ -165,12 +173,12 @@ mod tests {
         MAGIC.iter().copied().chain(ns.to_le_bytes()).chain(numbers).collect()
     }
 
-    fn track() -> Track {
-        Track { poses: heapless::Deque::new(), counts: PoseCounts::default() }
+    fn track() -> RecentPoses {
+        RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() }
     }
 
     /// Ten metres a second ahead, turning by 0.2 rad/s.
-    fn moving(seconds: std::ops::Range<u64>) -> Track {
+    fn moving(seconds: std::ops::Range<u64>) -> RecentPoses {
         let mut track = track();
         for tenth in seconds.start * 10..seconds.end * 10 {
             let t = tenth as f64 / 10.0;
@@ -208,6 +216,9 @@ mod tests {
         assert_eq!(track.poses.len(), KEPT);
         let mut jump = moving(1..2);
         jump.take(&datagram(u64::MAX, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
-        assert!(jump.at(u64::MAX, SECOND).is_none());
+        assert!(jump.at(u64::MAX, SECOND).is_none() && jump.poses.len() == 1);
+        // And back: one wrong stamp does not end it.
+        jump.take(&datagram(2 * SECOND, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        assert_eq!((jump.poses.len(), jump.counts.late), (1, 0));
     }
 }

@@ -18,7 +18,7 @@ use crate::console::warn;
 const POLL: Duration = Duration::from_secs(1);
 
 /// A pair of sweeps, kept to be written.
-pub struct KeptPair {
+pub struct RecordedPair {
     first: LiveSweep,
     columns: Vec<ColumnFlow>,
     returns: Vec<ReturnFlow>,
@@ -35,10 +35,10 @@ struct Rest {
     foreground_dropped: usize,
 }
 
-impl KeptPair {
+impl RecordedPair {
     /// Room for a pair.
-    pub fn of(sensor: &LiveSensor, profile: &Profile) -> KeptPair {
-        KeptPair {
+    pub fn of(sensor: &LiveSensor, profile: &Profile) -> RecordedPair {
+        RecordedPair {
             first: LiveSweep::of(sensor),
             columns: Vec::with_capacity(profile.columns().min(SOLID_MAX)),
             returns: Vec::with_capacity(profile.returns()),
@@ -82,7 +82,7 @@ impl KeptPair {
 
 /// What came of recording.
 #[derive(Debug, Default)]
-pub struct Recorded {
+pub struct RecordingOutcome {
     /// Pairs that were written.
     pub pairs: u64,
     /// Why no more were.
@@ -90,8 +90,12 @@ pub struct Recorded {
 }
 
 /// Writes pairs until no more come. A failure, as of a full disk, ends the recording alone.
-pub fn record(sink: BagSink, pairs: &Handover<KeptPair>, mut spare: KeptPair) -> Recorded {
-    let (mut recorded, mut sink) = (Recorded::default(), Some(sink));
+pub fn record(
+    sink: BagSink,
+    pairs: &Handover<RecordedPair>,
+    mut spare: RecordedPair,
+) -> RecordingOutcome {
+    let (mut recorded, mut sink) = (RecordingOutcome::default(), Some(sink));
     loop {
         match pairs.fetch(&mut spare, POLL) {
             Fetched::Value => {
@@ -114,7 +118,7 @@ pub fn record(sink: BagSink, pairs: &Handover<KeptPair>, mut spare: KeptPair) ->
     recorded
 }
 
-fn fail(recorded: &mut Recorded, error: Error) {
+fn fail(recorded: &mut RecordingOutcome, error: Error) {
     warn(&format!("{error}: nothing is recorded any more"));
     recorded.failure = Some(error);
 }

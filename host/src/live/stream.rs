@@ -14,9 +14,13 @@
 //!
 //! | kind | bytes | record |
 //! |---|--:|---|
-//! | sweep | 88 | f64 x, y, z, quaternion x, y, z, w of the vehicle in the world; f32 time since the sweep before, s (0: no flow), latency from the last packet, ms; u64 sweeps left out so far; u32 columns, tracklets that were sent; u64 stamp of the sweep before, ns |
+//! | sweep | 88 | f64 x, y, z and quaternion x, y, z, w of the vehicle in the world; then 1. |
 //! | column | 32 | f32 x, y, velocity x, y over ground, its covariance xx, xy, yy, P(moves) |
-//! | tracklet | 32 | f32 x, y, velocity x, y over ground, turn rate; u32 observations; f32 standard deviation of the speed, P(moves) |
+//! | tracklet | 32 | f32 x, y, velocity x, y over ground, turn rate; then 2. |
+//!
+//! 1. f32 time since the sweep before, s (0: no flow), latency from the last packet, ms; u64 sweeps
+//!    left out so far; u32 columns, u32 tracklets that were sent; u64 stamp of the sweep before, ns
+//! 2. u32 observations; f32 standard deviation of the speed, P(moves)
 //!
 //! Columns are those that move in the sweep before, tracklets those that move in the sweep; m, m/s,
 //! rad/s along the vehicle's axes. For every sweep there is a datagram of kind 0, after the others.
@@ -84,8 +88,8 @@ impl FlowStream {
             let socket = UdpSocket::bind(any)?;
             socket.set_nonblocking(true).map(|()| socket)
         };
-        let socket = open()
-            .map_err(|e: std::io::Error| Error::Usage(format!("--send {to}: {e}")))?;
+        let socket =
+            open().map_err(|e: std::io::Error| Error::Usage(format!("--send {to}: {e}")))?;
         Ok(FlowStream { socket, to, datagram: heapless::Vec::new(), unsent: 0 })
     }
 
@@ -232,8 +236,7 @@ mod tests {
             stream.columns(&sweeps[0], columns.iter()),
             stream.tracklets(&sweeps[1], std::iter::once(tracklet)),
         ];
-        let facts =
-            SweepFacts { dt_s: 0.1, latency_ms: 12.5, left_out: 3, sent, before_ns: 108 };
+        let facts = SweepFacts { dt_s: 0.1, latency_ms: 12.5, left_out: 3, sent, before_ns: 108 };
         stream.sweep(&sweeps[1], &facts);
         let mut got = Vec::new();
         for _ in 0..4 {
@@ -247,7 +250,10 @@ mod tests {
         let heads: Vec<_> = got.iter().map(|d| [4, 6, 8, 10].map(|at| word(d, at))).collect();
         assert_eq!(heads, [[0, 1, 0, 1], [1, 40, 0, 2], [1, 1, 1, 2], [2, 1, 0, 1]]);
         assert_eq!(got.iter().map(Vec::len).collect::<Vec<_>>(), [24 + 88, 24 + 40 * 32, 56, 56]);
-        assert_eq!([&got[0], &got[1], &got[3]].map(|d| (d[12], d[16])), [(9, 109), (8, 108), (9, 109)]);
+        assert_eq!(
+            [&got[0], &got[1], &got[3]].map(|d| (d[12], d[16])),
+            [(9, 109), (8, 108), (9, 109)]
+        );
         assert_eq!(f64::from_le_bytes(got[0][24..32].try_into().unwrap()), 1.0);
         assert_eq!((float(&got[0], 80), float(&got[0], 84)), (0.1, 12.5));
         assert_eq!((got[0][88], got[0][96], got[0][100], got[0][104]), (3, 41, 1, 108));

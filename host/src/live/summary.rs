@@ -73,6 +73,12 @@ impl LiveStatistics {
         let reset = output.reset.is_some_and(|reset| reset != Reset::First);
         counts.resets += u64::from(reset);
     }
+
+    /// Counts the latency of a sweep that may take so long.
+    pub fn latency(&mut self, ms: f64, deadline_ms: f64) {
+        self.latencies.add(ms);
+        self.counts.late += u64::from(ms > deadline_ms);
+    }
 }
 
 /// What a run was and what came of it.

@@ -13,13 +13,12 @@ use sd_notify::NotifyState;
 use super::handover::{Fetched, Handover};
 use super::locating::{LiveLocator, LocatedCounts};
 use super::receiver::Receiver;
-use super::recorder::KeptPair;
+use super::recorder::RecordedPair;
 use super::stream::{FlowStream, SentSweep, SweepFacts};
 use super::summary::{LiveStatistics, LiveSummary};
 use crate::console::{interrupted, say, warn};
 use crate::drive::Drive;
 use crate::error::RunError;
-use crate::laps::milliseconds;
 use crate::team;
 
 /// How often is asked whether it is over, where no sweep comes.
@@ -40,7 +39,7 @@ pub struct Worker<'a> {
     pub locator: LiveLocator<'a>,
     pub stream: Option<FlowStream>,
     /// Where pairs go that are recorded, and the next one.
-    pub recording: Option<(&'a Handover<KeptPair>, KeptPair)>,
+    pub recording: Option<(&'a Handover<RecordedPair>, RecordedPair)>,
     /// Whether results are digested.
     pub digests: bool,
     pub quiet: bool,
@@ -49,7 +48,7 @@ pub struct Worker<'a> {
 }
 
 /// A run that has ended.
-pub struct Ended {
+pub struct LiveEnd {
     statistics: LiveStatistics,
     drive: Drive,
     located: LocatedCounts,
@@ -60,7 +59,7 @@ pub struct Ended {
 }
 
 /// A run under way.
-struct Running<'a> {
+struct LiveRun<'a> {
     worker: Worker<'a>,
     statistics: LiveStatistics,
     now: LiveSweep,
@@ -73,6 +72,23 @@ struct Running<'a> {
 }
 
 impl Worker<'_> {
+    /// Sends what moves in a sweep, and the sweep.
+    fn send(&mut self, sweep: &LiveSweep, mut facts: SweepFacts) {
+        let Some(stream) = &mut self.stream else { return };
+        let moves_min = self.profile.moves.moves_min;
+        let moving = self.drive.tracklets().filter(|t| t.probability >= moves_min);
+        let sweep = sent_sweep(sweep);
+        facts.sent[1] = stream.tracklets(&sweep, moving);
+        stream.sweep(&sweep, &facts);
+    }
+
+    /// Hands on a pair whose flow is kept, for another sweep of no meaning in place of its first.
+    fn record(&mut self, first: &mut LiveSweep) {
+        let Some((pairs, kept)) = &mut self.recording else { return };
+        kept.take_first(first);
+        pairs.put(kept);
+    }
+
     /// Works on sweeps until a signal, the last one, or so many. `spare` is of no meaning.
     ///
     /// # Errors
@@ -82,9 +98,9 @@ impl Worker<'_> {
         receiver: &Receiver,
         sweeps: &Handover<LiveSweep>,
         spare: LiveSweep,
-    ) -> Result<Ended, RunError> {
+    ) -> Result<LiveEnd, RunError> {
         let (digests, times, most) = (self.digests, [self.turn, self.deadline], self.most);
-        let mut running = Running {
+        let mut running = LiveRun {
             statistics: LiveStatistics::new(),
             now: LiveSweep::of(receiver.sensor()),
             last: spare,
@@ -122,14 +138,17 @@ impl Worker<'_> {
             }
         }
         let _ = sd_notify::notify(&[NotifyState::Stopping]);
-        let Running { worker, statistics, frames, .. } = running;
+        let LiveRun { worker, mut statistics, frames, .. } = running;
+        let counts = &mut statistics.counts;
+        counts.unsent_datagrams = worker.stream.as_ref().map_or(0, FlowStream::unsent);
+        counts.unrecorded = worker.recording.as_ref().map_or(0, |(pairs, _)| pairs.replaced());
         let (located, drive) = (worker.locator.counts(), worker.drive);
         let seconds = began.elapsed().as_secs_f64();
-        Ok(Ended { statistics, drive, located, frames, digests, seconds, times })
+        Ok(LiveEnd { statistics, drive, located, frames, digests, seconds, times })
     }
 }
 
-impl Running<'_> {
+impl LiveRun<'_> {
     /// One sweep. Memory allocated in it is a defect that is counted, and told once: a vehicle goes
     /// on.
     fn take(&mut self, sweeps: &Handover<LiveSweep>) -> Result<(), RunError> {
@@ -150,7 +169,7 @@ impl Running<'_> {
 
     /// One sweep, from its returns to what is sent.
     fn sweep(&mut self) -> Result<(), RunError> {
-        let Running { worker, statistics, now, last, paired, frames, .. } = self;
+        let LiveRun { worker, statistics, now, last, paired, frames, .. } = self;
         let turn_ns = worker.turn.as_nanos() as u64;
         let counts = &mut statistics.counts;
         counts.incomplete += u64::from(now.lost_packets > 0);
@@ -162,7 +181,7 @@ impl Running<'_> {
         let stepped = worker.drive.step(&now.data.sweep(), before)?;
         let output = &stepped.output;
         statistics.sweep(output);
-        let mut sent = [0; 2];
+        let (mut sent, mut aside) = ([0; 2], Duration::ZERO);
         if let Some(flows) = &output.flows {
             let moves = |column: &&ColumnFlow| column.velocity_world_mps != [0.0; 2];
             let columns = flows.columns.iter().filter(moves);
@@ -170,6 +189,8 @@ impl Running<'_> {
             if let Some(stream) = &mut worker.stream {
                 sent[0] = stream.columns(&sent_sweep(last), columns);
             }
+            // What nobody waits for, done now as the next borrow of the drive ends the flow.
+            let clock = Instant::now();
             if let Some((_, kept)) = &mut worker.recording {
                 kept.keep(flows);
             }
@@ -177,37 +198,27 @@ impl Running<'_> {
                 flows.columns.iter().for_each(|c| statistics.digest.column(c));
                 flows.points.iter().for_each(|p| statistics.digest.point(&p));
             }
+            aside = clock.elapsed();
         }
         let dt_s = output.flows.map(|flows| flows.dt_s);
-        if let Some(stream) = &mut worker.stream {
-            let moves_min = worker.profile.moves.moves_min;
-            let moving = worker.drive.tracklets().filter(|t| t.probability >= moves_min);
-            let sweep = sent_sweep(now);
-            sent[1] = stream.tracklets(&sweep, moving);
-            let facts = SweepFacts {
-                dt_s: dt_s.unwrap_or(0.0),
-                latency_ms: milliseconds(now.arrived),
-                left_out: statistics.counts.left_out,
-                sent,
-                before_ns: last.stamp_ns,
-            };
-            stream.sweep(&sweep, &facts);
-            statistics.counts.unsent_datagrams = stream.unsent();
-        }
+        let facts = SweepFacts {
+            dt_s: dt_s.unwrap_or(0.0),
+            latency_ms: latency_ms(now, aside),
+            left_out: statistics.counts.left_out,
+            sent,
+            before_ns: last.stamp_ns,
+        };
+        worker.send(now, facts);
         // With the first pair the run has started: registration tries several motions there.
         if statistics.counts.pairs > 1 {
-            let latency_ms = milliseconds(now.arrived);
-            statistics.latencies.add(latency_ms);
-            let late = latency_ms > worker.deadline.as_secs_f64() * 1e3;
-            statistics.counts.late += u64::from(late);
+            let deadline_ms = worker.deadline.as_secs_f64() * 1e3;
+            statistics.latency(latency_ms(now, aside), deadline_ms);
         }
         if worker.digests {
             worker.drive.tracklets().for_each(|t| statistics.digest.tracklet(&t));
         }
-        if let Some((pairs, kept)) = worker.recording.as_mut().filter(|_| dt_s.is_some()) {
-            kept.take_first(last);
-            pairs.put(kept);
-            statistics.counts.unrecorded = pairs.replaced();
+        if dt_s.is_some() {
+            worker.record(last);
         }
         let frame = now.data.frame;
         *frames = Some(frames.map_or([frame; 2], |[first, _]| [first, frame]));
@@ -239,12 +250,17 @@ impl Running<'_> {
     }
 }
 
+/// Since a sweep's last packet came, ms, but for what was done aside.
+fn latency_ms(sweep: &LiveSweep, aside: Duration) -> f64 {
+    sweep.arrived.elapsed().saturating_sub(aside).as_secs_f64() * 1e3
+}
+
 fn sent_sweep(sweep: &LiveSweep) -> SentSweep {
     let LiveSweep { data, stamp_ns, .. } = sweep;
     SentSweep { number: data.frame, stamp_ns: *stamp_ns, pose: data.world_from_vehicle }
 }
 
-impl Ended {
+impl LiveEnd {
     /// What it was and what came of it; poses and recording apart.
     pub fn summary(&self, profile: &Profile, receiver: &Receiver) -> LiveSummary {
         let (drive, state) = (&self.drive, receiver.state());

@@ -65,7 +65,8 @@ impl Files {
         }
         let png = folder.as_ref().filter(|_| args.png).map(|out| out.join("png"));
         let pictures = Pictures::create(&PictureFiles::of(&args.views, png), &of.name, sweeps)?;
-        let bag = BagSink::create(&args.streams.sinks(Pace::Recorded), of.epoch_ns, Content::Objects)?;
+        let bag =
+            BagSink::create(&args.streams.sinks(Pace::Recorded), of.epoch_ns, Content::Objects)?;
         await_viewer(args.quiet, bag.as_ref())?;
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
     }

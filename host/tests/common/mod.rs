@@ -76,6 +76,18 @@ pub fn weights(kind: &str, shape: &[usize], value: impl Fn(usize) -> &'static st
     format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()))
 }
 
+/// The layer that lets calls of Vulkan fail, where cargo has put it: beside the test.
+#[allow(dead_code)]
+pub fn faulty_layer() -> PathBuf {
+    let folder = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
+    let name = format!(
+        "{}raywake_faulty_layer{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    );
+    folder.join(name)
+}
+
 /// What a process left behind.
 pub struct Outcome {
     pub code: Option<i32>,

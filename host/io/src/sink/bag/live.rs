@@ -9,8 +9,8 @@ use foxglove::{
     ChannelBuilder, Context, PartialMetadata, RawChannel, WebSocketServer, WebSocketServerHandle,
 };
 
-use super::Topic;
 use super::super::streams::Pace;
+use super::Topic;
 use crate::Error;
 
 /// The longest wait for the time of a message, s: where times of a recording jump, it goes on.

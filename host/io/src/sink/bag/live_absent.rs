@@ -2,8 +2,8 @@
 
 use std::net::SocketAddr;
 
-use super::Topic;
 use super::super::streams::Pace;
+use super::Topic;
 use crate::Error;
 
 /// No server.

@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Prints what `raywake live --send 127.0.0.1:9000` sends.
+
+A datagram, little-endian, is a head and records of one kind. The head: `RWF1`, the kind (u16), how
+many records follow, the number of this datagram and how many there are of its kind (u16 each), the
+sweep's number (u32) and its stamp (u64, ns since 1970). Places, in m, and velocities over ground,
+in m/s, are along the vehicle's axes at that sweep. Kinds:
+
+0 sweep, after all else of it: x, y, z and quaternion x, y, z, w of the vehicle in the world (f64);
+  time since the sweep before, s, and latency from the last packet, ms (f32); sweeps left out so far
+  (u64); columns and tracklets that were sent (u32); stamp of the sweep before, ns (u64)
+1 column that moves in the sweep before: x, y, velocity x, y, covariance xx, xy, yy, P(moves) (f32)
+2 tracklet that moves: x, y, velocity x, y, turn rate, rad/s (f32); observations (u32); standard
+  deviation of the speed, P(moves) (f32)
+"""
+
+import socket
+import struct
+import sys
+
+HEAD = struct.Struct("<4s4HIQ")
+RECORDS = {0: struct.Struct("<7d2fQ2IQ"), 1: struct.Struct("<8f"), 2: struct.Struct("<5fI2f")}
+
+
+def main(port: int) -> None:
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", port))
+    fastest = 0.0
+    while True:
+        datagram = receiver.recv(2048)
+        magic, kind, count, _part, _parts, sweep, _stamp = HEAD.unpack_from(datagram)
+        assert magic == b"RWF1", magic
+        record = RECORDS[kind]
+        assert len(datagram) == HEAD.size + count * record.size
+        for values in record.iter_unpack(datagram[HEAD.size :]):
+            if kind == 2:
+                fastest = max(fastest, (values[2] ** 2 + values[3] ** 2) ** 0.5)
+            elif kind == 0:
+                latency, left_out, columns, tracklets = values[8:12]
+                print(
+                    f"sweep {sweep}: {columns} columns and {tracklets} tracklets move, up to "
+                    f"{fastest:.1f} m/s; {latency:.1f} ms, {left_out} left out",
+                    flush=True,
+                )
+                fastest = 0.0
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 9000)

@@ -1,0 +1,334 @@
+//! Packets as they come: from a capture, or from a sensor that is made up.
+
+#![cfg(unix)]
+
+#[allow(dead_code)]
+mod common;
+
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::net::{SocketAddr, UdpSocket};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use common::{BACKEND, Outcome, SMALL, Temp};
+use raywake_sim::packets::{OusterPackets, begin_capture, capture};
+use raywake_sim::{Drive, Options, Sensor, SensorRig};
+use serde_json::Value;
+
+/// Turns of a capture; it begins within the first one.
+const TURNS: usize = 24;
+/// Those that are whole, and of which another packet shows that they are.
+const WHOLE: u64 = TURNS as u64 - 2;
+
+/// A capture of a small sensor in a street.
+fn recorded(t: &Temp) -> PathBuf {
+    let mut sensor = Sensor { columns: 512, ..Sensor::os1_128() };
+    let beams = sensor.beams.iter().step_by(4).copied().collect();
+    sensor.beams = beams;
+    let rig = SensorRig::single(sensor.clone(), 1.9);
+    let drive = Drive::new(3, Options { sweeps: TURNS, rig, ..Options::default() });
+    let packets = OusterPackets::of(&sensor);
+    t.write("street.json", packets.metadata());
+    let path = t.path().join("street.pcap");
+    let mut out = BufWriter::new(File::create(&path).unwrap());
+    begin_capture(&mut out).unwrap();
+    for (number, sweep) in drive.enumerate() {
+        let turn = packets.turn(number, &sweep.points);
+        let from = if number == 0 { turn.len() / 2 } else { 0 };
+        turn[from..].iter().for_each(|(ns, packet)| capture(&mut out, *ns, packet).unwrap());
+    }
+    out.into_inner().unwrap();
+    path
+}
+
+/// `raywake live` on a small window, its figures to `s.json`.
+fn live(t: &Temp, more: &[&str]) -> Command {
+    let (config, json) = (t.write("small.toml", SMALL), t.path().join("s.json"));
+    let mut command = common::command(&["live", "--config", config.to_str().unwrap()]);
+    command.args(["--summary", json.to_str().unwrap()]).args(more);
+    command
+}
+
+/// What came of a replay.
+fn replayed(t: &Temp, more: &[&str]) -> (Outcome, Value) {
+    let path = t.path().join("street.pcap");
+    let mut command = live(t, &["--replay", path.to_str().unwrap()]);
+    let o = Outcome::of(command.args(more).output().unwrap());
+    o.succeeded();
+    let summary = o.summary(&t.path().join("s.json"));
+    (o, summary)
+}
+
+fn count(summary: &Value, group: &str, name: &str) -> u64 {
+    summary[group][name].as_u64().unwrap_or_else(|| panic!("{group}.{name} of {summary}"))
+}
+
+/// Every packet and every sweep is accounted for, and nothing was allocated.
+fn accounted(summary: &Value) {
+    assert_eq!(count(summary, "sweeps", "allocating"), 0, "{summary}");
+    assert_eq!(count(summary, "packets", "packets"), (TURNS * 32 - 16) as u64, "{summary}");
+    assert_eq!(summary["overflowed"].as_u64().unwrap_or(0), 0, "{summary}");
+    let all = ["done", "left_out", "before_start"].map(|name| count(summary, "sweeps", name));
+    // The sweep that the rig is learned from comes first.
+    assert_eq!(all.iter().sum::<u64>(), WHOLE - 1, "{summary}");
+}
+
+fn socket() -> (UdpSocket, String) {
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+    let address = socket.local_addr().unwrap().to_string();
+    (socket, address)
+}
+
+/// Kinds of datagrams that arrived, and records in them, until none come any more.
+fn received(socket: &UdpSocket) -> [u64; 3] {
+    let (mut records, mut datagram) = ([0; 3], [0; 2000]);
+    while let Ok(length) = socket.recv(&mut datagram) {
+        assert!(datagram.starts_with(b"RWF1") && length > 24);
+        records[datagram[4] as usize] += u64::from(datagram[6]);
+    }
+    records
+}
+
+/// Live the same bits come out as of the capture. Messages are recorded, datagrams sent.
+#[test]
+fn a_replay_has_the_digest_of_the_capture() {
+    let t = Temp::new();
+    let (path, mcap) = (recorded(&t), t.path().join("street.mcap"));
+    let (socket, address) = socket();
+    let listening = thread::spawn(move || {
+        socket.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        let mut datagram = [0; 2000];
+        socket.peek(&mut datagram).unwrap();
+        socket.set_read_timeout(Some(Duration::from_secs(2))).unwrap();
+        received(&socket)
+    });
+    let to = ["--mcap", mcap.to_str().unwrap(), "--send", &address];
+    let (o, s) = replayed(&t, &[&BACKEND[..], &to].concat());
+    accounted(&s);
+    assert!(o.stdout.contains("simulated OS1-128 at 127.0.0.1:"), "{}", o.stdout);
+    let [sweeps, columns, tracklets] = listening.join().unwrap();
+    let (done, pairs) = (count(&s, "sweeps", "done"), count(&s, "sweeps", "pairs"));
+    assert_eq!((sweeps, columns), (done, count(&s, "sweeps", "moving_columns")));
+    assert!(columns > 100 && tracklets > 0, "{columns} {tracklets}");
+    let kept = ["recorded", "unrecorded"].map(|name| count(&s, "sweeps", name));
+    assert_eq!(kept.iter().sum::<u64>(), pairs);
+    assert!(s["latency_ms"]["median"].as_f64() > Some(0.0) && s["turn_ms"] == 100.0);
+    let read = common::raywake(&["run", mcap.to_str().unwrap(), "-n", "2", "--backend", "scalar"]);
+    read.succeeded();
+    // On a machine that is too busy some were left out: then there is nothing to compare.
+    let frames = [0, 1].map(|n| s["frames"][n].as_u64().unwrap());
+    if count(&s, "sweeps", "left_out") > 0 {
+        eprintln!("not compared: sweeps were left out");
+        return;
+    }
+    let (config, json) = (t.path().join("small.toml"), t.path().join("run.json"));
+    let sweeps = format!("{}..{}", frames[0], frames[1] + 1);
+    let run = ["run", path.to_str().unwrap(), "--config", config.to_str().unwrap()];
+    let part = ["--sweeps", &sweeps, "--summary", json.to_str().unwrap()];
+    let o = common::raywake(&[&run[..], &BACKEND, &part].concat());
+    o.succeeded();
+    assert_eq!(o.summary(&json)["digest"], s["digest"]);
+}
+
+/// With all cores busy, and ten times as fast: the queue stays bounded, and all is counted.
+#[test]
+fn more_than_it_can_do() {
+    let t = Temp::new();
+    recorded(&t);
+    let busy: Vec<Child> = (0..thread::available_parallelism().map_or(1, usize::from))
+        .map(|_| Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap())
+        .collect();
+    let (_, s) = replayed(&t, &[&BACKEND[..], &["--speed", "10", "--deadline", "5"]].concat());
+    for mut child in busy {
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    accounted(&s);
+    assert!(count(&s, "sweeps", "left_out") + count(&s, "sweeps", "before_start") > 0, "{s}");
+    assert!(count(&s, "sweeps", "done") > 0 && s["deadline_ms"] == 5.0);
+}
+
+/// Poses that come as datagrams, before the sweeps of their times do.
+#[test]
+fn poses_that_come() {
+    let t = Temp::new();
+    recorded(&t);
+    let place = |s: f64| [2.0 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let send = move |to: SocketAddr| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for n in 0..300_u64 {
+            let numbers = place(n as f64 * 0.01);
+            let stamp = 1_700_000_000_000_000_000 + n * 10_000_000;
+            let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
+            let bytes = b"RWP1\0\0\0\0".iter().copied().chain(stamp.to_le_bytes()).chain(numbers);
+            socket.send_to(&bytes.collect::<Vec<u8>>(), to).unwrap();
+            thread::sleep(Duration::from_micros(200));
+        }
+        socket.send_to(b"no pose", to).unwrap();
+    };
+    // A port that was free a moment ago.
+    let (free, address) = socket();
+    let to = free.local_addr().unwrap();
+    drop(free);
+    let sending = thread::spawn(move || {
+        thread::sleep(Duration::from_millis(100));
+        send(to);
+    });
+    let (_, s) = replayed(&t, &[&BACKEND[..], &["--poses-from", &address]].concat());
+    sending.join().unwrap();
+    accounted(&s);
+    assert_eq!(s["located"]["registered"], 0);
+    let done = count(&s, "sweeps", "done");
+    assert_eq!(count(&s, "located", "by_poses"), done);
+    assert_eq!((count(&s, "poses", "poses"), count(&s, "poses", "foreign")), (300, 1));
+}
+
+/// A device that is lost, or does not answer, in the fourth sweep.
+#[test]
+fn a_device_that_fails() {
+    let t = Temp::new();
+    recorded(&t);
+    let library = common::faulty_layer();
+    let path = t.path().join("street.pcap");
+    for (result, told) in [(-4, "device lost during"), (2, "no end of `flow` within 500ms")] {
+        let more = ["--backend", "vulkan", "--deadline", "50", "--replay"];
+        let mut command = live(&t, &[&more[..], &[path.to_str().unwrap()]].concat());
+        command.envs(raywake_faulty_layer::environment(t.path(), &library).unwrap());
+        command.env(raywake_faulty_layer::FAULT, format!("vkWaitForFences 6 {result}"));
+        let o = Outcome::of(command.output().unwrap());
+        if o.code == Some(5) && o.stderr.contains("Vulkan") {
+            eprintln!("skipped: {}", o.stderr);
+            return;
+        }
+        o.succeeded();
+        assert!(o.stderr.contains("going on with the scalar backend"), "{}", o.stderr);
+        let s = o.summary(&t.path().join("s.json"));
+        assert!(s["device_failure"].as_str().unwrap().contains(told), "{s}");
+        assert_eq!(s["backend"], "vulkan");
+        accounted(&s);
+    }
+}
+
+/// A disk that is full ends the recording, not the run.
+#[test]
+fn a_full_disk() {
+    let t = Temp::new();
+    let path = recorded(&t);
+    let arguments = live(&t, &[&BACKEND[..], &["--replay", path.to_str().unwrap()]].concat());
+    let arguments: Vec<_> = arguments.get_args().map(|a| a.to_str().unwrap().to_owned()).collect();
+    let mcap = t.path().join("street.mcap");
+    let line = format!(
+        "trap '' XFSZ; ulimit -f 400; exec {} {} --mcap {}",
+        env!("CARGO_BIN_EXE_raywake"),
+        arguments.join(" "),
+        mcap.display()
+    );
+    let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+    o.failed(4, &["street.mcap", "nothing is recorded any more"]);
+    let s = o.summary(&t.path().join("s.json"));
+    accounted(&s);
+    assert!(s["recording_failure"].as_str().is_some() && !mcap.exists());
+    assert!(!fs::read_dir(t.path()).unwrap().any(|e| is_partial(&e.unwrap().path())));
+}
+
+fn is_partial(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "partial")
+}
+
+/// Datagrams of others, and a signal: it ends in order, before and after the first sweep.
+#[test]
+fn a_signal_ends_it() {
+    let t = Temp::new();
+    let (free, address) = socket();
+    drop(free);
+    let notified = t.path().join("notify");
+    let watcher = UnixDatagram::bind(&notified).unwrap();
+    watcher.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    let listen = ["--listen", &address, "--model", "vlp16", "--ground=-1.9"];
+    for sweeps in [false, true] {
+        let mut command = live(&t, &[&BACKEND[..], &listen].concat());
+        command.env("NOTIFY_SOCKET", &notified).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = command.spawn().unwrap();
+        let told = || {
+            let mut text = [0; 64];
+            let length = watcher.recv(&mut text).unwrap();
+            String::from_utf8_lossy(&text[..length]).trim().to_owned()
+        };
+        let sensor = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let since = Instant::now();
+        if sweeps {
+            let mut n = 0;
+            watcher.set_nonblocking(true).unwrap();
+            while watcher.recv(&mut [0; 64]).is_err() {
+                let _ = sensor.send_to(&vlp16(n), &address);
+                n += 1;
+                thread::sleep(Duration::from_micros(300));
+                assert!(since.elapsed() < Duration::from_secs(60));
+            }
+            watcher.set_nonblocking(false).unwrap();
+        } else {
+            for _ in 0..50 {
+                let _ = sensor.send_to(b"something else", &address);
+                thread::sleep(Duration::from_millis(10));
+            }
+        }
+        let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        let o = Outcome::of(child.wait_with_output().unwrap());
+        o.succeeded();
+        if sweeps {
+            assert_eq!(told(), "STOPPING=1");
+            let s = o.summary(&t.path().join("s.json"));
+            assert!(s["sender"] == "127.0.0.1" && count(&s, "packets", "foreign") == 0, "{s}");
+        } else {
+            assert!(o.stdout.contains("no whole sweep arrived"), "{}", o.stdout);
+        }
+    }
+}
+
+/// A packet of a VLP-16 that sees something 10 m away all around; `n` counts packets, 75 a turn.
+fn vlp16(n: u32) -> Vec<u8> {
+    let block = |block: u32| {
+        let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
+        let seen = [0x88, 0x13, 51].repeat(32);
+        [&[0xff, 0xee][..], &azimuth.to_le_bytes(), &seen].concat()
+    };
+    let blocks: Vec<u8> = (0..12).flat_map(block).collect();
+    [&blocks[..], &(n * 1327).to_le_bytes(), &[0x37, 0x22]].concat()
+}
+
+#[test]
+fn what_does_not_fit_together() {
+    let t = Temp::new();
+    let wrong = |more: &[&str], code: i32, words: &[&str]| {
+        let mut command = live(&t, more);
+        let mut child = command.stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let since = Instant::now();
+        // What is taken for right would listen for ever.
+        while child.try_wait().unwrap().is_none() {
+            thread::sleep(Duration::from_millis(5));
+            if since.elapsed() > Duration::from_secs(30) {
+                child.kill().unwrap();
+            }
+        }
+        Outcome::of(child.wait_with_output().unwrap()).failed(code, words);
+    };
+    wrong(&[], 2, &["--model"]);
+    wrong(&["--model", "hdl99"], 2, &["vlp16", "ouster"]);
+    wrong(&["--model", "ouster"], 2, &["--metadata"]);
+    wrong(&["--model", "vlp16", "--metadata", "x.json"], 2, &["Ouster"]);
+    wrong(&["--model", "vlp16", "--speed", "2"], 2, &["--replay"]);
+    wrong(&["--model", "vlp16", "--listen", "here"], 2, &["ADDRESS:PORT"]);
+    wrong(&["--model", "vlp16", "--listen", "203.0.113.1:9"], 2, &["--listen 203.0.113.1:9"]);
+    wrong(&["--replay", "no.pcap"], 3, &["no.pcap"]);
+    let (_held, address) = socket();
+    wrong(&["--model", "vlp16", "--listen", &address], 2, &["--listen", "in use"]);
+    let capture = recorded(&t).display().to_string();
+    let onto = ["--replay", &capture, "--mcap", &capture];
+    wrong(&onto, 2, &["is an input"]);
+}
