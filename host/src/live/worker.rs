@@ -134,7 +134,8 @@ impl Worker<'_> {
             }
             if status.elapsed() > STATUS {
                 status = Instant::now();
-                say(running.worker.quiet, &running.status(receiver, began))?;
+                // A log that cannot be written is no reason to stop.
+                let _ = say(running.worker.quiet, &running.status(receiver, began));
             }
         }
         let _ = sd_notify::notify(&[NotifyState::Stopping]);

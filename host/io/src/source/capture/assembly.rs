@@ -1,5 +1,6 @@
 //! Packets as they come, put together to sweeps. Nothing is allocated.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use super::firing::{Firing, TURN};
@@ -14,6 +15,8 @@ const STEP_MAX_NS: i64 = 10_000_000_000;
 const RECENT: usize = 64;
 /// Before the first of them.
 const NEVER: u64 = u64::MAX;
+/// Times of a turn that are believed, ns.
+const TURN_NS: Range<f64> = 1e7..1e9;
 /// Share of a new step in the time of a turn: it drifts by parts in a thousand.
 const TURN_SHARE: f64 = 0.125;
 
@@ -226,14 +229,17 @@ impl Assembler {
         let mut step_ns = self.sensor.0.since(firing.clock_ns, begun.firing.clock_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             self.counts.clock_set += 1;
-            step_ns = self.turn_ns.unwrap_or(1.0).clamp(1.0, STEP_MAX_NS as f64) as i64;
+            step_ns = self.turn_ns.unwrap_or(TURN_NS.start) as i64;
         }
         // A sweep may begin within a turn, where packets are missing.
         let within = (f64::from(firing.angle) - f64::from(begun.firing.angle)) / TURN as f64;
-        let turn_ns = self.turn_ns.unwrap_or(step_ns as f64);
+        let turn_ns = self.turn_ns.unwrap_or(step_ns as f64).clamp(TURN_NS.start, TURN_NS.end);
         let turns = (step_ns as f64 / turn_ns - within).round().max(1.0);
         let seen_ns = step_ns as f64 / (turns + within);
-        self.turn_ns = Some(turn_ns + TURN_SHARE * (seen_ns - turn_ns));
+        // Of a turn that lacks most of its packets nothing can be told.
+        let likely = (0.5..2.0).contains(&(seen_ns / turn_ns));
+        let share = if likely { TURN_SHARE } else { 0.0 };
+        self.turn_ns = Some(turn_ns + share * (seen_ns - turn_ns));
         let (stamp_ns, number) = (begun.stamp_ns + step_ns, begun.number + turns as u64);
         Begun { firing, stamp_ns, number }
     }
