@@ -124,12 +124,16 @@ fn a_capture_is_sent_again() {
     socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
     let to = socket.local_addr().unwrap();
     std::thread::scope(|scope| {
-        let sent = scope.spawn(|| replay.send(to, 50.0, || false).unwrap());
-        let mut datagram = [0; 2000];
-        for n in 0..230 {
-            let length = socket.recv(&mut datagram).unwrap();
-            assert_eq!(&datagram[..length], vlp16(n));
+        let sent = scope.spawn(|| replay.send(to, 5.0, || false).unwrap());
+        let (mut datagram, mut next) = ([0; 2000], 0);
+        // On a busy machine the system may throw some away.
+        while let Ok(length) = socket.recv(&mut datagram) {
+            let found = (next..230).find(|n| vlp16(*n) == datagram[..length]);
+            next = found.expect("a packet of the capture, after those before it") + 1;
+            let last = if next == 230 { 1 } else { 2000 };
+            socket.set_read_timeout(Some(Duration::from_millis(last))).unwrap();
         }
+        assert!(next > 100, "{next}");
         assert_eq!(sent.join().unwrap(), 230);
     });
     assert_eq!(replay.send(to, 1e9, || true).unwrap(), 1);
