@@ -80,6 +80,12 @@ impl Pose {
         self.rotation * p + self.translation
     }
 
+    /// A velocity along the world's axes, as it is along those of this pose; the plane's part.
+    pub fn along_axes(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let v = self.rotation.conjugate() * DVec3::new(x.into(), y.into(), 0.0);
+        [v.x as f32, v.y as f32]
+    }
+
     /// Heading of the x axis about +z, rad.
     pub fn yaw_rad(&self) -> f64 {
         let x = self.rotation * DVec3::X;

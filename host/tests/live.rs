@@ -15,7 +15,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use common::{BACKEND, Outcome, SMALL, Temp};
-use raywake_sim::packets::{OusterPackets, begin_capture, capture};
+use raywake_sim::packets::OusterPackets;
 use raywake_sim::{Drive, Options, Sensor, SensorRig};
 use serde_json::Value;
 
@@ -35,12 +35,7 @@ fn recorded(t: &Temp) -> PathBuf {
     t.write("street.json", packets.metadata());
     let path = t.path().join("street.pcap");
     let mut out = BufWriter::new(File::create(&path).unwrap());
-    begin_capture(&mut out).unwrap();
-    for (number, sweep) in drive.enumerate() {
-        let turn = packets.turn(number, &sweep.points);
-        let from = if number == 0 { turn.len() / 2 } else { 0 };
-        turn[from..].iter().for_each(|(ns, packet)| capture(&mut out, *ns, packet).unwrap());
-    }
+    packets.capture(&mut out, drive).unwrap();
     out.into_inner().unwrap();
     path
 }

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use clap::builder::BoolishValueParser;
 use raywake_io::Error;
+use raywake_io::source::OpenOptions;
 use raywake_io::source::capture::live::SensorModel;
-use raywake_io::source::{OpenOptions, Unlocated};
 
 use super::FlowChoice;
 use super::results::StreamArgs;
@@ -138,7 +138,6 @@ impl PlaceArgs {
             ground_m: self.ground,
             own_vehicle: self.own_vehicle,
             deskew: self.deskew,
-            unlocated: Unlocated::Always,
             ..OpenOptions::default()
         }
     }

@@ -126,7 +126,7 @@ impl RecentPoses {
             false => stamp_ns.saturating_add(sweep_ns),
         };
         let span_s = (until_ns - stamp_ns) as f64 * S_OF_NS;
-        let then = self.pose(until_ns).or_else(|| self.beyond(until_ns))?;
+        let then = self.pose(until_ns)?;
         (span_s > 0.0).then(|| (pose, (pose.inverse() * then).twist(span_s)))
     }
 

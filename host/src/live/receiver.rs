@@ -15,7 +15,7 @@ use socket2::SockRef;
 use super::handover::Handover;
 
 /// More than any datagram has, bytes.
-pub const DATAGRAM: usize = 1 << 16;
+const DATAGRAM: usize = 1 << 16;
 /// Bytes of packets that the system is asked to hold: two sweeps of the largest sensor (OS1-128,
 /// 2048 columns).
 const HELD: usize = 8 << 20;
@@ -116,8 +116,8 @@ impl Receiver {
         let held = self.held();
         (held < HELD).then(|| {
             format!(
-                "the system holds {held} bytes of packets, where {HELD} would bridge two sweeps: \
-                 sysctl net.core.rmem_max={HELD} allows them"
+                "the system holds {held} bytes of packets, {HELD} were asked for: sysctl \
+                 net.core.rmem_max={HELD} allows them"
             )
         })
     }

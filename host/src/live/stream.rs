@@ -27,7 +27,6 @@
 
 use std::net::{SocketAddr, UdpSocket};
 
-use glam::dvec3;
 use raywake_core::output::{ColumnFlow, TrackletState};
 use raywake_core::pose::Pose;
 use raywake_io::Error;
@@ -106,7 +105,7 @@ impl FlowStream {
     ) -> usize {
         self.all(RecordKind::Column, sweep, columns, |this, column| {
             this.floats(&column.position_vehicle_m);
-            this.floats(&along(&sweep.pose, column.velocity_world_mps));
+            this.floats(&sweep.pose.along_axes(column.velocity_world_mps));
             this.floats(&turned_covariance(&sweep.pose, column.covariance));
             this.floats(&[column.probability]);
         })
@@ -120,7 +119,7 @@ impl FlowStream {
     ) -> usize {
         self.all(RecordKind::Tracklet, sweep, tracklets, |this, tracklet| {
             this.floats(&tracklet.position_vehicle_m);
-            this.floats(&along(&sweep.pose, tracklet.velocity_world_mps));
+            this.floats(&sweep.pose.along_axes(tracklet.velocity_world_mps));
             this.floats(&[tracklet.turn_rate_radps]);
             this.bytes(&tracklet.age.to_le_bytes());
             this.floats(&[tracklet.covariance[3][3].max(0.0).sqrt(), tracklet.probability]);
@@ -186,12 +185,6 @@ impl FlowStream {
     fn floats(&mut self, numbers: &[f32]) {
         numbers.iter().for_each(|number| self.bytes(&number.to_le_bytes()));
     }
-}
-
-/// A velocity of the world along the vehicle's axes.
-fn along(pose: &Pose, [x, y]: [f32; 2]) -> [f32; 2] {
-    let v = pose.rotation.conjugate() * dvec3(x.into(), y.into(), 0.0);
-    [v.x as f32, v.y as f32]
 }
 
 /// A covariance (xx, xy, yy) of the world along the vehicle's axes, in the plane.

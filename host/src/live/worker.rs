@@ -67,8 +67,6 @@ struct LiveRun<'a> {
     last: LiveSweep,
     paired: bool,
     frames: Option<[u64; 2]>,
-    /// Sweeps that were left out before the start.
-    before_start: u64,
 }
 
 impl Worker<'_> {
@@ -106,10 +104,9 @@ impl Worker<'_> {
             last: spare,
             paired: false,
             frames: None,
-            before_start: sweeps.replaced(),
             worker: self,
         };
-        running.statistics.counts.before_start = running.before_start;
+        running.statistics.counts.before_start = sweeps.replaced();
         // Nobody may watch.
         let _ = sd_notify::notify(&[NotifyState::Ready]);
         let began = Instant::now();
@@ -153,8 +150,8 @@ impl LiveRun<'_> {
     /// One sweep. Memory allocated in it is a defect that is counted, and told once: a vehicle goes
     /// on.
     fn take(&mut self, sweeps: &Handover<LiveSweep>) -> Result<(), RunError> {
-        let left_out = sweeps.replaced() - self.before_start;
-        self.statistics.counts.left_out = left_out;
+        let counts = &mut self.statistics.counts;
+        counts.left_out = sweeps.replaced() - counts.before_start;
         match watch("live", || self.sweep()) {
             Err(RunError::Allocation(allocation)) => {
                 let counts = &mut self.statistics.counts;

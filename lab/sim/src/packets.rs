@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 use raywake_core::sweep::Point;
 
-use crate::Sensor;
+use crate::{Sensor, SimSweep};
 
 /// Columns of a packet.
 const PACKET_COLUMNS: usize = 16;
@@ -60,7 +60,7 @@ impl OusterPackets {
 
     /// The packets of a turn, each with its time, ns. Returns are those of a sweep of the sensor
     /// alone, in its frame, each measured at its own time.
-    pub fn turn(&self, number: usize, returns: &[Point]) -> Vec<(u64, Vec<u8>)> {
+    fn turn(&self, number: usize, returns: &[Point]) -> Vec<(u64, Vec<u8>)> {
         let columns = self.sensor.columns;
         let begins_ns = START_NS + number as u64 * self.column_ns(columns);
         let column_size = COLUMN_HEAD + self.sensor.beams.len() * MEASUREMENT;
@@ -97,6 +97,22 @@ impl OusterPackets {
         packets
     }
 
+    /// Writes a capture of some turns, a sweep each. It begins within the first one, as that of a
+    /// sensor that runs does.
+    pub fn capture(
+        &self,
+        out: &mut impl Write,
+        sweeps: impl Iterator<Item = SimSweep>,
+    ) -> io::Result<()> {
+        head(out)?;
+        for (number, sweep) in sweeps.enumerate() {
+            let turn = self.turn(number, &sweep.points);
+            let from = if number == 0 { turn.len() / 2 } else { 0 };
+            turn[from..].iter().try_for_each(|(ns, packet)| datagram(out, *ns, packet))?;
+        }
+        Ok(())
+    }
+
     /// The beam that is nearest to an elevation, rad.
     fn beam(&self, elevation: f64) -> usize {
         let off = |n: &usize| (self.sensor.beams[*n].elevation - elevation).abs();
@@ -105,14 +121,14 @@ impl OusterPackets {
     }
 }
 
-/// Begins a capture (libpcap, times in ns, frames of IPv4).
-pub fn begin_capture(out: &mut impl Write) -> io::Result<()> {
+/// The head of a capture (libpcap, times in ns, frames of IPv4).
+fn head(out: &mut impl Write) -> io::Result<()> {
     let head: [u32; 6] = [0xa1b2_3c4d, 0x0004_0002, 0, 0, 1 << 17, 101];
     head.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))
 }
 
 /// Adds a datagram of the sensor.
-pub fn capture(out: &mut impl Write, time_ns: u64, payload: &[u8]) -> io::Result<()> {
+fn datagram(out: &mut impl Write, time_ns: u64, payload: &[u8]) -> io::Result<()> {
     let (udp, all) = (8 + payload.len() as u16, 28 + payload.len() as u32);
     let time = [(time_ns / 1_000_000_000) as u32, (time_ns % 1_000_000_000) as u32];
     let head = [time[0], time[1], all, all];

@@ -4,7 +4,7 @@ use super::sceneries;
 use raywake::progress::Progress;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_sim::packets::{OusterPackets, begin_capture, capture};
+use raywake_sim::packets::OusterPackets;
 use raywake_sim::{Drive, Options, Scenery, Sensor, SensorRig};
 use std::io::Write;
 use std::path::PathBuf;
@@ -47,15 +47,9 @@ pub fn packets(args: &PacketsArgs) -> Result<(), Error> {
     let json = args.out.with_extension("json");
     atomic::write(&json, |out| out.write_all(metadata.as_bytes()))?;
     let mut progress = Progress::new("sweep", sweeps, false);
-    atomic::write(&args.out, |out| {
-        begin_capture(out)?;
-        for (number, sweep) in drive.enumerate() {
-            let turn = packets.turn(number, &sweep.points);
-            // It begins within a turn, as those of a sensor that runs do.
-            let from = if number == 0 { turn.len() / 2 } else { 0 };
-            turn[from..].iter().try_for_each(|(time_ns, packet)| capture(out, *time_ns, packet))?;
-            progress.update(number + 1);
-        }
-        Ok(())
-    })
+    let told = drive.enumerate().map(|(number, sweep)| {
+        progress.update(number + 1);
+        sweep
+    });
+    atomic::write(&args.out, |out| packets.capture(out, told))
 }

@@ -184,7 +184,7 @@ struct MovingColumn {
 impl MovingColumn {
     fn of(pose: &Pose, column: &ColumnFlow) -> Option<MovingColumn> {
         let moves = column.velocity_world_mps != [0.0; 2];
-        let velocity = along_vehicle(pose, column.velocity_world_mps);
+        let velocity = pose.along_axes(column.velocity_world_mps);
         moves.then_some(MovingColumn { at: column.position_vehicle_m, velocity })
     }
 }
@@ -197,12 +197,6 @@ fn transform(stamp_ns: u64, pose: &Pose) -> Vec<u8> {
     cdr.text(VEHICLE);
     cdr.pose(pose);
     cdr.message()
-}
-
-/// Velocity over ground along the vehicle's axes; the plane's part of it.
-fn along_vehicle(pose: &Pose, [x, y]: [f32; 2]) -> [f32; 2] {
-    let v = pose.rotation.conjugate() * glam::dvec3(x.into(), y.into(), 0.0);
-    [v.x as f32, v.y as f32]
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use raywake_core::output::{PairFlows, PointFlow};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
+use super::VEHICLE;
 use super::cdr::Cdr;
-use super::{VEHICLE, along_vehicle};
 use crate::source::SweepData;
 
 /// `FLOAT32`, `INT32` and `UINT8` of `sensor_msgs/PointField`.
@@ -58,7 +58,7 @@ pub(super) fn with_tracks(stamp_ns: u64, sweep: &SweepData, tracks: &[i32]) -> V
 /// As [`WITH_FLOW`] names them.
 fn flow_fields(pose: &Pose, point: &Point, flow: PointFlow) -> [[u8; 4]; WITH_FLOW.len()] {
     let [x, y, z] = point.position.map(f32::to_le_bytes);
-    let [vx, vy] = along_vehicle(pose, flow.velocity_world_mps);
+    let [vx, vy] = pose.along_axes(flow.velocity_world_mps);
     let [i, vx, vy, speed, p] =
         [point.intensity, vx, vy, vx.hypot(vy), flow.probability].map(f32::to_le_bytes);
     [x, y, z, i, vx, vy, speed, p, [flow.status as u8, 0, 0, 0]]

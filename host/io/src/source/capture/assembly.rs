@@ -201,7 +201,7 @@ impl Assembler {
         if self.last.is_none() {
             return;
         }
-        let stamp_ns = self.sensor.0.epoch_ns(firing.clock_ns, now_ns).0;
+        let stamp_ns = self.sensor.0.epoch_ns(firing.clock_ns, now_ns);
         let (begun, sweeps_before) = match self.begun.take() {
             None => {
                 self.epoch_ns = stamp_ns;

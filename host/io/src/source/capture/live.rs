@@ -63,11 +63,6 @@ impl LiveSensor {
         self.0.name()
     }
 
-    /// Whether a datagram is a packet of its.
-    pub fn is_mine(&self, datagram: &[u8]) -> bool {
-        self.0.is_mine(datagram)
-    }
-
     /// Returns of a turn at most.
     pub fn returns_max(&self) -> usize {
         self.0.returns_max()

@@ -107,7 +107,7 @@ impl Capture {
             let turns = libm::round(step as f64 / usual - within).max(1.0);
             frames.push(frames[frames.len() - 1] + turns as u64);
         }
-        *epoch_ns = self.sensor.epoch_ns(cuts[0].clock_ns, cuts[0].time_ns).0;
+        *epoch_ns = self.sensor.epoch_ns(cuts[0].clock_ns, cuts[0].time_ns);
     }
 
     fn locate(&mut self, options: &OpenOptions) -> Result<(), Error> {

@@ -113,9 +113,9 @@ impl Sensor {
         }
     }
 
-    /// A time of its clock, ns since 1970, of what arrived at `now_ns`, and whether its clock is
-    /// set: otherwise the time is that of the arrival.
-    pub fn epoch_ns(&self, clock_ns: u64, now_ns: u64) -> (u64, bool) {
+    /// A time of its clock, ns since 1970, of what arrived at `now_ns`: where its clock is not set,
+    /// the time of the arrival.
+    pub fn epoch_ns(&self, clock_ns: u64, now_ns: u64) -> u64 {
         let set = match self {
             Sensor::Ouster(_) => Some(clock_ns).filter(|ns| *ns >= EPOCH_MIN_NS),
             Sensor::Velodyne(_) => {
@@ -124,7 +124,7 @@ impl Sensor {
                 set.then(|| now_ns.wrapping_sub(since_ns as u64))
             }
         };
-        (set.unwrap_or(now_ns), set.is_some())
+        set.unwrap_or(now_ns)
     }
 
     /// From one time of its clock to another, ns.

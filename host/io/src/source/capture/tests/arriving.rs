@@ -58,12 +58,7 @@ fn the_same_sweeps_as_those_of_a_capture() {
 
 #[test]
 fn disorder_is_counted() {
-    let mut packets = turns(0..750);
-    packets.drain(475..575);
-    packets.drain(285..390);
-    packets.insert(121, packets[120].clone());
-    packets.swap(200, 201);
-    packets.insert(50, b"something else".to_vec());
+    let packets = disorder::mixed();
     let (_folder, capture) = made(&from_one(&packets));
     let (live, counts) = assembled(&vlp(), &packets);
     check(&live, &sweeps(&mut capture.unwrap()));

@@ -43,15 +43,21 @@ fn fragments_and_pcapng() {
     assert_eq!(found[1].points.len(), expected[1].len() - 12 * 32);
 }
 
-/// Packets that come twice, late, or not at all, and those of others.
-#[test]
-fn disorder() {
+/// Turns of which packets come twice, late, or not at all, and one of others.
+pub(super) fn mixed() -> Vec<Vec<u8>> {
     let mut packets = turns(0..750);
     packets.drain(475..575);
     packets.drain(285..390);
     packets.insert(121, packets[120].clone());
     packets.swap(200, 201);
     packets.insert(50, b"something else".to_vec());
+    packets
+}
+
+/// Packets that come twice, late, or not at all, and those of others.
+#[test]
+fn disorder() {
+    let packets = mixed();
     let (_folder, capture) = made(&from_one(&packets));
     let mut capture = capture.unwrap();
     let notes = capture.notes().join("\n");
