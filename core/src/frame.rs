@@ -11,7 +11,7 @@ use crate::continuity::Reset;
 use crate::motion_compensation::{EgoMotion, turn};
 use crate::output::ColumnFlow;
 use crate::params::{ANCHOR_ABOVE_GROUND_M, Frame, Profile};
-use crate::pose::{Pose, Twist};
+use crate::pose::{Pose, Twist, to_grain};
 use crate::sweep::{Rig, Sweep};
 use crate::thinning::Thinning;
 use crate::tracklet::{Observation, Tracklet};
@@ -56,15 +56,23 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
 fn place_on_lattice(profile: &Profile, pose: &Pose, at: DVec3, origin: DVec3) -> Window {
     // A pose a world away saturates; its sweep is no continuation of any other.
     let index = |c: f64| libm::floor(c + 0.5).clamp(-FAR_CELLS, FAR_CELLS) as i32;
-    let cell = ((at - origin) / profile.voxel_m).to_array().map(index);
+    let cell = (to_grain(at - origin) / profile.voxel_m).to_array().map(index);
     let below = central(profile);
     let centre = DVec3::from_array(cell.map(f64::from)) * profile.voxel_m;
-    let translation = pose.translation - origin - centre;
+    let translation = to_grain(pose.translation - origin) - centre;
     Window {
         grid_from_vehicle: Pose { rotation: pose.rotation, translation },
         corner: [0, 1, 2].map(|a| cell[a] - below[a]),
         lattice_origin: origin,
     }
+}
+
+/// The second pose in the frame of the first, its place in whole steps.
+fn motion(from: &Pose, to: &Pose) -> Pose {
+    let (by, turned_back) =
+        (to_grain(to.translation - from.translation), from.rotation.conjugate());
+    let rotation = (turned_back * to.rotation).normalize();
+    Pose { rotation, translation: turned_back * by }
 }
 
 /// Farther than any drive leads, and within what an integer holds, cells.
@@ -96,6 +104,8 @@ pub(crate) struct SweepPair<'a> {
     pub current: Side,
     /// Time between them, s.
     pub dt_s: f64,
+    /// The vehicle at the second in its frame at the first.
+    moved: Pose,
     /// How much the vehicle turned in between, rad.
     pub turned_rad: f32,
     /// The vehicle's motion from the one to the other, at the first: the odometry flow.
@@ -146,9 +156,10 @@ impl Sides {
 impl<'a> SweepPair<'a> {
     fn new(profile: &'a Profile, before: Side, current: Side) -> SweepPair<'a> {
         let dt_s = current.stamp_s - before.stamp_s;
-        let moved = before.pose.inverse() * current.pose;
+        let moved = motion(&before.pose, &current.pose);
         let ego = EgoMotion::new(&before.pose, &moved.twist(dt_s));
-        SweepPair { profile, before, current, dt_s, turned_rad: moved.yaw_rad() as f32, ego }
+        let turned_rad = moved.yaw_rad() as f32;
+        SweepPair { profile, before, current, dt_s, moved, turned_rad, ego }
     }
 
     /// The first sweep's vehicle frame from the second's window: the corners differ by whole cells.
@@ -217,8 +228,8 @@ impl<'a> SweepPair<'a> {
         flow: &mut ColumnFlow,
     ) {
         let [x, y] = flow.displacement_m.map(f64::from);
-        let to = self.current.pose.transform(at + DVec3::new(x, y, 0.0));
-        let by = to - self.before.pose.transform(at);
+        let to = self.moved.transform(at + DVec3::new(x, y, 0.0));
+        let by = self.before.pose.rotation * (to - at);
         flow.displacement_m = [by.x as f32, by.y as f32];
         flow.velocity_ego_mps = velocity;
         let planar = DVec3::new(at.x, at.y, 0.0);

@@ -65,6 +65,7 @@ impl Pipeline {
     ) -> Result<SweepOutput<'o>, P::Error> {
         let Machine { backend, team, timer } = machine;
         let profile = &setup.profile;
+        let sweep = &Sweep { twist: sweep.twist.to_grain(), ..*sweep };
         let arrival = self.sides.advance(profile, &setup.rig, sweep);
         if arrival.reset.is_some() {
             self.tracklets.clear();

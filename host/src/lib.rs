@@ -17,7 +17,7 @@
 //! | [`locate`] | sweeps without poses, by registration |
 //! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
 //! | [`outputs`], [`summary`], `figures`, `settings_file` | files of a run, its figures, settings |
-//! | [`statistics`], [`order_statistics`], [`laps`] | what is counted and timed |
+//! | [`statistics`], [`order_statistics`], [`laps`], [`latency`] | what is counted and timed |
 //! | [`console`], [`progress`], `report`, `shell` | what the user reads, and types |
 //! | [`error`] | what can end a command, and its exit code |
 
@@ -37,6 +37,7 @@ pub mod error;
 mod figures;
 pub mod flow;
 pub mod laps;
+pub mod latency;
 #[cfg(feature = "pcap")]
 mod live;
 pub mod locate;

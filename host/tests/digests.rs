@@ -23,11 +23,7 @@ const DEVICE_BYTES: u64 = 64 << 20;
 
 /// The simulated street, turning, in KITTI's layout.
 fn drive(t: &Temp) -> PathBuf {
-    static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
-    let ego = Ego::Turn { left: true, speed: 6.0 };
-    let options = Options { sweeps: 4, ego, ..Options::default() };
-    let sweeps = SWEEPS.get_or_init(|| Drive::new(3, options).collect());
-    for (n, sweep) in sweeps.iter().enumerate() {
+    for (n, sweep) in sweeps().iter().enumerate() {
         let values = sweep.points.iter().flat_map(|p| {
             let [x, y, z] = p.position;
             [x, y, z, p.intensity]
@@ -35,16 +31,28 @@ fn drive(t: &Temp) -> PathBuf {
         let cloud: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
         t.write(&format!("drive/velodyne_points/data/{n:010}.bin"), cloud);
     }
-    let lines = |line: &dyn Fn(&SimSweep) -> String| sweeps.iter().map(line).collect::<String>();
-    t.write("drive/times.txt", lines(&|s| format!("{}\n", s.stamp_s)));
-    t.write("drive/poses.txt", lines(&pose));
+    t.write("drive/times.txt", rows(&|s| format!("{}\n", s.stamp_s)));
+    t.write("drive/poses.txt", rows(&|sweep| pose(sweep, 0.0)));
     t.path().join("drive")
 }
 
-/// A row of `poses.txt`.
-fn pose(sweep: &SimSweep) -> String {
+/// Its sweeps.
+fn sweeps() -> &'static [SimSweep] {
+    static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
+    let ego = Ego::Turn { left: true, speed: 6.0 };
+    let options = Options { sweeps: 4, ego, ..Options::default() };
+    SWEEPS.get_or_init(|| Drive::new(3, options).collect())
+}
+
+/// A row for each of them.
+fn rows(row: &dyn Fn(&SimSweep) -> String) -> String {
+    sweeps().iter().map(row).collect()
+}
+
+/// A row of `poses.txt`, where the world's origin lies elsewhere by `away`, m, along each axis.
+fn pose(sweep: &SimSweep, away: f64) -> String {
     let pose = sweep.world_from_vehicle;
-    let (turn, place) = (pose.matrix(), pose.translation.to_array());
+    let (turn, place) = (pose.matrix(), (pose.translation + away).to_array());
     let row = |n: usize| {
         let [a, b, c] = turn.row(n).to_array();
         format!("{a} {b} {c} {}", place[n])
@@ -171,6 +179,19 @@ fn widths_and_threads() {
     let threads = THREADS.map(|n| Way::Vulkan(THREADS_AT, Some(n)));
     for way in widths.into_iter().chain(threads) {
         assert_eq!(digest(&t, own(), way, &[]), scalar, "{way:?}");
+    }
+}
+
+#[test]
+fn wherever_the_origin_of_the_world_lies() {
+    let t = Temp::new();
+    drive(&t);
+    for profile in ["hdl64", "dissertation"] {
+        let found = [0.0, 1e5, -1e6].map(|away| {
+            t.write("drive/poses.txt", rows(&|sweep| pose(sweep, away)));
+            digest(&t, own(), Way::Scalar, &["--profile", profile])
+        });
+        assert!(found.iter().all(|digest| *digest == found[0]), "{profile}: {found:?}");
     }
 }
 

@@ -60,6 +60,8 @@ impl Grid {
 
     /// Fills `columns` and `of_point` from a sweep; returns where the window lies.
     pub fn sweep(&mut self, rig: &Rig, sweep: &Sweep) -> Window {
+        // As the pipeline takes it.
+        let sweep = &Sweep { twist: sweep.twist.to_grain(), ..*sweep };
         let pose = &sweep.world_from_vehicle;
         let origin = self
             .lattice_origin

@@ -16,6 +16,7 @@ pub mod results;
 #[cfg(test)]
 mod scratch;
 pub mod simulate;
+pub mod soak;
 pub mod toy;
 pub mod tracks;
 pub mod train;

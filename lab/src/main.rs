@@ -4,8 +4,10 @@
 use clap::Parser;
 use raywake::console::{INTERRUPTED_CODE, interrupted};
 use raywake::error::RunError;
+use raywake_alloc_guard::Guard;
 use raywake_lab::metrics::grade;
-use raywake_lab::{bench, eval, flsf, matching, results, simulate, toy, tracks, train};
+use raywake_lab::{bench, eval, flsf, matching, results, simulate, soak, toy, tracks, train};
+use std::alloc::System;
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -30,6 +32,8 @@ enum Command {
     Toy(toy::Args),
     /// Time two builds of the program in turn: ratios of sweeps, CPU and wall time.
     Bench(bench::Args),
+    /// Run sweeps in a loop for hours, with faults in between: digests, memory, times.
+    Soak(Box<soak::Args>),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
     /// Write the packets that a simulated sensor sends, as a capture.
@@ -67,6 +71,9 @@ impl Eval {
     }
 }
 
+#[global_allocator]
+static ALLOCATOR: Guard<System> = Guard(System);
+
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Train(command) => train::run(&command).map_err(Into::into),
@@ -78,6 +85,7 @@ fn main() -> ExitCode {
         Command::Packets(args) => simulate::packets::packets(&args).map_err(Into::into),
         Command::Toy(args) => toy::run(&args).map_err(Into::into),
         Command::Bench(args) => bench::run(&args).map_err(Into::into),
+        Command::Soak(args) => soak::run(&args),
         Command::Results(args) => results::run(&args).map_err(Into::into),
     };
     match done {

@@ -43,7 +43,7 @@ impl History {
     }
 
     pub fn clear(&mut self) {
-        self.held = 0;
+        (self.held, self.next) = (0, 0);
     }
 
     /// Remembers a sweep instead of the oldest, without the columns of what was seen to come from

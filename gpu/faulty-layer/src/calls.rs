@@ -16,20 +16,38 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What [`FAULT`] says: a function, the first call that fails, and what it returns.
-fn wanted() -> Option<(String, u64, i32)> {
-    let text = std::env::var(FAULT).ok()?;
-    let [function, from, result] = *text.split(' ').collect::<Vec<_>>() else { return None };
-    Some((function.into(), from.parse().ok()?, result.parse().ok()?))
+/// What [`FAULT`] says.
+struct FaultyCalls {
+    function: String,
+    /// The number of the first call that fails.
+    from: u64,
+    /// Its multiples fail, and not all after it.
+    each: bool,
+    /// What such a call returns.
+    result: i32,
+}
+
+impl FaultyCalls {
+    fn read() -> Option<FaultyCalls> {
+        let text = std::env::var(FAULT).ok()?;
+        let (text, each) = text.strip_suffix(" each").map_or((&*text, false), |text| (text, true));
+        let [function, from, result] = *text.split(' ').collect::<Vec<_>>() else { return None };
+        let (from, result) = (from.parse().ok()?, result.parse().ok()?);
+        Some(FaultyCalls { function: function.into(), from, each, result })
+    }
+
+    fn fails(&self, call: u64) -> bool {
+        if self.each { call.is_multiple_of(self.from) } else { call >= self.from }
+    }
 }
 
 /// Counts a call of a function. What it is to return, if not what it returns.
 pub fn fault(name: &str) -> Option<i32> {
     static CALLS: Mutex<u64> = Mutex::new(0);
-    let (_, from, result) = wanted().filter(|(function, ..)| function == name)?;
+    let wanted = FaultyCalls::read().filter(|wanted| wanted.function == name)?;
     let mut calls = locked(&CALLS);
     *calls += 1;
-    (*calls >= from).then_some(result)
+    wanted.fails(*calls).then_some(wanted.result)
 }
 
 /// What a call of a function comes to; `next` is what it would be.

@@ -2,7 +2,8 @@
 //! A Vulkan layer that lets chosen calls fail, for tests of what a program does then.
 //!
 //! The loader's variables switch it on ([`environment`]), and [`FAULT`] says what fails:
-//! `vkQueueSubmit 3 -4` lets the third call and every later one return `VK_ERROR_DEVICE_LOST`.
+//! `vkQueueSubmit 3 -4` lets the third call and every later one return `VK_ERROR_DEVICE_LOST`, with
+//! `each` behind it every third one alone.
 //! Waits are done all the same, so that nothing runs any more when it is said to be lost. It serves
 //! one instance and one device at a time.
 
@@ -16,7 +17,8 @@ use std::path::Path;
 pub const NAME: &str = "VK_LAYER_RAYWAKE_faulty";
 
 /// The variable with the function that fails, the number of the first call that does, and what it
-/// returns: a negative or positive `VkResult`, or [`NULL`] or [`GARBAGE`].
+/// returns: a negative or positive `VkResult`, or [`NULL`] or [`GARBAGE`]; `each` behind it where
+/// its multiples fail instead of all after it.
 pub const FAULT: &str = "RAYWAKE_FAULT";
 
 /// In place of a result: `vkMapMemory` succeeds, with a null pointer.

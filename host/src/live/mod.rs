@@ -13,7 +13,6 @@
 //! receiver, poses and worker allocate nothing; messages and replay do.
 
 mod handover;
-mod latency;
 mod locating;
 mod poses;
 mod receiver;

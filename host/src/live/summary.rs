@@ -7,9 +7,9 @@ use raywake_core::output::SweepOutput;
 use raywake_io::source::capture::assembly::PacketCounts;
 use serde::{Serialize, Serializer};
 
-use super::latency::{Latencies, LatencyFigures};
 use super::locating::LocatedCounts;
 use super::poses::PoseCounts;
+use crate::latency::{Latencies, LatencyFigures};
 
 /// Counted sweep by sweep. Nothing is allocated for it.
 pub struct LiveStatistics {
@@ -59,7 +59,7 @@ impl LiveStatistics {
         LiveStatistics {
             counts: SweepCounts::default(),
             dropped: DroppedReturns::default(),
-            latencies: Latencies::new(),
+            latencies: Latencies::default(),
             digest: Digest::default(),
         }
     }

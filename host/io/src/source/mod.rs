@@ -115,6 +115,7 @@ pub struct SourceGaps {
 }
 
 /// What is known of a recording before a cloud of it is read.
+#[derive(Clone)]
 pub struct Overview {
     /// Name of the log's or drive's folder.
     pub name: String,

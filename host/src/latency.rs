@@ -26,12 +26,14 @@ pub struct LatencyFigures {
     pub max: f64,
 }
 
-impl Latencies {
+impl Default for Latencies {
     /// None so far.
-    pub fn new() -> Latencies {
+    fn default() -> Latencies {
         Latencies { counts: Box::new([0; STEPS]), beyond: 0, max_ms: 0.0 }
     }
+}
 
+impl Latencies {
     /// Counts one.
     pub fn add(&mut self, ms: f64) {
         // It lies below the end of its step.
@@ -73,12 +75,12 @@ mod tests {
 
     #[test]
     fn ranks() {
-        let mut latencies = Latencies::new();
+        let mut latencies = Latencies::default();
         assert_eq!(latencies.figures(), None);
         latencies.add(3.25);
         let one = LatencyFigures { median: 3.25, p99: 3.25, max: 3.25 };
         assert_eq!(latencies.figures(), Some(one));
-        let mut latencies = Latencies::new();
+        let mut latencies = Latencies::default();
         (0..198).for_each(|n| latencies.add(f64::from(n) + 0.01));
         latencies.add(4000.0);
         latencies.add(5000.0);

@@ -1,0 +1,140 @@
+//! What goes wrong in a stretch of sweeps.
+
+use glam::{DQuat, DVec3};
+use raywake_core::params::{Profile, SENSORS_MAX};
+use raywake_core::pose::Pose;
+use raywake_core::sweep::Point;
+use raywake_io::source::SweepData;
+use raywake_sim::Rng;
+
+/// Every so many returns one is spoilt.
+const SPOILT_EVERY: usize = 7;
+/// How far noise reaches, m.
+const NOISE_M: f64 = 100.0;
+/// Sweeps of a gap: a second.
+pub const GAP: usize = 10;
+/// A sweep over capacity has so many times as many returns as the profile takes.
+pub const OVER: usize = 2;
+
+/// A fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// One sweep is lost, and tracking goes on.
+    LostSweep,
+    /// More are lost than tracking bears.
+    Gap,
+    /// Coordinates, times and intensities that are no numbers; sensors that there are none of.
+    NotFinite,
+    /// Poses go on a kilometre away.
+    Jump,
+    /// Poses go on the other way round.
+    Spin,
+    /// The clock is set back by an hour.
+    ClockBack,
+    /// The clock is set forward by an hour.
+    ClockForward,
+    /// A sweep without returns.
+    Empty,
+    /// Twice as many returns as are taken.
+    OverCapacity,
+    /// All returns at one place.
+    OnePlace,
+    /// Returns anywhere.
+    Noise,
+    /// The disk is full that results go to.
+    FullDisk,
+}
+
+impl Fault {
+    /// All of them.
+    pub const ALL: [Fault; 12] = [
+        Fault::LostSweep,
+        Fault::Gap,
+        Fault::NotFinite,
+        Fault::Jump,
+        Fault::Spin,
+        Fault::ClockBack,
+        Fault::ClockForward,
+        Fault::Empty,
+        Fault::OverCapacity,
+        Fault::OnePlace,
+        Fault::Noise,
+        Fault::FullDisk,
+    ];
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Fault::LostSweep => "a sweep lost",
+            Fault::Gap => "a second lost",
+            Fault::NotFinite => "returns that are no numbers",
+            Fault::Jump => "poses jump",
+            Fault::Spin => "poses turn round",
+            Fault::ClockBack => "clock set back",
+            Fault::ClockForward => "clock set forward",
+            Fault::Empty => "no returns",
+            Fault::OverCapacity => "over capacity",
+            Fault::OnePlace => "all returns at one place",
+            Fault::Noise => "returns anywhere",
+            Fault::FullDisk => "disk full",
+        }
+    }
+
+    /// Spoils the sweep that is `after` the one in the middle of its stretch, where that is not
+    /// negative. Returns whether there is a sweep at all.
+    pub fn spoil(
+        self,
+        after: usize,
+        sweep: &mut SweepData,
+        profile: &Profile,
+        rng: &mut Rng,
+    ) -> bool {
+        let first = after == 0;
+        match self {
+            Fault::LostSweep => return !first,
+            Fault::Gap => return after >= GAP,
+            Fault::ClockBack => sweep.stamp_s -= 3600.0,
+            Fault::ClockForward => sweep.stamp_s += 3600.0,
+            Fault::Jump => sweep.world_from_vehicle.translation += DVec3::new(1e3, -1e3, 10.0),
+            Fault::Spin => {
+                let turned = Pose::new(DQuat::from_rotation_z(3.0), DVec3::ZERO);
+                sweep.world_from_vehicle = sweep.world_from_vehicle * turned;
+            }
+            _ if first => self.spoil_returns(&mut sweep.points, profile, rng),
+            _ => {}
+        }
+        true
+    }
+
+    fn spoil_returns(self, points: &mut Vec<Point>, profile: &Profile, rng: &mut Rng) {
+        match self {
+            Fault::NotFinite => spoilt(points, rng),
+            Fault::Empty => points.clear(),
+            Fault::OverCapacity => {
+                let (there, wanted) = (points.len(), OVER * profile.returns());
+                points.reserve(wanted);
+                (there..wanted).for_each(|n| points.push(points[n - there]));
+            }
+            Fault::OnePlace => {
+                let at = points.first().copied().unwrap_or_default();
+                points.fill(at);
+            }
+            Fault::Noise => points.iter_mut().for_each(|point| {
+                let mut place = || rng.range(-NOISE_M, NOISE_M) as f32;
+                point.position = [place(), place(), place()];
+            }),
+            _ => {}
+        }
+    }
+}
+
+/// Some of the returns hold what is none.
+fn spoilt(points: &mut [Point], rng: &mut Rng) {
+    let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, -0.0];
+    for point in points.iter_mut().step_by(SPOILT_EVERY) {
+        let mut draw = || odd[(rng.bits() % odd.len() as u64) as usize];
+        point.position = [draw(), draw(), draw()];
+        (point.intensity, point.offset_s) = (draw(), draw());
+        point.sensor += SENSORS_MAX as u32;
+    }
+}

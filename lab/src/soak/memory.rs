@@ -1,0 +1,26 @@
+//! Memory of this process.
+
+/// Bytes that it occupies (RSS); none where the system does not say.
+pub fn resident_bytes() -> Option<u64> {
+    resident_of(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
+/// What Linux says of it.
+fn resident_of(status: &str) -> Option<u64> {
+    let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    Some(1024 * kibibytes.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_linux_says() {
+        let status = "VmPeak:\t  300 kB\nVmRSS:\t  190988 kB\nThreads:\t1\n";
+        assert_eq!(resident_of(status), Some(190_988 << 10));
+        assert_eq!(resident_of("VmRSS: many"), None);
+        // The code of these tests alone is larger.
+        assert!(!cfg!(target_os = "linux") || resident_bytes() > Some(1 << 20));
+    }
+}

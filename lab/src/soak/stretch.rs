@@ -1,0 +1,131 @@
+//! One stretch of sweeps through the pipeline.
+
+use super::fault::{Fault, OVER};
+use raywake::drive::Drive;
+use raywake::error::RunError;
+use raywake::laps::milliseconds;
+use raywake::latency::Latencies;
+use raywake::outputs::{Kinds, Outputs, RunFiles};
+use raywake_core::digest::Digest;
+use raywake_core::output::PairFlows;
+use raywake_core::params::Profile;
+use raywake_core::sweep::Point;
+use raywake_io::Error;
+use raywake_io::source::{Overview, SweepData};
+use raywake_sim::Rng;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// What all stretches have in common.
+pub struct Stretches {
+    /// Checked.
+    pub profile: Profile,
+    /// Of the recording.
+    pub overview: Overview,
+    /// The sweeps of a stretch.
+    pub sweeps: Vec<SweepData>,
+    /// A folder on a disk without room.
+    pub full_disk: Option<PathBuf>,
+    /// What chance there is.
+    pub rng: Rng,
+    /// The sweep in hand and the one before, whose memory is used again.
+    pub sides: [SweepData; 2],
+}
+
+/// What a stretch came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StretchEnd {
+    /// Of all that was put out.
+    pub digest: u64,
+    /// Sweeps that were given.
+    pub sweeps: u64,
+    /// Resets, the one that begins it included.
+    pub resets: u64,
+    /// Whether the device failed in it.
+    pub failed_over: bool,
+}
+
+/// Both sweeps' memory, as large as any fault needs it, and touched.
+pub fn sides(profile: &Profile) -> [SweepData; 2] {
+    let points = vec![Point { sensor: u32::MAX, ..Point::default() }; OVER * profile.returns()];
+    [points.clone(), points].map(|points| SweepData { points, ..SweepData::default() })
+}
+
+impl Stretches {
+    /// One stretch, with a fault in its middle or without one.
+    ///
+    /// # Errors
+    /// What a step returns; [`Error`] where a disk that is to be full is not, or is said to be
+    /// something else.
+    pub fn run(
+        &mut self,
+        drive: &mut Drive,
+        fault: Option<Fault>,
+        times: &mut Latencies,
+    ) -> Result<StretchEnd, RunError> {
+        let (mut end, mut digest) = (StretchEnd::default(), Digest::START);
+        let mut results = self.results(fault)?;
+        let on_device = drive.failure().is_none();
+        let Stretches { profile, sweeps, rng, sides: [now, last], .. } = self;
+        for (index, sweep) in sweeps.iter().enumerate() {
+            now.clone_from(sweep);
+            let after = index.checked_sub(sweeps.len() / 2);
+            let spoil = |(fault, after): (Fault, usize)| fault.spoil(after, now, profile, rng);
+            if !fault.zip(after).is_none_or(spoil) {
+                continue;
+            }
+            let began = Instant::now();
+            let before = if end.sweeps > 0 { &last.points[..] } else { &[] };
+            let stepped = drive.step(&now.sweep(), before)?;
+            times.add(milliseconds(began));
+            end.sweeps += 1;
+            end.resets += u64::from(stepped.output.reset.is_some());
+            if let Some(flows) = &stepped.output.flows {
+                flows.columns.iter().for_each(|column| digest.column(column));
+                flows.points.iter().for_each(|point| digest.point(&point));
+                results = results.and_then(|results| results.take(last, flows));
+            }
+            drive.tracklets().for_each(|tracklet| digest.tracklet(&tracklet));
+            std::mem::swap(now, last);
+        }
+        if results.is_some() {
+            return Err(Error::Usage("--full-disk: there was room for all results".into()).into());
+        }
+        end.digest = digest.value();
+        end.failed_over = on_device && drive.failure().is_some();
+        Ok(end)
+    }
+
+    /// Where results go that there is no room for.
+    fn results(&self, fault: Option<Fault>) -> Result<Option<FullDisk>, Error> {
+        let Some(folder) = self.full_disk.as_ref().filter(|_| fault == Some(Fault::FullDisk))
+        else {
+            return Ok(None);
+        };
+        let kinds = Kinds { columns: true, points: true, ..Kinds::default() };
+        let root = folder.join("results");
+        let files = RunFiles { root: Some(root.clone()), kinds, ..RunFiles::default() };
+        let outputs = Outputs::create(&files, &self.overview, self.sweeps.len(), &self.profile)?;
+        Ok(Some(FullDisk { outputs, root }))
+    }
+}
+
+/// Results on a disk without room.
+struct FullDisk {
+    outputs: Outputs,
+    root: PathBuf,
+}
+
+impl FullDisk {
+    /// Writes those of a pair; nothing is left of any once there was no room.
+    fn take(mut self, first: &SweepData, flows: &PairFlows) -> Option<FullDisk> {
+        match self.outputs.pair(first, flows, 0.0) {
+            Ok(()) => Some(self),
+            Err(_) => {
+                // A run goes on without them; the next stretch writes to an empty folder.
+                let _ = std::fs::remove_dir_all(&self.root);
+                None
+            }
+        }
+    }
+}

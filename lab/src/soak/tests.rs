@@ -1,0 +1,24 @@
+//! A round of all faults.
+
+use super::*;
+use clap::Parser;
+
+#[derive(Parser)]
+struct Line {
+    #[command(flatten)]
+    args: Args,
+}
+
+#[test]
+fn faults_leave_nothing_behind() {
+    let line = "soak --sweeps 1 -n 30 --out none --backend scalar --set side=81";
+    let args = Line::try_parse_from(line.split(' ')).unwrap_or_else(|e| panic!("{e}")).args;
+    let mut source = source(&args).unwrap();
+    let mut soak = Soak::new(&args, source.as_mut()).unwrap();
+    soak.run().unwrap();
+    let of_fault: Vec<_> = soak.findings.of_fault.into_iter().filter(|n| *n != [0, 0]).collect();
+    assert_eq!(of_fault, [[1, 1]; 11]);
+    assert_eq!(soak.findings.verdict(), None);
+    // Eleven stretches lose one sweep and a second of them.
+    assert_eq!(soak.findings.sweeps(), 22 * 30 - 11);
+}
