@@ -173,3 +173,14 @@ fn in_a_crowd_people_move_and_houses_stand() {
     let still = tally.returns - tally.of_movers;
     assert!(tally.moving[0] * 100 < still, "{tally:?}");
 }
+
+#[test]
+#[should_panic(expected = "returns of the sweep before")]
+fn returns_of_another_sweep_are_not_taken_for_those_of_the_one_before() {
+    let drive = through(Scene::empty(), 5.0);
+    let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
+    let mut pipeline = setup.drive(setup.scalar());
+    for index in 0..2 {
+        let _ = pipeline.step(&sweep(&drive.sweep(index)), &[]);
+    }
+}

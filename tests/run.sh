@@ -52,6 +52,13 @@ say "documentation"
 RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
     cargo doc --workspace --no-deps --document-private-items --quiet
 
+say "licences and versions of what is depended on"
+if command -v cargo-deny >/dev/null || cargo install --quiet --locked cargo-deny@0.20.2; then
+    cargo deny --log-level error check licenses bans sources
+else
+    echo "skipped: cargo-deny cannot be installed"
+fi
+
 say "core without an operating system"
 if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
     cargo check --quiet --target thumbv7em-none-eabihf \
@@ -59,6 +66,23 @@ if rustup target add thumbv7em-none-eabihf >/dev/null 2>&1; then
     echo "checks for thumbv7em-none-eabihf"
 else
     echo "skipped: the target thumbv7em-none-eabihf cannot be installed"
+fi
+
+say "undefined behaviour"
+# Of what a day's compiler finds, the day is fixed. Miri takes a thousand times as long as the
+# processor: what is unsafe, and of the core what does not work through whole sweeps. That target,
+# because for others libm has assembly, which Miri does not know.
+nightly=nightly-2026-10-29
+if rustup toolchain install $nightly --profile minimal -c miri -c rust-src >/dev/null 2>&1; then
+    miri() { CARGO_TARGET_DIR=target/miri cargo +$nightly miri test --quiet --lib "$@" 2>&1; }
+    miri -p raywake-alloc-guard | tail -n 3
+    # Its memory is borrowed for good.
+    MIRIFLAGS=-Zmiri-ignore-leaks \
+        miri --target riscv64gc-unknown-linux-gnu -p raywake-embed | tail -n 3
+    miri --target riscv64gc-unknown-linux-gnu -p raywake-core -- continuity digest dropped output \
+        params pose:: surface footprint prepare::tests::every prepare::tests::static | tail -n 3
+else
+    echo "skipped: Miri cannot be installed"
 fi
 
 # As on the host, bit for bit.
@@ -169,8 +193,11 @@ if command -v apt-get >/dev/null; then
     install slurm-wlm munge || true
     install parallel || true
 fi
-cargo build --quiet -p raywake-lab
+cargo build --quiet -p raywake-lab -p raywake-faulty-layer
 tests/shards.sh target/release/raywake target/debug/raywake-lab
+
+say "five minutes of sweeps and faults"
+tests/soak.sh target/debug/raywake-lab target/debug/libraywake_faulty_layer.so 2.5
 
 say "variants side by side, two sweeps each"
 cargo test --quiet -p raywake-tests --benches

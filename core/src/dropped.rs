@@ -90,6 +90,12 @@ impl DroppedReturns {
         None
     }
 
+    /// Those of which no ray is cast.
+    pub fn without_ray(&self) -> u64 {
+        let invalid = self.not_finite + self.no_return + self.unknown_sensor;
+        self.over_capacity + self.too_far + invalid
+    }
+
     /// Every count with the name of its field and a name for people.
     pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
         [

@@ -223,14 +223,16 @@ impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
         let lap = &mut |stage| timer.lap(stage);
         let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, team, lap));
         team.join(stages, meanwhile);
-        Ok(PerceptionBuffers {
+        let left = PerceptionBuffers {
             counters: s.counters,
             columns_before: s.columns_before,
             columns_now: s.columns_now,
             foreground: s.foreground,
             flow: s.flow,
             proposal: s.proposal,
-        }
-        .into())
+        };
+        // What is not put up with from a device is a defect here.
+        assert_eq!(left.check(sweep), Ok(()));
+        Ok(left.into())
     }
 }

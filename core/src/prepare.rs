@@ -101,6 +101,8 @@ impl Preparation {
             // Seldom: `rays` may be memory of a device, slow to read.
             rays.copy_within(admitted..admitted + more, count);
         }
+        let all = count + more + dropped.without_ray() as usize;
+        assert_eq!(all, sweep.points.len(), "returns that are cast or left out");
         (count + more, dropped)
     }
 }

@@ -53,6 +53,8 @@ impl Found<'_> {
         let (solid, valid, unlisted) = self.columns(index, out.columns);
         let (records, unplaced) = self.clusters(index, out.columns, solid);
         let (columns, thinning) = (&out.columns[..records], self.pair.before.points);
+        // Of another sweep's, velocities would be those of other returns.
+        assert_eq!(points.len(), thinning.of(), "returns of the sweep before");
         let of_points = TakenPoints::new(points, thinning.taken());
         let taken = &mut out.points[..of_points.count()];
         self.points(team, of_points, columns, index, taken);

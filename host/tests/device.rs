@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 
 use common::{Outcome, SMALL, Temp};
-use raywake_faulty_layer::{FAULT, GARBAGE, NAMES, NULL, environment};
+use raywake_faulty_layer::{FAULT, GARBAGE, NAME, NAMES, NULL, environment};
 
 /// Results of Vulkan.
 const OUT_OF_HOST_MEMORY: i32 = -1;
@@ -28,7 +28,25 @@ fn run(t: &Temp, fault: &str, more: &[&str]) -> Outcome {
     let mut command = common::command(&["run", data.to_str().unwrap()]);
     command.args(["--config", config.to_str().unwrap(), "--backend", "vulkan"]).args(more);
     command.envs(environment(t.path(), &common::faulty_layer()).unwrap()).env(FAULT, fault);
-    Outcome::of(command.output().unwrap())
+    if let Some(layers) = under_validation(t.path()) {
+        command.envs(layers);
+    }
+    let o = Outcome::of(command.output().unwrap());
+    assert!(!o.stdout.contains("has not been destroyed"), "{fault}: {}", o.stdout);
+    o
+}
+
+/// Variables that switch on the validation layer, too, where it is installed. It keeps an account
+/// of objects, and tells on standard output which are left at the end.
+fn under_validation(folder: &Path) -> Option<[(&'static str, String); 2]> {
+    let installed = Path::new("/usr/share/vulkan/explicit_layer.d");
+    if !installed.join("VkLayer_khronos_validation.json").is_file() {
+        eprintln!("skipped: an account of Vulkan objects, as there is no validation layer");
+        return None;
+    }
+    let folders = format!("{}:{}", folder.display(), installed.display());
+    let layers = format!("VK_LAYER_KHRONOS_validation:{NAME}");
+    Some([("VK_LAYER_PATH", folders), ("VK_INSTANCE_LAYERS", layers)])
 }
 
 /// A drive, if there is a device to run on.

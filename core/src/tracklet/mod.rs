@@ -67,7 +67,7 @@ crate::counters! {
         pub waiting,
         /// Ended for another one in the same cell.
         pub merged,
-        /// Ended unobserved.
+        /// Ended unobserved, or for want of room.
         pub lost,
         /// Ended because their cell left the window.
         pub left,
@@ -174,6 +174,7 @@ impl Tracklets {
         observed: &mut [Observation],
     ) -> TrackletTurnover {
         let mut turnover = TrackletTurnover { left: left.into(), ..TrackletTurnover::default() };
+        let known = self.now.len() as u64;
         self.claim(observed);
         if profile.tracklet.takes_over {
             self.take_over(step, observed);
@@ -194,6 +195,9 @@ impl Tracklets {
         // Swapped, the whole of both would go by way of the stack.
         self.now.clear();
         self.now.extend(self.next.iter().copied());
+        let TrackletTurnover { born, gated, merged, lost, left, .. } = turnover;
+        let ended = gated + merged + lost + left;
+        assert_eq!(self.now.len() as u64 + ended, known + born, "{turnover:?}");
         turnover
     }
 
@@ -272,6 +276,7 @@ impl Tracklets {
             return there;
         }
         if self.next.push(t).is_err() {
+            turnover.lost += 1;
             return NONE;
         }
         let slot = self.next.len() as u32 - 1;

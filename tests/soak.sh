@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Sweeps in a loop, with faults in between, for as many minutes on the CPU and on a device that is
+# lost now and then. `soak.sh LAB LAYER MINUTES`; what needs root (a full disk) or a device is
+# skipped without one, and says so.
+set -euo pipefail
+lab=$(realpath "$1")
+layer=$(realpath "$2")
+hours=$(awk "BEGIN { print $3 / 60 }")
+cd "$(dirname "$0")/.."
+out=$PWD/target/soak
+mkdir -p "$out/disk"
+
+options=()
+if mount -t tmpfs -o size=256k tmpfs "$out/disk" 2>/dev/null; then
+    trap 'umount "$out/disk"' EXIT
+    options=(--full-disk "$out/disk")
+else
+    echo "skipped: a full disk, as none can be mounted"
+fi
+soak() { "$lab" soak --hours "$hours" -n 30 "${options[@]}" --out "$out/$1" --backend "$@"; }
+soak scalar
+if [ "${RAYWAKE_VULKAN:-}" = required ]; then
+    soak vulkan --faulty-layer "$layer"
+else
+    echo "skipped: a device that is lost, as none is required"
+fi
