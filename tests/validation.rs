@@ -57,7 +57,8 @@ fn kernels_are_valid() {
     for kernel in KERNELS {
         let name = kernel.name;
         let path = folder.join(name);
-        std::fs::write(&path, bytemuck::cast_slice(kernel.spirv)).expect("a temporary file");
+        std::fs::write(&path, bytemuck::cast_slice(kernel.spirv.words()))
+            .expect("a temporary file");
         let arguments = ["--target-env", "vulkan1.1"];
         let said = Command::new("spirv-val").args(arguments).arg(&path).output().expect("it runs");
         let text = String::from_utf8_lossy(&[said.stdout, said.stderr].concat()).into_owned();

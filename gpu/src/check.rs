@@ -67,7 +67,7 @@ fn written(buffer: &Buffer) -> Result<(), String> {
 
 fn shader(limits: &Limits, kernel: &Kernel) -> Result<(), String> {
     let name = kernel.name;
-    let spirv = kernel.spirv.first() == Some(&SPIRV_MAGIC);
+    let spirv = kernel.spirv.words().first() == Some(&SPIRV_MAGIC);
     ensure(spirv, || format!("kernel {name} is not SPIR-V"))?;
     ensure(!name.contains('\0'), || format!("kernel {name:?} has a zero in its name"))?;
     let invocations: u64 = kernel.workgroup.iter().map(|&n| u64::from(n)).product();

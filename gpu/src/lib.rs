@@ -109,12 +109,33 @@ impl Binding {
 pub struct Kernel {
     /// The entry point's name in the module; also for messages.
     pub name: &'static str,
-    /// SPIR-V words, valid for Vulkan 1.1 (SPIR-V 1.3 or older).
-    pub spirv: &'static [u32],
+    /// The module.
+    pub spirv: Spirv,
     /// Invocations per workgroup, as compiled in.
     pub workgroup: [u32; 3],
     /// Storage buffers of set 0; the binding number is the index.
     pub bindings: &'static [Binding],
+}
+
+/// The words of a module that may be run.
+#[derive(Clone, Copy, Debug)]
+pub struct Spirv(&'static [u32]);
+
+impl Spirv {
+    /// Of these words.
+    ///
+    /// # Safety
+    /// They are a module that is valid for Vulkan 1.1 (SPIR-V 1.3 or older), and its shader keeps
+    /// within the buffers that [`Kernel::bindings`] name, whatever these hold. Drivers take that on
+    /// trust.
+    pub const unsafe fn new(words: &'static [u32]) -> Spirv {
+        Spirv(words)
+    }
+
+    /// The words.
+    pub const fn words(self) -> &'static [u32] {
+        self.0
+    }
 }
 
 /// How many workgroups a dispatch runs.

@@ -79,7 +79,7 @@ pub(crate) fn barriers(steps: &[Vec<Access>], buffers: usize) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Binding, Kernel};
+    use crate::{Binding, Kernel, Spirv};
 
     fn barriers(steps: &[Vec<Access>]) -> Vec<bool> {
         super::barriers(steps, 4)
@@ -125,7 +125,8 @@ mod tests {
     fn fills_write_copies_read_and_write_indirect_counts_are_read() {
         static KERNEL: Kernel = Kernel {
             name: "k",
-            spirv: &[],
+            // SAFETY: it is never run.
+            spirv: unsafe { Spirv::new(&[]) },
             workgroup: [1; 3],
             bindings: &[Binding::storage("b", true, true)],
         };

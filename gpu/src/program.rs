@@ -91,7 +91,7 @@ impl Pipelines {
             kernel,
             set_layout,
             layout,
-            handle: gpu.pipeline(kernel.spirv, &entry, layout)?,
+            handle: gpu.pipeline(kernel.spirv.words(), &entry, layout)?,
         });
         Ok(self.pipelines.len() - 1)
     }
