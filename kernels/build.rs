@@ -168,9 +168,8 @@ fn write_static(
     }
     let _ = writeln!(
         table,
-        "/// Kernel `{name}`.\npub static {}: Kernel = Kernel {{ name: {name:?}, \
-         workgroup: {:?}, bindings: &[{list}], \
-         spirv: unsafe {{ Spirv::new(&{words:?}) }} }};",
+        "/// Kernel `{name}`.\npub static {}: Kernel = Kernel {{ name: {name:?}, workgroup: {:?}, \
+         bindings: &[{list}], spirv: unsafe {{ Spirv::new(&{words:?}) }} }};",
         name.to_uppercase(),
         entry.workgroup_size,
     );

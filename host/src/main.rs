@@ -27,7 +27,7 @@ fn explain(e: &clap::Error) -> ! {
 
 /// A decoder that panics has met a damaged file, and that is what is told. Where panics do not
 /// unwind, it is the end.
-#[cfg(feature = "arrow")]
+#[cfg(any(feature = "arrow", feature = "mcap"))]
 fn tell_of_damaged_files() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| match raywake_io::source::decoder::damaged() {
@@ -44,7 +44,7 @@ fn tell_of_damaged_files() {
 static ALLOCATOR: Guard<System> = Guard(System);
 
 fn main() -> ExitCode {
-    #[cfg(feature = "arrow")]
+    #[cfg(any(feature = "arrow", feature = "mcap"))]
     tell_of_damaged_files();
     let args = Args::command().try_get_matches().unwrap_or_else(|e| explain(&e));
     ExitCode::from(raywake::carry_out(&args).unwrap_or_else(|e| explain(&e)))

@@ -1,7 +1,8 @@
 //! Decoders of other people's that panic on damaged files.
 //!
-//! Parquet's does where a page's levels are cut short, Arrow's where a buffer ends within a number.
-//! What they decode is named while they work, so that the program can say which file is damaged,
+//! Parquet's does where a page's levels are cut short, Arrow's where a buffer ends within a number,
+//! MCAP's where a record is longer than its chunk, as our profiles have it look for overflows. What
+//! they decode is named while they work, so that the program can say which file is damaged,
 //! however its panics end.
 
 use std::cell::RefCell;

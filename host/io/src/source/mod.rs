@@ -24,7 +24,7 @@ mod bin;
 #[cfg(feature = "pcap")]
 pub mod capture;
 mod clouds;
-#[cfg(feature = "arrow")]
+#[cfg(any(feature = "arrow", feature = "mcap"))]
 pub mod decoder;
 #[cfg(feature = "arrow")]
 pub mod feather;

@@ -10,6 +10,7 @@ use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::Error;
+use crate::source::decoder::guarded;
 
 /// Longest record that is read, bytes; a chunk may be longer, as it is read in pieces.
 const RECORD_MAX: usize = 256 << 20;
@@ -153,7 +154,7 @@ impl BagFile {
         let Some(OpenRecord { reader, next, left }) = &mut self.open else { return Ok(None) };
         let damaged =
             |what: String| Error::input(&self.path, format!("byte {}", next.record), what);
-        while let Some(event) = reader.next_event() {
+        while let Some(event) = guarded(&self.path, || reader.next_event())? {
             match event.map_err(|e| damaged(e.to_string()))? {
                 LinearReadEvent::Record { data, opcode } => {
                     let place = *next;

@@ -39,11 +39,11 @@ struct Seed {
     options: OpenOptions,
     files: Vec<(PathBuf, Vec<u8>)>,
     /// Below the folder.
-    root: &'static str,
+    root: String,
 }
 
 impl Seed {
-    fn new(folder: Temp, root: &'static str, options: OpenOptions) -> Seed {
+    fn new(folder: Temp, root: &str, options: OpenOptions) -> Seed {
         let (mut files, mut folders) = (Vec::new(), vec![folder.path().to_path_buf()]);
         while let Some(next) = folders.pop() {
             for entry in fs::read_dir(next).unwrap() {
@@ -55,12 +55,12 @@ impl Seed {
             }
         }
         files.sort();
-        Seed { folder, options, files, root }
+        Seed { folder, options, files, root: root.into() }
     }
 
     /// Opens the recording and reads some of it. Whether that went well.
     fn read(&self) -> bool {
-        let Ok(mut source) = open(&self.folder.path().join(self.root), &self.options) else {
+        let Ok(mut source) = open(&self.folder.path().join(&self.root), &self.options) else {
             return false;
         };
         let mut sweep = SweepData::default();
@@ -77,7 +77,6 @@ impl Seed {
 
     /// Damages files of the recording `times` over. Returns how often it could still be read.
     fn damage(&self, times: usize, random: &mut Random) -> usize {
-        assert!(self.read(), "the recording itself");
         let once = |random: &mut Random| {
             let (path, whole) = &self.files[random.below(self.files.len())];
             let bytes = damaged(whole, random);
@@ -159,12 +158,18 @@ fn number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     bytes.splice(from..from + length, other);
 }
 
+/// How many recordings of each format are damaged.
+fn times() -> usize {
+    let times = std::env::var("RAYWAKE_FUZZ").ok().and_then(|n| n.parse().ok());
+    times.unwrap_or(USUAL)
+}
+
 /// Damages a recording of a format.
 fn fuzz(name: &str, seed: Seed) {
-    let times = std::env::var("RAYWAKE_FUZZ").ok().and_then(|n| n.parse().ok());
-    let times = times.unwrap_or(USUAL);
+    let times = times();
     // A stream of its own for each format, and another one for another number of recordings.
     let number = name.bytes().fold(times as u64, |n, byte| n.wrapping_mul(31) + u64::from(byte));
+    assert!(seed.read(), "the recording itself");
     let read = seed.damage(times, &mut Random(number));
     println!("{name}: {times} damaged, {read} of them read");
     // Most damage is to numbers of returns, which may be any.
@@ -239,6 +244,25 @@ fn bags() {
     let options = bag::options().compression(None).use_chunks(false);
     t.write("a.mcap", bag::file(&bag::rig(3), options));
     fuzz("mcap", Seed::new(t, "", unlocated()));
+}
+
+/// What coverage-guided fuzzers start from, and what they broke once (`host/io/fuzz`).
+#[cfg(all(feature = "mcap", feature = "pcap"))]
+#[test]
+fn corpus() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
+    for kind in ["mcap", "npy", "pcap", "pcd", "ply"] {
+        let files = fs::read_dir(root.join(kind)).unwrap();
+        for (n, file) in files.map(|entry| entry.unwrap().path()).enumerate() {
+            let t = Temp::new();
+            let name = format!("0.{kind}");
+            t.write(&name, fs::read(&file).unwrap());
+            let one = if ["mcap", "pcap"].contains(&kind) { name } else { String::new() };
+            let seed = Seed::new(t, &one, unlocated());
+            println!("{}: {}", file.display(), seed.read());
+            seed.damage(times(), &mut Random(n as u64));
+        }
+    }
 }
 
 #[cfg(feature = "pcap")]

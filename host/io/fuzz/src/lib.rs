@@ -1,0 +1,68 @@
+#![forbid(unsafe_code)]
+//! What targets do with bytes: read them as a recording, or as weights. Whatever they are, that
+//! ends in an error or with a sweep.
+
+use raywake_core::encoder::EncoderWeights;
+use raywake_core::stages::{background_filter, occupancy_constancy};
+use raywake_io::source::decoder::damaged;
+use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+use tempfile::TempDir;
+
+/// Sweeps that are read of each.
+const SWEEPS: usize = 3;
+/// Levels that weights are read for.
+const LEVELS: usize = 10;
+
+/// Files of one recording after the other.
+static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
+    bear_guarded_panics();
+    TempDir::new().expect("a temporary folder")
+});
+
+/// A decoder of other people's that panics is caught, and is no find.
+fn bear_guarded_panics() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if damaged().is_none() {
+            usual(panic);
+        }
+    }));
+}
+
+/// Reads bytes as the file `0.EXTENSION` of a recording; for `mcap` and `pcap` it is one.
+pub fn recording(extension: &str, bytes: &[u8]) {
+    let file = FOLDER.path().join(format!("0.{extension}"));
+    fs::write(&file, bytes).expect("a temporary file");
+    let whole = ["mcap", "pcap"].contains(&extension);
+    read(if whole { &file } else { FOLDER.path() });
+}
+
+fn read(path: &Path) {
+    let (unlocated, ground_m) = (Unlocated::Accept, Some(-1.7));
+    let options = OpenOptions { unlocated, ground_m, ..OpenOptions::default() };
+    let Ok(mut source) = open(path, &options) else { return };
+    let mut sweep = SweepData::default();
+    for index in 0..source.len().min(SWEEPS) {
+        let read = source.read(index, &mut sweep);
+        assert!(read.is_ok() || sweep.points.is_empty(), "returns of a sweep that failed");
+        let pose = &sweep.world_from_vehicle;
+        assert!(pose.rotation.is_finite() && pose.translation.is_finite(), "{pose:?}");
+    }
+}
+
+/// Reads bytes as weights of each kind.
+pub fn weights(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let _ = background_filter::load(text, LEVELS, &mut vec![0; background_filter::TABLE_WORDS]);
+    constancy(text);
+    let _ = EncoderWeights::new().load(text, LEVELS);
+}
+
+fn constancy(text: &str) {
+    let mut weights = vec![0; occupancy_constancy::WEIGHT_WORDS];
+    let mut costs = vec![0; occupancy_constancy::SCORES_MAX];
+    let _ = occupancy_constancy::load(text, LEVELS, &mut weights, &mut costs);
+}
