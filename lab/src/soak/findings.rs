@@ -162,7 +162,8 @@ impl Findings {
             let counts = [Cell::from(n + 1), Cell::from(period.sweeps)];
             TableRow::new(counts.into_iter().chain(times).chain([memory]))
         };
-        let rows = self.periods.iter().enumerate().map(row).collect();
+        let known = self.periods.iter().enumerate().filter(|(_, period)| period.sweeps > 0);
+        let rows = known.map(row).collect();
         let columns = ["part", "sweeps", "median, ms", "p99, ms", "max, ms", "memory, MiB"];
         Table::new("time", "Time of a step, and memory at the end of each tenth", &columns, rows)
     }
