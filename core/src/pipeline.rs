@@ -55,6 +55,10 @@ impl Pipeline {
 
     /// One sweep. `before` holds the points of the sweep before, whose flow comes back; `out` must
     /// have room for a record of each of them and of every column.
+    ///
+    /// # Panics
+    /// `before` has not as many points as the sweep before had, unless this one does not continue it.
+    /// Or what must hold does not: a defect.
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,

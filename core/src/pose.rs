@@ -28,14 +28,16 @@ pub enum PoseError {
 /// Largest deviation of `R^T R` from the identity that is still read as a rounded rotation.
 const RIGID_TOLERANCE: f64 = 1e-3;
 
-/// Steps in which the pipeline takes differences of places, m, and velocities, m/s: 15 um, a
-/// thousandth of what poses err, and a million times what they are rounded by 100 km away. So the
+/// Steps in which the pipeline takes differences of places, m, and velocities, m/s: 15 um. Poses err
+/// by hundreds of times as much, and 100 km away they are rounded by a millionth of it, so that the
 /// same bits come out wherever the world's origin lies.
 const GRAIN: f64 = 1.0 / 65_536.0;
+/// Numbers from here on are whole steps as they are.
+const WHOLE: f64 = GRAIN / f64::EPSILON;
 
 /// The nearest whole number of steps.
 pub fn to_grain(v: DVec3) -> DVec3 {
-    let nearest = |c: f64| libm::round(c / GRAIN) * GRAIN;
+    let nearest = |c: f64| if c.abs() < WHOLE { libm::round(c / GRAIN) * GRAIN } else { c };
     DVec3::new(nearest(v.x), nearest(v.y), nearest(v.z))
 }
 
@@ -173,6 +175,14 @@ mod tests {
         let back = p.twist(0.1).over(0.1);
         assert!((back.yaw_rad() - 0.5).abs() < 1e-12);
         assert!((back.translation - p.translation).length() < 1e-12);
+    }
+
+    #[test]
+    fn steps() {
+        let v = to_grain(DVec3::new(0.3, -1e308, 7.0));
+        assert!((v.x - 0.3).abs() <= 0.5 * GRAIN && v.x / GRAIN == libm::round(v.x / GRAIN));
+        assert_eq!([v.y, v.z], [-1e308, 7.0]);
+        assert_eq!((WHOLE + 0.3 - WHOLE) / GRAIN % 1.0, 0.0);
     }
 
     #[test]
