@@ -57,8 +57,8 @@ impl Pipeline {
     /// have room for a record of each of them and of every column.
     ///
     /// # Panics
-    /// `before` has not as many points as the sweep before had, unless this one does not continue it.
-    /// Or what must hold does not: a defect.
+    /// `before` has not as many points as the sweep before had, unless this one does not continue
+    /// it. Or what must hold does not: a defect.
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,

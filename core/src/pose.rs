@@ -28,9 +28,9 @@ pub enum PoseError {
 /// Largest deviation of `R^T R` from the identity that is still read as a rounded rotation.
 const RIGID_TOLERANCE: f64 = 1e-3;
 
-/// Steps in which the pipeline takes differences of places, m, and velocities, m/s: 15 um. Poses err
-/// by hundreds of times as much, and 100 km away they are rounded by a millionth of it, so that the
-/// same bits come out wherever the world's origin lies.
+/// Steps in which the pipeline takes differences of places, m, and velocities, m/s: 15 um. Poses
+/// err by hundreds of times as much, and 100 km away they are rounded by a millionth of it, so that
+/// the same bits come out wherever the world's origin lies.
 const GRAIN: f64 = 1.0 / 65_536.0;
 /// Numbers from here on are whole steps as they are.
 const WHOLE: f64 = GRAIN / f64::EPSILON;
