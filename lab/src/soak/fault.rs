@@ -1,5 +1,6 @@
 //! What goes wrong in a stretch of sweeps.
 
+use clap::ValueEnum;
 use glam::{DQuat, DVec3};
 use raywake_core::params::{Profile, SENSORS_MAX};
 use raywake_core::pose::Pose;
@@ -17,7 +18,7 @@ pub const GAP: usize = 10;
 pub const OVER: usize = 2;
 
 /// A fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Fault {
     /// One sweep is lost, and tracking goes on.
     LostSweep,
@@ -46,38 +47,9 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All of them.
-    pub const ALL: [Fault; 12] = [
-        Fault::LostSweep,
-        Fault::Gap,
-        Fault::NotFinite,
-        Fault::Jump,
-        Fault::Spin,
-        Fault::ClockBack,
-        Fault::ClockForward,
-        Fault::Empty,
-        Fault::OverCapacity,
-        Fault::OnePlace,
-        Fault::Noise,
-        Fault::FullDisk,
-    ];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Fault::LostSweep => "a sweep lost",
-            Fault::Gap => "a second lost",
-            Fault::NotFinite => "returns that are no numbers",
-            Fault::Jump => "poses jump",
-            Fault::Spin => "poses turn round",
-            Fault::ClockBack => "clock set back",
-            Fault::ClockForward => "clock set forward",
-            Fault::Empty => "no returns",
-            Fault::OverCapacity => "over capacity",
-            Fault::OnePlace => "all returns at one place",
-            Fault::Noise => "returns anywhere",
-            Fault::FullDisk => "disk full",
-        }
+    /// Its name.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
     /// Spoils the sweep that is `after` the one in the middle of its stretch, where that is not

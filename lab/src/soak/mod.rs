@@ -12,6 +12,7 @@ mod stretch;
 #[cfg(test)]
 mod tests;
 
+use clap::ValueEnum;
 use device::Makes;
 use fault::{Fault, GAP};
 use findings::{Findings, PERIODS};
@@ -125,17 +126,14 @@ impl<'a> Soak<'a> {
 
     /// Rounds of all faults, until the time is over or a signal comes.
     fn run(&mut self) -> Result<(), RunError> {
-        let faults = Fault::ALL.iter().enumerate();
-        let met = |(_, fault): &(usize, &Fault)| {
-            **fault != Fault::FullDisk || self.args.full_disk.is_some()
-        };
-        let faults: Vec<(usize, Fault)> = faults.filter(met).map(|(n, f)| (n, *f)).collect();
+        let met = |fault: &Fault| *fault != Fault::FullDisk || self.args.full_disk.is_some();
+        let faults: Vec<Fault> = Fault::value_variants().iter().copied().filter(met).collect();
         let mut rounds = 0;
         while self.part() < 1.0 && !interrupted() {
-            for (n, fault) in &faults {
+            for fault in &faults {
                 self.stretch(Some(*fault))?;
                 let clean = self.stretch(None)?;
-                self.findings.count(*n, &clean);
+                self.findings.count(*fault, &clean);
             }
             rounds += 1;
             self.findings.weigh(self.period, rounds);

@@ -39,8 +39,6 @@ pub struct StretchEnd {
     pub digest: u64,
     /// Sweeps that were given.
     pub sweeps: u64,
-    /// Resets, the one that begins it included.
-    pub resets: u64,
     /// Whether the device failed in it.
     pub failed_over: bool,
 }
@@ -55,8 +53,8 @@ impl Stretches {
     /// One stretch, with a fault in its middle or without one.
     ///
     /// # Errors
-    /// What a step returns; [`Error`] where a disk that is to be full is not, or is said to be
-    /// something else.
+    /// What a step returns; [`Error`] where a disk that is to be full takes all results, or fails
+    /// otherwise than for want of room.
     pub fn run(
         &mut self,
         drive: &mut Drive,
@@ -79,11 +77,10 @@ impl Stretches {
             let stepped = drive.step(&now.sweep(), before)?;
             times.add(milliseconds(began));
             end.sweeps += 1;
-            end.resets += u64::from(stepped.output.reset.is_some());
             if let Some(flows) = &stepped.output.flows {
                 flows.columns.iter().for_each(|column| digest.column(column));
                 flows.points.iter().for_each(|point| digest.point(&point));
-                results = results.and_then(|results| results.take(last, flows));
+                results = results.map_or(Ok(None), |results| results.take(last, flows))?;
             }
             drive.tracklets().for_each(|tracklet| digest.tracklet(&tracklet));
             std::mem::swap(now, last);
@@ -117,15 +114,15 @@ struct FullDisk {
 }
 
 impl FullDisk {
-    /// Writes those of a pair; nothing is left of any once there was no room.
-    fn take(mut self, first: &SweepData, flows: &PairFlows) -> Option<FullDisk> {
+    /// Writes those of a pair. Once there is no room they are removed, and none is left.
+    fn take(mut self, first: &SweepData, flows: &PairFlows) -> Result<Option<FullDisk>, Error> {
         match self.outputs.pair(first, flows, 0.0) {
-            Ok(()) => Some(self),
-            Err(_) => {
-                // A run goes on without them; the next stretch writes to an empty folder.
-                let _ = std::fs::remove_dir_all(&self.root);
-                None
+            Ok(()) => Ok(Some(self)),
+            Err(Error::Write { .. }) => {
+                std::fs::remove_dir_all(&self.root).map_err(Error::writing(&self.root))?;
+                Ok(None)
             }
+            Err(e) => Err(e),
         }
     }
 }

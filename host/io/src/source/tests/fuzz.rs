@@ -246,21 +246,21 @@ fn bags() {
     fuzz("mcap", Seed::new(t, "", unlocated()));
 }
 
-/// What coverage-guided fuzzers start from, and what they broke once (`host/io/fuzz`).
+/// What coverage-guided fuzzers start from can be read, and what they broke once is an error. The
+/// other tests here damage their like.
 #[cfg(all(feature = "mcap", feature = "pcap"))]
 #[test]
 fn corpus() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
     for kind in ["mcap", "npy", "pcap", "pcd", "ply"] {
-        let files = fs::read_dir(root.join(kind)).unwrap();
-        for (n, file) in files.map(|entry| entry.unwrap().path()).enumerate() {
+        for file in fs::read_dir(root.join(kind)).unwrap().map(|entry| entry.unwrap().path()) {
             let t = Temp::new();
             let name = format!("0.{kind}");
             t.write(&name, fs::read(&file).unwrap());
             let one = if ["mcap", "pcap"].contains(&kind) { name } else { String::new() };
             let seed = Seed::new(t, &one, unlocated());
-            println!("{}: {}", file.display(), seed.read());
-            seed.damage(times(), &mut Random(n as u64));
+            let start = file.file_stem().is_some_and(|stem| stem.len() == 1);
+            assert_eq!(seed.read(), start, "{}", file.display());
         }
     }
 }
