@@ -16,8 +16,8 @@ fn faults_leave_nothing_behind() {
     let mut source = source(&args).unwrap();
     let mut soak = Soak::new(&args, source.as_mut()).unwrap();
     soak.run().unwrap();
-    let of_fault: Vec<_> = soak.findings.of_fault.into_iter().filter(|n| *n != [0, 0]).collect();
-    assert_eq!(of_fault, [[1, 1]; 11]);
+    let met = soak.findings.of_fault.iter().filter(|counts| **counts != [0, 0]);
+    assert!(met.clone().count() == 11 && met.clone().all(|counts| *counts == [1, 1]));
     assert_eq!(soak.findings.verdict(), None);
     // Eleven stretches lose one sweep and a second of them.
     assert_eq!(soak.findings.sweeps(), 22 * 30 - 11);
