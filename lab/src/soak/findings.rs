@@ -14,8 +14,8 @@ pub const PERIODS: usize = 10;
 /// Rounds after which most memory has been in use. Seen to grow by 2.4 MiB in the second round, by
 /// 0.06 in the next nine.
 const IN_USE: u32 = 3;
-/// By how much memory may grow after these, bytes. Seen: 1.5 to 1.7 MiB over six rounds of stretches
-/// of 30 sweeps, which is not explained; 0.02 over 26,279 sweeps in stretches of 100.
+/// By how much memory may grow after these, bytes. Seen: 1.5 to 1.7 MiB over six rounds of
+/// stretches of 30 sweeps, which is not explained; 0.02 over 26,279 sweeps in stretches of 100.
 const GROWTH_MAX: i64 = 4 << 20;
 
 /// A part of the time.
