@@ -34,7 +34,8 @@ pub struct LiveArgs {
     /// Model of the sensor [default: that of the replay]
     #[arg(long, required_unless_present = "replay", conflicts_with = "replay")]
     pub model: Option<SensorModel>,
-    /// What an Ouster says of itself: JSON, as from http://SENSOR/api/v1/sensor/metadata
+    /// What an Ouster says of itself: JSON, as from http://SENSOR/api/v1/sensor/metadata; of an
+    /// HDL-64E the db.xml that came with it
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     pub metadata: Option<PathBuf>,
     /// Where poses come from: `register`, by registration of the sweeps, or an address and port

@@ -7,12 +7,9 @@
 use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
 use glam::{DQuat, DVec3};
-use raywake_io::source::whole;
-use roxmltree::{Document, Node, ParsingOptions};
+use raywake_io::source::boost;
+use roxmltree::{Document, Node};
 use std::path::Path;
-
-/// Attributes of an element that are believed: those of KITTI's files have three at most.
-const ATTRIBUTES_MAX: usize = 100;
 
 /// Value of `state` of a pose that nobody set.
 const UNSET: u64 = 0;
@@ -22,31 +19,17 @@ const UNSET: u64 = 0;
 /// Fails where the file cannot be read, is no whole XML, lacks an element, or has another number of
 /// items than it says.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
-    let text = whole::read_text(path)?;
-    check_size(&text).map_err(|what| Error::input(path, "", what))?;
-    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(&text, options)
-        .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;
-    let file = File { path, document: &document };
+    boost::read(path, |document| labels(path, document))
+}
+
+fn labels(path: &Path, document: &Document) -> Result<Labels, Error> {
+    let file = File { path, document };
     let mut gather = Gather::default();
     let tracklets = file.child(document.root_element(), "tracklets")?;
     for (index, item) in file.items(tracklets)?.into_iter().enumerate() {
         file.track(item, &index.to_string(), &mut gather)?;
     }
     Ok(gather.finish(View::Camera))
-}
-
-/// What would take memory or time out of proportion to the file: text that is defined once and put
-/// in many times, and attributes, each of which is compared with those of its element before it.
-fn check_size(text: &str) -> Result<(), String> {
-    if text.contains("<!ENTITY") {
-        return Err("defines entities, which boost does not".into());
-    }
-    // In the value of an attribute there may be a `>`, but no `<`.
-    match text.split('<').map(|tag| tag.matches('=').count()).max() {
-        Some(most) if most > ATTRIBUTES_MAX => Err(format!("{most} attributes in one element")),
-        _ => Ok(()),
-    }
 }
 
 /// A parsed file with its name.

@@ -22,6 +22,8 @@ mod argoverse;
 mod bag;
 mod bin;
 #[cfg(feature = "pcap")]
+pub mod boost;
+#[cfg(feature = "pcap")]
 pub mod capture;
 mod clouds;
 #[cfg(any(feature = "arrow", feature = "mcap"))]

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Rig;
 
+use super::hdl64::Hdl64;
 use super::ouster::Ouster;
 use super::sensor::Sensor;
 use super::velodyne::{self, Velodyne};
@@ -24,6 +25,8 @@ pub enum SensorModel {
     Vlp32c,
     /// Velodyne's HDL-32E
     Hdl32e,
+    /// Velodyne's HDL-64E, S2 or S3; needs --metadata
+    Hdl64e,
     /// Ouster's OS0, OS1 or OS2; needs --metadata
     #[value(alias = "os1-128")]
     Ouster,
@@ -34,8 +37,8 @@ pub enum SensorModel {
 pub struct LiveSensor(pub(super) Sensor);
 
 impl LiveSensor {
-    /// A sensor of a model. Fails where an Ouster's metadata are missing or make no sense, or where
-    /// there are some of a Velodyne.
+    /// A sensor of a model. Fails where metadata that it needs are missing or make no sense, or
+    /// where there are some that it does not need.
     pub fn of(model: SensorModel, metadata: Option<&Path>) -> Result<LiveSensor, Error> {
         let code = match (model, metadata) {
             (SensorModel::Ouster, Some(path)) => {
@@ -46,8 +49,16 @@ impl LiveSensor {
                             itself (http://SENSOR/api/v1/sensor/metadata)";
                 return Err(Error::Usage(what.into()));
             }
+            (SensorModel::Hdl64e, Some(path)) => {
+                return Ok(LiveSensor(Sensor::Hdl64(Arc::new(Hdl64::read(path)?))));
+            }
+            (SensorModel::Hdl64e, None) => {
+                let what = "an HDL-64E's packets need --metadata, the db.xml that came with it";
+                return Err(Error::Usage(what.into()));
+            }
             (_, Some(_)) => {
-                return Err(Error::Usage("--metadata is for Ouster's sensors".into()));
+                let what = "--metadata is for Ouster's sensors and the HDL-64E";
+                return Err(Error::Usage(what.into()));
             }
             (SensorModel::Vlp16, _) => velodyne::VLP_16,
             (SensorModel::PuckHiRes, _) => velodyne::PUCK_HI_RES,

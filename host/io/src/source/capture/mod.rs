@@ -2,8 +2,9 @@
 //! Velodyne sensor, or of one of several.
 //!
 //! An Ouster's metadata is the file of its capture's name that ends in `.json`, or the one beside
-//! it whose name begins that name. The vehicle frame is the sensor's; a sweep begins at the rear
-//! and is stamped there, by the sensor's clock.
+//! it whose name begins that name; an HDL-64E's calibration is found in the same way and ends in
+//! `.xml`. The vehicle frame is the sensor's; a sweep begins at the rear and is stamped there, by
+//! the sensor's clock.
 //!
 //! Opening walks through the file once and keeps where each sweep begins; a sweep is read when it
 //! is asked for. Left out, and told: packets of others, with a wrong check sum or late, and turns
@@ -12,6 +13,7 @@
 pub mod assembly;
 mod datagrams;
 mod firing;
+mod hdl64;
 pub mod live;
 mod ouster;
 pub mod replay;

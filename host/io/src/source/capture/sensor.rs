@@ -5,6 +5,7 @@ use std::sync::Arc;
 use raywake_core::sweep::Point;
 
 use super::firing::{Firing, TURN};
+use super::hdl64::{self, Hdl64};
 use super::ouster::Ouster;
 use super::velodyne::{self, Velodyne};
 
@@ -34,6 +35,7 @@ pub(super) enum Order {
 #[derive(Clone)]
 pub(super) enum Sensor {
     Velodyne(Arc<Velodyne>),
+    Hdl64(Arc<Hdl64>),
     Ouster(Arc<Ouster>),
 }
 
@@ -41,6 +43,7 @@ impl Sensor {
     pub fn name(&self) -> &str {
         match self {
             Sensor::Velodyne(sensor) => sensor.name(),
+            Sensor::Hdl64(_) => Hdl64::NAME,
             Sensor::Ouster(sensor) => sensor.name(),
         }
     }
@@ -48,13 +51,14 @@ impl Sensor {
     pub fn is_mine(&self, packet: &[u8]) -> bool {
         match self {
             Sensor::Velodyne(sensor) => sensor.is_mine(packet),
+            Sensor::Hdl64(sensor) => sensor.is_mine(packet),
             Sensor::Ouster(sensor) => sensor.is_mine(packet),
         }
     }
 
     pub fn is_sound(&self, packet: &[u8]) -> bool {
         match self {
-            Sensor::Velodyne(_) => true,
+            Sensor::Velodyne(_) | Sensor::Hdl64(_) => true,
             Sensor::Ouster(sensor) => sensor.is_sound(packet),
         }
     }
@@ -63,10 +67,12 @@ impl Sensor {
     pub fn firings(&self, packet: &[u8]) -> impl Iterator<Item = (usize, Firing)> {
         let count = match self {
             Sensor::Velodyne(_) => velodyne::BLOCKS,
+            Sensor::Hdl64(_) => hdl64::FIRINGS,
             Sensor::Ouster(sensor) => sensor.packet_columns,
         };
         let firing = |n| match self {
             Sensor::Velodyne(sensor) => sensor.firing(packet, n),
+            Sensor::Hdl64(sensor) => sensor.firing(packet, n),
             Sensor::Ouster(sensor) => sensor.firing(packet, n),
         };
         (0..count).filter_map(move |n| Some((n, firing(n)?)))
@@ -75,6 +81,7 @@ impl Sensor {
     pub fn returns(&self, packet: &[u8], firing: usize, offset_ns: i64, into: &mut Vec<Point>) {
         match self {
             Sensor::Velodyne(sensor) => sensor.returns(packet, firing, offset_ns, into),
+            Sensor::Hdl64(sensor) => sensor.returns(packet, firing, offset_ns, into),
             Sensor::Ouster(sensor) => sensor.returns(packet, firing, offset_ns, into),
         }
     }
@@ -83,6 +90,7 @@ impl Sensor {
     pub fn returns_of_firing(&self) -> usize {
         match self {
             Sensor::Velodyne(_) => velodyne::MEASUREMENTS,
+            Sensor::Hdl64(_) => hdl64::LASERS,
             Sensor::Ouster(sensor) => sensor.beams(),
         }
     }
@@ -91,6 +99,7 @@ impl Sensor {
     pub fn returns_max(&self) -> usize {
         match self {
             Sensor::Velodyne(sensor) => sensor.returns_max(),
+            Sensor::Hdl64(sensor) => sensor.returns_max(),
             Sensor::Ouster(sensor) => sensor.beams() * (sensor.columns + 1),
         }
     }
@@ -99,6 +108,7 @@ impl Sensor {
     pub fn packet_ns(&self, packet: &[u8]) -> f64 {
         match self {
             Sensor::Velodyne(sensor) => sensor.packet_ns(packet),
+            Sensor::Hdl64(sensor) => sensor.packet_ns(packet),
             Sensor::Ouster(sensor) => {
                 sensor.turn_ns * sensor.packet_columns as f64 / sensor.columns as f64
             }
@@ -108,7 +118,7 @@ impl Sensor {
     /// Time of a turn, ns, where its settings tell it.
     pub fn turn_ns(&self) -> Option<f64> {
         match self {
-            Sensor::Velodyne(_) => None,
+            Sensor::Velodyne(_) | Sensor::Hdl64(_) => None,
             Sensor::Ouster(sensor) => Some(sensor.turn_ns),
         }
     }
@@ -118,7 +128,7 @@ impl Sensor {
     pub fn epoch_ns(&self, clock_ns: u64, now_ns: u64) -> u64 {
         let set = match self {
             Sensor::Ouster(_) => Some(clock_ns).filter(|ns| *ns >= EPOCH_MIN_NS),
-            Sensor::Velodyne(_) => {
+            Sensor::Velodyne(_) | Sensor::Hdl64(_) => {
                 let since_ns = self.since(now_ns % velodyne::CLOCK_NS, clock_ns);
                 let set = since_ns.abs() < SYNCHRONISED_NS;
                 set.then(|| now_ns.wrapping_sub(since_ns as u64))
@@ -130,7 +140,7 @@ impl Sensor {
     /// From one time of its clock to another, ns.
     pub fn since(&self, later_ns: u64, earlier_ns: u64) -> i64 {
         match self {
-            Sensor::Velodyne(_) => {
+            Sensor::Velodyne(_) | Sensor::Hdl64(_) => {
                 let clock = velodyne::CLOCK_NS;
                 let ahead = (later_ns + clock - earlier_ns) % clock;
                 if ahead < clock / 2 { ahead as i64 } else { ahead as i64 - clock as i64 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::datagrams::{Datagram, Datagrams, FrameCounts, Sender};
 use super::firing::Firing;
+use super::hdl64::Hdl64;
 use super::ouster::Ouster;
 use super::sensor::{Order, Sensor};
 use super::velodyne::Velodyne;
@@ -110,8 +111,8 @@ impl Stream {
 /// Streams of a capture while it is walked through.
 struct Streams {
     all: Vec<Stream>,
-    /// What the metadata beside the capture tells of.
-    ouster: Option<Arc<Ouster>>,
+    /// Those that files beside the capture tell of.
+    told: Vec<Sensor>,
     /// Datagrams, and bytes of the largest one.
     seen: u64,
     largest: usize,
@@ -132,8 +133,8 @@ impl Streams {
     /// Begins the stream of a sensor that is met for the first time.
     fn find(&mut self, sender: Sender, packet: &[u8]) -> Option<usize> {
         let velodyne = Velodyne::of(packet).map(|sensor| Sensor::Velodyne(Arc::new(sensor)));
-        let ouster = self.ouster.as_ref().filter(|ouster| ouster.is_mine(packet));
-        let sensor = velodyne.or_else(|| ouster.cloned().map(Sensor::Ouster))?;
+        let told = || self.told.iter().find(|sensor| sensor.is_mine(packet)).cloned();
+        let sensor = velodyne.or_else(told)?;
         let room = self.all.len() < SENSORS_TOLD;
         room.then(|| self.all.push(Stream::new(sender, sensor)))?;
         Some(self.all.len() - 1)
@@ -141,16 +142,16 @@ impl Streams {
 
     /// That nothing of a sensor was found.
     fn none(&self, path: &Path) -> Error {
-        let Streams { ouster, seen, largest, .. } = self;
-        let ouster = match ouster {
-            Some(ouster) => {
-                format!("nor of the {} that the .json beside it tells of", ouster.name())
-            }
-            None => "and Ouster's need the sensor's metadata, NAME.json beside NAME.pcap".into(),
+        let Streams { told, seen, largest, .. } = self;
+        let others = match told.first() {
+            Some(told) => format!("nor of the {} that a file beside it tells of", told.name()),
+            None => "and Ouster's need the sensor's metadata, NAME.json beside NAME.pcap, an \
+                     HDL-64E's its calibration, NAME.xml"
+                .into(),
         };
         let what = format!(
             "no packets of a VLP-16, VLP-32C or HDL-32E among {seen} datagrams of at most \
-             {largest} bytes, {ouster}"
+             {largest} bytes, {others}"
         );
         Error::input(path, "", what)
     }
@@ -161,10 +162,8 @@ pub(super) fn streams(
     path: &Path,
     datagrams: &Datagrams,
 ) -> Result<(Vec<Stream>, FrameCounts), Error> {
-    let ouster = metadata(path)?.map(|path| Ouster::read(&path).map(Arc::new)).transpose();
-    // Of a Velodyne's capture a file of that name is something else.
-    let (ouster, unread) = ouster.map_or_else(|e| (None, Some(e)), |ouster| (ouster, None));
-    let mut streams = Streams { all: Vec::new(), ouster, seen: 0, largest: 0 };
+    let (told, unread) = told(path)?;
+    let mut streams = Streams { all: Vec::new(), told, seen: 0, largest: 0 };
     let counts = datagrams.each(0, |datagram| {
         streams.take(&datagram);
         ControlFlow::Continue(())
@@ -214,13 +213,29 @@ pub(super) fn choose(
     }
 }
 
-/// The metadata that belongs to a capture: the `.json` beside it with the longest name that begins
-/// its own.
-fn metadata(path: &Path) -> Result<Option<PathBuf>, Error> {
+/// Sensors that files beside a capture tell of, and what is wrong with one of these: of another
+/// Velodyne's capture a file of that name is something else.
+fn told(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
+    let json = beside(path, "json")?.map(|path| Ouster::read(&path).map(Arc::new));
+    let xml = beside(path, "xml")?.map(|path| Hdl64::read(&path).map(Arc::new));
+    let both = [json.map(|o| o.map(Sensor::Ouster)), xml.map(|h| h.map(Sensor::Hdl64))];
+    let (mut told, mut unread) = (Vec::new(), None);
+    for one in both.into_iter().flatten() {
+        match one {
+            Ok(sensor) => told.push(sensor),
+            Err(e) => unread = Some(e),
+        }
+    }
+    Ok((told, unread))
+}
+
+/// The file that belongs to a capture: the one beside it with this extension and the longest name
+/// that begins its own.
+fn beside(path: &Path, extension: &str) -> Result<Option<PathBuf>, Error> {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     let mut files = entries(parent.unwrap_or(Path::new(".")))?;
     let own = stem(path);
-    files.retain(|p| p.extension().is_some_and(|e| e == "json") && own.starts_with(&stem(p)));
+    files.retain(|p| p.extension().is_some_and(|e| e == extension) && own.starts_with(&stem(p)));
     Ok(files.into_iter().max_by_key(|p| stem(p).len()))
 }

@@ -12,7 +12,7 @@ use raywake_core::sweep::Point;
 use super::firing::{Firing, REFLECTIVITY_MAX, TURN};
 
 /// Bytes of a packet.
-const PACKET: usize = 1206;
+pub(super) const PACKET: usize = 1206;
 /// Blocks of a packet.
 pub(super) const BLOCKS: usize = 12;
 const BLOCK: usize = 100;
@@ -20,8 +20,9 @@ const BLOCK: usize = 100;
 pub(super) const MEASUREMENTS: usize = 32;
 const BLOCK_HEAD: usize = 4;
 const MEASUREMENT: usize = 3;
-/// First bytes of a block.
+/// First bytes of a block, and of one of an HDL-64E's lower lasers.
 const FLAG: [u8; 2] = [0xff, 0xee];
+const LOWER: [u8; 2] = [0xff, 0xdd];
 /// Where the kind of returns stands, and what it is where each block is there twice: the last
 /// returns, then the strongest.
 const RETURNS_AT: usize = 1204;
@@ -29,7 +30,7 @@ const DUAL: u8 = 0x39;
 const MODEL_AT: usize = 1205;
 const TIME_AT: usize = 1200;
 /// Azimuths of a turn: 0.01°.
-const AZIMUTHS: u32 = 36_000;
+pub(super) const AZIMUTHS: u32 = 36_000;
 const NS_OF_US: u64 = 1000;
 /// Its clock counts to this, ns: an hour.
 pub(super) const CLOCK_NS: u64 = 3_600_000_000_000;
@@ -234,16 +235,11 @@ impl Velodyne {
         is_of(packet, self.model.code)
     }
 
-    /// Time and azimuth of a block. A turn begins at the rear, so that what is ahead is seen at
-    /// once. `None` where the block is damaged, or is there a second time.
+    /// Time and azimuth of a block. `None` where the block is damaged, or is there a second time.
     pub fn firing(&self, packet: &[u8], block: usize) -> Option<Firing> {
         let azimuth = azimuth(packet, block).filter(|_| !is_dual(packet) || block % 2 == 1)?;
-        let turned = (u64::from(azimuth + AZIMUTHS / 2) % u64::from(AZIMUTHS)) * TURN;
-        let us = packet.get(TIME_AT..TIME_AT + 4)?.try_into().ok()?;
-        let clock_ns = u64::from(u32::from_le_bytes(us)) * NS_OF_US;
-        let later_ns = self.block_ns(packet, block) as u64;
-        let angle = (turned / u64::from(AZIMUTHS)) as u16;
-        Some(Firing { clock_ns: (clock_ns + later_ns) % CLOCK_NS, angle, frame: None })
+        let clock_ns = clock_ns(packet)? + self.block_ns(packet, block) as u64;
+        Some(Firing { clock_ns: clock_ns % CLOCK_NS, angle: angle(azimuth), frame: None })
     }
 
     /// Adds the returns of a block, in the frame of the sensor: x ahead, y to the left, z up.
@@ -280,7 +276,9 @@ impl Velodyne {
 }
 
 fn is_of(packet: &[u8], code: u8) -> bool {
-    packet.len() == PACKET && packet[MODEL_AT] == code && packet.starts_with(&FLAG)
+    let whole = packet.len() == PACKET && packet.starts_with(&FLAG);
+    // The byte is something else in packets of an HDL-64E.
+    whole && packet[MODEL_AT] == code && !packet[BLOCK..].starts_with(&LOWER)
 }
 
 fn is_dual(packet: &[u8]) -> bool {
@@ -289,9 +287,45 @@ fn is_dual(packet: &[u8]) -> bool {
 
 /// The azimuth of a block, where it is one.
 fn azimuth(packet: &[u8], block: usize) -> Option<u32> {
-    let head = packet.get(block * BLOCK..)?.get(..BLOCK_HEAD)?;
-    let azimuth = u32::from(u16::from_le_bytes([head[2], head[3]]));
-    (head.starts_with(&FLAG) && azimuth < AZIMUTHS).then_some(azimuth)
+    let block = LaserBlock::of(packet, block)?;
+    (!block.is_lower).then_some(block.azimuth)
+}
+
+/// A block of a packet.
+pub(super) struct LaserBlock<'a> {
+    pub azimuth: u32,
+    /// Of the lower lasers of an HDL-64E.
+    pub is_lower: bool,
+    bytes: &'a [u8],
+}
+
+impl LaserBlock<'_> {
+    /// `None` where there is none, or a damaged one.
+    pub fn of(packet: &[u8], block: usize) -> Option<LaserBlock<'_>> {
+        let bytes = packet.get(block * BLOCK..)?.get(..BLOCK)?;
+        let azimuth = u32::from(u16::from_le_bytes([bytes[2], bytes[3]]));
+        let is_lower = bytes.starts_with(&LOWER);
+        let sound = (is_lower || bytes.starts_with(&FLAG)) && azimuth < AZIMUTHS;
+        sound.then_some(LaserBlock { azimuth, is_lower, bytes })
+    }
+
+    /// Distances and reflectivities, laser by laser.
+    pub fn measurements(&self) -> impl Iterator<Item = (u16, u8)> {
+        let each = self.bytes[BLOCK_HEAD..].chunks_exact(MEASUREMENT);
+        each.map(|m| (u16::from_le_bytes([m[0], m[1]]), m[2]))
+    }
+}
+
+/// When a packet's first firing was, by the sensor's clock, ns.
+pub(super) fn clock_ns(packet: &[u8]) -> Option<u64> {
+    let us = packet.get(TIME_AT..TIME_AT + 4)?.try_into().ok()?;
+    Some(u64::from(u32::from_le_bytes(us)) * NS_OF_US)
+}
+
+/// An azimuth since the rear: a turn begins there, so that what is ahead is seen at once.
+pub(super) fn angle(azimuth: u32) -> u16 {
+    let turned = (u64::from(azimuth + AZIMUTHS / 2) % u64::from(AZIMUTHS)) * TURN;
+    (turned / u64::from(AZIMUTHS)) as u16
 }
 
 /// How fast it turns within a packet, azimuths a ns; `span_ns` is the time from the first block to

@@ -12,7 +12,10 @@ use crate::source::tests::fuzz::{Random, damaged};
 const NOW_NS: u64 = 1_700_000_000_000_000_000;
 
 /// The sweeps of packets that come one after the other, and what became of these.
-fn assembled(sensor: &LiveSensor, packets: &[Vec<u8>]) -> (Vec<SweepData>, PacketCounts) {
+pub(super) fn assembled(
+    sensor: &LiveSensor,
+    packets: &[Vec<u8>],
+) -> (Vec<SweepData>, PacketCounts) {
     let (mut assembler, mut sweeps) = (Assembler::new(sensor.clone()), Vec::new());
     for packet in packets {
         assembler.take(packet, Instant::now(), NOW_NS, |sweep| {
@@ -100,14 +103,21 @@ fn what_no_turn_ends_is_bounded() {
 /// Any bytes.
 #[test]
 fn nonsense_is_counted() {
+    spoil(&vlp(), &turns(0..4000));
+}
+
+/// Of packets of a sensor every fourth is damaged.
+pub(super) fn spoil(sensor: &LiveSensor, packets: &[Vec<u8>]) {
     let mut random = Random(20);
-    let spoil =
-        |packet| if random.below(4) == 0 { damaged(packet, &mut random) } else { packet.to_vec() };
-    let packets: Vec<Vec<u8>> = turns(0..4000).iter().map(|p| p.as_slice()).map(spoil).collect();
-    let (live, counts) = assembled(&vlp(), &packets);
-    assert_eq!(counts.packets + counts.foreign, 4000);
-    assert!(counts.foreign > 100 && !live.is_empty(), "{counts:?}");
-    assert!(live.iter().all(|sweep| sweep.points.len() <= vlp().returns_max()));
+    let spoil = |packet: &Vec<u8>| match random.below(4) {
+        0 => damaged(packet, &mut random),
+        _ => packet.clone(),
+    };
+    let spoilt: Vec<Vec<u8>> = packets.iter().map(spoil).collect();
+    let (live, counts) = assembled(sensor, &spoilt);
+    assert_eq!(counts.packets + counts.foreign, packets.len() as u64);
+    assert!(counts.foreign > packets.len() as u64 / 40 && !live.is_empty(), "{counts:?}");
+    assert!(live.iter().all(|sweep| sweep.points.len() <= sensor.returns_max()));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod arriving;
 mod disorder;
+mod hdl64;
 
 use std::fs;
 
@@ -9,6 +10,7 @@ use etherparse::PacketBuilder;
 use md5::{Digest, Md5};
 use raywake_registration::Odometry;
 
+use super::hdl64::Hdl64;
 use super::ouster::Ouster;
 use super::velodyne::Velodyne;
 use super::*;

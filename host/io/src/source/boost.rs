@@ -1,0 +1,37 @@
+//! XML as boost serialises it: tracklets of KITTI's drives, calibrations of Velodyne's.
+
+use std::path::Path;
+
+use roxmltree::{Document, ParsingOptions};
+
+use super::whole;
+use crate::Error;
+
+/// Attributes of an element that are believed: those of such files have five at most.
+const ATTRIBUTES_MAX: usize = 100;
+
+/// What `each` makes of a file.
+///
+/// # Errors
+/// The file cannot be read, is no whole XML, or would take memory or time out of proportion to its
+/// size: text that is defined once and put in many times, and attributes, each of which is compared
+/// with those of its element before it. Or what `each` returns.
+pub fn read<T>(path: &Path, each: impl FnOnce(&Document) -> Result<T, Error>) -> Result<T, Error> {
+    let text = whole::read_text(path)?;
+    check_size(&text).map_err(|what| Error::input(path, "", what))?;
+    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(&text, options)
+        .map_err(|e| Error::input(path, format!("line {}", e.pos().row), format!("no XML: {e}")))?;
+    each(&document)
+}
+
+fn check_size(text: &str) -> Result<(), String> {
+    if text.contains("<!ENTITY") {
+        return Err("defines entities, which boost does not".into());
+    }
+    // In the value of an attribute there may be a `>`, but no `<`.
+    match text.split('<').map(|tag| tag.matches('=').count()).max() {
+        Some(most) if most > ATTRIBUTES_MAX => Err(format!("{most} attributes in one element")),
+        _ => Ok(()),
+    }
+}
