@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use raywake_core::sweep::Point;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::sink::objects::TrackedObject;
 use raywake_io::sink::streams::{Content, StreamTargets};
 use raywake_io::source::SweepData;
+use raywake_objects::tracked::TrackedObject;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};

@@ -19,6 +19,7 @@ pub mod params;
 #[path = "../../src/random.rs"]
 mod random;
 pub mod spline;
+pub mod tracked;
 
 /// Returns that a track keeps, and an estimate is made of, at most.
 pub const RETURNS_MAX: usize = 8192;

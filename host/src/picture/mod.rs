@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use raywake_core::output::ColumnFlow;
 use raywake_core::params::Profile;
 use raywake_io::sink::feather::Voxel;
-use raywake_io::sink::objects::TrackedObject;
+use raywake_objects::tracked::TrackedObject;
 
 use crate::args::{PictureFrame, Views};
 
@@ -48,7 +48,12 @@ pub enum Subject<'a> {
         voxel_m: f64,
     },
     /// The objects in the sweep.
-    Objects(&'a [TrackedObject]),
+    Objects {
+        /// What they are.
+        objects: &'a [TrackedObject],
+        /// The way of each so far, in the world, m.
+        ways: &'a [Vec<[f64; 3]>],
+    },
 }
 
 /// Where the pictures of a recording go.

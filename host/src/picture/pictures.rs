@@ -116,7 +116,7 @@ fn view(sweep: &SweepData, subject: &Subject) -> (Panel, Look) {
         Subject::Map { voxels, origin_m, voxel_m } => {
             map::view(&sweep.world_from_vehicle, voxels, *origin_m, *voxel_m)
         }
-        Subject::Objects(objects) => tracks::view(sweep, objects),
+        Subject::Objects { objects, ways } => tracks::view(sweep, objects, ways),
     }
 }
 

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
-use raywake_io::sink::objects::TrackedObject;
 use raywake_io::source::SweepData;
+use raywake_objects::tracked::TrackedObject;
 use raywake_render::{Look, Outline, Panel, Sign, Trail, colours};
 
 use super::drawing::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
@@ -15,13 +15,17 @@ const CELL_M: f64 = 0.4;
 /// The smallest side of a box, m.
 const SIDE_MIN_M: f32 = 0.4;
 
-pub(super) fn view(sweep: &SweepData, objects: &[TrackedObject]) -> (Panel, Look) {
+pub(super) fn view(
+    sweep: &SweepData,
+    objects: &[TrackedObject],
+    ways: &[Vec<[f64; 3]>],
+) -> (Panel, Look) {
     let pose = &sweep.world_from_vehicle;
     let mut panel = Panel { title: "Objects".into(), points: places(sweep), ..Panel::default() };
-    for object in objects {
+    for (object, way) in objects.iter().zip(ways) {
         let outline = outline(object, pose);
         if outline.arrow.is_some() {
-            let places = object.way.iter().map(|at| seen_from(pose, *at)).collect();
+            let places = way.iter().map(|at| seen_from(pose, *at)).collect();
             panel.trails.push(Trail { places, colour: outline.colour, width: WIDE });
         }
         panel.outlines.push(outline);

@@ -1,7 +1,6 @@
 //! `raywake track`: objects of a recorded drive.
 
 mod ground;
-mod live;
 mod report;
 mod tracker;
 mod write;

@@ -13,16 +13,15 @@ use raywake_objects::front_end::{
 use raywake_objects::object_box::ObjectBox;
 
 use raywake_objects::params::TrackingParams;
+use raywake_objects::tracked::TrackedObject;
 use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::Ground;
-use super::live::seen;
 use crate::config::Settings;
 use crate::console::interrupted;
 use crate::drive::Drive;
 use crate::error::RunError;
 use crate::team::{THREADS_MAX, ThreadTeam};
-use raywake_io::sink::objects::TrackedObject;
 use raywake_io::source::SweepData;
 
 /// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
@@ -216,10 +215,10 @@ impl Tracker {
         self.parts.front_end.members().map(|(n, slot)| (n, self.parts.tracks[slot].id))
     }
 
-    /// The objects of the last step's sweep: those of the tracks that are put out.
-    pub fn objects(&self) -> impl Iterator<Item = TrackedObject> {
+    /// The objects of the last step's sweep, with their tracks: those that are put out.
+    pub fn objects(&self) -> impl Iterator<Item = (TrackedObject, &Track)> {
         let shown = self.parts.tracks.iter().filter(|t| self.shows(t));
-        shown.filter_map(|track| seen(&self.params, track))
+        shown.filter_map(|track| Some((track.object(&self.params)?, track)))
     }
 
     /// Whether a track is put out: that of an object, or any.

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use raywake_objects::front_end::StateVariances;
+use raywake_objects::front_end::{StateVariances, Track};
 use raywake_objects::object_box::ObjectBox;
+use raywake_objects::tracked::TrackedObject;
 use raywake_objects::{ObjectReturn, ObjectState};
 
 use super::{Ended, Tracker};
@@ -12,7 +13,6 @@ use crate::console::await_viewer;
 use crate::picture::{PictureFiles, Pictures, Subject};
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::sink::objects::TrackedObject;
 use raywake_io::sink::streams::{Content, Pace};
 use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{atomic, clouds, feather};
@@ -79,10 +79,15 @@ impl Files {
         self.of_returns.clear();
         self.of_returns.resize(sweep.points.len(), -1);
         tracker.members().for_each(|(n, track)| self.of_returns[n] = track as i32);
-        let objects: Vec<TrackedObject> = tracker.objects().collect();
+        let (objects, ways): (Vec<TrackedObject>, Vec<Vec<[f64; 3]>>) =
+            tracker.objects().map(|(object, track)| (object, way(track))).unzip();
         let moving = objects.iter().filter(|o| o.velocity.is_some()).count();
         let figures = [("moving objects", moving as f64), ("ms a sweep", ms)];
-        self.pictures.write(sweep, &Subject::Objects(&objects), &figures)?;
+        self.pictures.write(
+            sweep,
+            &Subject::Objects { objects: &objects, ways: &ways },
+            &figures,
+        )?;
         if let Some(bag) = &mut self.bag {
             bag.objects(sweep, &self.of_returns, &objects)?;
         }
@@ -148,6 +153,11 @@ impl Files {
         objects(&mut t, &self.rows);
         t.write(&folder.join("tracks.feather"), &[feather::class_names()])
     }
+}
+
+/// Where a track was, in the world, m.
+fn way(track: &Track) -> Vec<[f64; 3]> {
+    track.history().iter().map(|state| track.in_world(state.position)).collect()
 }
 
 /// What a track is beside its states.

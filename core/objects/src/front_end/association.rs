@@ -29,12 +29,12 @@ impl Association {
     }
 
     /// Finds the segment that continues each live track.
-    pub fn find(
+    pub fn find<const R: usize, const H: usize>(
         &mut self,
         params: &FrontEndParams,
         batch: &Batch,
         segments: &[Segment],
-        tracks: &[Track],
+        tracks: &[Track<R, H>],
     ) {
         self.live.clear();
         for (slot, track) in tracks.iter().enumerate() {
@@ -76,10 +76,10 @@ impl Association {
 
 /// Squared Mahalanobis distance of a segment from a track's prediction, as a fraction of the gate;
 /// none beyond it.
-fn gate_share(
+fn gate_share<const R: usize, const H: usize>(
     params: &FrontEndParams,
     batch: &Batch,
-    track: &Track,
+    track: &Track<R, H>,
     ekf: &CentroidEkf,
     segment: &Segment,
 ) -> Option<f64> {

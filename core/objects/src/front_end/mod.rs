@@ -106,11 +106,11 @@ impl FrontEnd {
     /// Continues the tracks with what has been taken since the last step. `tracks` are the same as
     /// then, the first [`TRACKS_MAX`] of them are used; those that have ended can be looked at
     /// until the next step.
-    pub fn step(
+    pub fn step<const R: usize, const H: usize>(
         &mut self,
         params: &FrontEndParams,
         map: Option<&GroundMap>,
-        tracks: &mut [Track],
+        tracks: &mut [Track<R, H>],
     ) -> TrackingCounts {
         let used = tracks.len().min(TRACKS_MAX);
         let tracks = &mut tracks[..used];
@@ -148,7 +148,7 @@ impl FrontEnd {
     }
 
     /// Ends all tracks, as at the end of a drive. Returns how many there were.
-    pub fn finish(&mut self, tracks: &mut [Track]) -> u64 {
+    pub fn finish<const R: usize, const H: usize>(&mut self, tracks: &mut [Track<R, H>]) -> u64 {
         free_ended(tracks);
         end(tracks, |_| true)
     }
@@ -163,10 +163,10 @@ impl FrontEnd {
     }
 
     /// Updates the tracks that have a segment; the others wait, or end.
-    fn continue_tracks(
+    fn continue_tracks<const R: usize, const H: usize>(
         &mut self,
         params: &FrontEndParams,
-        tracks: &mut [Track],
+        tracks: &mut [Track<R, H>],
         counts: &mut TrackingCounts,
     ) {
         self.unassigned.clear();
@@ -192,10 +192,10 @@ impl FrontEnd {
     }
 
     /// Begins a track with each segment that has none, as far as there is room: largest first.
-    fn begin_tracks(
+    fn begin_tracks<const R: usize, const H: usize>(
         &mut self,
         params: &FrontEndParams,
-        tracks: &mut [Track],
+        tracks: &mut [Track<R, H>],
         counts: &mut TrackingCounts,
     ) {
         let segments = self.segments.all();
@@ -215,7 +215,7 @@ impl FrontEnd {
     }
 
     /// Hands the returns of every segment to its track.
-    fn distribute(&self, tracks: &mut [Track]) {
+    fn distribute<const R: usize, const H: usize>(&self, tracks: &mut [Track<R, H>]) {
         let Some(stamp_s) = self.last_s else { return };
         for (n, one) in self.batch.returns.iter().enumerate() {
             let Some(segment) = self.segments.of_return(n) else { continue };
@@ -229,12 +229,15 @@ impl FrontEnd {
 }
 
 /// Frees the room of tracks that have ended.
-fn free_ended(tracks: &mut [Track]) {
+fn free_ended<const R: usize, const H: usize>(tracks: &mut [Track<R, H>]) {
     tracks.iter_mut().filter(|t| t.life == Life::Ended).for_each(Track::free);
 }
 
 /// Ends live tracks. Returns how many.
-fn end(tracks: &mut [Track], which: impl Fn(&Track) -> bool) -> u64 {
+fn end<const R: usize, const H: usize>(
+    tracks: &mut [Track<R, H>],
+    which: impl Fn(&Track<R, H>) -> bool,
+) -> u64 {
     let mut ended = 0;
     for track in tracks.iter_mut().filter(|t| t.life == Life::Live && which(t)) {
         track.life = Life::Ended;

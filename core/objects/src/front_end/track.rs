@@ -28,9 +28,10 @@ pub enum Life {
     Ended,
 }
 
-/// An object followed over time.
+/// An object followed over time, with room for so many of its returns and states: all that an
+/// estimate at its end takes, unless less is asked for.
 #[derive(Clone, Debug, Default)]
-pub struct Track {
+pub struct Track<const RETURNS: usize = RETURNS_MAX, const HISTORY: usize = HISTORY_MAX> {
     /// Number among all tracks, from 0 in the order of their births.
     pub id: u32,
     /// Where it is in its life.
@@ -42,13 +43,13 @@ pub struct Track {
     /// Centroids observed.
     pub observations: u32,
     pub(super) ekf: Option<CentroidEkf>,
-    history: Thinned<ObjectState, HISTORY_MAX>,
-    returns: Thinned<ObjectReturn, RETURNS_MAX>,
+    history: Thinned<ObjectState, HISTORY>,
+    returns: Thinned<ObjectReturn, RETURNS>,
     latest: Thinned<ObjectReturn, LATEST_MAX>,
     told: Told,
     /// Mean P(moves) of its returns at every state of the history.
-    p_moves: Thinned<f32, HISTORY_MAX>,
-    variances: Thinned<StateVariances, HISTORY_MAX>,
+    p_moves: Thinned<f32, HISTORY>,
+    variances: Thinned<StateVariances, HISTORY>,
 }
 
 /// How sure the filter is of a state.
@@ -91,9 +92,9 @@ impl Told {
     const NONE: Told = Told { p_moves: (0.0, 0), classes: [0; ColumnClass::ALL.len()], moving: 0 };
 }
 
-impl Track {
+impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     /// Room for a track.
-    pub const fn new() -> Track {
+    pub const fn new() -> Self {
         Track {
             id: 0,
             life: Life::Free,
@@ -136,9 +137,14 @@ impl Track {
         self.variances.kept()
     }
 
+    /// How sure the filter is of its state.
+    pub fn variances_now(&self) -> Option<StateVariances> {
+        self.ekf.as_ref().map(StateVariances::of)
+    }
+
     /// From the place of its first state to that of its last one, along the ground, m.
     pub fn moved_m(&self) -> f64 {
-        let (Some(first), Some(last)) = (self.history().first(), self.history().last()) else {
+        let (Some(first), Some(last)) = (self.history().first(), self.state()) else {
             return 0.0;
         };
         let [x, y] = [0, 1].map(|a| last.position[a] - first.position[a]);
@@ -149,6 +155,12 @@ impl Track {
     /// not tell, 0 to 1 else.
     pub fn p_moves(&self) -> &[f32] {
         self.p_moves.kept()
+    }
+
+    /// That of its last observation; none where the flow does not tell.
+    pub fn p_moves_now(&self) -> Option<f32> {
+        let (sum, returns) = self.told.p_moves;
+        (returns > 0).then(|| sum / returns as f32)
     }
 
     /// What the encoder takes most of its returns for; none where it does not tell.
@@ -236,8 +248,7 @@ impl Track {
         if self.life != Life::Live || self.p_moves.seen() >= self.history.seen() {
             return;
         }
-        let (sum, returns) = self.told.p_moves;
-        let mean = if returns > 0 { sum / returns as f32 } else { f32::NAN };
+        let mean = self.p_moves_now().unwrap_or(f32::NAN);
         self.told.moving += u32::from(mean >= params.track_moves_min);
         self.p_moves.push(mean);
     }

@@ -2,8 +2,8 @@
 
 use raywake_core::output::PairFlows;
 use raywake_core::sweep::Point;
+use raywake_objects::tracked::TrackedObject;
 
-use super::objects::TrackedObject;
 use super::streams::{Content, StreamTargets};
 use crate::Error;
 use crate::source::SweepData;
@@ -37,6 +37,11 @@ impl Absent {
 
     /// Never called.
     pub fn objects(&mut self, _: &SweepData, _: &[i32], _: &[TrackedObject]) -> Result<(), Error> {
+        match *self {}
+    }
+
+    /// Never called.
+    pub fn boxes(&mut self, _: &SweepData, _: &[TrackedObject]) -> Result<(), Error> {
         match *self {}
     }
 

@@ -8,7 +8,6 @@ pub mod bag;
 pub mod clouds;
 pub mod feather;
 pub mod flow_tables;
-pub mod objects;
 #[cfg_attr(not(feature = "parquet"), path = "parquet_absent.rs")]
 pub mod parquet;
 pub mod streams;

@@ -36,7 +36,9 @@ pub enum Pace {
 pub enum Content {
     /// The flow of every sweep.
     Flow,
-    /// The objects in every sweep.
+    /// The flow of every sweep and the objects in it.
+    FlowAndObjects,
+    /// The objects in every sweep, and whose returns are which.
     Objects,
     /// The returns of every sweep.
     Clouds,

@@ -1,8 +1,9 @@
 //! What moves as `visualization_msgs/Marker`, which rviz shows.
 
+use raywake_objects::tracked::TrackedObject;
+
 use super::cdr::Cdr;
 use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
-use crate::sink::objects::TrackedObject;
 
 /// `CUBE` and `LINE_LIST` of the message.
 const CUBE: u32 = 1;

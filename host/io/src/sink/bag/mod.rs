@@ -21,7 +21,7 @@
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all that is known |
 //! | `/raywake/tracked_objects` | `autoware_perception_msgs/TrackedObjects` | for Autoware |
 //!
-//! A stream of clouds has `/tf` and `/points`: `x y z intensity`, and `time`, s after the stamp.
+//! A stream of both has all but `/raywake/tracked_points`. A stream of clouds has `/tf` and `/points`: `x y z intensity`, and `time`, s after the stamp.
 //!
 //! `track` is an int32, the number of the return's track, or -1; a marker has the same number.
 
@@ -38,8 +38,8 @@ mod tracked;
 use raywake_core::output::{ColumnFlow, PairFlows};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
+use raywake_objects::tracked::TrackedObject;
 
-use super::objects::TrackedObject;
 use super::streams::{Content, StreamTargets};
 use crate::Error;
 use crate::source::SweepData;
@@ -80,6 +80,7 @@ const fn topics(content: Content) -> &'static [Topic] {
     match content {
         Content::Flow => &[TF, POINTS, MOTION, SCENES],
         Content::Clouds => &[TF, CLOUDS],
+        Content::FlowAndObjects => &[TF, POINTS, MOTION, BOXES, SCENES, TRACKED],
         Content::Objects => &[TF, TRACKED_POINTS, BOXES, SCENES, TRACKED],
     }
 }
@@ -140,6 +141,12 @@ impl BagSink {
         let stamp_ns = self.stamp_ns(sweep);
         self.write(&TF, stamp_ns, transform(stamp_ns, &sweep.world_from_vehicle))?;
         self.write(&TRACKED_POINTS, stamp_ns, points::with_tracks(stamp_ns, sweep, tracks))?;
+        self.boxes(sweep, objects)
+    }
+
+    /// Writes the objects in a sweep that is written.
+    pub fn boxes(&mut self, sweep: &SweepData, objects: &[TrackedObject]) -> Result<(), Error> {
+        let stamp_ns = self.stamp_ns(sweep);
         for object in objects {
             self.write(&BOXES, stamp_ns, markers::cube(stamp_ns, object))?;
         }

@@ -1,9 +1,10 @@
 //! What moves as `foxglove_msgs/SceneUpdate`, which Foxglove and Lichtblick show, with what is
 //! known of an object where it is clicked on.
 
+use raywake_objects::tracked::TrackedObject;
+
 use super::cdr::Cdr;
 use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
-use crate::sink::objects::TrackedObject;
 
 /// Height of a name, m, and how far above its box it is, m.
 const TEXT_M: f64 = 0.6;

@@ -5,10 +5,10 @@
 
 use raywake_core::encoder::ColumnClass;
 use raywake_objects::front_end::StateVariances;
+use raywake_objects::tracked::TrackedObject;
 
 use super::WORLD;
 use super::cdr::Cdr;
-use crate::sink::objects::TrackedObject;
 
 /// `UNKNOWN`, `CAR`, `TRUCK`, `BICYCLE` and `PEDESTRIAN` of `ObjectClassification`.
 const UNKNOWN: u8 = 0;
