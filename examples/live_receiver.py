@@ -1,17 +1,23 @@
 #!/usr/bin/env python3
 """Prints what `raywake live --send 127.0.0.1:9000` sends.
 
-A datagram, little-endian, is a head and records of one kind. The head: `RWF1`, the kind (u16), how
+A datagram, little-endian, is a head and records of one kind. The head: `RWF2`, the kind (u16), how
 many records follow, the number of this datagram and how many there are of its kind (u16 each), the
 sweep's number (u32) and its stamp (u64, ns since 1970). Places, in m, and velocities over ground,
 in m/s, are along the vehicle's axes at that sweep. Kinds:
 
 0 sweep, after all else of it: x, y, z and quaternion x, y, z, w of the vehicle in the world (f64);
   time since the sweep before, s, and latency from the last packet, ms (f32); sweeps left out so far
-  (u64); columns and tracklets that were sent (u32); stamp of the sweep before, ns (u64)
+  (u64); columns, tracklets and objects that were sent, and 0 (u32); stamp of the sweep before, ns
+  (u64)
 1 column that moves in the sweep before: x, y, velocity x, y, covariance xx, xy, yy, P(moves) (f32)
 2 tracklet that moves: x, y, velocity x, y, turn rate, rad/s (f32); observations (u32); standard
   deviation of the speed, P(moves) (f32)
+3 object in the sweep before, with `--objects`: number, observations, class (u32: 4 car, 5 large
+  vehicle, 6 person, 7 two-wheeler, others stand, 255 not known); its share of the returns, P(moves)
+  (NaN: not known), time since the stamp when last seen, x, y, z of its middle, heading, length,
+  width, height, velocity x, y, turn rate, covariance xx, xy, yy of its place, variances of heading
+  and speed (f32)
 """
 
 import socket
@@ -19,7 +25,15 @@ import struct
 import sys
 
 HEAD = struct.Struct("<4s4HIQ")
-RECORDS = {0: struct.Struct("<7d2fQ2IQ"), 1: struct.Struct("<8f"), 2: struct.Struct("<5fI2f")}
+RECORDS = {
+    0: struct.Struct("<7d2fQ4IQ"),
+    1: struct.Struct("<8f"),
+    2: struct.Struct("<5fI2f"),
+    3: struct.Struct("<3I18f"),
+}
+
+
+CLASSES = {4: "car", 5: "large vehicle", 6: "person", 7: "two-wheeler"}
 
 
 def main(port: int) -> None:
@@ -29,11 +43,18 @@ def main(port: int) -> None:
     while True:
         datagram = receiver.recv(2048)
         magic, kind, count, _part, _parts, sweep, _stamp = HEAD.unpack_from(datagram)
-        assert magic == b"RWF1", magic
+        assert magic == b"RWF2", magic
         record = RECORDS[kind]
         assert len(datagram) == HEAD.size + count * record.size
         for values in record.iter_unpack(datagram[HEAD.size :]):
-            if kind == 2:
+            if kind == 3:
+                number, _, kind_of_object = values[:3]
+                x, y = values[6:8]
+                u, v = values[13:15]
+                if (u, v) != (0.0, 0.0):
+                    name = CLASSES.get(kind_of_object, "object")
+                    print(f"  {name} {number} at ({x:.1f}, {y:.1f}) m: ({u:.1f}, {v:.1f}) m/s")
+            elif kind == 2:
                 fastest = max(fastest, (values[2] ** 2 + values[3] ** 2) ** 0.5)
             elif kind == 0:
                 latency, left_out, columns, tracklets = values[8:12]

@@ -23,7 +23,7 @@ const MAY_NAME: [(&str, &[&str]); 15] = [
     ("host/io", &["raywake-core", "raywake-objects", "raywake-registration", "raywake-sim"]),
     ("host/render", &[]),
     ("host/team", &["raywake-core", "raywake-simd", "raywake-alloc-guard"]),
-    ("host/embed", &["raywake-core", "raywake-registration", "raywake-team"]),
+    ("host/embed", &["raywake-core", "raywake-objects", "raywake-registration", "raywake-team"]),
     ("host/embed/bare", &["raywake-core", "raywake-embed"]),
     ("host/capi", &["raywake-core", "raywake-embed", "raywake-registration"]),
     (

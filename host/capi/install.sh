@@ -16,7 +16,8 @@ version=$(cargo pkgid -p raywake-capi | sed 's/.*[#@]//')
 mkdir -p "$prefix/include" "$prefix/lib/pkgconfig"
 install -m 644 include/raywake.h "$prefix/include/"
 install -m 644 "$built/libraywake_c.a" "$prefix/lib/libraywake.a"
-install -m 755 "$built/libraywake_c.so" "$prefix/lib/libraywake.so.1"
-ln -sf libraywake.so.1 "$prefix/lib/libraywake.so"
+abi=$(sed -n 's/^#define RAYWAKE_ABI_VERSION //p' include/raywake.h)
+install -m 755 "$built/libraywake_c.so" "$prefix/lib/libraywake.so.$abi"
+ln -sf "libraywake.so.$abi" "$prefix/lib/libraywake.so"
 sed -e "s|@PREFIX@|$prefix|" -e "s|@VERSION@|$version|" raywake.pc.in \
     >"$prefix/lib/pkgconfig/raywake.pc"

@@ -83,10 +83,10 @@ fn socket() -> (UdpSocket, String) {
 }
 
 /// Kinds of datagrams that arrived, and records in them, until none come any more.
-fn received(socket: &UdpSocket) -> [u64; 3] {
-    let (mut records, mut datagram) = ([0; 3], [0; 2000]);
+fn received(socket: &UdpSocket) -> [u64; 4] {
+    let (mut records, mut datagram) = ([0; 4], [0; 2000]);
     while let Ok(length) = socket.recv(&mut datagram) {
-        assert!(datagram.starts_with(b"RWF1") && length > 24);
+        assert!(datagram.starts_with(b"RWF2") && length > 24);
         records[datagram[4] as usize] += u64::from(datagram[6]);
     }
     records
@@ -105,14 +105,18 @@ fn a_replay_has_the_digest_of_the_capture() {
         socket.set_read_timeout(Some(Duration::from_secs(2))).unwrap();
         received(&socket)
     });
-    let to = ["--mcap", mcap.to_str().unwrap(), "--send", &address];
+    let to = ["--objects", "--mcap", mcap.to_str().unwrap(), "--send", &address];
     let (o, s) = replayed(&t, &[&BACKEND[..], &to].concat());
     accounted(&s);
     assert!(o.stdout.contains("simulated OS1-128 at 127.0.0.1:"), "{}", o.stdout);
-    let [sweeps, columns, tracklets] = listening.join().unwrap();
+    let [sweeps, columns, tracklets, objects] = listening.join().unwrap();
     let (done, pairs) = (count(&s, "sweeps", "done"), count(&s, "sweeps", "pairs"));
     assert_eq!((sweeps, columns), (done, count(&s, "sweeps", "moving_columns")));
     assert!(columns > 100 && tracklets > 0, "{columns} {tracklets}");
+    let moving = count(&s, "sweeps", "moving_objects");
+    assert!(moving > 0 && objects >= moving, "{moving} of {objects}");
+    let known = ["updated", "waiting"].map(|name| count(&s, "tracking", name));
+    assert!(known.iter().sum::<u64>() >= objects, "{s}");
     let kept = ["recorded", "unrecorded"].map(|name| count(&s, "sweeps", name));
     assert_eq!(kept.iter().sum::<u64>(), pairs);
     assert!(s["latency_ms"]["median"].as_f64() > Some(0.0) && s["turn_ms"] == 100.0);

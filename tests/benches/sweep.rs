@@ -68,6 +68,7 @@ fn embedded(sweeps: &[SimSweep]) {
         rig: setup.rig.clone(),
         points_max: setup.profile.returns(),
         registers: false,
+        objects: false,
     };
     let mut team = TeamEstimator::on_heap(&options, 1).unwrap_or_else(|e| panic!("{e}"));
     let mut variants = ["program", "library"].map(|name| Variant::new(format!("step, {name}")));

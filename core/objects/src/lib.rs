@@ -75,6 +75,6 @@ impl ObjectState {
 }
 
 /// An angle within half a turn of zero.
-pub(crate) fn wrap_angle(angle: f64) -> f64 {
+pub fn wrap_angle(angle: f64) -> f64 {
     angle - core::f64::consts::TAU * libm::round(angle / core::f64::consts::TAU)
 }

@@ -130,3 +130,56 @@ impl ObjectTracker {
         shown.filter_map(|track| track.object(params))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::front_end::scene::{OFFSETS, Thing, rig, seen};
+    use raywake_core::pose::{Pose, Twist};
+    use std::vec::Vec;
+
+    const PARAMS: TrackingParams = TrackingParams::DEFAULT;
+
+    /// Without the flow, a car that drives and one that stands: what is kept of the past makes no
+    /// difference.
+    #[test]
+    fn what_a_track_keeps_does_not_matter() {
+        let mut short = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
+        let mut front_end = raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new());
+        let mut tracks = std::vec![Track::<8, 16>::new(); TRACKS_MAX];
+        let things = [Thing::car(-20.0, 6.0, [12.0, 0.0]), Thing::car(8.0, -5.0, [0.0; 2])];
+        let rig = rig(1, OFFSETS);
+        let mut last = Vec::new();
+        for n in 0..30 {
+            let stamp_s = 100.0 + 0.1 * f64::from(n);
+            let moved = things.map(|thing| {
+                let [u, v] = thing.velocity;
+                let at = [0.1 * f64::from(n) * u, 0.1 * f64::from(n) * v];
+                Thing { at: [thing.at[0] + at[0], thing.at[1] + at[1]], ..thing }
+            });
+            let points = seen(&moved, 0.0, 0.0, 0);
+            let (world_from_vehicle, twist) = (Pose::IDENTITY, Twist::ZERO);
+            let sweep = Sweep { stamp_s, points: &points, world_from_vehicle, twist };
+            let counts = short.step(&PARAMS, &rig, &sweep, None);
+            front_end.take(&PARAMS.front_end, &rig, &sweep, None);
+            assert_eq!(front_end.step(&PARAMS.front_end, None, &mut tracks), counts);
+            let all = short.tracks.iter().filter_map(|track| track.object(&PARAMS));
+            last = all.collect::<Vec<_>>();
+            let other: Vec<_> = tracks.iter().filter_map(|track| track.object(&PARAMS)).collect();
+            assert_eq!(last, other, "sweep {n}");
+            assert_eq!(last.len(), if n < 2 { 0 } else { 2 }, "sweep {n}");
+            assert!(last.iter().all(|object| object.time_s == stamp_s));
+        }
+        let [moving, standing] = [Some(true), None].map(|moves| {
+            last.iter().find(|o| o.velocity.map(|_| true) == moves).expect("one of each")
+        });
+        let velocity = moving.velocity.unwrap();
+        assert!((velocity[0] - 12.0).abs() < 0.3 && velocity[1].abs() < 0.3, "{velocity:?}");
+        assert!((moving.centre[0] - (-20.0 + 2.9 * 12.0)).abs() < 0.3, "{moving:?}");
+        assert!((standing.centre[0] - 8.0).abs() < 0.2 && standing.observations == 30);
+        assert!((standing.size[0] - 4.0).abs() < 0.4, "{standing:?}");
+        // Nobody tells what they are.
+        assert_eq!(short.objects(&PARAMS).count(), 0);
+    }
+}

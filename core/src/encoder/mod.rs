@@ -60,6 +60,14 @@ impl ColumnClass {
         ColumnClass::TwoWheeler,
     ];
 
+    /// What stands for none where classes are numbers.
+    pub const NONE: u8 = u8::MAX;
+
+    /// Its number, or [`ColumnClass::NONE`].
+    pub fn number(of: Option<ColumnClass>) -> u8 {
+        of.map_or(ColumnClass::NONE, |class| class as u8)
+    }
+
     /// In words.
     pub const fn name(self) -> &'static str {
         match self {

@@ -49,6 +49,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     raywake_options options = rig_of(file);
+    options.objects = 1;
     options.threads = argc > 2 ? (uint32_t)strtoul(argv[2], NULL, 10) : 0;
 
     raywake_error error;
@@ -62,6 +63,7 @@ int main(int argc, char **argv) {
     size_t room = 0, steps = 0;
     file_point *points = NULL;
     raywake_point *flow = NULL;
+    static raywake_object objects[RAYWAKE_OBJECTS_MAX];
     raywake_pose pose;
     raywake_twist twist;
     raywake_sweep sweep = {.world_from_vehicle = &pose, .twist = &twist};
@@ -87,12 +89,16 @@ int main(int argc, char **argv) {
         must(raywake_step(estimator, &sweep, &result, &error), "step", &error);
         if (steps < STEPS_MAX) times[steps++] = 1e3 * (seconds() - start);
 
-        size_t moving = 0;
+        size_t moving = 0, driving = 0, seen = 0;
         must(raywake_points(estimator, flow, room, &count), "points", NULL);
         for (size_t n = 0; n < count && n < room; n++) moving += flow[n].status == 1;
+        must(raywake_objects(estimator, objects, RAYWAKE_OBJECTS_MAX, &seen), "objects", NULL);
+        for (size_t n = 0; n < seen; n++) driving += objects[n].moves;
         must(raywake_add_to_digest(estimator, &digest), "digest", NULL);
-        printf("%.3f s: %zu columns, %zu returns, %zu of them moving, %zu tracklets\n",
-               sweep.stamp_s, result.columns, result.points, moving, result.tracklets);
+        printf("%.3f s: %zu columns, %zu returns, %zu of them moving, %zu tracklets, %zu objects, "
+               "%zu of them moving\n",
+               sweep.stamp_s, result.columns, result.points, moving, result.tracklets,
+               result.objects, driving);
     }
     must(raywake_destroy(estimator), "destroy", NULL);
     free(flow);

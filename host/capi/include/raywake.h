@@ -27,7 +27,7 @@
 
 // Version of this interface: structs, functions and their meaning. Another number is another
 // interface; the shared library is named after it.
-#define RAYWAKE_ABI_VERSION 1
+#define RAYWAKE_ABI_VERSION 2
 
 // All returns are taken at the sweep's stamp.
 #define RAYWAKE_TIMING_AT_STAMP 0
@@ -44,6 +44,9 @@
 
 // Where a digest begins.
 #define RAYWAKE_DIGEST_START 14695981039346656037ull
+
+// Objects that there are at most.
+#define RAYWAKE_OBJECTS_MAX 160
 
 // It continues the one before.
 #define RAYWAKE_RESET_NONE 0
@@ -133,6 +136,8 @@ typedef struct {
     uint32_t find_poses;
     // `RAYWAKE_TIMING_...`.
     uint32_t timing;
+    // Not 0: objects are followed, too, in memory of their own.
+    uint32_t objects;
     // `RAYWAKE_TIMING_OFFSET`: earliest time of a return after the stamp, s.
     double from_s;
     // Duration of a sweep, s; 0.1 where it is 0.
@@ -238,6 +243,44 @@ typedef struct {
     uint32_t age;
 } raywake_tracklet;
 
+// An object in a pair's first sweep: a box with a velocity.
+typedef struct {
+    // When it was last seen, s: before the sweep's stamp where it was not seen in it.
+    double time_s;
+    // Middle of its box in the world (the frame of the poses), m.
+    double position_world_m[3];
+    // Direction of its length in the world, rad. Of what stands either end may be the front.
+    float heading_rad;
+    // Length, width and height of what was seen of it, m.
+    float size_m[3];
+    // Velocity over ground along world axes, m/s; 0 where it stands.
+    float velocity_world_mps[2];
+    // Turning rate, rad/s.
+    float turn_rate_radps;
+    // Covariance of its place (xx, xy, yy) and variance of its height, m^2.
+    float position_covariance[4];
+    // Variance of the heading, rad^2.
+    float heading_variance;
+    // Variance of the speed, (m/s)^2.
+    float speed_variance;
+    // Variance of the turning rate, (rad/s)^2.
+    float turn_rate_variance;
+    // P(moves), the mean of its returns; NaN where it is not known.
+    float probability;
+    // The share of its returns that are taken for what it is taken for, 0 to 1.
+    float class_share;
+    // Number of its track, from 0 in the order of their births.
+    uint32_t id;
+    // Times that it was seen.
+    uint32_t observations;
+    // 1: it moves; 0: it stands.
+    uint8_t moves;
+    // As of a column; what most of its returns are taken for.
+    uint8_t class_id;
+    // 0.
+    uint8_t reserved[6];
+} raywake_object;
+
 // Velocity of the vehicle, along its own axes.
 typedef struct {
     // m/s.
@@ -281,6 +324,8 @@ typedef struct {
     size_t points;
     // Tracklets that can be read.
     size_t tracklets;
+    // Objects in the sweep before that can be read.
+    size_t objects;
     // Columns with a valid match.
     size_t matched;
     // Foreground columns of the sweep.
@@ -377,8 +422,18 @@ raywake_status raywake_tracklets(raywake_estimator *estimator,
                                  size_t room,
                                  size_t *count);
 
-// Adds all that can be read to a digest, which begins as `RAYWAKE_DIGEST_START`. After every sweep
-// of a recording it is the digest that the program `raywake` prints.
+// Objects in the sweep before the last, where the options ask for them: vehicles, people and
+// two-wheelers, and whatever else moves. As `raywake_columns`.
+//
+// # Safety
+// As of `raywake_columns`.
+raywake_status raywake_objects(raywake_estimator *estimator,
+                               raywake_object *records,
+                               size_t room,
+                               size_t *count);
+
+// Adds all that can be read but objects to a digest, which begins as `RAYWAKE_DIGEST_START`. After
+// every sweep of a recording it is the digest that the program `raywake` prints.
 //
 // # Safety
 // As of `raywake_columns`.

@@ -54,6 +54,8 @@ pub struct CreateOptions {
     pub find_poses: u32,
     /// `RAYWAKE_TIMING_...`.
     pub timing: u32,
+    /// Not 0: objects are followed, too, in memory of their own.
+    pub objects: u32,
     /// `RAYWAKE_TIMING_OFFSET`: earliest time of a return after the stamp, s.
     pub from_s: f64,
     /// Duration of a sweep, s; 0.1 where it is 0.
@@ -190,8 +192,8 @@ impl CreateOptions {
 
     fn about(&self, profile: Profile) -> Result<EstimatorOptions, Refusal> {
         let points_max = if self.points_max == 0 { profile.returns() } else { self.points_max };
-        let (rig, registers) = (self.rig()?, self.find_poses != 0);
-        Ok(EstimatorOptions { profile, rig, points_max, registers })
+        let (rig, registers, objects) = (self.rig()?, self.find_poses != 0, self.objects != 0);
+        Ok(EstimatorOptions { profile, rig, points_max, registers, objects })
     }
 }
 

@@ -21,7 +21,7 @@ pub use step::*;
 
 /// Version of this interface: structs, functions and their meaning. Another number is another
 /// interface; the shared library is named after it.
-pub const RAYWAKE_ABI_VERSION: u32 = 1;
+pub const RAYWAKE_ABI_VERSION: u32 = 2;
 
 /// `RAYWAKE_ABI_VERSION` of the library that is loaded.
 #[unsafe(no_mangle)]

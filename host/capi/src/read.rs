@@ -1,7 +1,9 @@
 //! Results out.
 
 use raywake_core::digest::Digest;
-use raywake_embed::{ColumnRecord, FlowEstimator, PointRecord, TrackletRecord};
+use raywake_embed::{
+    ColumnRecord, FlowEstimator, OBJECTS_MAX, ObjectRecord, PointRecord, TrackletRecord,
+};
 
 use crate::handle::Handle;
 use crate::status::{CallStatus, Refusal};
@@ -33,6 +35,19 @@ unsafe fn write<T>(
     Ok(())
 }
 
+fn columns(found: &FlowEstimator) -> impl ExactSizeIterator<Item = ColumnRecord> {
+    found.columns().iter().map(ColumnRecord::from)
+}
+
+fn tracklets(found: &FlowEstimator) -> impl ExactSizeIterator<Item = TrackletRecord> {
+    let mut tracklets = found.tracklets().map(TrackletRecord::from);
+    (0..found.tracklet_count()).map(move |_| tracklets.next().unwrap_or_default())
+}
+
+fn objects(found: &FlowEstimator) -> impl ExactSizeIterator<Item = ObjectRecord> {
+    found.objects().iter().map(ObjectRecord::from)
+}
+
 /// # Safety
 /// `estimator` as of every function.
 unsafe fn read(
@@ -59,11 +74,7 @@ pub unsafe extern "C" fn raywake_columns(
     count: *mut usize,
 ) -> CallStatus {
     // SAFETY: the caller's promise.
-    unsafe {
-        read(estimator, |found| {
-            write(found.columns().iter().map(ColumnRecord::from), records, room, count)
-        })
-    }
+    unsafe { read(estimator, |found| write(columns(found), records, room, count)) }
 }
 
 /// Flow of the returns of the sweep before the last, in their order. As `raywake_columns`.
@@ -98,18 +109,27 @@ pub unsafe extern "C" fn raywake_tracklets(
     count: *mut usize,
 ) -> CallStatus {
     // SAFETY: the caller's promise.
-    unsafe {
-        read(estimator, |found| {
-            let total = found.tracklet_count();
-            let mut tracklets = found.tracklets().map(TrackletRecord::from);
-            let records_of = (0..total).map(|_| tracklets.next().unwrap_or_default());
-            write(records_of, records, room, count)
-        })
-    }
+    unsafe { read(estimator, |found| write(tracklets(found), records, room, count)) }
 }
 
-/// Adds all that can be read to a digest, which begins as `RAYWAKE_DIGEST_START`. After every sweep
-/// of a recording it is the digest that the program `raywake` prints.
+/// Objects in the sweep before the last, where the options ask for them: vehicles, people and
+/// two-wheelers, and whatever else moves. As `raywake_columns`.
+///
+/// # Safety
+/// As of `raywake_columns`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn raywake_objects(
+    estimator: *mut Handle,
+    records: *mut ObjectRecord,
+    room: usize,
+    count: *mut usize,
+) -> CallStatus {
+    // SAFETY: the caller's promise.
+    unsafe { read(estimator, |found| write(objects(found), records, room, count)) }
+}
+
+/// Adds all that can be read but objects to a digest, which begins as `RAYWAKE_DIGEST_START`. After
+/// every sweep of a recording it is the digest that the program `raywake` prints.
 ///
 /// # Safety
 /// As of `raywake_columns`.
@@ -132,4 +152,8 @@ pub unsafe extern "C" fn raywake_add_to_digest(
     }
 }
 
+/// Objects that there are at most.
+pub const RAYWAKE_OBJECTS_MAX: usize = 160;
+
+const _: () = assert!(RAYWAKE_OBJECTS_MAX == OBJECTS_MAX);
 const _: () = assert!(Digest::START.value() == RAYWAKE_DIGEST_START);

@@ -85,6 +85,8 @@ pub struct StepResult {
     pub points: usize,
     /// Tracklets that can be read.
     pub tracklets: usize,
+    /// Objects in the sweep before that can be read.
+    pub objects: usize,
     /// Columns with a valid match.
     pub matched: usize,
     /// Foreground columns of the sweep.
@@ -237,6 +239,7 @@ impl StepResult {
             columns: pair.map_or(0, |pair| pair.columns),
             points: pair.map_or(0, |pair| pair.points),
             tracklets,
+            objects: summary.objects,
             matched: pair.map_or(0, |pair| pair.valid),
             foreground: summary.foreground,
             foreground_dropped: pair.map_or(0, |pair| pair.foreground_dropped),

@@ -54,7 +54,8 @@ static void expect(int line, raywake_status found, raywake_status wanted) {
     } while (0)
 
 static raywake_options options(void) {
-    raywake_options o = {.abi_version = RAYWAKE_ABI_VERSION, .ground_m = -1.73, .threads = 1};
+    raywake_options o = {.abi_version = RAYWAKE_ABI_VERSION, .ground_m = -1.73, .threads = 1,
+                         .objects = 1};
     return o;
 }
 
@@ -131,6 +132,7 @@ static void addresses_that_are_none(void) {
         raywake_status wanted = n ? RAYWAKE_STATUS_NOT_CREATED : RAYWAKE_STATUS_NULL_POINTER;
         expect(__LINE__, raywake_step(nowhere[n], &sweep, &result, &error), wanted);
         expect(__LINE__, raywake_columns(nowhere[n], NULL, 0, &count), wanted);
+        expect(__LINE__, raywake_objects(nowhere[n], NULL, 0, &count), wanted);
         expect(__LINE__, raywake_add_to_digest(nowhere[n], &digest), wanted);
         expect(__LINE__, raywake_destroy(nowhere[n]), wanted);
     }
@@ -141,6 +143,8 @@ static void addresses_that_are_none(void) {
     CHECK(count == 0);
     EXPECT(raywake_columns(e, NULL, 1, &count), NULL_POINTER);
     EXPECT(raywake_tracklets(e, NULL, 0, NULL), OK);
+    EXPECT(raywake_objects(e, NULL, 0, &count), OK);
+    CHECK(count == 0);
     EXPECT(raywake_add_to_digest(e, NULL), NULL_POINTER);
     EXPECT(raywake_step(e, NULL, &result, &error), NULL_POINTER);
     EXPECT(raywake_destroy(e), OK);

@@ -11,6 +11,9 @@ use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Sweep};
 use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
+use raywake_objects::front_end::{Flows, TRACKS_MAX};
+use raywake_objects::params::TrackingParams;
+use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 use raywake_registration::Odometry;
 use raywake_registration::odometry::Locating;
 
@@ -27,6 +30,10 @@ impl AtRest for Odometry {
     const REST: Odometry = Odometry::new();
 }
 
+impl AtRest for ObjectTracker {
+    const REST: ObjectTracker = ObjectTracker::new();
+}
+
 /// A pair's flow, but for its slices.
 #[derive(Clone, Copy)]
 struct KeptPair {
@@ -40,13 +47,29 @@ pub struct FlowEstimator {
     setup: Setup,
     pipeline: &'static mut Pipeline,
     odometry: Option<&'static mut Odometry>,
+    objects: Option<ObjectRoom>,
     backend: ScalarBackend<&'static mut [u32]>,
     columns: &'static mut [ColumnFlow],
     taken: &'static mut [ReturnFlow],
     /// Returns of the last sweep, and of the one before.
     sweeps: [SweepRoom; 2],
     pair: Option<KeptPair>,
-    before: Option<(f64, Pose)>,
+    before: Option<Before>,
+}
+
+/// When, where and how fast the last sweep was.
+#[derive(Clone, Copy)]
+struct Before {
+    stamp_s: f64,
+    pose: Pose,
+    twist: Twist,
+}
+
+/// Tracks, and what is put out of them.
+struct ObjectRoom {
+    tracker: &'static mut ObjectTracker,
+    seen: &'static mut [TrackedObject],
+    count: usize,
 }
 
 /// Returns of a sweep.
@@ -69,13 +92,37 @@ impl EstimatorOptions {
     /// Bytes that an estimator needs, wherever they begin: what [`FlowEstimator::new`] cuts off.
     pub fn bytes(&self) -> Result<usize, CreateError> {
         self.check()?;
-        let EstimatorOptions { profile, points_max, registers, .. } = self;
+        let EstimatorOptions { profile, points_max, registers, objects, .. } = self;
         Ok(bytes_of::<Pipeline>(1)
             + bytes_of::<Odometry>(usize::from(*registers))
+            + if *objects { ObjectRoom::BYTES } else { 0 }
             + bytes_of::<u32>(words(profile))
             + bytes_of::<ColumnFlow>(solid(profile))
             + bytes_of::<ReturnFlow>(profile.returns())
             + 2 * bytes_of::<Point>(*points_max))
+    }
+}
+
+impl ObjectRoom {
+    const BYTES: usize = bytes_of::<ObjectTracker>(1) + bytes_of::<TrackedObject>(TRACKS_MAX);
+
+    fn new(memory: &mut Memory) -> Option<ObjectRoom> {
+        let tracker = state::<ObjectTracker>(memory)?;
+        let seen = array(memory, TRACKS_MAX, TrackedObject::default())?;
+        Some(ObjectRoom { tracker, seen, count: 0 })
+    }
+
+    /// Follows the objects through a sweep, with its flow where there is one.
+    fn step(&mut self, setup: &Setup, sweep: &Sweep, flows: Option<PointFlows>) {
+        const PARAMS: TrackingParams = TrackingParams::DEFAULT;
+        let reach_m = Flows::reach_m(&setup.profile);
+        self.tracker.step(&PARAMS, &setup.rig, sweep, flows.map(|of| Flows { of, reach_m }));
+        let objects = self.tracker.objects(&PARAMS);
+        self.count = self.seen.iter_mut().zip(objects).map(|(to, object)| *to = object).count();
+    }
+
+    fn seen(&self) -> &[TrackedObject] {
+        &self.seen[..self.count]
     }
 }
 
@@ -104,7 +151,7 @@ impl FlowEstimator {
         options: &EstimatorOptions,
         mut memory: Memory,
     ) -> Result<FlowEstimator, CreateError> {
-        let EstimatorOptions { profile, rig, points_max, registers } = options;
+        let EstimatorOptions { profile, rig, points_max, registers, objects } = options;
         let bytes = options.bytes()?;
         let lacking = || CreateError::Memory(bytes);
         if memory.len() < bytes {
@@ -114,6 +161,7 @@ impl FlowEstimator {
         let pipeline = state::<Pipeline>(rest).ok_or_else(lacking)?;
         let odometry =
             registers.then(|| state::<Odometry>(rest).ok_or_else(lacking)).transpose()?;
+        let objects = objects.then(|| ObjectRoom::new(rest).ok_or_else(lacking)).transpose()?;
         let words = array(rest, words(profile), 0).ok_or_else(lacking)?;
         let columns = array(rest, solid(profile), ColumnFlow::default()).ok_or_else(lacking)?;
         let taken = array(rest, profile.returns(), ReturnFlow::default()).ok_or_else(lacking)?;
@@ -134,6 +182,7 @@ impl FlowEstimator {
             setup,
             pipeline,
             odometry,
+            objects,
             backend,
             columns,
             taken,
@@ -182,11 +231,17 @@ impl FlowEstimator {
         let room = Output { columns: self.columns, points: self.taken };
         let step = self.pipeline.step(&self.setup, machine, &sweep, before.points(), room);
         let output = step.unwrap_or_else(|never| match never {});
-        let summary = StepSummary::new(&output, pose, locating);
+        if let (Some(objects), Some(last)) = (&mut self.objects, self.before) {
+            let Before { stamp_s, pose: world_from_vehicle, twist } = last;
+            let sweep = Sweep { stamp_s, points: before.points(), world_from_vehicle, twist };
+            objects.step(&self.setup, &sweep, output.flows.as_ref().map(|flows| flows.points));
+        }
+        let objects = self.objects.as_ref().map_or(0, |objects| objects.count);
+        let summary = StepSummary::new(&output, pose, locating, objects);
         self.pair = output
             .flows
             .map(|flows| KeptPair { columns: flows.columns.len(), points: flows.points.keep() });
-        self.before = Some((place.stamp_s, pose));
+        self.before = Some(Before { stamp_s: place.stamp_s, pose, twist });
         summary
     }
 
@@ -210,11 +265,13 @@ impl FlowEstimator {
             return (found.world_from_vehicle, found.twist, Some(found.locating));
         }
         let pose = normalised(place.pose.unwrap_or(Pose::IDENTITY));
-        let steady = self.before.filter(|(at_s, before)| {
-            self.setup.profile.limits.broken(before, &pose, stamp_s - at_s).is_none()
+        let steady = self.before.filter(|before| {
+            let elapsed_s = stamp_s - before.stamp_s;
+            self.setup.profile.limits.broken(&before.pose, &pose, elapsed_s).is_none()
         });
-        let from_poses = steady
-            .map_or(Twist::ZERO, |(at_s, before)| (pose.inverse() * before).twist(at_s - stamp_s));
+        let from_poses = steady.map_or(Twist::ZERO, |before| {
+            (pose.inverse() * before.pose).twist(before.stamp_s - stamp_s)
+        });
         (pose, place.twist.unwrap_or(from_poses), None)
     }
 
@@ -240,7 +297,13 @@ impl FlowEstimator {
         self.pipeline.tracklets(&self.setup.profile)
     }
 
-    /// Adds all that can be read now to a digest: after every sweep, that of the program.
+    /// Objects in the pair's first sweep, where they are followed.
+    pub fn objects(&self) -> &[TrackedObject] {
+        self.objects.as_ref().map_or(&[], ObjectRoom::seen)
+    }
+
+    /// Adds all that can be read now, but objects, to a digest: after every sweep, that of the
+    /// program.
     pub fn add_to(&self, digest: &mut Digest) {
         self.columns().iter().for_each(|c| digest.column(c));
         self.points().into_iter().flat_map(PointFlows::iter).for_each(|p| digest.point(&p));

@@ -21,7 +21,8 @@ pub use estimator::FlowEstimator;
 pub use memory::Memory;
 pub use options::{CreateError, EstimatorOptions};
 pub use place::{SweepError, SweepPlace};
-pub use records::{ColumnRecord, NO_CLASS, PointRecord, TrackletRecord};
+pub use raywake_objects::front_end::TRACKS_MAX as OBJECTS_MAX;
+pub use records::{ColumnRecord, NO_CLASS, ObjectRecord, PointRecord, TrackletRecord};
 pub use summary::{PairSummary, StepSummary};
 #[cfg(feature = "std")]
 pub use team_estimator::{StepError, TeamError, TeamEstimator};

@@ -20,6 +20,8 @@ pub struct EstimatorOptions {
     pub points_max: usize,
     /// Whether poses are found by registration, as none are given.
     pub registers: bool,
+    /// Whether objects are followed, too.
+    pub objects: bool,
 }
 
 /// Why there is no estimator.

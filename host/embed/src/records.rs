@@ -3,9 +3,12 @@
 use bytemuck::{Pod, Zeroable};
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
+use raywake_objects::tracked::TrackedObject;
 
 /// Class of a column or return: there is none.
 pub const NO_CLASS: u8 = 255;
+
+const _: () = assert!(NO_CLASS == ColumnClass::NONE);
 
 /// Flow of one solid column of a pair's first sweep.
 #[repr(C)]
@@ -93,8 +96,69 @@ pub struct TrackletRecord {
     pub age: u32,
 }
 
-fn class_id(class: Option<ColumnClass>) -> u8 {
-    class.map_or(NO_CLASS, |class| class as u8)
+/// An object in a pair's first sweep: a box with a velocity.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ObjectRecord {
+    /// When it was last seen, s: before the sweep's stamp where it was not seen in it.
+    pub time_s: f64,
+    /// Middle of its box in the world (the frame of the poses), m.
+    pub position_world_m: [f64; 3],
+    /// Direction of its length in the world, rad. Of what stands either end may be the front.
+    pub heading_rad: f32,
+    /// Length, width and height of what was seen of it, m.
+    pub size_m: [f32; 3],
+    /// Velocity over ground along world axes, m/s; 0 where it stands.
+    pub velocity_world_mps: [f32; 2],
+    /// Turning rate, rad/s.
+    pub turn_rate_radps: f32,
+    /// Covariance of its place (xx, xy, yy) and variance of its height, m^2.
+    pub position_covariance: [f32; 4],
+    /// Variance of the heading, rad^2.
+    pub heading_variance: f32,
+    /// Variance of the speed, (m/s)^2.
+    pub speed_variance: f32,
+    /// Variance of the turning rate, (rad/s)^2.
+    pub turn_rate_variance: f32,
+    /// P(moves), the mean of its returns; NaN where it is not known.
+    pub probability: f32,
+    /// The share of its returns that are taken for what it is taken for, 0 to 1.
+    pub class_share: f32,
+    /// Number of its track, from 0 in the order of their births.
+    pub id: u32,
+    /// Times that it was seen.
+    pub observations: u32,
+    /// 1: it moves; 0: it stands.
+    pub moves: u8,
+    /// As of a column; what most of its returns are taken for.
+    pub class_id: u8,
+    /// 0.
+    pub reserved: [u8; 6],
+}
+
+impl From<&TrackedObject> for ObjectRecord {
+    fn from(o: &TrackedObject) -> ObjectRecord {
+        let (class, share) = o.class.unzip();
+        ObjectRecord {
+            time_s: o.time_s,
+            position_world_m: o.centre,
+            heading_rad: o.heading as f32,
+            size_m: o.size,
+            velocity_world_mps: o.velocity.unwrap_or_default().map(|v| v as f32),
+            turn_rate_radps: o.turn_rate as f32,
+            position_covariance: o.variances.position,
+            heading_variance: o.variances.heading,
+            speed_variance: o.variances.speed,
+            turn_rate_variance: o.variances.turn_rate,
+            probability: o.p_moves.unwrap_or(f32::NAN),
+            class_share: share.unwrap_or(0.0),
+            id: o.id,
+            observations: o.observations,
+            moves: o.velocity.is_some().into(),
+            class_id: ColumnClass::number(class),
+            reserved: [0; 6],
+        }
+    }
 }
 
 impl From<&ColumnFlow> for ColumnRecord {
@@ -111,7 +175,7 @@ impl From<&ColumnFlow> for ColumnRecord {
             probability: c.probability,
             age: c.age,
             basis: c.basis as u8,
-            class_id: class_id(c.class),
+            class_id: ColumnClass::number(c.class),
             reserved: [0; 6],
         }
     }
@@ -128,7 +192,7 @@ impl From<PointFlow> for PointRecord {
             age: p.age,
             status: p.status as u8,
             basis: p.basis as u8,
-            class_id: class_id(p.class),
+            class_id: ColumnClass::number(p.class),
             reserved: 0,
         }
     }

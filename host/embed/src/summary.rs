@@ -26,6 +26,8 @@ pub struct StepSummary {
     pub pose: Pose,
     /// How it was found, where it was.
     pub locating: Option<Locating>,
+    /// Objects in the sweep before.
+    pub objects: usize,
 }
 
 /// What a pair of sweeps came to.
@@ -46,7 +48,12 @@ pub struct PairSummary {
 }
 
 impl StepSummary {
-    pub(crate) fn new(output: &SweepOutput, pose: Pose, locating: Option<Locating>) -> StepSummary {
+    pub(crate) fn new(
+        output: &SweepOutput,
+        pose: Pose,
+        locating: Option<Locating>,
+        objects: usize,
+    ) -> StepSummary {
         StepSummary {
             pair: output.flows.as_ref().map(PairSummary::from),
             reset: output.reset,
@@ -56,6 +63,7 @@ impl StepSummary {
             rays: output.rays,
             pose,
             locating,
+            objects,
         }
     }
 }

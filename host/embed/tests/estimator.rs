@@ -10,8 +10,8 @@ use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Timing};
 use raywake_core::team::Alone;
 use raywake_embed::{
-    CreateError, EstimatorOptions, FlowEstimator, Memory, StepError, SweepError, SweepPlace,
-    TeamEstimator,
+    CreateError, EstimatorOptions, FlowEstimator, Memory, ObjectRecord, StepError, SweepError,
+    SweepPlace, TeamEstimator,
 };
 use raywake_sim::{Drive, Ego, Options, SimSweep};
 
@@ -31,6 +31,7 @@ fn options() -> EstimatorOptions {
         rig: drive().rig(),
         points_max: 150_000,
         registers: false,
+        objects: false,
     }
 }
 
@@ -78,6 +79,32 @@ fn threads_change_nothing() {
     }
 }
 
+/// They change nothing else, and threads change nothing of them.
+#[test]
+fn objects_are_followed() {
+    let following = EstimatorOptions { objects: true, ..options() };
+    let (mut plain, mut alone) = (estimator(&options()), estimator(&following));
+    let mut team = TeamEstimator::new(estimator(&following), 2).unwrap();
+    let mut digests = [Digest::default(); 2];
+    for sweep in sweeps() {
+        let points = || sweep.points.iter().copied();
+        let found = plain.step(&Alone, &place(sweep), points()).unwrap();
+        assert_eq!((found.objects, plain.objects()), (0, &[][..]));
+        let found = alone.step(&Alone, &place(sweep), points()).unwrap();
+        assert_eq!(found.objects, alone.objects().len());
+        plain.add_to(&mut digests[0]);
+        alone.add_to(&mut digests[1]);
+        assert_eq!(team.step(&place(sweep), points()), Ok(found));
+        team.read(|team| assert_eq!(team.objects(), alone.objects())).unwrap();
+    }
+    assert_eq!(digests[0], digests[1]);
+    let before = sweeps()[sweeps().len() - 2].stamp_s;
+    let seen = alone.objects();
+    assert!(seen.iter().any(|o| o.velocity.is_some() && o.time_s >= before), "{seen:?}");
+    let records: Vec<ObjectRecord> = seen.iter().map(ObjectRecord::from).collect();
+    assert!(records.iter().all(|o| o.observations >= 3 && o.size_m.iter().all(|m| *m < 30.0)));
+}
+
 #[test]
 fn poses_are_found_and_twists_follow_from_poses() {
     let mut finding = estimator(&EstimatorOptions { registers: true, ..options() });
@@ -99,7 +126,8 @@ fn poses_are_found_and_twists_follow_from_poses() {
 
 #[test]
 fn memory_is_as_large_as_said() {
-    for options in [options(), EstimatorOptions { registers: true, points_max: 1, ..options() }] {
+    let all = EstimatorOptions { registers: true, objects: true, points_max: 1, ..options() };
+    for options in [options(), all] {
         let bytes = options.bytes().unwrap();
         let too_small = FlowEstimator::new(&options, memory(bytes - 1)).err();
         assert_eq!(too_small, Some(CreateError::Memory(bytes)));

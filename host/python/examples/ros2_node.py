@@ -1,4 +1,5 @@
-"""A ROS 2 node: PointCloud2 in, PointCloud2 with velocity, P(moves) and status of every point out.
+"""A ROS 2 node: PointCloud2 in; PointCloud2 with velocity, P(moves) and status of every point, and
+objects as a MarkerArray of boxes out.
 
     pip install raywake
     python ros2_node.py --ros-args -r points:=/lidar/points -p ground:=-1.8
@@ -73,21 +74,42 @@ def with_velocity(positions, flow):
     return out
 
 
+def as_boxes(objects, world_from_vehicle):
+    """Of every object number, class, whether it moves, place, heading, size and velocity over ground,
+    in the frame of the vehicle."""
+    vehicle_from_world = np.linalg.inv(world_from_vehicle)
+    turn = vehicle_from_world[:3, :3]
+    yaw = np.arctan2(turn[1, 0], turn[0, 0])
+    for o in objects:
+        kind = raywake.CLASSES[o["class_id"]] if o["class_id"] < len(raywake.CLASSES) else "object"
+        yield {
+            "id": int(o["id"]),
+            "class": kind,
+            "moves": bool(o["moves"]),
+            "place": turn @ o["position_world_m"] + vehicle_from_world[:3, 3],
+            "heading": float(o["heading_rad"] + yaw),
+            "size": o["size_m"].tolist(),
+            "velocity": turn[:2, :2] @ o["velocity_world_mps"],
+        }
+
+
 class Flow:
     """What the node does with a cloud, without ROS."""
 
     def __init__(self, ground, find_poses, timed):
         timing = dict(timing="offset", distorted=True, start=-0.1, span=0.2) if timed else {}
         rig = raywake.Rig(ground=ground, **timing)
-        self.pipeline = raywake.Pipeline(rig=rig, find_poses=find_poses)
+        self.pipeline = raywake.Pipeline(rig=rig, find_poses=find_poses, objects=True)
         self.before = None
 
     def step(self, points, stamp, pose=None):
-        """Takes a cloud. Returns the cloud before as an array of OUT, or None."""
+        """Takes a cloud. Returns the cloud before as an array of OUT and its objects, or None."""
         positions = positions_of(points)
         step = self.pipeline.step(positions, stamp, pose, time=times_of(points, stamp))
-        before, self.before = self.before, positions
-        return None if step.dt is None else with_velocity(before, step.points)
+        before, self.before = self.before, (positions, step.pose)
+        if step.dt is None:
+            return None
+        return with_velocity(before[0], step.points), list(as_boxes(step.objects, before[1]))
 
 
 def main():
@@ -97,6 +119,7 @@ def main():
     from rclpy.time import Time
     from sensor_msgs.msg import PointCloud2, PointField
     from tf2_ros import Buffer, TransformException, TransformListener
+    from visualization_msgs.msg import Marker, MarkerArray
 
     class FlowNode(Node):
         def __init__(self):
@@ -108,6 +131,7 @@ def main():
             self.tf = Buffer()
             self.listener = TransformListener(self.tf, self)
             self.out = self.create_publisher(PointCloud2, "points_with_velocity", 10)
+            self.objects = self.create_publisher(MarkerArray, "objects", 10)
             self.create_subscription(
                 PointCloud2, "points", self.on_cloud, qos_profile_sensor_data
             )
@@ -132,7 +156,22 @@ def main():
                 return
             header, self.header = self.header, cloud.header
             if found is not None:
-                self.out.publish(self.message(header, found))
+                points, boxes = found
+                self.out.publish(self.message(header, points))
+                self.objects.publish(MarkerArray(markers=[self.marker(header, b) for b in boxes]))
+
+        def marker(self, header, box):
+            marker = Marker(header=header, ns=box["class"], id=box["id"], type=Marker.CUBE)
+            place, half = marker.pose, 0.5 * box["heading"]
+            place.position.x, place.position.y, place.position.z = map(float, box["place"])
+            place.orientation.z, place.orientation.w = np.sin(half), np.cos(half)
+            marker.scale.x, marker.scale.y, marker.scale.z = box["size"]
+            marker.color.r, marker.color.b = (0.8, 0.2) if box["moves"] else (0.4, 0.6)
+            marker.color.a = 0.6
+            marker.lifetime.nanosec = 250_000_000
+            u, v = box["velocity"]
+            marker.text = f"{box['class']} {box['id']} {np.hypot(u, v):.1f} m/s"
+            return marker
 
         def message(self, header, found):
             fields = [

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use raywake_core::sweep::Point;
-use raywake_embed::{ColumnRecord, PointRecord, TrackletRecord};
+use raywake_embed::{ColumnRecord, ObjectRecord, PointRecord, TrackletRecord};
 
 use crate::flow_record::FlowRecord;
 
@@ -78,6 +78,11 @@ record! {
         position_world_m, cell, position_vehicle_m, heading_rad, speed_mps, turn_rate_radps,
         probability, velocity_world_mps, velocity_ego_mps, covariance, age
     }
+    ObjectRecord {
+        time_s, position_world_m, heading_rad, size_m, velocity_world_mps, turn_rate_radps,
+        position_covariance, heading_variance, speed_variance, turn_rate_variance, probability,
+        class_share, id, observations, moves, class_id
+    }
     FlowRecord { flow_m, motion_m, covariance, status, basis }
 }
 
@@ -102,6 +107,7 @@ pub fn add_types(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("COLUMN_DTYPE", dtype::<ColumnRecord>(py)?)?;
     module.add("POINT_DTYPE", dtype::<PointRecord>(py)?)?;
     module.add("TRACKLET_DTYPE", dtype::<TrackletRecord>(py)?)?;
+    module.add("OBJECT_DTYPE", dtype::<ObjectRecord>(py)?)?;
     module.add("FLOW_DTYPE", dtype::<FlowRecord>(py)?)
 }
 

@@ -78,7 +78,8 @@ pub fn flow(
             None => motion::find([&first, &second], &rig).map_err(PyValueError::new_err)?.0,
         };
         let points_max = first.len().max(second.len());
-        let options = EstimatorOptions { profile, rig, points_max, registers: false };
+        let options =
+            EstimatorOptions { profile, rig, points_max, registers: false, objects: false };
         Ok::<_, PyErr>((rows(&options, [&first, &second], motion, dt)?, motion))
     })?;
     let points = array(py, rows.len(), rows.into_iter())?.unbind();

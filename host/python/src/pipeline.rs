@@ -8,8 +8,8 @@ use raywake_core::digest::Digest;
 use raywake_core::params::{AssignError, ParameterSetting, Profile, Value};
 use raywake_core::sweep::Point;
 use raywake_embed::{
-    ColumnRecord, CreateError, EstimatorOptions, FlowEstimator, PointRecord, StepError,
-    StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
+    ColumnRecord, CreateError, EstimatorOptions, FlowEstimator, ObjectRecord, PointRecord,
+    StepError, StepSummary, SweepPlace, TeamError, TeamEstimator, TrackletRecord,
 };
 
 use raywake_registration::odometry::Locating;
@@ -25,6 +25,7 @@ use crate::rig::PyRig;
 /// rig: where the sensors sit; see Rig.
 /// settings: parameters of the profile, by the names of PARAMETERS.md.
 /// find_poses: no poses will be given; they are found by registration.
+/// objects: objects are followed, too; see Step.objects.
 /// points_max: returns that a sweep has at most; 0: as many as the profile takes.
 /// threads: 0: as many as pay.
 ///
@@ -81,20 +82,21 @@ pub fn estimator(options: &EstimatorOptions, threads: usize) -> PyResult<TeamEst
 #[pymethods]
 impl PyPipeline {
     #[new]
-    #[pyo3(signature = (profile="hdl64", rig=None, *, settings=None, find_poses=false, points_max=0,
-        threads=0))]
+    #[pyo3(signature = (profile="hdl64", rig=None, *, settings=None, find_poses=false,
+        objects=false, points_max=0, threads=0))]
     fn new(
         profile: &str,
         rig: Option<&PyRig>,
         settings: Option<&Bound<'_, PyDict>>,
         find_poses: bool,
+        objects: bool,
         points_max: usize,
         threads: usize,
     ) -> PyResult<PyPipeline> {
         let profile = self::profile(profile, settings)?;
         let rig = rig.map_or_else(PyRig::alone, |rig| Ok(rig.clone()))?.0;
         let points_max = if points_max == 0 { profile.returns() } else { points_max };
-        let options = EstimatorOptions { profile, rig, points_max, registers: find_poses };
+        let options = EstimatorOptions { profile, rig, points_max, registers: find_poses, objects };
         let team = estimator(&options, threads)?;
         let memory = options.bytes().map_err(|e| PyValueError::new_err(e.to_string()))?;
         let (points, digest) = (Vec::with_capacity(points_max), Digest::default());
@@ -149,7 +151,7 @@ impl PyPipeline {
         let summary = stepped.map_err(refused)?;
         this.steps += 1;
         let number = this.steps;
-        Ok(Step { pipeline: slf.into(), number, summary, arrays: [const { None }; 3] })
+        Ok(Step { pipeline: slf.into(), number, summary, arrays: [const { None }; 4] })
     }
 
     /// Adds all that the last step found to the digest and returns that: of a recording stepped
@@ -182,8 +184,8 @@ pub struct Step {
     pipeline: Py<PyPipeline>,
     number: u64,
     summary: StepSummary,
-    /// Of columns, points and tracklets.
-    arrays: [Option<Py<PyAny>>; 3],
+    /// Of columns, points, tracklets and objects.
+    arrays: [Option<Py<PyAny>>; 4],
 }
 
 impl Step {
@@ -235,6 +237,16 @@ impl Step {
         self.array(py, 2, |found| {
             let count = found.tracklet_count();
             Ok(array(py, count, found.tracklets().map(TrackletRecord::from))?.unbind())
+        })
+    }
+
+    /// Objects in the sweep before: an array of OBJECT_DTYPE; empty unless the pipeline was made
+    /// with objects=True.
+    #[getter]
+    fn objects(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.array(py, 3, |found| {
+            let objects = found.objects();
+            Ok(array(py, objects.len(), objects.iter().map(ObjectRecord::from))?.unbind())
         })
     }
 

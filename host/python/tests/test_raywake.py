@@ -114,6 +114,27 @@ class Same(unittest.TestCase):
         self.assertTrue(view.shape == (len(columns), 2) and np.shares_memory(view, columns))
         self.assertTrue(0 <= columns["probability"].min() <= columns["probability"].max() <= 1)
 
+    def test_objects(self):
+        found = {}
+        for asked in (False, True):
+            pipeline = raywake.Pipeline(rig=SWEEPS.rig, objects=asked)
+            for stamp, pose, twist, returns in list(SWEEPS)[:8]:
+                step = pipeline.step(
+                    returns["xyz"], stamp, pose, twist=twist, time=returns["time"],
+                    sensor=returns["sensor"],
+                )
+                pipeline.update_digest()
+            found[asked] = (step.objects, pipeline.update_digest())
+        self.assertEqual(found[False][1], found[True][1])
+        self.assertEqual(len(found[False][0]), 0)
+        objects = found[True][0]
+        self.assertEqual(objects.dtype, raywake.OBJECT_DTYPE)
+        moving = objects[objects["moves"] == 1]
+        self.assertGreater(len(moving), 0)
+        self.assertGreater(np.hypot(*moving["velocity_world_mps"].T).max(), 1)
+        self.assertTrue((objects["class_id"] <= 7).any())
+        self.assertEqual(len(set(objects["id"])), len(objects))
+
     def test_flow_without_poses(self):
         (_, pose_a, _, a), (_, pose_b, _, b) = list(SWEEPS)[4:6]
         found = raywake.flow(a["xyz"], b["xyz"])
@@ -341,12 +362,20 @@ class Node(unittest.TestCase):
     def test_velocities_of_messages(self):
         flow = self.node.Flow(ground=SWEEPS.rig.ground, find_poses=True, timed=False)
         found = []
-        for stamp, _, _, returns in list(SWEEPS)[:3]:
+        for stamp, _, _, returns in list(SWEEPS)[:8]:
             found.append(flow.step(self.node.as_array(self.cloud(returns)), stamp))
         self.assertIsNone(found[0])
-        self.assertEqual([f.dtype for f in found[1:]], [self.node.OUT] * 2)
-        moving = found[2]["status"] == raywake.MOVING
-        self.assertTrue(moving.any() and found[2]["p_moves"][moving].min() >= 0.5)
+        self.assertEqual([points.dtype for points, _ in found[1:]], [self.node.OUT] * 7)
+        points = found[2][0]
+        moving = points["status"] == raywake.MOVING
+        self.assertTrue(moving.any() and points["p_moves"][moving].min() >= 0.5)
+        points, boxes = found[-1]
+        self.assertGreater(sum(box["moves"] for box in boxes), 0)
+        places = self.node.positions_of(points)
+        for box in boxes:
+            # In the frame of the cloud: what it is of lies there.
+            near = np.linalg.norm(places[:, :2] - box["place"][:2], axis=1) < 3
+            self.assertTrue(near.any(), box)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,9 @@ pub struct LiveArgs {
     /// a turn of the sensor]
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub deadline: Option<Duration>,
+    /// Follow objects, too: a box with a number, a velocity and a class for each
+    #[arg(long)]
+    pub objects: bool,
     /// End after so many sweeps
     #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
     pub count: Option<usize>,

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | receiver | packets to returns, returns to sweeps ([`receiver`]) | the newest sweep |
 //! | poses | keeps the last ones ([`poses`]) | the pose at a stamp |
-//! | worker, with its team | locates, computes flow, sends datagrams ([`worker`]) | a pair |
+//! | worker, with its team | locates, computes flow, follows objects, sends ([`worker`]) | a pair |
 //! | recorder | writes messages to a file and to viewers ([`recorder`]) | |
 //! | replay | sends a capture's packets, where there is no sensor | |
 //!
@@ -14,6 +14,8 @@
 
 mod handover;
 mod locating;
+mod objects;
+mod outlets;
 mod poses;
 mod receiver;
 mod recorder;
@@ -25,22 +27,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_io::sink::bag::BagSink;
 use raywake_io::sink::streams::{Content, Pace, StreamTargets};
 use raywake_io::source::capture::assembly::LiveSweep;
 use raywake_io::source::capture::live::{LiveRig, LiveSensor};
 use raywake_io::source::capture::replay::Replay;
+use raywake_objects::params::TrackingParams;
 
 use crate::args::{BackendChoice, LiveArgs, PosesFrom};
 use crate::budget;
 use crate::choose::{self, Chosen};
-use crate::config;
-use crate::console::{interrupted, listen, note, say};
+use crate::config::{self, Settings};
+use crate::console::{bytes, interrupted, listen, note, say};
 use crate::error::RunError;
 use crate::figures::FiguresFile;
 use crate::weight_files::WeightFiles;
 use handover::{Fetched, Handover};
+use objects::LiveObjects;
+use outlets::Outlets;
 use poses::PoseReceiver;
 use receiver::Receiver;
 use recorder::{RecordedPair, RecordingOutcome, record};
@@ -62,6 +68,7 @@ const DEVICE_DEADLINES: u32 = 10;
 struct Plan<'a> {
     args: &'a LiveArgs,
     profile: Profile,
+    tracking: TrackingParams,
     weights: WeightFiles,
     streams: StreamTargets,
 }
@@ -70,10 +77,10 @@ struct Plan<'a> {
 pub fn live(args: &LiveArgs) -> Result<(), RunError> {
     args.replay.check()?;
     listen();
-    let profile = config::profile(&args.flow.profile)?;
+    let Settings { profile, objects: tracking } = config::settings(&args.flow.profile)?;
     let weights = WeightFiles::read(&args.flow.learned, &profile)?;
     let streams = args.results.streams.sinks(Pace::AtOnce);
-    let plan = Plan { args, profile, weights, streams };
+    let plan = Plan { args, profile, tracking, weights, streams };
     let replay = &args.replay;
     let open = |path| Replay::open(path, replay.topic.as_deref());
     let replay = replay.replay.as_deref().map(open).transpose()?;
@@ -139,7 +146,8 @@ impl Plan<'_> {
             choose::drive(&backend, &self.weights, &self.profile, &rig)?;
         note(args.quiet, &lacking)?;
         say(args.quiet, &budget::paragraph(&self.profile, &drive, &filter))?;
-        let sink = BagSink::create(&self.streams, state.epoch_ns, Content::Flow)?;
+        let content = if args.objects { Content::FlowAndObjects } else { Content::Flow };
+        let sink = BagSink::create(&self.streams, state.epoch_ns, content)?;
         let pairs = sink.is_some().then(|| {
             let spare = || RecordedPair::of(sensor, &self.profile);
             (Handover::new(spare()), spare())
@@ -152,10 +160,13 @@ impl Plan<'_> {
             turn,
             deadline,
             drive,
+            objects: self.objects()?,
             locator: locating::LiveLocator::new(poses),
-            stream: args.results.send.map(FlowStream::to).transpose()?,
-            recording: pairs.as_ref().zip(kept),
-            digests: args.replay.replay.is_some(),
+            outlets: Outlets {
+                stream: args.results.send.map(FlowStream::to).transpose()?,
+                recording: pairs.as_ref().zip(kept),
+                digest: args.replay.replay.as_ref().map(|_| Digest::default()),
+            },
             quiet: args.quiet,
             most: args.count.map_or(u64::MAX, |count| count as u64),
         };
@@ -169,6 +180,16 @@ impl Plan<'_> {
             let recorded = recorder.map(|thread| thread.join().expect("a recorder does not panic"));
             self.finish(&figures, receiver, poses, ended?, recorded.unwrap_or_default())
         })
+    }
+
+    /// Room to follow objects in, where that is asked for.
+    fn objects(&self) -> Result<Option<LiveObjects>, RunError> {
+        if !self.args.objects {
+            return Ok(None);
+        }
+        let held = bytes(LiveObjects::BYTES as u64);
+        say(self.args.quiet, &format!("memory for objects: {held}\n"))?;
+        Ok(Some(LiveObjects::new(self.tracking, &self.profile)))
     }
 
     /// Waits for the first sweep. Returns whether there is one: a signal may come first.

@@ -7,9 +7,10 @@ use raywake_core::params::{Profile, SOLID_MAX};
 use raywake_core::tracklet::TrackletTurnover;
 use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
-use raywake_io::source::SweepData;
 use raywake_io::source::capture::assembly::LiveSweep;
 use raywake_io::source::capture::live::LiveSensor;
+use raywake_objects::front_end::TRACKS_MAX;
+use raywake_objects::tracked::TrackedObject;
 
 use super::handover::{Fetched, Handover};
 use crate::console::warn;
@@ -22,6 +23,8 @@ pub struct RecordedPair {
     first: LiveSweep,
     columns: Vec<ColumnFlow>,
     returns: Vec<ReturnFlow>,
+    /// None where they are not followed.
+    objects: Option<heapless::Vec<TrackedObject, TRACKS_MAX>>,
     /// What else is known; none before the first pair.
     rest: Option<Rest>,
 }
@@ -42,6 +45,7 @@ impl RecordedPair {
             first: LiveSweep::of(sensor),
             columns: Vec::with_capacity(profile.columns().min(SOLID_MAX)),
             returns: Vec::with_capacity(profile.returns()),
+            objects: None,
             rest: None,
         }
     }
@@ -58,13 +62,21 @@ impl RecordedPair {
         self.rest = Some(Rest { points, solid, dt_s, turnover, valid, foreground_dropped });
     }
 
+    /// Copies the objects in the pair's first sweep.
+    pub fn keep_objects(&mut self, seen: &[TrackedObject]) {
+        let kept = self.objects.get_or_insert_default();
+        kept.clear();
+        // There is room for as many as there are tracks.
+        let _ = kept.extend_from_slice(seen);
+    }
+
     /// Takes the pair's first sweep, for another of no meaning.
     pub fn take_first(&mut self, sweep: &mut LiveSweep) {
         std::mem::swap(&mut self.first, sweep);
     }
 
-    /// Shows the pair.
-    fn show<R>(&self, see: impl FnOnce(&SweepData, &PairFlows) -> R) -> Option<R> {
+    /// Writes the pair, where there is one.
+    fn write(&self, to: &mut BagSink) -> Option<Result<(), Error>> {
         let Rest { points, solid, dt_s, turnover, valid, foreground_dropped } =
             *self.rest.as_ref()?;
         let first = &self.first.data;
@@ -76,7 +88,11 @@ impl RecordedPair {
             valid,
             foreground_dropped,
         };
-        Some(see(first, &flows))
+        let written = to.pair(first, &flows);
+        Some(written.and_then(|()| match &self.objects {
+            Some(seen) => to.boxes(first, seen),
+            None => Ok(()),
+        }))
     }
 }
 
@@ -100,7 +116,7 @@ pub fn record(
         match pairs.fetch(&mut spare, POLL) {
             Fetched::Value => {
                 let Some(open) = &mut sink else { continue };
-                match spare.show(|first, flows| open.pair(first, flows)) {
+                match spare.write(open) {
                     Some(Err(e)) => {
                         sink = None;
                         fail(&mut recorded, e);

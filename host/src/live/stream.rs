@@ -1,11 +1,11 @@
 //! What comes out as datagrams: a small format for whoever acts on what moves.
 //!
-//! Little-endian. A datagram has a head of 24 bytes and up to 40 records of one kind:
+//! Little-endian. A datagram has a head of 24 bytes and records of one kind:
 //!
 //! | byte | type | what |
 //! |--:|---|---|
-//! | 0 | 4 bytes | `RWF1` |
-//! | 4 | u16 | kind of the records: 0 sweep, 1 column, 2 tracklet |
+//! | 0 | 4 bytes | `RWF2` |
+//! | 4 | u16 | kind of the records: 0 sweep, 1 column, 2 tracklet, 3 object |
 //! | 6 | u16 | records in this datagram |
 //! | 8 | u16 | number of this datagram among those of its kind and sweep |
 //! | 10 | u16 | how many there are |
@@ -14,29 +14,40 @@
 //!
 //! | kind | bytes | record |
 //! |---|--:|---|
-//! | sweep | 88 | f64 x, y, z and quaternion x, y, z, w of the vehicle in the world; then 1. |
+//! | sweep | 96 | f64 x, y, z and quaternion x, y, z, w of the vehicle in the world; then 1. |
 //! | column | 32 | f32 x, y, velocity x, y over ground, its covariance xx, xy, yy, P(moves) |
 //! | tracklet | 32 | f32 x, y, velocity x, y over ground, turn rate; then 2. |
+//! | object | 84 | u32 number, observations, class; f32 its share of the returns; then 3. |
 //!
 //! 1. f32 time since the sweep before, s (0: no flow), latency from the last packet, ms; u64 sweeps
-//!    left out so far; u32 columns, u32 tracklets that were sent; u64 stamp of the sweep before, ns
+//!    left out so far; u32 columns, tracklets, objects that were sent, and 0; u64 stamp of the
+//!    sweep before, ns
 //! 2. u32 observations; f32 standard deviation of the speed, P(moves)
+//! 3. f32 P(moves) (NaN: not known), time since the stamp at which it was last seen (s, below 0
+//!    where it was not seen in the sweep), x, y, z of the middle of its box, heading (rad), length,
+//!    width, height, velocity x, y over ground (0 where it stands), turn rate, covariance xx, xy,
+//!    yy of its place, variances of its heading and speed
 //!
-//! Columns are those that move in the sweep before, tracklets those that move in the sweep; m, m/s,
-//! rad/s along the vehicle's axes. For every sweep there is a datagram of kind 0, after the others.
+//! Columns are those that move in the sweep before, objects all in it (`--objects`), tracklets
+//! those that move in the sweep; m, m/s, rad/s along the vehicle's axes. Classes: 0 ground,
+//! 1 structure, 2 vegetation, 3 pole, 4 car, 5 large vehicle, 6 person, 7 two-wheeler, 255 none.
+//! For every sweep there is a datagram of kind 0, after the others.
 
 use std::net::{SocketAddr, UdpSocket};
 
+use glam::DVec3;
+use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, TrackletState};
 use raywake_core::pose::Pose;
 use raywake_io::Error;
+use raywake_objects::front_end::StateVariances;
+use raywake_objects::tracked::TrackedObject;
+use raywake_objects::wrap_angle;
 
-const MAGIC: &[u8; 4] = b"RWF1";
+const MAGIC: &[u8; 4] = b"RWF2";
 const HEAD: usize = 24;
-/// Bytes of a column and of a tracklet.
-const RECORD: usize = 32;
-/// Records of a datagram: it fits an Ethernet frame.
-const RECORDS: usize = 40;
+/// Bytes of records in a datagram: it fits an Ethernet frame.
+const RECORDS: usize = 1280;
 
 /// Kinds of records.
 #[derive(Clone, Copy)]
@@ -44,6 +55,18 @@ enum RecordKind {
     Sweep = 0,
     Column = 1,
     Tracklet = 2,
+    Object = 3,
+}
+
+impl RecordKind {
+    /// Bytes of a record.
+    const fn bytes(self) -> usize {
+        match self {
+            RecordKind::Sweep => 96,
+            RecordKind::Column | RecordKind::Tracklet => 32,
+            RecordKind::Object => 84,
+        }
+    }
 }
 
 /// A sweep that is sent.
@@ -62,8 +85,8 @@ pub struct SweepFacts {
     pub latency_ms: f64,
     /// Sweeps left out so far.
     pub left_out: u64,
-    /// Columns and tracklets that were sent.
-    pub sent: [usize; 2],
+    /// Columns, tracklets and objects that were sent.
+    pub sent: [usize; 3],
     /// Stamp of the sweep before, ns.
     pub before_ns: u64,
 }
@@ -72,7 +95,7 @@ pub struct SweepFacts {
 pub struct FlowStream {
     socket: UdpSocket,
     to: SocketAddr,
-    datagram: heapless::Vec<u8, { HEAD + RECORDS * RECORD }>,
+    datagram: heapless::Vec<u8, { HEAD + RECORDS }>,
     unsent: u64,
 }
 
@@ -126,6 +149,36 @@ impl FlowStream {
         })
     }
 
+    /// Sends objects of a sweep, whose stamp is also given as it stands in them, s. Returns how
+    /// many.
+    pub fn objects<'a>(
+        &mut self,
+        sweep: &SentSweep,
+        stamp_s: f64,
+        objects: impl Iterator<Item = &'a TrackedObject> + Clone,
+    ) -> usize {
+        let vehicle = sweep.pose.inverse();
+        self.all(RecordKind::Object, sweep, objects, |this, object| {
+            let (class, share) = object.class.unzip();
+            [object.id, object.observations, ColumnClass::number(class).into()]
+                .iter()
+                .for_each(|number| this.bytes(&number.to_le_bytes()));
+            this.floats(&[share.unwrap_or(0.0), object.p_moves.unwrap_or(f32::NAN)]);
+            this.floats(&[(object.time_s - stamp_s) as f32]);
+            let centre = vehicle.transform(DVec3::from(object.centre));
+            this.floats(&centre.to_array().map(|v| v as f32));
+            let heading = object.heading - sweep.pose.yaw_rad();
+            this.floats(&[wrap_angle(heading) as f32]);
+            this.floats(&object.size);
+            let velocity = object.velocity.unwrap_or_default().map(|v| v as f32);
+            this.floats(&sweep.pose.along_axes(velocity));
+            let StateVariances { position: [xx, xy, yy, _], heading, speed, .. } = object.variances;
+            this.floats(&[object.turn_rate as f32]);
+            this.floats(&turned_covariance(&sweep.pose, [xx, xy, yy]));
+            this.floats(&[heading, speed]);
+        })
+    }
+
     /// Sends a sweep, after all else of it.
     pub fn sweep(&mut self, sweep: &SentSweep, facts: &SweepFacts) {
         self.begin(RecordKind::Sweep, sweep, [0, 1, 1]);
@@ -135,7 +188,8 @@ impl FlowStream {
             .for_each(|number| self.bytes(&number.to_le_bytes()));
         self.floats(&[facts.dt_s as f32, facts.latency_ms as f32]);
         self.bytes(&facts.left_out.to_le_bytes());
-        facts.sent.iter().for_each(|count| self.bytes(&(*count as u32).to_le_bytes()));
+        let sent = facts.sent.iter().chain(&[0]);
+        sent.for_each(|count| self.bytes(&(*count as u32).to_le_bytes()));
         self.bytes(&facts.before_ns.to_le_bytes());
         self.finish();
     }
@@ -149,14 +203,14 @@ impl FlowStream {
         write: impl Fn(&mut FlowStream, R),
     ) -> usize {
         let count = records.clone().count();
-        let parts = count.div_ceil(RECORDS);
+        let most = RECORDS / kind.bytes();
+        let parts = count.div_ceil(most);
         for (n, record) in records.enumerate() {
-            if n % RECORDS == 0 {
-                let part = n / RECORDS;
-                self.begin(kind, sweep, [part, parts, (count - n).min(RECORDS)]);
+            if n % most == 0 {
+                self.begin(kind, sweep, [n / most, parts, (count - n).min(most)]);
             }
             write(self, record);
-            if n % RECORDS == RECORDS - 1 || n + 1 == count {
+            if n % most == most - 1 || n + 1 == count {
                 self.finish();
             }
         }
@@ -228,33 +282,75 @@ mod tests {
         let sent = [
             stream.columns(&sweeps[0], columns.iter()),
             stream.tracklets(&sweeps[1], std::iter::once(tracklet)),
+            stream.objects(&sweeps[0], 20.0, [object(5)].repeat(16).iter()),
         ];
         let facts = SweepFacts { dt_s: 0.1, latency_ms: 12.5, left_out: 3, sent, before_ns: 108 };
         stream.sweep(&sweeps[1], &facts);
         let mut got = Vec::new();
-        for _ in 0..4 {
+        for _ in 0..6 {
             let mut datagram = vec![0; 2000];
             let length = here.recv(&mut datagram).unwrap();
             datagram.truncate(length);
-            assert_eq!(&datagram[..4], b"RWF1");
+            assert_eq!(&datagram[..4], b"RWF2");
             got.push(datagram);
         }
         got.rotate_right(1);
         let heads: Vec<_> = got.iter().map(|d| [4, 6, 8, 10].map(|at| word(d, at))).collect();
-        assert_eq!(heads, [[0, 1, 0, 1], [1, 40, 0, 2], [1, 1, 1, 2], [2, 1, 0, 1]]);
-        assert_eq!(got.iter().map(Vec::len).collect::<Vec<_>>(), [24 + 88, 24 + 40 * 32, 56, 56]);
+        assert_eq!(heads[..4], [[0, 1, 0, 1], [1, 40, 0, 2], [1, 1, 1, 2], [2, 1, 0, 1]]);
+        assert_eq!(heads[4..], [[3, 15, 0, 2], [3, 1, 1, 2]]);
+        let lengths: Vec<usize> = got.iter().map(Vec::len).collect();
+        assert_eq!(lengths, [24 + 96, 24 + 40 * 32, 56, 56, 24 + 15 * 84, 24 + 84]);
         assert_eq!(
             [&got[0], &got[1], &got[3]].map(|d| (d[12], d[16])),
             [(9, 109), (8, 108), (9, 109)]
         );
         assert_eq!(f64::from_le_bytes(got[0][24..32].try_into().unwrap()), 1.0);
         assert_eq!((float(&got[0], 80), float(&got[0], 84)), (0.1, 12.5));
-        assert_eq!((got[0][88], got[0][96], got[0][100], got[0][104]), (3, 41, 1, 108));
+        assert_eq!([88, 96, 100, 104, 108, 112].map(|at| got[0][at]), [3, 41, 1, 16, 0, 108]);
         let numbers: Vec<f32> = (0..8).map(|n| float(&got[2], 24 + 4 * n)).collect();
         for (number, expected) in numbers.iter().zip([3.0, 4.0, 0.0, -1.0, 1.0, 0.0, 4.0, 0.75]) {
             assert!((number - expected).abs() < 1e-6, "{numbers:?}");
         }
         assert_eq!((got[3][44], float(&got[3], 48), float(&got[3], 52)), (7, 0.5, 0.5));
+        check_object(&got[5][24..]);
         assert_eq!(stream.unsent(), 0);
+    }
+
+    fn object(id: u32) -> TrackedObject {
+        TrackedObject {
+            id,
+            observations: 9,
+            time_s: 19.5,
+            centre: [1.0, 5.0, 0.5],
+            heading: std::f64::consts::PI,
+            size: [4.0, 2.0, 1.5],
+            velocity: Some([-3.0, 0.0]),
+            turn_rate: 0.25,
+            variances: StateVariances {
+                position: [4.0, 0.0, 1.0, 9.0],
+                heading: 0.5,
+                speed: 0.75,
+                turn_rate: 0.125,
+            },
+            p_moves: None,
+            class: Some((ColumnClass::Car, 0.75)),
+        }
+    }
+
+    /// That object, of a vehicle at (1, 2) that looks along y.
+    fn check_object(bytes: &[u8]) {
+        let numbers = [0, 4, 8].map(|at| u32::from_le_bytes(bytes[at..][..4].try_into().unwrap()));
+        assert_eq!(numbers, [5, 9, 4]);
+        assert!(float(bytes, 16).is_nan());
+        let numbers: Vec<f32> = (0..15).map(|n| float(bytes, 20 + 4 * n)).collect();
+        let quarter = std::f32::consts::FRAC_PI_2;
+        #[rustfmt::skip]
+        let expected = [
+            -0.5, 3.0, 0.0, 0.5, quarter, 4.0, 2.0, 1.5, 0.0, 3.0, 0.25, 1.0, 0.0, 4.0, 0.5,
+        ];
+        for (number, expected) in numbers.iter().zip(expected) {
+            assert!((number - expected).abs() < 1e-6, "{numbers:?}");
+        }
+        assert_eq!((float(bytes, 12), float(bytes, 80)), (0.75, 0.75));
     }
 }

@@ -1,10 +1,11 @@
 //! What is counted while sweeps come, and what is told of it.
 
 use raywake_core::continuity::Reset;
-use raywake_core::digest::Digest;
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::output::SweepOutput;
 use raywake_io::source::capture::assembly::PacketCounts;
+use raywake_objects::front_end::TrackingCounts;
+use raywake_objects::tracked::TrackedObject;
 use serde::{Serialize, Serializer};
 
 use super::locating::LocatedCounts;
@@ -16,8 +17,6 @@ pub struct LiveStatistics {
     pub counts: SweepCounts,
     pub dropped: DroppedReturns,
     pub latencies: Latencies,
-    /// Of all results; as that of a run.
-    pub digest: Digest,
 }
 
 /// What became of sweeps.
@@ -41,6 +40,8 @@ pub struct SweepCounts {
     pub resets: u64,
     /// Columns that were put out as moving.
     pub moving_columns: u64,
+    /// Objects that were put out as moving.
+    pub moving_objects: u64,
     /// Times that no sweep came for a second.
     pub pauses: u64,
     /// Sweeps in which memory was allocated: a defect of this program.
@@ -60,7 +61,6 @@ impl LiveStatistics {
             counts: SweepCounts::default(),
             dropped: DroppedReturns::default(),
             latencies: Latencies::default(),
-            digest: Digest::default(),
         }
     }
 
@@ -72,6 +72,12 @@ impl LiveStatistics {
         counts.pairs += u64::from(output.flows.is_some());
         let reset = output.reset.is_some_and(|reset| reset != Reset::First);
         counts.resets += u64::from(reset);
+    }
+
+    /// Counts the objects of a sweep.
+    pub fn objects(&mut self, seen: &[TrackedObject]) {
+        let moving = seen.iter().filter(|object| object.velocity.is_some());
+        self.counts.moving_objects += moving.count() as u64;
     }
 
     /// Counts the latency of a sweep that may take so long.
@@ -111,6 +117,9 @@ pub struct LiveSummary {
     /// Returns left out.
     #[serde(serialize_with = "by_name")]
     pub dropped_returns: DroppedReturns,
+    /// What following objects did, where it was asked for.
+    #[serde(serialize_with = "tracking_by_name")]
+    pub tracking: Option<TrackingCounts>,
     pub located: LocatedCounts,
     /// Where poses come.
     pub poses: Option<PoseCounts>,
@@ -127,6 +136,13 @@ pub struct LiveSummary {
 
 fn by_name<S: Serializer>(counts: &DroppedReturns, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(counts.counts().iter().map(|(key, _, count)| (key, count)))
+}
+
+fn tracking_by_name<S: Serializer>(
+    counts: &Option<TrackingCounts>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(counts.iter().flat_map(TrackingCounts::named))
 }
 
 impl LiveSummary {

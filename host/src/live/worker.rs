@@ -3,18 +3,20 @@
 use std::time::{Duration, Instant};
 
 use raywake_alloc_guard::watch;
-use raywake_core::output::ColumnFlow;
+use raywake_core::digest::Digest;
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
 use raywake_gpu::GpuError;
 use raywake_io::source::capture::assembly::LiveSweep;
+use raywake_objects::front_end::TrackingCounts;
 use sd_notify::NotifyState;
 
 use super::handover::{Fetched, Handover};
 use super::locating::{LiveLocator, LocatedCounts};
+use super::objects::LiveObjects;
+use super::outlets::{FlowGone, Outlets, sent_sweep};
 use super::receiver::Receiver;
-use super::recorder::RecordedPair;
-use super::stream::{FlowStream, SentSweep, SweepFacts};
+use super::stream::SweepFacts;
 use super::summary::{LiveStatistics, LiveSummary};
 use crate::console::{interrupted, say, warn};
 use crate::drive::Drive;
@@ -36,12 +38,9 @@ pub struct Worker<'a> {
     pub turn: Duration,
     pub deadline: Duration,
     pub drive: Drive,
+    pub objects: Option<LiveObjects>,
     pub locator: LiveLocator<'a>,
-    pub stream: Option<FlowStream>,
-    /// Where pairs go that are recorded, and the next one.
-    pub recording: Option<(&'a Handover<RecordedPair>, RecordedPair)>,
-    /// Whether results are digested.
-    pub digests: bool,
+    pub outlets: Outlets<'a>,
     pub quiet: bool,
     /// Sweeps after which it ends.
     pub most: u64,
@@ -53,7 +52,8 @@ pub struct LiveEnd {
     drive: Drive,
     located: LocatedCounts,
     frames: Option<[u64; 2]>,
-    digests: bool,
+    digest: Option<Digest>,
+    tracking: Option<TrackingCounts>,
     seconds: f64,
     times: [Duration; 2],
 }
@@ -72,19 +72,12 @@ struct LiveRun<'a> {
 impl Worker<'_> {
     /// Sends what moves in a sweep, and the sweep.
     fn send(&mut self, sweep: &LiveSweep, mut facts: SweepFacts) {
-        let Some(stream) = &mut self.stream else { return };
+        let Some(stream) = &mut self.outlets.stream else { return };
         let moves_min = self.profile.moves.moves_min;
         let moving = self.drive.tracklets().filter(|t| t.probability >= moves_min);
         let sweep = sent_sweep(sweep);
         facts.sent[1] = stream.tracklets(&sweep, moving);
         stream.sweep(&sweep, &facts);
-    }
-
-    /// Hands on a pair whose flow is kept, for another sweep of no meaning in place of its first.
-    fn record(&mut self, first: &mut LiveSweep) {
-        let Some((pairs, kept)) = &mut self.recording else { return };
-        kept.take_first(first);
-        pairs.put(kept);
     }
 
     /// Works on sweeps until a signal, the last one, or so many. `spare` is of no meaning.
@@ -97,7 +90,7 @@ impl Worker<'_> {
         sweeps: &Handover<LiveSweep>,
         spare: LiveSweep,
     ) -> Result<LiveEnd, RunError> {
-        let (digests, times, most) = (self.digests, [self.turn, self.deadline], self.most);
+        let (times, most) = ([self.turn, self.deadline], self.most);
         let mut running = LiveRun {
             statistics: LiveStatistics::new(),
             now: LiveSweep::of(receiver.sensor()),
@@ -138,11 +131,18 @@ impl Worker<'_> {
         let _ = sd_notify::notify(&[NotifyState::Stopping]);
         let LiveRun { worker, mut statistics, frames, .. } = running;
         let counts = &mut statistics.counts;
-        counts.unsent_datagrams = worker.stream.as_ref().map_or(0, FlowStream::unsent);
-        counts.unrecorded = worker.recording.as_ref().map_or(0, |(pairs, _)| pairs.replaced());
-        let (located, drive) = (worker.locator.counts(), worker.drive);
-        let seconds = began.elapsed().as_secs_f64();
-        Ok(LiveEnd { statistics, drive, located, frames, digests, seconds, times })
+        counts.unsent_datagrams = worker.outlets.unsent();
+        counts.unrecorded = worker.outlets.unrecorded();
+        Ok(LiveEnd {
+            statistics,
+            drive: worker.drive,
+            located: worker.locator.counts(),
+            frames,
+            digest: worker.outlets.digest,
+            tracking: worker.objects.as_ref().map(LiveObjects::counts),
+            seconds: began.elapsed().as_secs_f64(),
+            times,
+        })
     }
 }
 
@@ -179,31 +179,23 @@ impl LiveRun<'_> {
         let stepped = worker.drive.step(&now.data.sweep(), before)?;
         let output = &stepped.output;
         statistics.sweep(output);
-        let (mut sent, mut aside) = ([0; 2], Duration::ZERO);
-        if let Some(flows) = &output.flows {
-            let moves = |column: &&ColumnFlow| column.velocity_world_mps != [0.0; 2];
-            let columns = flows.columns.iter().filter(moves);
-            statistics.counts.moving_columns += columns.clone().count() as u64;
-            if let Some(stream) = &mut worker.stream {
-                sent[0] = stream.columns(&sent_sweep(last), columns);
-            }
-            // What nobody waits for, done now as the next borrow of the drive ends the flow.
-            let clock = Instant::now();
-            if let Some((_, kept)) = &mut worker.recording {
-                kept.keep(flows);
-            }
-            if worker.digests {
-                flows.columns.iter().for_each(|c| statistics.digest.column(c));
-                flows.points.iter().for_each(|p| statistics.digest.point(&p));
-            }
-            aside = clock.elapsed();
+        let flows = output.flows.as_ref();
+        let gone = flows.map(|flows| worker.outlets.flow(last, flows)).unwrap_or_default();
+        let FlowGone { moving, aside } = gone;
+        statistics.counts.moving_columns += moving as u64;
+        let mut objects = 0;
+        if let Some(tracker) = worker.objects.as_mut().filter(|_| *paired) {
+            let seen = tracker.step(worker.rig, &last.data.sweep(), flows.map(|f| f.points))?;
+            objects = seen.len();
+            statistics.objects(seen);
+            worker.outlets.objects(last, seen);
         }
         let dt_s = output.flows.map(|flows| flows.dt_s);
         let facts = SweepFacts {
             dt_s: dt_s.unwrap_or(0.0),
             latency_ms: latency_ms(now, aside),
             left_out: statistics.counts.left_out,
-            sent,
+            sent: [moving, 0, objects],
             before_ns: last.stamp_ns,
         };
         worker.send(now, facts);
@@ -212,11 +204,11 @@ impl LiveRun<'_> {
             let deadline_ms = worker.deadline.as_secs_f64() * 1e3;
             statistics.latency(latency_ms(now, aside), deadline_ms);
         }
-        if worker.digests {
-            worker.drive.tracklets().for_each(|t| statistics.digest.tracklet(&t));
+        if let Some(digest) = &mut worker.outlets.digest {
+            worker.drive.tracklets().for_each(|t| digest.tracklet(&t));
         }
         if dt_s.is_some() {
-            worker.record(last);
+            worker.outlets.record(last);
         }
         let frame = now.data.frame;
         *frames = Some(frames.map_or([frame; 2], |[first, _]| [first, frame]));
@@ -253,17 +245,11 @@ fn latency_ms(sweep: &LiveSweep, aside: Duration) -> f64 {
     sweep.arrived.elapsed().saturating_sub(aside).as_secs_f64() * 1e3
 }
 
-fn sent_sweep(sweep: &LiveSweep) -> SentSweep {
-    let LiveSweep { data, stamp_ns, .. } = sweep;
-    SentSweep { number: data.frame, stamp_ns: *stamp_ns, pose: data.world_from_vehicle }
-}
-
 impl LiveEnd {
     /// What it was and what came of it; poses and recording apart.
     pub fn summary(&self, profile: &Profile, receiver: &Receiver) -> LiveSummary {
         let (drive, state) = (&self.drive, receiver.state());
         let [turn_ms, deadline_ms] = self.times.map(|time| time.as_secs_f64() * 1e3);
-        let digest = format!("{:016x}", self.statistics.digest.value());
         LiveSummary {
             version: env!("CARGO_PKG_VERSION"),
             sensor: receiver.sensor().name().to_owned(),
@@ -277,6 +263,7 @@ impl LiveEnd {
             deadline_ms,
             seconds: self.seconds,
             packets: state.counts,
+            tracking: self.tracking,
             overflowed: receiver.overflowed(),
             held_bytes: receiver.held(),
             sweeps: self.statistics.counts,
@@ -287,7 +274,7 @@ impl LiveEnd {
             latency_ms: self.statistics.latencies.figures(),
             device_failure: drive.failure().map(GpuError::to_string),
             recording_failure: None,
-            digest: self.digests.then_some(digest),
+            digest: self.digest.map(|digest| format!("{:016x}", digest.value())),
         }
     }
 }

@@ -134,8 +134,7 @@ impl Tracker {
             rig: rig.clone(),
             params: settings.objects,
             drive,
-            // The window's columns, but for one at the edge.
-            reach_m: (0.5 * f64::from(settings.profile.side) - 1.0) * settings.profile.voxel_m,
+            reach_m: Flows::reach_m(&settings.profile),
             ground,
             parts: Sealed::new("tracks", parts),
             ended: Vec::with_capacity(TRACKS_MAX),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use raywake_core::encoder::ColumnClass;
 use raywake_objects::front_end::{StateVariances, Track};
 use raywake_objects::object_box::ObjectBox;
 use raywake_objects::tracked::TrackedObject;
@@ -115,7 +116,7 @@ impl Files {
             shape: *shape,
             variances: track.variances().get(n).copied().unwrap_or_default(),
             p_moves: track.p_moves().get(n).copied().unwrap_or(f32::NAN),
-            class: feather::class(track.class()),
+            class: ColumnClass::number(track.class()),
         }));
         let in_frame = |seen: &ObjectReturn| {
             let place = estimator.state(f64::from(seen.time_s)).local(seen.position);

@@ -78,11 +78,12 @@ impl Revision {
     }
 }
 
-/// How much of the motion is known.
+/// How much of the motion is known. Counted from 1, so that no filter is all zeros.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u8)]
 enum Phase {
     /// Nothing: where and when the first centroid was seen.
-    Resting { first: [f64; 2], since_s: f64 },
+    Resting { first: [f64; 2], since_s: f64 } = 1,
     /// It may still be backwards.
     Moving,
     /// Its heading has been seen to lead forwards: from now on a negative speed is reversing.

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use raywake_core::dropped::DroppedReturns;
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{FlowBasis, PointFlow, PointFlows, Status};
-use raywake_core::params::{POINTS_MAX, SENSORS_MAX, SLOTS};
+use raywake_core::params::{POINTS_MAX, Profile, SENSORS_MAX, SLOTS};
 use raywake_core::pose::Pose;
 use raywake_core::return_clock::{ReturnClock, slot_of};
 use raywake_core::sweep::{Point, Rig, Sweep, Timing};
@@ -51,6 +51,11 @@ pub struct Flows<'a> {
 }
 
 impl Flows<'_> {
+    /// How far the window of a profile reaches: all its columns, but for one at the edge, m.
+    pub fn reach_m(profile: &Profile) -> f64 {
+        (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m
+    }
+
     /// That of a return `away` (m) from the vehicle.
     fn at(&self, n: usize, away: [f64; 2]) -> Option<PointFlow> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;

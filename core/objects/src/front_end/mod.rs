@@ -23,7 +23,7 @@ mod counts;
 mod object_returns;
 mod params;
 #[cfg(test)]
-mod scene;
+pub(crate) mod scene;
 mod segments;
 #[cfg(test)]
 mod tests;

@@ -46,6 +46,7 @@ fn options() -> EstimatorOptions {
         },
         points_max: scene::RETURNS,
         registers: false,
+        objects: false,
     }
 }
 

@@ -45,7 +45,7 @@ pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
     t.column("p_moves", columns, |c| c.probability);
     t.column("foreground", columns, |c| c.basis != FlowBasis::Background);
     t.column("valid", columns, |c| c.basis >= FlowBasis::Matched);
-    t.column("class", columns, |c| class(c.class));
+    t.column("class", columns, |c| ColumnClass::number(c.class));
     t
 }
 
@@ -88,12 +88,7 @@ fn found(t: &mut TableWriter, flows: &[PointFlow]) {
     t.column("foreground", flows, |f| f.basis != FlowBasis::Background);
     t.column("valid", flows, |f| f.basis >= FlowBasis::Matched);
     t.column("status", flows, |f| f.status as u8);
-    t.column("class", flows, |f| class(f.class));
-}
-
-/// A class as a number, 255 without one.
-pub fn class(of: Option<ColumnClass>) -> u8 {
-    of.map_or(u8::MAX, |class| class as u8)
+    t.column("class", flows, |f| ColumnClass::number(f.class));
 }
 
 /// `class`: the name of every number, separated by commas.

@@ -8,8 +8,8 @@
         moving = step.points["status"] == raywake.MOVING
 
 Frames: x forward, y left, z up, metres and seconds. A pose is a 4x4 matrix (world_from_vehicle) or
-x, y, z, qx, qy, qz, qw. Arrays of records have one element per column, return or tracklet; their
-fields are views. They belong to the caller: no later step changes them.
+x, y, z, qx, qy, qz, qw. Arrays of records have one element per column, return, tracklet or object;
+their fields are views. They belong to the caller: no later step changes them.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import sys
 from ._raywake import (
     COLUMN_DTYPE,
     FLOW_DTYPE,
+    OBJECT_DTYPE,
     POINT_DTYPE,
     TRACKLET_DTYPE,
     CloudFlow,
@@ -56,6 +57,7 @@ __all__ = [
     "INVALID",
     "MOVING",
     "NO_ECHO",
+    "OBJECT_DTYPE",
     "OUTSIDE_WINDOW",
     "OVER_CAPACITY",
     "OWN_VEHICLE",

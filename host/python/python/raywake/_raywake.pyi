@@ -9,6 +9,7 @@ __version__: str
 COLUMN_DTYPE: np.dtype[np.void]
 POINT_DTYPE: np.dtype[np.void]
 TRACKLET_DTYPE: np.dtype[np.void]
+OBJECT_DTYPE: np.dtype[np.void]
 FLOW_DTYPE: np.dtype[np.void]
 
 Profile = Literal["hdl64", "wide", "far", "dissertation"]
@@ -37,6 +38,7 @@ class Pipeline:
         *,
         settings: Settings | None = None,
         find_poses: bool = False,
+        objects: bool = False,
         points_max: int = 0,
         threads: int = 0,
     ) -> Pipeline: ...
@@ -63,6 +65,8 @@ class Step:
     def points(self) -> NDArray[np.void]: ...
     @property
     def tracklets(self) -> NDArray[np.void]: ...
+    @property
+    def objects(self) -> NDArray[np.void]: ...
     @property
     def dt(self) -> float | None: ...
     @property

@@ -21,7 +21,8 @@
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all that is known |
 //! | `/raywake/tracked_objects` | `autoware_perception_msgs/TrackedObjects` | for Autoware |
 //!
-//! A stream of both has all but `/raywake/tracked_points`. A stream of clouds has `/tf` and `/points`: `x y z intensity`, and `time`, s after the stamp.
+//! A stream of both has all but `/raywake/tracked_points`. A stream of clouds has `/tf` and
+//! `/points`: `x y z intensity`, and `time`, s after the stamp.
 //!
 //! `track` is an int32, the number of the return's track, or -1; a marker has the same number.
 
