@@ -236,6 +236,14 @@ mod tests {
     }
 
     #[test]
+    fn damaged_files() {
+        let text = "base = \"wide\"\nside = 101\nvoxel_m = 0.4\ndeskew = false\nem_rounds = 5\n\
+            [tracklet]\ngate_d2 = 5.0\nbirth = \"source\"\n[objects]\npatience_s = 0.6\n";
+        let checked = |profile: Profile| assert_eq!(profile.check(), Ok(()));
+        crate::damaged::check(text, 5000, |text| parsed(text).map(checked).is_ok());
+    }
+
+    #[test]
     fn single_parameters() {
         let choice = |set: &[&str]| ProfileChoice {
             set: set.iter().map(|s| s.to_string()).collect(),

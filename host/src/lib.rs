@@ -29,6 +29,8 @@ pub mod choose;
 mod clean;
 pub mod config;
 pub mod console;
+#[cfg(test)]
+mod damaged;
 #[cfg(feature = "demo")]
 mod demo;
 pub mod drive;

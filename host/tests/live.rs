@@ -328,6 +328,9 @@ fn what_does_not_fit_together() {
     wrong(&["--model", "vlp16", "--listen", "here"], 2, &["ADDRESS:PORT"]);
     wrong(&["--model", "vlp16", "--listen", "203.0.113.1:9"], 2, &["--listen 203.0.113.1:9"]);
     wrong(&["--replay", "no.pcap"], 3, &["no.pcap"]);
+    // At once, before any sweep comes.
+    let nowhere = ["--model", "vlp16", "--listen", "127.0.0.1:0", "--mcap", "/nowhere/x.mcap"];
+    wrong(&nowhere, 4, &["/nowhere/x.mcap"]);
     let (_held, address) = socket();
     wrong(&["--model", "vlp16", "--listen", &address], 2, &["--listen", "in use"]);
     let capture = recorded(&t).display().to_string();

@@ -130,6 +130,8 @@ impl Plan<'_> {
     ) -> Result<(), RunError> {
         let (args, sensor) = (self.args, receiver.sensor());
         let figures = FiguresFile::create(args.results.summary.as_deref(), None)?;
+        let content = if args.objects { Content::FlowAndObjects } else { Content::Flow };
+        let mut sink = BagSink::create(&self.streams, 0, content)?;
         let mut first = LiveSweep::of(sensor);
         if !self.first_sweep(receiver, sweeps, &mut first)? {
             return Ok(());
@@ -146,8 +148,7 @@ impl Plan<'_> {
             choose::drive(&backend, &self.weights, &self.profile, &rig)?;
         note(args.quiet, &lacking)?;
         say(args.quiet, &budget::paragraph(&self.profile, &drive, &filter))?;
-        let content = if args.objects { Content::FlowAndObjects } else { Content::Flow };
-        let sink = BagSink::create(&self.streams, state.epoch_ns, content)?;
+        sink.iter_mut().for_each(|sink| sink.since(state.epoch_ns));
         let pairs = sink.is_some().then(|| {
             let spare = || RecordedPair::of(sensor, &self.profile);
             (Handover::new(spare()), spare())

@@ -107,6 +107,20 @@ NODATA_value -9999
     }
 
     #[test]
+    fn damaged_grids() {
+        crate::damaged::check(GRID, 5000, |text| match parse(Path::new("g.asc"), text) {
+            Ok(ground) => {
+                let map = ground.map();
+                assert_eq!(map.heights.len() % map.columns, 0);
+                // Anywhere, whatever the numbers are.
+                [-1e300, -1.0, 0.0, 4.5, 1e300].iter().for_each(|x| _ = map.height(*x, 5.0));
+                true
+            }
+            Err(_) => false,
+        });
+    }
+
+    #[test]
     fn what_is_no_grid() {
         let wrong = [
             ("cellsize 2", "", "`cellsize`"),

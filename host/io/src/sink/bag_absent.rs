@@ -26,6 +26,11 @@ impl Absent {
     }
 
     /// Never called.
+    pub fn since(&mut self, _: u64) {
+        match *self {}
+    }
+
+    /// Never called.
     pub fn is_watched(&self) -> bool {
         match *self {}
     }

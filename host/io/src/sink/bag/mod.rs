@@ -115,6 +115,11 @@ impl BagSink {
         Ok(is_wanted.then_some(BagSink { file, live, topics, epoch_ns }))
     }
 
+    /// From now on this is added to the sweeps' stamps, ns.
+    pub fn since(&mut self, epoch_ns: u64) {
+        self.epoch_ns = epoch_ns;
+    }
+
     /// Whether somebody sees what goes to viewers, or nothing does.
     pub fn is_watched(&self) -> bool {
         self.live.as_ref().is_none_or(LiveServer::is_watched)

@@ -76,6 +76,18 @@ fn disorder_is_counted() {
     assert_eq!(counts, expected);
 }
 
+#[test]
+fn wrong_check_sums_are_counted() {
+    let metadata = super::packets("crc_test.json");
+    let sensor = LiveSensor::of(SensorModel::Ouster, Some(&metadata)).unwrap();
+    let mut packets = every_payload("crc_test.pcap");
+    let (_, sound) = assembled(&sensor, &packets);
+    assert!(sound.packets > 10 && sound.unsound == 0, "{sound:?}");
+    packets[5][200] ^= 1;
+    let (_, counts) = assembled(&sensor, &packets);
+    assert_eq!((counts.unsound, counts.packets), (1, sound.packets - 1), "{counts:?}");
+}
+
 /// A sensor that stands still, and one whose clock is set.
 #[test]
 fn what_no_turn_ends_is_bounded() {

@@ -46,12 +46,16 @@ fn wrong(path: &Path) -> String {
 
 /// The payloads of a capture, of a length.
 fn payloads(name: &str, length: usize) -> Vec<Vec<u8>> {
+    let mut all = every_payload(name);
+    all.retain(|payload| payload.len() == length);
+    all
+}
+
+fn every_payload(name: &str) -> Vec<Vec<u8>> {
     let mut all = Vec::new();
     let datagrams = Datagrams::open(&packets(name)).unwrap();
     let each = datagrams.each(0, |datagram| {
-        if datagram.payload.len() == length {
-            all.push(datagram.payload.to_vec());
-        }
+        all.push(datagram.payload.to_vec());
         ControlFlow::Continue(())
     });
     each.unwrap();
