@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Float64Type, Int8Type, Int32Type, Int64Type};
@@ -10,6 +11,10 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
 };
+use parquet::column::page::PageReader;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ColumnChunkMetaData;
+use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::images::Image;
 use crate::Error;
@@ -17,6 +22,9 @@ use crate::source::decoder::guarded;
 
 /// Numbers of an image that are believed: six of each of 64 x 2650 pixels are ten times less.
 const NUMBERS_MAX: usize = 1 << 24;
+/// Numbers that a column of a group of rows is believed to have, 1 GiB of float32: twice as many as
+/// the images of 200 sweeps. A few bytes may say that one is repeated as often as one likes.
+const COLUMN_MAX: usize = 1 << 28;
 /// Rows that are decoded at once where rows are small.
 const BATCH: usize = 256;
 
@@ -71,10 +79,50 @@ impl ParquetTable {
             found.ok_or_else(|| Error::input(&self.path, at(), "is missing"))
         };
         let roots = columns.iter().map(|c| number(c.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        roots.iter().try_for_each(|root| self.check_size(*root, COLUMN_MAX))?;
         let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
         let builder = builder.with_projection(mask).with_batch_size(batch);
         let reader = guarded(&self.path, || builder.build())?;
         reader.map_err(|e| Error::input(&self.path, "", e.to_string()))
+    }
+
+    /// Whether a column has so many numbers at most in each group of rows, as its pages say, which
+    /// are what is decoded.
+    fn check_size(&self, root: usize, most: usize) -> Result<(), Error> {
+        let schema = self.metadata.parquet_schema();
+        let groups = self.metadata.metadata().row_groups();
+        for (n, group) in groups.iter().enumerate() {
+            for (leaf, chunk) in group.columns().iter().enumerate() {
+                if schema.get_column_root_idx(leaf) == root {
+                    let rows = group.num_rows().max(0) as usize;
+                    let count = guarded(&self.path, || self.numbers(chunk, rows, most))?;
+                    let wrong = |what| Error::input(&self.path, format!("row group {n}"), what);
+                    let count = count.map_err(|e| wrong(e.to_string()))?;
+                    if count > most {
+                        return Err(wrong(format!("unpacks to more than {most} numbers")));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// How many numbers the pages of a column have, as far as that is no more than `enough`.
+    fn numbers(
+        &self,
+        chunk: &ColumnChunkMetaData,
+        rows: usize,
+        enough: usize,
+    ) -> Result<usize, ParquetError> {
+        let file = Arc::new(self.file.try_clone()?);
+        let mut pages = SerializedPageReader::new(file, chunk, rows, None)?;
+        let mut count = 0_usize;
+        while let Some(page) = pages.peek_next_page()?.filter(|_| count <= enough) {
+            let levels = if page.is_dict { None } else { page.num_levels.or(page.num_rows) };
+            count = count.saturating_add(levels.unwrap_or(0));
+            pages.skip_next_page()?;
+        }
+        Ok(count)
     }
 
     /// Hands out rows with these columns.
@@ -183,5 +231,38 @@ impl TableRow<'_> {
             Some(values.map(|v| f64::from(*v)).collect())
         };
         floats.or_else(whole).ok_or_else(|| self.wrong(name, "is no list of float64 or int32"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::tests::Temp;
+    use arrow_array::{FixedSizeListArray, ListArray};
+    use parquet::arrow::ArrowWriter;
+
+    /// A million equal numbers in one row: a file of some hundred bytes.
+    #[test]
+    fn what_unpacks_to_too_much() {
+        const MANY: usize = 1 << 20;
+        let t = Temp::new();
+        let path = t.write("x.parquet", b"");
+        let values = [Some(vec![Some(1.0); MANY]), None, Some(vec![Some(2.0); 3])];
+        let values = Arc::new(ListArray::from_iter_primitive::<Float32Type, _, _>(values)) as _;
+        let few = [None::<Vec<Option<i32>>>, None, Some(vec![Some(1); 2])];
+        let few = Arc::new(FixedSizeListArray::from_iter_primitive::<Int32Type, _, _>(few, 2)) as _;
+        let batch = RecordBatch::try_from_iter([("values", values), ("few", few)]).unwrap();
+        let file = File::create(&path).unwrap();
+        let mut writer = ArrowWriter::try_new(file, batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        assert!(path.metadata().unwrap().len() < 10_000);
+        let table = ParquetTable::open(&path).unwrap();
+        // The null counts, too.
+        table.check_size(0, MANY + 4).unwrap();
+        table.check_size(1, 6).unwrap();
+        let e = table.check_size(0, MANY + 3).unwrap_err().to_string();
+        assert!(e.contains("x.parquet, row group 0: unpacks to more than 1048579 numbers"), "{e}");
+        assert!(table.reader(&["values"], 1).is_ok());
     }
 }
