@@ -86,8 +86,8 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     }
 }
 
-/// A track without what an estimate at its end takes.
-type ShortTrack = Track<2, 2>;
+/// A track without what an estimate at its end takes: of its states the first.
+type ShortTrack = Track<0, 2>;
 
 /// Objects on board: the front end with tracks that keep nothing of the past. Large: keep it where
 /// it is made.

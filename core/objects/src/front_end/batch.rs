@@ -31,14 +31,8 @@ pub(super) struct BatchReturn {
     pub class: Option<ColumnClass>,
     /// Which of its sweep's returns it is.
     pub index: u32,
-}
-
-impl BatchReturn {
     /// Index of the cell it lies in.
-    pub fn cell(&self) -> usize {
-        let [i, j] = cell(self.position);
-        i * SIDE + j
-    }
+    pub cell: u32,
 }
 
 /// The flow of a sweep's returns.
@@ -70,9 +64,15 @@ fn velocity(flow: PointFlow, sigma_max_mps: f32) -> Option<[f32; 2]> {
     (certain && flow.basis != FlowBasis::Unmatched).then_some(flow.velocity_world_mps)
 }
 
-/// Indices of the cell of a place in the window.
-pub(super) fn cell(at: [f32; 3]) -> [usize; 2] {
+/// Indices of the cell of a place in the window, along x and y.
+pub(super) fn cell_along(at: [f32; 3]) -> [usize; 2] {
     [at[0], at[1]].map(|v| ((v / CELL_M) as usize).min(SIDE - 1))
+}
+
+/// Index of that cell.
+pub(super) fn cell(at: [f32; 3]) -> u32 {
+    let [i, j] = cell_along(at);
+    (i * SIDE + j) as u32
 }
 
 /// What has been taken since the last step.
@@ -171,6 +171,7 @@ impl Batch {
                 p_moves: flow.map(|f| f.probability),
                 class: flow.and_then(|f| f.class),
                 index: n as u32,
+                cell: cell(at),
                 ..placed
             };
             // There is room for all that are taken.

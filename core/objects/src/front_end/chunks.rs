@@ -1,6 +1,6 @@
 //! Chunks: small containers of returns in space and time, found by cell.
 
-use super::batch::{BatchReturn, cell};
+use super::batch::{BatchReturn, cell_along};
 use super::{CELLS, FrontEndParams, SIDE};
 use raywake_core::record::NONE;
 
@@ -58,12 +58,17 @@ impl ReturnSums {
     }
 }
 
+/// What is looked at of a chunk that may be near: of the return that opened it.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chunk {
-    /// The return that opened it.
-    pub first: BatchReturn,
+    /// m from the batch's corner.
+    pub position: [f32; 3],
+    /// s after the batch's stamp.
+    pub time_s: f32,
+    /// m/s, where it is known.
+    pub velocity: Option<[f32; 2]>,
     /// The next chunk of the cell, or [`NONE`].
     next: u32,
-    pub sums: ReturnSums,
 }
 
 /// The chunks of a batch.
@@ -71,28 +76,36 @@ pub(super) struct Chunks {
     /// First chunk of every cell, or [`NONE`].
     heads: [u32; CELLS],
     all: heapless::Vec<Chunk, CHUNKS_MAX>,
+    /// Over the returns of each.
+    sums: heapless::Vec<ReturnSums, CHUNKS_MAX>,
 }
 
 impl Chunks {
     pub const fn new() -> Chunks {
-        Chunks { heads: [0; CELLS], all: heapless::Vec::new() }
+        Chunks { heads: [0; CELLS], all: heapless::Vec::new(), sums: heapless::Vec::new() }
     }
 
     pub fn clear(&mut self) {
         self.heads.fill(NONE);
         self.all.clear();
+        self.sums.clear();
     }
 
     pub fn all(&self) -> &[Chunk] {
         &self.all
     }
 
+    /// Sums over the returns of a chunk.
+    pub fn sums(&self, chunk: u32) -> &ReturnSums {
+        &self.sums[chunk as usize]
+    }
+
     /// Adds a return to the nearest chunk that it may join, or to one of its own. The chunk, or
     /// [`NONE`] where there is no room.
     pub fn add(&mut self, params: &FrontEndParams, one: &BatchReturn) -> u32 {
         let index = self.nearest(params, one).unwrap_or_else(|| self.open(one));
-        if let Some(chunk) = self.all.get_mut(index as usize) {
-            chunk.sums.add(&ReturnSums::of(one));
+        if let Some(sums) = self.sums.get_mut(index as usize) {
+            sums.add(&ReturnSums::of(one));
         }
         index
     }
@@ -102,11 +115,11 @@ impl Chunks {
         let radius = params.chunk_radius_m;
         let mut best = (radius * radius, None);
         self.around(one.position, radius, |index, chunk| {
-            let d = [0, 1, 2].map(|a| chunk.first.position[a] - one.position[a]);
+            let d = [0, 1, 2].map(|a| chunk.position[a] - one.position[a]);
             let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            let apart_s = (chunk.first.time_s - one.time_s).abs();
+            let apart_s = (chunk.time_s - one.time_s).abs();
             let near = apart_s < params.chunk_span_s && d2 < best.0;
-            if near && params.is_similar(chunk.first.velocity, one.velocity) {
+            if near && params.is_similar(chunk.velocity, one.velocity) {
                 best = (d2, Some(index));
             }
         });
@@ -114,9 +127,10 @@ impl Chunks {
     }
 
     fn open(&mut self, one: &BatchReturn) -> u32 {
-        let cell = one.cell();
-        let chunk = Chunk { first: *one, next: self.heads[cell], sums: ReturnSums::NONE };
-        if self.all.push(chunk).is_err() {
+        let cell = one.cell as usize;
+        let &BatchReturn { position, time_s, velocity, .. } = one;
+        let chunk = Chunk { position, time_s, velocity, next: self.heads[cell] };
+        if self.all.push(chunk).and(self.sums.push(ReturnSums::NONE).map_err(|_| chunk)).is_err() {
             return NONE;
         }
         self.heads[cell] = self.all.len() as u32 - 1;
@@ -125,8 +139,8 @@ impl Chunks {
 
     /// Visits the chunks of the cells within `reach` (m) of a place.
     pub fn around<'a>(&'a self, at: [f32; 3], reach: f32, mut visit: impl FnMut(u32, &'a Chunk)) {
-        let low = cell([at[0] - reach, at[1] - reach, 0.0]);
-        let high = cell([at[0] + reach, at[1] + reach, 0.0]);
+        let low = cell_along([at[0] - reach, at[1] - reach, 0.0]);
+        let high = cell_along([at[0] + reach, at[1] + reach, 0.0]);
         for i in low[0]..=high[0] {
             for j in low[1]..=high[1] {
                 let mut index = self.heads[i * SIDE + j];

@@ -130,7 +130,10 @@ impl FrontEnd {
             association.find(params, batch, segments.all(), tracks);
             self.continue_tracks(params, tracks, &mut counts);
             self.begin_tracks(params, tracks, &mut counts);
-            self.find_passing(params);
+            // For estimates alone.
+            if R > 0 {
+                self.find_passing(params);
+            }
             self.distribute(tracks);
             tracks.iter_mut().for_each(|track| track.complete(params));
         }

@@ -81,13 +81,13 @@ impl ObjectReturns {
         self.find_ground(batch, map);
         self.variance.fill(HeightVariance::NONE);
         for one in &batch.returns {
-            let cell = one.cell();
+            let cell = one.cell as usize;
             if self.above(cell, one).is_none_or(|h| h < params.overhead_m) {
                 self.variance[cell].add(one.position[2]);
             }
         }
         for (n, one) in batch.returns.iter().enumerate() {
-            let cell = one.cell();
+            let cell = one.cell as usize;
             let HeightVariance { count, squares, .. } = self.variance[cell];
             let varies = squares > params.variance_m2 * count;
             let is_object = varies || params.is_moving(one.velocity);
@@ -107,7 +107,7 @@ impl ObjectReturns {
     }
 
     fn find_ground(&mut self, batch: &Batch, map: Option<&GroundMap>) {
-        let cells = batch.returns.iter().map(|r| (r.cell(), r.position.map(|v| v / CELL_M)));
+        let cells = batch.returns.iter().map(|r| (r.cell as usize, r.position.map(|v| v / CELL_M)));
         let middle = 0.5 * SIDE as f32;
         let under = [middle, middle, 0.0];
         let ground = &mut self.ground;

@@ -5,8 +5,8 @@
 //! whose velocity is unknown, because it lies outside the flow's window or is unmatched, may join
 //! either.
 
-use super::batch::{Batch, BatchReturn};
-use super::chunks::{CHUNKS_MAX, Chunks, ReturnSums};
+use super::batch::Batch;
+use super::chunks::{CHUNKS_MAX, Chunk, Chunks, ReturnSums};
 use super::{FrontEndParams, SEGMENTS_MAX, TrackingCounts};
 use raywake_core::groups::DisjointSets;
 use raywake_core::params::POINTS_MAX;
@@ -102,8 +102,8 @@ impl Segmentation {
         let count = chunks.all().len();
         groups.start(count, |_| true);
         for (n, chunk) in chunks.all().iter().enumerate() {
-            chunks.around(chunk.first.position, params.link_m, |other, near| {
-                if (other as usize) < n && is_linked(params, &chunk.first, &near.first) {
+            chunks.around(chunk.position, params.link_m, |other, near| {
+                if (other as usize) < n && is_linked(params, chunk, near) {
                     groups.join(n as u32, other);
                 }
             });
@@ -117,7 +117,7 @@ impl Segmentation {
         for group in 0..self.groups.count() {
             let members = self.groups.members(group);
             let mut sums = ReturnSums::NONE;
-            members.iter().for_each(|c| sums.add(&self.chunks.all()[*c as usize].sums));
+            members.iter().for_each(|c| sums.add(self.chunks.sums(*c)));
             let extent = [0, 1].map(|a| sums.high[a] - sums.low[a]);
             let is_large = extent.iter().any(|e| *e > params.extent_max_m);
             let is_small = sums.count < params.returns_min;
@@ -137,7 +137,7 @@ impl Segmentation {
 }
 
 /// Whether two chunks are of one segment.
-fn is_linked(params: &FrontEndParams, a: &BatchReturn, b: &BatchReturn) -> bool {
+fn is_linked(params: &FrontEndParams, a: &Chunk, b: &Chunk) -> bool {
     let d = [0, 1, 2].map(|n| a.position[n] - b.position[n]);
     d[0] * d[0] + d[1] * d[1] <= params.link_m * params.link_m
         && d[2].abs() <= params.link_up_m
@@ -148,7 +148,7 @@ fn is_linked(params: &FrontEndParams, a: &BatchReturn, b: &BatchReturn) -> bool 
 mod tests {
     extern crate std;
     use super::*;
-    use crate::front_end::chunks::Chunk;
+    use crate::front_end::batch::{BatchReturn, cell};
     use crate::random::Random;
     use std::boxed::Box;
     use std::vec;
@@ -167,6 +167,7 @@ mod tests {
             for _ in 0..random.below(80) {
                 let [x, y] = middle.map(|m| m + random.between(-0.9, 0.9));
                 let one = BatchReturn {
+                    cell: cell([x, y, 0.0]),
                     position: [x, y, random.between(0.0, 2.0)],
                     time_s: random.between(0.0, 0.1),
                     velocity,
@@ -179,7 +180,7 @@ mod tests {
     }
 
     /// Every chunk with all that can be reached from it.
-    fn flood(firsts: &[BatchReturn]) -> Vec<usize> {
+    fn flood(firsts: &[Chunk]) -> Vec<usize> {
         let mut label = vec![usize::MAX; firsts.len()];
         for n in 0..firsts.len() {
             let mut open = vec![n];
@@ -204,8 +205,8 @@ mod tests {
             let batch = batch(seed);
             let mut counts = TrackingCounts::default();
             segments.find(&params, &batch, |n| n % 7 != 0, &mut counts);
-            let firsts: Vec<BatchReturn> = segments.chunks.all().iter().map(|c| c.first).collect();
-            let label = flood(&firsts);
+            let firsts = segments.chunks.all();
+            let label = flood(firsts);
             let mut of_label = vec![None; firsts.len()];
             for (label, segment) in label.iter().zip(segments.of_chunk) {
                 let known = of_label[*label].get_or_insert(segment);
@@ -234,18 +235,17 @@ mod tests {
                 }
                 // Of the chunks there were, the nearest it may join; else its own.
                 let joins = |c: &Chunk| {
-                    let d2: f32 =
-                        (0..3).map(|a| (c.first.position[a] - one.position[a]).powi(2)).sum();
+                    let d2: f32 = (0..3).map(|a| (c.position[a] - one.position[a]).powi(2)).sum();
                     let near = d2 < PARAMS.chunk_radius_m * PARAMS.chunk_radius_m
-                        && (c.first.time_s - one.time_s).abs() < PARAMS.chunk_span_s
-                        && PARAMS.is_similar(c.first.velocity, one.velocity);
+                        && (c.time_s - one.time_s).abs() < PARAMS.chunk_span_s
+                        && PARAMS.is_similar(c.velocity, one.velocity);
                     near.then_some(d2)
                 };
                 let least = all[..opened].iter().filter_map(joins).min_by(f32::total_cmp);
                 match least {
                     Some(d2) => assert_eq!(joins(&all[chunk as usize]), Some(d2)),
                     None => {
-                        assert_eq!((chunk as usize, all[opened].first), (opened, *one));
+                        assert_eq!((chunk as usize, all[opened].position), (opened, one.position));
                         opened += 1;
                     }
                 }

@@ -1,6 +1,6 @@
 //! Sequences of any length in fixed memory.
 
-/// Every k-th of a sequence, with k doubled whenever there is no room for more.
+/// Every k-th of a sequence, with k doubled whenever there is no room for more; of no room, none.
 #[derive(Clone, Debug)]
 pub struct Thinned<T, const N: usize> {
     kept: heapless::Vec<T, N>,
@@ -13,13 +13,13 @@ impl<T: Copy, const N: usize> Thinned<T, N> {
     /// Nothing yet.
     pub const fn new() -> Thinned<T, N> {
         // What is kept stays at even multiples when every other one goes.
-        assert!(N >= 2 && N.is_multiple_of(2));
+        assert!(N.is_multiple_of(2));
         Thinned { kept: heapless::Vec::new(), doublings: 0, seen: 0 }
     }
 
     /// Adds the next one.
     pub fn push(&mut self, item: T) {
-        if self.seen.is_multiple_of(1 << self.doublings) {
+        if N > 0 && self.seen.is_multiple_of(1 << self.doublings) {
             if self.kept.is_full() {
                 for n in 0..N / 2 {
                     self.kept[n] = self.kept[2 * n];
@@ -77,6 +77,9 @@ mod tests {
             assert_eq!(thinned.kept(), wanted, "{count}");
             assert_eq!(thinned.seen(), count as u64);
             assert!(every == 1 || wanted.len() > 4, "{count}: one of {every}");
+            let mut none = Thinned::<usize, 0>::new();
+            (0..count).for_each(|n| none.push(n));
+            assert_eq!((none.kept(), none.seen()), (&[][..], count as u64));
         }
     }
 }
