@@ -21,7 +21,7 @@ mod argoverse;
 #[cfg(feature = "mcap")]
 mod bag;
 mod bin;
-#[cfg(feature = "pcap")]
+#[cfg(feature = "xml")]
 pub mod boost;
 #[cfg(feature = "pcap")]
 pub mod capture;
