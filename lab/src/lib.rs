@@ -7,6 +7,7 @@ mod curve;
 pub mod eval;
 pub mod flsf;
 pub mod grid;
+pub mod growth;
 pub mod labels;
 mod learning;
 pub mod matching;
