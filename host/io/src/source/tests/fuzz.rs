@@ -271,4 +271,9 @@ fn captures() {
     let t = Temp::new();
     t.write("a.pcap", crate::source::capture::tests::recording());
     fuzz("pcap", Seed::new(t, "a.pcap", unlocated()));
+    let t = Temp::new();
+    let [packets, calibration] = crate::source::capture::tests::calibrated();
+    t.write("a.pcap", packets);
+    t.write("a.xml", calibration);
+    fuzz("db.xml", Seed::new(t, "a.pcap", unlocated()));
 }

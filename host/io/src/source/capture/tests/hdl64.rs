@@ -54,6 +54,11 @@ fn packets(dual: bool) -> Vec<Vec<u8>> {
     packets
 }
 
+/// The file of a turn, and what the sensor's calibration is.
+pub(crate) fn calibrated() -> [Vec<u8>; 2] {
+    [pcap(&from_one(&packets(false))), calibration().into_bytes()]
+}
+
 fn recorded(folder: &Temp, packets: &[Vec<u8>]) -> PathBuf {
     folder.write("made.pcap", pcap(&from_one(packets)))
 }

@@ -4,6 +4,8 @@ mod arriving;
 mod disorder;
 mod hdl64;
 
+pub(crate) use hdl64::calibrated;
+
 use std::fs;
 
 use etherparse::PacketBuilder;
