@@ -26,6 +26,7 @@ use crate::statistics::BUDGET_MS;
 use crate::team;
 use crate::track::Tracker;
 use raywake_io::Error;
+use raywake_objects::tracked::ObjectTracker;
 use serde::Serialize;
 
 pub use markdown::memory_layout;
@@ -183,9 +184,12 @@ fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     parts
 }
 
-/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run.
+/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run; the last is
+/// in place of all others on board.
 pub fn track_parts() -> Vec<Part> {
-    Tracker::parts().map(|(name, kind, bytes)| part(name, kind, bytes)).into()
+    let on_board = part("objects on board", "ObjectTracker", size_of::<ObjectTracker>());
+    let parts = Tracker::parts().map(|(name, kind, bytes)| part(name, kind, bytes));
+    parts.into_iter().chain([on_board]).collect()
 }
 
 /// Bytes of all parts.

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 use raywake_core::encoder::ColumnClass;
+use raywake_core::output::PointFlows;
+use raywake_core::params::Profile;
 use raywake_core::sweep::{Rig, Sweep};
 
 use crate::ObjectState;
@@ -45,7 +47,7 @@ pub struct TrackedObject {
 }
 
 impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
-    /// A state of it, in the world.
+    /// A place given from its anchor, in the world, m.
     pub fn in_world(&self, at: [f64; 3]) -> [f64; 3] {
         (DVec3::from(self.anchor) + DVec3::from(at)).to_array()
     }
@@ -94,6 +96,7 @@ type ShortTrack = Track<0, 2>;
 pub struct ObjectTracker {
     front_end: FrontEnd,
     tracks: [ShortTrack; TRACKS_MAX],
+    seen: heapless::Vec<TrackedObject, TRACKS_MAX>,
 }
 
 impl Default for ObjectTracker {
@@ -108,26 +111,33 @@ impl ObjectTracker {
         ObjectTracker {
             front_end: FrontEnd::new(),
             tracks: [const { ShortTrack::new() }; TRACKS_MAX],
+            seen: heapless::Vec::new(),
         }
     }
 
-    /// Continues the tracks with a sweep and the flow of its returns, where there is one.
+    /// Continues the tracks with a sweep and the flow of its returns by a profile, where there is
+    /// one.
     pub fn step(
         &mut self,
         params: &TrackingParams,
         rig: &Rig,
         sweep: &Sweep,
-        flows: Option<Flows>,
+        flows: Option<(PointFlows, &Profile)>,
     ) -> TrackingCounts {
-        self.front_end.take(&params.front_end, rig, sweep, flows);
-        self.front_end.step(&params.front_end, None, &mut self.tracks)
+        let flows = flows.map(|(of, profile)| Flows { of, reach_m: Flows::reach_m(profile) });
+        let ObjectTracker { front_end, tracks, seen } = self;
+        front_end.take(&params.front_end, rig, sweep, flows);
+        let counts = front_end.step(&params.front_end, None, tracks);
+        let shown = tracks.iter().filter(|track| track.is_object(&params.front_end));
+        seen.clear();
+        seen.extend(shown.filter_map(|track| track.object(params)));
+        counts
     }
 
     /// The objects of the last step's sweep: of tracks that were seen to move and came somewhere,
     /// or that the encoder takes for vehicles, people or two-wheelers. At most [`TRACKS_MAX`].
-    pub fn objects(&self, params: &TrackingParams) -> impl Iterator<Item = TrackedObject> {
-        let shown = self.tracks.iter().filter(|track| track.is_object(&params.front_end));
-        shown.filter_map(|track| track.object(params))
+    pub fn objects(&self) -> &[TrackedObject] {
+        &self.seen
     }
 }
 
@@ -180,6 +190,6 @@ mod tests {
         assert!((standing.centre[0] - 8.0).abs() < 0.2 && standing.observations == 30);
         assert!((standing.size[0] - 4.0).abs() < 0.4, "{standing:?}");
         // Nobody tells what they are.
-        assert_eq!(short.objects(&PARAMS).count(), 0);
+        assert_eq!(short.objects(), []);
     }
 }

@@ -11,7 +11,6 @@ use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Sweep};
 use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
-use raywake_objects::front_end::{Flows, TRACKS_MAX};
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 use raywake_registration::Odometry;
@@ -47,7 +46,7 @@ pub struct FlowEstimator {
     setup: Setup,
     pipeline: &'static mut Pipeline,
     odometry: Option<&'static mut Odometry>,
-    objects: Option<ObjectRoom>,
+    objects: Option<&'static mut ObjectTracker>,
     backend: ScalarBackend<&'static mut [u32]>,
     columns: &'static mut [ColumnFlow],
     taken: &'static mut [ReturnFlow],
@@ -63,13 +62,6 @@ struct Before {
     stamp_s: f64,
     pose: Pose,
     twist: Twist,
-}
-
-/// Tracks, and what is put out of them.
-struct ObjectRoom {
-    tracker: &'static mut ObjectTracker,
-    seen: &'static mut [TrackedObject],
-    count: usize,
 }
 
 /// Returns of a sweep.
@@ -95,34 +87,11 @@ impl EstimatorOptions {
         let EstimatorOptions { profile, points_max, registers, objects, .. } = self;
         Ok(bytes_of::<Pipeline>(1)
             + bytes_of::<Odometry>(usize::from(*registers))
-            + if *objects { ObjectRoom::BYTES } else { 0 }
+            + bytes_of::<ObjectTracker>(usize::from(*objects))
             + bytes_of::<u32>(words(profile))
             + bytes_of::<ColumnFlow>(solid(profile))
             + bytes_of::<ReturnFlow>(profile.returns())
             + 2 * bytes_of::<Point>(*points_max))
-    }
-}
-
-impl ObjectRoom {
-    const BYTES: usize = bytes_of::<ObjectTracker>(1) + bytes_of::<TrackedObject>(TRACKS_MAX);
-
-    fn new(memory: &mut Memory) -> Option<ObjectRoom> {
-        let tracker = state::<ObjectTracker>(memory)?;
-        let seen = array(memory, TRACKS_MAX, TrackedObject::default())?;
-        Some(ObjectRoom { tracker, seen, count: 0 })
-    }
-
-    /// Follows the objects through a sweep, with its flow where there is one.
-    fn step(&mut self, setup: &Setup, sweep: &Sweep, flows: Option<PointFlows>) {
-        const PARAMS: TrackingParams = TrackingParams::DEFAULT;
-        let reach_m = Flows::reach_m(&setup.profile);
-        self.tracker.step(&PARAMS, &setup.rig, sweep, flows.map(|of| Flows { of, reach_m }));
-        let objects = self.tracker.objects(&PARAMS);
-        self.count = self.seen.iter_mut().zip(objects).map(|(to, object)| *to = object).count();
-    }
-
-    fn seen(&self) -> &[TrackedObject] {
-        &self.seen[..self.count]
     }
 }
 
@@ -161,7 +130,8 @@ impl FlowEstimator {
         let pipeline = state::<Pipeline>(rest).ok_or_else(lacking)?;
         let odometry =
             registers.then(|| state::<Odometry>(rest).ok_or_else(lacking)).transpose()?;
-        let objects = objects.then(|| ObjectRoom::new(rest).ok_or_else(lacking)).transpose()?;
+        let objects =
+            objects.then(|| state::<ObjectTracker>(rest).ok_or_else(lacking)).transpose()?;
         let words = array(rest, words(profile), 0).ok_or_else(lacking)?;
         let columns = array(rest, solid(profile), ColumnFlow::default()).ok_or_else(lacking)?;
         let taken = array(rest, profile.returns(), ReturnFlow::default()).ok_or_else(lacking)?;
@@ -234,9 +204,10 @@ impl FlowEstimator {
         if let (Some(objects), Some(last)) = (&mut self.objects, self.before) {
             let Before { stamp_s, pose: world_from_vehicle, twist } = last;
             let sweep = Sweep { stamp_s, points: before.points(), world_from_vehicle, twist };
-            objects.step(&self.setup, &sweep, output.flows.as_ref().map(|flows| flows.points));
+            let flows = output.flows.as_ref().map(|flows| (flows.points, &self.setup.profile));
+            objects.step(&TrackingParams::DEFAULT, &self.setup.rig, &sweep, flows);
         }
-        let objects = self.objects.as_ref().map_or(0, |objects| objects.count);
+        let objects = self.objects.as_ref().map_or(0, |objects| objects.objects().len());
         let summary = StepSummary::new(&output, pose, locating, objects);
         self.pair = output
             .flows
@@ -299,7 +270,7 @@ impl FlowEstimator {
 
     /// Objects in the pair's first sweep, where they are followed.
     pub fn objects(&self) -> &[TrackedObject] {
-        self.objects.as_ref().map_or(&[], ObjectRoom::seen)
+        self.objects.as_ref().map_or(&[], |tracker| tracker.objects())
     }
 
     /// Adds all that can be read now, but objects, to a digest: after every sweep, that of the

@@ -51,7 +51,8 @@ const TRACKS_HEAD: &str = "
 ## Tracks
 
 `raywake track` holds these parts on the host, and two sweeps; with the flow, what `raywake run`
-holds besides.
+holds besides. The last one is in place of all others where objects are followed on board, by
+`raywake live --objects` and in the libraries.
 
 | part | type | bytes |
 |---|---|--:|

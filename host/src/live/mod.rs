@@ -184,7 +184,7 @@ impl Plan<'_> {
     }
 
     /// Room to follow objects in, where that is asked for.
-    fn objects(&self) -> Result<Option<LiveObjects>, RunError> {
+    fn objects(&self) -> Result<Option<LiveObjects<'_>>, RunError> {
         if !self.args.objects {
             return Ok(None);
         }

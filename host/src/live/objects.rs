@@ -5,33 +5,31 @@ use raywake_alloc_guard::Sealed;
 use raywake_core::output::PointFlows;
 use raywake_core::params::Profile;
 use raywake_core::sweep::{Rig, Sweep};
-use raywake_objects::front_end::{Flows, TRACKS_MAX, TrackingCounts};
+use raywake_objects::front_end::TrackingCounts;
 use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 
 use crate::error::RunError;
 
-/// Tracks and what is put out of them. Nothing is allocated once it is made.
-pub struct LiveObjects {
+/// Objects, and how they are followed. Nothing is allocated once it is made.
+pub struct LiveObjects<'a> {
     params: TrackingParams,
-    reach_m: f64,
+    profile: &'a Profile,
     tracker: Sealed<Box<ObjectTracker>>,
-    seen: heapless::Vec<TrackedObject, TRACKS_MAX>,
     counts: TrackingCounts,
 }
 
-impl LiveObjects {
+impl LiveObjects<'_> {
     /// Bytes that it holds.
     pub const BYTES: usize = size_of::<LiveObjects>() + size_of::<ObjectTracker>();
 
     /// No tracks yet.
-    pub fn new(params: TrackingParams, profile: &Profile) -> LiveObjects {
+    pub fn new(params: TrackingParams, profile: &Profile) -> LiveObjects<'_> {
         let tracker = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
         LiveObjects {
             params,
-            reach_m: Flows::reach_m(profile),
+            profile,
             tracker: Sealed::new("objects", tracker),
-            seen: heapless::Vec::new(),
             counts: TrackingCounts::default(),
         }
     }
@@ -52,14 +50,12 @@ impl LiveObjects {
         sweep: &Sweep,
         flows: Option<PointFlows>,
     ) -> Result<&[TrackedObject], RunError> {
-        let LiveObjects { params, reach_m, tracker, seen, counts } = self;
-        let flows = flows.map(|of| Flows { of, reach_m: *reach_m });
+        let LiveObjects { params, profile, tracker, counts } = self;
+        let flows = flows.map(|of| (of, *profile));
         tracker.step(|tracker| {
             *counts += tracker.step(params, rig, sweep, flows);
-            seen.clear();
-            seen.extend(tracker.objects(params));
             Ok::<_, RunError>(())
         })?;
-        Ok(seen)
+        Ok(tracker.objects())
     }
 }

@@ -38,7 +38,7 @@ pub struct Worker<'a> {
     pub turn: Duration,
     pub deadline: Duration,
     pub drive: Drive,
-    pub objects: Option<LiveObjects>,
+    pub objects: Option<LiveObjects<'a>>,
     pub locator: LiveLocator<'a>,
     pub outlets: Outlets<'a>,
     pub quiet: bool,

@@ -130,7 +130,7 @@ impl Chunks {
         let cell = one.cell as usize;
         let &BatchReturn { position, time_s, velocity, .. } = one;
         let chunk = Chunk { position, time_s, velocity, next: self.heads[cell] };
-        if self.all.push(chunk).and(self.sums.push(ReturnSums::NONE).map_err(|_| chunk)).is_err() {
+        if self.all.push(chunk).is_err() || self.sums.push(ReturnSums::NONE).is_err() {
             return NONE;
         }
         self.heads[cell] = self.all.len() as u32 - 1;
