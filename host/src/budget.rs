@@ -184,8 +184,8 @@ fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     parts
 }
 
-/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run; the last is
-/// in place of all others on board.
+/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run; the last
+/// is in place of all others on board.
 pub fn track_parts() -> Vec<Part> {
     let on_board = part("objects on board", "ObjectTracker", size_of::<ObjectTracker>());
     let parts = Tracker::parts().map(|(name, kind, bytes)| part(name, kind, bytes));
