@@ -286,6 +286,7 @@ fn a_signal_ends_it() {
         if sweeps {
             assert_eq!(told(), "STOPPING=1");
             let s = o.summary(&t.path().join("s.json"));
+            assert!((s["turn_ms"].as_f64().unwrap() - 75.0 * 1.327).abs() < 0.1, "{s}");
             assert!(s["sender"] == "127.0.0.1" && count(&s, "packets", "foreign") == 0, "{s}");
         } else {
             assert!(o.stdout.contains("no whole sweep arrived"), "{}", o.stdout);
@@ -293,11 +294,65 @@ fn a_signal_ends_it() {
     }
 }
 
-/// A packet of a VLP-16 that sees something 10 m away all around; `n` counts packets, 75 a turn.
+/// A program that gets no time for half a second, while its sensor goes on: a second later sweeps
+/// come without a gap again.
+#[test]
+fn a_stall() {
+    let t = Temp::new();
+    let ((free, address), (results, to)) = (socket(), socket());
+    drop(free);
+    results.set_nonblocking(true).unwrap();
+    let listen = ["--listen", &address, "--model", "vlp16", "--ground=-1.9", "--send", &to];
+    let mut command = live(&t, &[&BACKEND[..], &listen].concat());
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let signal = |name: &str| {
+        let kill = Command::new("kill").args([name, &child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+    };
+    let sensor = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let (mut n, mut swept) = (0, Vec::new());
+    let mut sends = |until: &dyn Fn(usize) -> bool| {
+        while !until(swept.len()) {
+            let _ = sensor.send_to(&vlp16(n), &address);
+            n += 1;
+            thread::sleep(Duration::from_micros(1327));
+            let mut datagram = [0; 2000];
+            while results.recv(&mut datagram).is_ok() {
+                // Of a sweep: the time since the one before, and how many were left out so far.
+                if datagram[4] == 0 {
+                    let dt_s = f32::from_le_bytes(datagram[80..84].try_into().unwrap());
+                    let left_out = u64::from_le_bytes(datagram[88..96].try_into().unwrap());
+                    swept.push((dt_s, left_out));
+                }
+            }
+        }
+        swept.len()
+    };
+    let began = Instant::now();
+    let before = sends(&|sweeps| sweeps >= 5 || began.elapsed() > Duration::from_secs(60));
+    assert!(before >= 5);
+    signal("-STOP");
+    let stopped = Instant::now();
+    sends(&|_| stopped.elapsed() > Duration::from_millis(500));
+    signal("-CONT");
+    let went_on = Instant::now();
+    let recovered = sends(&|_| went_on.elapsed() > Duration::from_secs(1));
+    sends(&|sweeps| sweeps >= recovered + 5 || went_on.elapsed() > Duration::from_secs(60));
+    signal("-TERM");
+    Outcome::of(child.wait_with_output().unwrap()).succeeded();
+    assert!(recovered > before, "{swept:?}");
+    let last = &swept[recovered..];
+    assert!(last.iter().all(|sweep| sweep.0 > 0.0 && sweep.1 == last[0].1), "{swept:?}");
+}
+
+/// A packet of a VLP-16 in the middle of a room, 16 m by 24 m; `n` counts packets, 75 a turn.
 fn vlp16(n: u32) -> Vec<u8> {
     let block = |block: u32| {
         let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
-        let seen = [0x88, 0x13, 51].repeat(32);
+        let (sin, cos) = (f64::from(azimuth) * 0.01).to_radians().sin_cos();
+        let distance = (12.0 / cos.abs()).min(8.0 / sin.abs());
+        let [low, high] = ((distance / 0.002) as u16).to_le_bytes();
+        let seen = [low, high, 51].repeat(32);
         [&[0xff, 0xee][..], &azimuth.to_le_bytes(), &seen].concat()
     };
     let blocks: Vec<u8> = (0..12).flat_map(block).collect();

@@ -11,10 +11,8 @@ mkdir -p "$out"
 python3 -m venv "$out/tools" &&
     "$out/tools/bin/pip" install --quiet --disable-pip-version-check maturin==1.16.0 || exit 77
 
-# The program's profile: its dependencies are compiled already.
 rm -rf "$out/wheels" "$out/fresh"
-PATH=$out/tools/bin:$PATH "$out/tools/bin/maturin" build --quiet --profile release \
-    --manifest-path host/python/Cargo.toml --target-dir target --out "$out/wheels"
+PATH=$out/tools/bin:$PATH host/python/wheel.sh "$(uname -m)" "$out/wheels"
 
 python3 -m venv "$out/fresh"
 start=$SECONDS

@@ -138,8 +138,7 @@ impl Plan<'_> {
         }
         let LiveRig { rig, notes } = sensor.learn(&first.data, &args.place.options())?;
         note(args.quiet, &notes)?;
-        let state = receiver.state();
-        let turn = Duration::from_nanos(state.turn_ns as u64);
+        let turn = Duration::from_nanos(first.turn_ns as u64);
         let deadline = args.deadline.unwrap_or(turn);
         let backend = &args.flow.backend;
         let timeout = backend.timeout.min(deadline * DEVICE_DEADLINES);
@@ -148,7 +147,7 @@ impl Plan<'_> {
             choose::drive(&backend, &self.weights, &self.profile, &rig)?;
         note(args.quiet, &lacking)?;
         say(args.quiet, &budget::paragraph(&self.profile, &drive, &filter))?;
-        sink.iter_mut().for_each(|sink| sink.since(state.epoch_ns));
+        sink.iter_mut().for_each(|sink| sink.since(receiver.state().epoch_ns));
         let pairs = sink.is_some().then(|| {
             let spare = || RecordedPair::of(sensor, &self.profile);
             (Handover::new(spare()), spare())

@@ -30,8 +30,6 @@ pub struct ReceiverState {
     pub sender: Option<IpAddr>,
     /// Time of the first stamp since 1970, ns.
     pub epoch_ns: u64,
-    /// Time of a turn, ns, once one has been seen.
-    pub turn_ns: f64,
 }
 
 /// A socket that packets arrive at.
@@ -138,8 +136,7 @@ impl Receiver {
                 // Whoever sent something else first is not the sensor.
                 sender = sender.filter(|_| counts.packets > 0);
                 let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-                let (epoch_ns, turn_ns) = (assembler.epoch_ns(), assembler.turn_ns());
-                *state = ReceiverState { counts, sender, epoch_ns, turn_ns };
+                *state = ReceiverState { counts, sender, epoch_ns: assembler.epoch_ns() };
             });
         });
         sweeps.close();

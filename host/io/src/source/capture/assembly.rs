@@ -31,6 +31,8 @@ pub struct LiveSweep {
     pub arrived: Instant,
     /// Packets that are missing in it.
     pub lost_packets: u64,
+    /// Time of a turn, as far as it is known by then, ns.
+    pub turn_ns: f64,
 }
 
 impl LiveSweep {
@@ -38,7 +40,7 @@ impl LiveSweep {
     pub fn of(sensor: &LiveSensor) -> LiveSweep {
         let points = Vec::with_capacity(sensor.returns_max());
         let data = SweepData { points, ..SweepData::default() };
-        LiveSweep { data, stamp_ns: 0, arrived: Instant::now(), lost_packets: 0 }
+        LiveSweep { data, stamp_ns: 0, arrived: Instant::now(), lost_packets: 0, turn_ns: 0.0 }
     }
 }
 
@@ -111,11 +113,6 @@ impl Assembler {
     /// [`LiveSweep::stamp_ns`] of the first sweep.
     pub fn epoch_ns(&self) -> u64 {
         self.epoch_ns
-    }
-
-    /// Time of a turn, ns; 0 until it is known.
-    pub fn turn_ns(&self) -> f64 {
-        self.turn_ns.unwrap_or(0.0)
     }
 
     /// Counts a datagram of another sender.
@@ -208,9 +205,10 @@ impl Assembler {
                 (Begun { firing, stamp_ns: 0, number: 0 }, 0)
             }
             Some(begun) => {
-                self.filling.arrived = arrived;
+                let (next, turn_ns) = self.after(&begun, firing);
+                self.turn_ns = Some(turn_ns);
+                (self.filling.arrived, self.filling.turn_ns) = (arrived, turn_ns);
                 complete(&mut self.filling);
-                let next = self.after(&begun, firing);
                 let sweeps_before = next.number - begun.number - 1;
                 (next, sweeps_before)
             }
@@ -224,8 +222,9 @@ impl Assembler {
         self.begun = Some(begun);
     }
 
-    /// Stamp and number of a turn that follows another.
-    fn after(&mut self, begun: &Begun, firing: Firing) -> Begun {
+    /// Stamp and number of a turn that follows another, and what is then known of the time of one,
+    /// ns.
+    fn after(&mut self, begun: &Begun, firing: Firing) -> (Begun, f64) {
         let mut step_ns = self.sensor.0.since(firing.clock_ns, begun.firing.clock_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             self.counts.clock_set += 1;
@@ -239,8 +238,7 @@ impl Assembler {
         // Of a turn that lacks most of its packets nothing can be told.
         let likely = (0.5..2.0).contains(&(seen_ns / turn_ns));
         let share = if likely { TURN_SHARE } else { 0.0 };
-        self.turn_ns = Some(turn_ns + share * (seen_ns - turn_ns));
         let (stamp_ns, number) = (begun.stamp_ns + step_ns, begun.number + turns as u64);
-        Begun { firing, stamp_ns, number }
+        (Begun { firing, stamp_ns, number }, turn_ns + share * (seen_ns - turn_ns))
     }
 }

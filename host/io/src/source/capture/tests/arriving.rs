@@ -49,6 +49,13 @@ fn the_same_sweeps_as_those_of_a_capture() {
     let (live, counts) = assembled(&vlp(), &packets);
     check(&live, &sweeps(&mut capture.unwrap()));
     assert_eq!(counts, PacketCounts { packets: 300, ..PacketCounts::default() });
+    // The first one knows how long a turn takes.
+    let mut assembler = Assembler::new(vlp());
+    let mut turns_ns = Vec::new();
+    for packet in &packets {
+        assembler.take(packet, Instant::now(), NOW_NS, |sweep| turns_ns.push(sweep.turn_ns));
+    }
+    assert_eq!(turns_ns, [75.0 * 1_327_000.0; 3]);
     // Of a capture that begins with a turn, that one is left out.
     let name = "OS-1-128_v2.3.0_1024x10_lb_n3";
     let metadata = super::packets("OS-1-128_v2.3.0_1024x10.json");
