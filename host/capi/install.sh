@@ -8,6 +8,10 @@ mkdir -p "$1"
 prefix=$(cd "$1" && pwd)
 cd "$(dirname "$0")"
 
+if [ $# -ge 2 ]; then
+    . ../package/cross.sh
+    cross "$2"
+fi
 cargo build --quiet --profile library -p raywake-capi --lib ${2:+--target "$2"}
 built=$(cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
 built=$built/${2:+$2/}library

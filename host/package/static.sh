@@ -6,12 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target=${1:?x86_64 or aarch64}-unknown-linux-musl
-rustup target add "$target" >&2
-if [ "$1" != "$(uname -m)" ]; then
-    # The C compiler of another architecture links; what it links is Rust's own.
-    linker=CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$target")_LINKER
-    export "$linker=${!linker:-$1-linux-gnu-gcc}"
-    export RUSTFLAGS="${RUSTFLAGS:-} -C link-self-contained=yes"
-fi
+. host/package/cross.sh
+cross "$target"
 cargo build --quiet --profile onboard -p raywake --no-default-features --target "$target" >&2
 echo "target/$target/onboard/raywake"

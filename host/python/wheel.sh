@@ -9,13 +9,9 @@ folder=$(cd "$2" && pwd)
 cd "$(dirname "$0")/../.."
 other=()
 if [ "$1" != "$(uname -m)" ]; then
-    target=$1-unknown-linux-gnu
-    rustup target add "$target" >&2
-    linker=CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$target")_LINKER
-    export "$linker=${!linker:-$1-linux-gnu-gcc}"
-    # What is C in it, the compression.
-    export "CC_${target//-/_}=${!linker}"
-    other=(--target "$target")
+    . host/package/cross.sh
+    cross "$1-unknown-linux-gnu"
+    other=(--target "$1-unknown-linux-gnu")
 fi
 # The program's profile: its dependencies are compiled already.
 maturin build --quiet --profile release --manifest-path host/python/Cargo.toml \

@@ -34,6 +34,20 @@ compare "C, one thread, shared library" "$out/replay-shared" "$out/demo.sweeps" 
 small_stack() { (ulimit -s 512 && "$@"); }
 compare "C, one thread, 512 KiB of stack" small_stack "$out/replay" "$out/demo.sweeps" 1
 
+# For another architecture, under its emulator.
+target=aarch64-unknown-linux-gnu
+if [ "$(uname -m)" = x86_64 ] && command -v aarch64-linux-gnu-gcc >/dev/null &&
+    command -v qemu-aarch64-static >/dev/null && rustup target add $target >/dev/null 2>&1; then
+    other=$out/aarch64
+    host/capi/install.sh "$other" $target
+    aarch64-linux-gnu-gcc "${flags[@]}" -I"$other/include" "$source" -L"$other/lib" -lraywake \
+        -Wl,-rpath,"$other/lib" -o "$out/replay-aarch64"
+    compare "C, aarch64, shared library" qemu-aarch64-static -L /usr/aarch64-linux-gnu \
+        "$out/replay-aarch64" "$out/demo.sweeps" 1
+else
+    echo "skipped: no compiler, target or emulator for aarch64"
+fi
+
 # The header is one of C++, too; and the shared library is found by its ABI.
 echo '#include <raywake.h>
 #include <cstdio>
