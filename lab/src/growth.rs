@@ -3,7 +3,7 @@
 //!
 //! Every row is a simulated drive through one street; one thing changes in each group of rows.
 
-use crate::report::{Cell, Report, Table, TableRow};
+use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::args::FlowChoice;
 use raywake::choose;
 use raywake::config;
@@ -36,8 +36,6 @@ pub struct Args {
 
 /// Columns of an OS1-128 of ten turns a second: its own settings, one below and one above them.
 const COLUMNS: [usize; 5] = [256, 512, 1024, 2048, 2720];
-/// Half the window's edge, in columns of the profile's own.
-const REACHES: [u32; 4] = [41, 83, 117, 167];
 /// Amounts of traffic; 1 is a busy street.
 const DENSITIES: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 /// Height of the sensor, m.
@@ -62,6 +60,8 @@ struct Measured {
     foreground: f64,
     total_ms: Vec<f64>,
     stages_ms: BTreeMap<&'static str, Vec<f64>>,
+    /// What did the work.
+    backend: String,
 }
 
 /// Drives, measures, writes and prints.
@@ -71,9 +71,9 @@ struct Measured {
 pub fn run(args: &Args) -> Result<(), RunError> {
     team::lead(team::available(), || {
         let profile = config::profile(&args.flow.profile)?;
-        let rows = cases(&profile).into_iter().map(|case| Ok(row(&case, &measure(args, &case)?)));
-        let rows = rows.collect::<Result<Vec<_>, RunError>>()?;
-        report(args, rows)?.print(&args.out);
+        let measured = |case: Case| measure(args, &case).map(|measured| (case, measured));
+        let all = cases(&profile).into_iter().map(measured).collect::<Result<Vec<_>, _>>()?;
+        report(args, &all)?.print(&args.out);
         Ok(())
     })
 }
@@ -86,9 +86,11 @@ fn cases(profile: &Profile) -> Vec<Case> {
         density,
     };
     let returns = COLUMNS.map(|columns| case("returns", profile, columns, 1.0));
-    let windows = REACHES.map(|reach| {
-        let wide = Profile { side: 2 * reach + 1, ..profile.clone() };
-        case("window", &wide, 1024, 1.0)
+    // The shipped windows, and half the smallest.
+    let shipped = [Profile::hdl64(), Profile::wide(), Profile::far()].map(|shipped| shipped.side);
+    let windows = [shipped[0] / 2, shipped[0], shipped[1], shipped[2]].map(|side| {
+        let other = Profile { side, ..profile.clone() };
+        case("window", &other, 1024, 1.0)
     });
     let traffic = DENSITIES.map(|density| case("traffic", profile, 1024, density));
     returns.into_iter().chain(windows).chain(traffic).collect()
@@ -103,7 +105,9 @@ fn measure(args: &Args, case: &Case) -> Result<Measured, RunError> {
     let sweeps: Vec<SimSweep> = drive.collect();
     let weights = WeightFiles::read(&args.flow.learned, &case.profile)?;
     let mut drive = choose::drive(&args.flow.backend, &weights, &case.profile, &rig)?.drive;
-    let mut measured = Measured::default();
+    let (on, simd) = (drive.backend(), drive.simd().name());
+    let backend = format!("{}, {}; {simd} on the CPU", on.name(), on.device());
+    let mut measured = Measured { backend, ..Measured::default() };
     for (n, seen) in sweeps.iter().enumerate() {
         let before = n.checked_sub(1).map_or(&[][..], |n| &sweeps[n].points);
         let (world_from_vehicle, twist) = (seen.world_from_vehicle, seen.twist);
@@ -139,9 +143,11 @@ fn row(case: &Case, measured: &Measured) -> TableRow {
     TableRow::new(first.into_iter().chain(stages))
 }
 
-fn report(args: &Args, rows: Vec<TableRow>) -> Result<crate::report::Results, RunError> {
+fn report(args: &Args, all: &[(Case, Measured)]) -> Result<Results, RunError> {
     let subject = format!("An OS1-128 in a simulated street, seed {}", args.seed);
     let mut report = Report::new("How a sweep's time grows", &subject);
+    report.fact("Backend", &all[0].1.backend);
+    let rows = all.iter().map(|(case, measured)| row(case, measured)).collect();
     let columns = ["changed", "returns a sweep", "window, m", "foreground columns", "sweep, ms"];
     let columns = columns.into_iter().chain(STAGES).collect::<Vec<_>>();
     let counted = usize::from(args.sweeps) - UNCOUNTED;
@@ -166,6 +172,6 @@ mod tests {
             assert!(others.clone().all(|(_, changed)| !changed), "{}", case.changed);
             case.profile.check().unwrap();
         }
-        assert_eq!(all.len(), COLUMNS.len() + REACHES.len() + DENSITIES.len());
+        assert_eq!(all.len(), COLUMNS.len() + 4 + DENSITIES.len());
     }
 }

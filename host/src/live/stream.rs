@@ -46,8 +46,11 @@ use raywake_objects::wrap_angle;
 
 const MAGIC: &[u8; 4] = b"RWF2";
 const HEAD: usize = 24;
-/// Bytes of records in a datagram: it fits an Ethernet frame.
-const RECORDS: usize = 1280;
+/// Bytes of records in a datagram at most: it fits an Ethernet frame.
+const ROOM: usize = 1280;
+/// Bytes of a column and of a tracklet, and of an object.
+const RECORD: usize = 32;
+const OBJECT: usize = 84;
 
 /// Kinds of records.
 #[derive(Clone, Copy)]
@@ -56,17 +59,6 @@ enum RecordKind {
     Column = 1,
     Tracklet = 2,
     Object = 3,
-}
-
-impl RecordKind {
-    /// Bytes of a record.
-    const fn bytes(self) -> usize {
-        match self {
-            RecordKind::Sweep => 96,
-            RecordKind::Column | RecordKind::Tracklet => 32,
-            RecordKind::Object => 84,
-        }
-    }
 }
 
 /// A sweep that is sent.
@@ -95,7 +87,7 @@ pub struct SweepFacts {
 pub struct FlowStream {
     socket: UdpSocket,
     to: SocketAddr,
-    datagram: heapless::Vec<u8, { HEAD + RECORDS }>,
+    datagram: heapless::Vec<u8, { HEAD + ROOM }>,
     unsent: u64,
 }
 
@@ -126,7 +118,7 @@ impl FlowStream {
         sweep: &SentSweep,
         columns: impl Iterator<Item = &'a ColumnFlow> + Clone,
     ) -> usize {
-        self.all(RecordKind::Column, sweep, columns, |this, column| {
+        self.all((RecordKind::Column, RECORD), sweep, columns, |this, column| {
             this.floats(&column.position_vehicle_m);
             this.floats(&sweep.pose.along_axes(column.velocity_world_mps));
             this.floats(&turned_covariance(&sweep.pose, column.covariance));
@@ -140,7 +132,7 @@ impl FlowStream {
         sweep: &SentSweep,
         tracklets: impl Iterator<Item = TrackletState> + Clone,
     ) -> usize {
-        self.all(RecordKind::Tracklet, sweep, tracklets, |this, tracklet| {
+        self.all((RecordKind::Tracklet, RECORD), sweep, tracklets, |this, tracklet| {
             this.floats(&tracklet.position_vehicle_m);
             this.floats(&sweep.pose.along_axes(tracklet.velocity_world_mps));
             this.floats(&[tracklet.turn_rate_radps]);
@@ -158,7 +150,7 @@ impl FlowStream {
         objects: impl Iterator<Item = &'a TrackedObject> + Clone,
     ) -> usize {
         let vehicle = sweep.pose.inverse();
-        self.all(RecordKind::Object, sweep, objects, |this, object| {
+        self.all((RecordKind::Object, OBJECT), sweep, objects, |this, object| {
             let (class, share) = object.class.unzip();
             [object.id, object.observations, ColumnClass::number(class).into()]
                 .iter()
@@ -194,16 +186,16 @@ impl FlowStream {
         self.finish();
     }
 
-    /// Sends records of one kind, as many a datagram as fit. Returns how many.
+    /// Sends records of one kind and size, as many a datagram as fit. Returns how many.
     fn all<R>(
         &mut self,
-        kind: RecordKind,
+        (kind, bytes): (RecordKind, usize),
         sweep: &SentSweep,
         records: impl Iterator<Item = R> + Clone,
         write: impl Fn(&mut FlowStream, R),
     ) -> usize {
         let count = records.clone().count();
-        let most = RECORDS / kind.bytes();
+        let most = ROOM / bytes;
         let parts = count.div_ceil(most);
         for (n, record) in records.enumerate() {
             if n % most == 0 {

@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn the_layout_for_foxglove_names_the_topics() {
         let layout = include_str!("../../../../../examples/foxglove_layout.json");
-        for content in [Content::Flow, Content::Objects] {
+        for content in [Content::FlowAndObjects, Content::Objects] {
             for (topic, _) in topics(content).iter().filter(|(topic, _)| *topic != TF.0) {
                 assert!(layout.contains(&format!("\"{topic}\"")), "{topic}");
             }
@@ -231,7 +231,9 @@ mod tests {
 
     #[test]
     fn every_definition_that_is_named_is_there() {
-        for (topic, schema) in [Content::Flow, Content::Objects].into_iter().flat_map(topics) {
+        for (topic, schema) in
+            [Content::FlowAndObjects, Content::Objects].into_iter().flat_map(topics)
+        {
             let text = schema.text();
             let kinds = text.lines().filter(|l| l.contains('/') && !l.starts_with("MSG"));
             for kind in kinds.filter_map(|line| line.split([' ', '[']).next()) {

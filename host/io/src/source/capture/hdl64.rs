@@ -14,7 +14,7 @@ use raywake_core::sweep::Point;
 use roxmltree::{Document, Node};
 
 use super::firing::{Firing, REFLECTIVITY_MAX};
-use super::velodyne::{self, BLOCKS, LaserBlock, MEASUREMENTS};
+use super::velodyne::{self, BLOCKS, LaserBlock, MEASUREMENTS, TURN_MAX_NS};
 use crate::Error;
 use crate::source::boost;
 
@@ -32,10 +32,8 @@ const FAR_M: f64 = 25.04;
 /// Unit of distances, m, and those that are believed.
 const UNIT_M: f64 = 0.002;
 const UNITS_M: std::ops::RangeInclusive<f64> = 0.0005..=0.02;
-/// Corrections that are believed, m: those of sensors are below 2 m.
+/// Corrections that are believed, m.
 const CORRECTION_MAX_M: f64 = 10.0;
-/// Longest turn, ns: five a second.
-const TURN_MAX_NS: u64 = 200_000_000;
 
 /// What was measured of a laser.
 #[derive(Clone, Copy, Default)]
@@ -65,9 +63,8 @@ impl CalibratedLaser {
         let angle = azimuth - self.azimuth;
         // As the manual has it: x to the right, y ahead.
         let (right, ahead) = (libm::sin(angle), libm::cos(angle));
-        let flat = |distance: f64| distance * cos - up * sin;
         let along = |distance: f64| {
-            let flat = flat(distance);
+            let flat = distance * cos - up * sin;
             [flat * right - beside * ahead, flat * ahead + beside * right]
         };
         let far = distance_m + self.far_m;
@@ -110,7 +107,7 @@ impl Hdl64 {
 
     /// Returns of a turn at most: those of the slowest.
     pub fn returns_max(&self) -> usize {
-        (TURN_MAX_NS / FIRING_NS) as usize * LASERS + FIRINGS * LASERS
+        ((TURN_MAX_NS / FIRING_NS as f64) as usize + FIRINGS) * LASERS
     }
 
     /// From the first firing of a packet to that of the next, ns.
@@ -138,16 +135,12 @@ impl Hdl64 {
         for block in (0..2).filter_map(|n| LaserBlock::of(packet, 2 * firing + n)) {
             let azimuth = f64::from(block.azimuth) / f64::from(velodyne::AZIMUTHS) * TAU;
             let lasers = &self.lasers[if block.is_lower { MEASUREMENTS } else { 0 }..];
-            for (laser, (distance, reflectivity)) in lasers.iter().zip(block.measurements()) {
-                if distance > 0 {
-                    into.push(Point {
-                        position: laser.place(f64::from(distance) * self.unit_m, azimuth),
-                        intensity: f32::from(reflectivity) / REFLECTIVITY_MAX,
-                        offset_s: (offset_ns as f64 * 1e-9) as f32,
-                        sensor: 0,
-                    });
-                }
-            }
+            into.extend(block.measurements().map(|(n, (distance, reflectivity))| Point {
+                position: lasers[n].place(f64::from(distance) * self.unit_m, azimuth),
+                intensity: f32::from(reflectivity) / REFLECTIVITY_MAX,
+                offset_s: (offset_ns as f64 * 1e-9) as f32,
+                sensor: 0,
+            }));
         }
     }
 }

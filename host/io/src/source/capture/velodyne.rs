@@ -41,7 +41,7 @@ pub(super) const PUCK_HI_RES: u8 = 0x24;
 pub(super) const HDL_32E: u8 = 0x21;
 pub(super) const VLP_32C: u8 = 0x28;
 /// Longest turn, ns: five a second.
-const TURN_MAX_NS: f64 = 2e8;
+pub(super) const TURN_MAX_NS: f64 = 2e8;
 
 /// What is fixed about a model.
 struct Model {
@@ -244,23 +244,18 @@ impl Velodyne {
 
     /// Adds the returns of a block, in the frame of the sensor: x ahead, y to the left, z up.
     pub fn returns(&self, packet: &[u8], block: usize, offset_ns: i64, into: &mut Vec<Point>) {
-        let Some(azimuth) = azimuth(packet, block) else { return };
+        let Some(block) = LaserBlock::of(packet, block).filter(|b| !b.is_lower) else { return };
         let per_ns = turning(packet, self.block_ns(packet, BLOCKS - 1));
-        for n in 0..MEASUREMENTS {
-            let at = block * BLOCK + BLOCK_HEAD + n * MEASUREMENT;
-            let distance = u16::from_le_bytes([packet[at], packet[at + 1]]);
-            if distance == 0 {
-                continue;
-            }
+        for (n, (distance, reflectivity)) in block.measurements() {
             let lasers = self.lasers.len();
             let laser = &self.lasers[n % lasers];
             let order = (n % lasers / self.model.together) as f64;
             let later_ns = (n / lasers) as f64 * self.model.cycle_ns + order * self.model.laser_ns;
-            let azimuths = f64::from(azimuth) + per_ns * later_ns;
+            let azimuths = f64::from(block.azimuth) + per_ns * later_ns;
             let range_m = f64::from(distance) * self.model.unit_m;
             into.push(Point {
                 position: laser.place(range_m, azimuths / f64::from(AZIMUTHS) * TAU),
-                intensity: f32::from(packet[at + 2]) / REFLECTIVITY_MAX,
+                intensity: f32::from(reflectivity) / REFLECTIVITY_MAX,
                 offset_s: ((offset_ns as f64 + later_ns) * 1e-9) as f32,
                 sensor: 0,
             });
@@ -309,10 +304,11 @@ impl LaserBlock<'_> {
         sound.then_some(LaserBlock { azimuth, is_lower, bytes })
     }
 
-    /// Distances and reflectivities, laser by laser.
-    pub fn measurements(&self) -> impl Iterator<Item = (u16, u8)> {
+    /// Distances and reflectivities of its returns, each with its place in the block.
+    pub fn measurements(&self) -> impl Iterator<Item = (usize, (u16, u8))> {
         let each = self.bytes[BLOCK_HEAD..].chunks_exact(MEASUREMENT);
-        each.map(|m| (u16::from_le_bytes([m[0], m[1]]), m[2]))
+        let each = each.map(|m| (u16::from_le_bytes([m[0], m[1]]), m[2]));
+        each.enumerate().filter(|(_, (distance, _))| *distance > 0)
     }
 }
 
