@@ -89,15 +89,18 @@ impl Clusters {
             columns.iter().for_each(|c| self.of_column[*c as usize] = n as u32);
             found.parent = n as u32;
         }
-        self.find_suspects(team, scans, flow);
-        let suspects = &self.suspects;
-        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_| 0);
-        let whole = self.found.len();
-        self.test_segments(team, scans, flow, predicted);
-        self.keep_moving_parts(scans, whole);
+        let params = &scans.scaled.params;
+        self.find_moving_parts(team, scans, flow, predicted, 0.0, |c| {
+            flow(c) & VALID != 0
+                && scans.column_residual(c, |s| scans.static_residual(s)) > params.column_residual
+        });
+        // Who walks beside a wall moves by less than a column from sweep to sweep.
+        self.find_moving_parts(team, scans, flow, predicted, params.part_since_margin, |c| {
+            !scans.stays(c) && history.is_new(scans.first, c, params.part_since_s)
+        });
         self.look_back(scans, history);
         for found in &mut self.found {
-            found.is_dynamic &= found.cues.worn <= scans.scaled.params.worn_max;
+            found.is_dynamic &= found.cues.worn <= params.worn_max;
         }
         self.take_along(scans);
         self.complete_bodies(scans, predicted);
@@ -135,24 +138,29 @@ impl Clusters {
         });
     }
 
-    /// A static cluster may have a part that moves: columns with a match that fit badly at rest.
-    fn find_suspects(
+    /// A static cluster may have parts that move: of its `suspect` columns.
+    fn find_moving_parts(
         &mut self,
         team: &impl Team,
         scans: Scans,
         flow: impl Fn(usize) -> Flow + Copy + Sync,
+        predicted: impl Fn(usize) -> Option<Prediction> + Copy + Sync,
+        margin_min: f32,
+        suspect: impl Fn(usize) -> bool + Sync,
     ) {
-        let residual_max = scans.scaled.params.column_residual;
-        let suspect = |c: usize| {
-            is_static(&self.of_column, &self.found, c)
-                && flow(c) & VALID != 0
-                && scans.column_residual(c, |s| scans.static_residual(s)) > residual_max
-        };
+        let suspect = |c: usize| is_static(&self.of_column, &self.found, c) && suspect(c);
         let columns = scans.first.side * scans.first.side;
         fill(team, 0, &mut self.suspects[..columns.div_ceil(64)], &|word| {
             let bits = (64 * word..columns.min(64 * (word + 1))).enumerate();
             bits.fold(0, |bits, (n, c)| bits | u64::from(suspect(c)) << n)
         });
+        let suspects = &self.suspects;
+        self.segments.find(&scans, |c| suspects[c / 64] >> (c % 64) & 1 != 0, |_| 0);
+        let whole = self.found.len();
+        self.test_segments(team, scans, flow, predicted);
+        let parts = &mut self.found[whole..];
+        parts.iter_mut().for_each(|f| f.is_dynamic &= f.cues.margin >= margin_min);
+        self.keep_moving_parts(scans, whole);
     }
 
     /// Keeps those parts, from the index `whole` on, that move, and grows them.

@@ -58,6 +58,17 @@ impl History {
         self.held = (self.held + 1).min(HISTORY);
     }
 
+    /// Whether a column of the pair's first sweep holds something that came since: in no sweep at
+    /// least `since_s` older was anything hit there, and there was such a sweep.
+    pub fn is_new(&self, first: &Cloud, column: usize, since_s: f64) -> bool {
+        let levels = first.levels(column);
+        let at = [column / first.side, column % first.side];
+        let old = |past: &&Past| first.stamp_s - past.stamp_s >= since_s;
+        let mut old = self.sweeps[..self.held].iter().filter(old).peekable();
+        let unseen = |past: &Past| past.around(first, at).is_some_and(|were| levels & were == 0);
+        levels != 0 && old.peek().is_some() && old.all(unseen)
+    }
+
     /// What the columns of moving clusters, those of the pair's first sweep, were before; the pair
     /// spans `span_s`.
     pub fn find(&self, first: &Cloud, span_s: f64, of_column: &[u32], found: &mut [Hypothesis]) {

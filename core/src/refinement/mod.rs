@@ -17,8 +17,9 @@
 //!    voxel no ray reached tells nothing. Of a motion that holds, too, if the encoder says that the
 //!    cluster could move; of all else what comes to lie unseen is missed, because behind a corner
 //!    anything fits. A cluster that moved in the last sweep needs less.
-//! 5. A static cluster may have a part that moves; what remains of it, fragments beside it and what
-//!    the encoder takes for the rest of its body may go with that ([`clusters`]).
+//! 5. A static cluster may have a part that moves: columns that fit badly at rest, or that came to
+//!    where nothing was before. What remains of it, fragments beside it and what the encoder takes
+//!    for the rest of its body may go with that ([`clusters`]).
 //! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
 //!    that found no match, and the ground below it ([`footprint`]), unless the encoder takes that
 //!    for road beside it. Covariances are inflated by the residual ([`refined`]).

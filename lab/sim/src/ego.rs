@@ -34,6 +34,18 @@ pub enum Ego {
     },
 }
 
+/// How fast others are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// As in town.
+    #[default]
+    Town,
+    /// As on a road out of town: vehicles at 15 to 36 m/s.
+    Fast,
+    /// Vehicles that creep, at up to 4 m/s, and many people, who stroll, alone or in pairs.
+    Slow,
+}
+
 /// A planned drive.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Plan {
@@ -41,8 +53,8 @@ pub(crate) struct Plan {
     pub(crate) path: Path,
     /// x of the crossing road's centre line, m.
     pub(crate) crossing: f64,
-    /// Whether traffic drives as on a road out of town.
-    pub(crate) fast: bool,
+    /// How traffic moves.
+    pub(crate) pace: Pace,
 }
 
 impl Ego {
@@ -52,15 +64,15 @@ impl Ego {
         let mut rng = Rng::split(seed, 0);
         let crossing = rng.sign() * rng.range(18.0, 60.0);
         let start = |speed: f64| Path::from(State { x: 0.0, y: -LANE, yaw: 0.0, speed });
-        let fast = false;
+        let pace = Pace::Town;
         match self {
             Ego::Any => Ego::drawn(&mut rng).plan(seed, duration_s),
-            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing, fast },
-            Ego::Straight { speed } => Plan { path: start(speed), crossing, fast },
+            Ego::Standing => Plan { path: Path::standing(0.0, -LANE, 0.0), crossing, pace },
+            Ego::Straight { speed } => Plan { path: start(speed), crossing, pace },
             Ego::StopAndGo { speed } => {
                 let path = start(speed).then(0.1 * duration_s, 0.0, 0.0);
                 let path = path.then_to_speed(0.0, 3.0, EASE_S).then(1.0, 0.0, 0.0);
-                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing, fast }
+                Plan { path: path.then_to_speed(speed, 2.0, EASE_S), crossing, pace }
             }
             Ego::Turn { left, speed } => {
                 let before = (0.25 * duration_s).min(1.0);
@@ -69,7 +81,7 @@ impl Ego {
                 let path = path.then_turn(angle, radius, EASE_S);
                 // The turn ends in the right lane of the crossing road.
                 let crossing = path.end().x - LANE.copysign(angle);
-                Plan { path, crossing, fast }
+                Plan { path, crossing, pace }
             }
         }
     }

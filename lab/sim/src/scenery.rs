@@ -1,6 +1,6 @@
 //! Kinds of scenery to drive through.
 
-use crate::ego::{Ego, Plan};
+use crate::ego::{Ego, Pace, Plan};
 use crate::outskirts::{self, Place};
 use crate::path::Path;
 use crate::scene::Scene;
@@ -17,6 +17,8 @@ pub enum Scenery {
     StreetCluttered,
     /// The same with the traffic of a road out of town, 15 to 36 m/s, to choose numbers on.
     StreetFast,
+    /// The same with vehicles that creep and many people who stroll, to choose numbers on.
+    StreetSlow,
     /// One of [`Place::ALL`], drawn by the seed: never trained or tuned on.
     Outskirts,
     /// This one of them.
@@ -37,11 +39,13 @@ impl fmt::Display for UnknownScenery {
 impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
+    const STREETS: [Scenery; 4] =
+        [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast, Scenery::StreetSlow];
+
     /// Every scenery.
     pub fn all() -> impl Iterator<Item = Scenery> {
         let places = Place::ALL.into_iter().map(Scenery::Only);
-        let streets = [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast];
-        streets.into_iter().chain([Scenery::Outskirts]).chain(places)
+        Scenery::STREETS.into_iter().chain([Scenery::Outskirts]).chain(places)
     }
 
     /// What [`Scenery::from_str`] understands.
@@ -50,6 +54,7 @@ impl Scenery {
             Scenery::Street => "street",
             Scenery::StreetCluttered => "street-cluttered",
             Scenery::StreetFast => "street-fast",
+            Scenery::StreetSlow => "street-slow",
             Scenery::Outskirts => "outskirts",
             Scenery::Only(place) => place.name(),
         }
@@ -58,9 +63,9 @@ impl Scenery {
     /// The place of the outskirts that a drive of this seed goes through.
     pub fn place(self, seed: u64) -> Option<Place> {
         match self {
-            Scenery::Street | Scenery::StreetCluttered | Scenery::StreetFast => None,
             Scenery::Outskirts => Some(Place::drawn(seed)),
             Scenery::Only(place) => Some(place),
+            _ => None,
         }
     }
 
@@ -69,11 +74,12 @@ impl Scenery {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);
         }
-        let (ego, fast) = match self {
-            Scenery::StreetFast => (ego.out_of_town(seed), true),
-            _ => (ego, false),
+        let (ego, pace) = match self {
+            Scenery::StreetFast => (ego.out_of_town(seed), Pace::Fast),
+            Scenery::StreetSlow => (ego, Pace::Slow),
+            _ => (ego, Pace::Town),
         };
-        let plan = Plan { fast, ..ego.plan(seed, duration_s) };
+        let plan = Plan { pace, ..ego.plan(seed, duration_s) };
         let cluttered = self == Scenery::StreetCluttered;
         (Scene::around(seed, &plan, duration_s, density, cluttered), plan.path)
     }

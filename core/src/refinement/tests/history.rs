@@ -70,6 +70,26 @@ fn nothing_is_known_of_what_it_hides_itself_or_of_no_sweep() {
 }
 
 #[test]
+fn what_came_since_is_new() {
+    let mut history = raywake_alloc_guard::boxed!(History, History::new());
+    let first = cloud(13, 0, SWEEPS);
+    let new = |history: &History, since_s| -> Vec<usize> {
+        (0..SIDE).filter(|i| history.is_new(&first, i * SIDE + 20, since_s)).collect()
+    };
+    assert!(new(&history, 0.0).is_empty());
+    // A column every second sweep: 10, 10, 11, 11, 12, then 13.
+    (0..SWEEPS).for_each(|n| history.push(&cloud(10 + n as i32 / 2, 0, n), |_| false));
+    assert_eq!(new(&history, 0.0), [16]);
+    assert_eq!(new(&history, 0.15), [15, 16]);
+    assert_eq!(new(&history, 0.35), [14, 15, 16]);
+    assert!(new(&history, 0.55).is_empty());
+    // Where it was not in view nothing is known.
+    history.clear();
+    history.push(&cloud(10, 15, 0), |_| false);
+    assert_eq!(new(&history, 0.0), [15, 16]);
+}
+
+#[test]
 fn one_that_came_leaves_no_trace() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     (0..SWEEPS).for_each(|n| history.push(&cloud(10, 0, n), |column| column % SIDE == 20));

@@ -288,3 +288,42 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let [unknown, known] = [residual(&[]), residual(&scored(127))];
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
 }
+
+#[test]
+fn who_walks_along_a_wall_is_found() {
+    // 1 m/s: a third of a voxel from sweep to sweep, a column beside a wall of one cluster with it.
+    let mut random = Random(11);
+    let mut sweep = |n: usize| {
+        let mut returns = Returns::flat();
+        for k in 0..200 {
+            let along = 10.0 + 0.2 * k as f32;
+            (0..5).for_each(|z| returns.add([along, 30.8, GROUND + 1.0 + z as f32], 0));
+        }
+        for k in 0..150 {
+            let (along, aside) = match k % 3 {
+                0 => (random.between(-0.8, 0.8), 0.0),
+                _ => (0.8, random.between(0.0, 1.6)),
+            };
+            let z = GROUND + random.between(0.7, 5.5);
+            returns.add([22.0 + n as f32 / 3.0 + along, 28.3 + aside, z], 0);
+        }
+        returns
+    };
+    let sweeps: Vec<Returns> = (0..7).map(&mut sweep).collect();
+    let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
+    let mut moving = Vec::new();
+    for (n, now) in sweeps.iter().enumerate() {
+        give(&mut refinement, now, n);
+        if n > 0 {
+            run(&mut refinement, &[&sweeps[n - 1], now], &no_flow());
+            moving.push(motions(&refinement));
+        }
+    }
+    let count = |n: usize| moving[n].iter().flatten().count();
+    assert!(count(1) == 0 && count(5) >= 4, "{:?}", (0..6).map(count).collect::<Vec<_>>());
+    // Him, and at most what of the wall he hides.
+    for (c, (by, _)) in moving[5].iter().enumerate().filter_map(|(c, m)| Some((c, (*m)?))) {
+        let right = (by[0] - 1.0 / 3.0).abs() < 0.05 && by[1].abs() < 0.05;
+        assert!(right && (22..27).contains(&(c / SIDE)), "{c} {by:?}");
+    }
+}

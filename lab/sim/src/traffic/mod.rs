@@ -5,7 +5,7 @@ mod footprint;
 mod routes;
 
 use crate::dimensions::{CROSS_HALF, ROAD_HALF};
-use crate::ego::{LANE, Plan};
+use crate::ego::{LANE, Pace, Plan};
 use crate::models;
 use crate::object::{Fixture, Object};
 use crate::path::Path;
@@ -55,8 +55,11 @@ pub(crate) fn fill(
     for _ in 0..amount(5.0, 0.2) {
         fill.mover(models::cyclist, |r| r.rider());
     }
-    for _ in 0..amount(16.0, 0.5) {
-        fill.mover(models::pedestrian, |r| r.walker());
+    match plan.pace {
+        Pace::Slow => (0..amount(24.0, 0.8)).for_each(|_| fill.pair()),
+        _ => (0..amount(16.0, 0.5)).for_each(|_| {
+            fill.mover(models::pedestrian, |r| r.walker());
+        }),
     }
     fill.objects
 }
@@ -93,6 +96,14 @@ impl Fill<'_> {
             let path = route(&mut self.routes());
             self.offer(model, path.clone()).then_some(path)
         })
+    }
+
+    /// Somebody on foot and, where there is room, a second one half a metre to a metre beside.
+    fn pair(&mut self) {
+        if let Some(path) = self.mover(models::pedestrian, |r| r.walker()) {
+            let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
+            self.offer(models::pedestrian, path.moved(0.0, beside));
+        }
     }
 
     /// One of [`DRIVERS`].

@@ -1,7 +1,7 @@
 //! Paths that people take: along, across, turning, braking, overtaking.
 
 use crate::dimensions::ROAD_HALF;
-use crate::ego::{LANE, Plan};
+use crate::ego::{LANE, Pace, Plan};
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -26,11 +26,12 @@ impl Routes<'_> {
 
     /// Of somebody who drives, in something short enough to turn (`nimble`) or not.
     pub(super) fn driver(&mut self, nimble: bool) -> Path {
-        match (self.plan.fast, nimble) {
-            (true, true) => self.fast(36.0),
-            (true, false) => self.fast(25.0),
-            (false, true) => self.nimble(),
-            (false, false) => self.heavy(),
+        match (self.plan.pace, nimble) {
+            (Pace::Fast, true) => self.fast(36.0),
+            (Pace::Fast, false) => self.fast(25.0),
+            (Pace::Slow, _) => self.creeping(),
+            (Pace::Town, true) => self.nimble(),
+            (Pace::Town, false) => self.heavy(),
         }
     }
 
@@ -38,7 +39,7 @@ impl Routes<'_> {
     fn nimble(&mut self) -> Path {
         match (self.rng.unit() * 20.0) as u32 {
             0..10 => self.along(LANE, 2.0, 18.0),
-            10..14 => self.changing(),
+            10..14 => self.changing([3.0, 14.0]),
             14..17 => self.turning(),
             _ => self.crossing(LANE, 4.0, 12.0),
         }
@@ -48,7 +49,7 @@ impl Routes<'_> {
     fn heavy(&mut self) -> Path {
         match (self.rng.unit() * 20.0) as u32 {
             0..11 => self.along(LANE, 2.0, 13.0),
-            11..16 => self.changing(),
+            11..16 => self.changing([3.0, 14.0]),
             _ => self.crossing(LANE, 4.0, 10.0),
         }
     }
@@ -59,6 +60,15 @@ impl Routes<'_> {
             self.along(LANE, 15.0, fastest)
         } else {
             self.crossing(LANE, 15.0, fastest)
+        }
+    }
+
+    /// In a queue that moves, on either road.
+    fn creeping(&mut self) -> Path {
+        match (self.rng.unit() * 10.0) as u32 {
+            0..4 => self.along(LANE, 0.5, 4.0),
+            4..8 => self.changing([0.5, 4.0]),
+            _ => self.crossing(LANE, 0.5, 4.0),
         }
     }
 
@@ -74,13 +84,13 @@ impl Routes<'_> {
     }
 
     /// Brakes or speeds up, beginning when it meets the vehicle.
-    fn changing(&mut self) -> Path {
+    fn changing(&mut self, [slow, fast]: [f64; 2]) -> Path {
         let (t, x) = self.meeting();
-        let (way, speed) = (self.rng.sign(), self.rng.range(3.0, 14.0));
+        let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
         let later = if self.rng.chance(0.6) {
             self.rng.range(0.0, 0.6 * speed)
         } else {
-            self.rng.range(speed, 15.0f64.max(speed))
+            self.rng.range(speed, fast + 1.0)
         };
         let rate = self.rng.range(1.0, 4.0);
         let start = State { x: x - way * speed * t, ..lane(way, LANE, speed) };
@@ -135,8 +145,12 @@ impl Routes<'_> {
     pub(super) fn walker(&mut self) -> Path {
         let (t, x) = self.meeting();
         let (way, side) = (self.rng.sign(), self.rng.sign());
-        let speed = self.rng.range(0.8, 2.0);
-        let y = side * (ROAD_HALF + self.rng.range(1.4, 3.2));
+        let ([slow, fast], aside) = match self.plan.pace {
+            Pace::Slow => ([0.4, 1.4], [0.8, 3.8]),
+            _ => ([0.8, 2.0], [1.4, 3.2]),
+        };
+        let speed = self.rng.range(slow, fast);
+        let y = side * (ROAD_HALF + self.rng.range(aside[0], aside[1]));
         let yaw = if way > 0.0 { 0.0 } else { PI };
         match (self.rng.unit() * 10.0) as u32 {
             0 => Path::standing(x, y, self.rng.range(-PI, PI)),
