@@ -138,7 +138,8 @@ impl Clusters {
         });
     }
 
-    /// A static cluster may have parts that move: of its `suspect` columns.
+    /// A static cluster may have parts that move: of its `suspect` columns, where the evidence
+    /// exceeds what the test asks for by `margin_min`.
     fn find_moving_parts(
         &mut self,
         team: &impl Team,

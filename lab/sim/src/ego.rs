@@ -35,14 +35,14 @@ pub enum Ego {
 }
 
 /// How fast others are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
     /// As in town.
-    #[default]
     Town,
     /// As on a road out of town: vehicles at 15 to 36 m/s.
     Fast,
-    /// Vehicles that creep, at up to 4 m/s, and many people, who stroll, alone or in pairs.
+    /// Vehicles that creep, at up to 4 m/s unless they overtake, and many people, who stroll, alone
+    /// or in pairs.
     Slow,
 }
 

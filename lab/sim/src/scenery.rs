@@ -98,6 +98,7 @@ impl FromStr for Scenery {
 mod tests {
     use super::*;
     use crate::collisions::check_clear;
+    use crate::object::Class;
     use std::collections::BTreeSet;
 
     #[test]
@@ -125,6 +126,31 @@ mod tests {
                 check_clear(&format!("seed {seed}"), &alone, more, None);
             }
         }
+    }
+
+    #[test]
+    fn a_slow_street_creeps_and_strolls() {
+        let of = |scenery: Scenery, seed| scenery.draw(seed, Ego::Any, 6.0, 1.0).0.objects;
+        let (mut speeds, mut people) = (Vec::new(), [0, 0]);
+        for seed in 0..5 {
+            for object in of(Scenery::StreetSlow, seed) {
+                let speed = object.path.at(3.0).speed;
+                match object.class {
+                    Class::Pedestrian => {
+                        assert!(speed <= 1.4, "{speed}");
+                        people[0] += 1;
+                    }
+                    Class::Cyclist => {}
+                    _ if speed > 0.0 => speeds.push(speed),
+                    _ => {}
+                }
+            }
+            let plain = of(Scenery::Street, seed);
+            people[1] += plain.iter().filter(|o| o.class == Class::Pedestrian).count();
+        }
+        speeds.sort_by(f64::total_cmp);
+        assert!(speeds.len() > 30 && speeds[speeds.len() * 3 / 4] <= 5.0, "{speeds:?}");
+        assert!(2 * people[0] > 3 * people[1], "{people:?}");
     }
 
     #[test]
