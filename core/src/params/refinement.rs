@@ -154,10 +154,10 @@ crate::params! {
         /// Returns of a column that are looked at for that.
         pub column_returns: u32 = 4, "returns", (1 to 1000), SIMULATED;
         /// Columns in which nothing was hit in sweeps that are older by so much, as far as they are
-        /// remembered (six), may belong to a part that moves, too.
+        /// remembered, may belong to a part that moves, too.
         pub part_since_s: f64 = 0.25, "s", (0 to 10),
-            "Columns of people who walk on `kitti_raw_0005` (94), found: 14 at 10 s, where nothing \
-             is remembered, 26 at 0.15 s, 37 here, 33 at 0.4 s.";
+            "Columns of people who walk on `kitti_raw_0005` (94), found with a margin of 0: 14 at \
+             10 s, where nothing is remembered, 26 at 0.15 s, 37 here, 33 at 0.4 s.";
         /// By how much the evidence of such a part must exceed what the test asks for: what comes
         /// out of a shadow was not there before, too.
         pub part_since_margin: f32 = 0.1, "", (0 to 1),

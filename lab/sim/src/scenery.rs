@@ -39,6 +39,7 @@ impl fmt::Display for UnknownScenery {
 impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
+    /// The street and its kinds.
     const STREETS: [Scenery; 4] =
         [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast, Scenery::StreetSlow];
 

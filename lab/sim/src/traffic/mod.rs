@@ -55,11 +55,13 @@ pub(crate) fn fill(
     for _ in 0..amount(5.0, 0.2) {
         fill.mover(models::cyclist, |r| r.rider());
     }
-    match plan.pace {
-        Pace::Slow => (0..amount(24.0, 0.8)).for_each(|_| fill.pair()),
-        _ => (0..amount(16.0, 0.5)).for_each(|_| {
-            fill.mover(models::pedestrian, |r| r.walker());
-        }),
+    let slow = plan.pace == Pace::Slow;
+    let people = if slow { amount(24.0, 0.8) } else { amount(16.0, 0.5) };
+    for _ in 0..people {
+        let walker = fill.mover(models::pedestrian, |r| r.walker());
+        if let Some(path) = walker.filter(|_| slow) {
+            fill.companion(path);
+        }
     }
     fill.objects
 }
@@ -98,12 +100,10 @@ impl Fill<'_> {
         })
     }
 
-    /// Somebody on foot and, where there is room, a second one half a metre to a metre beside.
-    fn pair(&mut self) {
-        if let Some(path) = self.mover(models::pedestrian, |r| r.walker()) {
-            let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
-            self.offer(models::pedestrian, path.moved(0.0, beside));
-        }
+    /// Somebody who walks with another, half a metre to a metre beside, where there is room.
+    fn companion(&mut self, path: Path) {
+        let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
+        self.offer(models::pedestrian, path.moved(0.0, beside));
     }
 
     /// One of [`DRIVERS`].
