@@ -65,6 +65,8 @@ pub mod refinement;
 pub mod return_clock;
 #[cfg(feature = "pipeline")]
 pub mod returns;
+#[cfg(feature = "pipeline")]
+mod sensor_paths;
 pub mod stages;
 #[cfg(feature = "pipeline")]
 pub mod sweep;

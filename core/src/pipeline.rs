@@ -11,7 +11,7 @@ use crate::frame::{Sides, SweepPair};
 use crate::output::{Output, SweepOutput, TrackletState};
 use crate::params::Profile;
 use crate::perceive::{Machine, Perceive, Perceived, StageTimer};
-use crate::prepare::Setup;
+use crate::prepare::{Placement, Setup};
 use crate::record::SweepUniform;
 use crate::refinement::Refinement;
 use crate::returns::Returns;
@@ -80,9 +80,10 @@ impl Pipeline {
         timer.lap("rays");
 
         let (mut unrefined, corner) = (0, arrival.window.corner);
+        let placement = Placement { profile, rig: &setup.rig, window: &arrival.window, sweep };
         let Pipeline { returns, refinement, encoder, .. } = self;
         let meanwhile = || {
-            unrefined = returns.insert(refinement, profile, team.simd(), corner, sweep);
+            unrefined = returns.insert(refinement, team.simd(), &placement);
             encoder.encode(team);
         };
         let perceived = backend.perceive(&sent.uniform, team, timer, meanwhile)?;

@@ -120,6 +120,18 @@ pub struct Placement<'a> {
     pub sweep: &'a Sweep<'a>,
 }
 
+impl Placement<'_> {
+    /// Whether returns are moved to the stamp by their time.
+    fn deskews(&self) -> bool {
+        self.profile.deskew && self.rig.distorted
+    }
+
+    /// Whether the vehicle's motion within the sweep counts.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.rig.timing != Timing::AtStamp && (self.deskews() || !self.rig.distorted)
+    }
+}
+
 /// Room for the rays of a sweep, the caller's.
 pub struct RayBuffers<'a> {
     /// An element for every return taken, perhaps memory of a device that is slow to read.
@@ -154,8 +166,7 @@ impl<'a> Caster<'a> {
         origins: &mut [[i32; 4]],
     ) -> Caster<'a> {
         let Placement { profile, rig, window, sweep } = *placement;
-        let deskew = profile.deskew && rig.distorted;
-        let moving = rig.timing != Timing::AtStamp && (deskew || !rig.distorted);
+        let (deskew, moving) = (placement.deskews(), placement.is_moving());
         let moved = |slot| if deskew && moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
         let matrix = |slot| voxel_matrix(profile, &(window.grid_from_vehicle * moved(slot)));
         let [from_s, to_s] = [0.0, SLOTS as f64].map(|when| rig.timing.offset_s(when) as f32);

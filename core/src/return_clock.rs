@@ -97,7 +97,7 @@ impl Sweep<'_> {
 /// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at
 /// the rear, 1 to the left, 2 in front, 3 to the right.
 #[inline]
-fn pseudo_angle(x: f32, y: f32) -> f32 {
+pub(crate) fn pseudo_angle(x: f32, y: f32) -> f32 {
     let sum = x.abs() + y.abs();
     if sum == 0.0 {
         return 2.0;

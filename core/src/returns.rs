@@ -2,10 +2,11 @@
 
 use crate::dropped::DroppedReturns;
 use crate::frame::Arrival;
-use crate::params::{POINTS_MAX, Profile};
+use crate::params::POINTS_MAX;
 use crate::prepare::{Placement, RayBuffers, Setup, uniform_of};
 use crate::record::{NONE, Ray, SweepUniform};
 use crate::refinement::{Refinement, SweepReturns};
+use crate::sensor_paths::SensorPaths;
 use crate::sweep::{Placed, Sweep};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
@@ -75,11 +76,10 @@ impl Returns {
     pub fn insert(
         &mut self,
         refinement: &mut Refinement,
-        profile: &Profile,
         simd: Simd,
-        corner: [i32; 3],
-        sweep: &Sweep,
+        placement: &Placement,
     ) -> usize {
+        let Placement { profile, window, sweep, .. } = *placement;
         if profile.refinement_sweeps == 0 {
             return 0;
         }
@@ -96,11 +96,12 @@ impl Returns {
             }
         }
         let returns = SweepReturns {
-            corner,
+            corner: window.corner,
             stamp_s: sweep.stamp_s,
             points,
             placed: &self.placed[..taken],
             columns,
+            sensors: &SensorPaths::new(placement),
         };
         refinement.insert_cloud(profile, simd, returns, &mut self.is_apart[self.now][..taken])
     }

@@ -91,14 +91,22 @@ crate::params! {
         /// Truncation of the residual: a return farther off than this across its surface is missed.
         pub truncation_m: f64 = 0.15, "m", (0.001 to 2), SIMULATED;
 
+        /// A return with so high a residual, or that nothing is near, is told by the rays that
+        /// passed there.
+        pub sight_residual: f32 = 0.1, "", (0 to 1), CALIBRATED;
+        /// How near to a place a ray must pass to tell of it.
+        pub sight_distance_m: f64 = 0.1, "m", (0.001 to 5), CALIBRATED;
+        /// The same as an angle, where that is farther: rings lie farther apart there.
+        pub sight_angle_rad: f32 = 0.008, "rad", (0 to 1), CALIBRATED;
+
         /// A cluster with so low a residual at rest is static without further test.
-        pub residual_static: f32 = 0.08, "", (0 to 1), SIMULATED;
+        pub residual_static: f32 = 0.03, "", (0 to 1), SIMULATED;
         /// A start that leads to so low a residual is the last.
         pub residual_good: f32 = 0.05, "", (0 to 1), SIMULATED;
         /// A residual above this is a bad fit: it calls for a search, and for twice the evidence.
         pub residual_bad: f32 = 0.3, "", (0 to 1), SIMULATED;
         /// Evidence against rest from which on a cluster is dynamic, see [`crate::refinement`].
-        pub evidence_min: f32 = 0.05, "", (0 to 1),
+        pub evidence_min: f32 = 0.02, "", (0 to 1),
             "So low that what moves is among what P(moves) decides of: of simulated streets of \
              other seeds than its weights are from, town and out of town, 96.9 and 96.1 % of \
              what moves is; 96.3 and 95.3 at 0.12, 97.2 and 96.4 at 0.03, where more stands among \

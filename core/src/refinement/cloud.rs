@@ -3,6 +3,7 @@
 use super::places::{Nearest, Places};
 use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
+use super::sightlines::{Listed, Sightlines};
 use super::surface::{self, LazyWeight};
 use crate::frame::central;
 use crate::ground::{GroundEstimator, GroundHeights};
@@ -11,6 +12,7 @@ use crate::params::{
     SENSORS_MAX, SUBVOXELS_MAX,
 };
 use crate::record::NONE;
+use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
 use core::ops::Range;
@@ -32,9 +34,11 @@ pub struct SweepReturns<'a> {
     pub placed: &'a [Placed],
     /// Their columns, or [`NONE`].
     pub columns: &'a [u32],
+    pub sensors: &'a SensorPaths,
 }
 
-/// Scratch of [`Cloud::fill`]: indices of the returns above the ground, as they come and by column.
+/// Scratch of [`Cloud::fill`]: indices of returns, as they come and by column; of [`Sightlines`],
+/// as they come, and their directions.
 pub struct Scratch {
     ground: GroundEstimator,
     listed: [u32; POINTS_MAX],
@@ -66,6 +70,8 @@ pub struct Cloud {
     weights: [LazyWeight; CLOUD_MAX],
     /// Levels above the ground of each column in which something was hit, a bit each.
     levels: [u32; COLUMNS_MAX],
+    /// Its rays, those of the ground among them.
+    pub sightlines: Sightlines,
 }
 
 impl Cloud {
@@ -81,6 +87,7 @@ impl Cloud {
             start: [0; COLUMNS_MAX + 1],
             weights: [const { LazyWeight::unknown() }; CLOUD_MAX],
             levels: [0; COLUMNS_MAX],
+            sightlines: Sightlines::new(),
         }
     }
 
@@ -97,6 +104,9 @@ impl Cloud {
     ) -> usize {
         self.side = profile.side as usize;
         (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
+        let SweepReturns { points, placed, sensors, .. } = returns;
+        let listed = Listed { index: &mut scratch.listed, bin: &mut scratch.order };
+        self.sightlines.fill(sensors, points, placed, listed);
         self.find_ground(profile, returns, &mut scratch.ground);
         let (count, sensors) = self.count_columns(scaled, returns, apart, &mut scratch.listed);
         self.sort(returns.columns, &scratch.listed[..count], &mut scratch.order);

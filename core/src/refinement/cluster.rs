@@ -161,25 +161,21 @@ impl<'a> Cluster<'a> {
     pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
         let scans = &self.scans;
         let mut mean = Mean::default();
-        let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, motion));
-        seen.for_each(|m| mean.add(m));
-        let visible = mean.count / self.samples.len().max(1) as f32;
-        for target in &scans.targets[1..] {
-            for s in &self.samples {
-                let at = target.predict(s, motion);
-                if let Some(found) = target.cloud.nearest(at, s.sensor, scans.reach_inlier()) {
-                    mean.add(scans.residual(scans.first, s, at, Some(found)));
-                }
+        let mut visible = 0.0;
+        for target in scans.targets {
+            let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, motion, target));
+            seen.for_each(|m| mean.add(m));
+            if target.index == 0 {
+                visible = mean.count / self.samples.len().max(1) as f32;
             }
         }
         let target = &scans.targets[0];
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
-            let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
-            let now = core::array::from_fn(|a| at[a] + target.offset[a]);
-            if found.is_some() || scans.is_free(scans.before, now) {
-                mean.add(scans.residual(target.cloud, q, at, found));
-            }
+            scans
+                .told_residual(target.cloud, q, scans.first, at)
+                .into_iter()
+                .for_each(|m| mean.add(m));
         }
         (mean.value(), visible)
     }

@@ -13,10 +13,10 @@
 //!    where none of these fits, a search.
 //! 4. A hypothesis test tells dynamic clusters from static ones ([`hypothesis`]): with r0 and r the
 //!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000),
-//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). At rest only what can be seen counts: a
-//!    voxel no ray reached tells nothing. Of a motion that holds, too, if the encoder says that the
-//!    cluster could move; of all else what comes to lie unseen is missed, because behind a corner
-//!    anything fits. A cluster that moved in the last sweep needs less.
+//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). At rest only what can be seen counts:
+//!    where a return fits badly, or nothing is near, a ray must have passed to tell
+//!    ([`sightlines`]). Of a motion that holds, too, if the encoder says that the cluster could
+//!    move; of all else what comes to lie unseen is missed, because behind a corner anything fits. A cluster that moved in the last sweep needs less.
 //! 5. A static cluster may have a part that moves: columns that fit badly at rest, or that came to
 //!    where nothing was before. What remains of it, fragments beside it and what the encoder takes
 //!    for the rest of its body may go with that ([`clusters`]).
@@ -45,6 +45,7 @@ mod scaled;
 mod scans;
 mod search;
 mod segments;
+mod sightlines;
 mod starts;
 mod surface;
 #[cfg(test)]
@@ -136,7 +137,7 @@ impl Refinement {
         let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
             return;
         };
-        let Perceived { flow: state, columns_before: before, columns_now: now, .. } = *perceived;
+        let Perceived { flow: state, .. } = *perceived;
         let newest = self.newest;
         let first = &self.clouds[index(newest, 1)];
         let side = first.side;
@@ -159,7 +160,7 @@ impl Refinement {
                 share: ((cloud.stamp_s - first.stamp_s) / span_s) as f32,
             });
         }
-        let scans = Scans { scaled, first, targets: &targets, before, now, scores, span_s };
+        let scans = Scans { scaled, first, targets: &targets, scores, span_s };
         self.clusters.find(team, scans, &self.history, flow, predicted);
         self.history.push(&self.clouds[index(newest, 1)], |c| self.clusters.came(c));
     }

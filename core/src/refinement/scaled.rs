@@ -28,6 +28,7 @@ pub(crate) struct Scaled {
     pub hold_information: f32,
     pub inlier: f32,
     pub truncation: f32,
+    sight_distance: f32,
     pub evidence_length: f32,
     pub displacement_min: f32,
     pub start_spacing: f32,
@@ -67,6 +68,7 @@ impl Scaled {
             hold_information: (hold * hold) as f32,
             inlier: length(p.inlier_m),
             truncation: length(p.truncation_m),
+            sight_distance: length(p.sight_distance_m),
             evidence_length: length(p.evidence_length_m),
             displacement_min: length(p.displacement_min_m),
             start_spacing: length(p.start_spacing_m),
@@ -76,6 +78,11 @@ impl Scaled {
             confidence: area(p.confidence_m2),
             range_min: length(p.range_min_m),
         }
+    }
+
+    /// How near to a place that is so far away a ray must pass to tell of it, voxels.
+    pub fn sight_reach(&self, distance: f32) -> f32 {
+        self.sight_distance.max(self.params.sight_angle_rad * distance)
     }
 
     /// Displacements that are searched either way in `span_s` seconds, voxels.

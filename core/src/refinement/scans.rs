@@ -5,8 +5,6 @@ use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
 use crate::encoder::{ColumnScores, could_move};
-use crate::params::LEVELS_MAX;
-use crate::record::Column;
 
 /// A sweep that clusters are registered with: where its window lies seen from the first sweep's,
 /// and how much of the motion over the pair has happened from stamp to stamp.
@@ -52,10 +50,6 @@ pub struct Scans<'a> {
     pub first: &'a Cloud,
     /// The pair's second sweep, then earlier ones.
     pub targets: &'a [Target<'a>],
-    /// Columns of the first sweep in the second's window.
-    pub before: &'a [Column],
-    /// Columns of the second sweep.
-    pub now: &'a [Column],
     /// What the first sweep's columns are, nothing where nothing is encoded.
     pub scores: &'a [ColumnScores],
     /// From the pair's first stamp to the second, s.
@@ -76,18 +70,6 @@ impl Scans<'_> {
     /// Whether ground in a column may be below a cluster that moves, not road beside it.
     pub fn may_be_below(&self, column: usize) -> bool {
         self.could_move(column) >= 0.0
-    }
-
-    /// Whether rays passed through the voxel of a place of the second sweep's window, and none
-    /// ended there: what was there is gone, or has come.
-    pub fn is_free(&self, columns: &[Column], at: [f32; 3]) -> bool {
-        let side = self.first.side as f32;
-        let inside = at[0] >= 0.0 && at[0] < side && at[1] >= 0.0 && at[1] < side;
-        let in_levels = at[2] >= 0.0 && at[2] < LEVELS_MAX as f32;
-        inside
-            && in_levels
-            && columns[at[0] as usize * self.first.side + at[1] as usize][0] >> at[2] as u32 & 1
-                != 0
     }
 
     /// Truncated residual of a return of the cloud `of` against what was found at the place it is
@@ -115,19 +97,35 @@ impl Scans<'_> {
         self.residual(self.first, s, at, target.cloud.nearest(at, s.sensor, self.reach_inlier()))
     }
 
-    /// Residual of a return of the first sweep in the second, if it was static: nothing where it
-    /// cannot be seen.
-    pub fn static_residual(&self, s: &CloudPoint) -> Option<f32> {
-        self.seen_residual(s, &Motion::default())
+    /// The same as far as it can be told.
+    pub fn seen_residual(&self, s: &CloudPoint, motion: &Motion, target: &Target) -> Option<f32> {
+        self.told_residual(self.first, s, target.cloud, target.predict(s, motion))
     }
 
-    /// The same of a motion.
-    pub fn seen_residual(&self, s: &CloudPoint, motion: &Motion) -> Option<f32> {
-        let target = &self.targets[0];
-        let at = target.predict(s, motion);
-        let found = target.cloud.nearest(at, s.sensor, self.reach_inlier());
-        let visible = found.is_some() || self.is_free(self.now, at);
-        visible.then(|| self.residual(self.first, s, at, found))
+    /// Residual of a return of the first sweep in the second, if it was static, as far as that can
+    /// be told.
+    pub fn static_residual(&self, s: &CloudPoint) -> Option<f32> {
+        self.seen_residual(s, &Motion::default(), &self.targets[0])
+    }
+
+    /// Residual of a return of the cloud `of` in another if it is predicted to be `at` there. Where
+    /// it fits badly what is near may be another part of its surface: a ray must have passed to
+    /// tell. One that was stopped before tells nothing.
+    pub fn told_residual(
+        &self,
+        of: &Cloud,
+        s: &CloudPoint,
+        other: &Cloud,
+        at: [f32; 3],
+    ) -> Option<f32> {
+        let near = self.residual(of, s, at, other.nearest(at, s.sensor, self.reach_inlier()));
+        if near < self.scaled.params.sight_residual {
+            return Some(near);
+        }
+        let weight = of.weight(self.scaled, s.index);
+        let behind = other.sightlines.depth((self.scaled, other.simd), at, &weight, s.offset_s)?;
+        let ratio = behind / self.scaled.truncation;
+        (ratio > -1.0).then(|| near.min(ratio * ratio))
     }
 
     /// Mean residual of some returns of a column, 0 where it cannot be told.

@@ -116,7 +116,7 @@ fn returns_beyond_the_capacity_are_counted() {
     for n in 0..3 {
         give(&mut refinement, &returns, n);
     }
-    run(&mut refinement, &[&returns, &returns], &no_flow());
+    run(&mut refinement, &no_flow());
     assert_eq!(motions(&refinement), vec![None; SIDE * SIDE]);
 }
 
@@ -136,15 +136,8 @@ fn segments_are_what_a_flood_fill_reaches() {
         let excluded = random.below(SIDE * SIDE);
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;
         let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
-        let scans = Scans {
-            scaled: &scaled(),
-            first: &cloud,
-            targets: &[],
-            before: &[],
-            scores: &[],
-            now: &[],
-            span_s: 0.1,
-        };
+        let scans =
+            Scans { scaled: &scaled(), first: &cloud, targets: &[], scores: &[], span_s: 0.1 };
         segments.find(&scans, part, |c| flows[c]);
         let touch = |a: usize, b: usize| {
             let apart =

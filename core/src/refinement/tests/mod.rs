@@ -5,11 +5,13 @@ mod cloud;
 mod history;
 mod motion;
 mod odd;
+mod sightlines;
 
 use super::*;
 use crate::encoder::layers::SCORES;
 use crate::random::Random;
-use crate::record::{Column, NONE, Proposal, pack_flow};
+use crate::record::{NONE, Proposal, pack_flow};
+use crate::sensor_paths::SensorPaths;
 use crate::sweep::{Placed, Point};
 use crate::team::Alone;
 use crate::thinning::TakenPoints;
@@ -21,6 +23,10 @@ use std::vec::Vec;
 const SIDE: usize = 63;
 /// Height of the ground in the window, voxels: 1.73 m below the middle of level 7.
 const GROUND: f32 = 7.5 - 1.73 / 0.3;
+/// Where the sensors are: beside the window, 1.8 m above the ground.
+const EYE: [f32; 3] = [31.5, -20.0, GROUND + 6.0];
+
+const SENSORS: SensorPaths = SensorPaths::at_rest([EYE; 2]);
 
 fn profile() -> Profile {
     Profile { side: SIDE as u32, ..Profile::hdl64() }
@@ -44,6 +50,21 @@ struct Returns {
 }
 
 impl Returns {
+    /// The same, and the rays of [`EYE`] that end beyond the window, as far as `beyond` lets them.
+    fn in_sight(&self, beyond: impl Fn([f32; 3]) -> bool) -> Returns {
+        let mut all = self.clone();
+        for azimuth in -150..150 {
+            for elevation in -40..20 {
+                let (x, z) = ((0.007 * azimuth as f32).tan(), 0.012 * elevation as f32);
+                let end = [EYE[0] + 100.0 * x, EYE[1] + 100.0, EYE[2] + 100.0 * z];
+                if beyond(end) {
+                    all.add(end, 0);
+                }
+            }
+        }
+        all
+    }
+
     fn add(&mut self, at: [f32; 3], sensor: u32) {
         self.points.push(Point { sensor, ..Point::default() });
         self.placed.push(Placed { at, offset_s: 0.0 });
@@ -64,13 +85,16 @@ impl Returns {
         Returns::ground(|_, _| GROUND)
     }
 
+    fn of_sweep<'a>(&'a self, stamp_s: f64, sensors: &'a SensorPaths) -> SweepReturns<'a> {
+        let Returns { points, placed, columns } = self;
+        SweepReturns { corner: [0; 3], stamp_s, points: all(points), placed, columns, sensors }
+    }
+
     /// How many had no room, and which are apart from clusters.
     fn fill(&self, cloud: &mut Cloud) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) =
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
-        let Returns { points, placed, columns } = self;
-        let (corner, stamp_s) = ([0; 3], 0.0);
-        let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
+        let returns = self.of_sweep(0.0, &SENSORS);
         (cloud.fill(&profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
     }
 
@@ -133,10 +157,13 @@ fn give(refinement: &mut Refinement, returns: &Returns, n: usize) {
 }
 
 fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, n: usize) {
-    let Returns { points, placed, columns } = returns;
-    let (corner, stamp_s) = ([0; 3], n as f64 * 0.1);
-    let mut apart = vec![false; points.len()];
-    let returns = SweepReturns { corner, stamp_s, points: all(points), placed, columns };
+    give_in_sight(refinement, profile, &returns.in_sight(|_| true), n);
+}
+
+/// The same with no other rays than those of the returns.
+fn give_in_sight(refinement: &mut Refinement, profile: &Profile, returns: &Returns, n: usize) {
+    let mut apart = vec![false; returns.points.len()];
+    let returns = returns.of_sweep(n as f64 * 0.1, &SENSORS);
     refinement.insert_cloud(profile, Simd::BASELINE, returns, &mut apart);
 }
 
@@ -148,46 +175,25 @@ fn no_flow() -> Vec<Flow> {
     vec![0; SIDE * SIDE]
 }
 
-/// Columns as rays leave them that end at the returns and pass everywhere else.
-fn columns(returns: &Returns) -> Vec<Column> {
-    let mut columns = vec![[0xffff, 0]; SIDE * SIDE];
-    for (Placed { at, .. }, &c) in returns.placed.iter().zip(&returns.columns) {
-        if c != NONE && (0.0..16.0).contains(&at[2]) {
-            let level = at[2] as u32;
-            let [masks, solid] = &mut columns[c as usize];
-            *masks = *masks & !(1 << level) | 1 << (16 + level);
-            *solid |= 1 << level;
-        }
-    }
-    columns
-}
-
-fn run(refinement: &mut Refinement, pair: &[&Returns; 2], flows: &[Flow]) {
-    run_knowing(refinement, pair, flows, None, &[]);
+fn run(refinement: &mut Refinement, flows: &[Flow]) {
+    run_knowing(refinement, flows, None, &[]);
 }
 
 /// The same where every tracklet predicts a displacement.
-fn run_expecting(
-    refinement: &mut Refinement,
-    pair: &[&Returns; 2],
-    flows: &[Flow],
-    expected: Option<[f32; 2]>,
-) {
-    run_knowing(refinement, pair, flows, expected, &[]);
+fn run_expecting(refinement: &mut Refinement, flows: &[Flow], expected: Option<[f32; 2]>) {
+    run_knowing(refinement, flows, expected, &[]);
 }
 
 /// The same with the encoder's scores.
 fn run_knowing(
     refinement: &mut Refinement,
-    pair: &[&Returns; 2],
     flows: &[Flow],
     expected: Option<[f32; 2]>,
     scores: &[ColumnScores],
 ) {
-    let [before, now] = pair.map(columns);
     let perceived = Perceived {
-        columns_before: &before,
-        columns_now: &now,
+        columns_before: &[],
+        columns_now: &[],
         foreground: &[],
         marked: 0,
         rays: 0,
@@ -221,7 +227,6 @@ fn check_sane(found: &[Moved]) {
 fn found_in(sweeps: &[Returns], flows: &[Flow]) -> Vec<Moved> {
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-    let [.., before, now] = sweeps else { panic!("two sweeps make a pair") };
-    run(&mut refinement, &[before, now], flows);
+    run(&mut refinement, flows);
     motions(&refinement)
 }

@@ -16,7 +16,7 @@ fn error_of_steady(sweeps: u32, by: [f32; 2], turn: f32, seed: u64) -> (usize, f
     let all: Vec<Returns> = (0..3).map(|n| sweep_of(&at(n as f32 - 1.0), &mut random)).collect();
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     all.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &profile, r, n));
-    run(&mut refinement, &[&all[1], &all[2]], &no_flow());
+    run(&mut refinement, &no_flow());
     let found = motions(&refinement);
     check_sane(&found);
     let mut errors = Vec::new();
@@ -92,7 +92,7 @@ fn what_stands_is_exactly_still() {
         all.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
         // Whatever energy minimisation made of it.
         let wrong = vec![pack_flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
-        run(&mut refinement, &[&all[1], &all[2]], &wrong);
+        run(&mut refinement, &wrong);
         assert!(motions(&refinement).iter().all(Option::is_none), "{n}");
     }
 }
@@ -108,7 +108,7 @@ fn columns_that_could_not_move_are_left_behind() {
     let found = |scores: &[ColumnScores]| {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_knowing(&mut refinement, &[&sweeps[1], &sweeps[2]], &flows, None, scores);
+        run_knowing(&mut refinement, &flows, None, scores);
         motions(&refinement)
     };
     let scores: Vec<ColumnScores> =
@@ -170,11 +170,10 @@ fn a_wall_that_seems_to_move_stands() {
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     let sweeps: Vec<Returns> = (0..3).map(wall).collect();
     sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
-    let masks = vec![[0xffff, 0]; 167 * 167];
     let flows = vec![pack_flow([10, 0]); 167 * 167];
     let perceived = Perceived {
-        columns_before: &masks,
-        columns_now: &masks,
+        columns_before: &[],
+        columns_now: &[],
         foreground: &[],
         marked: 0,
         rays: 0,
@@ -214,7 +213,7 @@ fn what_moved_goes_on_by_less() {
     let moving = |sweeps: &[Returns; 3], expected| {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_expecting(&mut refinement, &[&sweeps[1], &sweeps[2]], &no_flow(), expected);
+        run_expecting(&mut refinement, &no_flow(), expected);
         motions(&refinement).iter().flatten().count()
     };
     let steady = [0.0, 1.2, 2.4].map(long_side);
@@ -237,7 +236,7 @@ fn the_rest_of_a_body_goes_with_the_part_that_tells() {
         let flows: Vec<Flow> = (0..SIDE * SIDE).map(flow).collect();
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        run_knowing(&mut refinement, &[&sweeps[1], &sweeps[2]], &flows, None, scores);
+        run_knowing(&mut refinement, &flows, None, scores);
         motions(&refinement).iter().flatten().count()
     };
     let steady = [0.0, 1.2, 2.4].map(long_side);
@@ -256,31 +255,20 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
     let [first, second] =
         [25.0, 27.0].map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random));
-    // Of the second sweep nothing beyond a line is seen: neither returns nor free space.
-    let hidden = |c: usize| c / SIDE >= 28;
+    // Of the second sweep nothing beyond a line is seen: rays end there.
+    let hidden = 28.0;
     let mut seen = Returns::default();
-    for (placed, &c) in second.placed.iter().zip(&second.columns) {
-        if c != NONE && !hidden(c as usize) {
-            seen.add(placed.at, 0);
-        }
+    for placed in second.placed.iter().filter(|p| p.at[0] < hidden) {
+        seen.add(placed.at, 0);
     }
-    let mut now = columns(&seen);
-    now.iter_mut().enumerate().filter(|(c, _)| hidden(*c)).for_each(|(_, c)| *c = [0; 2]);
-    let [of, target] = [first.cloud(), seen.cloud()];
-    let (scaled, before) = (scaled(), columns(&first));
+    let [of, target] = [first.in_sight(|_| true), seen.in_sight(|end| end[0] < hidden)];
+    let [of, target] = [of, target].map(|returns| returns.cloud());
+    let scaled = scaled();
     let target = Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 };
     let part: Vec<u32> =
         (0..(SIDE * SIDE) as u32).filter(|c| of.levels(*c as usize) != 0).collect();
     let residual = |scores: &[ColumnScores]| {
-        let scans = Scans {
-            scaled: &scaled,
-            first: &of,
-            targets: &[target],
-            before: &before,
-            now: &now,
-            scores,
-            span_s: 0.1,
-        };
+        let scans = Scans { scaled: &scaled, first: &of, targets: &[target], scores, span_s: 0.1 };
         let cluster = Cluster::new(scans, &part);
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
         cluster.residual(&motion, &mut VisitedColumns::new())
@@ -315,7 +303,7 @@ fn who_walks_along_a_wall_is_found() {
     for (n, now) in sweeps.iter().enumerate() {
         give(&mut refinement, now, n);
         if n > 0 {
-            run(&mut refinement, &[&sweeps[n - 1], now], &no_flow());
+            run(&mut refinement, &no_flow());
             moving.push(motions(&refinement));
         }
     }

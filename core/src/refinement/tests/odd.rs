@@ -60,7 +60,7 @@ fn odd_sweeps_yield_no_nonsense() {
     );
     let mut alone = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     give(&mut alone, &odd[0], 0);
-    run(&mut alone, &[&odd[0], &odd[0]], &no_flow());
+    run(&mut alone, &no_flow());
     assert!(motions(&alone).iter().all(Option::is_none));
 }
 
@@ -82,9 +82,9 @@ fn the_same_sweeps_yield_the_same_bits() {
     // Whatever was before.
     let mut used = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     others.iter().enumerate().for_each(|(n, r)| give(&mut used, r, n));
-    run(&mut used, &[&others[1], &others[2]], &flows);
+    run(&mut used, &flows);
     used.clear();
     sweeps.iter().enumerate().for_each(|(n, r)| give(&mut used, r, n));
-    run(&mut used, &[&sweeps[2], &sweeps[3]], &flows);
+    run(&mut used, &flows);
     assert_eq!(motions(&used), wanted);
 }

@@ -1,0 +1,129 @@
+//! What rays tell of a place.
+
+use super::super::sample::SurfaceWeight;
+use super::super::sightlines::{Listed, Sightlines};
+use super::*;
+use crate::params::SIGHTLINES_MAX;
+
+/// A sensor 10 voxels beside the window's middle, and one far from it.
+const EYES: [[f32; 3]; 2] = [[20.0, 20.0, 5.0], [-40.0, 30.0, 5.0]];
+/// A surface whose returns tell nothing: across the line of sight.
+const UNKNOWN: SurfaceWeight = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+
+fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sightlines> {
+    let mut sightlines = raywake_alloc_guard::boxed!(Sightlines, Sightlines::new());
+    let point = |&(_, sensor, _): &(_, u32, f32)| Point { sensor, ..Point::default() };
+    let points: Vec<Point> = ends.iter().map(point).collect();
+    let placed: Vec<Placed> =
+        ends.iter().map(|&(at, _, offset_s)| Placed { at, offset_s }).collect();
+    let (mut index, mut bin) = (vec![0; ends.len()], vec![0; ends.len()]);
+    let listed = Listed { index: &mut index, bin: &mut bin };
+    sightlines.fill(sensors, all(&points), &placed, listed);
+    sightlines
+}
+
+#[test]
+fn a_ray_goes_through_ends_at_a_place_or_before_it() {
+    let sensors = SensorPaths::at_rest(EYES);
+    // Around the sensor, across the seam of azimuths too.
+    for n in 0..400 {
+        let azimuth = n as f32 * std::f32::consts::TAU / 400.0;
+        let along = |distance: f32| {
+            let [x, y] = [azimuth.cos(), azimuth.sin()].map(|v| v * distance);
+            [EYES[0][0] + x, EYES[0][1] + y, 5.0 + 0.1 * distance]
+        };
+        let depth = |end: f32, off: f32| {
+            let rays = sightlines(&sensors, &[(along(end), 0, 0.0)]);
+            let [x, y, z] = along(20.0);
+            rays.depth((&scaled(), Simd::BASELINE), [x, y, z + off], &UNKNOWN, 0.0)
+        };
+        // The slope makes 20 voxels in the plane 20.1 of the ray.
+        for end in [12.0, 20.0, 33.0] {
+            let behind = depth(end, 0.0).unwrap();
+            assert!((behind - 1.005 * (end - 20.0)).abs() < 0.05, "{n}: {end} {behind}");
+        }
+        // 0.1 m are a third of a voxel.
+        assert!(depth(33.0, 0.3).is_some() && depth(33.0, -0.3).is_some(), "{n}");
+        assert!(depth(33.0, 0.4).is_none() && depth(33.0, -0.4).is_none(), "{n}");
+    }
+}
+
+#[test]
+fn the_nearest_ray_of_all_sensors_tells() {
+    let sensors = SensorPaths::at_rest(EYES);
+    let place = [30.0, 30.0, 5.0];
+    let through = |sensor: usize, off: f32| {
+        let eye = EYES[sensor];
+        let end: [f32; 3] = std::array::from_fn(|a| eye[a] + 2.0 * (place[a] - eye[a]));
+        ([end[0], end[1], end[2] + 2.0 * off], sensor as u32, 0.0)
+    };
+    let at = ([30.0, 30.0, 5.1], 0, 0.0);
+    let depth = |ends: &[_]| {
+        sightlines(&sensors, ends).depth((&scaled(), Simd::BASELINE), place, &UNKNOWN, 0.0).unwrap()
+    };
+    assert!(depth(&[at, through(1, 0.0)]) > 10.0);
+    assert!(depth(&[at, through(1, 0.2)]).abs() < 0.1);
+    // Seen along a wall a ray passes near and never meets it.
+    let wall: SurfaceWeight = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    let beside = ([60.0, 29.9, 5.0], 1, 0.0);
+    let along = sightlines(&SensorPaths::at_rest([EYES[0], [-40.0, 29.8, 5.0]]), &[beside]);
+    assert!(
+        along
+            .depth((&scaled(), Simd::BASELINE), place, &UNKNOWN, 0.0)
+            .is_some_and(|behind| behind > 10.0)
+    );
+    assert!(along.depth((&scaled(), Simd::BASELINE), place, &wall, 0.0).is_none());
+}
+
+#[test]
+fn more_rays_than_there_is_room_for_are_thinned_evenly() {
+    let sensors = SensorPaths::at_rest(EYES);
+    // Rings one after the other, as columns of a spinning sensor: 64 by 4,096.
+    let end = |n: usize| {
+        let (azimuth, ring) = ((n / 64) as f32 * std::f32::consts::TAU / 4096.0, n % 64);
+        let [x, y] = [azimuth.cos(), azimuth.sin()].map(|v| 20.0 + 30.0 * v);
+        ([x, y, 5.0 + 0.25 * (ring as f32 - 32.0)], 0, 0.0)
+    };
+    let ends: Vec<_> = (0..4 * SIGHTLINES_MAX).map(end).collect();
+    let rays = sightlines(&sensors, &ends);
+    // Every place is told of: there were four rays within its reach.
+    for n in (0..ends.len()).step_by(37) {
+        let behind = rays.depth((&scaled(), Simd::BASELINE), ends[n].0, &UNKNOWN, 0.0);
+        assert!(behind.is_some_and(|behind| behind.abs() < 0.1), "{n}: {behind:?}");
+    }
+}
+
+#[test]
+fn a_ring_that_moves_with_the_sensor_stands() {
+    // A wall 6 voxels beside a lane of 7 voxels a sweep, of which one ring is seen: a hyperbola.
+    let wall = |n: usize| {
+        let eye = [10.0 + 7.0 * n as f32, 20.0, GROUND + 6.0];
+        // No ray reaches what lies behind it.
+        let mut returns = Returns::default();
+        for placed in Returns::flat().placed.iter().filter(|p| p.at[1] < 26.0) {
+            returns.add(placed.at, 0);
+        }
+        for k in -60..60 {
+            let along = 0.25 * k as f32;
+            let at = [eye[0] + along, 25.9, eye[2] - 0.35 * along.hypot(5.9)];
+            returns.add(at, 0);
+        }
+        (returns, SensorPaths::at_rest([eye; 2]))
+    };
+    let found = |sight_residual: f32| {
+        let mut profile = profile();
+        profile.refinement.sight_residual = sight_residual;
+        let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
+        for n in 0..3 {
+            let (returns, sensors) = wall(n);
+            let mut apart = vec![false; returns.points.len()];
+            let sweep = returns.of_sweep(n as f64 * 0.1, &sensors);
+            refinement.insert_cloud(&profile, Simd::BASELINE, sweep, &mut apart);
+        }
+        run(&mut refinement, &vec![pack_flow([7, 0]); SIDE * SIDE]);
+        motions(&refinement).iter().flatten().count()
+    };
+    // Where what is near decides alone it moves.
+    let [told, near] = [scaled().params.sight_residual, 1.1].map(found);
+    assert!(told == 0 && near > 20, "{told} {near}");
+}

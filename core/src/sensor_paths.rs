@@ -1,0 +1,72 @@
+//! Where each sensor is over a sweep, as the vehicle carries it along.
+
+use crate::frame::central;
+use crate::params::SENSORS_MAX;
+use crate::pose::Pose;
+use crate::prepare::Placement;
+use core::array::from_fn;
+
+/// Where each sensor is over a sweep: on a straight line, from which it strays by less than a
+/// millimetre where the vehicle turns by 0.05 rad in the time.
+#[derive(Clone, Copy)]
+pub(crate) struct SensorPaths {
+    /// Where each is as the sweep begins, voxels from the window's corner.
+    from: [[f32; 3]; SENSORS_MAX],
+    /// How far it gets until the sweep ends.
+    by: [[f32; 3]; SENSORS_MAX],
+    /// When the sweep begins, s after its stamp.
+    from_s: f32,
+    /// Sweeps in a second, 0 where a sweep takes no time.
+    per_s: f32,
+}
+
+impl SensorPaths {
+    /// Of no sweep.
+    pub const NOWHERE: SensorPaths = SensorPaths {
+        from: [[0.0; 3]; SENSORS_MAX],
+        by: [[0.0; 3]; SENSORS_MAX],
+        from_s: 0.0,
+        per_s: 0.0,
+    };
+
+    /// Of a sweep.
+    pub fn new(placement: &Placement) -> SensorPaths {
+        let Placement { profile, rig, window, sweep } = *placement;
+        let [from_s, to_s] = [0.0, 1.0].map(|turn| rig.timing.at(turn));
+        let mut paths = SensorPaths { from_s: from_s as f32, ..SensorPaths::NOWHERE };
+        if to_s > from_s {
+            paths.per_s = (1.0 / (to_s - from_s)) as f32;
+        }
+        let middle = central(profile);
+        for (sensor, mounted) in rig.sensors.iter().enumerate() {
+            let at = |offset_s: f64| {
+                let moving = placement.is_moving();
+                let moved = if moving { sweep.twist.over(offset_s) } else { Pose::IDENTITY };
+                let at = (window.grid_from_vehicle * moved * *mounted).translation;
+                let at = (at / profile.voxel_m).to_array();
+                from_fn(|a| (at[a] + 0.5) as f32 + middle[a] as f32)
+            };
+            let (from, to): ([f32; 3], [f32; 3]) = (at(from_s), at(to_s));
+            (paths.from[sensor], paths.by[sensor]) = (from, from_fn(|a| to[a] - from[a]));
+        }
+        paths
+    }
+
+    /// Of two sensors that stay where they are.
+    #[cfg(test)]
+    pub const fn at_rest([first, second]: [[f32; 3]; 2]) -> SensorPaths {
+        let mut paths = SensorPaths::NOWHERE;
+        (paths.from[0], paths.from[1]) = (first, second);
+        paths
+    }
+
+    /// The part of the sweep that has passed at an offset from its stamp, s: 0 to 1.
+    pub fn part(&self, offset_s: f32) -> f32 {
+        ((offset_s - self.from_s) * self.per_s).clamp(0.0, 1.0)
+    }
+
+    /// Where a sensor is when a part of the sweep has passed, voxels from the window's corner.
+    pub fn at(&self, sensor: usize, part: f32) -> [f32; 3] {
+        from_fn(|a| self.from[sensor][a] + part * self.by[sensor][a])
+    }
+}
