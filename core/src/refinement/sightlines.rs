@@ -20,6 +20,10 @@ use raywake_simd::Simd;
 
 /// Directions in the plane that are told apart, by [`pseudo_angle`]: of 0.3 to 0.5 degrees.
 const AZIMUTHS: usize = 1024;
+/// A whole turn of [`pseudo_angle`].
+const TURN: f32 = 4.0;
+/// Steps of a sweep that the time of a ray is rounded to, 0.4 ms.
+const PARTS: f32 = 255.0;
 /// Steps of a voxel that ends of rays are rounded to, 5 mm.
 const STEPS: f32 = 64.0;
 /// Farther ends, voxels along an axis, are moved up along their ray: what a step's type holds.
@@ -47,7 +51,7 @@ pub struct Sightlines {
     start: [u32; SENSORS_MAX * AZIMUTHS + 1],
     /// Their ends by axis, steps from the sensor.
     end: [[i16; SIGHTLINES_MAX + LANES]; 3],
-    /// The part of the sweep that had passed, of 255.
+    /// The part of the sweep that had passed, of [`PARTS`].
     part: [u8; SIGHTLINES_MAX],
 }
 
@@ -104,7 +108,7 @@ impl Sightlines {
         for (end, v) in self.end.iter_mut().zip(ray) {
             end[to] = (v * scale) as i16;
         }
-        self.part[to] = (part * 255.0) as u8;
+        self.part[to] = (part * PARTS) as u8;
     }
 
     /// How far behind a place of a surface, voxels across it, the ray ended that met the surface
@@ -117,13 +121,13 @@ impl Sightlines {
         weight: &SurfaceWeight,
         offset_s: f32,
     ) -> Option<f32> {
-        let mut nearest = Nearest { squared_distance: f32::INFINITY, depth: None };
+        let mut nearest = NearestRay { squared_distance: f32::INFINITY, depth: None };
         for sensor in 0..SENSORS_MAX {
             if self.rays(sensor * AZIMUTHS..(sensor + 1) * AZIMUTHS).is_empty() {
                 continue;
             }
             let (eye, bin) = self.eye(sensor, at, offset_s);
-            let surface = Surface::new(minus(at, eye), weight);
+            let surface = SurfacePatch::new(minus(at, eye), weight);
             let reach = scaled.sight_reach(surface.distance());
             let within = nearest.squared_distance.min(reach * reach);
             let found = simd.run(
@@ -144,7 +148,7 @@ impl Sightlines {
         let (mut eye, mut direction) = look(self.paths.part(offset_s));
         for _ in 0..ROUNDS {
             let Some(first) = self.rays(direction..direction + 1).next() else { break };
-            (eye, direction) = look(f32::from(self.part[first]) / 255.0);
+            (eye, direction) = look(f32::from(self.part[first]) / PARTS);
         }
         (eye, direction)
     }
@@ -157,7 +161,7 @@ impl Sightlines {
     /// The ray of a direction, or of those beside it, that meets a surface nearest to its place,
     /// within a squared distance, voxels².
     #[inline(always)]
-    fn nearest(&self, bin: Bin, surface: &Surface, within: f32) -> Nearest {
+    fn nearest(&self, bin: Bin, surface: &SurfacePatch, within: f32) -> NearestRay {
         let (mut least, mut depth) = ([within; LANES], [f32::NAN; LANES]);
         for bins in beside(bin) {
             let rays = self.rays(bins);
@@ -168,10 +172,10 @@ impl Sightlines {
                 surface.meet([x, y, z], left, &mut least, &mut depth);
             }
         }
-        let mut nearest = Nearest { squared_distance: within, depth: None };
+        let mut nearest = NearestRay { squared_distance: within, depth: None };
         for (least, depth) in least.into_iter().zip(depth) {
             if least < nearest.squared_distance {
-                nearest = Nearest { squared_distance: least, depth: Some(depth) };
+                nearest = NearestRay { squared_distance: least, depth: Some(depth) };
             }
         }
         nearest
@@ -186,7 +190,7 @@ fn is_kept(n: usize, of: usize) -> bool {
 }
 
 fn bin(sensor: usize, [x, y, _]: [f32; 3]) -> Bin {
-    let azimuth = (pseudo_angle(x, y) * (AZIMUTHS as f32 / 4.0)) as usize;
+    let azimuth = (pseudo_angle(x, y) * (AZIMUTHS as f32 / TURN)) as usize;
     sensor * AZIMUTHS + azimuth.min(AZIMUTHS - 1)
 }
 
@@ -201,7 +205,7 @@ fn beside(bin: Bin) -> [Range<Bin>; 2] {
 }
 
 /// The ray that meets a surface nearest to its place.
-struct Nearest {
+struct NearestRay {
     /// Between the two, voxels²; before there is one, of the farthest that counts.
     squared_distance: f32,
     /// How far behind the surface it ended, voxels across it.
@@ -210,7 +214,7 @@ struct Nearest {
 
 /// A surface through a place, seen from a sensor: across it where the returns around tell, across
 /// the line of sight where they do not.
-struct Surface {
+struct SurfacePatch {
     /// The place, voxels from the sensor.
     at: [f32; 3],
     /// Unit vector across, away from the sensor.
@@ -219,13 +223,13 @@ struct Surface {
     away: f32,
 }
 
-impl Surface {
-    fn new(at: [f32; 3], weight: &SurfaceWeight) -> Surface {
+impl SurfacePatch {
+    fn new(at: [f32; 3], weight: &SurfaceWeight) -> SurfacePatch {
         let [x, y, z] = at;
         let [xx, xy, xz, yy, yz, zz] = *weight;
         let across = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z];
         let across = across.map(|v| v / libm::sqrtf(dot(across, across)));
-        Surface { at, across, away: dot(across, at) }
+        SurfacePatch { at, across, away: dot(across, at) }
     }
 
     fn distance(&self) -> f32 {
