@@ -172,10 +172,9 @@ impl<'a> Cluster<'a> {
         let target = &scans.targets[0];
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
-            scans
-                .told_residual(target.cloud, q, scans.first, at)
-                .into_iter()
-                .for_each(|m| mean.add(m));
+            if let Some(told) = scans.told_residual(target.cloud, q, scans.first, at) {
+                mean.add(told);
+            }
         }
         (mean.value(), visible)
     }

@@ -138,7 +138,7 @@ impl Refinement {
         let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
             return;
         };
-        let Perceived { flow: state, .. } = *perceived;
+        let state = perceived.flow;
         let newest = self.newest;
         let first = &self.clouds[index(newest, 1)];
         let side = first.side;

@@ -75,9 +75,9 @@ impl Sightlines {
     ) {
         self.paths = *paths;
         self.start.fill(0);
-        let (mut count, all) = (0, placed.len());
+        let (mut count, share) = (0, share_kept(placed.len()));
         for (n, placed) in placed.iter().enumerate() {
-            if is_kept(n, all) && placed.at[0].is_finite() && count < SIGHTLINES_MAX {
+            if is_kept(n, share) && placed.at[0].is_finite() && count < SIGHTLINES_MAX {
                 let sensor = points.get(n).sensor as usize;
                 let eye = paths.at(sensor, paths.part(placed.offset_s));
                 let bin = bin(sensor, minus(placed.at, eye));
@@ -182,10 +182,14 @@ impl Sightlines {
     }
 }
 
-/// Whether a return is among those kept: as many as there is room for, spread evenly however the
-/// source orders them (steps of the golden ratio).
-fn is_kept(n: usize, of: usize) -> bool {
-    let share = ((SIGHTLINES_MAX as u64) << 32) / of as u64;
+/// How many of 2³² returns are kept where a sweep has so many.
+fn share_kept(of: usize) -> u64 {
+    ((SIGHTLINES_MAX as u64) << 32) / of.max(1) as u64
+}
+
+/// Whether a return is among those kept: in steps of the golden ratio they are spread evenly,
+/// however the source orders them.
+fn is_kept(n: usize, share: u64) -> bool {
     u64::from((n as u32).wrapping_mul(0x9E37_79B1)) < share
 }
 
