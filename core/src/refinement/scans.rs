@@ -118,9 +118,14 @@ impl Scans<'_> {
         other: &Cloud,
         at: [f32; 3],
     ) -> Option<f32> {
-        let near = self.residual(of, s, at, other.nearest(at, s.sensor, self.reach_inlier()));
+        let found = other.nearest(at, s.sensor, self.reach_inlier());
+        let near = self.residual(of, s, at, found);
         if near < self.scaled.params.sight_residual {
             return Some(near);
+        }
+        // A ray that passes just below a ceiling goes on far: it meets it there.
+        if at[2] >= self.scaled.levels {
+            return found.map(|_| near);
         }
         let weight = of.weight(self.scaled, s.index);
         let behind = other.sightlines.depth((self.scaled, other.simd), at, &weight, s.offset_s)?;
