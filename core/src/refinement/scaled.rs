@@ -29,8 +29,6 @@ pub(crate) struct Scaled {
     pub inlier: f32,
     pub truncation: f32,
     sight_distance: f32,
-    /// Height of the window, within which rays tell.
-    pub levels: f32,
     pub evidence_length: f32,
     pub displacement_min: f32,
     pub start_spacing: f32,
@@ -71,7 +69,6 @@ impl Scaled {
             inlier: length(p.inlier_m),
             truncation: length(p.truncation_m),
             sight_distance: length(p.sight_distance_m),
-            levels: profile.levels as f32,
             evidence_length: length(p.evidence_length_m),
             displacement_min: length(p.displacement_min_m),
             start_spacing: length(p.start_spacing_m),

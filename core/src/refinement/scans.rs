@@ -123,8 +123,8 @@ impl Scans<'_> {
         if near < self.scaled.params.sight_residual {
             return Some(near);
         }
-        // A ray that passes just below a ceiling goes on far: it meets it there.
-        if at[2] >= self.scaled.levels {
+        // Beyond the window no returns are kept to be near, and along a wall rays end farther on.
+        if other.column_at([at[0], at[1]]).is_none() {
             return found.map(|_| near);
         }
         let weight = of.weight(self.scaled, s.index);
