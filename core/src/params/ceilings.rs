@@ -56,8 +56,8 @@ pub const SUBVOXELS_MAX: usize = 4;
 /// Thinned returns of one sweep that the refinement keeps; those of the last columns are dropped
 /// and counted.
 pub const CLOUD_MAX: usize = 65_536;
-/// Rays of one sweep that tell whether something was seen; of more, evenly spread ones. With four
-/// times as many nothing changes (simulated streets, 25 sweeps of 21 drives).
+/// Rays of one sweep that tell whether something was seen; of more, evenly spread ones. With all of
+/// them recall on simulated streets is 94.8 % instead of 94.7 (21 drives of 25 sweeps).
 pub const SIGHTLINES_MAX: usize = 65_536;
 /// Updates (voxel, log-odds) of one band of the sparse map.
 pub const BAND_UPDATES: usize = 1 << 20;

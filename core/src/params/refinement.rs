@@ -96,8 +96,8 @@ crate::params! {
         pub sight_residual: f32 = 0.1, "", (0 to 1),
             "Columns put out as moving of simulated streets (`raywake-lab sim --drives 3 --sweeps \
              25 --seed 9001`, slow, plain and fast, `vlp32x2` and `hdl64`, and plain \
-             `hdl32x4-full`): precision 95.1 %, recall 94.6 here, 94.8 and 94.6 at 0.05. Before \
-             rays told, 94.2 and 94.4.";
+             `hdl32x4-full`), with 0.03 for `evidence_min`: precision 95.1 %, recall 94.6 here, \
+             94.8 and 94.6 at 0.05. Before rays told, 94.2 and 94.4.";
         /// How near to a place a ray must pass to tell of it.
         pub sight_distance_m: f64 = 0.1, "m", (0.001 to 5),
             "Precision and recall as above: 95.2 and 94.7 at 0.07 m, 95.1 and 94.7 at 0.15 m.";
@@ -118,8 +118,7 @@ crate::params! {
         /// Evidence against rest from which on a cluster is dynamic, see [`crate::refinement`].
         pub evidence_min: f32 = 0.02, "", (0 to 1),
             "So low that what moves is among what P(moves) decides of. Precision and recall as \
-             above, with 0.05 and 0.03 for `residual_static`: 95.1 and 94.6 at 0.03, 95.0 and 94.8 \
-             here.";
+             above: 95.1 and 94.6 at 0.03, 95.0 and 94.8 here, with 0.03 for `residual_static`.";
         /// Difference in evidence that makes motion e times likelier.
         pub evidence_scale: f32 = 0.04, "", (0.0001 to 1), CALIBRATED;
         /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in
