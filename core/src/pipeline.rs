@@ -76,11 +76,11 @@ impl Pipeline {
             self.refinement.clear();
             self.encoder.clear();
         }
-        let sent = self.returns.send(setup, team, sweep, &arrival, backend.input()?);
+        let placement = Placement { profile, rig: &setup.rig, window: &arrival.window, sweep };
+        let sent = self.returns.send(setup, team, &placement, arrival.shift, backend.input()?);
         timer.lap("rays");
 
         let (mut unrefined, corner) = (0, arrival.window.corner);
-        let placement = Placement { profile, rig: &setup.rig, window: &arrival.window, sweep };
         let Pipeline { returns, refinement, encoder, .. } = self;
         let meanwhile = || {
             unrefined = returns.insert(refinement, team.simd(), &placement);
@@ -131,7 +131,7 @@ impl Pipeline {
         let left = self.tracklets.place(sweep);
         let [dt_s, voxel_m] = [pair.dt_s, pair.profile.voxel_m].map(|v| v as f32);
         let predicted = |column| self.tracklets.predict(column, dt_s, voxel_m);
-        self.refinement.run(team, sweep, perceived, self.encoder.scores(), predicted);
+        self.refinement.run(team, sweep, perceived.flow, self.encoder.scores(), predicted);
         left
     }
 

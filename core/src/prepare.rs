@@ -16,6 +16,7 @@ use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::Team;
 use crate::thinning::TakenPoints;
 use batch::{RayLattice, ReturnBatch};
+use glam::DVec3;
 use raywake_simd::Simd;
 
 fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
@@ -130,6 +131,13 @@ impl Placement<'_> {
     pub(crate) fn is_moving(&self) -> bool {
         self.rig.timing != Timing::AtStamp && (self.deskews() || !self.rig.distorted)
     }
+
+    /// Where a sensor mounted so is at an offset from the stamp, s: voxels from the centre of the
+    /// central voxel.
+    pub(crate) fn sensor(&self, mounted: &Pose, offset_s: f64) -> DVec3 {
+        let moved = if self.is_moving() { self.sweep.twist.over(offset_s) } else { Pose::IDENTITY };
+        (self.window.grid_from_vehicle * moved * *mounted).translation / self.profile.voxel_m
+    }
 }
 
 /// Room for the rays of a sweep, the caller's.
@@ -183,7 +191,7 @@ impl<'a> Caster<'a> {
                 drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
             },
             moving,
-            origin_ids: place_origins(placement, moving, origins),
+            origin_ids: place_origins(placement, origins),
             from_s,
             slot_s,
         }
@@ -325,18 +333,17 @@ type OriginIds = [[u32; SLOTS]; SENSORS_MAX];
 
 /// Voxels of the ray origins, and which of them each sensor and slot has. Slots whose origins
 /// share a voxel share an entry, so that equal rays can be recognised.
-fn place_origins(placement: &Placement, moving: bool, origins: &mut [[i32; 4]]) -> OriginIds {
+fn place_origins(placement: &Placement, origins: &mut [[i32; 4]]) -> OriginIds {
     assert!(origins.len() == ORIGINS_MAX);
-    let Placement { profile, rig, window, sweep } = *placement;
+    let Placement { profile, rig, .. } = *placement;
     let mut ids = [[0; SLOTS]; SENSORS_MAX];
     // Looked up here, not in `origins`: that may be memory of a device, slow to read.
     let mut table = heapless::Vec::<[i32; 4], ORIGINS_MAX>::new();
-    let slots = if moving { SLOTS } else { 1 };
+    let slots = if placement.is_moving() { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {
         for (slot, id) in ids[sensor][..slots].iter_mut().enumerate() {
-            let moved = if moving { sweep.motion(rig, slot) } else { Pose::IDENTITY };
-            let at = (window.grid_from_vehicle * moved * *mounted).translation;
-            let v = (at / profile.voxel_m).to_array().map(nearest);
+            let at = placement.sensor(mounted, rig.timing.offset_s(slot as f64 + 0.5));
+            let v = at.to_array().map(nearest);
             let [x, y, z] = add(v, central(profile));
             let known = table.iter().position(|o| *o == [x, y, z, 0]);
             *id = known.unwrap_or(table.len()) as u32;

@@ -28,7 +28,7 @@ impl ReturnClock {
         let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
         for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
             // The inverse of `pseudo_angle`.
-            let p = n as f64 * 4.0 / AZIMUTHS as f64;
+            let p = n as f64 * f64::from(TURN) / AZIMUTHS as f64;
             let x = if p < 2.0 { p - 1.0 } else { 3.0 - p };
             let y = libm::copysign(1.0 - libm::fabs(x), 2.0 - p);
             let turn = 0.5 - libm::atan2(y, x) / core::f64::consts::TAU;
@@ -48,7 +48,7 @@ impl ReturnClock {
             }
             Timing::Azimuth { .. } => {
                 let p = pseudo_angle(point.position[0], point.position[1]);
-                let p = p * (AZIMUTHS as f32 / 4.0);
+                let p = p * (AZIMUTHS as f32 / TURN);
                 let n = (p as i32 as usize).min(AZIMUTHS - 1);
                 let (low, high) = (self.slot_of_azimuth[n], self.slot_of_azimuth[n + 1]);
                 low + (p - n as f32) * (high - low)
@@ -93,6 +93,9 @@ impl Sweep<'_> {
         self.twist.over(rig.timing.offset_s(slot as f64 + 0.5))
     }
 }
+
+/// A whole turn of [`pseudo_angle`].
+pub(crate) const TURN: f32 = 4.0;
 
 /// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at
 /// the rear, 1 to the left, 2 in front, 3 to the right.

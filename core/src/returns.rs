@@ -1,13 +1,12 @@
 //! The returns of the last two sweeps: where each of them is.
 
 use crate::dropped::DroppedReturns;
-use crate::frame::Arrival;
 use crate::params::POINTS_MAX;
 use crate::prepare::{Placement, RayBuffers, Setup, uniform_of};
 use crate::record::{NONE, Ray, SweepUniform};
 use crate::refinement::{Refinement, SweepReturns};
 use crate::sensor_paths::SensorPaths;
-use crate::sweep::{Placed, Sweep};
+use crate::sweep::Placed;
 use crate::team::Team;
 use crate::thinning::TakenPoints;
 use raywake_simd::Simd;
@@ -41,22 +40,20 @@ impl Returns {
         }
     }
 
-    /// Turns the sweep that has just come into rays.
+    /// Turns the sweep that has just come into rays. The window is shifted by so many cells.
     pub fn send(
         &mut self,
         setup: &Setup,
         team: &impl Team,
-        sweep: &Sweep,
-        arrival: &Arrival,
+        placement: &Placement,
+        [shift_x, shift_y, shift_z]: [i32; 3],
         (rays, origins): (&mut [Ray], &mut [[i32; 4]]),
     ) -> Sent {
-        let Setup { profile, rig, .. } = setup;
+        let profile = &setup.profile;
         self.now = 1 - self.now;
-        let placement = Placement { profile, rig, window: &arrival.window, sweep };
         let (columns, placed) = (&mut self.column[self.now], &mut self.placed);
         let buffers = RayBuffers { rays, origins, columns, placed };
-        let (count, dropped) = setup.preparation.prepare(team, &placement, buffers);
-        let [shift_x, shift_y, shift_z] = arrival.shift;
+        let (count, dropped) = setup.preparation.prepare(team, placement, buffers);
         let uniform = SweepUniform {
             shift_x,
             shift_y,

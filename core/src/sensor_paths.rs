@@ -2,12 +2,11 @@
 
 use crate::frame::central;
 use crate::params::SENSORS_MAX;
-use crate::pose::Pose;
 use crate::prepare::Placement;
 use core::array::from_fn;
 
-/// Where each sensor is over a sweep: on a straight line, from which it strays by less than a
-/// millimetre where the vehicle turns by 0.05 rad in the time.
+/// Where each sensor is over a sweep: on a straight line, from which one 2 m from the vehicle's
+/// centre strays by less than a millimetre where that turns by 0.05 rad in the time.
 #[derive(Clone, Copy)]
 pub(crate) struct SensorPaths {
     /// Where each is as the sweep begins, voxels from the window's corner.
@@ -31,7 +30,7 @@ impl SensorPaths {
 
     /// Of a sweep.
     pub fn new(placement: &Placement) -> SensorPaths {
-        let Placement { profile, rig, window, sweep } = *placement;
+        let Placement { profile, rig, .. } = *placement;
         let [from_s, to_s] = [0.0, 1.0].map(|turn| rig.timing.at(turn));
         let mut paths = SensorPaths { from_s: from_s as f32, ..SensorPaths::NOWHERE };
         if to_s > from_s {
@@ -40,10 +39,7 @@ impl SensorPaths {
         let middle = central(profile);
         for (sensor, mounted) in rig.sensors.iter().enumerate() {
             let at = |offset_s: f64| {
-                let moving = placement.is_moving();
-                let moved = if moving { sweep.twist.over(offset_s) } else { Pose::IDENTITY };
-                let at = (window.grid_from_vehicle * moved * *mounted).translation;
-                let at = (at / profile.voxel_m).to_array();
+                let at = placement.sensor(mounted, offset_s).to_array();
                 from_fn(|a| (at[a] + 0.5) as f32 + middle[a] as f32)
             };
             let (from, to): ([f32; 3], [f32; 3]) = (at(from_s), at(to_s));

@@ -54,7 +54,6 @@ mod tests;
 
 use crate::encoder::ColumnScores;
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
-use crate::perceive::Perceived;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::team::Team;
 pub(crate) use cloud::SweepReturns;
@@ -123,14 +122,15 @@ impl Refinement {
         cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `scores` are the encoder's of its columns,
+    /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new window
+    /// were matched with, `scores` are the encoder's of its columns,
     /// none where nothing is encoded, and `predicted` is what the tracklet of a column of the new
     /// window predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
         step: &SweepUniform,
-        perceived: &Perceived,
+        flow: &[Flow],
         scores: &[ColumnScores],
         predicted: impl Fn(usize) -> Option<Prediction> + Sync,
     ) {
@@ -138,7 +138,6 @@ impl Refinement {
         let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
             return;
         };
-        let state = perceived.flow;
         let newest = self.newest;
         let first = &self.clouds[index(newest, 1)];
         let side = first.side;
@@ -147,7 +146,7 @@ impl Refinement {
             let inside = (0..step.side).contains(&i) && (0..step.side).contains(&j);
             inside.then_some((i * step.side + j) as usize)
         };
-        let flow = |c: usize| shifted(c).map_or(0, |c| state[c]);
+        let flow = |c: usize| shifted(c).map_or(0, |c| flow[c]);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let span_s = self.clouds[newest].stamp_s - first.stamp_s;
         let mut targets = heapless::Vec::<Target, TARGETS_MAX>::new();

@@ -24,6 +24,12 @@ pub fn squared_distance(weight: &SurfaceWeight, [x, y, z]: [f32; 3]) -> f32 {
     x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z
 }
 
+/// A difference weighed by what is known across each direction.
+pub fn weighed(weight: &SurfaceWeight, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let [xx, xy, xz, yy, yz, zz] = *weight;
+    [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+}
+
 pub fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

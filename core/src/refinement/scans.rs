@@ -128,7 +128,7 @@ impl Scans<'_> {
             return found.map(|_| near);
         }
         let weight = of.weight(self.scaled, s.index);
-        let behind = other.sightlines.depth((self.scaled, other.simd), at, &weight, s.offset_s)?;
+        let behind = other.sightlines.depth(other.simd, self.scaled, at, &weight, s.offset_s)?;
         let ratio = behind / self.scaled.truncation;
         (ratio > -1.0).then(|| near.min(ratio * ratio))
     }

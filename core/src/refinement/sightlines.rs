@@ -8,26 +8,25 @@
 //! 3D computer objects", PAMI 1995) a place is compared with what its direction shows, not with
 //! what is near it in space.
 
-use super::sample::{SurfaceWeight, minus};
+use super::sample::{SurfaceWeight, minus, weighed};
 use super::scaled::Scaled;
 use crate::params::{SENSORS_MAX, SIGHTLINES_MAX};
-use crate::return_clock::pseudo_angle;
+use crate::return_clock::{TURN, pseudo_angle};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
 use core::ops::Range;
 use raywake_simd::Simd;
 
-/// Directions in the plane that are told apart, by [`pseudo_angle`]: of 0.3 to 0.5 degrees.
+/// Directions in the plane that are told apart, by [`pseudo_angle`]: of 0.2 to 0.5 degrees.
 const AZIMUTHS: usize = 1024;
-/// A whole turn of [`pseudo_angle`].
-const TURN: f32 = 4.0;
 /// Steps of a sweep that the time of a ray is rounded to, 0.4 ms.
 const PARTS: f32 = 255.0;
 /// Steps of a voxel that ends of rays are rounded to, 5 mm.
 const STEPS: f32 = 64.0;
 /// Farther ends, voxels along an axis, are moved up along their ray: what a step's type holds.
 const FAR: f32 = 500.0;
+const _: () = assert!(FAR * STEPS <= i16::MAX as f32);
 /// Times that the moment is sought at which a sensor looked in a direction: between two sweeps it
 /// has moved, and with it the direction.
 const ROUNDS: usize = 3;
@@ -116,7 +115,8 @@ impl Sightlines {
     /// be seen, s after the stamp.
     pub fn depth(
         &self,
-        (scaled, simd): (&Scaled, Simd),
+        simd: Simd,
+        scaled: &Scaled,
         at: [f32; 3],
         weight: &SurfaceWeight,
         offset_s: f32,
@@ -229,9 +229,7 @@ struct SurfacePatch {
 
 impl SurfacePatch {
     fn new(at: [f32; 3], weight: &SurfaceWeight) -> SurfacePatch {
-        let [x, y, z] = at;
-        let [xx, xy, xz, yy, yz, zz] = *weight;
-        let across = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z];
+        let across = weighed(weight, at);
         let across = across.map(|v| v / libm::sqrtf(dot(across, across)));
         SurfacePatch { at, across, away: dot(across, at) }
     }

@@ -10,7 +10,7 @@ mod sightlines;
 use super::*;
 use crate::encoder::layers::SCORES;
 use crate::random::Random;
-use crate::record::{NONE, Proposal, pack_flow};
+use crate::record::{NONE, pack_flow};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::{Placed, Point};
 use crate::team::Alone;
@@ -50,7 +50,7 @@ struct Returns {
 }
 
 impl Returns {
-    /// The same, and the rays of [`EYE`] that end beyond the window, as far as `beyond` lets them.
+    /// The same, and rays of [`EYE`] that end beyond the window, where `beyond` takes the end.
     fn in_sight(&self, beyond: impl Fn([f32; 3]) -> bool) -> Returns {
         let mut all = self.clone();
         for azimuth in -150..150 {
@@ -157,13 +157,19 @@ fn give(refinement: &mut Refinement, returns: &Returns, n: usize) {
 }
 
 fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, n: usize) {
-    give_in_sight(refinement, profile, &returns.in_sight(|_| true), n);
+    give_seen(refinement, profile, &returns.in_sight(|_| true), &SENSORS, n);
 }
 
-/// The same with no other rays than those of the returns.
-fn give_in_sight(refinement: &mut Refinement, profile: &Profile, returns: &Returns, n: usize) {
+/// The same with these sensors, and no other rays than those of the returns.
+fn give_seen(
+    refinement: &mut Refinement,
+    profile: &Profile,
+    returns: &Returns,
+    sensors: &SensorPaths,
+    n: usize,
+) {
     let mut apart = vec![false; returns.points.len()];
-    let returns = returns.of_sweep(n as f64 * 0.1, &SENSORS);
+    let returns = returns.of_sweep(n as f64 * 0.1, sensors);
     refinement.insert_cloud(profile, Simd::BASELINE, returns, &mut apart);
 }
 
@@ -191,17 +197,8 @@ fn run_knowing(
     expected: Option<[f32; 2]>,
     scores: &[ColumnScores],
 ) {
-    let perceived = Perceived {
-        columns_before: &[],
-        columns_now: &[],
-        foreground: &[],
-        marked: 0,
-        rays: 0,
-        flow: flows,
-        proposal: &[] as &[Proposal],
-    };
     let step = SweepUniform { side: SIDE as i32, ..SweepUniform::default() };
-    refinement.run(&Alone, &step, &perceived, scores, |_| {
+    refinement.run(&Alone, &step, flows, scores, |_| {
         expected.map(|by| Prediction { by, certainty: 3.0 })
     });
 }

@@ -171,19 +171,9 @@ fn a_wall_that_seems_to_move_stands() {
     let sweeps: Vec<Returns> = (0..3).map(wall).collect();
     sweeps.iter().enumerate().for_each(|(n, r)| give_with(&mut refinement, &big, r, n));
     let flows = vec![pack_flow([10, 0]); 167 * 167];
-    let perceived = Perceived {
-        columns_before: &[],
-        columns_now: &[],
-        foreground: &[],
-        marked: 0,
-        rays: 0,
-        flow: &flows,
-        proposal: &[] as &[Proposal],
-    };
     let step = SweepUniform { side: 167, ..SweepUniform::default() };
-    refinement.run(&Alone, &step, &perceived, &[], |_| {
-        Some(Prediction { by: [10.0, 0.0], certainty: 3.0 })
-    });
+    refinement
+        .run(&Alone, &step, &flows, &[], |_| Some(Prediction { by: [10.0, 0.0], certainty: 3.0 }));
     let extent_max = scaled().extent_max;
     let longest = refinement.clusters.found().iter().map(|f| f.extent).fold(0.0, f32::max);
     assert!(longest > extent_max, "{longest}");
@@ -255,13 +245,14 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
     let [first, second] =
         [25.0, 27.0].map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random));
-    // Of the second sweep nothing beyond a line is seen: rays end there.
+    // Of the second sweep nothing beyond a line is seen: rays that pass there are missing.
     let hidden = 28.0;
     let mut seen = Returns::default();
     for placed in second.placed.iter().filter(|p| p.at[0] < hidden) {
         seen.add(placed.at, 0);
     }
-    let [of, target] = [first.in_sight(|_| true), seen.in_sight(|end| end[0] < hidden)];
+    let at_car = |end: [f32; 3]| EYE[0] + (end[0] - EYE[0]) * (31.0 - EYE[1]) / (end[1] - EYE[1]);
+    let [of, target] = [first.in_sight(|_| true), seen.in_sight(|end| at_car(end) < hidden)];
     let [of, target] = [of, target].map(|returns| returns.cloud());
     let scaled = scaled();
     let target = Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 };

@@ -3,9 +3,13 @@
 use super::super::sample::SurfaceWeight;
 use super::super::sightlines::{Listed, Sightlines};
 use super::*;
+use crate::frame;
 use crate::params::SIGHTLINES_MAX;
+use crate::pose::{Pose, Twist};
+use crate::prepare::Placement;
+use crate::sweep::{Rig, Sweep, Timing};
 
-/// A sensor 10 voxels beside the window's middle, and one far from it.
+/// A sensor in the window, and one beside it.
 const EYES: [[f32; 3]; 2] = [[20.0, 20.0, 5.0], [-40.0, 30.0, 5.0]];
 /// A surface whose returns tell nothing: across the line of sight.
 const UNKNOWN: SurfaceWeight = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
@@ -35,7 +39,7 @@ fn a_ray_goes_through_ends_at_a_place_or_before_it() {
         let depth = |end: f32, off: f32| {
             let rays = sightlines(&sensors, &[(along(end), 0, 0.0)]);
             let [x, y, z] = along(20.0);
-            rays.depth((&scaled(), Simd::BASELINE), [x, y, z + off], &UNKNOWN, 0.0)
+            rays.depth(Simd::BASELINE, &scaled(), [x, y, z + off], &UNKNOWN, 0.0)
         };
         // The slope makes 20 voxels in the plane 20.1 of the ray.
         for end in [12.0, 20.0, 33.0] {
@@ -59,7 +63,7 @@ fn the_nearest_ray_of_all_sensors_tells() {
     };
     let at = ([30.0, 30.0, 5.1], 0, 0.0);
     let depth = |ends: &[_]| {
-        sightlines(&sensors, ends).depth((&scaled(), Simd::BASELINE), place, &UNKNOWN, 0.0).unwrap()
+        sightlines(&sensors, ends).depth(Simd::BASELINE, &scaled(), place, &UNKNOWN, 0.0).unwrap()
     };
     assert!(depth(&[at, through(1, 0.0)]) > 10.0);
     assert!(depth(&[at, through(1, 0.2)]).abs() < 0.1);
@@ -69,16 +73,64 @@ fn the_nearest_ray_of_all_sensors_tells() {
     let along = sightlines(&SensorPaths::at_rest([EYES[0], [-40.0, 29.8, 5.0]]), &[beside]);
     assert!(
         along
-            .depth((&scaled(), Simd::BASELINE), place, &UNKNOWN, 0.0)
+            .depth(Simd::BASELINE, &scaled(), place, &UNKNOWN, 0.0)
             .is_some_and(|behind| behind > 10.0)
     );
-    assert!(along.depth((&scaled(), Simd::BASELINE), place, &wall, 0.0).is_none());
+    assert!(along.depth(Simd::BASELINE, &scaled(), place, &wall, 0.0).is_none());
+}
+
+#[test]
+fn a_sensor_is_where_it_was_as_it_looked() {
+    // It goes 7 voxels a sweep and turns once, clockwise from the rear; 20 voxels off, 7 are 19
+    // degrees.
+    let twist = Twist { linear: glam::DVec3::X * 21.0, ..Default::default() };
+    let rig = Rig {
+        sensors: [Pose::IDENTITY].into_iter().collect(),
+        timing: Timing::Offset { from_s: -0.05, span_s: 0.1 },
+        distorted: true,
+        ground_m: -1.73,
+        own_vehicle: None,
+    };
+    let profile = profile();
+    let pose = Pose::IDENTITY;
+    let sweep = Sweep { stamp_s: 0.0, points: &[], world_from_vehicle: pose, twist };
+    let window = &frame::place(&profile, &rig, &pose, None);
+    let placement = Placement { profile: &profile, rig: &rig, window, sweep: &sweep };
+    let sensors = SensorPaths::new(&placement);
+    let eye = |offset_s: f32| sensors.at(0, sensors.part(offset_s));
+    let [first, last] = [-0.05, 0.05].map(eye);
+    let gone: [f32; 3] = std::array::from_fn(|a| last[a] - first[a]);
+    assert!((gone[0] - 7.0).abs() < 1e-4 && gone[1] == 0.0 && gone[2] == 0.0, "{gone:?}");
+    // At the stamp it is 1.73 m, 5.77 voxels, above the ground, which the anchor is as far above.
+    assert!(
+        (eye(0.0)[0] - 31.5).abs() < 1e-4 && (eye(0.0)[2] - 7.5).abs() < 1e-4,
+        "{:?}",
+        eye(0.0)
+    );
+    let along = |n: usize, distance: f32| {
+        let (offset_s, turned) =
+            (0.000025 * n as f32 - 0.05, n as f32 * std::f32::consts::TAU / 4000.0);
+        let eye = eye(offset_s);
+        let at = [eye[0] - distance * turned.cos(), eye[1] + distance * turned.sin(), eye[2]];
+        (at, 0, offset_s)
+    };
+    let ends: Vec<_> = (0..4000).map(|n| along(n, 30.0)).collect();
+    let rays = sightlines(&sensors, &ends);
+    // Apart from the rear, which it passes as the sweep begins and ends.
+    for n in (400..3600).step_by(7) {
+        let place = along(n, 20.0).0;
+        // Whenever it is thought to have been seen.
+        for offset_s in [-0.05, 0.0, 0.05] {
+            let behind = rays.depth(Simd::BASELINE, &scaled(), place, &UNKNOWN, offset_s);
+            assert!(behind.is_some_and(|b| (b - 10.0).abs() < 0.1), "{n} {offset_s}: {behind:?}");
+        }
+    }
 }
 
 #[test]
 fn more_rays_than_there_is_room_for_are_thinned_evenly() {
     let sensors = SensorPaths::at_rest(EYES);
-    // Rings one after the other, as columns of a spinning sensor: 64 by 4,096.
+    // Column by column of 64 rings, as a spinning sensor sends them.
     let end = |n: usize| {
         let (azimuth, ring) = ((n / 64) as f32 * std::f32::consts::TAU / 4096.0, n % 64);
         let [x, y] = [azimuth.cos(), azimuth.sin()].map(|v| 20.0 + 30.0 * v);
@@ -86,9 +138,9 @@ fn more_rays_than_there_is_room_for_are_thinned_evenly() {
     };
     let ends: Vec<_> = (0..4 * SIGHTLINES_MAX).map(end).collect();
     let rays = sightlines(&sensors, &ends);
-    // Every place is told of: there were four rays within its reach.
+    // Of each place a ray is kept within its reach: of every fourth ring alone there would be none.
     for n in (0..ends.len()).step_by(37) {
-        let behind = rays.depth((&scaled(), Simd::BASELINE), ends[n].0, &UNKNOWN, 0.0);
+        let behind = rays.depth(Simd::BASELINE, &scaled(), ends[n].0, &UNKNOWN, 0.0);
         assert!(behind.is_some_and(|behind| behind.abs() < 0.1), "{n}: {behind:?}");
     }
 }
@@ -116,9 +168,7 @@ fn a_ring_that_moves_with_the_sensor_stands() {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         for n in 0..3 {
             let (returns, sensors) = wall(n);
-            let mut apart = vec![false; returns.points.len()];
-            let sweep = returns.of_sweep(n as f64 * 0.1, &sensors);
-            refinement.insert_cloud(&profile, Simd::BASELINE, sweep, &mut apart);
+            give_seen(&mut refinement, &profile, &returns, &sensors, n);
         }
         run(&mut refinement, &vec![pack_flow([7, 0]); SIDE * SIDE]);
         motions(&refinement).iter().flatten().count()
