@@ -122,10 +122,9 @@ impl Refinement {
         cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new window
-    /// were matched with, `scores` are the encoder's of its columns,
-    /// none where nothing is encoded, and `predicted` is what the tracklet of a column of the new
-    /// window predicts.
+    /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new
+    /// window were matched with, `scores` are the encoder's of its columns, none where nothing is
+    /// encoded, and `predicted` is what the tracklet of a column of the new window predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
