@@ -48,14 +48,14 @@ pub const EXTENT_VOXELS: i32 = 4095;
 /// Voxels a ray may be traced for.
 pub const RANGE_STEPS_MAX: i32 = 2000;
 /// Sweeps the refinement of the flow may look at.
-pub const REFINEMENT_SWEEPS_MAX: usize = 3;
+pub const REFINEMENT_SWEEPS_MAX: usize = 5;
 /// Levels above the ground that clusters may have: a column's share one 32-bit word.
 pub const CLUSTER_LEVELS_MAX: usize = 32;
 /// Sub-voxels along an axis of a voxel, each of which keeps one return.
 pub const SUBVOXELS_MAX: usize = 4;
 /// Thinned returns of one sweep that the refinement keeps; those of the last columns are dropped
 /// and counted.
-pub const CLOUD_MAX: usize = 65_536;
+pub const CLOUD_MAX: usize = 65_535;
 /// Rays of one sweep that tell whether something was seen; of more, evenly spread ones. With all of
 /// them recall on simulated streets is 94.8 % instead of 94.7 (21 drives of 25 sweeps).
 pub const SIGHTLINES_MAX: usize = 65_536;

@@ -16,6 +16,11 @@ use super::scaled::Scaled;
 use super::scans::Target;
 use nalgebra::{Matrix3, Vector3};
 
+/// Sweeps that a cluster is registered with, of those that it is compared with: over a longer time
+/// its speed changes. With the third one, from 0.3 s before, the movers of KITTI drive 0005 are off
+/// by 3.1 cm in the median instead of 2.2.
+const REGISTERED: usize = 2;
+
 /// Normal equations of a step: x, y and the turn about the centre.
 struct NormalEquations<'a> {
     scaled: &'a Scaled,
@@ -81,6 +86,7 @@ impl Cluster<'_> {
     /// Registers every `stride`-th return of the cluster, starting at `motion`.
     pub fn align(&self, mut motion: Motion, stride: usize, visited: &mut VisitedColumns) -> Motion {
         let (scaled, targets) = (self.scans.scaled, self.scans.targets);
+        let (targets, others) = targets.split_at(targets.len().min(REGISTERED));
         let mut seen = self.target_samples(&motion, visited);
         let mut wide = scaled.params.iterations_wide;
         for _ in 0..scaled.params.iterations {
@@ -96,6 +102,9 @@ impl Cluster<'_> {
             motion.delta += step;
             motion.covariance = covariance;
             motion.delay = equations.delay.map(|mean| mean.value() / self.scans.span_s as f32);
+            for other in others {
+                motion.delay[other.index] = other.share * motion.delay[0];
+            }
             let small = step.norm_squared() < scaled.converged * scaled.converged;
             if wide == 0 && small {
                 break;
@@ -136,7 +145,7 @@ impl Cluster<'_> {
         for q in seen.iter().step_by(stride) {
             let at = target.retrace(q, motion);
             if let Some((_, p)) = self.scans.first.nearest(at, q.sensor, self.scans.reach_exact()) {
-                let weight = target.cloud.weight(self.scans.scaled, q.index);
+                let weight = self.scans.second.weight(self.scans.scaled, q.index);
                 to.add(&weight, p.at, minus(at, p.at), share);
                 to.delay[0].add(q.offset_s - p.offset_s);
             }

@@ -15,7 +15,7 @@ use crate::record::NONE;
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
-use core::ops::Range;
+use core::ops::{Deref, Range};
 use raywake_simd::Simd;
 
 /// Words of a mask of the sub-voxels of a column.
@@ -37,21 +37,71 @@ pub struct SweepReturns<'a> {
     pub sensors: &'a SensorPaths,
 }
 
-/// Scratch of [`Cloud::fill`]: indices of returns, as they come and by column; of [`Sightlines`],
-/// as they come, and their directions.
+/// Scratch of [`Cloud::fill`]: indices of returns, as they come and by column, and where those of
+/// each column end; of [`Sightlines`], as they come, and their directions.
 pub struct Scratch {
     ground: GroundEstimator,
     listed: [u32; POINTS_MAX],
     order: [u32; POINTS_MAX],
+    end: [u32; COLUMNS_MAX],
 }
 
 impl Scratch {
     pub(super) const fn new() -> Scratch {
-        Scratch { ground: GroundEstimator::new(), listed: [0; POINTS_MAX], order: [0; POINTS_MAX] }
+        Scratch {
+            ground: GroundEstimator::new(),
+            listed: [0; POINTS_MAX],
+            order: [0; POINTS_MAX],
+            end: [0; COLUMNS_MAX],
+        }
+    }
+
+    /// Lists the returns of clusters and counts them by column. `apart` becomes whether a return is
+    /// of the ground, or higher than clusters are. Returns how many there are, and the sensors that
+    /// saw them, a bit each.
+    fn count(
+        &mut self,
+        ground: &GroundHeights,
+        scaled: &Scaled,
+        returns: SweepReturns,
+        apart: &mut [bool],
+    ) -> (usize, u32) {
+        let SweepReturns { points, placed, columns, .. } = returns;
+        self.end.fill(0);
+        let (mut count, mut sensors) = (0, 0u32);
+        for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
+            *apart = false;
+            if column == NONE {
+                continue;
+            }
+            let height = ground.above(column as usize, placed[n].at[2]);
+            *apart = !(scaled.ground_height..scaled.height_max).contains(&height);
+            if (scaled.height_min..scaled.height_max).contains(&height) {
+                self.end[column as usize] += 1;
+                self.listed[count] = n as u32;
+                sensors |= 1 << points.get(n).sensor;
+                count += 1;
+            }
+        }
+        (count, sensors)
+    }
+
+    /// A counting sort of `count` listed returns, which keeps the source's order within a column.
+    fn sort(&mut self, columns: &[u32], count: usize) {
+        let mut total = 0;
+        for end in &mut self.end {
+            total += core::mem::replace(end, total);
+        }
+        for &n in &self.listed[..count] {
+            let end = &mut self.end[columns[n as usize] as usize];
+            self.order[*end as usize] = n;
+            *end += 1;
+        }
     }
 }
 
-/// Thinned returns of one sweep, voxels from the window's corner.
+/// Thinned returns of one sweep, voxels from the window's corner, and its rays: what clusters of
+/// another sweep are compared with.
 pub struct Cloud {
     /// Columns along an axis of the window.
     pub side: usize,
@@ -61,58 +111,30 @@ pub struct Cloud {
     pub stamp_s: f64,
     /// The instructions it is searched with.
     pub simd: Simd,
-    ground: GroundHeights,
     places: Places,
-    /// When each was, s after the sweep's stamp: seldom asked for.
-    offset_s: [f32; CLOUD_MAX],
     /// Where the returns of each column begin, and those of the last one end.
-    start: [u32; COLUMNS_MAX + 1],
-    weights: [LazyWeight; CLOUD_MAX],
-    /// Levels above the ground of each column in which something was hit, a bit each.
-    levels: [u32; COLUMNS_MAX],
+    start: [u16; COLUMNS_MAX + 1],
     /// Its rays, those of the ground among them.
     pub sightlines: Sightlines,
 }
 
-impl Cloud {
-    pub(super) const fn new() -> Cloud {
-        Cloud {
-            side: 0,
-            corner: [0; 3],
-            stamp_s: 0.0,
-            simd: Simd::BASELINE,
-            ground: GroundHeights::new(),
-            places: Places::new(),
-            offset_s: [0.0; CLOUD_MAX],
-            start: [0; COLUMNS_MAX + 1],
-            weights: [const { LazyWeight::unknown() }; CLOUD_MAX],
-            levels: [0; COLUMNS_MAX],
-            sightlines: Sightlines::new(),
-        }
-    }
+const _: () = assert!(CLOUD_MAX <= u16::MAX as usize);
 
-    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than
-    /// clusters are. Returns how many returns were left out for want of room: those of the
-    /// last columns.
-    pub(super) fn fill(
-        &mut self,
-        profile: &Profile,
-        scaled: &Scaled,
-        returns: SweepReturns,
-        apart: &mut [bool],
-        scratch: &mut Scratch,
-    ) -> usize {
-        self.side = profile.side as usize;
-        (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
-        let SweepReturns { points, placed, sensors, .. } = returns;
-        let listed = Listed { index: &mut scratch.listed, bin: &mut scratch.order };
-        self.sightlines.fill(sensors, points, placed, listed);
-        self.find_ground(profile, returns, &mut scratch.ground);
-        let (count, sensors) = self.count_columns(scaled, returns, apart, &mut scratch.listed);
-        self.sort(returns.columns, &scratch.listed[..count], &mut scratch.order);
-        let dropped = self.thin(scaled, returns, &scratch.order, sensors);
-        self.weights[..self.places.len()].fill_with(LazyWeight::unknown);
-        dropped
+/// What is kept besides of the two sweeps of a pair.
+pub struct CloudDetail {
+    ground: GroundHeights,
+    /// Levels above the ground of each column in which something was hit, a bit each.
+    levels: [u32; COLUMNS_MAX],
+    weights: [LazyWeight; CLOUD_MAX],
+}
+
+impl CloudDetail {
+    pub(super) const fn new() -> CloudDetail {
+        CloudDetail {
+            ground: GroundHeights::new(),
+            levels: [0; COLUMNS_MAX],
+            weights: [const { LazyWeight::unknown() }; CLOUD_MAX],
+        }
     }
 
     fn find_ground(
@@ -127,88 +149,121 @@ impl Cloud {
         let found = found.filter(|(column, _)| **column != NONE);
         let found = found.map(|(column, placed)| (*column as usize, placed.at));
         let under = [middle[0], middle[1], level];
-        let (params, ground) = (&profile.ground, &mut self.ground);
-        estimator.estimate(params, profile.voxel_m, self.side, under, found, ground);
+        let (params, side) = (&profile.ground, profile.side as usize);
+        estimator.estimate(params, profile.voxel_m, side, under, found, &mut self.ground);
+    }
+}
+
+/// A cloud of one of the two sweeps of a pair.
+#[derive(Clone, Copy)]
+pub struct DetailedCloud<'a> {
+    pub cloud: &'a Cloud,
+    pub detail: &'a CloudDetail,
+}
+
+impl Deref for DetailedCloud<'_> {
+    type Target = Cloud;
+
+    fn deref(&self) -> &Cloud {
+        self.cloud
+    }
+}
+
+impl DetailedCloud<'_> {
+    /// Levels of a column in which something was hit, a bit each.
+    pub fn levels(&self, column: usize) -> u32 {
+        self.detail.levels[column]
     }
 
-    /// Lists the returns of clusters and counts them by column, one place farther in `start`.
-    /// Returns how many there are, and the sensors that saw them, a bit each.
-    fn count_columns(
+    /// Whether something was hit in the voxel of a place.
+    pub fn is_hit(&self, at: [f32; 3]) -> bool {
+        let Some(column) = self.column_at([at[0], at[1]]) else { return false };
+        let height = self.detail.ground.above(column, at[2]);
+        let in_levels = (0.0..CLUSTER_LEVELS_MAX as f32).contains(&height);
+        in_levels && self.levels(column) >> height as u32 & 1 != 0
+    }
+
+    /// What the returns of its sensor around a return tell about the surface it lies on.
+    pub fn weight(&self, scaled: &Scaled, n: u32) -> SurfaceWeight {
+        let around = |radius| self.sums_around(n as usize, radius);
+        self.detail.weights[n as usize].get(|| surface::weight(scaled, around))
+    }
+}
+
+impl Cloud {
+    pub(super) const fn new() -> Cloud {
+        Cloud {
+            side: 0,
+            corner: [0; 3],
+            stamp_s: 0.0,
+            simd: Simd::BASELINE,
+            places: Places::new(),
+            start: [0; COLUMNS_MAX + 1],
+            sightlines: Sightlines::new(),
+        }
+    }
+
+    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than
+    /// clusters are. Returns how many returns were left out for want of room: those of the
+    /// last columns.
+    pub(super) fn fill(
         &mut self,
-        scaled: &Scaled,
+        detail: &mut CloudDetail,
+        profile: &Profile,
         returns: SweepReturns,
         apart: &mut [bool],
-        listed: &mut [u32],
-    ) -> (usize, u32) {
-        let SweepReturns { points, placed, columns, .. } = returns;
-        self.start[..self.side * self.side + 1].fill(0);
-        let (mut count, mut sensors) = (0, 0u32);
-        for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
-            *apart = false;
-            if column == NONE {
-                continue;
-            }
-            let height = self.ground.above(column as usize, placed[n].at[2]);
-            *apart = !(scaled.ground_height..scaled.height_max).contains(&height);
-            if (scaled.height_min..scaled.height_max).contains(&height) {
-                self.start[column as usize + 1] += 1;
-                listed[count] = n as u32;
-                sensors |= 1 << points.get(n).sensor;
-                count += 1;
-            }
-        }
-        (count, sensors)
-    }
-
-    /// A counting sort, which keeps the source's order within a column. Each start becomes its end.
-    fn sort(&mut self, columns: &[u32], listed: &[u32], order: &mut [u32]) {
-        for c in 0..self.side * self.side {
-            self.start[c + 1] += self.start[c];
-        }
-        for &n in listed {
-            let at = &mut self.start[columns[n as usize] as usize];
-            order[*at as usize] = n;
-            *at += 1;
-        }
+        scratch: &mut Scratch,
+    ) -> usize {
+        let scaled = &Scaled::new(profile);
+        self.side = profile.side as usize;
+        (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
+        let SweepReturns { points, placed, sensors, .. } = returns;
+        let listed = Listed { index: &mut scratch.listed, bin: &mut scratch.order };
+        self.sightlines.fill(sensors, points, placed, listed);
+        detail.find_ground(profile, returns, &mut scratch.ground);
+        let (count, sensors) = scratch.count(&detail.ground, scaled, returns, apart);
+        scratch.sort(returns.columns, count);
+        let dropped = self.thin(detail, scaled.subvoxels, returns, scratch, sensors);
+        detail.weights[..self.places.len()].fill_with(LazyWeight::unknown);
+        dropped
     }
 
     /// Keeps of each sub-voxel the first return of each sensor. Returns how many had no room.
     fn thin(
         &mut self,
-        scaled: &Scaled,
+        detail: &mut CloudDetail,
+        subvoxels: usize,
         returns: SweepReturns,
-        order: &[u32],
+        sorted: &Scratch,
         sensors: u32,
     ) -> usize {
         // By column they are looked up far apart: only where there are several.
         let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
         let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points.get(n as usize).sensor);
-        // Each start has become its end; what is kept is written from the front again.
         self.places.clear();
         let (mut from, mut dropped) = (0, 0);
-        for c in 0..self.side * self.side {
-            let end = self.start[c] as usize;
-            let listed = &order[from..end];
-            from = end;
-            self.start[c] = self.places.len() as u32;
-            self.levels[c] = 0;
+        for (c, &end) in sorted.end[..self.side * self.side].iter().enumerate() {
+            let listed = &sorted.order[from..end as usize];
+            from = end as usize;
+            self.start[c] = self.places.len() as u16;
+            detail.levels[c] = 0;
             let sensors = listed.iter().fold(0u32, |s, n| s | 1 << sensor_of(*n));
             for sensor in (0..SENSORS_MAX as u32).filter(|s| sensors & 1 << s != 0) {
                 let own = listed.iter().filter(|n| sensor_of(**n) == sensor);
                 let own = own.map(|n| returns.placed[*n as usize]);
-                dropped += self.thin_column(scaled.subvoxels, c, sensor, own);
+                dropped += self.thin_column(detail, subvoxels, [c, sensor as usize], own);
             }
         }
-        self.start[self.side * self.side] = self.places.len() as u32;
+        self.start[self.side * self.side] = self.places.len() as u16;
         dropped
     }
 
     /// The same of one column and sensor.
     fn thin_column(
         &mut self,
+        detail: &mut CloudDetail,
         subvoxels: usize,
-        column: usize,
-        sensor: u32,
+        [column, sensor]: [usize; 2],
         returns: impl Iterator<Item = Placed>,
     ) -> usize {
         let corner = [(column / self.side) as f32, (column % self.side) as f32];
@@ -217,17 +272,15 @@ impl Cloud {
         let mut dropped = 0;
         for Placed { at: p, offset_s } in returns {
             let part = |v: f32| (v * scale).clamp(0.0, scale - 1.0) as usize;
-            let height = self.ground.above(column, p[2]);
+            let height = detail.ground.above(column, p[2]);
             let level = (height * scale) as usize;
             let bit =
                 (level * subvoxels + part(p[0] - corner[0])) * subvoxels + part(p[1] - corner[1]);
             let word = &mut taken[(bit / 32).min(MASK_WORDS - 1)];
             if *word & 1 << (bit % 32) == 0 {
                 *word |= 1 << (bit % 32);
-                let kept = self.places.len();
-                if self.places.push(p, sensor) {
-                    self.offset_s[kept] = offset_s;
-                    self.levels[column] |= 1 << height as u32;
+                if self.places.push(p, sensor as u32, offset_s) {
+                    detail.levels[column] |= 1 << height as u32;
                 } else {
                     dropped += 1;
                 }
@@ -236,24 +289,11 @@ impl Cloud {
         dropped
     }
 
-    /// Levels of a column in which something was hit, a bit each.
-    pub fn levels(&self, column: usize) -> u32 {
-        self.levels[column]
-    }
-
     /// The column of a place, if that lies in the window.
     pub fn column_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let side = self.side as f32;
         let inside = x >= 0.0 && x < side && y >= 0.0 && y < side;
         inside.then(|| x as usize * self.side + y as usize)
-    }
-
-    /// Whether something was hit in the voxel of a place.
-    pub fn is_hit(&self, at: [f32; 3]) -> bool {
-        let Some(column) = self.column_at([at[0], at[1]]) else { return false };
-        let height = self.ground.above(column, at[2]);
-        let in_levels = (0.0..CLUSTER_LEVELS_MAX as f32).contains(&height);
-        in_levels && self.levels[column] >> height as u32 & 1 != 0
     }
 
     /// Indices of the thinned returns in a column.
@@ -319,18 +359,12 @@ impl Cloud {
 
     /// A return.
     pub fn sample(&self, n: usize) -> CloudPoint {
-        let (at, sensor) = (self.places.at(n), self.places.sensor(n));
-        CloudPoint { at, sensor, offset_s: self.offset_s[n], index: n as u32 }
-    }
-
-    /// What the returns of its sensor around a return tell about the surface it lies on.
-    pub fn weight(&self, scaled: &Scaled, n: u32) -> SurfaceWeight {
-        let n = n as usize;
-        self.weights[n].get(|| surface::weight(scaled, |radius| self.sums_around(n, radius)))
+        let (sensor, offset_s) = self.places.seen(n);
+        CloudPoint { at: self.places.at(n), sensor, offset_s, index: n as u32 }
     }
 
     fn sums_around(&self, n: usize, radius: f32) -> [f32; 10] {
-        let (at, sensor) = (self.places.at(n), self.places.sensor(n));
+        let (at, (sensor, _)) = (self.places.at(n), self.places.seen(n));
         let [i, j] = [at[0] as usize, at[1] as usize];
         let reach = radius as usize;
         let mut sums = [0.0; 10];

@@ -4,7 +4,7 @@
 //! that a motion explains it better; but its places were hit long before the motion would have
 //! brought it there.
 
-use super::cloud::Cloud;
+use super::cloud::{Cloud, DetailedCloud};
 use super::hypothesis::Hypothesis;
 use crate::params::{CLUSTER_LEVELS_MAX, COLUMNS_MAX};
 use crate::record::NONE;
@@ -48,7 +48,7 @@ impl History {
 
     /// Remembers a sweep instead of the oldest, without the columns of what was seen to come from
     /// elsewhere: one that follows comes to where the other was.
-    pub fn push(&mut self, cloud: &Cloud, came: impl Fn(usize) -> bool) {
+    pub fn push(&mut self, cloud: DetailedCloud, came: impl Fn(usize) -> bool) {
         let columns = cloud.side * cloud.side;
         let past = &mut self.sweeps[self.next];
         (past.corner, past.stamp_s) = (cloud.corner, cloud.stamp_s);
@@ -60,18 +60,24 @@ impl History {
 
     /// Whether a column of the pair's first sweep holds something that came since: in no sweep at
     /// least `since_s` older was anything hit there, and there was such a sweep.
-    pub fn is_new(&self, first: &Cloud, column: usize, since_s: f64) -> bool {
+    pub fn is_new(&self, first: DetailedCloud, column: usize, since_s: f64) -> bool {
         let levels = first.levels(column);
         let at = [column / first.side, column % first.side];
         let old = |past: &&Past| first.stamp_s - past.stamp_s >= since_s;
         let mut old = self.sweeps[..self.held].iter().filter(old).peekable();
-        let unseen = |past: &Past| past.around(first, at).is_some_and(|were| levels & were == 0);
+        let unseen = |past: &Past| past.around(&first, at).is_some_and(|were| levels & were == 0);
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 
     /// What the columns of moving clusters, those of the pair's first sweep, were before; the pair
     /// spans `span_s`.
-    pub fn find(&self, first: &Cloud, span_s: f64, of_column: &[u32], found: &mut [Hypothesis]) {
+    pub fn find(
+        &self,
+        first: DetailedCloud,
+        span_s: f64,
+        of_column: &[u32],
+        found: &mut [Hypothesis],
+    ) {
         for (c, &n) in of_column[..first.side * first.side].iter().enumerate() {
             let levels = first.levels(c);
             if n == NONE || levels == 0 {
@@ -87,7 +93,7 @@ impl History {
                 if first.column_at(on).is_some_and(|on| of_column[on] == n) {
                     continue;
                 }
-                let Some(were) = past.around(first, at) else { continue };
+                let Some(were) = past.around(&first, at) else { continue };
                 one.looks.made += levels.count_ones();
                 one.looks.hits += (levels & were).count_ones();
             }

@@ -13,6 +13,7 @@ use super::motion::Motion;
 use super::scaled::Scaled;
 use super::scans::Scans;
 use super::search::search;
+use super::slide::slide;
 use super::starts::Votes;
 use crate::record::Flow;
 
@@ -117,14 +118,20 @@ impl Trials<'_> {
         let motion = cluster.align(start, scaled.params.start_stride as usize, self.visited);
         if cluster.residual(&motion, self.visited) < self.residual {
             let motion = cluster.align(motion, 1, self.visited);
-            let residual = cluster.residual(&motion, self.visited);
-            if residual < self.residual {
-                (self.residual, self.motion) = (residual, motion);
-            }
+            self.consider(motion);
         }
     }
 
-    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search.
+    /// Takes a motion if it fits better than the best so far.
+    fn consider(&mut self, motion: Motion) {
+        let residual = self.cluster.residual(&motion, self.visited);
+        if residual < self.residual {
+            (self.residual, self.motion) = (residual, motion);
+        }
+    }
+
+    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; from
+    /// the best of these it slides along itself.
     fn run(&mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) {
         let cluster = self.cluster;
         let params = &cluster.scans.scaled.params;
@@ -141,6 +148,11 @@ impl Trials<'_> {
         let enough = cluster.samples.len() >= params.search_returns_min as usize;
         if self.residual > params.residual_bad && enough {
             self.start(search(cluster));
+        }
+        if let Some(slid) = slide(cluster, &self.motion, self.residual, self.visited) {
+            self.consider(slid);
+            let motion = cluster.align(slid, 1, self.visited);
+            self.consider(motion);
         }
     }
 }

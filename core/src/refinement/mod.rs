@@ -32,6 +32,7 @@
 
 mod align;
 mod cloud;
+mod clouds;
 mod cluster;
 mod clusters;
 pub mod cues;
@@ -47,51 +48,41 @@ mod scans;
 mod search;
 mod segments;
 mod sightlines;
+mod slide;
 mod starts;
 mod surface;
 #[cfg(test)]
 mod tests;
 
 use crate::encoder::ColumnScores;
-use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
+use crate::params::Profile;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::team::Team;
+use cloud::Scratch;
 pub(crate) use cloud::SweepReturns;
-use cloud::{Cloud, Scratch};
+use clouds::Clouds;
 use clusters::Clusters;
 pub(crate) use cues::Prediction;
 use history::History;
-use motion::TARGETS_MAX;
 use raywake_simd::Simd;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
-use scans::{Scans, Target};
+use scans::Scans;
 
 /// State of the refinement between sweeps.
 pub struct Refinement {
     scaled: Option<Scaled>,
-    clouds: [Cloud; REFINEMENT_SWEEPS_MAX],
-    /// Sweeps held in `clouds`.
-    held: usize,
-    /// Where the newest is.
-    newest: usize,
+    clouds: Clouds,
     history: History,
     scratch: Scratch,
     clusters: Clusters,
-}
-
-/// Index of the cloud `age` sweeps before the newest.
-fn index(newest: usize, age: usize) -> usize {
-    (newest + REFINEMENT_SWEEPS_MAX - age) % REFINEMENT_SWEEPS_MAX
 }
 
 impl Refinement {
     pub(crate) const fn new() -> Refinement {
         Refinement {
             scaled: None,
-            clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
-            held: 0,
-            newest: 0,
+            clouds: Clouds::new(),
             history: History::new(),
             scratch: Scratch::new(),
             clusters: Clusters::new(),
@@ -100,7 +91,7 @@ impl Refinement {
 
     /// Forgets all sweeps.
     pub(crate) fn clear(&mut self) {
-        self.held = 0;
+        self.clouds.clear();
         self.history.clear();
     }
 
@@ -114,12 +105,8 @@ impl Refinement {
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
-        let scaled = self.scaled.insert(Scaled::new(profile));
-        self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
-        self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
-        let cloud = &mut self.clouds[self.newest];
-        cloud.simd = simd;
-        cloud.fill(profile, scaled, returns, apart, &mut self.scratch)
+        self.scaled = Some(Scaled::new(profile));
+        self.clouds.insert(profile, simd, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new
@@ -134,11 +121,10 @@ impl Refinement {
         predicted: impl Fn(usize) -> Option<Prediction> + Sync,
     ) {
         self.clusters.clear();
-        let Some(scaled) = self.scaled.as_ref().filter(|_| self.held >= 2) else {
+        let (Some(scaled), Some(span_s)) = (&self.scaled, self.clouds.span_s()) else {
             return;
         };
-        let newest = self.newest;
-        let first = &self.clouds[index(newest, 1)];
+        let (first, second) = (self.clouds.first(), self.clouds.second());
         let side = first.side;
         let shifted = |c: usize| {
             let (i, j) = ((c / side) as i32 - step.shift_x, (c % side) as i32 - step.shift_y);
@@ -147,21 +133,10 @@ impl Refinement {
         };
         let flow = |c: usize| shifted(c).map_or(0, |c| flow[c]);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
-        let span_s = self.clouds[newest].stamp_s - first.stamp_s;
-        let mut targets = heapless::Vec::<Target, TARGETS_MAX>::new();
-        for age in (0..self.held).filter(|a| *a != 1) {
-            let cloud = &self.clouds[index(newest, age)];
-            // There are fewer than the capacity.
-            let _ = targets.push(Target {
-                index: targets.len(),
-                cloud,
-                offset: core::array::from_fn(|a| (first.corner[a] - cloud.corner[a]) as f32),
-                share: ((cloud.stamp_s - first.stamp_s) / span_s) as f32,
-            });
-        }
-        let scans = Scans { scaled, first, targets: &targets, scores, span_s };
+        let targets = self.clouds.targets(span_s);
+        let scans = Scans { scaled, first, second, targets: &targets, scores, span_s };
         self.clusters.find(team, scans, &self.history, flow, predicted);
-        self.history.push(&self.clouds[index(newest, 1)], |c| self.clusters.came(c));
+        self.history.push(first, |c| self.clusters.came(c));
     }
 
     /// Columns of clusters that there was no room for: they are taken to stand.
@@ -172,7 +147,7 @@ impl Refinement {
     /// How a column of the first sweep's window moved, as part of a cluster that does.
     pub(crate) fn at(&self, column: u32) -> Option<Refined> {
         let cluster = self.clusters.of(column as usize).filter(|f| f.is_dynamic)?;
-        let side = self.clouds[index(self.newest, 1)].side as u32;
+        let side = self.clouds.first().side as u32;
         let at = [column / side, column % side].map(|c| c as f32 + 0.5);
         let cues = self.clusters.cues(column as usize);
         Some(Refined { cues, ..Refined::of(self.scaled.as_ref()?, cluster, at) })

@@ -3,8 +3,9 @@
 use crate::params::REFINEMENT_SWEEPS_MAX;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 
-/// Sweeps that a cluster is registered with, at most.
-pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX - 1;
+/// Sweeps that a cluster is compared with, at most: the pair's second, and of those before the pair
+/// every other. Of those in between what is slow looks much as in their neighbours.
+pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX.div_ceil(2);
 
 /// Rigid motion in the plane over one pair of sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,9 +27,9 @@ impl Motion {
         Motion { centre, ..Motion::default() }
     }
 
-    /// The same, displaced.
+    /// The same, displaced by so much more.
     pub fn displaced(self, by: [f32; 2]) -> Motion {
-        Motion { delta: Vector3::new(by[0], by[1], 0.0), ..self }
+        Motion { delta: self.delta + Vector3::new(by[0], by[1], 0.0), ..self }
     }
 
     /// The same motion about another centre.

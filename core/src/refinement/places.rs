@@ -1,7 +1,7 @@
 //! Places of returns, an array per axis: a processor compares several of them at once. Compilers
 //! see to that where nothing in a lane can branch: hence no sums with a check for overflow.
 
-use crate::params::CLOUD_MAX;
+use crate::params::{CLOUD_MAX, SENSORS_MAX};
 use core::array::from_fn;
 use core::ops::Range;
 
@@ -15,12 +15,26 @@ const NONE: u32 = u32::MAX;
 /// Moments over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
 pub type Moments = [f32; 10];
 
-/// Places of returns, voxels from the window's corner, with the sensor that saw each: every sensor
-/// sees a thing at a time of its own.
+/// Places of returns, voxels from the window's corner, with the sensor that saw each and when: every
+/// sensor sees a thing at a time of its own.
 pub struct Places {
     len: usize,
     at: [[f32; ROOM]; 3],
-    sensor: [u32; ROOM],
+    seen: [Seen; ROOM],
+}
+
+/// The sensor that saw a return, and in the lower bits when, ticks after the sweep's stamp.
+type Seen = u32;
+
+const TICK_BITS: u32 = 24;
+/// Of a microsecond, in which what passes at 40 m/s goes 40 µm: 8 s either way.
+const TICKS_PER_S: f32 = 1e6;
+const TICKS_MAX: f32 = ((1 << (TICK_BITS - 1)) - 1) as f32;
+const _: () = assert!(SENSORS_MAX <= 1 << (u32::BITS - TICK_BITS));
+
+fn seen(sensor: u32, offset_s: f32) -> Seen {
+    let ticks = (offset_s * TICKS_PER_S).clamp(-TICKS_MAX, TICKS_MAX) as i32 as u32;
+    sensor << TICK_BITS | ticks & ((1 << TICK_BITS) - 1)
 }
 
 /// Added to an index for each look before it.
@@ -85,7 +99,7 @@ fn masked(v: f32, mask: u32) -> f32 {
 
 impl Places {
     pub const fn new() -> Places {
-        Places { len: 0, at: [[0.0; ROOM]; 3], sensor: [0; ROOM] }
+        Places { len: 0, at: [[0.0; ROOM]; 3], seen: [0; ROOM] }
     }
 
     pub fn clear(&mut self) {
@@ -97,14 +111,14 @@ impl Places {
     }
 
     /// Adds a return if there is room. Returns whether there was.
-    pub fn push(&mut self, at: [f32; 3], sensor: u32) -> bool {
+    pub fn push(&mut self, at: [f32; 3], sensor: u32, offset_s: f32) -> bool {
         if self.len == CLOUD_MAX {
             return false;
         }
         for (of, v) in self.at.iter_mut().zip(at) {
             of[self.len] = v;
         }
-        self.sensor[self.len] = sensor;
+        self.seen[self.len] = seen(sensor, offset_s);
         self.len += 1;
         true
     }
@@ -113,8 +127,12 @@ impl Places {
         from_fn(|a| self.at[a][n])
     }
 
-    pub fn sensor(&self, n: usize) -> u32 {
-        self.sensor[n]
+    /// The sensor that saw a return, and when, s after the sweep's stamp.
+    pub fn seen(&self, n: usize) -> (u32, f32) {
+        let seen = self.seen[n];
+        // Shifted up and down again for the sign.
+        let ticks = (seen << (u32::BITS - TICK_BITS)) as i32 >> (u32::BITS - TICK_BITS);
+        (seen >> TICK_BITS, ticks as f32 / TICKS_PER_S)
     }
 
     /// Looks for the return of a sensor that is nearest to a place among some.
@@ -122,16 +140,16 @@ impl Places {
     pub fn look(&self, range: Range<usize>, at: [f32; 3], sensor: u32, nearest: &mut Nearest) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
-        let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
+        let (z, seen) = (blocks(&self.at[2], &padded), blocks(&self.seen, &padded));
         let (mut n, end) = (range.start as u32 | nearest.looks, range.end as u32 | nearest.looks);
         nearest.looks += LOOK;
         let (mut least, mut best) = (nearest.least, nearest.best);
-        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
+        for (((x, y), z), seen) in x.iter().zip(y).zip(z).zip(seen) {
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let own = n.wrapping_add(l as u32);
-                let closer = (d2 < least[l]) & (sensors[l] == sensor) & (own < end);
+                let closer = (d2 < least[l]) & (seen[l] >> TICK_BITS == sensor) & (own < end);
                 least[l] = if closer { d2 } else { least[l] };
                 best[l] = if closer { own } else { best[l] };
             }
@@ -152,15 +170,15 @@ impl Places {
     ) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
-        let (z, sensors) = (blocks(&self.at[2], &padded), blocks(&self.sensor, &padded));
+        let (z, seen) = (blocks(&self.at[2], &padded), blocks(&self.seen, &padded));
         let (mut n, end) = (range.start as u32, range.end as u32);
-        for (((x, y), z), sensors) in x.iter().zip(y).zip(z).zip(sensors) {
+        for (((x, y), z), seen) in x.iter().zip(y).zip(z).zip(seen) {
             let mut terms = [[0.0; LANES]; 10];
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let own = n.wrapping_add(l as u32);
-                let near = (d2 < radius * radius) & (sensors[l] == sensor) & (own < end);
+                let near = (d2 < radius * radius) & (seen[l] >> TICK_BITS == sensor) & (own < end);
                 // What is not near adds zeros, which changes no sum.
                 let mask = if near { u32::MAX } else { 0 };
                 let [x, y, z] = [masked(d[0], mask), masked(d[1], mask), masked(d[2], mask)];

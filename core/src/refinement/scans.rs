@@ -1,6 +1,6 @@
 //! The sweeps that clusters are registered with, and the residual of one return.
 
-use super::cloud::Cloud;
+use super::cloud::{Cloud, DetailedCloud};
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
@@ -47,7 +47,9 @@ impl Target<'_> {
 pub struct Scans<'a> {
     pub scaled: &'a Scaled,
     /// The pair's first sweep, which the clusters are of.
-    pub first: &'a Cloud,
+    pub first: DetailedCloud<'a>,
+    /// The pair's second sweep, the first of the targets.
+    pub second: DetailedCloud<'a>,
     /// The pair's second sweep, then earlier ones.
     pub targets: &'a [Target<'a>],
     /// What the first sweep's columns are, nothing where nothing is encoded.
@@ -76,7 +78,7 @@ impl Scans<'_> {
     /// predicted to be, 0 to 1: whatever is missed counts the same.
     pub fn residual(
         &self,
-        of: &Cloud,
+        of: DetailedCloud,
         s: &CloudPoint,
         at: [f32; 3],
         found: Option<(f32, CloudPoint)>,
@@ -113,7 +115,7 @@ impl Scans<'_> {
     /// tell. One that was stopped before tells nothing.
     pub fn told_residual(
         &self,
-        of: &Cloud,
+        of: DetailedCloud,
         s: &CloudPoint,
         other: &Cloud,
         at: [f32; 3],

@@ -95,7 +95,7 @@ fn returns_beyond_the_capacity_are_counted() {
     }
     let mut returns = Returns::flat();
     parts.iter().for_each(|p| returns.add(*p, 0));
-    let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
+    let mut cloud = Kept::new();
     let (dropped, _) = returns.fill(&mut cloud);
     assert_eq!(dropped, parts.len() - CLOUD_MAX);
     assert!(dropped > 20_000);
@@ -129,15 +129,17 @@ fn segments_are_what_a_flood_fill_reaches() {
             let [x, y] = [0; 2].map(|_| random.between(0.0, SIDE as f32));
             returns.add([x, y, GROUND + random.between(0.7, 13.9)], 0);
         }
-        let cloud = returns.cloud();
+        let kept = returns.cloud();
+        let cloud = kept.all();
         let flows: Vec<Flow> = (0..SIDE * SIDE)
             .map(|_| if random.below(2) == 0 { 0 } else { pack_flow([random.below(5) as i32, 0]) })
             .collect();
         let excluded = random.below(SIDE * SIDE);
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;
         let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
-        let scans =
-            Scans { scaled: &scaled(), first: &cloud, targets: &[], scores: &[], span_s: 0.1 };
+        let (first, second) = (cloud, cloud);
+        let scaled = &scaled();
+        let scans = Scans { scaled, first, second, targets: &[], scores: &[], span_s: 0.1 };
         segments.find(&scans, part, |c| flows[c]);
         let touch = |a: usize, b: usize| {
             let apart =
@@ -176,8 +178,8 @@ fn segments_are_what_a_flood_fill_reaches() {
 }
 
 /// Columns that hold part of a cluster.
-fn occupied(cloud: &Cloud) -> BTreeSet<usize> {
-    (0..SIDE * SIDE).filter(|c| cloud.levels(*c) != 0).collect()
+fn occupied(kept: &Kept) -> BTreeSet<usize> {
+    (0..SIDE * SIDE).filter(|c| kept.all().levels(*c) != 0).collect()
 }
 
 #[test]
@@ -231,7 +233,7 @@ fn mirrored_returns_do_not_pull_the_ground_down() {
     let heights = [0.1, 1.0, 13.5, 14.5];
     heights.iter().for_each(|h| returns.add([30.5, 30.5, GROUND + h], 0));
     let last = returns.points.len() - heights.len();
-    let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
+    let mut cloud = Kept::new();
     let (_, apart) = returns.fill(&mut cloud);
     assert_eq!(apart[last..], [true, false, false, true]);
 }

@@ -12,24 +12,23 @@ const SWEEPS: usize = 5;
 
 /// A sweep that sees a block of columns, from column `from` on along x, in a window whose corner
 /// lies `corner` columns on.
-fn cloud(from: i32, corner: i32, n: usize) -> Box<Cloud> {
+fn cloud(from: i32, corner: i32, n: usize) -> Kept {
     let mut returns = Returns::flat();
     for i in 0..LENGTH {
         let x = (from - corner) as f32 + i as f32 + 0.5;
         returns.add([x, 20.5, GROUND + 2.5], 0);
         returns.add([x, 20.5, GROUND + 3.5], 0);
     }
-    let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
-    returns.fill(&mut cloud);
-    (cloud.corner, cloud.stamp_s) = ([corner, 0, 0], n as f64 * 0.1);
-    cloud
+    let mut kept = returns.cloud();
+    (kept.cloud.corner, kept.cloud.stamp_s) = ([corner, 0, 0], n as f64 * 0.1);
+    kept
 }
 
 /// What became of a block that is said to go `by` columns a sweep and was seen at `at(n)`.
 fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     for n in 0..SWEEPS {
-        history.push(&cloud(at(n as i32), corner(n as i32), n), |_| false);
+        history.push(cloud(at(n as i32), corner(n as i32), n).all(), |_| false);
     }
     let (last, corner) = (at(SWEEPS as i32), corner(SWEEPS as i32));
     let first = cloud(last, corner, SWEEPS);
@@ -39,7 +38,7 @@ fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks
     }
     let motion = Motion::around([0.0; 2]).displaced([by, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(&first, 0.1, &of_column, &mut found);
+    history.find(first.all(), 0.1, &of_column, &mut found);
     found[0].looks
 }
 
@@ -74,29 +73,29 @@ fn what_came_since_is_new() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     let first = cloud(13, 0, SWEEPS);
     let new = |history: &History, since_s| -> Vec<usize> {
-        (0..SIDE).filter(|i| history.is_new(&first, i * SIDE + 20, since_s)).collect()
+        (0..SIDE).filter(|i| history.is_new(first.all(), i * SIDE + 20, since_s)).collect()
     };
     assert!(new(&history, 0.0).is_empty());
     // A column every second sweep: 10, 10, 11, 11, 12, then 13.
-    (0..SWEEPS).for_each(|n| history.push(&cloud(10 + n as i32 / 2, 0, n), |_| false));
+    (0..SWEEPS).for_each(|n| history.push(cloud(10 + n as i32 / 2, 0, n).all(), |_| false));
     assert_eq!(new(&history, 0.0), [16]);
     assert_eq!(new(&history, 0.15), [15, 16]);
     assert_eq!(new(&history, 0.35), [14, 15, 16]);
     assert!(new(&history, 0.55).is_empty());
     // Where it was not in view nothing is known.
     history.clear();
-    history.push(&cloud(10, 15, 0), |_| false);
+    history.push(cloud(10, 15, 0).all(), |_| false);
     assert_eq!(new(&history, 0.0), [15, 16]);
 }
 
 #[test]
 fn one_that_came_leaves_no_trace() {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
-    (0..SWEEPS).for_each(|n| history.push(&cloud(10, 0, n), |column| column % SIDE == 20));
+    (0..SWEEPS).for_each(|n| history.push(cloud(10, 0, n).all(), |column| column % SIDE == 20));
     let mut of_column = vec![NONE; SIDE * SIDE];
     (10..10 + LENGTH).for_each(|i| of_column[i * SIDE + 20] = 0);
     let motion = Motion::around([0.0; 2]).displaced([1.0, 0.0]);
     let mut found = [Hypothesis { is_dynamic: true, motion, ..Hypothesis::default() }];
-    history.find(&cloud(10, 0, SWEEPS), 0.1, &of_column, &mut found);
+    history.find(cloud(10, 0, SWEEPS).all(), 0.1, &of_column, &mut found);
     assert!(found[0].looks.worn() == 0.0 && found[0].looks.fresh() > 0.5);
 }

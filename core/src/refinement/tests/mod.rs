@@ -7,6 +7,8 @@ mod motion;
 mod odd;
 mod sightlines;
 
+use super::cloud::{Cloud, CloudDetail, DetailedCloud};
+use super::scans::Target;
 use super::*;
 use crate::encoder::layers::SCORES;
 use crate::random::Random;
@@ -15,6 +17,7 @@ use crate::sensor_paths::SensorPaths;
 use crate::sweep::{Placed, Point};
 use crate::team::Alone;
 use crate::thinning::TakenPoints;
+use core::ops::Deref;
 use raywake_simd::Simd;
 use std::boxed::Box;
 use std::vec;
@@ -91,17 +94,45 @@ impl Returns {
     }
 
     /// How many had no room, and which are apart from clusters.
-    fn fill(&self, cloud: &mut Cloud) -> (usize, Vec<bool>) {
+    fn fill(&self, kept: &mut Kept) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) =
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
         let returns = self.of_sweep(0.0, &SENSORS);
-        (cloud.fill(&profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
+        let Kept { cloud, detail } = kept;
+        (cloud.fill(detail, &profile(), returns, &mut apart, &mut scratch), apart)
     }
 
-    fn cloud(&self) -> Box<Cloud> {
-        let mut cloud = raywake_alloc_guard::boxed!(Cloud, Cloud::new());
-        self.fill(&mut cloud);
-        cloud
+    fn cloud(&self) -> Kept {
+        let mut kept = Kept::new();
+        self.fill(&mut kept);
+        kept
+    }
+}
+
+/// What is kept of a sweep.
+struct Kept {
+    cloud: Box<Cloud>,
+    detail: Box<CloudDetail>,
+}
+
+impl Kept {
+    fn new() -> Kept {
+        Kept {
+            cloud: raywake_alloc_guard::boxed!(Cloud, Cloud::new()),
+            detail: raywake_alloc_guard::boxed!(CloudDetail, CloudDetail::new()),
+        }
+    }
+
+    fn all(&self) -> DetailedCloud<'_> {
+        DetailedCloud { cloud: &self.cloud, detail: &self.detail }
+    }
+}
+
+impl Deref for Kept {
+    type Target = Cloud;
+
+    fn deref(&self) -> &Cloud {
+        &self.cloud
     }
 }
 

@@ -255,11 +255,13 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let [of, target] = [first.in_sight(|_| true), seen.in_sight(|end| at_car(end) < hidden)];
     let [of, target] = [of, target].map(|returns| returns.cloud());
     let scaled = scaled();
-    let target = Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 };
+    let [first, second] = [of.all(), target.all()];
+    let targets = [Target { index: 0, cloud: second.cloud, offset: [0.0; 3], share: 1.0 }];
     let part: Vec<u32> =
-        (0..(SIDE * SIDE) as u32).filter(|c| of.levels(*c as usize) != 0).collect();
+        (0..(SIDE * SIDE) as u32).filter(|c| first.levels(*c as usize) != 0).collect();
     let residual = |scores: &[ColumnScores]| {
-        let scans = Scans { scaled: &scaled, first: &of, targets: &[target], scores, span_s: 0.1 };
+        let (scaled, targets) = (&scaled, &targets);
+        let scans = Scans { scaled, first, second, targets, scores, span_s: 0.1 };
         let cluster = Cluster::new(scans, &part);
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
         cluster.residual(&motion, &mut VisitedColumns::new())
