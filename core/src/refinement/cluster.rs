@@ -157,6 +157,18 @@ impl<'a> Cluster<'a> {
         self.seen_residual(&Motion::around(self.centre), visited)
     }
 
+    /// The same in the earliest sweep alone, if that is one before the pair and most can be seen.
+    pub fn standing_residual(&self) -> Option<f32> {
+        let scans = &self.scans;
+        let [_, .., earliest] = scans.targets else { return None };
+        let mut mean = Mean::default();
+        let rest = Motion::default();
+        let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, &rest, earliest));
+        seen.for_each(|m| mean.add(m));
+        let visible = mean.count / self.samples.len().max(1) as f32;
+        (visible > scans.scaled.params.visible_ratio).then(|| mean.value())
+    }
+
     /// The same of a motion.
     pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
         let scans = &self.scans;

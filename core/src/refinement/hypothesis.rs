@@ -26,6 +26,10 @@ const STARTS_MAX: usize = VOTED_STARTS + 3;
 /// evidence.
 const BAD_FIT_EVIDENCE: f32 = 2.0;
 
+/// Share of `residual_static` up to which what stood in the earliest sweep, by far the longest time
+/// to move in, is not looked at any further.
+const STANDING_RATIO: f32 = 0.5;
+
 /// Share of looks that found nothing from which on a cluster was seen to come: of clusters that
 /// move 0.9 in the median, of those that stand far from any 0.2, of a tenth of them more than 0.75
 /// (simulated drives).
@@ -149,7 +153,9 @@ impl Trials<'_> {
         if self.residual > params.residual_bad && enough {
             self.start(search(cluster));
         }
-        if let Some(slid) = slide(cluster, &self.motion, self.residual, self.visited) {
+        if self.residual > params.residual_good
+            && let Some(slid) = slide(cluster, &self.motion, self.residual, self.visited)
+        {
             self.consider(slid);
             let motion = cluster.align(slid, 1, self.visited);
             self.consider(motion);
@@ -167,8 +173,11 @@ pub fn test(
 ) -> Hypothesis {
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
-    let static_residual = cluster.static_residual(visited).0;
     let prior = prior_of(cluster, predicted);
+    let standing = cluster.standing_residual().filter(|residual| {
+        prior.by.is_none() && *residual < STANDING_RATIO * params.residual_static
+    });
+    let static_residual = standing.unwrap_or_else(|| cluster.static_residual(visited).0);
     let cues =
         Cues::of_cluster(-params.evidence_min, static_residual, cluster.samples.len(), &prior);
     let found =
@@ -177,7 +186,10 @@ pub fn test(
         params.evidence_prior_ratio * (scaled.evidence_length / cluster.extent).min(1.0);
     let prior_ratio = 1.0 - prior.share * (1.0 - prior_ratio);
     let ease = if prior.by.is_some() { prior_ratio } else { 1.0 };
-    if static_residual < params.residual_static * ease || cluster.extent > scaled.extent_max {
+    if static_residual < params.residual_static * ease
+        || cluster.extent > scaled.extent_max
+        || cluster.samples.len() < params.returns_min as usize
+    {
         return found;
     }
     let tried = heapless::Vec::new();
@@ -246,8 +258,7 @@ fn decide(
     let likely = 1.0 / (1.0 + libm::expf((needed - evidence) / params.evidence_scale));
     Hypothesis {
         is_dynamic: convinces
-            && motion.delta.xy().norm() > scaled.displacement_min
-            && cluster.samples.len() >= params.returns_min as usize,
+            && motion.delta.xy().norm() > scaled.displacement_min,
         variance: likely * (1.0 - likely),
         footprint: Footprint::along(&motion),
         motion: with_confidence(cluster, motion, residual),

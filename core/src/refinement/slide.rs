@@ -8,10 +8,11 @@
 use super::cluster::{Cluster, VisitedColumns};
 use super::motion::Motion;
 
-/// Displacements that are tried either way.
-const STEPS: i32 = 32;
-/// From one to the next, voxels: 0.15 m. Registration does the rest.
-const STEP: f32 = 0.5;
+/// Displacements that are tried either way, and from one to the next, voxels: 4.8 m, in steps of
+/// 0.3 m. The better of those beside the best is then sought at half the distance, and again.
+const STEPS: i32 = 16;
+const STEP: f32 = 1.0;
+const HALVINGS: usize = 2;
 /// How many times as uncertain one direction must be as the other, standard deviations, for it to be
 /// a side.
 const ASPECT: f32 = 2.0;
@@ -30,16 +31,22 @@ pub fn slide(
     visited: &mut VisitedColumns,
 ) -> Option<Motion> {
     let direction = side(motion).filter(|_| cluster.extent >= EXTENT_MIN)?;
+    let slid = |by: f32| motion.displaced(direction.map(|d| by * d));
     let mut best = (residual - GAIN, None);
-    for step in -STEPS..=STEPS {
-        let by = direction.map(|d| step as f32 * STEP * d);
-        let tried = motion.displaced(by);
-        let residual = cluster.residual(&tried, visited);
+    let mut attempt = |by: f32, best: &mut (f32, Option<f32>)| {
+        let residual = cluster.residual(&slid(by), visited);
         if residual < best.0 {
-            best = (residual, Some(tried));
+            *best = (residual, Some(by));
         }
+    };
+    (-STEPS..=STEPS).for_each(|n| attempt(n as f32 * STEP, &mut best));
+    let mut step = STEP;
+    for _ in 0..HALVINGS {
+        step *= 0.5;
+        let around = best.1?;
+        [around - step, around + step].into_iter().for_each(|by| attempt(by, &mut best));
     }
-    best.1
+    best.1.map(slid)
 }
 
 /// The direction of a cluster's side: that in which its displacement is most uncertain, if it is
