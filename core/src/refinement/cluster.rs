@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean};
-use super::scans::Scans;
+use super::scans::{Scans, Target};
 use crate::params::COLUMNS_MAX;
 
 /// Returns of a cluster that are registered, at most; as many of the second sweep are registered
@@ -123,22 +123,50 @@ impl<'a> Cluster<'a> {
 
     /// Mean truncated residual of a motion, both ways, 0 (all lie on something) to 1 (none does).
     /// What comes to lie where nothing can be seen is missed, unless the cluster could move and
-    /// most of it is seen: behind a corner anything fits.
+    /// most of it is seen in the second sweep: behind a corner anything fits.
     pub fn residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
-        let scans = &self.scans;
         if self.could_move {
             let (residual, visible) = self.seen_residual(motion, visited);
-            if visible > scans.scaled.params.visible_ratio {
+            if visible > self.scans.scaled.params.visible_ratio {
                 return residual;
             }
         }
         let mut mean = Mean::default();
-        for target in scans.targets {
-            for s in &self.samples {
-                mean.add(scans.dynamic_residual(s, motion, target));
-            }
+        self.scans.targets.iter().for_each(|t| mean.include(self.all_in(t, motion)));
+        self.add_all_back(&mut mean, motion, visited);
+        mean.value()
+    }
+
+    /// Residuals of a motion in one sweep.
+    fn all_in(&self, target: &Target, motion: &Motion) -> Mean {
+        let mut mean = Mean::default();
+        for s in self.samples.iter().step_by(target.stride()) {
+            let residual = self.scans.dynamic_residual(s, motion, target);
+            mean.add_times(residual, target.stride() as f32);
         }
-        let target = &scans.targets[0];
+        mean
+    }
+
+    /// The same by what can be seen, and the share of the returns of which that can.
+    fn seen_in(&self, target: &Target, motion: &Motion) -> (Mean, f32) {
+        let mut mean = Mean::default();
+        let looked_at = self.samples.iter().step_by(target.stride());
+        let count = looked_at.len() * target.stride();
+        let seen = looked_at.filter_map(|s| self.scans.seen_residual(s, motion, target));
+        seen.for_each(|m| mean.add_times(m, target.stride() as f32));
+        let visible = mean.count / count.max(1) as f32;
+        (mean, visible)
+    }
+
+    /// The same if most can be seen.
+    fn mostly_seen_in(&self, target: &Target, motion: &Motion) -> Option<Mean> {
+        let (mean, visible) = self.seen_in(target, motion);
+        (visible > self.scans.scaled.params.visible_ratio).then_some(mean)
+    }
+
+    /// Adds residuals of the second sweep's returns in the first.
+    fn add_all_back(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+        let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
             let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
@@ -148,46 +176,58 @@ impl<'a> Cluster<'a> {
                 mean.add(residual);
             }
         }
-        mean.value()
     }
 
-    /// The same at rest, by what can be seen, 0 where nothing can; and the share of its returns
-    /// that can be seen in the second sweep.
-    pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
-        self.seen_residual(&Motion::around(self.centre), visited)
-    }
-
-    /// The same in the earliest sweep alone, if that is one before the pair and most can be seen.
-    pub fn standing_residual(&self) -> Option<f32> {
-        let scans = &self.scans;
-        let [_, .., earliest] = scans.targets else { return None };
-        let mut mean = Mean::default();
-        let rest = Motion::default();
-        let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, &rest, earliest));
-        seen.for_each(|m| mean.add(m));
-        let visible = mean.count / self.samples.len().max(1) as f32;
-        (visible > scans.scaled.params.visible_ratio).then(|| mean.value())
-    }
-
-    /// The same of a motion.
-    pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
-        let scans = &self.scans;
-        let mut mean = Mean::default();
-        let mut visible = 0.0;
-        for target in scans.targets {
-            let seen = self.samples.iter().filter_map(|s| scans.seen_residual(s, motion, target));
-            seen.for_each(|m| mean.add(m));
-            if target.index == 0 {
-                visible = mean.count / self.samples.len().max(1) as f32;
-            }
-        }
-        let target = &scans.targets[0];
+    /// The same by what can be seen.
+    fn add_seen_back(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
+        let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
             if let Some(told) = scans.told_residual(scans.second, q, &scans.first, at) {
                 mean.add(told);
             }
         }
+    }
+
+    /// The residual at rest, by what can be seen, 0 where nothing can; and the share of its returns
+    /// that can be seen in the second sweep.
+    pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
+        self.seen_residual(&Motion::around(self.centre), visited)
+    }
+
+    /// The residual at rest to compare that of a motion with: of what could move without the sweeps
+    /// that show little of where it would have been. Rest, which they may show, does not fit worse
+    /// for that.
+    pub fn compared_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
+        let rest = Motion::around(self.centre);
+        let mut mean = Mean::default();
+        for target in self.scans.targets {
+            if !self.could_move || self.mostly_seen_in(target, motion).is_some() {
+                mean.include(self.seen_in(target, &rest).0);
+            }
+        }
+        self.add_seen_back(&mut mean, &rest, visited);
+        mean.value()
+    }
+
+    /// The same in the earliest sweep alone, if that is one before the pair and most can be seen.
+    pub fn standing_residual(&self) -> Option<f32> {
+        let [_, .., earliest] = self.scans.targets else { return None };
+        self.mostly_seen_in(earliest, &Motion::default()).map(|mean| mean.value())
+    }
+
+    /// The same of a motion.
+    pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
+        let mut mean = Mean::default();
+        let mut visible = 0.0;
+        for target in self.scans.targets {
+            let (seen, share) = self.seen_in(target, motion);
+            mean.include(seen);
+            if target.index == 0 {
+                visible = share;
+            }
+        }
+        self.add_seen_back(&mut mean, motion, visited);
         (mean.value(), visible)
     }
 

@@ -196,7 +196,9 @@ pub fn test(
     let motion = Motion::around(cluster.centre);
     let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
     trials.run(prior.by, flow);
-    let Trials { residual, motion, .. } = trials;
+    let Trials { residual, motion, visited, .. } = trials;
+    let static_residual = cluster.compared_residual(&motion, visited);
+    let found = Hypothesis { static_residual, ..found };
     let as_predicted =
         prior.by.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
     let needed = params.evidence_min * if as_predicted { prior_ratio } else { 1.0 };
@@ -257,8 +259,7 @@ fn decide(
     let convinces = evidence > if fits { needed } else { BAD_FIT_EVIDENCE * needed };
     let likely = 1.0 / (1.0 + libm::expf((needed - evidence) / params.evidence_scale));
     Hypothesis {
-        is_dynamic: convinces
-            && motion.delta.xy().norm() > scaled.displacement_min,
+        is_dynamic: convinces && motion.delta.xy().norm() > scaled.displacement_min,
         variance: likely * (1.0 - likely),
         footprint: Footprint::along(&motion),
         motion: with_confidence(cluster, motion, residual),

@@ -43,8 +43,17 @@ pub struct Mean {
 
 impl Mean {
     pub fn add(&mut self, value: f32) {
-        self.sum += value;
-        self.count += 1.0;
+        self.add_times(value, 1.0);
+    }
+
+    pub fn add_times(&mut self, value: f32, times: f32) {
+        self.sum += times * value;
+        self.count += times;
+    }
+
+    pub fn include(&mut self, other: Mean) {
+        self.sum += other.sum;
+        self.count += other.count;
     }
 
     pub fn value(&self) -> f32 {

@@ -16,7 +16,18 @@ pub struct Target<'a> {
     pub share: f32,
 }
 
+/// Of a cluster's returns, all are compared with the pair's second sweep, and every other with each
+/// earlier one, where it counts twice. With all there, precision and recall are the same to 0.3 %
+/// (18 drives of 25 sweeps on simulated outskirts, three rigs), and a sweep of KITTI drive 0005
+/// takes 5 % longer on one core.
+const EARLIER_STRIDE: usize = 2;
+
 impl Target<'_> {
+    /// Every how many returns are compared with it.
+    pub fn stride(&self) -> usize {
+        if self.index == 0 { 1 } else { EARLIER_STRIDE }
+    }
+
     /// How much of a motion over the pair has happened when a cluster is seen in this sweep.
     pub fn share(&self, motion: &Motion) -> f32 {
         self.share + motion.delay[self.index]
