@@ -6,18 +6,19 @@
 //!
 //! 1. Returns above the ground are thinned to one a sub-voxel ([`cloud`]).
 //! 2. Columns that touch make a cluster ([`segments`]).
-//! 3. Each cluster is registered with the second sweep, and with earlier ones where
+//! 3. Each cluster is registered with the second sweep, and with one before the pair where
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
 //!    generalised ICP with a Geman-McClure kernel, both ways, from several starts: rest, what its
 //!    tracklets predict, the displacements most of its columns found by energy minimisation and,
-//!    where none of these fits, a search.
+//!    where none of these fits, a search. Its ends tell how far it slid along itself ([`slide`]).
 //! 4. A hypothesis test tells dynamic clusters from static ones ([`hypothesis`]): with r0 and r the
 //!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000),
-//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). At rest only what can be seen counts:
-//!    where a return fits badly, or nothing is near, a ray must have passed to tell
-//!    ([`sightlines`]). Of a motion that holds, too, if the encoder says that the cluster could
-//!    move; of all else what comes to lie unseen is missed, because behind a corner anything fits.
-//!    A cluster that moved in the last sweep needs less.
+//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair are
+//!    compared, the earlier one from 0.3 s before it at 10 Hz: who walks has moved by then. At rest
+//!    only what can be seen counts: where a return fits badly, or nothing is near, a ray must have
+//!    passed to tell ([`sightlines`]). Of a motion that holds, too, if the encoder says that the
+//!    cluster could move; of all else what comes to lie unseen is missed, because behind a corner
+//!    anything fits. A cluster that moved in the last sweep needs less.
 //! 5. A static cluster may have a part that moves: columns that fit badly at rest, or that came to
 //!    where nothing was before. What remains of it, fragments beside it and what the encoder takes
 //!    for the rest of its body may go with that ([`clusters`]).
@@ -32,7 +33,7 @@
 
 mod align;
 mod cloud;
-mod clouds;
+mod cloud_ring;
 mod cluster;
 mod clusters;
 pub mod cues;
@@ -60,7 +61,7 @@ use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::team::Team;
 use cloud::Scratch;
 pub(crate) use cloud::SweepReturns;
-use clouds::Clouds;
+use cloud_ring::CloudRing;
 use clusters::Clusters;
 pub(crate) use cues::Prediction;
 use history::History;
@@ -72,7 +73,7 @@ use scans::Scans;
 /// State of the refinement between sweeps.
 pub struct Refinement {
     scaled: Option<Scaled>,
-    clouds: Clouds,
+    clouds: CloudRing,
     history: History,
     scratch: Scratch,
     clusters: Clusters,
@@ -82,7 +83,7 @@ impl Refinement {
     pub(crate) const fn new() -> Refinement {
         Refinement {
             scaled: None,
-            clouds: Clouds::new(),
+            clouds: CloudRing::new(),
             history: History::new(),
             scratch: Scratch::new(),
             clusters: Clusters::new(),

@@ -15,8 +15,8 @@ const NONE: u32 = u32::MAX;
 /// Moments over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
 pub type Moments = [f32; 10];
 
-/// Places of returns, voxels from the window's corner, with the sensor that saw each and when: every
-/// sensor sees a thing at a time of its own.
+/// Places of returns, voxels from the window's corner, with the sensor that saw each and when:
+/// every sensor sees a thing at a time of its own.
 pub struct Places {
     len: usize,
     at: [[f32; ROOM]; 3],

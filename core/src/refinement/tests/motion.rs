@@ -55,6 +55,34 @@ fn cars_move_by_fractions_of_a_voxel() {
     }
 }
 
+/// A wall of 40 voxels along x, seen at places of its own in every sweep.
+fn side(centre: f32, random: &mut Random) -> Returns {
+    let mut returns = Returns::flat();
+    for _ in 0..800 {
+        let [along, height] = [random.between(-20.0, 20.0), random.between(0.7, 8.0)];
+        returns.add([centre + along, 31.5, GROUND + height], 0);
+    }
+    returns
+}
+
+#[test]
+fn ends_tell_how_far_a_side_slid() {
+    // Registration alone leaves all of them at rest: any displacement along it fits the side.
+    for by in [5.3, -4.1, 3.2] {
+        let mut random = Random(12);
+        let all: Vec<Returns> = (0..3).map(|n| side(31.5 + n as f32 * by, &mut random)).collect();
+        let found = found_in(&all, &no_flow());
+        let moved: Vec<[f32; 2]> = found.iter().flatten().map(|m| m.0).collect();
+        // Ends are known to the distance of two returns.
+        let right = |m: &&[f32; 2]| (m[0] - by).abs() < 0.5 && m[1].abs() < 0.05;
+        let count = moved.iter().filter(right).count();
+        assert!(count > 35 && count == moved.len(), "{by}: {count} of {}", moved.len());
+    }
+    let mut random = Random(13);
+    let still: Vec<Returns> = (0..3).map(|_| side(31.5, &mut random)).collect();
+    assert!(found_in(&still, &no_flow()).iter().all(Option::is_none));
+}
+
 #[test]
 fn what_is_seen_later_has_moved_for_longer() {
     // Seen 4 ms later in every sweep, as one that is overtaken.

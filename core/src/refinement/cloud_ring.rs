@@ -9,7 +9,7 @@ use raywake_simd::Simd;
 pub type Targets<'a> = heapless::Vec<Target<'a>, TARGETS_MAX>;
 
 /// The last sweeps.
-pub struct Clouds {
+pub struct CloudRing {
     clouds: [Cloud; REFINEMENT_SWEEPS_MAX],
     /// Of the newest and of the one before, in turn.
     details: [CloudDetail; 2],
@@ -21,9 +21,9 @@ pub struct Clouds {
     newest_detail: usize,
 }
 
-impl Clouds {
-    pub const fn new() -> Clouds {
-        Clouds {
+impl CloudRing {
+    pub const fn new() -> CloudRing {
+        CloudRing {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
             details: [const { CloudDetail::new() }; 2],
             held: 0,
