@@ -16,8 +16,9 @@ const STEPS: i32 = 16;
 const STEP: f32 = 1.0;
 const HALVINGS: usize = 2;
 /// How many times as uncertain one direction must be as the other, standard deviations, for it to
-/// be a side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on those drives,
-/// seen by four HDL-32E, 95.0 % are within 30 cm, 94.7 with 4 and 3.6 m, 93.9 without slides.
+/// be a side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on those
+/// drives, seen by four HDL-32E, 95.0 % are within 30 cm, 94.7 with 4 and 3.6 m, 93.9 without
+/// slides.
 const ASPECT: f32 = 2.0;
 const EXTENT_MIN: f32 = 6.0;
 /// By how much the residual must fall. With 0.02 they are 94.9 %.
