@@ -195,14 +195,14 @@ impl<'a> Cluster<'a> {
         self.seen_residual(&Motion::around(self.centre), visited)
     }
 
-    /// The residual at rest to compare that of a motion with: of what could move without the sweeps
-    /// that show little of where it would have been. Rest, which they may show, does not fit worse
-    /// for that.
+    /// The residual at rest to compare that of a motion with, without the sweeps that show little of
+    /// where the cluster would have been: they may show all of it at rest, and then tell of that
+    /// alone.
     pub fn compared_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
         for target in self.scans.targets {
-            if !self.could_move || self.mostly_seen_in(target, motion).is_some() {
+            if self.mostly_seen_in(target, motion).is_some() {
                 mean.include(self.seen_in(target, &rest).0);
             }
         }

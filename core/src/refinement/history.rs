@@ -1,6 +1,6 @@
 //! Where something was hit in earlier sweeps: what moves comes to where nothing stood.
 //!
-//! Registration looks at three sweeps. What stands may be seen so differently from one to the next
+//! Registration looks at a few sweeps. What stands may be seen so differently from one to the next
 //! that a motion explains it better; but its places were hit long before the motion would have
 //! brought it there.
 

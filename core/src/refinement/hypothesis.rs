@@ -197,7 +197,11 @@ pub fn test(
     let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
     trials.run(prior.by, flow);
     let Trials { residual, motion, visited, .. } = trials;
-    let static_residual = cluster.compared_residual(&motion, visited);
+    // Of all else what is not seen is missed.
+    let static_residual = match cluster.could_move {
+        true => cluster.compared_residual(&motion, visited),
+        false => static_residual,
+    };
     let found = Hypothesis { static_residual, ..found };
     let as_predicted =
         prior.by.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
