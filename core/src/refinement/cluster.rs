@@ -195,9 +195,9 @@ impl<'a> Cluster<'a> {
         self.seen_residual(&Motion::around(self.centre), visited)
     }
 
-    /// The residual at rest to compare that of a motion with, without the sweeps that show little of
-    /// where the cluster would have been: they may show all of it at rest, and then tell of that
-    /// alone.
+    /// The residual at rest to compare that of a motion with, without the sweeps that show little
+    /// of where the cluster would have been: they may show all of it at rest, and then tell of
+    /// that alone.
     pub fn compared_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
