@@ -78,8 +78,8 @@ crate::params! {
         pub refinement_sweeps: u32 = 5, "sweeps", (0 or 2 to 5),
             "2 sweeps: 5.8 cm mean error of what moves against 4.4 cm with 3, whole cells 38.8 cm \
              (`raywake-lab ablate`). Recall at a precision of 95 % on simulated outskirts \
-             (`--seed 7070`; `vlp32x2`, `hdl32x4-full`, `hdl64`): 88.9, 88.4, 86.7 % with 3; 90.2, \
-             89.4, 88.2 with 5, of which every other one is looked at.";
+             (`--seed 7070`; `vlp32x2`, `hdl32x4-full`): 88.9 and 88.4 % with 3, 90.0 and 88.9 \
+             with 5.";
     } and {
         /// Name shown in reports.
         pub name: String<24> = String::new();

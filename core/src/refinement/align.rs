@@ -102,6 +102,7 @@ impl Cluster<'_> {
             motion.delta += step;
             motion.covariance = covariance;
             motion.delay = equations.delay.map(|mean| mean.value() / self.scans.span_s as f32);
+            // Of a sweep that is not registered with: as long for each sweep in between.
             for other in others {
                 motion.delay[other.index] = other.share * motion.delay[0];
             }
@@ -145,7 +146,7 @@ impl Cluster<'_> {
         for q in seen.iter().step_by(stride) {
             let at = target.retrace(q, motion);
             if let Some((_, p)) = self.scans.first.nearest(at, q.sensor, self.scans.reach_exact()) {
-                let weight = self.scans.second.weight(self.scans.scaled, q.index);
+                let weight = self.scans.second().weight(self.scans.scaled, q.index);
                 to.add(&weight, p.at, minus(at, p.at), share);
                 to.delay[0].add(q.offset_s - p.offset_s);
             }

@@ -56,7 +56,7 @@ impl Scratch {
         }
     }
 
-    /// Lists the returns of clusters and counts them by column. `apart` becomes whether a return is
+    /// Lists the returns of clusters and adds them to the counts by column. `apart` becomes whether a return is
     /// of the ground, or higher than clusters are. Returns how many there are, and the sensors that
     /// saw them, a bit each.
     fn count(
@@ -67,7 +67,6 @@ impl Scratch {
         apart: &mut [bool],
     ) -> (usize, u32) {
         let SweepReturns { points, placed, columns, .. } = returns;
-        self.end.fill(0);
         let (mut count, mut sensors) = (0, 0u32);
         for (n, (&column, apart)) in columns.iter().zip(apart).enumerate() {
             *apart = false;
@@ -86,14 +85,15 @@ impl Scratch {
         (count, sensors)
     }
 
-    /// A counting sort of `count` listed returns, which keeps the source's order within a column.
-    fn sort(&mut self, columns: &[u32], count: usize) {
+    /// A counting sort of `count` listed returns into so many columns, `column` of each, which keeps
+    /// the source's order within a column.
+    fn sort(&mut self, columns: usize, column: &[u32], count: usize) {
         let mut total = 0;
-        for end in &mut self.end {
+        for end in &mut self.end[..columns] {
             total += core::mem::replace(end, total);
         }
         for &n in &self.listed[..count] {
-            let end = &mut self.end[columns[n as usize] as usize];
+            let end = &mut self.end[column[n as usize] as usize];
             self.order[*end as usize] = n;
             *end += 1;
         }
@@ -210,19 +210,20 @@ impl Cloud {
         &mut self,
         detail: &mut CloudDetail,
         profile: &Profile,
+        scaled: &Scaled,
         returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
-        let scaled = &Scaled::new(profile);
         self.side = profile.side as usize;
         (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
         let SweepReturns { points, placed, sensors, .. } = returns;
         let listed = Listed { index: &mut scratch.listed, bin: &mut scratch.order };
         self.sightlines.fill(sensors, points, placed, listed);
         detail.find_ground(profile, returns, &mut scratch.ground);
+        scratch.end[..self.side * self.side].fill(0);
         let (count, sensors) = scratch.count(&detail.ground, scaled, returns, apart);
-        scratch.sort(returns.columns, count);
+        scratch.sort(self.side * self.side, returns.columns, count);
         let dropped = self.thin(detail, scaled.subvoxels, returns, scratch, sensors);
         detail.weights[..self.places.len()].fill_with(LazyWeight::unknown);
         dropped

@@ -2,33 +2,35 @@
 
 use super::cloud::{Cloud, CloudDetail, DetailedCloud, Scratch, SweepReturns};
 use super::motion::TARGETS_MAX;
+use super::scaled::Scaled;
 use super::scans::Target;
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
 use raywake_simd::Simd;
 
 pub type Targets<'a> = heapless::Vec<Target<'a>, TARGETS_MAX>;
 
+/// Sweeps of which detail is kept: those of a pair.
+const DETAILS: usize = 2;
+/// Sweeps after which one is kept again where another was, and its detail, too.
+const CYCLE: usize = REFINEMENT_SWEEPS_MAX * DETAILS;
+
 /// The last sweeps.
 pub struct CloudRing {
     clouds: [Cloud; REFINEMENT_SWEEPS_MAX],
-    /// Of the newest and of the one before, in turn.
-    details: [CloudDetail; 2],
+    details: [CloudDetail; DETAILS],
     /// Sweeps held in `clouds`.
     held: usize,
-    /// Where the newest is.
+    /// The newest sweep's number in its cycle: the rest by the length of either array is its place.
     newest: usize,
-    /// Where its detail is.
-    newest_detail: usize,
 }
 
 impl CloudRing {
     pub const fn new() -> CloudRing {
         CloudRing {
             clouds: [const { Cloud::new() }; REFINEMENT_SWEEPS_MAX],
-            details: [const { CloudDetail::new() }; 2],
+            details: [const { CloudDetail::new() }; DETAILS],
             held: 0,
             newest: 0,
-            newest_detail: 0,
         }
     }
 
@@ -40,32 +42,35 @@ impl CloudRing {
     pub fn insert(
         &mut self,
         profile: &Profile,
+        scaled: &Scaled,
         simd: Simd,
         returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
-        self.newest = (self.newest + 1) % REFINEMENT_SWEEPS_MAX;
-        self.newest_detail = 1 - self.newest_detail;
+        self.newest = (self.newest + 1) % CYCLE;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
-        let cloud = &mut self.clouds[self.newest];
+        let cloud = &mut self.clouds[self.newest % REFINEMENT_SWEEPS_MAX];
         cloud.simd = simd;
-        cloud.fill(&mut self.details[self.newest_detail], profile, returns, apart, scratch)
+        let detail = &mut self.details[self.newest % DETAILS];
+        cloud.fill(detail, profile, scaled, returns, apart, scratch)
     }
 
-    /// The cloud `age` sweeps before the newest.
-    fn of_age(&self, age: usize) -> &Cloud {
-        &self.clouds[(self.newest + REFINEMENT_SWEEPS_MAX - age) % REFINEMENT_SWEEPS_MAX]
+    /// The cloud `age` sweeps before the newest, with the detail of one of the pair's.
+    fn of_age(&self, age: usize) -> DetailedCloud<'_> {
+        let number = self.newest + CYCLE - age;
+        let cloud = &self.clouds[number % REFINEMENT_SWEEPS_MAX];
+        DetailedCloud { cloud, detail: &self.details[number % DETAILS] }
     }
 
     /// The first sweep of the newest pair.
     pub fn first(&self) -> DetailedCloud<'_> {
-        DetailedCloud { cloud: self.of_age(1), detail: &self.details[1 - self.newest_detail] }
+        self.of_age(1)
     }
 
     /// The second sweep of the newest pair.
     pub fn second(&self) -> DetailedCloud<'_> {
-        DetailedCloud { cloud: self.of_age(0), detail: &self.details[self.newest_detail] }
+        self.of_age(0)
     }
 
     /// From the stamp of the newest pair's first sweep to that of its second, s; nothing where
@@ -78,7 +83,7 @@ impl CloudRing {
     /// the first.
     pub fn targets(&self, span_s: f64) -> Targets<'_> {
         let first = self.first();
-        let ages = (0..self.held).step_by(2).map(|age| self.of_age(age));
+        let ages = (0..self.held).step_by(2).map(|age| self.of_age(age).cloud);
         ages.enumerate()
             .map(|(index, cloud)| Target {
                 index,

@@ -170,7 +170,7 @@ impl<'a> Cluster<'a> {
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
             let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
-            let residual = scans.residual(scans.second, q, at, found);
+            let residual = scans.residual(scans.second(), q, at, found);
             // What is static was there before.
             if residual < HALF_MISSED || !self.was_there(q) {
                 mean.add(residual);
@@ -183,7 +183,7 @@ impl<'a> Cluster<'a> {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
             let at = target.retrace(q, motion);
-            if let Some(told) = scans.told_residual(scans.second, q, &scans.first, at) {
+            if let Some(told) = scans.told_residual(scans.second(), q, &scans.first, at) {
                 mean.add(told);
             }
         }

@@ -198,9 +198,10 @@ pub fn test(
     trials.run(prior.by, flow);
     let Trials { residual, motion, visited, .. } = trials;
     // Of all else what is not seen is missed.
-    let static_residual = match cluster.could_move {
-        true => cluster.compared_residual(&motion, visited),
-        false => static_residual,
+    let static_residual = if cluster.could_move {
+        cluster.compared_residual(&motion, visited)
+    } else {
+        static_residual
     };
     let found = Hypothesis { static_residual, ..found };
     let as_predicted =

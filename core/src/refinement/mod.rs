@@ -106,8 +106,8 @@ impl Refinement {
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
-        self.scaled = Some(Scaled::new(profile));
-        self.clouds.insert(profile, simd, returns, apart, &mut self.scratch)
+        let scaled = self.scaled.insert(Scaled::new(profile));
+        self.clouds.insert(profile, scaled, simd, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new
@@ -125,7 +125,7 @@ impl Refinement {
         let (Some(scaled), Some(span_s)) = (&self.scaled, self.clouds.span_s()) else {
             return;
         };
-        let (first, second) = (self.clouds.first(), self.clouds.second());
+        let first = self.clouds.first();
         let side = first.side;
         let shifted = |c: usize| {
             let (i, j) = ((c / side) as i32 - step.shift_x, (c % side) as i32 - step.shift_y);
@@ -135,7 +135,8 @@ impl Refinement {
         let flow = |c: usize| shifted(c).map_or(0, |c| flow[c]);
         let predicted = |c: usize| shifted(c).and_then(&predicted);
         let targets = self.clouds.targets(span_s);
-        let scans = Scans { scaled, first, second, targets: &targets, scores, span_s };
+        let detail = self.clouds.second().detail;
+        let scans = Scans { scaled, first, targets: &targets, detail, scores, span_s };
         self.clusters.find(team, scans, &self.history, flow, predicted);
         self.history.push(first, |c| self.clusters.came(c));
     }

@@ -1,6 +1,6 @@
 //! The sweeps that clusters are registered with, and the residual of one return.
 
-use super::cloud::{Cloud, DetailedCloud};
+use super::cloud::{Cloud, CloudDetail, DetailedCloud};
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
@@ -59,17 +59,22 @@ pub struct Scans<'a> {
     pub scaled: &'a Scaled,
     /// The pair's first sweep, which the clusters are of.
     pub first: DetailedCloud<'a>,
-    /// The pair's second sweep, the first of the targets.
-    pub second: DetailedCloud<'a>,
     /// The pair's second sweep, then earlier ones.
     pub targets: &'a [Target<'a>],
+    /// Of the pair's second sweep.
+    pub detail: &'a CloudDetail,
     /// What the first sweep's columns are, nothing where nothing is encoded.
     pub scores: &'a [ColumnScores],
     /// From the pair's first stamp to the second, s.
     pub span_s: f64,
 }
 
-impl Scans<'_> {
+impl<'a> Scans<'a> {
+    /// The pair's second sweep.
+    pub fn second(&self) -> DetailedCloud<'a> {
+        DetailedCloud { cloud: self.targets[0].cloud, detail: self.detail }
+    }
+
     /// Score of a column of the first sweep, nats, of what could move; 0 where that is not told.
     pub fn could_move(&self, column: usize) -> f32 {
         self.scores.get(column).map_or(0.0, could_move)

@@ -16,7 +16,7 @@ pub fn search(cluster: &Cluster) -> [f32; 2] {
             for s in &cluster.samples {
                 let at = [s.at[0] + by[0], s.at[1] + by[1], s.at[2]];
                 let there = core::array::from_fn(|a| at[a] + target.offset[a]);
-                if scans.second.is_hit(there) {
+                if scans.second().is_hit(there) {
                     score += 2 - scans.first.is_hit(at) as u32;
                 }
             }

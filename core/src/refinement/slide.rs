@@ -9,19 +9,19 @@ use super::cluster::{Cluster, VisitedColumns};
 use super::motion::Motion;
 
 /// Displacements that are tried either way, and from one to the next, voxels: 4.8 m, in steps of
-/// 0.3 m. The better of those beside the best is then sought at half the distance, and again. With
-/// all of them at half a voxel the same is found (18 drives of 25 sweeps on simulated outskirts,
-/// three rigs), in twice the time.
+/// 0.3 m. The better of those beside the best is then sought at half the distance, and again: 37
+/// residuals. With all of them at half a voxel, 65, as much of what moves is within 30 cm, to 0.4 %
+/// (18 drives of 25 sweeps on simulated outskirts, three rigs).
 const STEPS: i32 = 16;
 const STEP: f32 = 1.0;
 const HALVINGS: usize = 2;
 /// How many times as uncertain one direction must be as the other, standard deviations, for it to
-/// be a side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on those
+/// be a side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on six of those
 /// drives, seen by four HDL-32E, 95.0 % are within 30 cm, 94.7 with 4 and 3.6 m, 93.9 without
-/// slides.
+/// slides (each compared with two sweeps).
 const ASPECT: f32 = 2.0;
 const EXTENT_MIN: f32 = 6.0;
-/// By how much the residual must fall. With 0.02 they are 94.9 %.
+/// By how much the residual must fall. With 4 and 3.6 m they are 94.9 % with 0.02, and 94.7 here.
 const GAIN: f32 = 0.005;
 
 /// The motion that explains a cluster better than `motion`, of which the residual is `residual`,

@@ -137,9 +137,8 @@ fn segments_are_what_a_flood_fill_reaches() {
         let excluded = random.below(SIDE * SIDE);
         let part = |c: usize| c != excluded && cloud.levels(c) != 0;
         let mut segments = raywake_alloc_guard::boxed!(Segments, Segments::new());
-        let (first, second) = (cloud, cloud);
-        let scaled = &scaled();
-        let scans = Scans { scaled, first, second, targets: &[], scores: &[], span_s: 0.1 };
+        let (scaled, detail) = (&scaled(), cloud.detail);
+        let scans = Scans { scaled, first: cloud, targets: &[], detail, scores: &[], span_s: 0.1 };
         segments.find(&scans, part, |c| flows[c]);
         let touch = |a: usize, b: usize| {
             let apart =

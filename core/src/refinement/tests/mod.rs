@@ -99,7 +99,7 @@ impl Returns {
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
         let returns = self.of_sweep(0.0, &SENSORS);
         let Kept { cloud, detail } = kept;
-        (cloud.fill(detail, &profile(), returns, &mut apart, &mut scratch), apart)
+        (cloud.fill(detail, &profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
     }
 
     fn cloud(&self) -> Kept {
