@@ -56,9 +56,9 @@ impl Scratch {
         }
     }
 
-    /// Lists the returns of clusters and adds them to the counts by column. `apart` becomes whether a return is
-    /// of the ground, or higher than clusters are. Returns how many there are, and the sensors that
-    /// saw them, a bit each.
+    /// Lists the returns of clusters and adds them to the counts by column. `apart` becomes whether
+    /// a return is of the ground, or higher than clusters are. Returns how many there are, and the
+    /// sensors that saw them, a bit each.
     fn count(
         &mut self,
         ground: &GroundHeights,
@@ -85,8 +85,8 @@ impl Scratch {
         (count, sensors)
     }
 
-    /// A counting sort of `count` listed returns into so many columns, `column` of each, which keeps
-    /// the source's order within a column.
+    /// A counting sort of `count` listed returns into so many columns, `column` of each, which
+    /// keeps the source's order within a column.
     fn sort(&mut self, columns: usize, column: &[u32], count: usize) {
         let mut total = 0;
         for end in &mut self.end[..columns] {

@@ -2,6 +2,7 @@
 
 extern crate std;
 mod cloud;
+mod cloud_ring;
 mod history;
 mod motion;
 mod odd;
