@@ -83,8 +83,8 @@ impl Pipeline {
         let (mut unrefined, corner) = (0, arrival.window.corner);
         let Pipeline { returns, refinement, encoder, .. } = self;
         let meanwhile = || {
-            unrefined = returns.insert(refinement, team.simd(), &placement);
-            encoder.encode(team);
+            let insert = || unrefined = returns.insert(refinement, team, &placement);
+            team.join(insert, || encoder.encode(team));
         };
         let perceived = backend.perceive(&sent.uniform, team, timer, meanwhile)?;
 

@@ -13,7 +13,7 @@ use crate::record::{NONE, Ray, SweepUniform, ray};
 use crate::return_clock::{ReturnClock, slot_of};
 use crate::stages::occupancy_constancy::Scores;
 use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
-use crate::team::Team;
+use crate::team::{self, Team};
 use crate::thinning::TakenPoints;
 use batch::{RayLattice, ReturnBatch};
 use glam::DVec3;
@@ -48,6 +48,9 @@ pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
     }
 }
 
+/// Parts of a sweep that threads share; one more costs another look at as many returns.
+const PARTS: usize = 4;
+
 /// Turns sweeps into rays.
 pub struct Preparation {
     clock: ReturnClock,
@@ -81,30 +84,45 @@ impl Preparation {
         let count = points.count();
         assert!(rays.len() >= count && columns.len() >= count);
         let caster = Caster::new(&self.clock, team.simd(), placement, origins);
-        // Two parts, the rays of the second behind those that the first may have.
-        let [first, second] = [points.range(0..count / 2), points.range(count / 2..count)];
+        let part = |n: usize| count * n / PARTS..count * (n + 1) / PARTS;
+        // The rays of each part lie behind those that the ones before it may have.
         let is_ray = |p: &&Point| DroppedReturns::default().admit(rig, p).is_some();
-        let admitted = points.range(0..count / 2).filter(is_ray).count();
-        let (of_first, of_second) = rays.split_at_mut(admitted);
-        let (columns, more_columns) = columns.split_at_mut(count / 2);
-        let (placed, more_placed) = placed.split_at_mut((count / 2).min(placed.len()));
-        let of_second = Castings::new(of_second, more_columns, more_placed);
-        let mut found = [(0, DroppedReturns::default()); 2];
-        let [one, other] = &mut found;
-        team.join(
-            || *one = caster.cast_all(first, Castings::new(of_first, columns, placed)),
-            || *other = caster.cast_all(second, of_second),
-        );
-        let [(count, mut dropped), (more, more_dropped)] = found;
-        dropped += more_dropped;
+        let mut admitted = [0; PARTS];
+        team::fill(team, 0, &mut admitted[..PARTS - 1], &|n| {
+            points.range(part(n)).filter(is_ray).count()
+        });
+        let (mut rays_left, mut columns, mut placed) = (&mut *rays, columns, placed);
+        let mut parts: heapless::Vec<_, PARTS> = (0..PARTS)
+            .map(|n| {
+                let len = part(n).len();
+                let of_part = if n + 1 < PARTS { admitted[n] } else { rays_left.len() };
+                let rays = rays_left.split_off_mut(..of_part).expect("room");
+                let columns = columns.split_off_mut(..len).expect("as many");
+                let placed = placed.split_off_mut(..len.min(placed.len())).expect("no more");
+                (part(n), Castings::new(rays, columns, placed))
+            })
+            .collect();
+        team::each(team, &mut parts, &|(range, castings)| {
+            caster.cast_all(points.range(range.clone()), castings);
+        });
+        let mut dropped = DroppedReturns::default();
+        let found = parts.into_iter().map(|(_, castings)| {
+            dropped += castings.dropped;
+            castings.count
+        });
+        let found: heapless::Vec<usize, PARTS> = found.collect();
         dropped.over_capacity = points.left_out() as u64;
-        if count < admitted {
-            // Seldom: `rays` may be memory of a device, slow to read.
-            rays.copy_within(admitted..admitted + more, count);
+        let (mut end, mut from) = (0, 0);
+        for (count, room) in found.into_iter().zip(admitted) {
+            if end < from {
+                // Seldom: `rays` may be memory of a device, slow to read.
+                rays.copy_within(from..from + count, end);
+            }
+            (end, from) = (end + count, from + room);
         }
-        let all = count + more + dropped.without_ray() as usize;
+        let all = end + dropped.without_ray() as usize;
         assert_eq!(all, sweep.points.len(), "returns that are cast or left out");
-        (count + more, dropped)
+        (end, dropped)
     }
 }
 
@@ -197,12 +215,8 @@ impl<'a> Caster<'a> {
         }
     }
 
-    /// Rays of some returns, their columns and places; returns how many rays there are.
-    fn cast_all<'p>(
-        &self,
-        points: impl Iterator<Item = &'p Point>,
-        mut out: Castings,
-    ) -> (usize, DroppedReturns) {
+    /// Rays of some returns, their columns and places.
+    fn cast_all<'p>(&self, points: impl Iterator<Item = &'p Point>, out: &mut Castings) {
         let mut batch = ReturnBatch::new();
         let count = out.columns.len();
         for (n, point) in points.take(count).enumerate() {
@@ -213,11 +227,10 @@ impl<'a> Caster<'a> {
             let when = self.clock.slots(self.rig, point);
             let slot = if self.moving { slot_of(when) } else { 0 };
             if batch.push(n, point, own, when, slot) {
-                self.cast(&mut batch, &mut out);
+                self.cast(&mut batch, out);
             }
         }
-        self.cast(&mut batch, &mut out);
-        (out.count, out.dropped)
+        self.cast(&mut batch, out);
     }
 
     /// Rays of a batch, which is empty then.

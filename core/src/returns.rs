@@ -9,7 +9,6 @@ use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use crate::team::Team;
 use crate::thinning::TakenPoints;
-use raywake_simd::Simd;
 
 /// Where the returns of the last two sweeps are.
 pub(crate) struct Returns {
@@ -73,7 +72,7 @@ impl Returns {
     pub fn insert(
         &mut self,
         refinement: &mut Refinement,
-        simd: Simd,
+        team: &impl Team,
         placement: &Placement,
     ) -> usize {
         let Placement { profile, window, sweep, .. } = *placement;
@@ -100,7 +99,7 @@ impl Returns {
             columns,
             sensors: &SensorPaths::new(placement),
         };
-        refinement.insert_cloud(profile, simd, returns, &mut self.is_apart[self.now][..taken])
+        refinement.insert_cloud(team, profile, returns, &mut self.is_apart[self.now][..taken])
     }
 
     /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are

@@ -19,6 +19,7 @@ pub mod flow {
     //! candidate in scan order and to the first column, and the energies of the targets are rebuilt
     //! each round from their winners.
     pub mod expectation;
+    pub mod expectation_by_rings;
     pub mod maximisation;
     #[cfg(test)]
     mod tests;
@@ -233,7 +234,8 @@ pub const FLOW: &[StageOp] = &[
             (sweep, list foreground, foreground_index, quads pair_cost, flow, target_energy,
                 min_cost, mut proposal),
             scalar: by_rows::expectation,
-            ThreadPer(Foreground)
+            GroupPerColumn,
+            on_cpus: (expectation_by_rings, ThreadPer(Foreground))
         )),
         Fill(Buffer::target_energy, NONE),
         Fill(Buffer::target_index, NONE),

@@ -1,7 +1,7 @@
 //! Work that may be split over threads. Core has none; the caller may bring some.
 //!
 //! Clusters are registered independently of each other, each into a slot of its own; the rays of a
-//! sweep and the velocities of its points are computed in two halves. The number of threads
+//! sweep and the velocities of its points are computed in parts. The number of threads
 //! therefore changes no bit of the results, nor do the instructions they use.
 
 use core::ops::Range;
@@ -63,6 +63,19 @@ pub(crate) fn fill<T: Send>(
             let half = slots.len() / 2;
             let (a, b) = slots.split_at_mut(half);
             team.join(|| fill(team, first, a, value), || fill(team, first + half, b, value));
+        }
+    }
+}
+
+/// Does the work of each slot. By recursive halving, as [`fill`].
+#[cfg(feature = "pipeline")]
+pub(crate) fn each<T: Send>(team: &impl Team, slots: &mut [T], work: &(impl Fn(&mut T) + Sync)) {
+    match slots {
+        [] => {}
+        [slot] => work(slot),
+        _ => {
+            let (a, b) = slots.split_at_mut(slots.len() / 2);
+            team.join(|| each(team, a, work), || each(team, b, work));
         }
     }
 }

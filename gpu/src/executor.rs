@@ -40,8 +40,21 @@ impl Executor {
         buffers: &[Buffer],
         programs: &[Program],
     ) -> Result<Self, GpuError> {
+        Self::with(options, buffers, |_| programs)
+    }
+
+    /// As [`Executor::new`], with the programs for the device that is found.
+    ///
+    /// # Errors
+    /// As [`Executor::new`].
+    pub fn with<'p>(
+        options: &Options,
+        buffers: &[Buffer],
+        programs: impl FnOnce(&DeviceInfo) -> &'p [Program],
+    ) -> Result<Self, GpuError> {
         let instance = Instance::new(options.validation)?;
         let physical = device::select(&instance, options.device)?;
+        let programs = programs(&physical.info);
         check::schedule(&physical.info.limits, buffers, programs)?;
         let mut gpu = Gpu::new(instance, physical)?;
         let slots = arena::allocate(&mut gpu, buffers)?;

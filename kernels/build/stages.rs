@@ -17,7 +17,7 @@ pub fn entries() -> Vec<Entry> {
         walk(program.ops, Runner::Device, 1, &mut |op| {
             let StageOp::Run(stage) = op else { return };
             let arguments: Vec<Argument> = stage.bindings().collect();
-            for (name, _) in stage.kernels {
+            for (name, _) in stage.all_kernels() {
                 match all.iter().find(|e| e.name == *name) {
                     Some(known) => check_alike(known, &arguments),
                     None => all.push(Entry { name, arguments: arguments.clone() }),

@@ -16,7 +16,12 @@ pub struct Schedule {
     pub rows: Vec<MemoryRow>,
     /// The programs, in the order given, by rows.
     pub programs: Vec<gpu::Program>,
+    /// The same for devices that are CPUs.
+    pub on_cpus: Vec<gpu::Program>,
 }
+
+/// Which of a stage's kernels run.
+type KernelsOf = fn(&'static Stage) -> &'static [(&'static str, GroupCount)];
 
 /// A buffer on the device, or the mapped one through which it crosses.
 #[derive(Clone, Copy, Debug)]
@@ -50,9 +55,16 @@ impl Schedule {
             });
             rows.extend(wanted.map(|&buffer| MemoryRow { buffer, heap }));
         }
-        let mut schedule = Schedule { rows, programs: Vec::new() };
-        schedule.programs = programs.iter().map(|p| schedule.program(p, profile)).collect();
+        let mut schedule = Schedule { rows, programs: Vec::new(), on_cpus: Vec::new() };
+        let on = |kernels| programs.iter().map(|p| schedule.program(p, kernels, profile)).collect();
+        let all = [on(|stage| stage.kernels), on(Stage::kernels_on_cpus)];
+        [schedule.programs, schedule.on_cpus] = all;
         schedule
+    }
+
+    /// The programs for a device.
+    pub fn programs_on(&self, device: &gpu::DeviceInfo) -> &[gpu::Program] {
+        if device.kind == gpu::DeviceKind::Cpu { &self.on_cpus } else { &self.programs }
     }
 
     /// The table as the executor takes it.
@@ -71,7 +83,12 @@ impl Schedule {
         found.unwrap_or_else(|| panic!("`{}` is in no {heap:?} row", buffer.row().name))
     }
 
-    fn program(&self, program: &stages::StageProgram, profile: &Profile) -> gpu::Program {
+    fn program(
+        &self,
+        program: &stages::StageProgram,
+        kernels: KernelsOf,
+        profile: &Profile,
+    ) -> gpu::Program {
         let mut ops = Vec::new();
         let row = |heap, buffer| self.index(heap, buffer);
         walk(program.ops, Runner::Device, profile.em_rounds, &mut |op| match op {
@@ -84,13 +101,20 @@ impl Schedule {
             stages::StageOp::Fill(b, value) => {
                 ops.push(gpu::Op::Fill { buffer: row(Heap::Device, b), value });
             }
-            stages::StageOp::Run(stage) => ops.extend(self.dispatches(stage, profile)),
+            stages::StageOp::Run(stage) => {
+                ops.extend(self.dispatches(stage, kernels(stage), profile))
+            }
             other => unreachable!("{other:?} is a list of others"),
         });
         gpu::Program { name: program.name, ops }
     }
 
-    fn dispatches(&self, stage: &'static Stage, profile: &Profile) -> Vec<gpu::Op> {
+    fn dispatches(
+        &self,
+        stage: &'static Stage,
+        kernels: &[(&'static str, GroupCount)],
+        profile: &Profile,
+    ) -> Vec<gpu::Op> {
         let buffers: Vec<usize> =
             stage.bindings().map(|a| self.index(Heap::Device, a.buffer)).collect();
         let dispatch = |(entry, groups): &(&'static str, GroupCount)| {
@@ -102,7 +126,7 @@ impl Schedule {
                 groups: self.groups(*groups, kernel, profile),
             }
         };
-        stage.kernels.iter().map(dispatch).collect()
+        kernels.iter().map(dispatch).collect()
     }
 
     fn groups(&self, groups: GroupCount, kernel: &Kernel, profile: &Profile) -> gpu::Groups {

@@ -52,3 +52,14 @@ fn advance(w: Walk) -> Walk {
 fn inside_window(v: vec3<i32>, side: i32, levels: i32) -> bool {
     return all(v >= vec3<i32>(0)) && v.x < side && v.y < side && v.z < levels;
 }
+
+fn inside_square(i: i32, j: i32, side: i32) -> bool {
+    return i >= 0 && i < side && j >= 0 && j < side;
+}
+
+// `a / n` to the nearest integer, halves upwards; `n` is positive.
+fn round_div(a: i32, n: i32) -> i32 {
+    let twice = 2 * a + n;
+    let quotient = twice / (2 * n);
+    return quotient - select(0, 1, quotient * 2 * n > twice);
+}

@@ -7,16 +7,13 @@ var<workgroup> rows: array<u32, 9>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> place: atomic<u32>;
 
-fn inside(i: i32, j: i32) -> bool {
-    return i >= 0 && i < sweep.side && j >= 0 && j < sweep.side;
-}
-
 // Energy and place of the displacement at an element of the row, NONE where it leads outside.
 fn energy_at(i: i32, j: i32, at: u32, cost: u32, outside: i32) -> vec2<u32> {
     let d = vec2<i32>(i32(at / LINE), i32(at % LINE)) - vec2<i32>(REACH);
     let square = d.x * d.x + d.y * d.y;
     let energy = u32(i32(cost) + sweep.displacement_cost * square + outside);
-    return vec2<u32>(select(NONE, energy, d.y <= REACH && inside(i + d.x, j + d.y)), at);
+    let may_be = d.y <= REACH && inside_square(i + d.x, j + d.y, sweep.side);
+    return vec2<u32>(select(NONE, energy, may_be), at);
 }
 
 fn lesser(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
@@ -36,7 +33,7 @@ fn window(
         let nj = j + i32(lane) % 3 - 1;
         // A neighbour outside costs nothing here: it is the same at every displacement.
         rows[lane] = NONE - 1u;
-        if inside(ni, nj) {
+        if inside_square(ni, nj, sweep.side) {
             rows[lane] = foreground_index.d[ni * sweep.side + nj];
         }
     }

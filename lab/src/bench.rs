@@ -3,16 +3,13 @@
 //! Each runs in turn on the same sweeps, so that what else the machine does meets both. What
 //! travels is the ratio, pair by pair; times are those of this machine at that hour.
 
+use crate::program::{ProgramBuild, beside_this};
 use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::error::RunError;
 use raywake::order_statistics::Spread;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use raywake_io::source::whole;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::time::Instant;
 
 /// `raywake-lab bench`: report.html and a table of ratios.
 #[derive(clap::Args)]
@@ -65,8 +62,7 @@ type Figures = [f64; FIGURES.len()];
 pub fn run(args: &Args) -> Result<(), RunError> {
     let settings = settings(&args.setting)?;
     atomic::create_folder(&args.out)?;
-    let own = || Some(std::env::current_exe().ok()?.with_file_name("raywake"));
-    let program = args.program.clone().or_else(own).unwrap_or_default();
+    let program = args.program.clone().unwrap_or_else(beside_this);
     let mut rows = Vec::new();
     for (name, before, arguments) in settings {
         let of = |program: &Path| measure(args, program, before, arguments);
@@ -94,55 +90,17 @@ fn settings(names: &[String]) -> Result<Vec<Setting>, Error> {
     names.iter().map(find).collect()
 }
 
-/// Runs a program once. A shell between tells the CPU time, as POSIX has it.
 fn measure(
     args: &Args,
     program: &Path,
     before: &[&str],
     arguments: &[&str],
 ) -> Result<Figures, Error> {
-    let failed = |what: String| Error::Usage(format!("{}: {what}", program.display()));
-    let summary = args.out.join("summary.json");
-    let begin = Instant::now();
-    let mut shell = Command::new("sh");
-    shell
-        .args(["-c", "\"$@\" && times", "sh"])
-        .args(before)
-        .arg(program)
-        .arg("run")
-        .arg(&args.data);
-    shell.args(["--quiet", "-n", &args.sweeps.to_string(), "--summary"]).arg(&summary);
-    let done = shell.args(arguments).output();
-    let done = done.map_err(|e| failed(format!("cannot be run: {e}")))?;
-    let wall_s = begin.elapsed().as_secs_f64();
-    if !done.status.success() {
-        return Err(failed(String::from_utf8_lossy(&done.stderr).trim().to_owned()));
-    }
-    let [median, mean] = sweep_ms(&summary)?;
-    let times = String::from_utf8_lossy(&done.stdout).into_owned();
-    let cpu_s = cpu_s(&times).ok_or_else(|| failed(format!("`times` says {times}")))?;
-    Ok([median, mean, cpu_s, wall_s])
-}
-
-/// Median and mean time of a sweep, ms, of the summary of a run.
-fn sweep_ms(summary: &Path) -> Result<[f64; 2], Error> {
-    let text = whole::read_text(summary)?;
-    let read: Value = serde_json::from_str(&text)
-        .map_err(|e| Error::input(summary, format!("line {}", e.line()), e.to_string()))?;
-    let total = |name: &str| read["total_ms"][name].as_f64();
-    let both = total("median").zip(total("mean"));
-    let none = || Error::input(summary, "", "no pair of sweeps, no time");
-    both.map(|(median, mean)| [median, mean]).ok_or_else(none)
-}
-
-/// CPU time of a shell's children, s: the second line of `times`, user and system, as `0m1.25s`.
-fn cpu_s(times: &str) -> Option<f64> {
-    let seconds = |word: &str| {
-        let (minutes, seconds) = word.strip_suffix('s')?.split_once('m')?;
-        Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
-    };
-    let children = times.lines().last()?;
-    children.split_whitespace().map(seconds).sum()
+    let program =
+        ProgramBuild { path: program, data: &args.data, sweeps: args.sweeps, out: &args.out };
+    let ran = program.run(before, arguments)?;
+    let [median, mean] = ["median", "mean"].map(|of| ran.total_ms(of));
+    Ok([median?, mean?, ran.cpu_s, ran.wall_s])
 }
 
 /// A row for each figure: both medians, and the ratios of pairs.
@@ -179,9 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_of_a_shell() {
-        assert_eq!(cpu_s("0m0.00s 0m0.01s\n1m2.50s 0m0.25s\n"), Some(62.75));
-        assert_eq!(cpu_s("nothing"), None);
+    fn settings_have_names() {
         assert!(
             settings(&["wide".into()]).unwrap().len() == 1 && settings(&[]).unwrap().len() == 4
         );

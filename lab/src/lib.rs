@@ -4,6 +4,7 @@
 
 pub mod bench;
 mod curve;
+pub mod device;
 pub mod eval;
 pub mod flsf;
 pub mod grid;
@@ -12,6 +13,7 @@ pub mod labels;
 mod learning;
 pub mod matching;
 pub mod metrics;
+mod program;
 pub mod report;
 pub mod results;
 #[cfg(test)]

@@ -7,7 +7,7 @@ use raywake::error::RunError;
 use raywake_alloc_guard::Guard;
 use raywake_lab::metrics::grade;
 use raywake_lab::{
-    bench, eval, flsf, growth, matching, results, simulate, soak, toy, tracks, train,
+    bench, device, eval, flsf, growth, matching, results, simulate, soak, toy, tracks, train,
 };
 use std::alloc::System;
 use std::error::Error;
@@ -34,6 +34,8 @@ enum Command {
     Toy(toy::Args),
     /// Time two builds of the program in turn: ratios of sweeps, CPU and wall time.
     Bench(bench::Args),
+    /// Run on a Vulkan device and on the CPU alone: the same results, and what each takes.
+    Device(device::Args),
     /// Time simulated sweeps: how they grow with returns, the window and traffic.
     Growth(Box<growth::Args>),
     /// Run sweeps in a loop for hours, with faults in between: digests, memory, times.
@@ -89,6 +91,7 @@ fn main() -> ExitCode {
         Command::Packets(args) => simulate::packets::packets(&args).map_err(Into::into),
         Command::Toy(args) => toy::run(&args).map_err(Into::into),
         Command::Bench(args) => bench::run(&args).map_err(Into::into),
+        Command::Device(args) => device::run(&args).map_err(Into::into),
         Command::Growth(args) => growth::run(&args).map_err(Into::into),
         Command::Soak(args) => soak::run(&args),
         Command::Results(args) => results::run(&args).map_err(Into::into),

@@ -7,13 +7,13 @@ use raywake_core::stages::occupancy_constancy::COST_MAX;
 use raywake_core::stages::window::window as least_of;
 use raywake_core::stages::{COUNTERS, FOREGROUND_COUNT};
 use raywake_gpu::Kernel;
-use raywake_kernels::kernel::EXPECTATION;
+use raywake_kernels::kernel::{EXPECTATION, EXPECTATION_BY_RINGS};
 use raywake_tests::bench::Bench;
 use raywake_tests::random::Random;
 
 use super::{POISON, around, packed, window};
 
-pub const KERNELS: &[&Kernel] = &[&EXPECTATION];
+pub const KERNELS: &[&Kernel] = &[&EXPECTATION, &EXPECTATION_BY_RINGS];
 
 /// What a round of expectation looks at.
 struct Round {
@@ -46,7 +46,7 @@ impl Round {
         }
     }
 
-    /// Both, compared. Returns the proposals.
+    /// Both kernels, compared with the twin. Returns the proposals.
     fn check(&self, case: &str) -> Vec<Proposal> {
         let count = self.foreground.len();
         let mut proposal = vec![[POISON; 2]; count];
@@ -55,16 +55,22 @@ impl Round {
         let mut foreground = self.foreground.clone();
         // Left from a sweep with more of them.
         foreground.extend([0; 3]);
-        let bench = Bench::new(Some(&self.step))
-            .buffer("counters", counters)
-            .buffer("foreground", foreground)
-            .buffer("foreground_index", self.rank.clone())
-            .buffer("pair_cost", packed(&self.costs))
-            .buffer("flow", self.state.clone())
-            .buffer("target_energy", self.target_energy.clone())
-            .buffer("min_cost", padded(self.least.as_flattened()))
-            .buffer("proposal", padded(bytemuck::cast_slice(&proposal)))
-            .threads(&EXPECTATION, count + 3);
+        let poisoned = padded(bytemuck::cast_slice(&proposal));
+        let bench = || {
+            Bench::new(Some(&self.step))
+                .buffer("counters", counters.clone())
+                .buffer("foreground", foreground.clone())
+                .buffer("foreground_index", self.rank.clone())
+                .buffer("pair_cost", packed(&self.costs))
+                .buffer("flow", self.state.clone())
+                .buffer("target_energy", self.target_energy.clone())
+                .buffer("min_cost", padded(self.least.as_flattened()))
+                .buffer("proposal", poisoned.clone())
+        };
+        let runs = [
+            bench().groups(&EXPECTATION, count),
+            bench().threads(&EXPECTATION_BY_RINGS, count + 3),
+        ];
         expectation(
             &self.step,
             &self.foreground,
@@ -75,9 +81,10 @@ impl Round {
             &self.least,
             &mut proposal,
         );
-        if let Some(outcome) = bench.run() {
-            let case = format!("{case}, {count} columns, {:?}", self.step);
-            let wanted = padded(bytemuck::cast_slice(&proposal));
+        let wanted = padded(bytemuck::cast_slice(&proposal));
+        for (run, kernel) in runs.into_iter().zip(KERNELS) {
+            let Some(outcome) = run.run() else { continue };
+            let case = format!("{}: {case}, {count} columns, {:?}", kernel.name, self.step);
             outcome.check(&case, &[("proposal", &wanted)]);
         }
         proposal

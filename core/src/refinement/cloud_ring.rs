@@ -1,11 +1,13 @@
 //! The sweeps that the refinement remembers.
 
-use super::cloud::{Cloud, CloudDetail, DetailedCloud, Scratch, SweepReturns};
+use super::cloud::{Cloud, DetailedCloud, Scratch};
+use super::cloud_detail::CloudDetail;
 use super::motion::TARGETS_MAX;
 use super::scaled::Scaled;
 use super::scans::Target;
+use super::sweep_returns::SweepReturns;
 use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
-use raywake_simd::Simd;
+use crate::team::Team;
 
 pub type Targets<'a> = heapless::Vec<Target<'a>, TARGETS_MAX>;
 
@@ -41,9 +43,9 @@ impl CloudRing {
     /// Inserts a sweep instead of the oldest: see [`Cloud::fill`].
     pub fn insert(
         &mut self,
+        team: &impl Team,
         profile: &Profile,
         scaled: &Scaled,
-        simd: Simd,
         returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
@@ -51,9 +53,9 @@ impl CloudRing {
         self.newest = (self.newest + 1) % CYCLE;
         self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
         let cloud = &mut self.clouds[self.newest % REFINEMENT_SWEEPS_MAX];
-        cloud.simd = simd;
+        cloud.simd = team.simd();
         let detail = &mut self.details[self.newest % DETAILS];
-        cloud.fill(detail, profile, scaled, returns, apart, scratch)
+        cloud.fill(detail, team, (profile, scaled), returns, apart, scratch)
     }
 
     /// The cloud `age` sweeps before the newest, with the detail of one of the pair's.

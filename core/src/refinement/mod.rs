@@ -4,7 +4,7 @@
 //! works on clusters rather than columns: all columns of a cluster share one rigid motion. It has
 //! no counterpart in the dissertation. Per pair of sweeps:
 //!
-//! 1. Returns above the ground are thinned to one a sub-voxel ([`cloud`]).
+//! 1. Returns above the ground are thinned to one a sub-voxel ([`thinned_returns`]).
 //! 2. Columns that touch make a cluster ([`segments`]).
 //! 3. Each cluster is registered with the second sweep, and with one before the pair where
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
@@ -33,6 +33,7 @@
 
 mod align;
 mod cloud;
+mod cloud_detail;
 mod cloud_ring;
 mod cluster;
 mod clusters;
@@ -52,23 +53,24 @@ mod sightlines;
 mod slide;
 mod starts;
 mod surface;
+mod sweep_returns;
 #[cfg(test)]
 mod tests;
+mod thinned_returns;
 
 use crate::encoder::ColumnScores;
 use crate::params::Profile;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::team::Team;
 use cloud::Scratch;
-pub(crate) use cloud::SweepReturns;
 use cloud_ring::CloudRing;
 use clusters::Clusters;
 pub(crate) use cues::Prediction;
 use history::History;
-use raywake_simd::Simd;
 pub(crate) use refined::Refined;
 use scaled::Scaled;
 use scans::Scans;
+pub(crate) use sweep_returns::SweepReturns;
 
 /// State of the refinement between sweeps.
 pub struct Refinement {
@@ -97,17 +99,16 @@ impl Refinement {
     }
 
     /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or
-    /// higher than clusters are; `simd` are the instructions it is searched with. Returns how many
-    /// returns had no room.
+    /// higher than clusters are. Returns how many returns had no room.
     pub(crate) fn insert_cloud(
         &mut self,
+        team: &impl Team,
         profile: &Profile,
-        simd: Simd,
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
         let scaled = self.scaled.insert(Scaled::new(profile));
-        self.clouds.insert(profile, scaled, simd, returns, apart, &mut self.scratch)
+        self.clouds.insert(team, profile, scaled, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new

@@ -1,6 +1,7 @@
 //! The sweeps that clusters are registered with, and the residual of one return.
 
-use super::cloud::{Cloud, CloudDetail, DetailedCloud};
+use super::cloud::{Cloud, DetailedCloud};
+use super::cloud_detail::CloudDetail;
 use super::motion::Motion;
 use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;

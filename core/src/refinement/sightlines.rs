@@ -37,11 +37,9 @@ const LANES: usize = 8;
 /// A direction of a sensor, sensors in order.
 type Bin = usize;
 
-/// Scratch of [`Sightlines::fill`], an element for each return of a sweep.
-pub(super) struct Listed<'a> {
-    pub index: &'a mut [u32],
-    pub bin: &'a mut [u32],
-}
+/// Scratch of [`Sightlines::fill`]: the direction of every ray, as they come.
+pub(super) type Directions = [u16; SIGHTLINES_MAX];
+const _: () = assert!(SENSORS_MAX * AZIMUTHS <= u16::MAX as usize + 1);
 
 /// The rays of one sweep, thinned evenly to the capacity.
 pub struct Sightlines {
@@ -70,32 +68,35 @@ impl Sightlines {
         paths: &SensorPaths,
         points: TakenPoints,
         placed: &[Placed],
-        listed: Listed,
+        directions: &mut Directions,
     ) {
         self.paths = *paths;
         self.start.fill(0);
-        let (mut count, share) = (0, share_kept(placed.len()));
-        for (n, placed) in placed.iter().enumerate() {
-            if is_kept(n, share) && placed.at[0].is_finite() && count < SIGHTLINES_MAX {
-                let sensor = points.get(n).sensor as usize;
-                let eye = paths.at(sensor, paths.part(placed.offset_s));
-                let bin = bin(sensor, minus(placed.at, eye));
-                (listed.index[count], listed.bin[count]) = (n as u32, bin as u32);
-                self.start[bin + 1] += 1;
-                count += 1;
-            }
+        let share = share_kept(placed.len());
+        let kept = || {
+            let rays = placed.iter().enumerate();
+            rays.filter(|(n, placed)| is_kept(*n, share) && placed.at[0].is_finite())
+        };
+        let mut count = 0;
+        for ((n, placed), direction) in kept().zip(directions.iter_mut()) {
+            let sensor = points.get(n).sensor as usize;
+            let eye = paths.at(sensor, paths.part(placed.offset_s));
+            let bin = bin(sensor, minus(placed.at, eye));
+            *direction = bin as u16;
+            self.start[bin + 1] += 1;
+            count += 1;
         }
         for bin in 0..SENSORS_MAX * AZIMUTHS {
             self.start[bin + 1] += self.start[bin];
         }
-        // From the last one on, so that each end becomes its start, and the order stays.
-        for n in (0..count).rev() {
-            let bin = listed.bin[n] as usize;
-            self.start[bin + 1] -= 1;
-            self.keep(self.start[bin + 1] as usize, bin, &placed[listed.index[n] as usize]);
+        // Each start becomes its end, which is the next one's start.
+        self.start.copy_within(..SENSORS_MAX * AZIMUTHS, 1);
+        for ((_, placed), bin) in kept().zip(&directions[..count]) {
+            let to = &mut self.start[usize::from(*bin) + 1];
+            *to += 1;
+            let to = *to as usize - 1;
+            self.keep(to, usize::from(*bin), placed);
         }
-        self.start.copy_within(1.., 0);
-        self.start[SENSORS_MAX * AZIMUTHS] = count as u32;
     }
 
     /// Keeps a ray.

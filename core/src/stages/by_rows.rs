@@ -4,7 +4,7 @@
 //! thread and reads what no thread writes: how they are shared makes no difference.
 
 use super::background_filter::mark_by_bytes;
-use super::flow::expectation::expectation_by_rings;
+use super::flow::expectation_by_rings::expectation_by_rings;
 use super::occupancy_constancy::occupancy_constancy_by_bytes;
 use super::window::window;
 use super::{FOREGROUND_COUNT, Storage};

@@ -140,6 +140,9 @@ pub struct Stage {
     pub name: &'static str,
     /// Entry points in order, all with the stage's arguments.
     pub kernels: &'static [(&'static str, GroupCount)],
+    /// The kernels for devices that are CPUs, where those want others: a barrier costs them much,
+    /// and they take both ways at a branch. None where they do not.
+    pub on_cpus: &'static [(&'static str, GroupCount)],
     /// Arguments of the twin.
     pub arguments: &'static [Argument],
     /// What the scalar backend runs. Twins that wider instructions help are inlined, and use them.
@@ -147,11 +150,21 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// The kernels for devices of either kind.
+    pub fn all_kernels(&self) -> impl Iterator<Item = &'static (&'static str, GroupCount)> {
+        self.kernels.iter().chain(self.on_cpus)
+    }
+
+    /// The kernels for devices that are CPUs.
+    pub fn kernels_on_cpus(&'static self) -> &'static [(&'static str, GroupCount)] {
+        if self.on_cpus.is_empty() { self.kernels } else { self.on_cpus }
+    }
+
     /// What the kernels bind, in order: the arguments, and `counters` behind a list where threads
     /// have to know its length.
     pub fn bindings(&self) -> impl Iterator<Item = Argument> {
         let by_group = |(_, groups): &(_, GroupCount)| matches!(groups, GroupCount::GroupPerColumn);
-        let counted = !self.kernels.iter().all(by_group);
+        let counted = !self.all_kernels().all(by_group);
         let of =
             move |a: &Argument| [Some(*a), (a.is_list && counted).then_some(argument!(counters))];
         self.arguments.iter().flat_map(of).flatten()
@@ -255,8 +268,11 @@ macro_rules! buffers {
 /// [`Storage`], `[ENTRY: GROUPS, ..]`
 /// the entry points where there are several.
 macro_rules! stage {
-    ($name:ident in $($seg:ident)::+, ($($($a:ident)+),*), scalar: $fast:path, $groups:expr) => {
-        stage!(@@ $name, ($($($a)+),*), [($name, $groups)], $fast)
+    (
+        $name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr
+        $(, on_cpus: ($kernel:ident, $cpu_groups:expr))?
+    ) => {
+        stage!(@@ $name, $args, [($name, $groups)], [$(($kernel, $cpu_groups))?], $fast)
     };
     ($name:ident in $($seg:ident)::+, $args:tt, [$($kernel:ident: $groups:expr),*]) => {
         stage!(@ $name, $args, [$(($kernel, $groups)),*], $($seg)::+::$name)
@@ -265,20 +281,24 @@ macro_rules! stage {
         stage!(@ $name, $args, [($name, $groups)], $($seg)::+::$name)
     };
     (device $name:ident, $args:tt, $groups:expr) => {
-        stage!(@@ $name, $args, [($name, $groups)], |_, _| ())
+        stage!(@@ $name, $args, [($name, $groups)], [], |_, _| ())
     };
     (@ $name:ident, ($($($a:ident)+),*), $kernels:tt, $twin:path) => {
-        stage!(@@ $name, ($($($a)+),*), $kernels, |storage, workers| {
+        stage!(@@ $name, ($($($a)+),*), $kernels, [], |storage, workers| {
             workers.simd().run(
                 #[inline(always)]
                 || $twin($(passed!(storage, $($a)+)),*),
             )
         })
     };
-    (@@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*], $scalar:expr) => {
+    (
+        @@ $name:ident, ($($($a:ident)+),*), [$(($kernel:ident, $groups:expr)),*],
+        [$(($on_cpu:ident, $on_cpu_groups:expr)),*], $scalar:expr
+    ) => {
         &Stage {
             name: stringify!($name),
             kernels: &[$((stringify!($kernel), $groups)),*],
+            on_cpus: &[$((stringify!($on_cpu), $on_cpu_groups)),*],
             arguments: &[$(argument!($($a)+)),*],
             scalar: $scalar,
         }

@@ -15,6 +15,10 @@ use super::Tables;
 const LOAD: usize = 0;
 const FLOW: usize = 1;
 
+/// What a sweep takes beyond the time of its dispatches: what the CPU does meanwhile, submission
+/// and waiting.
+pub const MEANWHILE: &str = "meanwhile";
+
 /// A device with everything recorded.
 pub struct Device {
     executor: Executor,
@@ -26,7 +30,8 @@ impl Device {
     /// without rays: software devices compile kernels in their first run.
     pub fn new(profile: &Profile, tables: &Tables, options: &Options) -> Result<Device, GpuError> {
         let schedule = Schedule::new(FLOW_PROGRAMS, profile);
-        let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
+        let buffers = schedule.buffers(profile);
+        let executor = Executor::with(options, &buffers, |device| schedule.programs_on(device))?;
         let mut device = Device { executor, schedule };
         device.upload(Buffer::filter_table, bytemuck::cast_slice(&tables.filter))?;
         device.upload(Buffer::constancy_weights, bytemuck::cast_slice(&tables.constancy))?;
@@ -93,7 +98,7 @@ impl Perceive for Device {
     ) -> Result<Perceived<'_>, GpuError> {
         sweep.write(self.executor.upload(self.schedule.index(Heap::Upload, Buffer::sweep))?);
         self.executor.run_beside(FLOW, meanwhile)?;
-        timer.measured(&mut self.executor.times(FLOW), "submit and wait");
+        timer.measured(&mut self.executor.times(FLOW), MEANWHILE);
         if let Err(what) = self.left().check(sweep) {
             return Err(self.executor.give_up(FLOW, what));
         }

@@ -27,7 +27,8 @@ impl DeviceMap {
     /// Allocates and records for a profile.
     pub fn new(profile: &Profile, options: &Options) -> Result<DeviceMap, GpuError> {
         let schedule = Schedule::new(MAP_PROGRAMS, profile);
-        let executor = Executor::new(options, &schedule.buffers(profile), &schedule.programs)?;
+        let buffers = schedule.buffers(profile);
+        let executor = Executor::with(options, &buffers, |device| schedule.programs_on(device))?;
         Ok(DeviceMap { executor, schedule, bands: Bands::new(Mapper::keys(profile)) })
     }
 

@@ -21,8 +21,11 @@ use crate::config::Settings;
 use crate::console::interrupted;
 use crate::drive::Drive;
 use crate::error::RunError;
-use crate::team::{THREADS_MAX, ThreadTeam};
+use crate::team::ThreadTeam;
 use raywake_io::source::SweepData;
+
+/// Tracks that have ended and are estimated at the same time, each on a thread; 3.9 MB a track.
+const SOLVERS: usize = 4;
 
 /// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
 pub struct Tracker {
@@ -41,7 +44,7 @@ pub struct Tracker {
 struct TrackerParts {
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
-    /// One for each thread; fixed lags use the first.
+    /// Fixed lags use the first.
     solvers: Vec<Solver>,
     /// One for each track, or none.
     lags: Vec<Lag>,
@@ -127,7 +130,7 @@ impl Tracker {
         let parts = TrackerParts {
             front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
             tracks: vec![Track::new(); TRACKS_MAX],
-            solvers: (0..THREADS_MAX).map(|_| Solver::new()).collect(),
+            solvers: (0..SOLVERS).map(|_| Solver::new()).collect(),
             lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::new()).collect(),
         };
         Tracker {
@@ -149,7 +152,7 @@ impl Tracker {
         [
             ("front end", "FrontEnd", size_of::<FrontEnd>()),
             ("tracks", "Track", TRACKS_MAX * size_of::<Track>()),
-            ("estimates, one for each thread", "Solver", THREADS_MAX * solver),
+            ("estimates at the same time", "Solver", SOLVERS * solver),
             ("estimates of every sweep, with `--fixed-lag`", "Lag", TRACKS_MAX * lag),
         ]
     }

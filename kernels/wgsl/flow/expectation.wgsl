@@ -1,183 +1,183 @@
-// The feasible displacement of least energy for every foreground column.
-// Twin: core/src/stages/flow/expectation.rs, whose `expectation_by_rings` explains the search.
+// The feasible displacement of least energy for every foreground column, one workgroup a column.
+// Twin: core/src/stages/flow/expectation.rs; expectation_by_rings.rs beside it says why few
+// candidates are enough.
 
-struct Best { energy: i32, index: i32 }
+const ROW_QUADS = ROW_WORDS / 4u;
+const QUADS_PER_LANE = ROW_QUADS / ROW_WORKGROUP + 1u;
+// Displacements around the mean of the neighbours that are looked at before any others: a lane
+// each.
+const NEAR = 3;
+const NEAR_SIDE = 2 * NEAR + 1;
+const_assert u32(NEAR_SIDE * NEAR_SIDE) <= ROW_WORKGROUP;
 
-fn inside(i: i32, j: i32) -> bool {
-    return i >= 0 && i < sweep.side && j >= 0 && j < sweep.side;
+// Rows of the column and its neighbours in `pair_cost`, NONE where there is none, one less outside
+// the window.
+var<workgroup> rows: array<u32, 9>;
+// Of the valid flows around: how many, their sum, and that of their squares.
+var<workgroup> around: array<atomic<i32>, 4>;
+// Least energy of those near and of all, and where the latter is.
+var<workgroup> least: array<atomic<u32>, 2>;
+var<workgroup> place: atomic<u32>;
+
+struct Search {
+    column: i32,
+    i: i32,
+    j: i32,
+    own: u32,
+    // Of neighbours that have no row.
+    beside: i32,
+    n: i32,
+    sum: vec2<i32>,
+    squares: i32,
 }
 
-// Rows of the column and its neighbours in `pair_cost`, NONE where there is none.
-var<private> rows: array<u32, 9>;
-// Cost of those without one: inside the window unknown, outside it a number of the profile.
-var<private> beside: i32;
-
-fn look_around(i: i32, j: i32) {
-    beside = 0;
-    for (var n = 0; n < 9; n += 1) {
-        let ni = i + n / 3 - 1;
-        let nj = j + n % 3 - 1;
-        var row = NONE;
-        if inside(ni, nj) {
-            row = foreground_index.d[ni * sweep.side + nj];
-            beside += select(0, i32(COST_UNKNOWN), row == NONE);
-        } else {
-            beside += sweep.outside_cost;
-        }
-        rows[n] = row;
-    }
-}
-
-// Eight costs of the window, two a word.
+// Eight costs of the window, two a word: nine of at most COST_MAX never carry.
 fn costs_of(quad: u32) -> vec4<u32> {
     var sum = vec4<u32>(0u);
     for (var n = 0; n < 9; n += 1) {
         if rows[n] < FOREGROUND_MAX {
-            sum += pair_cost.d[rows[n] * (ROW_WORDS / 4u) + quad];
+            sum += pair_cost.d[rows[n] * ROW_QUADS + quad];
         }
     }
     return sum;
 }
 
-fn cost_in(costs: vec4<u32>, n: u32) -> i32 {
-    return i32((costs[n / 2u] >> (16u * (n & 1u))) & 0xffffu) + beside;
-}
-
-fn displacement(index: i32) -> vec2<i32> {
-    return vec2<i32>(index / i32(LINE), index % i32(LINE)) - vec2<i32>(REACH);
-}
-
-fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best {
-    if energy > best.energy || (energy == best.energy && index > best.index) {
-        return best;
+// Energy of a displacement within reach and its place in the row, NONE where it is not feasible or
+// `energy_max` or more.
+fn energy_at(s: Search, d: vec2<i32>, costs: vec4<u32>, energy_max: u32) -> vec2<u32> {
+    let index = u32(d.x + REACH) * LINE + u32(d.y + REACH);
+    let cost = i32((costs[(index % 8u) / 2u] >> (16u * (index & 1u))) & 0xffffu);
+    let square = d.x * d.x + d.y * d.y;
+    let smoothness = s.squares + s.n * square - 2 * (d.x * s.sum.x + d.y * s.sum.y);
+    // Never negative: its order is that of unsigned numbers, and NONE is above all.
+    let energy = u32(cost + s.beside + sweep.displacement_cost * square
+        + sweep.smoothing * smoothness);
+    if energy >= energy_max || !inside_square(s.i + d.x, s.j + d.y, sweep.side) {
+        return vec2<u32>(NONE);
     }
-    let d = displacement(index);
-    let at = column + d.x * sweep.side + d.y;
-    if u32(energy) < target_energy.d[at] || own == pack_flow(d) {
-        return Best(energy, index);
+    let at = s.column + d.x * sweep.side + d.y;
+    if energy < target_energy.d[at] || s.own == pack_flow(d) {
+        return vec2<u32>(energy, index);
     }
-    return best;
+    return vec2<u32>(NONE);
 }
 
-// Every displacement, without smoothing.
-fn everywhere(column: i32, i: i32, j: i32, own: u32) -> Best {
-    var best = Best(I32_MAX, I32_MAX);
-    for (var quad = 0u; quad < ROW_WORDS / 4u; quad += 1u) {
+// Of the column's displacements those that fall to a lane, without any in the padding.
+fn everywhere(s: Search, lane: u32) -> vec2<u32> {
+    var best = vec2<u32>(NONE);
+    for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= QUADS_PER_LANE
         let costs = costs_of(quad);
         for (var n = 0u; n < 8u; n += 1u) {
-            let index = i32(8u * quad + n);
-            let d = displacement(index);
-            if d.y <= REACH && inside(i + d.x, j + d.y) {
-                let square = d.x * d.x + d.y * d.y;
-                let energy = cost_in(costs, n) + sweep.displacement_cost * square;
-                if energy < best.energy {
-                    best = consider(best, column, index, energy, own);
-                }
+            let index = 8u * quad + n;
+            let d = vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
+            if d.y <= REACH {
+                let found = energy_at(s, d, costs, best.x);
+                best = select(best, found, found.x < best.x);
             }
         }
     }
     return best;
 }
 
-// `a / n` to the nearest integer, halves upwards; `n` is positive.
-fn round_div(a: i32, n: i32) -> i32 {
-    let twice = 2 * a + n;
-    let quotient = twice / (2 * n);
-    return quotient - select(0, 1, quotient * 2 * n > twice);
+// The displacement near the mean that falls to a lane.
+fn near_mean(s: Search, lane: i32) -> vec2<u32> {
+    let mean = vec2<i32>(round_div(s.sum.x, s.n), round_div(s.sum.y, s.n));
+    let d = mean + vec2<i32>(lane / NEAR_SIDE, lane % NEAR_SIDE) - vec2<i32>(NEAR);
+    if lane >= NEAR_SIDE * NEAR_SIDE || max(abs(d.x), abs(d.y)) > REACH {
+        return vec2<u32>(NONE);
+    }
+    let index = u32(d.x + REACH) * LINE + u32(d.y + REACH);
+    return energy_at(s, d, costs_of(index / 8u), NONE);
 }
 
-// Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
-fn rings(
-    rank: u32,
-    column: i32,
-    i: i32,
-    j: i32,
-    own: u32,
-    n: i32,
-    s: vec2<i32>,
-    squares: i32,
-) -> Best {
-    var best = Best(I32_MAX, I32_MAX);
-    let floor_energy = i32(min_cost.d[rank].x);
-    let mean = vec2<i32>(round_div(s.x, n), round_div(s.y, n));
-    let spread = (n * squares - s.x * s.x - s.y * s.y) / n;
-    for (var ring = 0; ring <= 2 * REACH; ring += 1) {
-        let near = max(2 * ring - 1, 0);
-        if floor_energy + sweep.smoothing * (n * near * near / 4 + spread) > best.energy {
-            break;
-        }
-        // The ring's cells in order, 8 of them per unit of its radius, one in its middle.
-        let cells = max(8 * ring, 1);
-        for (var cell = 0; cell < cells; cell += 1) { // <= 8 * 2 * REACH
-            let d = mean + on_ring(ring, cell);
-            if inside(i + d.x, j + d.y) && max(abs(d.x), abs(d.y)) <= REACH {
-                let square = d.x * d.x + d.y * d.y;
-                let smoothness = squares + n * square - 2 * (d.x * s.x + d.y * s.y);
-                let index = (d.x + REACH) * i32(LINE) + d.y + REACH;
-                let cost = cost_in(costs_of(u32(index) / 8u), u32(index) % 8u);
-                let energy = cost
-                    + sweep.displacement_cost * square + sweep.smoothing * smoothness;
-                best = consider(best, column, index, energy, own);
-            }
-        }
-    }
-    return best;
+// Whether nothing farther from the mean than those near can have this energy or less.
+fn excludes(s: Search, floor_energy: u32, energy: u32) -> bool {
+    let spread = (s.n * s.squares - s.sum.x * s.sum.x - s.sum.y * s.sum.y) / s.n;
+    // Twice the least distance of those of the next ring from the mean, which was rounded.
+    let near = 2 * (NEAR + 1) - 1;
+    let smoothness = s.n * near * near / 4 + spread;
+    return floor_energy + u32(sweep.smoothing * smoothness) > energy;
 }
 
-// Cell `n` of a ring: two full lines, then the sides.
-fn on_ring(ring: i32, n: i32) -> vec2<i32> {
-    let line = 2 * ring + 1;
-    if n < line {
-        return vec2<i32>(-ring, n - ring);
-    }
-    if n < 2 * line {
-        return vec2<i32>(ring, n - line - ring);
-    }
-    let side = n - 2 * line;
-    return vec2<i32>(side / 2 - ring + 1, select(-ring, ring, (side & 1) == 1));
+fn lesser(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    return select(a, b, b.x < a.x || (b.x == a.x && b.y < a.y));
 }
 
 @compute @workgroup_size(ROW_WORKGROUP)
-fn expectation(@builtin(global_invocation_id) id: vec3<u32>) {
-    let rank = id.x;
-    if rank >= counters.d[FOREGROUND_COUNT] {
-        return;
-    }
+fn expectation(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let rank = group.x;
     let column = i32(foreground.d[rank]);
+    let known = min_cost.d[rank];
     let i = column / sweep.side;
     let j = column % sweep.side;
-    var count = 0;
-    var sum = vec2<i32>(0);
-    var squares = 0;
-    for (var n = 0; n < 25; n += 1) {
-        let ni = i + n / 5 - 2;
-        let nj = j + n % 5 - 2;
-        if n != 12 && inside(ni, nj) {
-            let flow = flow.d[ni * sweep.side + nj];
-            if (flow & VALID) != 0u {
-                let s = flow_displacement(flow);
-                count += 1;
-                sum += s;
-                squares += s.x * s.x + s.y * s.y;
-            }
+    if lane < 9u {
+        let ni = i + i32(lane) / 3 - 1;
+        let nj = j + i32(lane) % 3 - 1;
+        rows[lane] = NONE - 1u;
+        if inside_square(ni, nj, sweep.side) {
+            rows[lane] = foreground_index.d[ni * sweep.side + nj];
         }
     }
-    let own = flow.d[column];
-    look_around(i, j);
-    var best = Best(I32_MAX, I32_MAX);
-    if count == 0 {
+    if lane < 4u {
+        atomicStore(&around[lane], 0);
+    }
+    if lane < 2u {
+        atomicStore(&least[lane], NONE);
+        atomicStore(&place, NONE);
+    }
+    workgroupBarrier();
+    let ni = i + i32(lane) / 5 - 2;
+    let nj = j + i32(lane) % 5 - 2;
+    if lane < 25u && lane != 12u && inside_square(ni, nj, sweep.side) {
+        let flow = flow.d[ni * sweep.side + nj];
+        if (flow & VALID) != 0u {
+            let s = flow_displacement(flow);
+            atomicAdd(&around[0], 1);
+            atomicAdd(&around[1], s.x);
+            atomicAdd(&around[2], s.y);
+            atomicAdd(&around[3], s.x * s.x + s.y * s.y);
+        }
+    }
+    workgroupBarrier();
+    var beside = 0;
+    for (var n = 0; n < 9; n += 1) {
+        beside += select(0, i32(COST_UNKNOWN), rows[n] == NONE);
+        beside += select(0, sweep.outside_cost, rows[n] == NONE - 1u);
+    }
+    let n = atomicLoad(&around[0]);
+    let sum = vec2<i32>(atomicLoad(&around[1]), atomicLoad(&around[2]));
+    let s = Search(column, i, j, flow.d[column], beside, n, sum, atomicLoad(&around[3]));
+    var mine = vec2<u32>(NONE);
+    if n > 0 {
+        mine = near_mean(s, i32(lane));
+    } else if lane == 0u {
         // Where it pays least, if it may.
-        let known = min_cost.d[rank];
-        best = consider(best, column, i32(known.y), i32(known.x), own);
-        if best.index == I32_MAX {
-            best = everywhere(column, i, j, own);
-        }
-    } else {
-        best = rings(rank, column, i, j, own, count, sum, squares);
+        let d = vec2<i32>(i32(known.y / LINE), i32(known.y % LINE)) - vec2<i32>(REACH);
+        mine = energy_at(s, d, costs_of(known.y / 8u), NONE);
     }
-    if best.index == I32_MAX {
-        proposal.d[rank] = vec2<u32>(0u, NONE);
-    } else {
-        proposal.d[rank] = vec2<u32>(pack_flow(displacement(best.index)), u32(best.energy));
+    atomicMin(&least[0], mine.x);
+    workgroupBarrier();
+    let energy = atomicLoad(&least[0]);
+    var done = energy != NONE;
+    if n > 0 {
+        done = excludes(s, known.x, energy);
+    }
+    if !done {
+        mine = lesser(mine, everywhere(s, lane));
+    }
+    atomicMin(&least[1], mine.x);
+    workgroupBarrier();
+    if mine.x == atomicLoad(&least[1]) {
+        atomicMin(&place, mine.y);
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        let index = atomicLoad(&place);
+        let d = vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
+        let found = vec2<u32>(pack_flow(d), atomicLoad(&least[1]));
+        proposal.d[rank] = select(found, vec2<u32>(0u, NONE), index == NONE);
     }
 }

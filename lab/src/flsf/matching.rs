@@ -10,7 +10,7 @@ use raywake_core::params::{LINE, Profile, REACH, ROW, SIDE as SEARCH};
 use raywake_core::prepare::uniform_of;
 use raywake_core::record::{Flow, MinCost, NONE, Proposal, SweepUniform, VALID, flow_displacement};
 use raywake_core::stages::background_filter::background_filter_by_bytes;
-use raywake_core::stages::flow::{expectation::propose, maximisation::maximisation};
+use raywake_core::stages::flow::{expectation_by_rings::propose, maximisation::maximisation};
 use raywake_core::stages::occupancy_constancy::occupancy_constancy_by_bytes;
 use raywake_core::stages::window::{Costs, WindowCosts, least};
 

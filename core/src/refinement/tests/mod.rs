@@ -8,7 +8,8 @@ mod motion;
 mod odd;
 mod sightlines;
 
-use super::cloud::{Cloud, CloudDetail, DetailedCloud};
+use super::cloud::{Cloud, DetailedCloud};
+use super::cloud_detail::CloudDetail;
 use super::scans::Target;
 use super::*;
 use crate::encoder::layers::SCORES;
@@ -19,7 +20,6 @@ use crate::sweep::{Placed, Point};
 use crate::team::Alone;
 use crate::thinning::TakenPoints;
 use core::ops::Deref;
-use raywake_simd::Simd;
 use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
@@ -100,7 +100,8 @@ impl Returns {
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
         let returns = self.of_sweep(0.0, &SENSORS);
         let Kept { cloud, detail } = kept;
-        (cloud.fill(detail, &profile(), &scaled(), returns, &mut apart, &mut scratch), apart)
+        let profiles = (&profile(), &scaled());
+        (cloud.fill(detail, &Alone, profiles, returns, &mut apart, &mut scratch), apart)
     }
 
     fn cloud(&self) -> Kept {
@@ -202,7 +203,7 @@ fn give_seen(
 ) {
     let mut apart = vec![false; returns.points.len()];
     let returns = returns.of_sweep(n as f64 * 0.1, sensors);
-    refinement.insert_cloud(profile, Simd::BASELINE, returns, &mut apart);
+    refinement.insert_cloud(&Alone, profile, returns, &mut apart);
 }
 
 fn all(points: &[Point]) -> TakenPoints<'_> {

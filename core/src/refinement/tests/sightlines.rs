@@ -1,13 +1,14 @@
 //! What rays tell of a place.
 
 use super::super::sample::SurfaceWeight;
-use super::super::sightlines::{Listed, Sightlines};
+use super::super::sightlines::Sightlines;
 use super::*;
 use crate::frame;
 use crate::params::SIGHTLINES_MAX;
 use crate::pose::{Pose, Twist};
 use crate::prepare::Placement;
 use crate::sweep::{Rig, Sweep, Timing};
+use raywake_simd::Simd;
 
 /// A sensor in the window, and one beside it.
 const EYES: [[f32; 3]; 2] = [[20.0, 20.0, 5.0], [-40.0, 30.0, 5.0]];
@@ -20,9 +21,8 @@ fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sight
     let points: Vec<Point> = ends.iter().map(point).collect();
     let placed: Vec<Placed> =
         ends.iter().map(|&(at, _, offset_s)| Placed { at, offset_s }).collect();
-    let (mut index, mut bin) = (vec![0; ends.len()], vec![0; ends.len()]);
-    let listed = Listed { index: &mut index, bin: &mut bin };
-    sightlines.fill(sensors, all(&points), &placed, listed);
+    let mut directions = [0; SIGHTLINES_MAX];
+    sightlines.fill(sensors, all(&points), &placed, &mut directions);
     sightlines
 }
 

@@ -1,7 +1,8 @@
 //! The rounds against equation (3.14) by brute force.
 
 extern crate std;
-use super::expectation::{expectation, expectation_by_rings};
+use super::expectation::expectation;
+use super::expectation_by_rings::expectation_by_rings;
 use super::maximisation::{maximisation, target};
 use crate::params::{LINE, REACH, ROW};
 use crate::record::{
