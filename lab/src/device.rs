@@ -104,7 +104,7 @@ fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results,
 fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
     let parts = [MEANWHILE, ON_CPU[0], ON_CPU[1], ON_CPU[2], ON_CPU[3]];
     let columns = [what, "threads", "CPU alone", "p99", "with the device", "p99", "on the device"];
-    let columns: Vec<&str> = columns.into_iter().chain(parts).chain(["digest"]).collect();
+    let columns: Vec<&str> = columns.into_iter().chain(parts).collect();
     let row = |both: &Both| {
         let total = |run: &Ran| Ok::<_, Error>([run.total_ms("median")?, run.total_ms("p99")?]);
         let [scalar, device] = [total(&both.scalar)?, total(&both.device)?];
@@ -114,9 +114,7 @@ fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
         let times = scalar.into_iter().chain(device).map(|ms| Cell::Number(ms, 1));
         let dispatched = Cell::Number(dispatches(&both.device).map(|(_, ms)| ms).sum(), 2);
         let parts = parts.map(|part| Cell::Number(of(part).map_or(0.0, |(_, ms)| ms), 1));
-        let digest = Cell::from(both.device.text("digest"));
-        let cells = cells.into_iter().chain(times).chain([dispatched]).chain(parts);
-        Ok(TableRow::new(cells.chain([digest])))
+        Ok(TableRow::new(cells.into_iter().chain(times).chain([dispatched]).chain(parts)))
     };
     let rows = runs.iter().map(row).collect::<Result<Vec<_>, Error>>()?;
     Ok(Table::new(id, "Medians, ms; the last columns with the device", &columns, rows))

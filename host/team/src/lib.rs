@@ -13,8 +13,8 @@ use raywake_alloc_guard::watch;
 use raywake_core::team::Team;
 use raywake_simd::Simd;
 
-/// Threads at most. A sweep of `kitti_raw_0005` beside a GPU takes 38, 22, 18 and 17 ms with 1, 2,
-/// 4 and 8 threads of a machine of 16 cores, and 14 with all of them: the rest is left to others.
+/// Threads at most. A sweep of `kitti_raw_0005` beside a GPU takes 39, 28, 19 and 16 ms on 1, 2, 4
+/// and 8 cores of a machine of 16, and 13 to 17 on all of them: the rest is left to others.
 pub const THREADS_MAX: usize = 8;
 
 /// Whoever belongs to the thread that asks.
