@@ -16,6 +16,7 @@ use crate::sweep::{Placed, Point, Rig, Sweep, Timing};
 use crate::team::{self, Team};
 use crate::thinning::TakenPoints;
 use batch::{RayLattice, ReturnBatch};
+use core::array::from_fn;
 use glam::DVec3;
 use raywake_simd::Simd;
 
@@ -105,15 +106,13 @@ impl Preparation {
         team::each(team, &mut parts, &|(range, castings)| {
             caster.cast_all(points.range(range.clone()), castings);
         });
-        let mut dropped = DroppedReturns::default();
-        let found = parts.into_iter().map(|(_, castings)| {
-            dropped += castings.dropped;
-            castings.count
-        });
-        let found: heapless::Vec<usize, PARTS> = found.collect();
-        dropped.over_capacity = points.left_out() as u64;
+        let found: [_; PARTS] = from_fn(|n| (parts[n].1.count, parts[n].1.dropped));
+        drop(parts);
+        let over_capacity = points.left_out() as u64;
+        let mut dropped = DroppedReturns { over_capacity, ..DroppedReturns::default() };
         let (mut end, mut from) = (0, 0);
-        for (count, room) in found.into_iter().zip(admitted) {
+        for ((count, of_part), room) in found.into_iter().zip(admitted) {
+            dropped += of_part;
             if end < from {
                 // Seldom: `rays` may be memory of a device, slow to read.
                 rays.copy_within(from..from + count, end);
@@ -205,7 +204,7 @@ impl<'a> Caster<'a> {
                 side: profile.side,
                 levels: profile.levels,
                 centre: central(profile),
-                to_voxel: core::array::from_fn(matrix),
+                to_voxel: from_fn(matrix),
                 drift: Drift::new(profile, window, sweep, if deskew { slot_s } else { 0.0 }),
             },
             moving,

@@ -17,7 +17,7 @@ use crate::tracklet::{TrackletTurnover, Tracklets};
 use core::ops::Range;
 use glam::DVec3;
 
-/// Returns that a thread looks at in one piece; some 0.2 ms.
+/// Returns that a thread looks at in one piece: an eighth of a sweep of an HDL-64E.
 const RETURNS_LEAST: usize = 1 << 14;
 
 /// Index of the record of every column of the first sweep's window, [`NONE`] where it has none.
