@@ -12,10 +12,12 @@ crate::params! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MovesParams {
         /// What is put out as moving has at least this P(moves).
-        pub moves_min: f32 = 0.5, "", (0 to 1),
-            "Likelier than not. Precision and recall of columns on simulated streets of another \
-             seed than the weights are from (as for `could_move_min`; slow and plain, `vlp32x2`): \
-             95.4 and 91.1, 96.2 and 97.5 % at 0.3, 96.2 and 89.4, 96.8 and 97.0 here.";
+        pub moves_min: f32 = 0.4, "", (0 to 1),
+            "The least (of 0.3, 0.4, 0.5) at which fewer than one in 2,000 returns of a still \
+             simulated street move. Precision and recall of columns on simulated streets of \
+             another seed than the weights are from (as for `could_move_min`; slow and plain, \
+             `vlp32x2`): 95.4 and 91.1, 96.2 and 97.5 % at 0.3; 95.8 and 90.3, 96.4 and 97.3 \
+             here; 96.2 and 89.4, 96.8 and 97.0 at 0.5.";
         /// Logit without any cue.
         pub moves_bias: f32 = -5.87, "nat", (-100 to 100), FITTED;
         /// Weight of the evidence beyond what the hypothesis test asked for.
