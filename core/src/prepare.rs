@@ -100,13 +100,13 @@ impl Preparation {
                 let rays = rays_left.split_off_mut(..of_part).expect("room");
                 let columns = columns.split_off_mut(..len).expect("as many");
                 let placed = placed.split_off_mut(..len.min(placed.len())).expect("no more");
-                (part(n), Castings::new(rays, columns, placed))
+                Castings::new(rays, columns, placed)
             })
             .collect();
-        team::each(team, &mut parts, &|(range, castings)| {
-            caster.cast_all(points.range(range.clone()), castings);
+        team::each(team, 0, &mut parts, &|n, castings| {
+            caster.cast_all(points.range(part(n)), castings);
         });
-        let found: [_; PARTS] = from_fn(|n| (parts[n].1.count, parts[n].1.dropped));
+        let found: [_; PARTS] = from_fn(|n| (parts[n].count, parts[n].dropped));
         drop(parts);
         let over_capacity = points.left_out() as u64;
         let mut dropped = DroppedReturns { over_capacity, ..DroppedReturns::default() };

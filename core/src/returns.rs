@@ -92,6 +92,7 @@ impl Returns {
             }
         }
         let returns = SweepReturns {
+            profile,
             corner: window.corner,
             stamp_s: sweep.stamp_s,
             points,
@@ -99,7 +100,7 @@ impl Returns {
             columns,
             sensors: &SensorPaths::new(placement),
         };
-        refinement.insert_cloud(team, profile, returns, &mut self.is_apart[self.now][..taken])
+        refinement.insert_cloud(team, returns, &mut self.is_apart[self.now][..taken])
     }
 
     /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are

@@ -47,8 +47,7 @@ impl Team for Alone {
     }
 }
 
-/// Fills each slot with the value of its index, counted from `first`. By recursive halving, so that
-/// idle threads can steal work.
+/// Fills each slot with the value of its index, counted from `first`.
 #[cfg(feature = "pipeline")]
 pub(crate) fn fill<T: Send>(
     team: &impl Team,
@@ -56,26 +55,25 @@ pub(crate) fn fill<T: Send>(
     slots: &mut [T],
     value: &(impl Fn(usize) -> T + Sync),
 ) {
+    each(team, first, slots, &|index, slot| *slot = value(index));
+}
+
+/// Does the work of each slot, by its index counted from `first`. By recursive halving, so that
+/// idle threads can steal work.
+#[cfg(feature = "pipeline")]
+pub(crate) fn each<T: Send>(
+    team: &impl Team,
+    first: usize,
+    slots: &mut [T],
+    work: &(impl Fn(usize, &mut T) + Sync),
+) {
     match slots {
         [] => {}
-        [slot] => *slot = value(first),
+        [slot] => work(first, slot),
         _ => {
             let half = slots.len() / 2;
             let (a, b) = slots.split_at_mut(half);
-            team.join(|| fill(team, first, a, value), || fill(team, first + half, b, value));
-        }
-    }
-}
-
-/// Does the work of each slot. By recursive halving, as [`fill`].
-#[cfg(feature = "pipeline")]
-pub(crate) fn each<T: Send>(team: &impl Team, slots: &mut [T], work: &(impl Fn(&mut T) + Sync)) {
-    match slots {
-        [] => {}
-        [slot] => work(slot),
-        _ => {
-            let (a, b) = slots.split_at_mut(slots.len() / 2);
-            team.join(|| each(team, a, work), || each(team, b, work));
+            team.join(|| each(team, first, a, work), || each(team, first + half, b, work));
         }
     }
 }

@@ -21,6 +21,11 @@ fn flow_displacement(flow: u32) -> vec2<i32> {
     return vec2<i32>(i32((flow >> 8u) & 0xffu), i32(flow & 0xffu)) - vec2<i32>(REACH);
 }
 
+// The displacement at an element of a row.
+fn displacement_at(index: u32) -> vec2<i32> {
+    return vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
+}
+
 // Bresenham's walk in three dimensions, as `Walk` in core/src/stages/grid/walk.rs.
 struct Walk {
     voxel: vec3<i32>,
@@ -62,4 +67,11 @@ fn round_div(a: i32, n: i32) -> i32 {
     let twice = 2 * a + n;
     let quotient = twice / (2 * n);
     return quotient - select(0, 1, quotient * 2 * n > twice);
+}
+
+// The `n`-th column of the square that reaches so far around one, -1 outside the window.
+fn column_around(i: i32, j: i32, reach: i32, n: i32, side: i32) -> i32 {
+    let line = 2 * reach + 1;
+    let at = vec2<i32>(i, j) + vec2<i32>(n / line, n % line) - vec2<i32>(reach);
+    return select(-1, at.x * side + at.y, inside_square(at.x, at.y, side));
 }

@@ -9,7 +9,7 @@ var<workgroup> place: atomic<u32>;
 
 // Energy and place of the displacement at an element of the row, NONE where it leads outside.
 fn energy_at(i: i32, j: i32, at: u32, cost: u32, outside: i32) -> vec2<u32> {
-    let d = vec2<i32>(i32(at / LINE), i32(at % LINE)) - vec2<i32>(REACH);
+    let d = displacement_at(at);
     let square = d.x * d.x + d.y * d.y;
     let energy = u32(i32(cost) + sweep.displacement_cost * square + outside);
     let may_be = d.y <= REACH && inside_square(i + d.x, j + d.y, sweep.side);
@@ -29,12 +29,11 @@ fn window(
     let i = column / sweep.side;
     let j = column % sweep.side;
     if lane < 9u {
-        let ni = i + i32(lane) / 3 - 1;
-        let nj = j + i32(lane) % 3 - 1;
-        // A neighbour outside costs nothing here: it is the same at every displacement.
+        let neighbour = column_around(i, j, 1, i32(lane), sweep.side);
+        // One outside costs nothing here: it is the same at every displacement.
         rows[lane] = NONE - 1u;
-        if inside_square(ni, nj, sweep.side) {
-            rows[lane] = foreground_index.d[ni * sweep.side + nj];
+        if neighbour >= 0 {
+            rows[lane] = foreground_index.d[neighbour];
         }
     }
     if lane == 0u {

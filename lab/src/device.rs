@@ -3,11 +3,12 @@
 
 use crate::program::{ProgramBuild, Ran, beside_this};
 use crate::report::{Cell, Report, Results, Table, TableRow};
-use raywake::backend::device::MEANWHILE;
 use raywake::error::RunError;
+use raywake_core::params::Profile;
+use raywake_core::stages::FLOW_PROGRAMS;
 use raywake_io::Error;
 use raywake_io::sink::atomic;
-use std::collections::BTreeSet;
+use raywake_kernels::schedule::Schedule;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -32,10 +33,6 @@ pub struct Args {
     device: Option<usize>,
 }
 
-/// Built-in profiles.
-const PROFILES: [&str; 4] = ["hdl64", "wide", "far", "dissertation"];
-/// Stages of a sweep that the CPU does, whoever does the others.
-const ON_CPU: [&str; 4] = ["rays", "refine", "track", "out"];
 /// Numbers of CPU cores that are tried, as far as there are so many.
 const CORES: [usize; 5] = [1, 2, 4, 8, 16];
 
@@ -62,17 +59,19 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         vulkan.extend(index.as_ref().into_iter().flat_map(|index| ["--device", index]));
         let device = program.run(before, &vulkan)?;
         let scalar = program.run(before, &[&common[..], &["scalar"]].concat())?;
-        if device.text("digest") != scalar.text("digest") {
-            let what = format!("{name}: other results on {}", device.text("device"));
-            return Err(Error::Usage(what));
+        let other = device.text("digest") != scalar.text("digest");
+        let failure = other.then_some("other results").or(device.get("device_failure"));
+        if let Some(what) = failure {
+            return Err(Error::Usage(format!("{name}, {}: {what}", device.text("device"))));
         }
         Ok(Both { name: name.to_owned(), device, scalar })
     };
-    let profiles = PROFILES.iter().map(|name| both(name, &[], name));
+    let shipped = Profile::shipped();
+    let profiles = shipped.iter().map(|profile| both(&profile.name, &[], &profile.name));
     let profiles = profiles.collect::<Result<Vec<_>, _>>()?;
     let on = |cores: usize| {
         let these = format!("0-{}", cores - 1);
-        both(&cores.to_string(), &["taskset", "-c", &these], PROFILES[0])
+        both(&cores.to_string(), &["taskset", "-c", &these], &shipped[0].name)
     };
     let available = available_parallelism().map_or(1, NonZero::get);
     let threads = CORES.into_iter().filter(|cores| *cores <= available).map(on);
@@ -81,9 +80,16 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Median times of what a device does in a sweep, ms.
-fn dispatches(run: &Ran) -> impl Iterator<Item = (&str, f64)> {
-    run.stages_ms().filter(|(name, _)| !ON_CPU.contains(name) && *name != MEANWHILE)
+/// Stages that a device does, in their order.
+fn on_device() -> Vec<&'static str> {
+    let programs = Schedule::new(FLOW_PROGRAMS, &Profile::hdl64()).programs;
+    let mut names = Vec::new();
+    for name in programs.iter().flat_map(|p| &p.ops).map(|op| op.name()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results, Error> {
@@ -100,21 +106,27 @@ fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results,
     report.write(&args.out)
 }
 
-/// Whole sweeps, and their parts beside the device.
+/// Whole sweeps, and what of them the CPU does beside the device.
 fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
-    let parts = [MEANWHILE, ON_CPU[0], ON_CPU[1], ON_CPU[2], ON_CPU[3]];
+    let on_device = on_device();
+    let beside = |run: &Ran| -> Vec<(String, f64)> {
+        let stages = run.stages_ms().filter(|(name, _)| !on_device.contains(name));
+        stages.map(|(name, ms)| (name.to_owned(), ms)).collect()
+    };
+    let parts = runs.first().map_or(Vec::new(), |both| beside(&both.device));
     let columns = [what, "threads", "CPU alone", "p99", "with the device", "p99", "on the device"];
-    let columns: Vec<&str> = columns.into_iter().chain(parts).collect();
+    let columns: Vec<&str> =
+        columns.into_iter().chain(parts.iter().map(|(name, _)| name.as_str())).collect();
     let row = |both: &Both| {
         let total = |run: &Ran| Ok::<_, Error>([run.total_ms("median")?, run.total_ms("p99")?]);
         let [scalar, device] = [total(&both.scalar)?, total(&both.device)?];
-        let of = |part: &str| both.device.stages_ms().find(|(name, _)| *name == part);
         let used = both.device.summary["threads"].as_f64().unwrap_or_default();
         let cells = [Cell::from(both.name.as_str()), Cell::Number(used, 0)];
         let times = scalar.into_iter().chain(device).map(|ms| Cell::Number(ms, 1));
-        let dispatched = Cell::Number(dispatches(&both.device).map(|(_, ms)| ms).sum(), 2);
-        let parts = parts.map(|part| Cell::Number(of(part).map_or(0.0, |(_, ms)| ms), 1));
-        Ok(TableRow::new(cells.into_iter().chain(times).chain([dispatched]).chain(parts)))
+        let dispatched = on_device.iter().map(|name| both.device.stage_ms(name)).sum();
+        let parts = parts.iter().map(|(name, _)| Cell::Number(both.device.stage_ms(name), 1));
+        let cells = cells.into_iter().chain(times).chain([Cell::Number(dispatched, 2)]);
+        Ok(TableRow::new(cells.chain(parts)))
     };
     let rows = runs.iter().map(row).collect::<Result<Vec<_>, Error>>()?;
     Ok(Table::new(id, "Medians, ms; the last columns with the device", &columns, rows))
@@ -122,14 +134,25 @@ fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
 
 /// Each stage of each profile.
 fn stages(profiles: &[Both]) -> Table {
-    let names: BTreeSet<&str> =
-        profiles.iter().flat_map(|b| dispatches(&b.device)).map(|s| s.0).collect();
     let row = |name: &str| {
-        let of = |both: &Both| dispatches(&both.device).find(|s| s.0 == name).map_or(0.0, |s| s.1);
-        let times = profiles.iter().map(|both| Cell::Number(of(both), 3));
+        let times = profiles.iter().map(|both| Cell::Number(both.device.stage_ms(name), 3));
         TableRow::new([Cell::from(name)].into_iter().chain(times))
     };
     let columns: Vec<&str> =
         ["stage"].into_iter().chain(profiles.iter().map(|both| both.name.as_str())).collect();
-    Table::new("stages", "Medians, ms a sweep", &columns, names.into_iter().map(row).collect())
+    let rows = on_device().into_iter().map(row).collect();
+    Table::new("stages", "Medians, ms a sweep", &columns, rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raywake::backend::device::MEANWHILE;
+
+    #[test]
+    fn stages_of_a_device_are_those_of_its_programs() {
+        let stages = on_device();
+        assert!(stages.contains(&"copy") && stages.contains(&"expectation"), "{stages:?}");
+        assert!(!stages.contains(&"refine") && !stages.contains(&MEANWHILE), "{stages:?}");
+    }
 }

@@ -72,15 +72,25 @@ impl Ran {
         self.summary["total_ms"][figure].as_f64().ok_or_else(none)
     }
 
-    /// Median times of the stages of a sweep, ms, by their names.
+    /// Median time of a stage, ms; none where a sweep has none of it.
+    pub fn stage_ms(&self, name: &str) -> f64 {
+        self.summary["stage_ms"][name]["median"].as_f64().unwrap_or_default()
+    }
+
+    /// Those of all stages, by their names.
     pub fn stages_ms(&self) -> impl Iterator<Item = (&str, f64)> {
         let stages = self.summary["stage_ms"].as_object().into_iter().flatten();
         stages.filter_map(|(name, of)| Some((name.as_str(), of["median"].as_f64()?)))
     }
 
-    /// A text of the summary.
+    /// A text of the summary, empty where there is none.
     pub fn text(&self, name: &str) -> &str {
-        self.summary[name].as_str().unwrap_or_default()
+        self.get(name).unwrap_or_default()
+    }
+
+    /// A text of the summary.
+    pub fn get(&self, name: &str) -> Option<&str> {
+        self.summary[name].as_str()
     }
 }
 

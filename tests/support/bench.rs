@@ -69,13 +69,19 @@ impl Bench {
 
     /// Runs everything. None where there is no device.
     pub fn run(self) -> Option<Outcome> {
+        self.run_on(&Options::default())
+    }
+
+    /// Runs everything on a device: where that is under the validation layer, without a message.
+    pub fn run_on(self, options: &Options) -> Option<Outcome> {
         let mut executor =
-            vulkan::expect(Executor::new(&Options::default(), &self.table(), &[self.program()]))?;
+            vulkan::expect(Executor::new(options, &self.table(), &[self.program()]))?;
         let count = self.names.len();
         for (n, words) in self.contents.iter().enumerate() {
             executor.upload(n).expect("nothing has run").copy_from_slice(words);
         }
         executor.run(0).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(executor.message_texts(), [""; 0]);
         let after = (0..count).map(|n| executor.readback(2 * count + n).to_vec()).collect();
         Some(Outcome { before: self, after })
     }

@@ -6,10 +6,11 @@ use raywake_core::stages::flow::expectation::expectation;
 use raywake_core::stages::occupancy_constancy::COST_MAX;
 use raywake_core::stages::window::window as least_of;
 use raywake_core::stages::{COUNTERS, FOREGROUND_COUNT};
-use raywake_gpu::Kernel;
+use raywake_gpu::{Kernel, Options, Validation};
 use raywake_kernels::kernel::{EXPECTATION, EXPECTATION_BY_RINGS};
 use raywake_tests::bench::Bench;
 use raywake_tests::random::Random;
+use raywake_tests::vulkan;
 
 use super::{POISON, around, packed, window};
 
@@ -48,6 +49,11 @@ impl Round {
 
     /// Both kernels, compared with the twin. Returns the proposals.
     fn check(&self, case: &str) -> Vec<Proposal> {
+        self.check_on(&Options::default(), case)
+    }
+
+    /// The same on a device.
+    fn check_on(&self, options: &Options, case: &str) -> Vec<Proposal> {
         let count = self.foreground.len();
         let mut proposal = vec![[POISON; 2]; count];
         let mut counters = vec![POISON; COUNTERS];
@@ -68,8 +74,8 @@ impl Round {
                 .buffer("proposal", poisoned.clone())
         };
         let runs = [
-            bench().groups(&EXPECTATION, count),
-            bench().threads(&EXPECTATION_BY_RINGS, count + 3),
+            (&EXPECTATION, bench().groups(&EXPECTATION, count)),
+            (&EXPECTATION_BY_RINGS, bench().threads(&EXPECTATION_BY_RINGS, count + 3)),
         ];
         expectation(
             &self.step,
@@ -82,8 +88,8 @@ impl Round {
             &mut proposal,
         );
         let wanted = padded(bytemuck::cast_slice(&proposal));
-        for (run, kernel) in runs.into_iter().zip(KERNELS) {
-            let Some(outcome) = run.run() else { continue };
+        for (kernel, run) in runs {
+            let Some(outcome) = run.run_on(options) else { continue };
             let case = format!("{}: {case}, {count} columns, {:?}", kernel.name, self.step);
             outcome.check(&case, &[("proposal", &wanted)]);
         }
@@ -173,4 +179,17 @@ fn nothing_is_feasible_where_every_target_is_taken() {
     round.target_energy.fill(0);
     let proposal = round.check("taken");
     assert!(proposal.iter().all(|p| *p == [0, NONE]));
+}
+
+/// A device runs one of the two in the whole pipeline, which `validation.rs` looks at: here both.
+#[test]
+fn no_access_out_of_bounds_is_found() {
+    let Some(options) = vulkan::under(Validation::GpuAssisted) else { return };
+    let mut random = Random::new(24);
+    let all = (0..961).collect();
+    let mut round = Round::first(with(31, SETTINGS[0]), all, || random.below(COST_MAX + 1) as u16);
+    round.check_on(&options, "first round");
+    round.state.fill_with(|| any_flow(&mut random));
+    round.target_energy.fill(0);
+    round.check_on(&options, "no target left");
 }

@@ -9,7 +9,7 @@ use super::surface::{self, LazyWeight};
 use super::sweep_returns::SweepReturns;
 use super::thinned_returns::{ColumnSort, ThinnedReturns};
 use crate::ground::GroundEstimator;
-use crate::params::{CLUSTER_LEVELS_MAX, Profile, SIGHTLINES_MAX};
+use crate::params::{CLUSTER_LEVELS_MAX, SIGHTLINES_MAX};
 use crate::team::Team;
 use core::ops::{Deref, Range};
 use raywake_simd::Simd;
@@ -102,28 +102,27 @@ impl Cloud {
         &mut self,
         detail: &mut CloudDetail,
         team: &impl Team,
-        (profile, scaled): (&Profile, &Scaled),
+        scaled: &Scaled,
         returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
-        self.side = profile.side as usize;
+        self.side = returns.profile.side as usize;
+        self.simd = team.simd();
         (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
         let (side, Scratch { directions, ground, columns }) = (self.side, scratch);
         let Cloud { thinned, sightlines, .. } = self;
         let SweepReturns { points, placed, sensors, .. } = returns;
         let mut dropped = 0;
         let keep_returns = || {
-            detail.find_ground(profile, returns, ground);
+            detail.find_ground(returns, ground);
             dropped = thinned.fill(detail, side, scaled, returns, apart, columns);
             detail.weights[..thinned.places.len()].fill_with(LazyWeight::unknown);
         };
         team.join(keep_returns, || sightlines.fill(sensors, points, placed, directions));
         dropped
     }
-}
 
-impl Cloud {
     /// The column of a place, if that lies in the window.
     pub fn column_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let side = self.side as f32;

@@ -4,7 +4,7 @@ use super::surface::LazyWeight;
 use super::sweep_returns::SweepReturns;
 use crate::frame::central;
 use crate::ground::{GroundEstimator, GroundHeights};
-use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX, Profile};
+use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX};
 use crate::record::NONE;
 
 /// What is kept besides of the two sweeps of a pair.
@@ -25,12 +25,8 @@ impl CloudDetail {
     }
 
     /// Estimates the ground below the returns.
-    pub fn find_ground(
-        &mut self,
-        profile: &Profile,
-        returns: SweepReturns,
-        estimator: &mut GroundEstimator,
-    ) {
+    pub fn find_ground(&mut self, returns: SweepReturns, estimator: &mut GroundEstimator) {
+        let profile = returns.profile;
         let middle = central(profile).map(|c| c as f32 + 0.5);
         let level = middle[2] - (ANCHOR_ABOVE_GROUND_M / profile.voxel_m) as f32;
         let found = returns.columns.iter().zip(returns.placed);

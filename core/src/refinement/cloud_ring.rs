@@ -6,7 +6,7 @@ use super::motion::TARGETS_MAX;
 use super::scaled::Scaled;
 use super::scans::Target;
 use super::sweep_returns::SweepReturns;
-use crate::params::{Profile, REFINEMENT_SWEEPS_MAX};
+use crate::params::REFINEMENT_SWEEPS_MAX;
 use crate::team::Team;
 
 pub type Targets<'a> = heapless::Vec<Target<'a>, TARGETS_MAX>;
@@ -44,18 +44,16 @@ impl CloudRing {
     pub fn insert(
         &mut self,
         team: &impl Team,
-        profile: &Profile,
         scaled: &Scaled,
         returns: SweepReturns,
         apart: &mut [bool],
         scratch: &mut Scratch,
     ) -> usize {
         self.newest = (self.newest + 1) % CYCLE;
-        self.held = (self.held + 1).min(profile.refinement_sweeps as usize);
+        self.held = (self.held + 1).min(returns.profile.refinement_sweeps as usize);
         let cloud = &mut self.clouds[self.newest % REFINEMENT_SWEEPS_MAX];
-        cloud.simd = team.simd();
         let detail = &mut self.details[self.newest % DETAILS];
-        cloud.fill(detail, team, (profile, scaled), returns, apart, scratch)
+        cloud.fill(detail, team, scaled, returns, apart, scratch)
     }
 
     /// The cloud `age` sweeps before the newest, with the detail of one of the pair's.

@@ -59,7 +59,6 @@ mod tests;
 mod thinned_returns;
 
 use crate::encoder::ColumnScores;
-use crate::params::Profile;
 use crate::record::{Flow, SweepUniform, VALID, flow_displacement};
 use crate::team::Team;
 use cloud::Scratch;
@@ -103,12 +102,11 @@ impl Refinement {
     pub(crate) fn insert_cloud(
         &mut self,
         team: &impl Team,
-        profile: &Profile,
         returns: SweepReturns,
         apart: &mut [bool],
     ) -> usize {
-        let scaled = self.scaled.insert(Scaled::new(profile));
-        self.clouds.insert(team, profile, scaled, returns, apart, &mut self.scratch)
+        let scaled = self.scaled.insert(Scaled::new(returns.profile));
+        self.clouds.insert(team, scaled, returns, apart, &mut self.scratch)
     }
 
     /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new

@@ -86,16 +86,16 @@ impl Sightlines {
             self.start[bin + 1] += 1;
             count += 1;
         }
-        for bin in 0..SENSORS_MAX * AZIMUTHS {
-            self.start[bin + 1] += self.start[bin];
+        // Behind each direction its start, which becomes its end, where the next one starts.
+        let mut total = 0;
+        for start in &mut self.start[1..] {
+            total += core::mem::replace(start, total);
         }
-        // Each start becomes its end, which is the next one's start.
-        self.start.copy_within(..SENSORS_MAX * AZIMUTHS, 1);
         for ((_, placed), bin) in kept().zip(&directions[..count]) {
-            let to = &mut self.start[usize::from(*bin) + 1];
-            *to += 1;
-            let to = *to as usize - 1;
-            self.keep(to, usize::from(*bin), placed);
+            let bin = usize::from(*bin);
+            let to = self.start[bin + 1] as usize;
+            self.start[bin + 1] += 1;
+            self.keep(to, bin, placed);
         }
     }
 

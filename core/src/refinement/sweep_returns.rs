@@ -1,5 +1,6 @@
 //! What the refinement gets of a sweep.
 
+use crate::params::Profile;
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use crate::thinning::TakenPoints;
@@ -7,6 +8,8 @@ use crate::thinning::TakenPoints;
 /// The returns of a sweep.
 #[derive(Clone, Copy)]
 pub struct SweepReturns<'a> {
+    /// What it was placed by.
+    pub profile: &'a Profile,
     /// Lattice index of the window's first voxel.
     pub corner: [i32; 3],
     /// Time of the sweep, s.

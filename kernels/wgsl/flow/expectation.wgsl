@@ -4,8 +4,8 @@
 
 const ROW_QUADS = ROW_WORDS / 4u;
 const QUADS_PER_LANE = ROW_QUADS / ROW_WORKGROUP + 1u;
-// Displacements around the mean of the neighbours that are looked at before any others: a lane
-// each.
+// Displacements around the mean of the neighbours that are looked at before any others: as far
+// as there is a lane for each.
 const NEAR = 3;
 const NEAR_SIDE = 2 * NEAR + 1;
 const_assert u32(NEAR_SIDE * NEAR_SIDE) <= ROW_WORKGROUP;
@@ -31,6 +31,10 @@ struct Search {
     squares: i32,
 }
 
+fn index_of(d: vec2<i32>) -> u32 {
+    return u32(d.x + REACH) * LINE + u32(d.y + REACH);
+}
+
 // Eight costs of the window, two a word: nine of at most COST_MAX never carry.
 fn costs_of(quad: u32) -> vec4<u32> {
     var sum = vec4<u32>(0u);
@@ -45,7 +49,7 @@ fn costs_of(quad: u32) -> vec4<u32> {
 // Energy of a displacement within reach and its place in the row, NONE where it is not feasible or
 // `energy_max` or more.
 fn energy_at(s: Search, d: vec2<i32>, costs: vec4<u32>, energy_max: u32) -> vec2<u32> {
-    let index = u32(d.x + REACH) * LINE + u32(d.y + REACH);
+    let index = index_of(d);
     let cost = i32((costs[(index % 8u) / 2u] >> (16u * (index & 1u))) & 0xffffu);
     let square = d.x * d.x + d.y * d.y;
     let smoothness = s.squares + s.n * square - 2 * (d.x * s.sum.x + d.y * s.sum.y);
@@ -69,7 +73,7 @@ fn everywhere(s: Search, lane: u32) -> vec2<u32> {
         let costs = costs_of(quad);
         for (var n = 0u; n < 8u; n += 1u) {
             let index = 8u * quad + n;
-            let d = vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
+            let d = displacement_at(index);
             if d.y <= REACH {
                 let found = energy_at(s, d, costs, best.x);
                 best = select(best, found, found.x < best.x);
@@ -86,7 +90,7 @@ fn near_mean(s: Search, lane: i32) -> vec2<u32> {
     if lane >= NEAR_SIDE * NEAR_SIDE || max(abs(d.x), abs(d.y)) > REACH {
         return vec2<u32>(NONE);
     }
-    let index = u32(d.x + REACH) * LINE + u32(d.y + REACH);
+    let index = index_of(d);
     return energy_at(s, d, costs_of(index / 8u), NONE);
 }
 
@@ -114,11 +118,10 @@ fn expectation(
     let i = column / sweep.side;
     let j = column % sweep.side;
     if lane < 9u {
-        let ni = i + i32(lane) / 3 - 1;
-        let nj = j + i32(lane) % 3 - 1;
+        let neighbour = column_around(i, j, 1, i32(lane), sweep.side);
         rows[lane] = NONE - 1u;
-        if inside_square(ni, nj, sweep.side) {
-            rows[lane] = foreground_index.d[ni * sweep.side + nj];
+        if neighbour >= 0 {
+            rows[lane] = foreground_index.d[neighbour];
         }
     }
     if lane < 4u {
@@ -129,10 +132,9 @@ fn expectation(
         atomicStore(&place, NONE);
     }
     workgroupBarrier();
-    let ni = i + i32(lane) / 5 - 2;
-    let nj = j + i32(lane) % 5 - 2;
-    if lane < 25u && lane != 12u && inside_square(ni, nj, sweep.side) {
-        let flow = flow.d[ni * sweep.side + nj];
+    let neighbour = column_around(i, j, 2, i32(lane), sweep.side);
+    if lane < 25u && lane != 12u && neighbour >= 0 {
+        let flow = flow.d[neighbour];
         if (flow & VALID) != 0u {
             let s = flow_displacement(flow);
             atomicAdd(&around[0], 1);
@@ -155,8 +157,7 @@ fn expectation(
         mine = near_mean(s, i32(lane));
     } else if lane == 0u {
         // Where it pays least, if it may.
-        let d = vec2<i32>(i32(known.y / LINE), i32(known.y % LINE)) - vec2<i32>(REACH);
-        mine = energy_at(s, d, costs_of(known.y / 8u), NONE);
+        mine = energy_at(s, displacement_at(known.y), costs_of(known.y / 8u), NONE);
     }
     atomicMin(&least[0], mine.x);
     workgroupBarrier();
@@ -176,8 +177,7 @@ fn expectation(
     workgroupBarrier();
     if lane == 0u {
         let index = atomicLoad(&place);
-        let d = vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
-        let found = vec2<u32>(pack_flow(d), atomicLoad(&least[1]));
+        let found = vec2<u32>(pack_flow(displacement_at(index)), atomicLoad(&least[1]));
         proposal.d[rank] = select(found, vec2<u32>(0u, NONE), index == NONE);
     }
 }

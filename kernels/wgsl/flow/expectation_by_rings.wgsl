@@ -40,15 +40,11 @@ fn cost_in(costs: vec4<u32>, n: u32) -> i32 {
     return i32((costs[n / 2u] >> (16u * (n & 1u))) & 0xffffu) + beside;
 }
 
-fn displacement(index: i32) -> vec2<i32> {
-    return vec2<i32>(index / i32(LINE), index % i32(LINE)) - vec2<i32>(REACH);
-}
-
 fn consider(best: Best, column: i32, index: i32, energy: i32, own: u32) -> Best {
     if energy > best.energy || (energy == best.energy && index > best.index) {
         return best;
     }
-    let d = displacement(index);
+    let d = displacement_at(u32(index));
     let at = column + d.x * sweep.side + d.y;
     if u32(energy) < target_energy.d[at] || own == pack_flow(d) {
         return Best(energy, index);
@@ -63,7 +59,7 @@ fn everywhere(column: i32, i: i32, j: i32, own: u32) -> Best {
         let costs = costs_of(quad);
         for (var n = 0u; n < 8u; n += 1u) {
             let index = i32(8u * quad + n);
-            let d = displacement(index);
+            let d = displacement_at(u32(index));
             if d.y <= REACH && inside_square(i + d.x, j + d.y, sweep.side) {
                 let square = d.x * d.x + d.y * d.y;
                 let energy = cost_in(costs, n) + sweep.displacement_cost * square;
@@ -168,6 +164,6 @@ fn expectation_by_rings(@builtin(global_invocation_id) id: vec3<u32>) {
     if best.index == I32_MAX {
         proposal.d[rank] = vec2<u32>(0u, NONE);
     } else {
-        proposal.d[rank] = vec2<u32>(pack_flow(displacement(best.index)), u32(best.energy));
+        proposal.d[rank] = vec2<u32>(pack_flow(displacement_at(u32(best.index))), u32(best.energy));
     }
 }

@@ -13,6 +13,7 @@ use super::cloud_detail::CloudDetail;
 use super::scans::Target;
 use super::*;
 use crate::encoder::layers::SCORES;
+use crate::params::Profile;
 use crate::random::Random;
 use crate::record::{NONE, pack_flow};
 use crate::sensor_paths::SensorPaths;
@@ -89,19 +90,32 @@ impl Returns {
         Returns::ground(|_, _| GROUND)
     }
 
-    fn of_sweep<'a>(&'a self, stamp_s: f64, sensors: &'a SensorPaths) -> SweepReturns<'a> {
+    fn of_sweep<'a>(
+        &'a self,
+        profile: &'a Profile,
+        stamp_s: f64,
+        sensors: &'a SensorPaths,
+    ) -> SweepReturns<'a> {
         let Returns { points, placed, columns } = self;
-        SweepReturns { corner: [0; 3], stamp_s, points: all(points), placed, columns, sensors }
+        SweepReturns {
+            profile,
+            corner: [0; 3],
+            stamp_s,
+            points: all(points),
+            placed,
+            columns,
+            sensors,
+        }
     }
 
     /// How many had no room, and which are apart from clusters.
     fn fill(&self, kept: &mut Kept) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) =
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
-        let returns = self.of_sweep(0.0, &SENSORS);
+        let (profile, scaled) = (profile(), scaled());
+        let returns = self.of_sweep(&profile, 0.0, &SENSORS);
         let Kept { cloud, detail } = kept;
-        let profiles = (&profile(), &scaled());
-        (cloud.fill(detail, &Alone, profiles, returns, &mut apart, &mut scratch), apart)
+        (cloud.fill(detail, &Alone, &scaled, returns, &mut apart, &mut scratch), apart)
     }
 
     fn cloud(&self) -> Kept {
@@ -202,8 +216,8 @@ fn give_seen(
     n: usize,
 ) {
     let mut apart = vec![false; returns.points.len()];
-    let returns = returns.of_sweep(n as f64 * 0.1, sensors);
-    refinement.insert_cloud(&Alone, profile, returns, &mut apart);
+    let returns = returns.of_sweep(profile, n as f64 * 0.1, sensors);
+    refinement.insert_cloud(&Alone, returns, &mut apart);
 }
 
 fn all(points: &[Point]) -> TakenPoints<'_> {
