@@ -367,8 +367,9 @@ class Node(unittest.TestCase):
         self.assertIsNone(found[0])
         self.assertEqual([points.dtype for points, _ in found[1:]], [self.node.OUT] * 7)
         points = found[2][0]
-        moving = points["status"] == raywake.MOVING
-        self.assertTrue(moving.any() and points["p_moves"][moving].min() >= 0.5)
+        p_moves, moving = points["p_moves"], points["status"] == raywake.MOVING
+        standing = points["status"] == raywake.STATIC
+        self.assertGreater(p_moves[moving].min(), p_moves[standing].mean())
         points, boxes = found[-1]
         self.assertGreater(sum(box["moves"] for box in boxes), 0)
         places = self.node.positions_of(points)
