@@ -105,8 +105,8 @@ if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
         scontrol update JobId="${job}_1" StartTime=now >/dev/null 2>&1 || true
         sleep 0.5
     done
-    echo "restarts of the task that was killed: $(scontrol show job "${job}_1" |
-        grep -o 'Restarts=[0-9]*' || true)"
+    scontrol show job "${job}_1" | grep -o 'Restarts=[0-9]*' | grep -x Restarts=1 ||
+        { echo "the task was not killed at work"; exit 1; }
     mv "$work/slurm/out" "$work/array"
     compare array
 else

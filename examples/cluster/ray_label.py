@@ -1,6 +1,6 @@
 """Labels many recordings on a Ray cluster: share of returns that move, per recording and sweep.
 
-    pip install raywake "ray[data]"
+    pip install FOLDER/raywake-*.whl "ray[data]"
     python ray_label.py drives.txt labels.csv
 """
 

@@ -63,7 +63,12 @@ fn allocate_heap(
     let handles = rows.iter().map(|&row| gpu.buffer(table[row].bytes));
     let handles: Vec<_> =
         handles.collect::<Result<_, _>>().map_err(exhausted("vkCreateBuffer", heap, least))?;
-    let needs: Vec<_> = handles.iter().map(|&h| gpu.requirements(h)).collect();
+    let need = |(&row, &handle): (&usize, &vk::Buffer)| {
+        let need = gpu.requirements(handle);
+        // No driver says less, or all that is placed within it would not be.
+        vk::MemoryRequirements { size: need.size.max(table[row].bytes), ..need }
+    };
+    let needs: Vec<_> = rows.iter().zip(&handles).map(need).collect();
     let (offsets, bytes) = place(&needs, gpu.info().limits.storage_alignment_bytes);
     let usable = needs.iter().fold(!0, |bits, n| bits & n.memory_type_bits);
     let kind = memory_type(&properties, usable, heap).ok_or_else(|| GpuError::Unsupported {
@@ -115,12 +120,14 @@ fn exhausted(call: &'static str, heap: Heap, bytes: u64) -> impl Fn(vk::Result) 
     }
 }
 
-/// One buffer after the other: their offsets, and the size of the block.
+/// One buffer after the other: their offsets, and the size of the block, all there is where it is
+/// beyond any.
 fn place(needs: &[vk::MemoryRequirements], alignment: u64) -> (Vec<u64>, u64) {
     let mut end = 0u64;
     let place_one = |need: &vk::MemoryRequirements| {
-        let offset = end.next_multiple_of(need.alignment.max(alignment).max(4));
-        end = offset + need.size;
+        let offset = end.checked_next_multiple_of(need.alignment.max(alignment).max(4));
+        let offset = offset.unwrap_or(u64::MAX);
+        end = offset.saturating_add(need.size);
         offset
     };
     (needs.iter().map(place_one).collect(), end)
@@ -163,6 +170,9 @@ mod tests {
         assert_eq!(place(&needs, 16), (vec![0, 64, 176], 180));
         assert_eq!(place(&needs, 256), (vec![0, 256, 512], 516));
         assert_eq!(place(&[], 16), (vec![], 0));
+        // Of a driver that says nonsense.
+        assert_eq!(place(&[need(u64::MAX - 7, 4), need(20, 4)], 16).1, u64::MAX);
+        assert_eq!(place(&[need(20, 4), need(20, 1 << 63), need(20, 1 << 63)], 16).1, u64::MAX);
     }
 
     #[test]

@@ -1,12 +1,14 @@
 #!/usr/bin/env bash
 # Builds the program as one file that needs nothing else, for the CPU alone: a static program cannot
-# load Vulkan. It prints where that is.
+# load Vulkan. It reads KITTI's and Argoverse's drives and clouds in files, and writes tables. It
+# prints where it is.
 #
-#     host/package/static.sh x86_64|aarch64
+#     host/package/static.sh x86_64|aarch64 [FEATURES]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target=${1:?x86_64 or aarch64}-unknown-linux-musl
 . host/package/cross.sh
 cross "$target"
-cargo build --quiet --profile onboard -p raywake --no-default-features --target "$target" >&2
+cargo build --quiet --profile onboard -p raywake \
+    --no-default-features --features "${2:-arrow}" --target "$target" >&2
 echo "target/$target/onboard/raywake"

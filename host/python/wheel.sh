@@ -13,6 +13,6 @@ if [ "$1" != "$(uname -m)" ]; then
     cross "$1-unknown-linux-gnu"
     other=(--target "$1-unknown-linux-gnu")
 fi
-# The program's profile: its dependencies are compiled already.
-maturin build --quiet --profile release --manifest-path host/python/Cargo.toml \
+# With its own profile: a defect is an exception there, not the end of the interpreter.
+maturin build --quiet --profile library --manifest-path host/python/Cargo.toml \
     --target-dir target "${other[@]}" --out "$folder"

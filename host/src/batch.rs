@@ -1,7 +1,7 @@
 //! Many recordings, one after another, each with results of its own: what `--list` does.
 //!
 //! Results of a recording lie at its path below the folder of results. A file [`DONE`] beside them
-//! tells with what they were finished: settings, weights and version. Whoever comes back, on
+//! tells with what they were finished: settings, weights and algorithms. Whoever comes back, on
 //! whatever machine, leaves them as they are. A part that was interrupted goes on, as a single
 //! recording does; where two do the same one, the later is told.
 
@@ -23,6 +23,10 @@ use crate::weight_files::WeightFiles;
 
 /// Name of the file beside results that are whole.
 const DONE: &str = "done";
+
+/// The digest that `raywake demo` prints: another one where results have become others. Those of
+/// before are not taken for done then.
+pub const RESULTS: u64 = 0xeac4_ab86_8963_cbc7;
 
 /// Arguments of every command that works on a recording.
 pub struct SharedArgs<'a> {
@@ -203,7 +207,8 @@ fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     (*recordings, flow.backend, *quiet) = (Recordings::default(), BackendChoice::default(), true);
     let settings = config::settings(&flow.profile)?;
     let weights = WeightFiles::read(&flow.learned, &settings.profile)?.digest();
-    let all = format!("{plain:?} {:?} {:?} {weights}", settings.profile, settings.objects);
+    let made_with = (&settings.profile, &settings.objects);
+    let all = format!("{plain:?} {made_with:?} {weights} {RESULTS:016x}");
     let (digest, version) = (Digest::of(all.as_bytes()), env!("CARGO_PKG_VERSION"));
     Ok(format!("raywake {version} {} {digest:016x}\n", C::NAME))
 }

@@ -1,6 +1,8 @@
 //! The user's terminal: what a command says, and the signals that interrupt it.
 
 use std::io::{self, Write};
+#[cfg(unix)]
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use std::{process, thread};
@@ -31,6 +33,14 @@ pub fn listen() {
             process::exit(INTERRUPTED_CODE.into());
         }
     });
+}
+
+/// From now on a file that would grow beyond what the process may write is an error in writing it,
+/// not the end of the process.
+#[cfg(unix)]
+pub fn survive_file_limits() {
+    // A signal that cannot be caught ends it as before.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
 /// Prints to standard output unless quiet. A reader that has gone away is not an error.

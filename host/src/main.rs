@@ -46,6 +46,8 @@ static ALLOCATOR: Guard<System> = Guard(System);
 fn main() -> ExitCode {
     #[cfg(any(feature = "arrow", feature = "mcap"))]
     tell_of_damaged_files();
+    #[cfg(unix)]
+    raywake::console::survive_file_limits();
     let args = Args::command().try_get_matches().unwrap_or_else(|e| explain(&e));
     ExitCode::from(raywake::carry_out(&args).unwrap_or_else(|e| explain(&e)))
 }

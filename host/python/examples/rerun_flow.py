@@ -1,6 +1,6 @@
 """Flow of a recording in Rerun, as it is computed: returns in grey, an arrow per return that moves.
 
-    pip install raywake rerun-sdk
+    pip install FOLDER/raywake-*.whl rerun-sdk
     python rerun_flow.py RECORDING [--save FILE.rrd]
 """
 

@@ -1,11 +1,11 @@
 """A ROS 2 node: PointCloud2 in; PointCloud2 with velocity, P(moves) and status of every point, and
 objects as a MarkerArray of boxes out.
 
-    pip install raywake
+    pip install FOLDER/raywake-*.whl
     python ros2_node.py --ros-args -r points:=/lidar/points -p ground:=-1.8
 
-Poses come from tf (`world_frame` to the cloud's frame) where there are any, else from registration
-(`find_poses:=true`, the default). What is put out is of the cloud before the last.
+Poses come from registration or, with `-p find_poses:=false`, from tf (`world_frame` to the cloud's
+frame). What is put out is of the cloud before the last.
 """
 
 import numpy as np

@@ -114,7 +114,7 @@ impl PyPipeline {
     /// sensor: index of every return's sensor.
     #[pyo3(signature = (points, stamp=None, pose=None, *, twist=None, time=None, sensor=None))]
     fn step(
-        mut slf: PyRefMut<'_, Self>,
+        slf: &Bound<'_, Self>,
         points: &Bound<'_, PyAny>,
         stamp: Option<f64>,
         pose: Option<&Bound<'_, PyAny>>,
@@ -122,7 +122,9 @@ impl PyPipeline {
         time: Option<&Bound<'_, PyAny>>,
         sensor: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
-        let this = &mut *slf;
+        let busy = |_| PyRuntimeError::new_err("another thread is in a step of this pipeline");
+        let mut this = slf.try_borrow_mut().map_err(busy)?;
+        let this = &mut *this;
         let place = if let Ok(sweep) = points.cast::<PySweep>() {
             if stamp.or(pose.map(|_| 0.0)).or(time.or(sensor).map(|_| 0.0)).is_some() {
                 return Err(PyTypeError::new_err(
@@ -151,7 +153,7 @@ impl PyPipeline {
         let summary = stepped.map_err(refused)?;
         this.steps += 1;
         let number = this.steps;
-        Ok(Step { pipeline: slf.into(), number, summary, arrays: [const { None }; 4] })
+        Ok(Step { pipeline: slf.clone().unbind(), number, summary, arrays: [const { None }; 4] })
     }
 
     /// Adds all that the last step found to the digest and returns that: of a recording stepped

@@ -15,7 +15,7 @@ pub struct Recordings {
     #[arg(help_heading = "Many recordings")]
     pub list: Option<PathBuf>,
     /// Only every N-th recording of the list, from the I-th on (0 to N-1) [default: by the array or
-    /// the tasks of Slurm, or by JOB_COMPLETION_INDEX of Kubernetes and RAYWAKE_SHARDS]
+    /// the step of Slurm, or by JOB_COMPLETION_INDEX of Kubernetes and RAYWAKE_SHARDS]
     #[arg(long, value_name = "I/N", requires = "list", value_parser = Shard::parse)]
     #[arg(help_heading = "Many recordings")]
     pub shard: Option<Shard>,
@@ -44,6 +44,8 @@ pub struct Shard {
 
 /// Names of the variables in which a scheduler tells a process its part.
 struct Scheduler {
+    /// Set where there are parts.
+    shared: &'static str,
     /// Its number.
     index: &'static str,
     /// Number of the first part; 0 without.
@@ -57,13 +59,27 @@ struct Scheduler {
 /// In order of preference: tasks of an array are more than processes of a task.
 const SCHEDULERS: [Scheduler; 3] = [
     Scheduler {
+        shared: "SLURM_ARRAY_TASK_ID",
         index: "SLURM_ARRAY_TASK_ID",
         first: Some("SLURM_ARRAY_TASK_MIN"),
         step: Some("SLURM_ARRAY_TASK_STEP"),
         count: "SLURM_ARRAY_TASK_COUNT",
     },
-    Scheduler { index: "SLURM_PROCID", first: None, step: None, count: "SLURM_NTASKS" },
-    Scheduler { index: "JOB_COMPLETION_INDEX", first: None, step: None, count: "RAYWAKE_SHARDS" },
+    // Not `SLURM_NTASKS`: a batch script has that, too, which runs once.
+    Scheduler {
+        shared: "SLURM_STEP_NUM_TASKS",
+        index: "SLURM_PROCID",
+        first: None,
+        step: None,
+        count: "SLURM_STEP_NUM_TASKS",
+    },
+    Scheduler {
+        shared: "JOB_COMPLETION_INDEX",
+        index: "JOB_COMPLETION_INDEX",
+        first: None,
+        step: None,
+        count: "RAYWAKE_SHARDS",
+    },
 ];
 
 impl Shard {
@@ -88,7 +104,7 @@ impl Shard {
     }
 
     fn of_scheduler(variable: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
-        let scheduler = SCHEDULERS.iter().find(|of| variable(of.index).is_some());
+        let scheduler = SCHEDULERS.iter().find(|of| variable(of.shared).is_some());
         scheduler.map_or(Ok(Shard { index: 0, of: 1 }), |scheduler| scheduler.shard(&variable))
     }
 }
@@ -104,7 +120,7 @@ impl Scheduler {
             let index: usize = number(self.index)?;
             Ok((index, or(self.first, 0)?, or(self.step, 1)?, number(self.count)?))
         };
-        let wrong = |what: String| format!("{} is set, but {what}: give --shard I/N", self.index);
+        let wrong = |what: String| format!("{} is set, but {what}: give --shard I/N", self.shared);
         let (index, first, step, of): (usize, usize, usize, usize) = read().map_err(wrong)?;
         let ahead = index.checked_sub(first).and_then(|ahead| ahead.checked_div(step));
         let shard = ahead.and_then(|ahead| Shard::new(ahead, of));
@@ -140,7 +156,7 @@ mod tests {
                 ("SLURM_ARRAY_TASK_STEP", step),
                 ("SLURM_ARRAY_TASK_COUNT", count),
                 ("SLURM_PROCID", "0"),
-                ("SLURM_NTASKS", "1"),
+                ("SLURM_STEP_NUM_TASKS", "1"),
             ])
         };
         assert_eq!(array("7", "1", "2", "4"), Ok((3, 4)));
@@ -148,7 +164,11 @@ mod tests {
         assert!(array("9", "0", "1", "8").unwrap_err().contains("9 of 8"));
         assert!(array("0", "1", "1", "8").is_err() && array("1", "0", "0", "8").is_err());
         assert!(array("x", "0", "1", "8").unwrap_err().contains("is `x`"));
-        assert_eq!(shard(&[("SLURM_PROCID", "2"), ("SLURM_NTASKS", "4")]), Ok((2, 4)));
+        let process = ("SLURM_PROCID", "2");
+        assert_eq!(shard(&[process, ("SLURM_STEP_NUM_TASKS", "4")]), Ok((2, 4)));
+        assert!(shard(&[("SLURM_STEP_NUM_TASKS", "4")]).unwrap_err().contains("PROCID is not set"));
+        // A batch script for four tasks, which starts them by itself.
+        assert_eq!(shard(&[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "4")]), Ok((0, 1)));
         let index = ("JOB_COMPLETION_INDEX", "5");
         assert_eq!(shard(&[index, ("RAYWAKE_SHARDS", "6")]), Ok((5, 6)));
         assert!(shard(&[index]).unwrap_err().contains("RAYWAKE_SHARDS is not set"));

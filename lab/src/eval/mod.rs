@@ -207,11 +207,10 @@ fn names_of_list(
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
     let mut names = BTreeMap::new();
     for ListedRecording { data, place } in batch::part(list, shard)?.0 {
-        let name = place.to_string_lossy().replace(['/', '\\'], "+");
-        if let Some(other) = names.insert(name, data.clone()) {
-            let what = format!("has the same name as {}", other.display());
-            return Err(Error::input(&data, "", what));
-        }
+        // No two paths have one, in whichever part they are.
+        let parts = place.iter().map(|part| part.to_string_lossy());
+        let parts = parts.map(|part| part.replace('%', "%25").replace('+', "%2B"));
+        names.insert(parts.collect::<Vec<_>>().join("+"), data);
     }
     Ok((names, shard.of == 1))
 }

@@ -29,6 +29,7 @@ pub struct Partial {
     partial: PathBuf,
     /// The open file again, for what is done at the end. While it is open it is locked.
     file: File,
+    kept: bool,
 }
 
 /// How often another process may remove a temporary file just before it is locked.
@@ -40,7 +41,7 @@ impl Partial {
         let partial = partial_path(path)?;
         let file = create_locked(&partial).map_err(Error::writing(path))?;
         let again = file.try_clone().map_err(Error::writing(path))?;
-        let this = Partial { path: path.to_path_buf(), partial, file: again };
+        let this = Partial { path: path.to_path_buf(), partial, file: again, kept: false };
         Ok((this, BufWriter::with_capacity(1 << 18, file)))
     }
 
@@ -50,7 +51,7 @@ impl Partial {
     }
 
     /// Gives it its name. All must have been written.
-    pub fn keep(self) -> Result<(), Error> {
+    pub fn keep(mut self) -> Result<(), Error> {
         match self.file.sync_data() {
             // Some file systems cannot.
             Err(e) if !matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {
@@ -58,14 +59,19 @@ impl Partial {
             }
             _ => (),
         }
-        fs::rename(&self.partial, &self.path).map_err(Error::writing(&self.path))
+        fs::rename(&self.partial, &self.path).map_err(Error::writing(&self.path))?;
+        self.kept = true;
+        Ok(())
     }
 }
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        // It has its name, or is of no use. The first failure is the one to tell.
-        let _ = fs::remove_file(&self.partial);
+        // With its own name it is done; by now another process may use the temporary one. Without,
+        // it is of no use. The first failure is the one to tell.
+        if !self.kept {
+            let _ = fs::remove_file(&self.partial);
+        }
     }
 }
 
@@ -81,7 +87,9 @@ fn create_locked(path: &Path) -> io::Result<File> {
                 }
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                let there = File::open(path).ok().filter(|_| !path.is_symlink());
+                // Opening a pipe waits for its other end.
+                let ordinary = path.symlink_metadata().is_ok_and(|there| there.is_file());
+                let there = ordinary.then(|| File::open(path).ok()).flatten();
                 if there.is_some_and(|there| !lock(&there)) {
                     return Err(busy());
                 }

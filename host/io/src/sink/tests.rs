@@ -69,6 +69,37 @@ fn a_planted_link_is_not_followed() {
     assert_eq!(fs::read(t.path().join("a.txt")).unwrap(), b"one");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_planted_pipe_holds_nothing_up() {
+    let t = Temp::new();
+    let pipe = t.path().join(".a.txt.partial");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    atomic::write(&t.path().join("a.txt"), |w| w.write_all(b"one")).unwrap();
+    assert_eq!(
+        (fs::read(t.path().join("a.txt")).unwrap(), names(t.path()).len()),
+        (b"one".into(), 1)
+    );
+}
+
+#[test]
+fn writers_of_one_file_leave_each_other_alone() {
+    let t = Temp::new();
+    let path = t.path().join("a.txt");
+    let write = || {
+        for _ in 0..300 {
+            if let Err(e) = atomic::write(&path, |w| w.write_all(b"whole")) {
+                assert!(e.to_string().contains("another process is writing it"), "{e}");
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(write);
+        scope.spawn(write);
+    });
+    assert_eq!((fs::read(&path).unwrap(), names(t.path()).len()), (b"whole".to_vec(), 1));
+}
+
 #[test]
 fn a_folder_has_one_writer() {
     let t = Temp::new();

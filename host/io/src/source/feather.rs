@@ -118,7 +118,7 @@ impl FeatherTable {
         kind: &str,
         take: impl Fn(&dyn Array, &mut Vec<T>) -> bool,
     ) -> Result<Vec<T>, Error> {
-        let mut out = Vec::with_capacity(self.rows());
+        let mut out = Vec::new();
         for batch in &self.batches {
             let missing = || Error::input(&self.path, "", format!("has no column `{name}`"));
             let column = batch.column_by_name(name).ok_or_else(missing)?;

@@ -3,17 +3,34 @@
 
 use arrow_ipc::{Block, RecordBatch, root_as_footer, root_as_message};
 
-use super::whole::SIZE_MAX;
+use super::whole::{SIZE_MAX, unpacked_max};
 
 /// First and last bytes of a feather file.
 const MAGIC: &[u8] = b"ARROW1";
 
+/// Rows that are read at most, a hundred times those of a sweep: as many as an uncompressed file of
+/// [`SIZE_MAX`] has.
+const ROWS_MAX: u64 = SIZE_MAX / 16;
+
 /// Length of the footer and [`MAGIC`], at the end of the file.
 const TRAILER: usize = 10;
 
-/// Most that the columns of a file may unpack to, all together, bytes: as for any other file of a
-/// sweep. What a file claims is allocated before it is verified.
-const UNPACKED_MAX: u64 = SIZE_MAX;
+/// What record batches claim to have. It is allocated before it is verified.
+#[derive(Clone, Copy, Default)]
+struct Claims {
+    /// Bytes that their columns unpack to.
+    bytes: u64,
+    rows: u64,
+}
+
+impl Claims {
+    fn with(self, more: Claims) -> Claims {
+        Claims {
+            bytes: self.bytes.saturating_add(more.bytes),
+            rows: self.rows.saturating_add(more.rows),
+        }
+    }
+}
 
 /// `Err` with what is wrong.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
@@ -33,18 +50,23 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     if footer.dictionaries().is_some_and(|blocks| !blocks.is_empty()) {
         return Err("has columns coded by dictionary: write them plainly".into());
     }
-    let mut unpacked = 0u64;
+    let mut claims = Claims::default();
     for block in footer.recordBatches().into_iter().flatten() {
-        unpacked = unpacked.saturating_add(check_block(&body[..start], block)?);
+        claims = claims.with(check_block(&body[..start], block)?);
     }
-    match unpacked {
-        0..=UNPACKED_MAX => Ok(()),
-        _ => Err(format!("unpacks to {unpacked} bytes, at most {UNPACKED_MAX} are read")),
+    let most = unpacked_max(bytes.len() as u64).min(SIZE_MAX);
+    if claims.bytes > most {
+        return Err(format!("unpacks to {} bytes, at most {most} are read", claims.bytes));
+    }
+    // A column may be of nothing, and have any number of rows.
+    match claims.rows {
+        0..=ROWS_MAX => Ok(()),
+        rows => Err(format!("has {rows} rows, at most {ROWS_MAX} are read")),
     }
 }
 
-/// A block lies within the file and its message within the block. Returns the bytes it unpacks to.
-fn check_block(file: &[u8], block: &Block) -> Result<u64, String> {
+/// A block lies within the file and its message within the block. Returns what it claims.
+fn check_block(file: &[u8], block: &Block) -> Result<Claims, String> {
     let outside = || format!("damaged: a record batch at byte {} is cut off", block.offset());
     let size = |v: i64| usize::try_from(v).map_err(|_| outside());
     let offset = size(block.offset())?;
@@ -58,19 +80,19 @@ fn check_block(file: &[u8], block: &Block) -> Result<u64, String> {
     let message = head.get(skip..).ok_or_else(outside)?;
     let message = root_as_message(message)
         .map_err(|e| format!("damaged message at byte {}: {e}", block.offset()))?;
-    message.header_as_record_batch().map_or(Ok(0), |batch| check_batch(&batch, body))
+    let batch = message.header_as_record_batch();
+    batch.map_or(Ok(Claims::default()), |batch| check_batch(&batch, body))
 }
 
-/// Every buffer of a batch lies within its body, and no length is absurd. Returns the bytes they
-/// unpack to.
-fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<u64, String> {
+/// Every buffer of a batch lies within its body, and no length is absurd. Returns what it claims.
+fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<Claims, String> {
     let sensible = |rows: i64| (0..=i64::from(i32::MAX)).contains(&rows);
     let nodes = batch.nodes().into_iter().flatten();
     let mut counts = nodes.flat_map(|n| [n.length(), n.null_count()]);
     if !sensible(batch.length()) || !counts.all(sensible) {
         return Err("damaged: invalid number of rows".into());
     }
-    let mut unpacked = 0u64;
+    let mut claims = Claims { bytes: 0, rows: batch.length() as u64 };
     for buffer in batch.buffers().into_iter().flatten() {
         let range =
             usize::try_from(buffer.offset()).ok().zip(usize::try_from(buffer.length()).ok());
@@ -80,7 +102,7 @@ fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<u64, String> {
         let claimed = bytes.first_chunk().map(|b| i64::from_le_bytes(*b));
         let claimed = claimed.filter(|_| batch.compression().is_some());
         let length = claimed.and_then(|n| u64::try_from(n).ok()).unwrap_or(bytes.len() as u64);
-        unpacked = unpacked.saturating_add(length);
+        claims.bytes = claims.bytes.saturating_add(length);
     }
-    Ok(unpacked)
+    Ok(claims)
 }

@@ -7,7 +7,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::fs::File;
 use std::io::BufReader;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
@@ -19,7 +18,9 @@ use serde::de::{DeserializeOwned, Deserializer, SeqAccess, Visitor};
 
 use super::poses::{PoseTrack, check_rising, rigid};
 use super::recognise::{SCENES as SWEEPS, entries};
-use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply, read_cloud};
+use super::{
+    OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated, apply, read_cloud, whole,
+};
 use crate::Error;
 
 /// The channel whose sweeps are read.
@@ -245,7 +246,7 @@ fn poses(
 
 /// Hands out the rows of a table, one after the other.
 fn each<T: DeserializeOwned>(path: &Path, see: impl FnMut(T)) -> Result<(), Error> {
-    let file = File::open(path).map_err(Error::reading(path))?;
+    let (file, _) = whole::open(path)?;
     let mut table = serde_json::Deserializer::from_reader(BufReader::new(file));
     let read = table.deserialize_seq(EachRow { see, of: PhantomData }).and_then(|()| table.end());
     read.map_err(|e| Error::input(path, "", e.to_string()))

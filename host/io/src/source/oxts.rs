@@ -7,7 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
 
 use super::poses::{pose_from, shift};
-use super::{text, whole};
+use super::{plausible, text, whole};
 use crate::Error;
 
 /// Radius of the sphere of the Mercator projection, m.
@@ -27,9 +27,11 @@ pub(super) fn read_calibration(path: &Path) -> Result<Pose, Error> {
     let text = whole::read_text(path)?;
     let rotation = text::keyed::<9>(path, &text, "R")?;
     let translation = text::keyed::<3>(path, &text, "T")?;
-    let (Some((line, r)), Some((_, t))) = (rotation, translation) else {
+    let (Some((line, r)), Some((t_line, t))) = (rotation, translation) else {
         return Err(Error::input(path, "", "lines `R:` and `T:` expected"));
     };
+    let place = plausible::place(t.into());
+    place.map_err(|what| Error::input(path, format!("line {t_line}"), what))?;
     let rows = [r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2]];
     pose_from(&rows, path, format!("line {line}"))
 }

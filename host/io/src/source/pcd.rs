@@ -3,7 +3,6 @@
 //! The fields are those of [`super::returns`]. `VIEWPOINT`, where the sensor was, makes poses of a
 //! folder of files that have it ([`super::viewpoints`]).
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -59,7 +58,7 @@ const HEADER_MAX: u64 = 4096;
 ///
 /// Fails where the file cannot be read, and where that is no pose.
 pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
-    let file = File::open(path).map_err(Error::reading(path))?;
+    let (file, _) = whole::open(path)?;
     let mut bytes = Vec::new();
     file.take(HEADER_MAX).read_to_end(&mut bytes).map_err(Error::reading(path))?;
     for (n, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
@@ -79,6 +78,10 @@ pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
 /// bytes.
 fn unpack(path: &Path, bytes: &[u8], at: usize, size: usize) -> Result<Vec<u8>, Error> {
     let wrong = |what: String| Error::input(path, format!("byte {at}"), what);
+    let most = whole::unpacked_max(bytes.len() as u64).min(whole::SIZE_MAX);
+    if size as u64 > most {
+        return Err(wrong(format!("unpacks to {size} bytes, at most {most} are read")));
+    }
     let rest = bytes.get(at..).unwrap_or_default();
     let (lengths, rest) = rest.split_at_checked(8).ok_or_else(|| {
         wrong(format!("truncated: two lengths expected, {} bytes left", rest.len()))

@@ -11,6 +11,17 @@ use crate::Error;
 /// may grow.
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
+/// What a packed file may unpack to: so many bytes, and so many times its own size. Returns pack to
+/// a third of theirs; 16 MiB are the zeros of a sweep's flow, which pack to nothing.
+const UNPACKED_BASE: u64 = 16 << 20;
+const UNPACKED_RATIO: u64 = 256;
+
+/// Most bytes that what is packed in so many may unpack to. Of a file that is read at once no more
+/// than [`SIZE_MAX`].
+pub(super) fn unpacked_max(packed: u64) -> u64 {
+    packed.saturating_mul(UNPACKED_RATIO).saturating_add(UNPACKED_BASE)
+}
+
 /// The content of a file of at most [`SIZE_MAX`] bytes.
 ///
 /// # Errors
@@ -19,8 +30,11 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     read_up_to(path, SIZE_MAX)
 }
 
-/// The same for at most so many bytes.
-pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+/// Opens an ordinary file. With it comes its length, bytes.
+///
+/// # Errors
+/// As those of [`read`], but that it may be of any length.
+pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     // Asked before it is opened: opening a pipe waits for its other end.
     let metadata = path.metadata().map_err(Error::reading(path))?;
     if metadata.is_dir() {
@@ -29,16 +43,21 @@ pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     if !metadata.is_file() {
         return Err(Error::input(path, "", "is not an ordinary file, but a device or a pipe"));
     }
+    Ok((File::open(path).map_err(Error::reading(path))?, metadata.len()))
+}
+
+/// The same for at most so many bytes.
+pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     let too_long = |size: u64| {
         Error::input(path, "", format!("has {size} bytes or more, at most {most} are read"))
     };
-    if metadata.len() > most {
-        return Err(too_long(metadata.len()));
+    let (file, length) = open(path)?;
+    if length > most {
+        return Err(too_long(length));
     }
     let mut bytes = Vec::new();
-    let room = bytes.try_reserve_exact(metadata.len() as usize);
+    let room = bytes.try_reserve_exact(length as usize);
     room.map_err(|_| Error::reading(path)(io::ErrorKind::OutOfMemory.into()))?;
-    let file = File::open(path).map_err(Error::reading(path))?;
     file.take(most + 1).read_to_end(&mut bytes).map_err(Error::reading(path))?;
     if bytes.len() as u64 > most {
         return Err(too_long(most + 1));

@@ -11,9 +11,10 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::Error;
 use crate::source::decoder::guarded;
+use crate::source::whole::{self, unpacked_max};
 
 /// Longest record that is read, bytes; a chunk may be longer, as it is read in pieces.
-const RECORD_MAX: usize = 256 << 20;
+const RECORD_MAX: u64 = 256 << 20;
 
 /// What a file begins with.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -39,6 +40,8 @@ pub(super) struct BagFile {
     file: File,
     /// Bytes of it.
     length: u64,
+    /// Bytes of the records that one call has walked through.
+    unpacked: u64,
     open: Option<OpenRecord>,
 }
 
@@ -62,14 +65,13 @@ pub(super) enum FileEnd {
 impl BagFile {
     /// Fails where it cannot be read or is no MCAP file.
     pub fn open(path: &Path) -> Result<BagFile, Error> {
-        let mut file = File::open(path).map_err(Error::reading(path))?;
-        let length = file.metadata().map_err(Error::reading(path))?.len();
+        let (mut file, length) = whole::open(path)?;
         let mut magic = [0; MAGIC.len()];
         let read = file.read_exact(&mut magic);
         if read.is_err() || magic != MAGIC {
             return Err(Error::input(path, "byte 0", "not an MCAP file"));
         }
-        Ok(BagFile { path: path.to_path_buf(), file, length, open: None })
+        Ok(BagFile { path: path.to_path_buf(), file, length, unpacked: 0, open: None })
     }
 
     /// Hands every schema, channel and message to `each`, in the order of the file.
@@ -80,6 +82,7 @@ impl BagFile {
         &mut self,
         mut each: impl FnMut(Place, Record) -> Result<(), Error>,
     ) -> Result<FileEnd, Error> {
+        self.unpacked = 0;
         let mut at = MAGIC.len() as u64;
         while at < self.length {
             let Some((kind, length)) = self.head(at)? else { return Ok(FileEnd::Cut(at)) };
@@ -104,6 +107,7 @@ impl BagFile {
 
     /// Bytes of the message at a place. Quick where it follows the one read before.
     pub fn message(&mut self, wanted: Place) -> Result<Vec<u8>, Error> {
+        self.unpacked = 0;
         let gone = "the message that was here is gone: has the file changed?";
         let follows = |open: &OpenRecord| {
             open.next.record == wanted.record && open.next.before <= wanted.before
@@ -142,7 +146,7 @@ impl BagFile {
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_validate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_MAX);
+            .with_record_length_limit(unpacked_max(self.length).min(RECORD_MAX) as usize);
         let reader = LinearReader::new_with_options(options);
         let left = HEAD.saturating_add(length);
         self.open = Some(OpenRecord { reader, next: Place { record, before: 0 }, left });
@@ -151,6 +155,7 @@ impl BagFile {
 
     /// The next record in that one; `None` after its end, and where the file is cut off in it.
     fn next(&mut self) -> Result<Option<(Place, Record<'static>)>, Error> {
+        let most = unpacked_max(self.length);
         let Some(OpenRecord { reader, next, left }) = &mut self.open else { return Ok(None) };
         let damaged =
             |what: String| Error::input(&self.path, format!("byte {}", next.record), what);
@@ -159,6 +164,15 @@ impl BagFile {
                 LinearReadEvent::Record { data, opcode } => {
                     let place = *next;
                     next.before += 1;
+                    self.unpacked += HEAD + data.len() as u64;
+                    if self.unpacked > most {
+                        let what = format!("unpacks to more than {most} bytes");
+                        return Err(Error::input(
+                            &self.path,
+                            format!("byte {}", place.record),
+                            what,
+                        ));
+                    }
                     if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
                         let record = parse_record(opcode, data);
                         let record = record.map_err(|e| damaged(e.to_string()))?;

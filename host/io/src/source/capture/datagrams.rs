@@ -2,7 +2,6 @@
 //! together again.
 
 use std::collections::VecDeque;
-use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::net::IpAddr;
 use std::ops::ControlFlow;
@@ -15,6 +14,7 @@ use pcap_parser::pcapng::Block;
 use pcap_parser::{Linktype, PcapBlockOwned, PcapError, create_reader};
 
 use crate::Error;
+use crate::source::whole;
 
 /// Bytes that are held of a capture: more than a frame has in any.
 const BUFFER: usize = 1 << 20;
@@ -93,7 +93,7 @@ impl Datagrams {
             _ if ranges.len() > INTERFACES_MAX => Err("too many interfaces".into()),
             _ => Ok(ControlFlow::Break(())),
         })?;
-        let mut file = File::open(path).map_err(Error::reading(path))?;
+        let (mut file, _) = whole::open(path)?;
         for (place, size) in ranges {
             let mut bytes = vec![0; size];
             file.seek(SeekFrom::Start(place)).map_err(Error::reading(path))?;
@@ -127,7 +127,7 @@ impl Datagrams {
         mut visit: impl FnMut(u64, usize, &PcapBlockOwned) -> Result<ControlFlow<()>, String>,
     ) -> Result<bool, Error> {
         let before = if from == 0 { &[][..] } else { &self.preamble };
-        let mut file = File::open(&self.path).map_err(Error::reading(&self.path))?;
+        let (mut file, _) = whole::open(&self.path)?;
         file.seek(SeekFrom::Start(from)).map_err(Error::reading(&self.path))?;
         let wrong =
             |place: u64, what: String| Error::input(&self.path, format!("byte {place}"), what);

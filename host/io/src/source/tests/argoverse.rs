@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arrow_array::types::{ArrowPrimitiveType, Float16Type, Int8Type};
 use arrow_array::{
     ArrayRef, BooleanArray, DictionaryArray, Float16Array, Float64Array, Int8Array, Int32Array,
-    Int64Array, RecordBatch, StringArray, UInt8Array,
+    Int64Array, NullArray, RecordBatch, StringArray, UInt8Array,
 };
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
@@ -223,8 +223,21 @@ fn what_unpacks_to_too_much_is_refused() {
     let refused = |columns: &[&str]| {
         FeatherTable::parse(Path::new("f.feather"), &bytes, columns).err().unwrap().to_string()
     };
-    let wanted = "f.feather: unpacks to 314572800 bytes, at most 268435456 are read";
-    assert_eq!((refused(&["x"]), refused(&[])), (wanted.into(), wanted.into()));
+    let most = (16 << 20) + 256 * bytes.len();
+    let wanted = format!("f.feather: unpacks to 314572800 bytes, at most {most} are read");
+    assert_eq!((refused(&["x"]), refused(&[])), (wanted.clone(), wanted));
+}
+
+#[test]
+fn rows_of_nothing_are_counted() {
+    let nothing: ArrayRef = Arc::new(NullArray::new(1 << 30));
+    let bytes = file(&[batch(vec![("x", nothing)])], None);
+    let e = FeatherTable::parse(Path::new("f.feather"), &bytes, &["x"]).err().unwrap().to_string();
+    assert_eq!(e, "f.feather: has 1073741824 rows, at most 16777216 are read");
+    let bits: ArrayRef = Arc::new(BooleanArray::from(vec![false; 1 << 25]));
+    let bytes = file(&vec![batch(vec![("x", bits)]); 2], Some(CompressionType::ZSTD));
+    let e = FeatherTable::parse(Path::new("f.feather"), &bytes, &["x"]).err().unwrap().to_string();
+    assert_eq!(e, "f.feather: has 67108864 rows, at most 16777216 are read");
 }
 
 #[test]

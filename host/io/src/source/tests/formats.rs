@@ -112,8 +112,13 @@ fn oxts_beyond_any_drive() {
     fs::write(&path, numbers.join(" ")).unwrap();
     assert!(refused(&t.path().join("day/drive")).contains("the pose of frame 1: "));
     fs::write(&path, packet).unwrap();
-    t.write("day/calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: 1e308 1e308 0\n");
-    assert!(refused(&t.path().join("day/drive")).contains(" is at "));
+    // Of a single one the products do not overflow.
+    for place in ["1e308 1e308 0", "1e308 0 0", "0 -1e300 0"] {
+        let calibration = format!("R: 1 0 0 0 1 0 0 0 1\nT: {place}\n");
+        t.write("day/calib_imu_to_velo.txt", calibration);
+        let e = refused(&t.path().join("day/drive"));
+        assert!(e.contains("calib_imu_to_velo.txt, line 2: at ["), "{e}");
+    }
 }
 
 #[test]

@@ -19,12 +19,15 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::images::Image;
 use crate::Error;
 use crate::source::decoder::guarded;
+use crate::source::whole::{self, unpacked_max};
 
 /// Numbers of an image that are believed: six of each of 64 x 2650 pixels are ten times less.
 const NUMBERS_MAX: usize = 1 << 24;
 /// Numbers that a column of a group of rows is believed to have, 1 GiB of float32: twice as many as
 /// the images of 200 sweeps. A few bytes may say that one is repeated as often as one likes.
-const COLUMN_MAX: usize = 1 << 28;
+const COLUMN_MAX: u64 = 1 << 28;
+/// Rows that are believed: of a segment's boxes there are 100,000.
+const ROWS_MAX: usize = 1 << 20;
 /// Rows that are decoded at once where rows are small.
 const BATCH: usize = 256;
 
@@ -33,6 +36,8 @@ pub(super) struct ParquetTable {
     path: PathBuf,
     file: File,
     metadata: ArrowReaderMetadata,
+    /// Numbers that a column of a group of rows may have.
+    numbers_max: u64,
 }
 
 /// A row of a batch.
@@ -54,10 +59,11 @@ pub(super) struct ImageRows {
 
 impl ParquetTable {
     pub fn open(path: &Path) -> Result<ParquetTable, Error> {
-        let file = File::open(path).map_err(Error::reading(path))?;
+        let (file, length) = whole::open(path)?;
         let metadata = guarded(path, || ArrowReaderMetadata::load(&file, Default::default()))?;
         let metadata = metadata.map_err(|e| Error::input(path, "", e.to_string()))?;
-        Ok(ParquetTable { path: path.to_path_buf(), file, metadata })
+        let numbers_max = COLUMN_MAX.min(unpacked_max(length) / size_of::<f32>() as u64);
+        Ok(ParquetTable { path: path.to_path_buf(), file, metadata, numbers_max })
     }
 
     pub fn path(&self) -> &Path {
@@ -83,7 +89,7 @@ impl ParquetTable {
             let found = named.iter().position(|field| field.name() == column);
             let at = || format!("column `{column}`");
             let root = found.ok_or_else(|| Error::input(&self.path, at(), "is missing"))?;
-            self.check_size(root, COLUMN_MAX).map(|()| root)
+            self.check_size(root, self.numbers_max as usize).map(|()| root)
         };
         columns.iter().map(find).collect()
     }
@@ -134,8 +140,14 @@ impl ParquetTable {
         mut see: impl FnMut(&TableRow) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut reader = self.reader(&self.find(columns)?, BATCH)?;
+        let mut seen = 0;
         while let Some(batch) = guarded(&self.path, || reader.next())? {
             let batch = batch.map_err(|e| Error::input(&self.path, "", e.to_string()))?;
+            seen += batch.num_rows();
+            if seen > ROWS_MAX {
+                let what = format!("has more than {ROWS_MAX} rows");
+                return Err(Error::input(&self.path, "", what));
+            }
             let rows =
                 (0..batch.num_rows()).map(|row| TableRow { path: &self.path, batch: &batch, row });
             rows.into_iter().try_for_each(|row| see(&row))?;

@@ -136,6 +136,7 @@ fn calibrations_that_are_none() {
         (">0.2<", ">20<", "distLSB_: a unit of 0.2 m"),
         (">0.2<", ">two<", "distLSB_: `two` is no such number"),
         ("<!DOCTYPE boost_serialization>", "<!ENTITY a \"b\">", "defines entities"),
+        ("<DB>", "<DB xmlns:a=\"b\">", "has namespaces"),
         ("</DB>", "", "no XML"),
     ] {
         assert!(own.contains(from), "{from}");
