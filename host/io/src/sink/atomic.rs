@@ -87,18 +87,45 @@ fn create_locked(path: &Path) -> io::Result<File> {
                 }
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                // Opening a pipe waits for its other end.
-                let ordinary = path.symlink_metadata().is_ok_and(|there| there.is_file());
-                let there = ordinary.then(|| File::open(path).ok()).flatten();
-                if there.is_some_and(|there| !lock(&there)) {
-                    return Err(busy());
+                // While it is locked here nobody else removes it.
+                match LeftOver::at(path)? {
+                    LeftOver::Gone => (),
+                    LeftOver::Locked => return Err(busy()),
+                    LeftOver::Free(_locked) => fs::remove_file(path)?,
                 }
-                fs::remove_file(path)?;
             }
             Err(e) => return Err(e),
         }
     }
     Err(busy())
+}
+
+/// What is where a temporary file is to be.
+enum LeftOver {
+    /// Nothing any more: it has got its name, or another process has removed it.
+    Gone,
+    /// What another process is writing.
+    Locked,
+    /// What nobody writes, locked while this lives where it is an ordinary file.
+    Free(Option<File>),
+}
+
+impl LeftOver {
+    fn at(path: &Path) -> io::Result<LeftOver> {
+        let gone = |e: &io::Error| e.kind() == ErrorKind::NotFound;
+        // Opening a pipe would wait for its other end.
+        match path.symlink_metadata() {
+            Ok(there) if there.is_file() => (),
+            Err(e) if gone(&e) => return Ok(LeftOver::Gone),
+            other => return other.map(|_| LeftOver::Free(None)),
+        }
+        Ok(match File::open(path) {
+            Err(e) if gone(&e) => LeftOver::Gone,
+            Ok(file) if !lock(&file) => LeftOver::Locked,
+            Ok(file) if !is_at(&file, path) => LeftOver::Gone,
+            file => LeftOver::Free(file.ok()),
+        })
+    }
 }
 
 /// Locks a file or folder, unless another process has: then `false`. Where there are no locks, none

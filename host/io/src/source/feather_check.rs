@@ -3,14 +3,10 @@
 
 use arrow_ipc::{Block, RecordBatch, root_as_footer, root_as_message};
 
-use super::whole::{SIZE_MAX, unpacked_max};
+use super::whole::check_unpacked;
 
 /// First and last bytes of a feather file.
 const MAGIC: &[u8] = b"ARROW1";
-
-/// Rows that are read at most, a hundred times those of a sweep: as many as an uncompressed file of
-/// [`SIZE_MAX`] has.
-const ROWS_MAX: u64 = SIZE_MAX / 16;
 
 /// Length of the footer and [`MAGIC`], at the end of the file.
 const TRAILER: usize = 10;
@@ -54,15 +50,8 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     for block in footer.recordBatches().into_iter().flatten() {
         claims = claims.with(check_block(&body[..start], block)?);
     }
-    let most = unpacked_max(bytes.len() as u64).min(SIZE_MAX);
-    if claims.bytes > most {
-        return Err(format!("unpacks to {} bytes, at most {most} are read", claims.bytes));
-    }
     // A column may be of nothing, and have any number of rows.
-    match claims.rows {
-        0..=ROWS_MAX => Ok(()),
-        rows => Err(format!("has {rows} rows, at most {ROWS_MAX} are read")),
-    }
+    check_unpacked(bytes.len(), claims.bytes, claims.rows)
 }
 
 /// A block lies within the file and its message within the block. Returns what it claims.

@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
             Ok(fields.returns(rows, |row, f| columns[f].value(records, row, false), points))
         }
         Data::Compressed => {
-            let unpacked = unpack(path, &bytes, at, rows.saturating_mul(header.record()))?;
+            let unpacked = unpack(path, &bytes, at, rows, header.record())?;
             let before = header.before(Field::size);
             // Field after field, each of all points.
             let columns = header.columns(|f| (rows * before[f], header.fields[f].size()));
@@ -76,12 +76,16 @@ pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
 
 /// The body of a compressed file: its packed and unpacked length, 32 bits each, and the former's
 /// bytes.
-fn unpack(path: &Path, bytes: &[u8], at: usize, size: usize) -> Result<Vec<u8>, Error> {
+fn unpack(
+    path: &Path,
+    bytes: &[u8],
+    at: usize,
+    rows: usize,
+    record: usize,
+) -> Result<Vec<u8>, Error> {
+    let size = rows.saturating_mul(record);
     let wrong = |what: String| Error::input(path, format!("byte {at}"), what);
-    let most = whole::unpacked_max(bytes.len() as u64).min(whole::SIZE_MAX);
-    if size as u64 > most {
-        return Err(wrong(format!("unpacks to {size} bytes, at most {most} are read")));
-    }
+    whole::check_unpacked(bytes.len(), size as u64, rows as u64).map_err(wrong)?;
     let rest = bytes.get(at..).unwrap_or_default();
     let (lengths, rest) = rest.split_at_checked(8).ok_or_else(|| {
         wrong(format!("truncated: two lengths expected, {} bytes left", rest.len()))

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use raywake_core::sweep::Point;
+
 use crate::Error;
 
 /// Longest file that is read at once, bytes: 16 million returns of a `.bin`, a hundred times what a
@@ -14,12 +16,22 @@ pub(super) const SIZE_MAX: u64 = 256 << 20;
 /// What a packed file may unpack to: so many bytes, and so many times its own size. Returns pack to
 /// a third of theirs; 16 MiB are the zeros of a sweep's flow, which pack to nothing.
 const UNPACKED_BASE: u64 = 16 << 20;
-const UNPACKED_RATIO: u64 = 256;
+const UNPACKED_RATIO: u64 = 64;
+/// What a row takes at least, however little it unpacks to.
+const ROW: u64 = size_of::<Point>() as u64;
 
-/// Most bytes that what is packed in so many may unpack to. Of a file that is read at once no more
-/// than [`SIZE_MAX`].
+/// Most bytes that what is packed in so many may unpack to.
 pub(super) fn unpacked_max(packed: u64) -> u64 {
     packed.saturating_mul(UNPACKED_RATIO).saturating_add(UNPACKED_BASE)
+}
+
+/// Whether a file that is read at once, of `packed` bytes, may unpack to so many, and so many rows.
+pub(super) fn check_unpacked(packed: usize, bytes: u64, rows: u64) -> Result<(), String> {
+    let most = unpacked_max(packed as u64).min(SIZE_MAX);
+    match bytes.max(rows.saturating_mul(ROW)) {
+        bytes if bytes > most => Err(format!("unpacks to {bytes} bytes, at most {most} are read")),
+        _ => Ok(()),
+    }
 }
 
 /// The content of a file of at most [`SIZE_MAX`] bytes.

@@ -160,22 +160,6 @@ fn one_lidar_without_anything_else() {
 }
 
 #[test]
-fn chunks_that_unpack_to_too_much() {
-    let temp = Temp::new();
-    let zeros = |n| ("/image", "sensor_msgs/msg/Image", BEGIN_NS + n, vec![0; 9 << 20]);
-    let messages: Vec<Message> = sweeps(2).into_iter().chain((0..20).map(zeros)).collect();
-    // LZ4 packs no better than to a 255th.
-    for (compression, refused) in [(Compression::Zstd, true), (Compression::Lz4, false)] {
-        let bytes = file(&messages, options().compression(Some(compression)));
-        let most = (16 << 20) + 256 * bytes.len();
-        let path = temp.write("zeros.mcap", bytes);
-        let error = open(&path, &accept()).map(|_| ()).err().map(|e| e.to_string());
-        let what = format!(": unpacks to more than {most} bytes");
-        assert_eq!(error.as_ref().is_some_and(|e| e.ends_with(&what)), refused, "{error:?}");
-    }
-}
-
-#[test]
 fn two_lidars_in_one_vehicle_with_odometry_in_two_files() {
     let temp = Temp::new();
     let all = rig(6);

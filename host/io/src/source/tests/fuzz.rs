@@ -246,6 +246,23 @@ fn bags() {
     fuzz("mcap", Seed::new(t, "", unlocated()));
 }
 
+#[cfg(feature = "mcap")]
+#[test]
+fn chunks_that_unpack_to_too_much() {
+    use crate::source::bag::tests as bag;
+    use mcap::Compression;
+    let temp = Temp::new();
+    let zeros = |n| ("/image", "sensor_msgs/msg/Image", n, vec![0; 9 << 20]);
+    let messages: Vec<_> = bag::rig(2).into_iter().chain((0..20).map(zeros)).collect();
+    for compression in [Compression::Zstd, Compression::Lz4] {
+        let bytes = bag::file(&messages, bag::options().compression(Some(compression)));
+        let most = (16 << 20) + 64 * bytes.len();
+        let path = temp.write("zeros.mcap", bytes);
+        let error = open(&path, &unlocated()).map(|_| ()).unwrap_err().to_string();
+        assert!(error.ends_with(&format!(": unpacks to more than {most} bytes")), "{error}");
+    }
+}
+
 /// What coverage-guided fuzzers start from can be read, and what they broke once is an error. The
 /// other tests here damage their like.
 #[cfg(all(feature = "mcap", feature = "pcap"))]
