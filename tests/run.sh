@@ -187,6 +187,21 @@ else
     echo "skipped: python3-venv cannot be installed"
 fi
 
+say "the Debian package"
+if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
+    cargo install --quiet --locked cargo-deb@3.8.0; }; then
+    package=$(host/package/deb.sh)
+    rm -rf target/installed
+    dpkg-deb --extract "$package" target/installed
+    target/installed/usr/bin/raywake --version
+    for file in etc/default/raywake usr/lib/systemd/system/raywake.service \
+        usr/share/man/man1/raywake-live.1.gz; do
+        [ -s "target/installed/$file" ] || { echo "$file is missing"; exit 1; }
+    done
+else
+    echo "skipped: no Debian package can be made here"
+fi
+
 say "many recordings, many processes"
 if command -v apt-get >/dev/null; then
     # What cannot be had is skipped there.

@@ -76,6 +76,24 @@ fn every_call_of_the_set_up() {
     run(&t, &format!("vkMapMemory 1 {NULL}"), &[]).failed(5, &["vkMapMemory"]);
 }
 
+/// What is there by then is destroyed.
+#[test]
+fn the_second_call_of_the_set_up() {
+    let Some(t) = drive() else { return };
+    let mut failed = Vec::new();
+    for name in NAMES {
+        let o = run(&t, &format!("{name} 2 {OUT_OF_DEVICE_MEMORY}"), &[]);
+        match o.code {
+            Some(5) => failed.push(*name),
+            // There is no second one, or it is that of a sweep.
+            _ => o.succeeded(),
+        }
+    }
+    for name in ["vkAllocateMemory", "vkCreateBuffer", "vkMapMemory", "vkCreateComputePipelines"] {
+        assert!(failed.contains(&name), "{name} is not among {failed:?}");
+    }
+}
+
 /// Tables of a run's results by name, from a frame on.
 fn tables(out: &Path, from: usize) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();

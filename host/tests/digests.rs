@@ -5,6 +5,7 @@
 mod common;
 
 use std::env;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -130,6 +131,19 @@ fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
     s["digest"].as_str().unwrap().to_string()
 }
 
+/// The bytes of a table, if the program can write any.
+fn table(t: &Temp, program: &Path) -> Option<Vec<u8>> {
+    let out = t.path().join("tables");
+    let _ = fs::remove_dir_all(&out);
+    let mut command = Way::Scalar.command(program, "run", &t.path().join("drive"));
+    let outcome = Outcome::of(command.args(["--quiet", "--out"]).arg(&out).output().unwrap());
+    if outcome.stderr.contains("needs the feature `arrow`") {
+        return None;
+    }
+    outcome.succeeded();
+    Some(fs::read(out.join("columns/0000000001.feather")).unwrap())
+}
+
 /// The digest that `map` prints.
 fn map_digest(t: &Temp, way: Way) -> String {
     let mut command = way.command(own(), "map", &t.path().join("drive"));
@@ -246,16 +260,23 @@ fn other_builds() {
     drive(&t);
     let wanted = digest(&t, own(), Way::Scalar, &[]);
     let tracks = track_digest(&t, own(), Way::Scalar, "flow");
+    let table = table(&t, own()).expect("tests are built with tables");
+    let mut written = 0;
     for program in env::split_paths(&programs).filter(|p| !p.as_os_str().is_empty()) {
         let name = program.display();
         assert_eq!(digest(&t, &program, Way::Scalar, &[]), wanted, "{name}, scalar");
         let found = track_digest(&t, &program, Way::Scalar, "flow");
         assert_eq!(found, tracks, "{name}, tracks");
+        if let Some(found) = self::table(&t, &program) {
+            assert!(found == table, "{name}, tables");
+            written += 1;
+        }
         if vulkan(&program) {
             let way = Way::Vulkan(THREADS_AT, None);
             assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");
         }
     }
+    println!("{written} other builds write tables");
 }
 
 /// A whole recorded drive: equal digests, flow in every pair, nothing allocated.

@@ -219,18 +219,22 @@ static void *disturb(void *nothing) {
     return nothing;
 }
 
-/* A drive with two threads; with `disturbed`, a third calls all the while. Returns its digest. */
-static uint64_t drive(const char *path, int disturbed) {
+/* A drive with two threads; with `disturbed`, a third calls all the while; with `all`, on one, with
+   poses found and objects followed, and all is read. Returns its digest. */
+static uint64_t drive(const char *path, int disturbed, int all) {
     FILE *file = fopen(path, "rb");
     if (!file) exit(3);
     raywake_options o = rig_of(file);
-    o.threads = 2;
+    o.threads = all ? 1 : 2, o.find_poses = o.objects = all;
     uint64_t count, digest = RAYWAKE_DIGEST_START;
     size_t bytes = 0, room = 262144;
     EXPECT(raywake_memory_needed(&o, &bytes, NULL), OK);
     void *memory = malloc(bytes);
     file_point *points = malloc(room * sizeof *points);
     raywake_point *flow = malloc(room * sizeof *flow);
+    raywake_column *columns = malloc(room * sizeof *columns);
+    raywake_tracklet *tracklets = malloc(room * sizeof *tracklets);
+    raywake_object *objects = malloc(room * sizeof *objects);
     raywake_estimator *e = NULL;
     EXPECT(raywake_create(&o, memory, bytes, &e, NULL), OK);
     pthread_t other;
@@ -248,6 +252,7 @@ static uint64_t drive(const char *path, int disturbed) {
         CHECK(count <= room);
         need(file, points, count * sizeof *points);
         s.count = count;
+        if (all) s.world_from_vehicle = NULL, s.twist = NULL;
         long before = allocated();
         raywake_status status;
         do status = raywake_step(e, &s, &result, NULL);
@@ -255,6 +260,9 @@ static uint64_t drive(const char *path, int disturbed) {
         expect(__LINE__, status, RAYWAKE_STATUS_OK);
         if (!disturbed) {
             EXPECT(raywake_points(e, flow, room, NULL), OK);
+            EXPECT(raywake_columns(e, columns, room, NULL), OK);
+            EXPECT(raywake_tracklets(e, tracklets, room, NULL), OK);
+            if (all) EXPECT(raywake_objects(e, objects, room, NULL), OK);
             EXPECT(raywake_add_to_digest(e, &digest), OK);
         }
         CHECK(allocated() == before);
@@ -263,7 +271,7 @@ static uint64_t drive(const char *path, int disturbed) {
     stop = 1;
     if (disturbed) pthread_join(other, NULL);
     EXPECT(raywake_destroy(e), OK);
-    free(flow), free(points), free(memory), fclose(file);
+    free(objects), free(tracklets), free(columns), free(flow), free(points), free(memory), fclose(file);
     CHECK(sweeps > 1);
     return digest;
 }
@@ -274,8 +282,9 @@ int main(int argc, char **argv) {
     options_that_are_none();
     addresses_that_are_none();
     sweeps_that_are_none();
-    CHECK(drive(argv[1], 0) == drive(argv[1], 0));
-    drive(argv[1], 1);
+    CHECK(drive(argv[1], 0, 0) == drive(argv[1], 0, 0));
+    CHECK(drive(argv[1], 0, 1) == drive(argv[1], 0, 1));
+    drive(argv[1], 1, 0);
     CHECK(busy > 0);
     printf("%s; %d calls at the same time were refused\n", failed ? "FAILED" : "passed", busy);
     return failed;
