@@ -85,6 +85,9 @@ else
     echo "skipped: Miri cannot be installed"
 fi
 
+say "fuzzers compile"
+CARGO_TARGET_DIR=target/fuzz cargo check --quiet --locked --manifest-path host/io/fuzz/Cargo.toml
+
 # As on the host, bit for bit.
 bare() {
     rustup target add aarch64-unknown-none >/dev/null 2>&1 || return 1

@@ -282,6 +282,10 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "registered|ground", *noise, call=raywake.flow)
         self.refuses(ValueError, "dt", *noise, dt=0, call=raywake.flow)
         self.refuses(OSError, "No such file", "/nonexistent", call=raywake.Recording)
+        # The decoder panics over it.
+        corpus = Path(__file__).parents[2] / "io/fuzz/corpus"
+        damaged = corpus / "mcap/record-longer-than-chunk.mcap"
+        self.refuses(OSError, "damaged", damaged, call=raywake.Recording)
         with self.assertRaises(raywake.CommandError) as caught:
             raywake.clean("/nonexistent", "/nonexistent")
         self.assertEqual(caught.exception.code, 3)
