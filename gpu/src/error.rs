@@ -31,8 +31,10 @@ pub enum GpuError {
         bytes: u64,
     },
     /// The device stopped working. Final.
-    #[error("device lost during {during}")]
+    #[error("device lost during {during}, says {call}")]
     DeviceLost {
+        /// The function that said so.
+        call: &'static str,
         /// How far it came.
         during: During,
     },

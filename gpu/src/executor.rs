@@ -156,7 +156,9 @@ impl Executor {
 
     fn fault(&mut self, call: &'static str, result: vk::Result, program: usize) -> GpuError {
         match result {
-            vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost { during: self.during(program) },
+            vk::Result::ERROR_DEVICE_LOST => {
+                GpuError::DeviceLost { call, during: self.during(program) }
+            }
             _ => failed(call)(result),
         }
     }
