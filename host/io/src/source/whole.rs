@@ -13,8 +13,9 @@ use crate::Error;
 /// may grow.
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
-/// What a packed file may unpack to: so many bytes, and so many times its own size. Returns pack to
-/// a third of theirs; 16 MiB are the zeros of a sweep's flow, which pack to nothing.
+/// What a packed file may unpack to: so many bytes, and so many times its own size. Files of an
+/// Argoverse 2 log unpack to six times theirs at most; zeros pack to nothing, and 16 MiB are 64 bytes
+/// for each return of the largest sweep.
 const UNPACKED_BASE: u64 = 16 << 20;
 const UNPACKED_RATIO: u64 = 64;
 /// What a row takes at least, however little it unpacks to.
@@ -58,7 +59,7 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     Ok((File::open(path).map_err(Error::reading(path))?, metadata.len()))
 }
 
-/// The same for at most so many bytes.
+/// The content of a file of at most so many bytes, see [`read`].
 pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     let too_long = |size: u64| {
         Error::input(path, "", format!("has {size} bytes or more, at most {most} are read"))

@@ -166,12 +166,7 @@ impl BagFile {
                     next.before += 1;
                     self.unpacked += HEAD + data.len() as u64;
                     if self.unpacked > most {
-                        let what = format!("unpacks to more than {most} bytes");
-                        return Err(Error::input(
-                            &self.path,
-                            format!("byte {}", place.record),
-                            what,
-                        ));
+                        return Err(damaged(format!("unpacks to more than {most} bytes")));
                     }
                     if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
                         let record = parse_record(opcode, data);

@@ -26,7 +26,7 @@ const NUMBERS_MAX: usize = 1 << 24;
 /// Numbers that a column of a group of rows is believed to have, 1 GiB of float32: twice as many as
 /// the images of 200 sweeps. A few bytes may say that one is repeated as often as one likes.
 const COLUMN_MAX: u64 = 1 << 28;
-/// Rows that are believed: of a segment's boxes there are 100,000.
+/// Rows that are believed. A segment has five a sweep, some 1,000.
 const ROWS_MAX: usize = 1 << 20;
 /// Rows that are decoded at once where rows are small.
 const BATCH: usize = 256;
