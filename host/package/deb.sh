@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
 # Builds the Debian package, with all formats, manual pages and completions, by cargo-deb. It prints
 # where that is.
+#
+#     host/package/deb.sh [PROFILE]
 set -euo pipefail
+profile=${1:-onboard}
 cd "$(dirname "$0")/../.."
-cargo build --quiet --profile onboard -p raywake --all-features >&2
-program=target/onboard/raywake
+cargo build --quiet --profile "$profile" -p raywake --all-features >&2
+program=target/$profile/raywake
 shell=target/package
 mkdir -p "$shell"
 for command in "" run live flow track clean map odometry demo budget devices; do
@@ -14,5 +17,5 @@ done
 "$program" completions bash >"$shell/raywake.bash"
 "$program" completions zsh >"$shell/_raywake"
 "$program" completions fish >"$shell/raywake.fish"
-cargo deb --quiet --no-build --profile onboard -p raywake --output target/package/
+cargo deb --quiet --no-build --profile "$profile" -p raywake --output target/package/
 ls -t target/package/raywake_*.deb | head -1
