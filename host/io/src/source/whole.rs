@@ -14,8 +14,8 @@ use crate::Error;
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
 /// What a packed file may unpack to: so many bytes, and so many times its own size. Files of an
-/// Argoverse 2 log unpack to six times theirs at most; zeros pack to nothing, and 16 MiB are 64 bytes
-/// for each return of the largest sweep.
+/// Argoverse 2 log unpack to six times theirs at most; zeros pack to nothing, and 16 MiB are 64
+/// bytes for each return of the largest sweep.
 const UNPACKED_BASE: u64 = 16 << 20;
 const UNPACKED_RATIO: u64 = 64;
 /// What a row takes at least, however little it unpacks to.
