@@ -40,6 +40,8 @@ fi
 
 dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$@"; }
 dump demo "$out/demo.sweeps" 20
+# Those of another build would be results of other settings.
+rm -rf "$out/demo"
 RAYWAKE_SWEEPS=$out/demo.sweeps \
     RAYWAKE_DIGEST=$("$program" demo --backend scalar --out "$out/demo" | sed -n 's/^digest *//p') \
     "$python" host/python/tests/test_raywake.py
