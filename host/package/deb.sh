@@ -17,5 +17,5 @@ done
 "$program" completions bash >"$shell/raywake.bash"
 "$program" completions zsh >"$shell/_raywake"
 "$program" completions fish >"$shell/raywake.fish"
-cargo deb --quiet --no-build --profile "$profile" -p raywake --output target/package/
+cargo deb --quiet --no-build --profile "$profile" -p raywake --output target/package/ >&2
 ls -t target/package/raywake_*.deb | head -1
