@@ -26,7 +26,7 @@ const DONE: &str = "done";
 
 /// The digest that `raywake demo` prints: another one where results have become others. Those of
 /// before are not taken for done then.
-pub const RESULTS: u64 = 0xeac4_ab86_8963_cbc7;
+pub const DEMO_DIGEST: u64 = 0xeac4_ab86_8963_cbc7;
 
 /// Arguments of every command that works on a recording.
 pub struct SharedArgs<'a> {
@@ -208,7 +208,7 @@ fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let settings = config::settings(&flow.profile)?;
     let weights = WeightFiles::read(&flow.learned, &settings.profile)?.digest();
     let made_with = (&settings.profile, &settings.objects);
-    let all = format!("{plain:?} {made_with:?} {weights} {RESULTS:016x}");
+    let all = format!("{plain:?} {made_with:?} {weights} {DEMO_DIGEST:016x}");
     let (digest, version) = (Digest::of(all.as_bytes()), env!("CARGO_PKG_VERSION"));
     Ok(format!("raywake {version} {} {digest:016x}\n", C::NAME))
 }

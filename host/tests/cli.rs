@@ -351,7 +351,7 @@ fn a_demo() {
     o.succeeded();
     assert!(o.stdout.contains("median speed error"), "{}", o.stdout);
     // Where results have become others, work that was done before is not taken for done.
-    let digest = format!("{:016x}", raywake::batch::RESULTS);
+    let digest = format!("{:016x}", raywake::batch::DEMO_DIGEST);
     assert!(o.stdout.contains(&digest), "{digest} is not in {}", o.stdout);
     assert!(o.summary(&out.join("summary.json"))["valid_flows"].as_u64() > Some(1000));
     assert!(out.join("columns/0000000000.feather").is_file());

@@ -276,7 +276,7 @@ fn other_builds() {
             assert_eq!(digest(&t, &program, way, &[]), wanted, "{name}, {way:?}");
         }
     }
-    println!("{written} other builds write tables");
+    assert!(written > 0, "none of them writes tables");
 }
 
 /// A whole recorded drive: equal digests, flow in every pair, nothing allocated.

@@ -271,7 +271,8 @@ static uint64_t drive(const char *path, int disturbed, int all) {
     stop = 1;
     if (disturbed) pthread_join(other, NULL);
     EXPECT(raywake_destroy(e), OK);
-    free(objects), free(tracklets), free(columns), free(flow), free(points), free(memory), fclose(file);
+    free(objects), free(tracklets), free(columns), free(flow), free(points), free(memory);
+    fclose(file);
     CHECK(sweeps > 1);
     return digest;
 }

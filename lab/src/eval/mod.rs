@@ -207,12 +207,16 @@ fn names_of_list(
     let shard = shard.map_or_else(Shard::of_environment, Ok)?;
     let mut names = BTreeMap::new();
     for ListedRecording { data, place } in batch::part(list, shard)?.0 {
-        // No two paths have one, in whichever part they are.
-        let parts = place.iter().map(|part| part.to_string_lossy());
-        let parts = parts.map(|part| part.replace('%', "%25").replace('+', "%2B"));
-        names.insert(parts.collect::<Vec<_>>().join("+"), data);
+        names.insert(name_of(&place), data);
     }
     Ok((names, shard.of == 1))
+}
+
+/// A path in one piece. No two have the same, in whichever part of a list they are.
+fn name_of(place: &Path) -> String {
+    let parts = place.iter().map(|part| part.to_string_lossy());
+    let parts = parts.map(|part| part.replace('%', "%25").replace('+', "%2B"));
+    parts.collect::<Vec<_>>().join("+")
 }
 
 /// Drives that were evaluated, and those that failed.

@@ -3,7 +3,7 @@
 mod recorded;
 
 use super::row::{CLASSES, Row};
-use super::{Args, ablate, rows_file, run};
+use super::{Args, ablate, name_of, rows_file, run};
 use crate::scratch::Scratch;
 use crate::simulate::{Motion, Recipe, truth, write};
 use clap::Parser;
@@ -327,4 +327,10 @@ fn variants_in_one_table() {
     let table = lines(&author);
     assert!(!table[0][2].is_empty() && table[1][0] == "refine-2" && table[1][2].is_empty());
     assert!(fs::read_to_string(author.join("report.html")).unwrap().contains("refinement_sweeps"));
+}
+
+#[test]
+fn no_two_paths_of_a_list_have_one_name() {
+    let names = ["a/b", "a+b", "a/+b", "a+/b", "a%2Bb", "ab"].map(|path| name_of(Path::new(path)));
+    assert_eq!(names, ["a+b", "a%2Bb", "a+%2Bb", "a%2B+b", "a%252Bb", "ab"]);
 }

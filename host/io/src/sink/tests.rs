@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
+use std::time::Duration;
 
 use super::atomic;
 use crate::source::tests::Temp;
@@ -75,11 +76,13 @@ fn a_planted_pipe_holds_nothing_up() {
     let t = Temp::new();
     let pipe = t.path().join(".a.txt.partial");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    atomic::write(&t.path().join("a.txt"), |w| w.write_all(b"one")).unwrap();
-    assert_eq!(
-        (fs::read(t.path().join("a.txt")).unwrap(), names(t.path()).len()),
-        (b"one".into(), 1)
-    );
+    let path = t.path().join("a.txt");
+    let (tell, told) = std::sync::mpsc::channel();
+    let to = path.clone();
+    std::thread::spawn(move || tell.send(atomic::write(&to, |w| w.write_all(b"one"))));
+    let written = told.recv_timeout(Duration::from_secs(60));
+    written.expect("the other end of the pipe is not waited for").unwrap();
+    assert_eq!((fs::read(&path).unwrap(), names(t.path()).len()), (b"one".to_vec(), 1));
 }
 
 #[test]
