@@ -244,8 +244,8 @@ impl Tracklets {
         }
     }
 
-    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Returns its
-    /// slot, or that of the older one there.
+    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Where two meet,
+    /// one that moves stays rather than one at rest, and of two alike the older. Returns the slot.
     fn put(
         &mut self,
         step: &SweepUniform,
@@ -270,7 +270,9 @@ impl Tracklets {
         let there = self.slot_of_column[column as usize];
         if let Some(other) = self.next.get_mut(there as usize) {
             turnover.merged += 1;
-            if t.age > other.age {
+            // Put out with the velocity of what stands there, what moves would be taken to stand.
+            let rank = |t: &Tracklet| (!t.ekf.at_rest(), t.age);
+            if rank(&t) > rank(other) {
                 *other = t;
             }
             return there;

@@ -104,6 +104,23 @@ fn what_meets_in_one_cell_becomes_the_older() {
 }
 
 #[test]
+fn what_moves_to_where_something_stands_still_moves() {
+    // Put in before the one that stands, and after it.
+    for (from, by) in [(10, 2.0), (14, -2.0)] {
+        let standing = seen(cell(12, 10), [0.0, 0.0]);
+        let mut tracklets = new();
+        advance(&mut tracklets, &profile(), [0, 0], &mut [standing]);
+        let mut observed = [standing, seen(cell(from, 10), [by, 0.0])];
+        observed.sort_by_key(|o| o.column);
+        let (turnover, _) = advance(&mut tracklets, &profile(), [0, 0], &mut observed);
+        assert_eq!((turnover.born, turnover.updated, turnover.merged), (1, 1, 1));
+        assert_eq!(observed.map(|o| o.slot), [0, 0]);
+        let [kept] = tracklets.all() else { panic!("{}", tracklets.all().len()) };
+        assert!(!kept.ekf.at_rest() && kept.age == 0, "{kept:?}");
+    }
+}
+
+#[test]
 fn unobserved_tracklets_wait_ever_less_sure() {
     for coast_sweeps in [0, 1, 2, 5] {
         let mut profile = profile();
