@@ -59,6 +59,11 @@ fn counts(error: bool, validation: bool, id: &[u8]) -> bool {
     (error || validation) && !noise
 }
 
+/// Notes a message that counts.
+///
+/// # Safety
+/// `data` is valid during the call, and `user` a [`Messages`]: called by Vulkan, with what
+/// [`messenger`] was given.
 unsafe extern "system" fn receive(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     types: vk::DebugUtilsMessageTypeFlagsEXT,

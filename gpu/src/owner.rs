@@ -132,11 +132,13 @@ impl Gpu {
         }
     }
 
-    /// Reads timestamps as (ticks, available), without waiting for any.
+    /// Reads timestamps as (ticks, available), without waiting for any. What cannot be read is not
+    /// available.
     pub fn timestamps(&self, pool: vk::QueryPool, ticks: &mut [[u64; 2]]) {
+        ticks.fill([0; 2]);
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
         // SAFETY: `ticks` has one element per query of the pool, of the size the flags imply.
-        // An error (some not available yet) shows in the elements.
+        // An error shows in the elements.
         let _ = unsafe { self.raw.get_query_pool_results(pool, 0, ticks, flags) };
     }
 }

@@ -4,7 +4,7 @@
 #
 #     host/package/deb.sh [PROFILE]
 set -euo pipefail
-profile=${1:-onboard}
+profile=${1:-library}
 cd "$(dirname "$0")/../.."
 cargo build --quiet --profile "$profile" -p raywake --all-features >&2
 program=target/$profile/raywake

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Builds the wheel for Linux on an architecture, with maturin on the path:
 #
-#     host/python/wheel.sh x86_64|aarch64 FOLDER
+#     host/python/wheel.sh x86_64|aarch64 FOLDER [PROFILE]
 set -euo pipefail
-[ $# = 2 ] || { echo "wheel.sh x86_64|aarch64 FOLDER" >&2; exit 2; }
+[ $# = 2 ] || [ $# = 3 ] || { echo "wheel.sh x86_64|aarch64 FOLDER [PROFILE]" >&2; exit 2; }
 mkdir -p "$2"
 folder=$(cd "$2" && pwd)
 cd "$(dirname "$0")/../.."
@@ -13,6 +13,6 @@ if [ "$1" != "$(uname -m)" ]; then
     cross "$1-unknown-linux-gnu"
     other=(--target "$1-unknown-linux-gnu")
 fi
-# With its own profile: a defect is an exception there, not the end of the interpreter.
-maturin build --quiet --profile library --manifest-path host/python/Cargo.toml \
+# With a profile where panics unwind: a defect is an exception, not the end of the interpreter.
+maturin build --quiet --profile "${3:-library}" --manifest-path host/python/Cargo.toml \
     --target-dir target "${other[@]}" --out "$folder"

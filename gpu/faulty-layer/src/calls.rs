@@ -218,4 +218,8 @@ calls! {
     vkWaitForFences(
         device: vk::Device, count: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64
     );
+    vkGetQueryPoolResults(
+        device: vk::Device, pool: vk::QueryPool, first: u32, count: u32, bytes: usize,
+        data: *mut c_void, stride: u64, flags: vk::QueryResultFlags
+    );
 }

@@ -103,6 +103,9 @@ unsafe extern "system" fn create_instance(
     allocator: *const vk::AllocationCallbacks<'static>,
     instance: *mut vk::Instance,
 ) -> vk::Result {
+    if let Some(result) = fault("vkCreateInstance") {
+        return vk::Result::from_raw(result);
+    }
     // SAFETY: the caller's promise throughout.
     unsafe {
         let link = advance((*info).p_next.cast_mut().cast(), LOADER_INSTANCE);

@@ -12,7 +12,8 @@ python3 -m venv "$out/tools" &&
     "$out/tools/bin/pip" install --quiet --disable-pip-version-check maturin==1.16.0 || exit 77
 
 rm -rf "$out/wheels" "$out/fresh"
-PATH=$out/tools/bin:$PATH host/python/wheel.sh "$(uname -m)" "$out/wheels"
+# As the program is built: to optimise across crates takes minutes, and changes no result.
+PATH=$out/tools/bin:$PATH host/python/wheel.sh "$(uname -m)" "$out/wheels" release
 
 python3 -m venv "$out/fresh"
 start=$SECONDS
