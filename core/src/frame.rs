@@ -88,6 +88,24 @@ pub(crate) struct Side {
     pub points: Thinning,
 }
 
+/// Rounding far from the drive's start, and places in whole steps, come to less; a cell is larger.
+const SLIP_MAX_M: f64 = 1e-3;
+
+impl Side {
+    /// By how much what stands comes to lie elsewhere than the window of the next sweep, which was
+    /// shifted, has it; unless nothing of it is in view.
+    fn slip_m(&self, profile: &Profile, next: &Side, shift: [i32; 3]) -> Option<f64> {
+        let beyond = shift.iter().any(|cells| cells.unsigned_abs() >= profile.side);
+        if profile.frame != Frame::Lattice || beyond {
+            return None;
+        }
+        let at = |window: &Window| window.grid_from_vehicle.translation;
+        let moved = next.pose.translation - self.pose.translation;
+        let shift_m = DVec3::from_array(shift.map(f64::from)) * profile.voxel_m;
+        Some((at(&self.window) - at(&next.window) + moved - shift_m).length())
+    }
+}
+
 /// Where a sweep lies.
 pub(crate) struct Arrival {
     pub window: Window,
@@ -141,9 +159,12 @@ impl Sides {
         self.lattice_origin.get_or_insert(window.lattice_origin);
         let points = Thinning::new(sweep.points.len(), profile.returns());
         let (stamp_s, twist) = (sweep.stamp_s, sweep.twist);
-        self.current = Some(Side { window, pose, twist, stamp_s, points });
-        let before = self.before.as_ref().map(|b| &b.window);
-        let shift = profile.frame.shift(profile.side as i32, before, &window);
+        let side = Side { window, pose, twist, stamp_s, points };
+        self.current = Some(side);
+        let before = self.before.as_ref();
+        let shift = profile.frame.shift(profile.side as i32, before.map(|b| &b.window), &window);
+        let slip_m = before.and_then(|before| before.slip_m(profile, &side, shift));
+        assert!(slip_m.is_none_or(|m| m < SLIP_MAX_M), "{slip_m:?} from {before:?} to {side:?}");
         Arrival { window, shift, reset }
     }
 
@@ -285,4 +306,50 @@ impl Frame {
 pub(crate) fn centre_of(profile: &Profile, i: i32, j: i32) -> DVec3 {
     let [ci, cj, _] = central(profile);
     DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0) * profile.voxel_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::Timing;
+
+    /// Cells from the window before, and whether there is one, for places in turn, 0.1 s apart.
+    fn shifts<const N: usize>(places: [[f64; 3]; N]) -> [([i32; 3], bool); N] {
+        let (profile, mut sides) = (Profile::hdl64(), Sides::new());
+        let rig = Rig {
+            sensors: heapless::Vec::new(),
+            timing: Timing::AtStamp,
+            distorted: false,
+            ground_m: -1.7,
+            own_vehicle: None,
+        };
+        let mut stamp_s = 0.0;
+        places.map(|place| {
+            stamp_s += 0.1;
+            let world_from_vehicle =
+                Pose { translation: DVec3::from_array(place), ..Pose::IDENTITY };
+            let twist = Twist::ZERO;
+            let sweep = Sweep { stamp_s, points: &[], world_from_vehicle, twist };
+            let arrival = sides.advance(&profile, &rig, &sweep);
+            (arrival.shift, arrival.reset.is_none())
+        })
+    }
+
+    #[test]
+    fn windows_are_shifted_by_whole_cells() {
+        for from in [0.0, 0.1, 1e5, -3e7] {
+            let at = |x: f64| [from + x, -from, 0.0];
+            let found = shifts([at(0.0), at(0.16), at(0.44), at(0.46), at(-0.46)]);
+            let cells = [[1, 0, 0], [0, 0, 0], [1, 0, 0], [-4, 0, 0]].map(|shift| (shift, true));
+            assert_eq!(found[1..], cells, "from {from}");
+        }
+    }
+
+    #[test]
+    fn places_that_cannot_be_told_are_borne() {
+        for far in [4e8, 1e13, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
+            shifts([[0.0; 3], [far, 0.0, 0.0], [far, 1.0, 0.0], [-far, 0.0, 0.0], [0.0; 3]]);
+            shifts([[far, 0.0, 0.0], [far, 1.0, 0.0], [far, 30.0, 0.0]]);
+        }
+    }
 }
