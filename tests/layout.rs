@@ -65,6 +65,47 @@ fn the_parameters_are_what_the_code_says() {
     assert_printed("PARAMETERS.md", &budget::parameters());
 }
 
+/// Structures of a source file, as rows of a table of their fields: name, type, what it says.
+fn fields(source: &str) -> String {
+    let mut text = String::new();
+    let mut said = Vec::new();
+    for line in source.lines().map(str::trim) {
+        if let Some(doc) = line.strip_prefix("/// ") {
+            said.push(doc);
+            continue;
+        }
+        let about = said.join(" ");
+        if let Some(name) = line.strip_prefix("pub struct ") {
+            let name = name.trim_end_matches("Record {");
+            text += &format!("\n## {}_DTYPE\n\n{about}\n\n", name.to_uppercase());
+            text += "| field | type | |\n| --- | --- | --- |\n";
+        } else if let Some((name, kind)) =
+            line.strip_prefix("pub ").and_then(|field| field.trim_end_matches(',').split_once(": "))
+            && name != "reserved"
+            && !name.contains(' ')
+        {
+            text += &format!("| `{name}` | {kind} | {about} |\n");
+        }
+        if !line.starts_with("#[") {
+            said.clear();
+        }
+    }
+    text
+}
+
+#[test]
+fn fields_of_pythons_records_are_what_the_code_says() {
+    let mut text = String::from(
+        "# Fields of the arrays of records\n\nWritten by a test from the records' sources; \
+         `UPDATE=1` rewrites it.\nFrames: x forward, y left, z up; the world's is that of the \
+         poses. `[f32; 2]` is two numbers an\nelement.\n",
+    );
+    for file in ["host/embed/src/records.rs", "host/python/src/flow_record.rs"] {
+        text += &fields(&read(&root().join(file)));
+    }
+    assert_printed("host/python/FIELDS.md", &text);
+}
+
 #[test]
 fn every_kernel_lies_where_its_twin_does() {
     let folder = root().join("kernels/wgsl");

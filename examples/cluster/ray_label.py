@@ -31,16 +31,23 @@ def label(path):
 
 
 def main(listed, out):
-    """Labels all recordings of a list."""
+    """Labels all recordings of a list. One that cannot be read is told, and the others go on."""
     paths = [line.strip() for line in open(listed) if line.strip() and line[0] != "#"]
     waiting = [label.remote(path) for path in paths]
+    failed = 0
     with open(out, "w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["recording", "stamp_s", "returns", "moving", "fastest_mps"])
         while waiting:
             done, waiting = ray.wait(waiting)
             for task in done:
-                rows.writerows(ray.get(task))
+                try:
+                    rows.writerows(ray.get(task))
+                except ray.exceptions.RayTaskError as error:
+                    failed += 1
+                    print(error.cause, file=sys.stderr)
+    if failed:
+        sys.exit(f"{failed} of {len(paths)} recordings are not labelled")
 
 
 if __name__ == "__main__":
