@@ -12,6 +12,7 @@ use raywake_registration::Odometry;
 use raywake_registration::odometry::Locating;
 use serde::Serialize;
 
+use crate::budget;
 use crate::console::bytes;
 use crate::error::RunError;
 use crate::laps::milliseconds;
@@ -111,29 +112,36 @@ impl Locator {
     pub const BYTES: u64 = size_of::<Odometry>() as u64;
 
     /// Allocates all it needs for a source; nothing is needed for poses that are trusted.
-    pub fn of<S: Source + ?Sized>(source: &S) -> Option<Locator> {
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
+    pub fn of<S: Source + ?Sized>(source: &S) -> Result<Option<Locator>, RunError> {
         match source.is_located() {
-            true if source.overview().trusted => None,
-            true => Some(Locator::new(PoseUse::Check)),
-            false => Some(Locator::finding()),
+            true if source.overview().trusted => Ok(None),
+            true => Locator::new(PoseUse::Check).map(Some),
+            false => Locator::finding().map(Some),
         }
     }
 
     /// For sweeps without poses.
-    pub fn finding() -> Locator {
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
+    pub fn finding() -> Result<Locator, RunError> {
         Locator::new(PoseUse::Find)
     }
 
-    fn new(poses: PoseUse) -> Locator {
+    fn new(poses: PoseUse) -> Result<Locator, RunError> {
+        budget::ask_for(Locator::BYTES)?;
         let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
-        Locator {
+        Ok(Locator {
             odometry: Sealed::new("registration", odometry),
             poses,
             last: [Pose::IDENTITY; 2],
             compared: Compared::default(),
             counts: [0; 4],
             times_ms: Vec::new(),
-        }
+        })
     }
 
     /// Gives a sweep that follows those before its pose and twist, unless those that it has are

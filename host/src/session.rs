@@ -35,7 +35,8 @@ pub struct SessionEnd {
 /// finished and no further one is read.
 ///
 /// # Errors
-/// What the source or `visit` returns, at once; [`RunError::Allocation`] of registration.
+/// What the source or `visit` returns, at once; [`RunError::Allocation`] and
+/// [`RunError::NoMemory`] of registration.
 pub fn each_sweep<S: Source + ?Sized>(
     source: &mut S,
     sweeps: Range<usize>,
@@ -44,7 +45,7 @@ pub fn each_sweep<S: Source + ?Sized>(
 ) -> Result<SessionEnd, RunError> {
     listen();
     let (mut now, mut last) = (SweepData::default(), SweepData::default());
-    let mut locator = Locator::of(source);
+    let mut locator = Locator::of(source)?;
     let mut progress = Progress::new("sweep", sweeps.len(), quiet);
     let mut stopped = false;
     for (done, index) in sweeps.enumerate() {

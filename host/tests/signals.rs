@@ -21,9 +21,17 @@ fn too_little_memory_is_told_before_the_first_sweep() {
     t.drive(2);
     let program = env!("CARGO_BIN_EXE_raywake");
     let data = t.path().join("drive").display().to_string();
-    let line = format!("ulimit -v 70000; exec {program} run {data} --backend scalar");
-    let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
-    o.failed(6, &["MB needed, which the system does not give"]);
+    let out = t.path().join("out").display().to_string();
+    for (kib, command) in [
+        (70_000, format!("run {data} --backend scalar")),
+        (40_000, format!("odometry {data} --out {out}")),
+        (40_000, format!("map {data} --backend scalar --out {out}")),
+        (60_000, format!("track {data} --front-end variance --out {out}")),
+    ] {
+        let line = format!("ulimit -v {kib}; exec {program} {command}");
+        let o = Outcome::of(Command::new("sh").args(["-c", &line]).output().unwrap());
+        o.failed(6, &["MB needed, which the system does not give"]);
+    }
 }
 
 #[test]

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::CommandFactory;
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyOSError;
+use pyo3::exceptions::{PyMemoryError, PyOSError};
 use pyo3::prelude::*;
 use raywake::args::Args;
+use raywake::error::RunError;
 use raywake::locate::Locator;
 use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
 
@@ -31,7 +32,9 @@ pub fn main(py: Python<'_>, args: Vec<String>) -> u8 {
 pub fn odometry(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let options = OpenOptions { unlocated: Unlocated::Always, ..OpenOptions::default() };
     let mut source = py.detach(|| open(&path, &options)).map_err(failed)?;
-    let (mut locator, mut sweep) = (Locator::finding(), SweepData::default());
+    let in_memory = |e: RunError| PyMemoryError::new_err(e.to_string());
+    let mut locator = Locator::finding().map_err(in_memory)?;
+    let mut sweep = SweepData::default();
     let mut numbers = Vec::with_capacity(16 * source.len());
     for index in 0..source.len() {
         py.check_signals()?;

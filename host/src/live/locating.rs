@@ -9,6 +9,7 @@ use raywake_registration::odometry::Locating;
 use serde::Serialize;
 
 use super::poses::PoseReceiver;
+use crate::budget;
 use crate::error::RunError;
 
 /// How sweeps were located.
@@ -39,13 +40,19 @@ enum By<'a> {
 
 impl<'a> LiveLocator<'a> {
     /// By poses, or by registration where none come.
-    pub fn new(poses: Option<&'a PoseReceiver>) -> LiveLocator<'a> {
-        let registration = || {
-            let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
-            By::Registration(Sealed::new("registration", odometry))
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
+    pub fn new(poses: Option<&'a PoseReceiver>) -> Result<LiveLocator<'a>, RunError> {
+        let by = match poses {
+            Some(poses) => By::Poses(poses),
+            None => {
+                budget::ask_for(size_of::<Odometry>() as u64)?;
+                let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+                By::Registration(Sealed::new("registration", odometry))
+            }
         };
-        let by = poses.map_or_else(registration, By::Poses);
-        LiveLocator { by, counts: LocatedCounts::default() }
+        Ok(LiveLocator { by, counts: LocatedCounts::default() })
     }
 
     /// How it went so far.

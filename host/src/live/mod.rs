@@ -161,7 +161,7 @@ impl Plan<'_> {
             deadline,
             drive,
             objects: self.objects()?,
-            locator: locating::LiveLocator::new(poses),
+            locator: locating::LiveLocator::new(poses)?,
             outlets: Outlets {
                 stream: args.results.send.map(FlowStream::to).transpose()?,
                 recording: pairs.as_ref().zip(kept),
@@ -187,6 +187,7 @@ impl Plan<'_> {
         if !self.args.objects {
             return Ok(None);
         }
+        budget::ask_for(LiveObjects::BYTES as u64)?;
         let held = bytes(LiveObjects::BYTES as u64);
         say(self.args.quiet, &format!("memory for objects: {held}\n"))?;
         Ok(Some(LiveObjects::new(self.tracking, &self.profile)))

@@ -7,6 +7,7 @@ use raywake_core::params::Profile;
 
 use super::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
+use crate::budget;
 use crate::choose;
 use crate::console::{bytes, note, say};
 use crate::error::RunError;
@@ -26,6 +27,7 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let wanted = choose::wanted(&args.backend)?;
+    budget::ask_for(Mapper::bytes(&profile) as u64)?;
     let backend = match &wanted.device {
         Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),
         None => MapBackend::Scalar(Box::new(ScalarMap::new(&profile))),
@@ -41,8 +43,8 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let _claim = made.claim(Some(&args.out))?;
     say(args.quiet, &format!("{}\n", source.describe()))?;
     note(args.quiet, source.notes().iter().chain(&wanted.note))?;
-    let budget = bytes(Mapper::bytes(&profile) as u64);
-    say(args.quiet, &format!("{}; memory budget: at most {budget} of buffers\n", backend.name()))?;
+    let most = bytes(Mapper::bytes(&profile) as u64);
+    say(args.quiet, &format!("{}; memory budget: at most {most} of buffers\n", backend.name()))?;
 
     let mut mapper = Mapper::new(profile.clone(), source.rig().clone(), backend);
     let files = PictureFiles::of(&args.views, args.png.then(|| args.out.clone()));

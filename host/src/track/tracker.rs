@@ -157,6 +157,12 @@ impl Tracker {
         ]
     }
 
+    /// Bytes of all parts, of those of every sweep's estimate only where they are wanted.
+    pub fn bytes(fixed_lag: bool) -> u64 {
+        let [front_end, tracks, solvers, lags] = Tracker::parts().map(|part| part.2 as u64);
+        front_end + tracks + solvers + if fixed_lag { lags } else { 0 }
+    }
+
     /// A sweep, and the one before it if there is one. With the flow it is that one whose tracks
     /// come next, as its flow is then known; nothing comes back where there is none.
     pub fn sweep(

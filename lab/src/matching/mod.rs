@@ -58,7 +58,7 @@ struct Found {
 }
 
 fn located(source: &mut dyn Source, count: usize) -> Result<Found, RunError> {
-    let mut locator = Locator::finding();
+    let mut locator = Locator::finding()?;
     let mut sweep = SweepData::default();
     let mut differences = Differences::default();
     let mut last = [Pose::IDENTITY; 2];
