@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds the program as one file that needs nothing else, for the CPU alone: a static program cannot
-# load Vulkan. It reads KITTI's and Argoverse's drives and clouds in files, and writes tables. It
-# prints where it is.
+# load Vulkan. It reads KITTI's and Argoverse's drives and clouds in files, and writes tables. With
+# features for more formats it goes on after a recording over which a decoder panics. It prints where
+# it is.
 #
 #     host/package/static.sh x86_64|aarch64 [FEATURES]
 set -euo pipefail
@@ -9,6 +10,8 @@ cd "$(dirname "$0")/../.."
 target=${1:?x86_64 or aarch64}-unknown-linux-musl
 . host/package/cross.sh
 cross "$target"
-cargo build --quiet --profile onboard -p raywake \
+profile=onboard
+[ -z "${2:-}" ] || profile=library
+cargo build --quiet --profile "$profile" -p raywake \
     --no-default-features --features "${2:-arrow}" --target "$target" >&2
-echo "target/$target/onboard/raywake"
+echo "target/$target/$profile/raywake"
