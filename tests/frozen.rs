@@ -108,7 +108,7 @@ fn check_tracks(flow: bool) {
     let drive = flow.then(|| setup.drive(setup.scalar()));
     let (profile, objects) = (setup.profile.clone(), TrackingParams::DEFAULT);
     let settings = Settings { profile, objects };
-    let mut tracker = Tracker::new(&setup.rig, &settings, drive, None, true);
+    let mut tracker = Tracker::new(&setup.rig, &settings, drive, None, true).expect("room");
     let sweeps: Vec<SweepData> = street()
         .iter()
         .map(|s| SweepData {

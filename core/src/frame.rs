@@ -93,10 +93,12 @@ const SLIP_MAX_M: f64 = 1e-3;
 
 impl Side {
     /// By how much what stands comes to lie elsewhere than the window of the next sweep, which was
-    /// shifted, has it; unless nothing of it is in view.
+    /// shifted, has it; unless nothing of it is in view, or windows lie so far off that places are
+    /// not told to a cell.
     fn slip_m(&self, profile: &Profile, next: &Side, shift: [i32; 3]) -> Option<f64> {
+        let far = |w: &Window| w.corner.iter().any(|c| f64::from(*c).abs() > FAR_CELLS / 2.0);
         let beyond = shift.iter().any(|cells| cells.unsigned_abs() >= profile.side);
-        if profile.frame != Frame::Lattice || beyond {
+        if profile.frame != Frame::Lattice || beyond || far(&self.window) || far(&next.window) {
             return None;
         }
         let at = |window: &Window| window.grid_from_vehicle.translation;
@@ -351,5 +353,8 @@ mod tests {
             shifts([[0.0; 3], [far, 0.0, 0.0], [far, 1.0, 0.0], [-far, 0.0, 0.0], [0.0; 3]]);
             shifts([[far, 0.0, 0.0], [far, 1.0, 0.0], [far, 30.0, 0.0]]);
         }
+        // The distance from the drive's start is rounded down once, and up once.
+        let far = 1e15;
+        shifts([[0.0625, 0.0, 0.0], [far, 0.0, 0.0], [far + 0.375, 0.0, 0.0]]);
     }
 }

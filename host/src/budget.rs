@@ -197,19 +197,6 @@ pub fn host_bytes(profile: &Profile, scalar: bool) -> u64 {
     host_parts(profile, scalar).iter().map(|p| p.bytes).sum()
 }
 
-/// Asks the system for memory and gives it back: a refusal ends the process later, and here the
-/// command.
-///
-/// # Errors
-/// [`RunError::NoMemory`].
-pub fn ask_for(bytes: u64) -> Result<(), RunError> {
-    let mut room = Vec::<u8>::new();
-    let given = room.try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
-    // Else the compiler may leave out what is not used.
-    std::hint::black_box(&room);
-    given.map_err(|_| RunError::NoMemory { bytes })
-}
-
 /// What a run takes, for the head of its report.
 pub fn paragraph(profile: &Profile, drive: &Drive, filter: &str) -> String {
     let backend = drive.backend();

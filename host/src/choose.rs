@@ -11,6 +11,7 @@ use crate::budget;
 use crate::console;
 use crate::drive::Drive;
 use crate::error::RunError;
+use crate::memory;
 use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use serde::Serialize;
@@ -42,7 +43,7 @@ pub fn drive(
 ) -> Result<Chosen, RunError> {
     let tables = weights.tables(profile)?;
     let wanted = wanted(choice)?;
-    budget::ask_for(budget::host_bytes(profile, wanted.device.is_none()))?;
+    memory::ask_for(budget::host_bytes(profile, wanted.device.is_none()))?;
     let backend = match &wanted.device {
         Some(options) => Backend::Device(Box::new(Device::new(profile, &tables, options)?)),
         None => Backend::scalar(profile, &tables),

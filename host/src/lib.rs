@@ -44,6 +44,7 @@ pub mod latency;
 mod live;
 pub mod locate;
 pub mod map;
+mod memory;
 mod odometry;
 pub mod order_statistics;
 pub mod outputs;

@@ -12,10 +12,10 @@ use raywake_registration::Odometry;
 use raywake_registration::odometry::Locating;
 use serde::Serialize;
 
-use crate::budget;
 use crate::console::bytes;
 use crate::error::RunError;
 use crate::laps::milliseconds;
+use crate::memory;
 use crate::order_statistics::Spread;
 
 /// Steps from sweep to sweep that decide whether poses are of use.
@@ -107,6 +107,16 @@ pub struct LocatedSweeps {
     pub ms: Option<Spread>,
 }
 
+/// What registers sweeps, at rest.
+///
+/// # Errors
+/// [`RunError::NoMemory`].
+pub fn registration() -> Result<Sealed<Box<Odometry>>, RunError> {
+    memory::ask_for(Locator::BYTES)?;
+    let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+    Ok(Sealed::new("registration", odometry))
+}
+
 impl Locator {
     /// Bytes that registration works in.
     pub const BYTES: u64 = size_of::<Odometry>() as u64;
@@ -132,10 +142,8 @@ impl Locator {
     }
 
     fn new(poses: PoseUse) -> Result<Locator, RunError> {
-        budget::ask_for(Locator::BYTES)?;
-        let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
         Ok(Locator {
-            odometry: Sealed::new("registration", odometry),
+            odometry: registration()?,
             poses,
             last: [Pose::IDENTITY; 2],
             compared: Compared::default(),

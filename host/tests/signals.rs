@@ -22,6 +22,8 @@ fn too_little_memory_is_told_before_the_first_sweep() {
     let program = env!("CARGO_BIN_EXE_raywake");
     let data = t.path().join("drive").display().to_string();
     let out = t.path().join("out").display().to_string();
+    // The program starts within 20 MB; what is asked for fits from 50 on (registration), or from 75
+    // and more.
     for (kib, command) in [
         (70_000, format!("run {data} --backend scalar")),
         (40_000, format!("odometry {data} --out {out}")),

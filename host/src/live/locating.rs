@@ -9,8 +9,8 @@ use raywake_registration::odometry::Locating;
 use serde::Serialize;
 
 use super::poses::PoseReceiver;
-use crate::budget;
 use crate::error::RunError;
+use crate::locate::registration;
 
 /// How sweeps were located.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -46,11 +46,7 @@ impl<'a> LiveLocator<'a> {
     pub fn new(poses: Option<&'a PoseReceiver>) -> Result<LiveLocator<'a>, RunError> {
         let by = match poses {
             Some(poses) => By::Poses(poses),
-            None => {
-                budget::ask_for(size_of::<Odometry>() as u64)?;
-                let odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
-                By::Registration(Sealed::new("registration", odometry))
-            }
+            None => By::Registration(registration()?),
         };
         Ok(LiveLocator { by, counts: LocatedCounts::default() })
     }

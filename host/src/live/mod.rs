@@ -187,10 +187,9 @@ impl Plan<'_> {
         if !self.args.objects {
             return Ok(None);
         }
-        budget::ask_for(LiveObjects::BYTES as u64)?;
         let held = bytes(LiveObjects::BYTES as u64);
         say(self.args.quiet, &format!("memory for objects: {held}\n"))?;
-        Ok(Some(LiveObjects::new(self.tracking, &self.profile)))
+        LiveObjects::new(self.tracking, &self.profile).map(Some)
     }
 
     /// Waits for the first sweep. Returns whether there is one: a signal may come first.

@@ -10,6 +10,7 @@ use raywake_objects::params::TrackingParams;
 use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 
 use crate::error::RunError;
+use crate::memory;
 
 /// Objects, and how they are followed. Nothing is allocated once it is made.
 pub struct LiveObjects<'a> {
@@ -24,14 +25,18 @@ impl LiveObjects<'_> {
     pub const BYTES: usize = size_of::<LiveObjects>() + size_of::<ObjectTracker>();
 
     /// No tracks yet.
-    pub fn new(params: TrackingParams, profile: &Profile) -> LiveObjects<'_> {
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
+    pub fn new(params: TrackingParams, profile: &Profile) -> Result<LiveObjects<'_>, RunError> {
+        memory::ask_for(LiveObjects::BYTES as u64)?;
         let tracker = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
-        LiveObjects {
+        Ok(LiveObjects {
             params,
             profile,
             tracker: Sealed::new("objects", tracker),
             counts: TrackingCounts::default(),
-        }
+        })
     }
 
     /// What was done so far.

@@ -7,11 +7,11 @@ use raywake_core::params::Profile;
 
 use super::{MapBackend, Mapper, device::DeviceMap, scalar::ScalarMap};
 use crate::args;
-use crate::budget;
 use crate::choose;
 use crate::console::{bytes, note, say};
 use crate::error::RunError;
 use crate::laps::milliseconds;
+use crate::memory;
 use crate::order_statistics::Spread;
 use crate::picture::{PictureFiles, Pictures, Subject, SweepFigures};
 use crate::session::each_sweep;
@@ -27,10 +27,12 @@ pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let mut source = source::open(&args.data, &args.recording.options())?;
     let sweeps = args.part.range(source.len())?;
     let wanted = choose::wanted(&args.backend)?;
-    budget::ask_for(Mapper::bytes(&profile) as u64)?;
     let backend = match &wanted.device {
         Some(options) => MapBackend::Device(Box::new(DeviceMap::new(&profile, options)?)),
-        None => MapBackend::Scalar(Box::new(ScalarMap::new(&profile))),
+        None => {
+            memory::ask_for(Mapper::bytes(&profile) as u64)?;
+            MapBackend::Scalar(Box::new(ScalarMap::new(&profile)))
+        }
     };
     let made = Made {
         command: "map",

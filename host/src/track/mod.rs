@@ -55,8 +55,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let figures = FiguresFile::create(args.summary.as_deref(), args.out.as_deref())?;
     say(args.quiet, &budget(args.fixed_lag))?;
     let mut files = write::Files::create(args, source.overview(), sweeps.len())?;
-    crate::budget::ask_for(Tracker::bytes(args.fixed_lag))?;
-    let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag);
+    let mut tracker = Tracker::new(source.rig(), &settings, drive, ground, args.fixed_lag)?;
     tracker.all |= args.all;
     let mut report = report::Report::default();
     let end = each_sweep(source.as_mut(), sweeps, args.quiet, |_, visit| {

@@ -21,6 +21,7 @@ use crate::config::Settings;
 use crate::console::interrupted;
 use crate::drive::Drive;
 use crate::error::RunError;
+use crate::memory;
 use crate::team::ThreadTeam;
 use raywake_io::source::SweepData;
 
@@ -119,13 +120,17 @@ impl Tracker {
     /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, with
     /// a map of the ground where there is one, and with the estimate of every sweep where
     /// `fixed_lag` says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
+    ///
+    /// # Errors
+    /// [`RunError::NoMemory`].
     pub fn new(
         rig: &Rig,
         settings: &Settings,
         drive: Option<Drive>,
         ground: Option<Ground>,
         fixed_lag: bool,
-    ) -> Tracker {
+    ) -> Result<Tracker, RunError> {
+        memory::ask_for(Tracker::bytes(fixed_lag))?;
         let all = drive.as_ref().is_none_or(|d| !d.tells_classes());
         let parts = TrackerParts {
             front_end: raywake_alloc_guard::boxed!(FrontEnd, FrontEnd::new()),
@@ -133,7 +138,7 @@ impl Tracker {
             solvers: (0..SOLVERS).map(|_| Solver::new()).collect(),
             lags: (0..if fixed_lag { TRACKS_MAX } else { 0 }).map(|_| Lag::new()).collect(),
         };
-        Tracker {
+        Ok(Tracker {
             rig: rig.clone(),
             params: settings.objects,
             drive,
@@ -142,7 +147,7 @@ impl Tracker {
             parts: Sealed::new("tracks", parts),
             ended: Vec::with_capacity(TRACKS_MAX),
             all,
-        }
+        })
     }
 
     /// The parts of the host's memory held: name, type and bytes, those of the flow apart.
@@ -158,7 +163,7 @@ impl Tracker {
     }
 
     /// Bytes of all parts, of those of every sweep's estimate only where they are wanted.
-    pub fn bytes(fixed_lag: bool) -> u64 {
+    fn bytes(fixed_lag: bool) -> u64 {
         let [front_end, tracks, solvers, lags] = Tracker::parts().map(|part| part.2 as u64);
         front_end + tracks + solvers + if fixed_lag { lags } else { 0 }
     }

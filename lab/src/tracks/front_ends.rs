@@ -98,7 +98,7 @@ fn follow(path: &Path, kind: FrontEndKind, flow: &FlowChoice) -> Result<Vec<Trac
             Some(choose::drive(&flow.backend, &weights, profile, source.rig())?.drive)
         }
     };
-    let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false);
+    let mut tracker = Tracker::new(source.rig(), &tracking, drive, None, false)?;
     let mut tracks = Vec::new();
     let mut keep = |tracker: &Tracker| tracks.extend(tracker.ended_tracks().cloned());
     let (mut now, mut before) = (SweepData::default(), SweepData::default());
