@@ -9,6 +9,8 @@ use core::array::from_fn;
 /// centre strays by less than a millimetre where that turns by 0.05 rad in the time.
 #[derive(Clone, Copy)]
 pub(crate) struct SensorPaths {
+    /// How many there are.
+    pub sensors: usize,
     /// Where each is as the sweep begins, voxels from the window's corner.
     from: [[f32; 3]; SENSORS_MAX],
     /// How far it gets until the sweep ends.
@@ -22,6 +24,7 @@ pub(crate) struct SensorPaths {
 impl SensorPaths {
     /// Of no sweep.
     pub const NOWHERE: SensorPaths = SensorPaths {
+        sensors: 0,
         from: [[0.0; 3]; SENSORS_MAX],
         by: [[0.0; 3]; SENSORS_MAX],
         from_s: 0.0,
@@ -32,7 +35,11 @@ impl SensorPaths {
     pub fn new(placement: &Placement) -> SensorPaths {
         let Placement { profile, rig, .. } = *placement;
         let [from_s, to_s] = [0.0, 1.0].map(|turn| rig.timing.at(turn));
-        let mut paths = SensorPaths { from_s: from_s as f32, ..SensorPaths::NOWHERE };
+        let mut paths = SensorPaths {
+            sensors: rig.sensors.len(),
+            from_s: from_s as f32,
+            ..SensorPaths::NOWHERE
+        };
         if to_s > from_s {
             paths.per_s = (1.0 / (to_s - from_s)) as f32;
         }
@@ -51,7 +58,7 @@ impl SensorPaths {
     /// Of two sensors that stay where they are.
     #[cfg(test)]
     pub const fn at_rest([first, second]: [[f32; 3]; 2]) -> SensorPaths {
-        let mut paths = SensorPaths::NOWHERE;
+        let mut paths = SensorPaths { sensors: 2, ..SensorPaths::NOWHERE };
         (paths.from[0], paths.from[1]) = (first, second);
         paths
     }

@@ -1,10 +1,10 @@
 //! What clusters are made of and compared with: the returns of a sweep, and its rays.
 
 use super::cloud_detail::CloudDetail;
-use super::places::Nearest;
+use super::places::{MomentSums, Moments, Nearest};
 use super::sample::{CloudPoint, SurfaceWeight};
 use super::scaled::Scaled;
-use super::sightlines::{Directions, Sightlines};
+use super::sightlines::{Sightlines, Unsorted, UnsortedRay};
 use super::surface::{self, LazyWeight};
 use super::sweep_returns::SweepReturns;
 use super::thinned_returns::{ColumnSort, ThinnedReturns};
@@ -16,7 +16,7 @@ use raywake_simd::Simd;
 
 /// Scratch of [`Cloud::fill`].
 pub struct Scratch {
-    directions: Directions,
+    rays: Unsorted,
     ground: GroundEstimator,
     columns: ColumnSort,
 }
@@ -24,7 +24,7 @@ pub struct Scratch {
 impl Scratch {
     pub(super) const fn new() -> Scratch {
         Scratch {
-            directions: [0; SIGHTLINES_MAX],
+            rays: [UnsortedRay::NONE; SIGHTLINES_MAX],
             ground: GroundEstimator::new(),
             columns: ColumnSort::new(),
         }
@@ -110,8 +110,8 @@ impl Cloud {
         self.side = returns.profile.side as usize;
         self.simd = team.simd();
         (self.corner, self.stamp_s) = (returns.corner, returns.stamp_s);
-        let (side, Scratch { directions, ground, columns }) = (self.side, scratch);
-        let Cloud { thinned, sightlines, .. } = self;
+        let (side, Scratch { rays, ground, columns }) = (self.side, scratch);
+        let Cloud { thinned, sightlines, simd, .. } = self;
         let SweepReturns { points, placed, sensors, .. } = returns;
         let mut dropped = 0;
         let keep_returns = || {
@@ -119,7 +119,7 @@ impl Cloud {
             dropped = thinned.fill(detail, side, scaled, returns, apart, columns);
             detail.weights[..thinned.places.len()].fill_with(LazyWeight::unknown);
         };
-        team.join(keep_returns, || sightlines.fill(sensors, points, placed, directions));
+        team.join(keep_returns, || sightlines.fill(sensors, points, placed, *simd, rays));
         dropped
     }
 
@@ -197,15 +197,21 @@ impl Cloud {
         CloudPoint { at: self.thinned.places.at(n), sensor, offset_s, index: n as u32 }
     }
 
-    fn sums_around(&self, n: usize, radius: f32) -> [f32; 10] {
+    fn sums_around(&self, n: usize, radius: f32) -> Moments {
         let (at, (sensor, _)) = (self.thinned.places.at(n), self.thinned.places.seen(n));
         let [i, j] = [at[0] as usize, at[1] as usize];
         let reach = radius as usize;
-        let mut sums = [0.0; 10];
-        for a in i.saturating_sub(reach)..(i + reach + 1).min(self.side) {
-            let row = self.row(a, j.saturating_sub(reach), (j + reach + 1).min(self.side));
-            self.thinned.places.add_around(row, at, sensor, radius, &mut sums);
-        }
-        sums
+        let columns = j.saturating_sub(reach)..(j + reach + 1).min(self.side);
+        self.simd.run(
+            #[inline(always)]
+            || {
+                let mut sums = MomentSums::ZERO;
+                for a in i.saturating_sub(reach)..(i + reach + 1).min(self.side) {
+                    let row = self.row(a, columns.start, columns.end);
+                    self.thinned.places.add_around(row, at, sensor, radius, &mut sums);
+                }
+                sums.total()
+            },
+        )
     }
 }

@@ -36,6 +36,14 @@ impl VisitedColumns {
     }
 }
 
+/// Residuals in one sweep of what can be seen there.
+#[derive(Clone, Copy)]
+pub struct SeenResidual {
+    mean: Mean,
+    /// The share of the returns that can be seen.
+    visible: f32,
+}
+
 /// A cluster: its columns, some of its returns, and what they are registered with.
 pub struct Cluster<'a> {
     pub scans: Scans<'a>,
@@ -148,20 +156,18 @@ impl<'a> Cluster<'a> {
     }
 
     /// The same by what can be seen, and the share of the returns of which that can.
-    fn seen_in(&self, target: &Target, motion: &Motion) -> (Mean, f32) {
+    fn seen_in(&self, target: &Target, motion: &Motion) -> SeenResidual {
         let mut mean = Mean::default();
         let looked_at = self.samples.iter().step_by(target.stride());
         let count = looked_at.len() * target.stride();
         let seen = looked_at.filter_map(|s| self.scans.seen_residual(s, motion, target));
         seen.for_each(|m| mean.add_times(m, target.stride() as f32));
-        let visible = mean.count / count.max(1) as f32;
-        (mean, visible)
+        SeenResidual { mean, visible: mean.count / count.max(1) as f32 }
     }
 
-    /// The same if most can be seen.
-    fn mostly_seen_in(&self, target: &Target, motion: &Motion) -> Option<Mean> {
-        let (mean, visible) = self.seen_in(target, motion);
-        (visible > self.scans.scaled.params.visible_ratio).then_some(mean)
+    /// Whether that share of its returns is most of them.
+    fn is_most(&self, visible: f32) -> bool {
+        visible > self.scans.scaled.params.visible_ratio
     }
 
     /// Adds residuals of the second sweep's returns in the first.
@@ -189,10 +195,14 @@ impl<'a> Cluster<'a> {
         }
     }
 
-    /// The residual at rest, by what can be seen, 0 where nothing can; and the share of its returns
-    /// that can be seen in the second sweep.
-    pub fn static_residual(&self, visited: &mut VisitedColumns) -> (f32, f32) {
-        self.seen_residual(&Motion::around(self.centre), visited)
+    /// [`Cluster::seen_residual`] at rest. `in_earliest` is [`Cluster::seen_in_earliest`], where
+    /// that is known.
+    pub fn static_residual(
+        &self,
+        in_earliest: Option<SeenResidual>,
+        visited: &mut VisitedColumns,
+    ) -> (f32, f32) {
+        self.residual_after(in_earliest, &Motion::around(self.centre), visited)
     }
 
     /// The residual at rest to compare that of a motion with, without the sweeps that show little
@@ -202,29 +212,52 @@ impl<'a> Cluster<'a> {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
         for target in self.scans.targets {
-            if self.mostly_seen_in(target, motion).is_some() {
-                mean.include(self.seen_in(target, &rest).0);
+            if self.is_most(self.seen_in(target, motion).visible) {
+                mean.include(self.seen_in(target, &rest).mean);
             }
         }
         self.add_seen_back(&mut mean, &rest, visited);
         mean.value()
     }
 
-    /// The same in the earliest sweep alone, if that is one before the pair and most can be seen.
-    pub fn standing_residual(&self) -> Option<f32> {
-        let [_, .., earliest] = self.scans.targets else { return None };
-        self.mostly_seen_in(earliest, &Motion::default()).map(|mean| mean.value())
+    /// The residual of its returns at rest in the second sweep alone, 0 where none can be seen.
+    pub fn second_residual(&self) -> f32 {
+        self.seen_in(&self.scans.targets[0], &Motion::around(self.centre)).mean.value()
     }
 
-    /// The same of a motion.
+    /// Residuals at rest in the earliest sweep, if that is one before the pair.
+    pub fn seen_in_earliest(&self) -> Option<SeenResidual> {
+        let [_, .., earliest] = self.scans.targets else { return None };
+        Some(self.seen_in(earliest, &Motion::around(self.centre)))
+    }
+
+    /// The mean of those, if most can be seen there.
+    pub fn standing_residual(&self, in_earliest: SeenResidual) -> Option<f32> {
+        self.is_most(in_earliest.visible).then(|| in_earliest.mean.value())
+    }
+
+    /// The residual of a motion, by what can be seen, 0 where nothing can; and the share of its
+    /// returns that can be seen in the second sweep.
     pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
+        self.residual_after(None, motion, visited)
+    }
+
+    /// The same where that in the earliest sweep may be known.
+    fn residual_after(
+        &self,
+        earliest: Option<SeenResidual>,
+        motion: &Motion,
+        visited: &mut VisitedColumns,
+    ) -> (f32, f32) {
         let mut mean = Mean::default();
         let mut visible = 0.0;
-        for target in self.scans.targets {
-            let (seen, share) = self.seen_in(target, motion);
-            mean.include(seen);
+        let targets = self.scans.targets;
+        for target in targets {
+            let in_earliest = earliest.filter(|_| target.index + 1 == targets.len());
+            let seen = in_earliest.unwrap_or_else(|| self.seen_in(target, motion));
+            mean.include(seen.mean);
             if target.index == 0 {
-                visible = share;
+                visible = seen.visible;
             }
         }
         self.add_seen_back(&mut mean, motion, visited);

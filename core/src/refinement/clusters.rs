@@ -10,7 +10,7 @@ use super::scans::Scans;
 use super::segments::Segments;
 use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
-use crate::team::{Team, fill};
+use crate::team::{Team, fill, share};
 
 /// Moving clusters near a fragment that are tried; the first ones are enough.
 const NEIGHBOURS_MAX: usize = 8;
@@ -108,7 +108,7 @@ impl Clusters {
         self.cover_ground(scans);
         self.look_back(scans, history);
         let (of_column, found) = (&self.of_column, &self.found);
-        fill(team, 0, &mut self.column_cues[..scans.first.side * scans.first.side], &|c| {
+        let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
             // What neither moves nor did tells nothing.
             let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
@@ -116,6 +116,11 @@ impl Clusters {
                 misfit: scans.misfit(c, &f.motion),
                 could_move: f.could_move(&scans, c),
             })
+        };
+        let side = scans.first.side;
+        share(team, 1, 0..side, &mut self.column_cues[..side * side], side, &|rows, out| {
+            let columns = rows.start * side..rows.end * side;
+            columns.zip(out).for_each(|(c, out)| *out = cues(c));
         });
     }
 
@@ -222,7 +227,7 @@ impl Clusters {
                 continue;
             }
             let rest = Cluster::new(scans, columns);
-            let static_residual = rest.static_residual(visited).0;
+            let static_residual = rest.static_residual(None, visited).0;
             let with = near.iter().filter_map(|m| {
                 let body = &self.found[*m as usize];
                 hypothesis::along_with(&rest, static_residual, body, predicted, visited)
@@ -299,7 +304,7 @@ impl Clusters {
         visited: &mut VisitedColumns,
     ) -> Option<u32> {
         let params = &fragment.scans.scaled.params;
-        let (rest, visible) = fragment.static_residual(visited);
+        let (rest, visible) = fragment.static_residual(None, visited);
         let parent = self.of_column[fragment.columns[0] as usize];
         let extent_min = params.remainder_ratio * self.found[parent as usize].extent;
         let mut best = (1.0, None);

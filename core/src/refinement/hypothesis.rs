@@ -174,23 +174,34 @@ pub fn test(
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
     let prior = prior_of(cluster, predicted);
-    let standing = cluster.standing_residual().filter(|residual| {
+    let at_rest = |static_residual: f32| Hypothesis {
+        static_residual,
+        extent: cluster.extent,
+        cues: Cues::of_cluster(
+            -params.evidence_min,
+            static_residual,
+            cluster.samples.len(),
+            &prior,
+        ),
+        ..Hypothesis::default()
+    };
+    // Too large or too small to move by itself: how well it fits only tells how certain that is.
+    if cluster.extent > scaled.extent_max || cluster.samples.len() < params.returns_min as usize {
+        return at_rest(cluster.second_residual());
+    }
+    let in_earliest = cluster.seen_in_earliest();
+    let standing = in_earliest.and_then(|seen| cluster.standing_residual(seen));
+    let standing = standing.filter(|residual| {
         prior.by.is_none() && *residual < STANDING_RATIO * params.residual_static
     });
-    let static_residual = standing.unwrap_or_else(|| cluster.static_residual(visited).0);
-    let cues =
-        Cues::of_cluster(-params.evidence_min, static_residual, cluster.samples.len(), &prior);
-    let found =
-        Hypothesis { static_residual, extent: cluster.extent, cues, ..Hypothesis::default() };
+    let static_residual =
+        standing.unwrap_or_else(|| cluster.static_residual(in_earliest, visited).0);
     let prior_ratio =
         params.evidence_prior_ratio * (scaled.evidence_length / cluster.extent).min(1.0);
     let prior_ratio = 1.0 - prior.share * (1.0 - prior_ratio);
     let ease = if prior.by.is_some() { prior_ratio } else { 1.0 };
-    if static_residual < params.residual_static * ease
-        || cluster.extent > scaled.extent_max
-        || cluster.samples.len() < params.returns_min as usize
-    {
-        return found;
+    if static_residual < params.residual_static * ease {
+        return at_rest(static_residual);
     }
     let tried = heapless::Vec::new();
     let motion = Motion::around(cluster.centre);
@@ -203,13 +214,13 @@ pub fn test(
     } else {
         static_residual
     };
-    let found = Hypothesis { static_residual, ..found };
     let as_predicted =
         prior.by.is_some_and(|e| is_same(scaled, &e, [motion.delta.x, motion.delta.y]));
     let needed = params.evidence_min * if as_predicted { prior_ratio } else { 1.0 };
     let margin = evidence(static_residual, residual) - needed;
     let cues = Cues::of_cluster(margin, residual, cluster.samples.len(), &prior);
-    decide(cluster, Hypothesis { cues, ..found }, motion, residual, needed)
+    let found = Hypothesis { cues, ..at_rest(static_residual) };
+    decide(cluster, found, motion, residual, needed)
 }
 
 /// What the tracklets of a cluster's columns predict.

@@ -43,6 +43,7 @@ mod history;
 mod hypothesis;
 mod motion;
 mod places;
+mod ray_batch;
 mod refined;
 mod sample;
 mod scaled;

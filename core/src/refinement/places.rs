@@ -97,6 +97,19 @@ fn masked(v: f32, mask: u32) -> f32 {
     f32::from_bits(v.to_bits() & mask)
 }
 
+/// Moments so far. Each lane has its own, so that none waits for another.
+pub struct MomentSums([[f32; LANES]; 10]);
+
+impl MomentSums {
+    pub const ZERO: MomentSums = MomentSums([[0.0; LANES]; 10]);
+
+    /// Those of all lanes, always in the same order.
+    #[inline(always)]
+    pub fn total(&self) -> Moments {
+        self.0.map(|[a, b, c, d, e, f, g, h]| ((a + b) + (c + d)) + ((e + f) + (g + h)))
+    }
+}
+
 impl Places {
     pub const fn new() -> Places {
         Places { len: 0, at: [[0.0; ROOM]; 3], seen: [0; ROOM] }
@@ -158,22 +171,21 @@ impl Places {
         (nearest.least, nearest.best) = (least, best);
     }
 
-    /// Adds those returns of a sensor, among some, that are closer to a place than `radius`, in
-    /// their order.
+    /// Adds those returns of a sensor, among some, that are closer to a place than `radius`.
+    #[inline(always)]
     pub fn add_around(
         &self,
         range: Range<usize>,
         at: [f32; 3],
         sensor: u32,
         radius: f32,
-        sums: &mut Moments,
+        sums: &mut MomentSums,
     ) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
         let (x, y) = (blocks(&self.at[0], &padded), blocks(&self.at[1], &padded));
         let (z, seen) = (blocks(&self.at[2], &padded), blocks(&self.seen, &padded));
         let (mut n, end) = (range.start as u32, range.end as u32);
         for (((x, y), z), seen) in x.iter().zip(y).zip(z).zip(seen) {
-            let mut terms = [[0.0; LANES]; 10];
             for l in 0..LANES {
                 let d = [x[l] - at[0], y[l] - at[1], z[l] - at[2]];
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -182,21 +194,16 @@ impl Places {
                 // What is not near adds zeros, which changes no sum.
                 let mask = if near { u32::MAX } else { 0 };
                 let [x, y, z] = [masked(d[0], mask), masked(d[1], mask), masked(d[2], mask)];
-                terms[0][l] = masked(1.0, mask);
-                terms[1][l] = x;
-                terms[2][l] = y;
-                terms[3][l] = z;
-                terms[4][l] = x * x;
-                terms[5][l] = x * y;
-                terms[6][l] = x * z;
-                terms[7][l] = y * y;
-                terms[8][l] = y * z;
-                terms[9][l] = z * z;
-            }
-            for l in 0..LANES {
-                for (sum, term) in sums.iter_mut().zip(&terms) {
-                    *sum += term[l];
-                }
+                sums.0[0][l] += masked(1.0, mask);
+                sums.0[1][l] += x;
+                sums.0[2][l] += y;
+                sums.0[3][l] += z;
+                sums.0[4][l] += x * x;
+                sums.0[5][l] += x * y;
+                sums.0[6][l] += x * z;
+                sums.0[7][l] += y * y;
+                sums.0[8][l] += y * z;
+                sums.0[9][l] += z * z;
             }
             n = n.wrapping_add(LANES as u32);
         }

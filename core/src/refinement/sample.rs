@@ -35,7 +35,7 @@ pub fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 /// A running mean, 0 of nothing.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 pub struct Mean {
     sum: f32,
     pub count: f32,

@@ -1,12 +1,13 @@
 //! What rays tell of a place.
 
 use super::super::sample::SurfaceWeight;
-use super::super::sightlines::Sightlines;
+use super::super::sightlines::{Sightlines, UnsortedRay};
 use super::*;
 use crate::frame;
 use crate::params::SIGHTLINES_MAX;
 use crate::pose::{Pose, Twist};
 use crate::prepare::Placement;
+use crate::random::Random;
 use crate::sweep::{Rig, Sweep, Timing};
 use raywake_simd::Simd;
 
@@ -21,8 +22,8 @@ fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sight
     let points: Vec<Point> = ends.iter().map(point).collect();
     let placed: Vec<Placed> =
         ends.iter().map(|&(at, _, offset_s)| Placed { at, offset_s }).collect();
-    let mut directions = [0; SIGHTLINES_MAX];
-    sightlines.fill(sensors, all(&points), &placed, &mut directions);
+    let mut rays = [UnsortedRay::NONE; SIGHTLINES_MAX];
+    sightlines.fill(sensors, all(&points), &placed, Simd::BASELINE, &mut rays);
     sightlines
 }
 
@@ -176,4 +177,28 @@ fn a_ring_that_moves_with_the_sensor_stands() {
     // Where what is near decides alone it moves.
     let [told, near] = [scaled().params.sight_residual, 1.1].map(found);
     assert!(told == 0 && near > 20, "{told} {near}");
+}
+
+#[test]
+fn bands_hide_no_ray() {
+    // Rays of all slopes, and places anywhere: near the sensor, above and below it.
+    let mut random = Random(5);
+    let mut place = || [(0.0, 80.0), (0.0, 80.0), (-12.0, 18.0)].map(|(a, b)| random.between(a, b));
+    let ends: Vec<_> = (0..40_000).map(|_| (place(), 0, 0.0)).collect();
+    let with = |sensors| {
+        let mut paths = SensorPaths::at_rest(EYES);
+        paths.sensors = sensors;
+        sightlines(&paths, &ends)
+    };
+    // Of one sensor, and as if there were so many that each has two bands.
+    let [many, few] = [with(1), with(8)];
+    let mut told = 0;
+    for n in 0..20_000 {
+        let (at, scale) = (place(), [1.0, 0.1, 0.01][n % 3]);
+        let at = [0, 1, 2].map(|a| EYES[0][a] + scale * (at[a] - EYES[0][a]));
+        let depth = |of: &Sightlines| of.depth(Simd::BASELINE, &scaled(), at, &UNKNOWN, 0.0);
+        assert_eq!(depth(&many), depth(&few), "{at:?}");
+        told += usize::from(depth(&many).is_some());
+    }
+    assert!(told > 5000, "{told}");
 }
