@@ -1,9 +1,10 @@
 //! Many recordings, one after another, each with results of its own: what `--list` does.
 //!
 //! Results of a recording lie at its path below the folder of results. A file [`DONE`] beside them
-//! tells with what they were finished: settings, weights and algorithms. Whoever comes back, on
-//! whatever machine, leaves them as they are. A part that was interrupted goes on, as a single
-//! recording does; where two do the same one, the later is told.
+//! tells with what they were finished: settings, weights and algorithms, and names and sizes of the
+//! recording's files. Whoever comes back, on whatever machine, leaves them as they are. A part that
+//! was interrupted goes on, as a single recording does; where two do the same one, the later is
+//! told.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -19,6 +20,7 @@ use crate::args::{BackendChoice, FlowChoice, Recordings, Shard, inputs};
 use crate::config;
 use crate::console::{interrupted, say, warn};
 use crate::error::RunError;
+use crate::inventory::Inventory;
 use crate::weight_files::WeightFiles;
 
 /// Name of the file beside results that are whole.
@@ -185,6 +187,7 @@ fn finish(
 ) -> Result<Option<bool>, RunError> {
     let Some(out) = command.out() else { return command.carry_out().map(Some) };
     let done = out.join(DONE);
+    let seal = format!("{seal}, {}\n", Inventory::of(data)?);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }
@@ -197,8 +200,8 @@ fn finish(
     Ok(Some(whole))
 }
 
-/// With what results are made, but for the recording: a line. Fails where nothing can be made with
-/// that.
+/// With what results are made, but for the recording: part of a line. Fails where nothing can be
+/// made with that.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
     plain.set_out(PathBuf::new());
@@ -210,7 +213,7 @@ fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let made_with = (&settings.profile, &settings.objects);
     let all = format!("{plain:?} {made_with:?} {weights} {DEMO_DIGEST:016x}");
     let (digest, version) = (Digest::of(all.as_bytes()), env!("CARGO_PKG_VERSION"));
-    Ok(format!("raywake {version} {} {digest:016x}\n", C::NAME))
+    Ok(format!("raywake {version} {} {digest:016x}", C::NAME))
 }
 
 /// Recordings of a list: a path a line; empty lines and those that begin with `#` count for none.
@@ -379,6 +382,10 @@ mod tests {
         assert_eq!(each(&command).unwrap_err().exit_code(), 3);
         command.flow.backend.simd = Some(raywake_simd::Simd::BASELINE);
         assert!(each(&command).is_err());
-        assert_eq!(names.map(|name| times(&name)), [2, 2, 3, 2, 2]);
+        assert_eq!(names.clone().map(|name| times(&name)), [2, 2, 3, 2, 2]);
+        // So is a recording that has become another.
+        fs::write(names[0].join("more"), "x").unwrap();
+        assert!(each(&command).is_err());
+        assert_eq!(names.map(|name| times(&name)), [3, 2, 4, 2, 2]);
     }
 }

@@ -52,9 +52,9 @@ impl UnsortedRay {
 /// less than a hundredth of that.
 const ROUNDING: f32 = 0.01;
 
-/// Of a direction that no ray has.
-const NO_PART: u16 = u16::MAX;
-const _: () = assert!(PARTS < NO_PART as f32);
+/// Of a direction that no ray has: states are zeros at the start, which take no room in a program.
+/// Other parts are one more.
+const NO_PART: u16 = 0;
 
 /// The rays of one sweep, thinned evenly to the capacity.
 pub struct Sightlines {
@@ -135,7 +135,7 @@ impl Sightlines {
         for (l, ray) in rays[..added].iter_mut().enumerate() {
             let bin = batch.sensor[l] * AZIMUTHS + usize::from(kept.azimuth[l]);
             if self.part[bin] == NO_PART {
-                self.part[bin] = (batch.part[l] * PARTS) as u16;
+                self.part[bin] = (batch.part[l] * PARTS) as u16 + 1;
             }
             let cell = self.cell(bin, self.band(kept.slope[l]));
             let end = kept.end.each_ref().map(|axis| axis[l]);
@@ -200,7 +200,7 @@ impl Sightlines {
             if part == NO_PART || before == Some(part) {
                 break;
             }
-            (eye, direction) = look(f32::from(part) / PARTS);
+            (eye, direction) = look(f32::from(part - 1) / PARTS);
             before = Some(part);
         }
         (eye, direction)

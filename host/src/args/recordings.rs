@@ -10,7 +10,7 @@ pub struct Recordings {
     #[arg(required_unless_present = "list")]
     pub data: Option<PathBuf>,
     /// Do so with every recording of a list, a path a line: results of PATH go to DIR/PATH. What
-    /// was done before with the same settings and weights is left as it is
+    /// was done before with the same settings, weights and files is left as it is
     #[arg(long, value_name = "FILE", conflicts_with = "data", requires = "out")]
     #[arg(help_heading = "Many recordings")]
     pub list: Option<PathBuf>,

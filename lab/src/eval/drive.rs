@@ -12,6 +12,7 @@ use super::row::Row;
 use super::rows_file;
 use crate::labels::{self, Labels, View};
 use raywake::args::BackendChoice;
+use raywake::batch::DEMO_DIGEST;
 use raywake::engine::{self, RunPlan};
 use raywake::error::RunError;
 use raywake::outputs::RunFiles;
@@ -78,6 +79,7 @@ impl Settings {
         let drive = format!("{:?}{:?}{labels:?}", source.rig(), moments.collect::<Vec<_>>());
         json!({
             "rows": ROWS,
+            "algorithms": format!("{DEMO_DIGEST:016x}"),
             "profile": format!("{:?}", self.profile),
             "weights": self.weights_digest,
             "backend": format!("{:?}", self.backend.backend),
