@@ -28,8 +28,8 @@ const ROUNDS: usize = 3;
 type Bin = usize;
 
 /// Bands that the slopes of rays are sorted into, those of all sensors together: only rays of bands
-/// within reach of a place are looked at. A choice of time alone: with a single band for a sensor a
-/// sweep of KITTI drive 0005 takes a tenth longer on one core.
+/// within reach of a place are looked at. A choice of time alone: of the 190 rays in the directions
+/// of a place 40 are left (KITTI drive 0005).
 const BANDS: usize = 16;
 const _: () = assert!(SENSORS_MAX <= BANDS);
 
