@@ -20,7 +20,7 @@ use crate::args::{BackendChoice, FlowChoice, Recordings, Shard, inputs};
 use crate::config;
 use crate::console::{interrupted, say, warn};
 use crate::error::RunError;
-use crate::inventory::Inventory;
+use crate::inventory::inventory;
 use crate::weight_files::WeightFiles;
 
 /// Name of the file beside results that are whole.
@@ -187,7 +187,7 @@ fn finish(
 ) -> Result<Option<bool>, RunError> {
     let Some(out) = command.out() else { return command.carry_out().map(Some) };
     let done = out.join(DONE);
-    let seal = format!("{seal}, {}\n", Inventory::of(data)?);
+    let seal = format!("{seal}, {}\n", inventory(data)?);
     if std::fs::read(&done).is_ok_and(|there| there == seal.as_bytes()) {
         return Ok(None);
     }

@@ -159,8 +159,8 @@ fn table(list: &[DeviceInfo]) -> String {
 const CPU_NOTE: &str =
     "A CPU stands in for a GPU in tests: the scalar backend finds the same flow in less time.\n";
 
-/// Mesa's first version whose llvmpipe reads the memory of several lanes at once without AVX-512.
-const GATHERING_MESA: u32 = 24;
+/// Older versions of Mesa read memory lane by lane without AVX-512: 22.3.6 does, 25.0.7 does not.
+const GATHERING_MESA: u32 = 23;
 
 /// Of an older Mesa. A sweep of KITTI drive 0005 takes 125 ms with 22.3.6, 63 with 25.0.7 and 32
 /// with the scalar backend (2 cores of an AMD EPYC, Zen 3, medians of 5 to 11 runs).
