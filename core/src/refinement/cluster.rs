@@ -54,7 +54,7 @@ pub struct Cluster<'a> {
     pub centre: [f32; 2],
     /// Largest extent along an axis, voxels.
     pub extent: f32,
-    /// Whether the encoder takes it for what could move.
+    /// Whether the encoder takes it rather for what could move, or it moved in the last sweep.
     pub could_move: bool,
 }
 
@@ -72,8 +72,7 @@ impl<'a> Cluster<'a> {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
         let extent = extent[0].max(extent[1]);
-        let scores = columns.iter().map(|c| scans.could_move(*c as usize)).sum::<f32>();
-        let could_move = scores > scans.scaled.params.body_min * columns.len() as f32;
+        let could_move = columns.iter().map(|c| scans.could_move(*c as usize)).sum::<f32>() > 0.0;
         Cluster { scans, columns, samples, centre, extent, could_move }
     }
 
@@ -149,6 +148,11 @@ impl<'a> Cluster<'a> {
     fn all_in(&self, target: &Target, motion: &Motion) -> Mean {
         let mut mean = Mean::default();
         for s in self.samples.iter().step_by(target.stride()) {
+            let [x, y, _] = target.predict(s, motion);
+            // What has just come into the window was beyond it before.
+            if target.index > 0 && target.cloud.column_at([x, y]).is_none() {
+                continue;
+            }
             let residual = self.scans.dynamic_residual(s, motion, target);
             mean.add_times(residual, target.stride() as f32);
         }

@@ -139,7 +139,7 @@ impl Clusters {
         let _ = self.found.resize(all, Hypothesis::default());
         fill(team, 0, &mut self.found[before..], &|n| {
             let cluster = Cluster::new(scans, self.segments.columns(n));
-            hypothesis::test(&cluster, flow, predicted, &mut VisitedColumns::new())
+            hypothesis::test(cluster, flow, predicted, &mut VisitedColumns::new())
         });
     }
 

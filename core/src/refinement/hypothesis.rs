@@ -166,14 +166,17 @@ impl Trials<'_> {
 /// Tests whether a cluster is dynamic. `predicted` is what the tracklet of a column predicts,
 /// `flow` the match of a column.
 pub fn test(
-    cluster: &Cluster,
+    mut cluster: Cluster,
     flow: impl Fn(usize) -> Flow,
     predicted: impl Fn(usize) -> Option<Prediction>,
     visited: &mut VisitedColumns,
 ) -> Hypothesis {
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
-    let prior = prior_of(cluster, predicted);
+    let prior = prior_of(&cluster, predicted);
+    // What moved can.
+    cluster.could_move |= prior.share >= 1.0;
+    let cluster = &cluster;
     let at_rest = |static_residual: f32| Hypothesis {
         static_residual,
         extent: cluster.extent,

@@ -17,8 +17,9 @@
 //!    compared, the earlier one from 0.3 s before it at 10 Hz: who walks has moved by then. At rest
 //!    only what can be seen counts: where a return fits badly, or nothing is near, a ray must have
 //!    passed to tell ([`sightlines`]). Of a motion that holds, too, if the encoder says that the
-//!    cluster could move; of all else what comes to lie unseen is missed, because behind a corner
-//!    anything fits. A cluster that moved in the last sweep needs less.
+//!    cluster could move, or if it moved in the last sweep; of all else what comes to lie unseen is
+//!    missed, because behind a corner anything fits, but not what was beyond the window before the
+//!    pair. A cluster that moved in the last sweep needs less.
 //! 5. A static cluster may have a part that moves: columns that fit badly at rest, or that came to
 //!    where nothing was before. What remains of it, fragments beside it and what the encoder takes
 //!    for the rest of its body may go with that ([`clusters`]).

@@ -1,7 +1,7 @@
 //! Clusters whose motion is known.
 
 use super::super::cluster::{Cluster, VisitedColumns};
-use super::super::hypothesis::Hypothesis;
+use super::super::hypothesis::{self, Hypothesis};
 use super::super::motion::Motion;
 use super::*;
 
@@ -287,15 +287,40 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let targets = [Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 }];
     let part: Vec<u32> =
         (0..(SIDE * SIDE) as u32).filter(|c| first.levels(*c as usize) != 0).collect();
-    let residual = |scores: &[ColumnScores]| {
-        let (scaled, targets) = (&scaled, &targets);
+    let (scaled, targets, could) = (&scaled, &targets, scored(127));
+    let cluster = |scores| {
         let scans = Scans { scaled, first, targets, detail, scores, span_s: 0.1 };
-        let cluster = Cluster::new(scans, &part);
+        Cluster::new(scans, &part)
+    };
+    let residual = |cluster: Cluster| {
         let motion = Motion::around(cluster.centre).displaced([2.0, 0.0]);
         cluster.residual(&motion, &mut VisitedColumns::new())
     };
-    let [unknown, known] = [residual(&[]), residual(&scored(127))];
+    let [unknown, known] = [cluster(&[]), cluster(&could)].map(residual);
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
+    // What moved before can, too.
+    let moved = |_| Some(Prediction { by: [2.0, 0.0], certainty: 3.0 });
+    let found = hypothesis::test(cluster(&[]), |_| 0, moved, &mut VisitedColumns::new());
+    assert!(found.is_dynamic && found.cues.residual < 0.05, "{}", found.cues.residual);
+}
+
+#[test]
+fn what_comes_into_the_window_was_beyond_it() {
+    let mut random = Random(12);
+    // A third of the car was beyond the window in the sweep before the pair.
+    let [earlier, first, second] = [61.0, 53.0, 45.0]
+        .map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random).cloud());
+    let target = |index, cloud, share| Target { index, cloud, offset: [0.0; 3], share };
+    let targets = [target(0, &second, 1.0), target(1, &earlier, -1.0)];
+    let first = first.all();
+    let part: Vec<u32> =
+        (0..(SIDE * SIDE) as u32).filter(|c| first.levels(*c as usize) != 0).collect();
+    let (scaled, detail) = (&scaled(), second.all().detail);
+    let scans = Scans { scaled, first, targets: &targets, detail, scores: &[], span_s: 0.1 };
+    let cluster = Cluster::new(scans, &part);
+    let motion = Motion::around(cluster.centre).displaced([-8.0, 0.0]);
+    let residual = cluster.residual(&motion, &mut VisitedColumns::new());
+    assert!(residual < 0.05, "{residual}");
 }
 
 #[test]
