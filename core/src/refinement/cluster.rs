@@ -72,6 +72,7 @@ impl<'a> Cluster<'a> {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
         let extent = extent[0].max(extent[1]);
+        // Rather than not. At 1 nat recall at a precision of 95 % is 0.1 points lower (streets).
         let could_move = columns.iter().map(|c| scans.could_move(*c as usize)).sum::<f32>() > 0.0;
         Cluster { scans, columns, samples, centre, extent, could_move }
     }
