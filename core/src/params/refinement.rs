@@ -141,9 +141,9 @@ crate::params! {
         /// Columns whose score is above this and that touch a cluster that moves go with it where
         /// they fit its motion about as well as rest (`remainder_residual`).
         pub body_min: f32 = 1.0, "nat", (-8 to 8),
-            "Columns that stand far from movers and are put out as moving, four HDL-32E on \
-             simulated outskirts (`--drives 6 --sweeps 25 --seed 7070`): 528 here, 649 at 0. On \
-             simulated streets there is no difference.";
+            "At 0 precision and recall are the same to 0.1 points on simulated streets as above; \
+             far from movers four HDL-32E on outskirts (`--drives 6 --sweeps 25 --seed 7070`) put \
+             out 649 columns that stand, 528 here.";
         /// A cluster stands if something was hit in more than this share of looks at its voxels
         /// in sweeps in which, by its motion, it was not there yet.
         pub worn_max: f32 = 0.5, "", (0 to 1),

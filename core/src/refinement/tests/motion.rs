@@ -268,6 +268,10 @@ fn the_rest_of_a_body_goes_with_the_part_that_tells() {
     assert_eq!(moving(&still, &scored(127)), 0);
 }
 
+fn columns_with_returns(cloud: DetailedCloud) -> Vec<u32> {
+    (0..(SIDE * SIDE) as u32).filter(|c| cloud.levels(*c as usize) != 0).collect()
+}
+
 #[test]
 fn what_could_move_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
@@ -285,8 +289,7 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let scaled = scaled();
     let (first, detail) = (of.all(), target.all().detail);
     let targets = [Target { index: 0, cloud: &target, offset: [0.0; 3], share: 1.0 }];
-    let part: Vec<u32> =
-        (0..(SIDE * SIDE) as u32).filter(|c| first.levels(*c as usize) != 0).collect();
+    let part = columns_with_returns(first);
     let (scaled, targets, could) = (&scaled, &targets, scored(127));
     let cluster = |scores| {
         let scans = Scans { scaled, first, targets, detail, scores, span_s: 0.1 };
@@ -313,8 +316,7 @@ fn what_comes_into_the_window_was_beyond_it() {
     let target = |index, cloud, share| Target { index, cloud, offset: [0.0; 3], share };
     let targets = [target(0, &second, 1.0), target(1, &earlier, -1.0)];
     let first = first.all();
-    let part: Vec<u32> =
-        (0..(SIDE * SIDE) as u32).filter(|c| first.levels(*c as usize) != 0).collect();
+    let part = columns_with_returns(first);
     let (scaled, detail) = (&scaled(), second.all().detail);
     let scans = Scans { scaled, first, targets: &targets, detail, scores: &[], span_s: 0.1 };
     let cluster = Cluster::new(scans, &part);
