@@ -6,10 +6,14 @@ use raywake_core::encoder::EncoderWeights;
 use raywake_core::stages::{background_filter, occupancy_constancy};
 use raywake_io::source::decoder::damaged;
 use raywake_io::source::{OpenOptions, SweepData, Unlocated, open};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::sync::LazyLock;
+use std::sync::{LazyLock, Mutex, PoisonError};
 use tempfile::TempDir;
+
+pub mod bundle;
+use bundle::Bundle;
 
 /// Sweeps that are read of each.
 const SWEEPS: usize = 3;
@@ -32,17 +36,42 @@ fn bear_guarded_panics() {
     }));
 }
 
-/// Reads bytes as the file `0.EXTENSION` of a recording; for `mcap` and `pcap` it is one.
-pub fn recording(extension: &str, bytes: &[u8]) {
-    let file = FOLDER.path().join(format!("0.{extension}"));
-    fs::write(&file, bytes).expect("a temporary file");
-    let whole = ["mcap", "pcap"].contains(&extension);
-    read(if whole { &file } else { FOLDER.path() });
+/// Reads a [`Bundle`] as a recording.
+pub fn recording(bytes: &[u8]) {
+    let Some(Bundle { root, topics, files }) = Bundle::parse(bytes) else { return };
+    if replace(files).is_ok() {
+        read(&FOLDER.path().join(root), topics);
+    }
 }
 
-fn read(path: &Path) {
+/// Has the folder hold these files. Most inputs differ from the last one in one file.
+fn replace(files: BTreeMap<String, Vec<u8>>) -> std::io::Result<()> {
+    static WRITTEN: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut written = WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let old = std::mem::take(&mut *written);
+    for place in old.keys().filter(|place| !files.contains_key(*place)) {
+        fs::remove_file(FOLDER.path().join(place))?;
+    }
+    let mut changed = files.iter().filter(|(place, content)| old.get(*place) != Some(content));
+    if let Err(error) = changed.try_for_each(|(place, content)| write(place, content)) {
+        // A file's place is another's folder.
+        fs::remove_dir_all(FOLDER.path())?;
+        fs::create_dir_all(FOLDER.path())?;
+        return Err(error);
+    }
+    *written = files;
+    Ok(())
+}
+
+fn write(place: &str, content: &[u8]) -> std::io::Result<()> {
+    let path = FOLDER.path().join(place);
+    path.parent().map_or(Ok(()), fs::create_dir_all)?;
+    fs::write(path, content)
+}
+
+fn read(path: &Path, topics: Vec<String>) {
     let (unlocated, ground_m) = (Unlocated::Accept, Some(-1.7));
-    let options = OpenOptions { unlocated, ground_m, ..OpenOptions::default() };
+    let options = OpenOptions { unlocated, ground_m, topics, ..OpenOptions::default() };
     let Ok(mut source) = open(path, &options) else { return };
     let mut sweep = SweepData::default();
     for index in 0..source.len().min(SWEEPS) {

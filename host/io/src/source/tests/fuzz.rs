@@ -11,10 +11,16 @@ use std::time::{Duration, Instant};
 use super::super::Unlocated;
 use super::*;
 
+#[path = "../../../fuzz/src/bundle.rs"]
+mod bundle;
+use bundle::Bundle;
+
 /// Damaged recordings of a format where nobody says how many.
 const USUAL: usize = 200;
 /// Longest that a recording may take.
 const LONGEST: Duration = Duration::from_secs(1);
+/// A folder of recordings for each format.
+const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus/recording");
 /// Sweeps that are read of each.
 const SWEEPS: usize = 3;
 /// Numbers that readers have stumbled over.
@@ -56,6 +62,16 @@ impl Seed {
         }
         files.sort();
         Seed { folder, options, files, root: root.into() }
+    }
+
+    /// The recording that a fuzzer starts from.
+    fn bundle(&self) -> Bundle {
+        let place = |path: &Path| {
+            path.strip_prefix(self.folder.path()).unwrap().to_str().unwrap().to_string()
+        };
+        let files = self.files.iter().map(|(path, content)| (place(path), content.clone()));
+        let (root, topics) = (self.root.clone(), self.options.topics.clone());
+        Bundle { root, topics, files: files.collect() }
     }
 
     /// Opens the recording and reads some of it. Whether that went well.
@@ -164,16 +180,32 @@ fn times() -> usize {
     times.unwrap_or(USUAL)
 }
 
-/// Damages a recording of a format.
+/// Damages a recording that fuzzers start from.
 fn fuzz(name: &str, seed: Seed) {
+    start(name, &seed);
+    damage(name, seed);
+}
+
+/// Damages a recording of a format.
+fn damage(name: &str, seed: Seed) {
     let times = times();
     // A stream of its own for each format, and another one for another number of recordings.
     let number = name.bytes().fold(times as u64, |n, byte| n.wrapping_mul(31) + u64::from(byte));
-    assert!(seed.read(), "the recording itself");
     let read = seed.damage(times, &mut Random(number));
     println!("{name}: {times} damaged, {read} of them read");
     // Most damage is to numbers of returns, which may be any.
     assert!(times < 50 || (1..times).contains(&read), "{name}: {read} of {times} were read");
+}
+
+/// What fuzzers that look at coverage start from; written with `UPDATE=1`.
+fn start(name: &str, seed: &Seed) {
+    assert!(seed.read(), "{name}: the recording itself");
+    let path = Path::new(CORPUS).join(name).join("0");
+    if std::env::var_os("UPDATE").is_some() {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, seed.bundle().bytes()).unwrap();
+    }
+    assert!(path.exists(), "UPDATE=1 writes {}", path.display());
 }
 
 /// Without poses, for what has none.
@@ -207,9 +239,9 @@ fn folders_of_clouds() {
         t.write("times.txt", "0\n0.1\n");
         Seed::new(t, "", unlocated())
     };
-    fuzz("pcd binary", two("pcd", &files::binary()));
-    fuzz("pcd compressed", two("pcd", &files::compressed_file()));
-    fuzz("ply binary", two("ply", &files::ply("binary_little_endian", &files::vertices(false))));
+    fuzz("pcd", two("pcd", &files::binary()));
+    fuzz("pcd-compressed", two("pcd", &files::compressed_file()));
+    fuzz("ply", two("ply", &files::ply("binary_little_endian", &files::vertices(false))));
     let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (2, 4), }\n";
     let length = (header.len() as u16).to_le_bytes();
     let numbers: Vec<u8> = (0..8).flat_map(|n| (n as f32 * 0.5).to_le_bytes()).collect();
@@ -239,11 +271,18 @@ fn waymo_segments() {
 #[test]
 fn bags() {
     use crate::source::bag::tests as bag;
-    let t = Temp::new();
     // Without checksums, which find all damage.
-    let options = bag::options().compression(None).use_chunks(false);
-    t.write("a.mcap", bag::file(&bag::rig(3), options));
-    fuzz("mcap", Seed::new(t, "", unlocated()));
+    let of = |sweeps| {
+        let t = Temp::new();
+        let options = bag::options().compression(None).use_chunks(false);
+        // Images are skipped, and long.
+        let mut messages = bag::rig(sweeps);
+        messages.retain(|(topic, ..)| *topic != "/image");
+        t.write("a.mcap", bag::file(&messages, options));
+        Seed::new(t, "a.mcap", unlocated())
+    };
+    start("mcap", &of(1));
+    damage("bags", of(3));
 }
 
 #[cfg(feature = "mcap")]
@@ -265,19 +304,21 @@ fn chunks_that_unpack_to_too_much() {
 
 /// What coverage-guided fuzzers start from can be read, and what they broke once is an error. The
 /// other tests here damage their like.
-#[cfg(all(feature = "mcap", feature = "pcap"))]
+#[cfg(all(feature = "mcap", feature = "nuscenes", feature = "parquet", feature = "pcap"))]
 #[test]
 fn corpus() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus");
-    for kind in ["mcap", "npy", "pcap", "pcd", "ply"] {
-        for file in fs::read_dir(root.join(kind)).unwrap().map(|entry| entry.unwrap().path()) {
-            let t = Temp::new();
-            let name = format!("0.{kind}");
-            t.write(&name, fs::read(&file).unwrap());
-            let one = if ["mcap", "pcap"].contains(&kind) { name } else { String::new() };
-            let seed = Seed::new(t, &one, unlocated());
-            let start = file.file_stem().is_some_and(|stem| stem.len() == 1);
-            assert_eq!(seed.read(), start, "{}", file.display());
+    for kind in fs::read_dir(CORPUS).unwrap().map(|entry| entry.unwrap().path()) {
+        for file in fs::read_dir(kind).unwrap().map(|entry| entry.unwrap().path()) {
+            let bundle = Bundle::parse(&fs::read(&file).unwrap()).expect("a bundle");
+            assert_eq!(Bundle::parse(&bundle.bytes()).as_ref(), Some(&bundle));
+            let folder = Temp::new();
+            for (place, content) in &bundle.files {
+                folder.write(place, content);
+            }
+            let options = OpenOptions { topics: bundle.topics, ..unlocated() };
+            let seed = Seed::new(folder, &bundle.root, options);
+            let starts = file.file_name().is_some_and(|name| name == "0");
+            assert_eq!(seed.read(), starts, "{}", file.display());
         }
     }
 }
@@ -285,12 +326,27 @@ fn corpus() {
 #[cfg(feature = "pcap")]
 #[test]
 fn captures() {
-    let t = Temp::new();
-    t.write("a.pcap", crate::source::capture::tests::recording());
-    fuzz("pcap", Seed::new(t, "a.pcap", unlocated()));
-    let t = Temp::new();
-    let [packets, calibration] = crate::source::capture::tests::calibrated();
-    t.write("a.pcap", packets);
-    t.write("a.xml", calibration);
-    fuzz("db.xml", Seed::new(t, "a.pcap", unlocated()));
+    use crate::source::capture::tests as capture;
+    let of = |packets: Vec<u8>, beside: &str, content: Vec<u8>| {
+        let t = Temp::new();
+        t.write("a.pcap", packets);
+        t.write(&format!("a.{beside}"), content);
+        Seed::new(t, "a.pcap", unlocated())
+    };
+    let vlp = |packets| of(capture::recording(packets), "txt", Vec::new());
+    let hdl = |packets| {
+        let [packets, calibration] = capture::calibrated(packets);
+        of(packets, "xml", calibration)
+    };
+    let ouster = |packets| {
+        let [packets, metadata] = capture::published(packets);
+        of(packets, "json", metadata)
+    };
+    // Small files to start from: few packets of a turn.
+    [("pcap", vlp(4)), ("db.xml", hdl(4)), ("ouster", ouster(2))]
+        .iter()
+        .for_each(|(name, seed)| start(name, seed));
+    damage("turns", vlp(230));
+    damage("turns with db.xml", hdl(700));
+    damage("turns of an ouster", ouster(34));
 }

@@ -142,7 +142,7 @@ pub(super) fn spoil(sensor: &LiveSensor, packets: &[Vec<u8>]) {
 #[test]
 fn a_capture_is_sent_again() {
     let folder = Temp::new();
-    let path = folder.write("made.pcap", recording());
+    let path = folder.write("made.pcap", recording(230));
     let replay = Replay::open(&path, None).unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();

@@ -54,9 +54,9 @@ fn packets(dual: bool) -> Vec<Vec<u8>> {
     packets
 }
 
-/// The file of a turn, and what the sensor's calibration is.
-pub(crate) fn calibrated() -> [Vec<u8>; 2] {
-    [pcap(&from_one(&packets(false))), calibration().into_bytes()]
+/// The file of some packets, 300 a turn, and what the sensor's calibration is.
+pub(crate) fn calibrated(count: usize) -> [Vec<u8>; 2] {
+    [pcap(&from_one(&packets(false)[..count])), calibration().into_bytes()]
 }
 
 fn recorded(folder: &Temp, packets: &[Vec<u8>]) -> PathBuf {

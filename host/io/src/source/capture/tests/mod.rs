@@ -127,9 +127,16 @@ fn turns(packets: std::ops::Range<u32>) -> Vec<Vec<u8>> {
     packets.map(vlp16).collect()
 }
 
-/// The file of three turns of a sensor.
-pub(crate) fn recording() -> Vec<u8> {
-    pcap(&from_one(&turns(0..230)))
+/// The file of packets of a VLP-16, 75 a turn.
+pub(crate) fn recording(packets: u32) -> Vec<u8> {
+    pcap(&from_one(&turns(0..packets)))
+}
+
+/// A file of the first packets that an Ouster sent, and what it says of itself.
+pub(crate) fn published(count: usize) -> [Vec<u8>; 2] {
+    let sent = every_payload("crc_test.pcap");
+    let metadata = fs::read(packets("crc_test.json")).unwrap();
+    [pcap(&from_one(&sent[..count.min(sent.len())])), metadata]
 }
 
 /// A capture of packets of one sensor, with a floor found by the user.

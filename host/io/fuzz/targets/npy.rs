@@ -1,4 +1,0 @@
-#![no_main]
-//! `.npy` as a recording.
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| raywake_fuzz::recording("npy", bytes));
