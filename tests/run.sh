@@ -215,6 +215,18 @@ fi
 cargo build --quiet -p raywake-lab -p raywake-faulty-layer
 tests/shards.sh target/release/raywake target/debug/raywake-lab
 
+say "instructions of every stage, twice the same"
+if command -v valgrind >/dev/null; then
+    instructions() {
+        target/debug/raywake-lab instructions -n 3 --out target/instructions | grep -v report
+    }
+    instructions >target/counted
+    grep -q '^refine' target/counted
+    cmp target/counted <(instructions)
+else
+    echo "skipped: there is no Valgrind"
+fi
+
 say "five minutes of sweeps and faults"
 tests/soak.sh target/debug/raywake-lab target/debug/libraywake_faulty_layer.so 2.5
 

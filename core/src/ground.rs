@@ -187,8 +187,12 @@ impl GroundEstimator {
 
     /// Keeps the height of a return in a column if it is among the three lowest of its cell.
     fn lower(&mut self, column: usize, mut z: f32) {
-        for low in &mut self.lowest[self.cell[column] as usize] {
-            (*low, z) = (low.min(z), low.max(z));
+        let lowest = &mut self.lowest[self.cell[column] as usize];
+        // Few are.
+        if z < lowest[2] {
+            for low in lowest {
+                (*low, z) = (low.min(z), low.max(z));
+            }
         }
     }
 

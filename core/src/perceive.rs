@@ -91,6 +91,10 @@ impl<'a> From<PerceptionBuffers<'a>> for Perceived<'a> {
     }
 }
 
+/// What is booked for what a sweep takes beyond the stages of perception: what the CPU does
+/// meanwhile as far as they are done before, and, of a device, submission and waiting.
+pub const MEANWHILE: &str = "meanwhile";
+
 /// Who keeps the times of the stages.
 pub trait StageTimer {
     /// Books the time since the last stage ended to `stage`.
@@ -223,6 +227,7 @@ impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
         let lap = &mut |stage| timer.lap(stage);
         let stages = || [GRID, FLOW].iter().for_each(|ops| run(ops, &mut s, rounds, team, lap));
         team.join(stages, meanwhile);
+        timer.lap(MEANWHILE);
         let left = PerceptionBuffers {
             counters: s.counters,
             columns_before: s.columns_before,

@@ -2,9 +2,9 @@
 //! device fails and the CPU takes its place.
 
 use raywake_alloc_guard::Sealed;
-use raywake_core::output::{self, ColumnFlow, Output, ReturnFlow, TrackletState};
+use raywake_core::output::{ColumnFlow, Output, ReturnFlow, SweepOutput, TrackletState};
 use raywake_core::params::{Profile, SOLID_MAX};
-use raywake_core::perceive::Machine;
+use raywake_core::perceive::{Machine, StageTimer};
 use raywake_core::pipeline::Pipeline;
 use raywake_core::prepare::{Preparation, Setup};
 use raywake_core::sweep::{Point, Rig, Sweep};
@@ -57,7 +57,7 @@ fn solid(profile: &Profile) -> usize {
 /// What one sweep yields, and how long it took.
 pub struct Stepped<'a> {
     /// What comes out.
-    pub output: output::SweepOutput<'a>,
+    pub output: SweepOutput<'a>,
     /// Time of every stage.
     pub laps: Laps,
 }
@@ -114,15 +114,30 @@ impl Drive {
         sweep: &Sweep,
         before: &'a [Point],
     ) -> Result<Stepped<'a>, RunError> {
+        let mut laps = Laps::start();
+        let output = self.step_timed(sweep, before, &mut laps)?;
+        Ok(Stepped { output, laps })
+    }
+
+    /// The same, with somebody else to keep the times of the stages.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn step_timed<'a>(
+        &'a mut self,
+        sweep: &Sweep,
+        before: &'a [Point],
+        timer: &mut (impl StageTimer + Send),
+    ) -> Result<SweepOutput<'a>, RunError> {
         let Drive { parts, spare, failover } = self;
         if let Some(failover) = failover {
-            return step(&mut failover.parts, sweep, before);
+            return step(&mut failover.parts, sweep, before, timer);
         }
-        match (step(parts, sweep, before), spare) {
+        match (step(parts, sweep, before, timer), spare) {
             (Err(RunError::Device(failure)), Some(spare)) => {
                 warn(&format!("device: {failure}: going on with the scalar backend"));
                 let failover = failover.insert(Failover { failure, parts: spare.parts() });
-                step(&mut failover.parts, sweep, &[])
+                step(&mut failover.parts, sweep, &[], timer)
             }
             (stepped, _) => stepped,
         }
@@ -191,11 +206,10 @@ fn step<'a>(
     parts: &'a mut Sealed<Parts>,
     sweep: &Sweep,
     before: &'a [Point],
-) -> Result<Stepped<'a>, RunError> {
+    timer: &mut (impl StageTimer + Send),
+) -> Result<SweepOutput<'a>, RunError> {
     parts.step(|Parts { setup, pipeline, backend, team, columns, points }| {
-        let mut laps = Laps::start();
-        let machine = Machine { backend, team, timer: &mut laps };
-        let output = pipeline.step(setup, machine, sweep, before, Output { columns, points })?;
-        Ok(Stepped { output, laps })
+        let machine = Machine { backend, team, timer };
+        Ok(pipeline.step(setup, machine, sweep, before, Output { columns, points })?)
     })
 }

@@ -147,7 +147,7 @@ fn stages(profiles: &[Both]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raywake::backend::device::MEANWHILE;
+    use raywake_core::perceive::MEANWHILE;
 
     #[test]
     fn stages_of_a_device_are_those_of_its_programs() {

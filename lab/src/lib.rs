@@ -9,6 +9,7 @@ pub mod eval;
 pub mod flsf;
 pub mod grid;
 pub mod growth;
+pub mod instructions;
 pub mod labels;
 mod learning;
 pub mod matching;

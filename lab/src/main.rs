@@ -7,7 +7,8 @@ use raywake::error::RunError;
 use raywake_alloc_guard::Guard;
 use raywake_lab::metrics::grade;
 use raywake_lab::{
-    bench, device, eval, flsf, growth, matching, results, simulate, soak, toy, tracks, train,
+    bench, device, eval, flsf, growth, instructions, matching, results, simulate, soak, toy,
+    tracks, train,
 };
 use std::alloc::System;
 use std::error::Error;
@@ -38,6 +39,8 @@ enum Command {
     Device(device::Args),
     /// Time simulated sweeps: how they grow with returns, the window and traffic.
     Growth(Box<growth::Args>),
+    /// Count the instructions of every stage of a sweep, by Valgrind: the same on a busy machine.
+    Instructions(Box<instructions::Args>),
     /// Run sweeps in a loop for hours, with faults in between: digests, memory, times.
     Soak(Box<soak::Args>),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
@@ -93,6 +96,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => bench::run(&args).map_err(Into::into),
         Command::Device(args) => device::run(&args).map_err(Into::into),
         Command::Growth(args) => growth::run(&args).map_err(Into::into),
+        Command::Instructions(args) => instructions::run(&args).map_err(Into::into),
         Command::Soak(args) => soak::run(&args),
         Command::Results(args) => results::run(&args).map_err(Into::into),
     };

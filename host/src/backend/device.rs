@@ -1,7 +1,9 @@
 //! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
 
 use raywake_core::params::Profile;
-use raywake_core::perceive::{Perceive, Perceived, PerceptionBuffers, RayInput, StageTimer};
+use raywake_core::perceive::{
+    MEANWHILE, Perceive, Perceived, PerceptionBuffers, RayInput, StageTimer,
+};
 use raywake_core::prepare::uniform_of;
 use raywake_core::record::SweepUniform;
 use raywake_core::stages::{Buffer, FLOW_PROGRAMS};
@@ -14,10 +16,6 @@ use super::Tables;
 /// Index of the program run once, and of the one run every sweep.
 const LOAD: usize = 0;
 const FLOW: usize = 1;
-
-/// What a sweep takes beyond the time of its dispatches: what the CPU does meanwhile, submission
-/// and waiting.
-pub const MEANWHILE: &str = "meanwhile";
 
 /// A device with everything recorded.
 pub struct Device {
