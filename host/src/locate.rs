@@ -98,8 +98,8 @@ pub struct LocatedSweeps {
     pub poses: PoseUse,
     /// Sweeps whose motion was found.
     pub registered: u64,
-    /// Sweeps that show too little, as a wall or a tunnel does: a part of their motion is that of
-    /// the sweep before.
+    /// Sweeps that show too little, as a wall, a tunnel or a motorway among others that are as fast
+    /// does: a part of their motion is that of the sweep before, or a guess.
     pub degenerate: u64,
     /// Sweeps that fit nothing known: their motion is that of the sweep before.
     pub lost: u64,
@@ -245,9 +245,13 @@ impl LocatedSweeps {
     fn line(&self) -> String {
         let LocatedSweeps { registered, degenerate, lost, ms, .. } = self;
         let ms = ms.map_or(String::new(), |ms| format!("; {}", ms.line(1)));
+        let doubt = match degenerate {
+            0 => "",
+            _ => "degenerate sweeps do not show how far the vehicle went: poses may be far off\n",
+        };
         format!(
             "registration: {registered} sweeps located, {degenerate} degenerate, {lost} lost{ms}; \
-             {}\n",
+             {}\n{doubt}",
             bytes(Locator::BYTES)
         )
     }

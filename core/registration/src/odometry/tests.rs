@@ -90,18 +90,72 @@ fn a_tunnel_does_not_tell_how_far() {
         };
         (0..40_000).map(|_| Point { position: at(), ..Point::default() }).collect()
     };
-    let rig = Rig {
-        sensors: [Pose::IDENTITY].into_iter().collect(),
-        timing: Timing::AtStamp,
-        distorted: false,
-        ground_m: -1.7,
-        own_vehicle: None,
-    };
+    let rig = at_stamp();
     let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
     for n in 0..4 {
         let found = odometry.locate(0.1 * f64::from(n), &sweep(), &rig);
         let expected = if n == 0 { Locating::Start } else { Locating::Degenerate };
         assert_eq!(found.locating, expected, "{found:?}");
+    }
+}
+
+/// A sweep of a vehicle at 22 m/s between guard rails, among others that are as fast; with posts
+/// beside the rails, or without.
+fn motorway(rng: &mut Rng, sweep: usize, posts: bool) -> Vec<Point> {
+    let gone_m = 2.2 * sweep as f64;
+    let mut points = Vec::new();
+    let mut add = |at: [f64; 3]| {
+        let position = at.map(|v| (v + 0.01 * rng.bell()) as f32);
+        points.push(Point { position, ..Point::default() });
+    };
+    for n in 0..150 {
+        let x = 0.5 * f64::from(n) - 37.5;
+        (0..24).for_each(|j| add([x, 0.5 * f64::from(j) - 6.0, -1.7]));
+        [-6.5, 6.5]
+            .into_iter()
+            .for_each(|y| (0..4).for_each(|k| add([x, y, 0.25 * f64::from(k) - 1.7])));
+    }
+    // The back of each.
+    for (x, y) in [(12.0, 0.0), (-9.0, 3.5), (20.0, 3.5)] {
+        (0..8).for_each(|j| {
+            (0..6).for_each(|k| add([x, y + 0.25 * f64::from(j), 0.25 * f64::from(k) - 1.5]))
+        });
+    }
+    for post in 0..if posts { 80 } else { 0 } {
+        let x = 9.0 * f64::from(post) - 20.0 - gone_m;
+        for y in [-9.0, 8.0].into_iter().filter(|_| x.abs() < 40.0) {
+            (0..12).for_each(|j| {
+                (0..24).for_each(|k| add([x, y + 0.25 * f64::from(j), 0.25 * f64::from(k) - 1.5]))
+            });
+        }
+    }
+    points
+}
+
+#[test]
+fn a_motorway_among_others_does_not_tell_how_fast() {
+    let mut rng = Rng::new(3);
+    let rig = at_stamp();
+    let mut odometry = raywake_alloc_guard::boxed!(Odometry, Odometry::new());
+    let found: Vec<Located> = (0..24)
+        .map(|n| odometry.locate(0.1 * n as f64, &motorway(&mut rng, n, n >= 12), &rig))
+        .collect();
+    let among = &found[1..12];
+    assert!(among.iter().all(|l| l.locating == Locating::Degenerate), "{among:?}");
+    // What stands tells, once there is some.
+    let last = found[23];
+    assert_eq!(last.locating, Locating::Registered, "{last:?}");
+    assert!((last.twist.linear.x - 22.0).abs() < 0.3, "{last:?}");
+}
+
+/// Clouds as they were at the stamp.
+fn at_stamp() -> Rig {
+    Rig {
+        sensors: [Pose::IDENTITY].into_iter().collect(),
+        timing: Timing::AtStamp,
+        distorted: false,
+        ground_m: -1.7,
+        own_vehicle: None,
     }
 }
 
