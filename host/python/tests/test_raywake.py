@@ -283,9 +283,12 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "dt", *noise, dt=0, call=raywake.flow)
         self.refuses(OSError, "No such file", "/nonexistent", call=raywake.Recording)
         # The decoder panics over it.
-        corpus = Path(__file__).parents[2] / "io/fuzz/corpus"
-        damaged = corpus / "mcap/record-longer-than-chunk.mcap"
-        self.refuses(OSError, "damaged", damaged, call=raywake.Recording)
+        corpus = Path(__file__).parents[2] / "io/fuzz/corpus/recording"
+        bundle = (corpus / "mcap/record-longer-than-chunk").read_bytes()
+        with tempfile.TemporaryDirectory() as folder:
+            damaged = Path(folder) / "a.mcap"
+            damaged.write_bytes(bundle.partition(b"%%% a.mcap\n")[2])
+            self.refuses(OSError, "damaged", damaged, call=raywake.Recording)
         with self.assertRaises(raywake.CommandError) as caught:
             raywake.clean("/nonexistent", "/nonexistent")
         self.assertEqual(caught.exception.code, 3)

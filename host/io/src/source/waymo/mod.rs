@@ -14,6 +14,7 @@
 
 mod images;
 mod table;
+mod thrift;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,15 @@
 //! Parquet files row by row: numbers, and lists of them.
 
 use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float32Type, Float64Type, Int8Type, Int32Type, Int64Type};
 use arrow_array::{Array, ArrayRef, RecordBatch};
+use arrow_schema::DataType;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -17,6 +20,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::images::Image;
+use super::thrift::{self, PageHeader};
 use crate::Error;
 use crate::source::decoder::guarded;
 use crate::source::whole::{self, unpacked_max};
@@ -28,6 +32,8 @@ const NUMBERS_MAX: usize = 1 << 24;
 const COLUMN_MAX: u64 = 1 << 28;
 /// Rows that are believed. A segment has five a sweep, some 1,000.
 const ROWS_MAX: usize = 1 << 20;
+/// Bytes that the header of a page is looked for in at first: most have fewer than 100.
+const HEADER_BYTES: u64 = 1024;
 /// Rows that are decoded at once where rows are small.
 const BATCH: usize = 256;
 
@@ -60,6 +66,7 @@ pub(super) struct ImageRows {
 impl ParquetTable {
     pub fn open(path: &Path) -> Result<ParquetTable, Error> {
         let (file, length) = whole::open(path)?;
+        check_footer(&file, length).map_err(|e| Error::input(path, "", e.to_string()))?;
         let metadata = guarded(path, || ArrowReaderMetadata::load(&file, Default::default()))?;
         let metadata = metadata.map_err(|e| Error::input(path, "", e.to_string()))?;
         let numbers_max = COLUMN_MAX.min(unpacked_max(length) / size_of::<f32>() as u64);
@@ -89,6 +96,10 @@ impl ParquetTable {
             let found = named.iter().position(|field| field.name() == column);
             let at = || format!("column `{column}`");
             let root = found.ok_or_else(|| Error::input(&self.path, at(), "is missing"))?;
+            // A row without a list is filled up, as often as its type says.
+            if fixed_size(named[root].data_type()).saturating_mul(BATCH as u64) > self.numbers_max {
+                return Err(Error::input(&self.path, at(), "has lists of too many numbers"));
+            }
             self.check_size(root, self.numbers_max as usize).map(|()| root)
         };
         columns.iter().map(find).collect()
@@ -122,6 +133,7 @@ impl ParquetTable {
         rows: usize,
         enough: usize,
     ) -> Result<usize, ParquetError> {
+        self.check_pages(chunk)?;
         let file = Arc::new(self.file.try_clone()?);
         let mut pages = SerializedPageReader::new(file, chunk, rows, None)?;
         let mut count = 0_usize;
@@ -131,6 +143,32 @@ impl ParquetTable {
             pages.skip_next_page()?;
         }
         Ok(count)
+    }
+
+    /// Fails where the header of a page is not what its decoder may be given.
+    fn check_pages(&self, chunk: &ColumnChunkMetaData) -> Result<(), ParquetError> {
+        let (mut from, length) = chunk.byte_range();
+        let end = from.saturating_add(length);
+        while from < end {
+            let header = self.page_header(from..end)?;
+            from += (header.length + header.compressed) as u64;
+        }
+        Ok(())
+    }
+
+    /// The header of the page that begins there.
+    fn page_header(&self, within: Range<u64>) -> Result<PageHeader, ParquetError> {
+        let left = within.end - within.start;
+        let mut room = HEADER_BYTES;
+        loop {
+            let bytes = read_at(&self.file, within.start, room.min(left))?;
+            match thrift::page_header(&bytes) {
+                Some(header) => return Ok(header),
+                None if room >= left => return Err(damaged("header of a page")),
+                // Long where it has statistics of long texts.
+                None => room *= 16,
+            }
+        }
     }
 
     /// Hands out rows with these columns.
@@ -160,6 +198,44 @@ impl ParquetTable {
         let roots = self.find(columns)?;
         let reader = self.reader(&roots, 1)?;
         Ok(ImageRows { table: self, roots, reader, next: 0 })
+    }
+}
+
+/// Fails where what describes a file is not what its decoder may be given.
+fn check_footer(file: &File, length: u64) -> Result<(), ParquetError> {
+    let Some(at) = length.checked_sub(8) else { return Ok(()) };
+    let end = read_at(file, at, 8)?;
+    let size = u64::from(u32::from_le_bytes([end[0], end[1], end[2], end[3]]));
+    // What is no such file is told so by the decoder.
+    let Some(from) = at.checked_sub(size) else { return Ok(()) };
+    if thrift::is_sound(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
+}
+
+/// Bytes of a file that has so many.
+fn read_at(mut file: &File, from: u64, count: u64) -> Result<Vec<u8>, ParquetError> {
+    let mut bytes = vec![0; count as usize];
+    file.seek(SeekFrom::Start(from))?;
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn damaged(what: &str) -> ParquetError {
+    ParquetError::General(format!("damaged: the {what}"))
+}
+
+/// Numbers that a row of a type has whatever is in it.
+fn fixed_size(kind: &DataType) -> u64 {
+    match kind {
+        DataType::FixedSizeList(of, count) => {
+            fixed_size(of.data_type()).saturating_mul((*count).max(0) as u64)
+        }
+        DataType::List(of) | DataType::LargeList(of) | DataType::Map(of, _) => {
+            fixed_size(of.data_type())
+        }
+        DataType::Struct(of) => {
+            of.iter().map(|field| fixed_size(field.data_type())).fold(0, u64::saturating_add)
+        }
+        _ => 1,
     }
 }
 
@@ -253,7 +329,24 @@ mod tests {
     use super::*;
     use crate::source::tests::Temp;
     use arrow_array::{FixedSizeListArray, ListArray};
+    use arrow_schema::Field;
     use parquet::arrow::ArrowWriter;
+
+    /// Lists of a million numbers, none of which is there: a file of some hundred bytes.
+    #[test]
+    fn what_is_filled_up_to_too_much() {
+        let t = Temp::new();
+        let path = t.write("x.parquet", b"");
+        let field = Arc::new(Field::new("item", DataType::Float32, true));
+        let none = FixedSizeListArray::new_null(field, 1 << 20, 2);
+        let batch = RecordBatch::try_from_iter([("values", Arc::new(none) as _)]).unwrap();
+        let mut writer =
+            ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let e = ParquetTable::open(&path).unwrap().find(&["values"]).unwrap_err().to_string();
+        assert!(e.ends_with("x.parquet, column `values`: has lists of too many numbers"), "{e}");
+    }
 
     /// A million equal numbers in one row: a file of some hundred bytes.
     #[test]

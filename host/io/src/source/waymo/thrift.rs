@@ -1,0 +1,159 @@
+//! What Parquet's headers are written in, Thrift's compact protocol, looked through before they are
+//! decoded. The decoder goes through as many truths of a list as the file says that there are,
+//! though they take no bytes: lists of two thousand million within each other would keep it for
+//! hours.
+
+/// Structures within each other, at most; Parquet has 8.
+const DEPTH_MAX: usize = 32;
+/// The field of a page's header that says how many bytes follow it.
+const COMPRESSED_SIZE: i64 = 3;
+
+/// A page's header.
+#[derive(Debug, PartialEq)]
+pub(super) struct PageHeader {
+    /// Its bytes.
+    pub length: usize,
+    /// Bytes that follow.
+    pub compressed: usize,
+}
+
+/// Whether bytes begin with a structure of which every element has bytes of its own.
+pub(super) fn is_sound(bytes: &[u8]) -> bool {
+    Elements { left: bytes }.fields(0, |_, _| {}).is_some()
+}
+
+/// The header of a page that bytes begin with.
+pub(super) fn page_header(bytes: &[u8]) -> Option<PageHeader> {
+    let (mut elements, mut compressed) = (Elements { left: bytes }, None);
+    elements.fields(0, |id, value| {
+        if id == COMPRESSED_SIZE {
+            compressed = Some(value);
+        }
+    })?;
+    let compressed = usize::try_from(compressed?).ok()?;
+    Some(PageHeader { length: bytes.len() - elements.left.len(), compressed })
+}
+
+/// Bytes that have not been looked at.
+struct Elements<'a> {
+    left: &'a [u8],
+}
+
+impl Elements<'_> {
+    fn skip(&mut self, count: usize) -> Option<()> {
+        self.left = self.left.get(count..)?;
+        Some(())
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        self.left.split_off_first().copied()
+    }
+
+    /// A number of one to ten bytes, seven bits each.
+    fn number(&mut self) -> Option<u64> {
+        let mut number = 0;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte()?;
+            number |= u64::from(byte & 0x7f) << shift;
+            if byte < 0x80 {
+                return Some(number);
+            }
+        }
+        None
+    }
+
+    /// One with a sign, the lowest bit.
+    fn signed(&mut self) -> Option<i64> {
+        self.number().map(|n| (n >> 1) as i64 ^ -((n & 1) as i64))
+    }
+
+    /// The fields of a structure; whole numbers are shown, with the number of their field.
+    fn fields(&mut self, depth: usize, mut see: impl FnMut(i64, i64)) -> Option<()> {
+        let mut id = 0_i64;
+        loop {
+            let head = self.byte()?;
+            let kind = head & 15;
+            if kind == 0 {
+                return Some(());
+            }
+            id = match head >> 4 {
+                0 => self.signed()?,
+                delta => id.wrapping_add(delta.into()),
+            };
+            match kind {
+                // A truth of a field is its kind.
+                1 | 2 => {}
+                4..=6 => see(id, self.signed()?),
+                _ => self.value(kind, depth)?,
+            }
+        }
+    }
+
+    /// A value of a kind, which takes at least a byte.
+    fn value(&mut self, kind: u8, depth: usize) -> Option<()> {
+        match kind {
+            3 => self.skip(1),
+            4..=6 => self.number().map(|_| ()),
+            7 => self.skip(8),
+            8 => {
+                let length = self.number()?;
+                self.skip(usize::try_from(length).ok()?)
+            }
+            9 | 10 => self.list(depth),
+            11 => self.map(depth),
+            12 if depth < DEPTH_MAX => self.fields(depth + 1, |_, _| {}),
+            13 => self.skip(16),
+            _ => None,
+        }
+    }
+
+    fn list(&mut self, depth: usize) -> Option<()> {
+        let head = self.byte()?;
+        let count = if head >> 4 == 15 { self.number()? } else { u64::from(head >> 4) };
+        (0..count).try_for_each(|_| self.value_below(head & 15, depth))
+    }
+
+    fn map(&mut self, depth: usize) -> Option<()> {
+        let count = self.number()?;
+        let kinds = if count > 0 { self.byte()? } else { 0 };
+        (0..count).try_for_each(|_| {
+            self.value_below(kinds >> 4, depth)?;
+            self.value_below(kinds & 15, depth)
+        })
+    }
+
+    fn value_below(&mut self, kind: u8, depth: usize) -> Option<()> {
+        if depth < DEPTH_MAX { self.value(kind, depth + 1) } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Field 1: 2; field 2: -3; field 3: 300; field 5: a structure of one text; the end.
+    const PAGE: [u8; 13] = [0x15, 4, 0x15, 5, 0x15, 0xd8, 4, 0x2c, 0x18, 1, b'x', 0, 0];
+
+    #[test]
+    fn a_header_and_how_much_follows() {
+        let long = [&PAGE[..], &[7; 9]].concat();
+        assert_eq!(page_header(&long), Some(PageHeader { length: 13, compressed: 300 }));
+        assert!(is_sound(&PAGE) && (0..13).all(|end| page_header(&PAGE[..end]).is_none()));
+        // Less than nothing follows, or nobody says how much.
+        assert_eq!(page_header(&[0x35, 1, 0]), None);
+        assert_eq!(page_header(&[0x15, 2, 0]), None);
+    }
+
+    #[test]
+    fn elements_without_bytes() {
+        let list =
+            |kind: u8, count: [u8; 2]| [&[0x19, 0xf0 | kind][..], &count, &[1, 2, 0]].concat();
+        // Two numbers of a byte; 3, of which one is missing.
+        assert!(is_sound(&list(3, [0x82, 0])) && !is_sound(&list(3, [0x83, 0])));
+        // Truths, a map of them, and lists within each other without end.
+        assert!(!is_sound(&list(1, [0xff, 0x7f])));
+        assert!(!is_sound(&[0x1b, 5, 0x11, 0, 0, 0]));
+        assert!(!is_sound(&[&[0x19][..], &[0x19; 1000], &[0; 9]].concat()));
+        assert!(!is_sound(&[&[0x1c; 1000][..], &[0; 1001]].concat()));
+    }
+}
