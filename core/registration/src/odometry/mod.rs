@@ -46,7 +46,7 @@ const DISTINCT_MPS: f64 = 5.0;
 /// for another motion, 14 of them on motorways: there it was 0.945 to 1.03. Of the others it was
 /// below 0.88 but in four, 0.94 to 0.975.
 const RIVAL: f64 = 0.91;
-/// The same where the motion was not clear before: at 0.91 two of 18 such drives, and a part of a
+/// The same where the motion was not clear before: at 0.91 two of 19 such drives, and a part of a
 /// third, then were taken for another motion.
 const RIVAL_AGAIN: f64 = 0.8;
 /// While the motion is not clear, several are tried at every so many sweeps: it takes ten times as

@@ -49,11 +49,11 @@ fn replace(files: BTreeMap<String, Vec<u8>>) -> std::io::Result<()> {
     static WRITTEN: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut written = WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
     let old = std::mem::take(&mut *written);
-    for place in old.keys().filter(|place| !files.contains_key(*place)) {
-        fs::remove_file(FOLDER.path().join(place))?;
-    }
+    let mut gone = old.keys().filter(|place| !files.contains_key(*place));
+    let removed = gone.try_for_each(|place| fs::remove_file(FOLDER.path().join(place)));
     let mut changed = files.iter().filter(|(place, content)| old.get(*place) != Some(content));
-    if let Err(error) = changed.try_for_each(|(place, content)| write(place, content)) {
+    let write = |()| changed.try_for_each(|(place, content)| write(place, content));
+    if let Err(error) = removed.and_then(write) {
         // A file's place is another's folder.
         fs::remove_dir_all(FOLDER.path())?;
         fs::create_dir_all(FOLDER.path())?;
