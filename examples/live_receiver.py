@@ -1,23 +1,23 @@
 #!/usr/bin/env python3
 """Prints what `raywake live --send 127.0.0.1:9000` sends.
 
-A datagram, little-endian, is a head and records of one kind. The head: `RWF2`, the kind (u16), how
-many records follow, the number of this datagram and how many there are of its kind (u16 each), the
-sweep's number (u32) and its stamp (u64, ns since 1970). Places, in m, and velocities over ground,
-in m/s, are along the vehicle's axes at that sweep. Kinds:
+A datagram, little-endian, consists of a head and records of one kind. The head: `RWF2`, the kind
+(u16), the number of records that follow, the number of this datagram and how many there are of its
+kind (u16 each), the sweep's number (u32) and its stamp (u64, ns since 1970). Positions, in m, and
+velocities over ground, in m/s, are along the vehicle's axes at that sweep. Kinds:
 
-0 sweep, after all else of it: x, y, z and quaternion x, y, z, w of the vehicle in the world (f64);
-  time since the sweep before, s, and latency from the last packet, ms (f32); sweeps left out so far
-  (u64); columns, tracklets and objects that were sent, and 0 (u32); stamp of the sweep before, ns
-  (u64)
-1 column that moves in the sweep before: x, y, velocity x, y, covariance xx, xy, yy, P(moves) (f32)
-2 tracklet that moves: x, y, velocity x, y, turn rate, rad/s (f32); observations (u32); standard
+0 sweep, sent after the rest of it: x, y, z and quaternion x, y, z, w of the vehicle in the world
+  (f64); time since the previous sweep, s, and latency from the last packet, ms (f32); sweeps left
+  out so far (u64); numbers of columns, tracklets and objects sent, and 0 (u32); stamp of the
+  previous sweep, ns (u64)
+1 moving column in the previous sweep: x, y, velocity x, y, covariance xx, xy, yy, P(moves) (f32)
+2 moving tracklet: x, y, velocity x, y, turn rate, rad/s (f32); observations (u32); standard
   deviation of the speed, P(moves) (f32)
-3 object in the sweep before, with `--objects`: number, observations, class (u32: 4 car, 5 large
-  vehicle, 6 person, 7 two-wheeler, others stand, 255 not known); its share of the returns, P(moves)
-  (NaN: not known), time since the stamp when last seen, x, y, z of its middle, heading, length,
-  width, height, velocity x, y, turn rate, covariance xx, xy, yy of its place, variances of heading
-  and speed (f32)
+3 object in the previous sweep, with `--objects`: number, observations, class (u32: 4 car, 5 large
+  vehicle, 6 person, 7 two-wheeler, others static, 255 unknown); its share of the returns, P(moves)
+  (NaN: unknown), time since the stamp when last seen, x, y, z of its centre, heading, length,
+  width, height, velocity x, y, turn rate, covariance xx, xy, yy of its position, variances of
+  heading and speed (f32)
 """
 
 import socket

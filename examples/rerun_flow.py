@@ -1,4 +1,4 @@
-"""Shows what `raywake run DATA --mcap flow.mcap` wrote in Rerun, with an arrow per return that moves.
+"""Shows what `raywake run DATA --mcap flow.mcap` wrote in Rerun, with an arrow per moving return.
 
     pip install rerun-sdk mcap-ros2-support numpy
     python rerun_flow.py flow.mcap

@@ -1,5 +1,5 @@
 //! WGSL to SPIR-V at build time: prelude, naga, checks, and a table of what each kernel binds.
-//! A kernel that breaks a limit of `build/limits.rs` does not build.
+//! A kernel that exceeds a limit of `build/limits.rs` does not build.
 
 #[path = "build/arithmetic.rs"]
 mod arithmetic;
@@ -22,7 +22,7 @@ fn main() {
     println!("cargo::rerun-if-changed=build");
     println!("cargo::rerun-if-env-changed=RAYWAKE_KERNELS");
     // `RAYWAKE_KERNELS=restrict` clamps every index, for the test that the results stay the same;
-    // `debug` names things, for the layer that reports accesses out of bounds.
+    // `debug` includes names, for the layer that reports out-of-bounds accesses.
     let mode = std::env::var("RAYWAKE_KERNELS").unwrap_or_default();
     let shared = read(&root.join("wgsl/shared.wgsl"));
     let prelude = prelude::prelude() + &shared;
@@ -93,7 +93,7 @@ fn compile(
     write_static(table, entry, &bindings, &words);
 }
 
-/// What an entry point does with its bindings that its stage does not say.
+/// What an entry point does with its bindings in contradiction to its stage, if anything.
 fn mistake(
     declared: &stages::Entry,
     bindings: &[reflect::Bound],
@@ -133,8 +133,8 @@ fn spirv(
             buffer: policy,
             ..BoundsCheckPolicies::default()
         },
-        // The polyfill makes one invocation clear the whole array; the kernels write before they
-        // read. Loops are bounded by `limits.rs`, divisors are never zero.
+        // The polyfill has one invocation clear the whole array; the kernels write before they
+        // read. Loops are bounded by `limits.rs`, and divisors are never zero.
         zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
         force_loop_bounding: false,
         emit_int_div_checks: false,

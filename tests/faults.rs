@@ -1,4 +1,4 @@
-//! Devices that are missing, too small or too slow end in an error that says so.
+//! Missing, too small or too slow devices produce an error that says so.
 
 #![forbid(unsafe_code)]
 
@@ -13,7 +13,7 @@ use raywake_tests::drives::{Setup, street, sweep};
 use raywake_tests::vulkan;
 use std::time::{Duration, Instant};
 
-/// Longer than any error may take to come back.
+/// Upper bound on the time any error may take to be returned.
 const SOON: Duration = Duration::from_secs(5);
 
 #[test]
@@ -68,12 +68,12 @@ fn a_backend_that_cannot_be_set_up_in_time() {
     }
 }
 
-/// A window so wide and so many rounds that a sweep of a street takes long, and its set-up.
+/// A window so wide and so many rounds that a sweep of a street takes long, and so does its set-up.
 fn slow() -> Setup {
     Setup::new(Profile { side: 337, em_rounds: 100, ..Profile::wide() }, None)
 }
 
-/// How long set-up without rays takes, kernels compiled; none without a software device.
+/// How long set-up without rays takes once kernels are compiled; `None` without a software device.
 fn set_up_time(setup: &Setup) -> Option<Duration> {
     let mut time = Duration::ZERO;
     for _ in 0..2 {

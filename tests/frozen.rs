@@ -1,5 +1,5 @@
 //! Nothing is allocated, created or recorded between the first sweep and the last, however many
-//! threads share the work; and all of them together find the same as one.
+//! threads share the work; and several threads produce the same results as one.
 
 #![forbid(unsafe_code)]
 
@@ -23,10 +23,10 @@ use raywake_tests::drives::{Setup, pairs, street, sweep};
 #[global_allocator]
 static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 
-/// What a device may hold for a window of 50 m.
+/// Maximum memory on a device for a window of 50 m.
 const DEVICE_BYTES: u64 = 64 << 20;
 
-/// Numbers of threads, whatever the machine has.
+/// Numbers of threads, independent of the machine.
 const THREADS: [usize; 2] = [3, 1];
 
 fn main() {
@@ -37,7 +37,7 @@ fn main() {
     assert!(several == one, "{several:x?}, alone {one:x?}");
 }
 
-/// All checks. Returns digests of what the sweeps yield.
+/// Runs all checks. Returns digests of the results.
 fn run() -> Vec<u64> {
     println!("threads: {}", team::threads());
     the_team_is_watched();
@@ -60,7 +60,7 @@ fn run() -> Vec<u64> {
     digests
 }
 
-/// An allocation on purpose, in a step or in what another thread may take over from it.
+/// A deliberate allocation, in a step or in work that another thread may take over from it.
 fn the_team_is_watched() {
     let allocate = || drop(black_box(vec![1u8; 100]));
     let told = |section, work: &dyn Fn()| {
@@ -76,7 +76,7 @@ fn the_team_is_watched() {
     println!("an allocation in a step is an error ... ok");
 }
 
-/// Ten sweeps, none of which may allocate. Returns a digest of their flow.
+/// Runs ten sweeps, none of which may allocate. Returns a digest of their flow.
 fn check(setup: &Setup, backend: Backend) -> u64 {
     let name = backend.name();
     let filter = if setup.filter.is_some() { "on" } else { "off" };
@@ -102,7 +102,7 @@ fn check(setup: &Setup, backend: Backend) -> u64 {
     digest.value()
 }
 
-/// Ten sweeps through the front end of the tracks, and the estimates of these.
+/// Runs ten sweeps through the front end of the tracks, and the estimates of these.
 fn check_tracks(flow: bool) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.to_string()));
     let drive = flow.then(|| setup.drive(setup.scalar()));
@@ -141,7 +141,7 @@ fn check_tracks(flow: bool) {
     println!("tracks, flow {flow}: {updates} updates, {estimated} estimates ... ok");
 }
 
-/// Bytes on the device.
+/// Checks a census; returns the bytes on the device.
 fn check_census(census: &Census) -> u64 {
     let bytes = census.upload_bytes + census.device_bytes + census.readback_bytes;
     assert!(census.memory_allocations <= 3, "{census:?}");

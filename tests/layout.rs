@@ -1,4 +1,4 @@
-//! Files that must agree with the code, and the order of the packages.
+//! Files that must agree with the code, and the dependency order of the packages.
 
 #![forbid(unsafe_code)]
 
@@ -7,10 +7,10 @@ use raywake_tests::{files, read, root};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Kernels' files without a scalar twin: group counts, and what is put in front of all others.
+/// Kernel files without a scalar twin: group counts, and the prelude of all others.
 const WITHOUT_TWIN: [&str; 2] = ["plan.wgsl", "shared.wgsl"];
 
-/// Which packages of the project each one may name. Whatever is not listed may name any.
+/// Packages of the project that each one may depend on. Packages not listed may depend on any.
 const MAY_NAME: [(&str, &[&str]); 15] = [
     ("core", &["raywake-simd"]),
     ("core/objects", &["raywake-core"]),
@@ -45,7 +45,7 @@ const MAY_NAME: [(&str, &[&str]); 15] = [
     ),
 ];
 
-/// Compares a file with what the code says; with `UPDATE=1`, writes it.
+/// Compares a file with what the code generates; with `UPDATE=1`, writes it.
 fn assert_printed(name: &str, text: &str) {
     let path = root().join(name);
     if std::env::var_os("UPDATE").is_some() {
@@ -65,7 +65,7 @@ fn the_parameters_are_what_the_code_says() {
     assert_printed("PARAMETERS.md", &budget::parameters());
 }
 
-/// Structures of a source file, as rows of a table of their fields: name, type, what it says.
+/// Structures of a source file, as tables of their fields: name, type, documentation.
 fn fields(source: &str) -> String {
     let mut text = String::new();
     let mut said = Vec::new();
@@ -119,7 +119,7 @@ fn every_kernel_lies_where_its_twin_does() {
     assert_eq!(alone, WITHOUT_TWIN.map(String::from).into());
 }
 
-/// Packages of the project among the dependencies in a manifest, development ones apart.
+/// Packages of the project among a manifest's dependencies, excluding development ones.
 fn dependencies(manifest: &str) -> Vec<&str> {
     let mut section = "";
     let mut found = Vec::new();
@@ -161,7 +161,7 @@ fn dependencies_are_read() {
     assert_eq!(dependencies(manifest), ["raywake-core", "raywake-gpu"]);
 }
 
-/// Lines where a word stands outside of comments and strings.
+/// Lines in which a word occurs outside comments and strings.
 fn lines_with(word: &str, source: &str) -> Vec<usize> {
     let has = |line: &str| {
         let code = line.split("//").next().unwrap_or_default();
@@ -178,8 +178,8 @@ fn words_are_found() {
     assert_eq!(lines_with("b", source), [1, 4]);
 }
 
-/// Outside of `gpu`: where memory of others is made one's own, the border to C, a bare machine, and
-/// what naga made, which a device is to run.
+/// Places outside `gpu` where unsafe code is allowed: taking over memory of others, the C
+/// interface, a bare machine, and naga's output, which a device is to run.
 const TRUSTED: [&str; 5] = [
     "host/embed/src/",
     "host/embed/bare/src/board.rs",

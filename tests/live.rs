@@ -1,4 +1,4 @@
-//! A viewer that connects gets every message, at the pace of their times.
+//! A viewer that connects receives every message, paced by their times.
 
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::thread;
@@ -13,12 +13,12 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
-/// Stamps of the sweeps, s; the last one's time jumped by a year.
+/// Stamps of the sweeps, s; the last one jumps by a year.
 const STAMPS_S: [f64; 4] = [0.0, 0.1, 0.2, 3.2e7];
 
 type Viewer = WebSocket<MaybeTlsStream<TcpStream>>;
 
-/// Connects and asks for all topics. Returns their names by number.
+/// Connects and subscribes to all topics. Returns their names by number.
 fn viewer(address: SocketAddr) -> (Viewer, Vec<String>) {
     let mut request = format!("ws://{address}").into_client_request().unwrap();
     request.headers_mut().insert("sec-websocket-protocol", "foxglove.sdk.v1".parse().unwrap());
@@ -42,7 +42,7 @@ fn viewer(address: SocketAddr) -> (Viewer, Vec<String>) {
     }
 }
 
-/// Names of the topics of all messages until the server closes, and how long that took.
+/// Topics of all messages until the server closes, and how long that took.
 fn seen(address: SocketAddr) -> (Vec<String>, Duration) {
     let (mut socket, names) = viewer(address);
     let (mut topics, mut first) = (Vec::new(), None);
@@ -83,6 +83,6 @@ fn a_viewer_sees_all_of_it() {
     for (name, times) in expected {
         assert_eq!(count(&format!("/{name}")), times, "{name} of {topics:?}");
     }
-    // As long as they are apart, but for the jump.
+    // As long as the stamps are apart, except for the jump.
     assert!(took >= Duration::from_millis(200), "{took:?}");
 }

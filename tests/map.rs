@@ -1,4 +1,4 @@
-//! The sparse map (B.2.3) is the dense window where that reaches, on either backend.
+//! The sparse map (B.2.3) equals the dense window within its extent, on either backend.
 
 #![forbid(unsafe_code)]
 
@@ -14,11 +14,11 @@ use raywake_tests::grid::{Rays, Tracer};
 use raywake_tests::{difference, vulkan};
 use std::sync::OnceLock;
 
-/// Sweeps of the street to map.
+/// Number of sweeps of the street to map.
 const SWEEPS: usize = 3;
 
-/// A sweep's map: where it lies, its voxels in the order of the backend, and the lattice indices
-/// and log-odds of the same.
+/// A sweep's map: its placement, its voxels in the order of the backend, and their lattice indices
+/// and log-odds.
 struct Map {
     mapped: Mapped,
     voxels: Vec<Update>,
@@ -46,7 +46,7 @@ fn scalar() -> &'static [Map] {
     MAPS.get_or_init(|| maps(MapBackend::Scalar(Box::new(ScalarMap::new(&Profile::map())))))
 }
 
-/// None where there is no device.
+/// `None` if there is no device.
 fn device() -> Option<&'static [Map]> {
     static MAPS: OnceLock<Option<Vec<Map>>> = OnceLock::new();
     let maps = MAPS.get_or_init(|| {
@@ -56,7 +56,7 @@ fn device() -> Option<&'static [Map]> {
     maps.as_deref()
 }
 
-/// Every voxel of the dense window against the map, which lies in the same lattice.
+/// Checks every voxel of the dense window against the map, which lies in the same lattice.
 fn check_dense(profile: &Profile, simulated: &SimSweep, map: &Map) {
     let (rig, origin) = (rig(), map.mapped.window.lattice_origin);
     let window = place(profile, &rig, &simulated.world_from_vehicle, Some(origin));

@@ -1,4 +1,4 @@
-//! Simulated objects move as fast as their tracklets say.
+//! Simulated objects move as fast as their tracklets state.
 
 #![forbid(unsafe_code)]
 
@@ -11,16 +11,16 @@ use raywake_sim::{Class, Drive, ObjectState, Options, Path, Scene, State, models
 use raywake_tests::drives::{Setup, sweep};
 use std::collections::BTreeMap;
 
-/// Observations after which a tracklet is held to its word.
+/// Observations from which on a tracklet's velocity is checked.
 const AGE: u32 = 10;
-/// Columns of an object, over all sweeps, below which nothing is concluded.
+/// Columns of an object, over all sweeps, below which no conclusion is drawn.
 const ENOUGH: usize = 50;
 /// Largest median error, m/s.
 const LIMIT: f64 = 0.4;
-/// Speed from which on something counts as moving, m/s.
+/// Speed above which something counts as moving, m/s.
 const MOVES: f64 = 0.5;
 
-/// Objects at 3 to 15 m/s, each in a lane of its own, within sight for a few seconds.
+/// Objects at 3 to 15 m/s, each in its own lane, in view for a few seconds.
 fn scene() -> Scene {
     let mut scene = Scene::empty();
     let along = |x: f64, y: f64, speed: f64| Path::from(State { x, y, yaw: 0.0, speed });
@@ -36,7 +36,7 @@ fn scene() -> Scene {
     scene
 }
 
-/// What the vehicle does: it stands, goes straight on, turns.
+/// Motions of the vehicle: stationary, straight on, turning.
 fn drives() -> [(&'static str, Drive); 3] {
     let straight = Path::from(State { speed: 8.0, ..State::default() });
     let turning = Path::from(State { speed: 5.0, ..State::default() }).then(5.0, 0.0, 0.06);
@@ -45,7 +45,7 @@ fn drives() -> [(&'static str, Drive); 3] {
         .map(|(name, path)| (name, Drive::through(scene(), path, 1, options())))
 }
 
-/// Whether a column lies in an object, or up to `beside` m from it.
+/// Whether a column lies in an object, or within `beside` m of it.
 fn inside(c: &ColumnFlow, object: &ObjectState, beside: f64) -> bool {
     let [x, y] = c.position_world_m;
     let centre = object.world_from_object.translation;
@@ -53,7 +53,8 @@ fn inside(c: &ColumnFlow, object: &ObjectState, beside: f64) -> bool {
     at.x.abs() <= 0.5 * object.size[0] + beside && at.y.abs() <= 0.5 * object.size[1] + beside
 }
 
-/// Calls `each` with the columns of every pair of a drive, and the objects at its first sweep.
+/// Calls `each` with the columns of every pair of a drive, and the objects at the pair's first
+/// sweep.
 fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     let mut pipeline = setup.drive(setup.scalar());
@@ -67,7 +68,7 @@ fn follow(drive: &Drive, mut each: impl FnMut(&[ColumnFlow], &[ObjectState])) {
     }
 }
 
-/// Errors of velocity (m/s, world axes) of old matched columns, by the object they lie in.
+/// Velocity errors (m/s, world axes) of old matched columns, by the object they lie in.
 fn errors(drive: &Drive) -> BTreeMap<u32, Vec<DVec2>> {
     let mut errors = BTreeMap::<u32, Vec<DVec2>>::new();
     follow(drive, |columns, objects| {
@@ -82,7 +83,7 @@ fn errors(drive: &Drive) -> BTreeMap<u32, Vec<DVec2>> {
     errors
 }
 
-/// What the tracklets of an object say together, component by component, m/s off.
+/// Error of the combined velocity of an object's tracklets, by the median of each component, m/s.
 fn together(errors: &[DVec2]) -> f64 {
     let x = median(errors.iter().map(|e| e.x));
     let y = median(errors.iter().map(|e| e.y));
@@ -118,10 +119,10 @@ fn tracklets_recover_the_velocity_of_moving_objects() {
     assert!(each <= LIMIT, "a column is {each:.2} m/s off");
 }
 
-/// Past parked cars, houses and trees, where nothing moves but the vehicle.
+/// Past parked cars, houses and trees, where only the vehicle moves.
 #[test]
 fn nothing_moves_in_a_street_that_stands() {
-    // Columns that move, of all: of parked cars, and of what lies away from any object.
+    // Counts of moving columns and of all: on parked cars, and away from any object.
     let (mut parked, mut background) = ([0; 2], [0; 2]);
     for seed in [5, 6, 7] {
         let mut scene = Scene::street(seed);

@@ -1,5 +1,6 @@
-//! Sweeps that a street does not make: too many returns, all in one place, without ground, of
-//! ground alone, along walls, in a crowd. Bounded and counted, and what stands, stands.
+//! Sweeps that do not occur in a street: too many returns, all in one place, without ground, ground
+//! only, along walls, in a crowd. Results stay bounded and counted, and static structure stays
+//! static.
 
 #![forbid(unsafe_code)]
 
@@ -12,13 +13,13 @@ use raywake_core::sweep::Point;
 use raywake_sim::{Class, Drive, Options, Path, Scene, Shape, SimSweep, State, Surface, models};
 use raywake_tests::drives::{Setup, sweep};
 
-/// Returns by what became of them, and what of them moves.
+/// Returns by status, and how many of them move.
 #[derive(Debug, Default)]
 struct Tally {
     returns: usize,
-    /// Put out as moving: of what stands, and of what moves.
+    /// Reported as moving: static ones, and moving ones.
     moving: [usize; 2],
-    /// Of what moves.
+    /// Returns of moving objects.
     of_movers: usize,
     of_status: [usize; Status::ALL.len()],
     over_capacity: u64,
@@ -37,7 +38,7 @@ impl Tally {
     }
 }
 
-/// Runs sweeps, each as `edit` leaves it.
+/// Runs sweeps, each after being changed by `edit`.
 fn run(profile: Profile, drive: &Drive, edit: impl Fn(&mut SimSweep)) -> Tally {
     let setup = Setup::new(profile, Some(background_filter::SHIPPED.into()));
     let mut pipeline = setup.drive(setup.scalar());
@@ -76,7 +77,7 @@ fn block(scene: &mut Scene, size: [f64; 3], at: [f64; 3]) {
     scene.put(Class::Building, shape, pose, Surface::matt(0.4));
 }
 
-/// Keeps those returns of a sweep of which `keep` holds.
+/// Keeps only the returns of a sweep whose class `keep` accepts.
 fn keep(sweep: &mut SimSweep, keep: impl Fn(Class) -> bool) {
     let mut kept = sweep.truth.iter().map(|t| keep(t.class));
     sweep.points.retain(|_| kept.next().unwrap_or(false));
@@ -101,7 +102,7 @@ fn a_sweep_with_twice_the_capacity_is_thinned_and_says_so() {
     assert!(thinned.over_capacity as usize >= left_out, "{thinned:?}");
     let whole = run(Profile::hdl64(), &drive, |_| ());
     assert_eq!((whole.of(Status::OverCapacity), whole.over_capacity), (0, 0));
-    // A still street: of either next to nothing moves.
+    // A still street: in either case next to nothing moves.
     for tally in [&thinned, &whole] {
         assert!(tally.moving[0] * 2000 < tally.returns, "{tally:?}");
     }
@@ -128,7 +129,7 @@ fn all_returns_in_one_column() {
 fn a_still_street_without_its_ground_stands_as_well_as_with_it() {
     let whole = run(Profile::hdl64(), &still_street(), |_| ());
     let tally = run(Profile::hdl64(), &still_street(), |s| keep(s, |c| c != Class::Ground));
-    // As well, to a twentieth: 168 returns move without the ground and 514 with it.
+    // Within a twentieth: 168 returns move without the ground and 514 with it.
     assert!(tally.returns > 100_000, "{tally:?}");
     assert!(tally.moving[0] * 20 <= whole.moving[0] * 21, "{tally:?}, not as {whole:?}");
 }
@@ -139,7 +140,7 @@ fn ground_alone_stands() {
     assert!(tally.returns > 100_000 && tally.moving[0] == 0, "{tally:?}");
 }
 
-/// Nothing tells how fast one drives along it: it must not tell that it moves either.
+/// Nothing reveals how fast one drives along it, so nothing may be reported as moving either.
 #[test]
 fn a_wall_and_a_tunnel_stand() {
     let mut wall = Scene::empty();
@@ -153,7 +154,7 @@ fn a_wall_and_a_tunnel_stand() {
     }
 }
 
-/// People all around walk with the vehicle; the houses beside them do not.
+/// People all around walk along with the vehicle; the houses next to them stay put.
 #[test]
 fn in_a_crowd_people_move_and_houses_stand() {
     let mut scene = Scene::empty();

@@ -1,4 +1,4 @@
-//! Recorded drives. `RAYWAKE_DATA` names the folder that holds them.
+//! Recorded drives, in the folder named by `RAYWAKE_DATA`.
 
 #![forbid(unsafe_code)]
 
@@ -15,7 +15,7 @@ fn open(name: &str) -> Box<dyn Source> {
     source::open(&path, &OpenOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// What some sweeps come to.
+/// Result of several sweeps.
 struct Run {
     digest: u64,
     /// Matched columns of every pair.

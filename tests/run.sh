@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything that must hold, in one command. On Debian it installs what is missing, so that nothing
-# is skipped: the software Vulkan device, validation layers, spirv-val, a browser, compilers and
+# Runs every check in one command. On Debian it installs what is missing, so that nothing is
+# skipped: the software Vulkan device, validation layers, spirv-val, a browser, compilers and
 # emulators for aarch64, Valgrind, Python's venv, Slurm and GNU parallel.
 #
 #   RAYWAKE_DATA=FOLDER   also run the tests on recorded drives found there
@@ -40,7 +40,7 @@ if ! browser >/dev/null && command -v apt-get >/dev/null; then
     install chromium || echo "chromium cannot be installed"
 fi
 export RAYWAKE_VULKAN=${RAYWAKE_VULKAN:-required}
-# The module for Python is for any interpreter; none is needed to compile it.
+# The Python module works with any interpreter; none is needed to compile it.
 export PYO3_NO_PYTHON=1
 
 say "format and lints"
@@ -48,7 +48,7 @@ cargo fmt --all --check
 cargo clippy --workspace --all-targets --quiet -- -D warnings
 
 say "documentation"
-# Links to private items resolve, as these are documented too.
+# Links to private items resolve, since these are documented too.
 RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" \
     cargo doc --workspace --no-deps --document-private-items --quiet
 
@@ -69,14 +69,15 @@ else
 fi
 
 say "undefined behaviour"
-# Of what a day's compiler finds, the day is fixed. Miri takes a thousand times as long as the
-# processor: what is unsafe, and of the core what does not work through whole sweeps. That target,
-# because for others libm has assembly, which Miri does not know.
+# Findings vary from one nightly compiler to the next, so the date is fixed. Miri is about a
+# thousand times slower than native: it runs the unsafe code, and those parts of core that do not
+# process whole sweeps. This target, because for others libm has assembly, which Miri does not
+# support.
 nightly=nightly-2026-10-29
 if rustup toolchain install $nightly --profile minimal -c miri -c rust-src >/dev/null 2>&1; then
     miri() { CARGO_TARGET_DIR=target/miri cargo +$nightly miri test --quiet --lib "$@" 2>&1; }
     miri -p raywake-alloc-guard
-    # Its memory is borrowed for good.
+    # Its memory is borrowed permanently.
     MIRIFLAGS=-Zmiri-ignore-leaks \
         miri --target riscv64gc-unknown-linux-gnu -p raywake-embed
     miri --target riscv64gc-unknown-linux-gnu -p raywake-core -- continuity digest dropped output \
@@ -88,7 +89,7 @@ fi
 say "fuzzers compile"
 CARGO_TARGET_DIR=target/fuzz cargo check --quiet --locked --manifest-path host/io/fuzz/Cargo.toml
 
-# As on the host, bit for bit.
+# The same results as on the host, bit for bit.
 bare() {
     rustup target add aarch64-unknown-none >/dev/null 2>&1 || return 1
     command -v qemu-system-aarch64 >/dev/null || { command -v apt-get >/dev/null &&
@@ -107,13 +108,13 @@ say "the program alone, onboard, with every index clamped, and for aarch64"
 cargo build --quiet --release -p raywake --all-features
 cargo build --quiet --profile onboard -p raywake --no-default-features
 RAYWAKE_KERNELS=restrict cargo build --quiet --release -p raywake --target-dir target/restrict
-# States are zeros at the start, which take no room in a file; one that is not shows here.
+# States are zero-initialised, which takes no room in a file; one that is not would show here.
 bytes=$(wc -c <target/onboard/raywake)
 echo "onboard binary: $bytes bytes"
 [ "$bytes" -le 4000000 ] || { echo "larger than 4,000,000 bytes"; exit 1; }
 others=(target/release/raywake target/onboard/raywake target/restrict/release/raywake)
 
-# As one file that needs nothing else.
+# As a single file without dependencies.
 static() {
     rustup target add "$1-unknown-linux-musl" >/dev/null 2>&1 || return 1
     local bytes
@@ -128,7 +129,7 @@ else
     echo "skipped: no static binary, as its target cannot be installed"
 fi
 
-# The same bits on another instruction set: an emulator wrapped up as one more program.
+# The same bits on another instruction set: an emulator wrapped as one more program.
 aarch64() {
     [ "$(uname -m)" = x86_64 ] || return 1
     command -v apt-get >/dev/null || return 1
@@ -162,7 +163,7 @@ say "the library for C"
 host/capi/tests/run.sh target/release/raywake
 
 say "other programs' recordings in, ours into theirs"
-# Wheels that are there or can be had; a failure of what they run is a failure.
+# Wheels that are installed or can be; a failure of what they run is a failure.
 viewers() {
     ! command -v apt-get >/dev/null || install python3-venv || return 1
     python3 -m venv target/viewers 2>/dev/null || return 1
@@ -193,7 +194,7 @@ fi
 say "the Debian package"
 if command -v dpkg-deb >/dev/null && { command -v cargo-deb >/dev/null ||
     cargo install --quiet --locked cargo-deb@3.8.0; }; then
-    # The profile takes minutes to compile, and changes nothing in the package.
+    # The package profile takes minutes to compile, and changes nothing in the package.
     package=$(host/package/deb.sh release)
     rm -rf target/installed
     dpkg-deb --extract "$package" target/installed
@@ -208,7 +209,7 @@ fi
 
 say "many recordings, many processes"
 if command -v apt-get >/dev/null; then
-    # What cannot be had is skipped there.
+    # What cannot be installed is skipped there.
     install slurm-wlm munge || true
     install parallel || true
 fi

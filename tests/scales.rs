@@ -1,5 +1,5 @@
-//! The same scene has the same motion whatever the voxel's size and the sensor's rate: parameters
-//! are in metres and seconds.
+//! A scene has the same motion whatever the voxel size and the sensor's rate: parameters are in
+//! metres and seconds.
 
 #![forbid(unsafe_code)]
 
@@ -13,26 +13,26 @@ use raywake_sim::{Drive, ObjectState, Options, Path, Scene, SimSweep, State, mod
 use raywake_tests::drives::Setup;
 use std::collections::BTreeMap;
 
-/// Edges of a voxel, m, each with a window of 50 m.
+/// Edge of a voxel, m, and side of a 50 m window, voxels.
 const VOXELS: [(f64, u32); 3] = [(0.20, 251), (0.30, 167), (0.40, 125)];
 /// Sweeps per second.
 const RATES: [f64; 2] = [10.0, 20.0];
-/// Duration of the scene, s, and of what tracklets take to settle.
+/// Duration of the scene, and the time tracklets take to settle, s.
 const DURATION_S: f64 = 3.0;
 const SETTLED_S: f64 = 1.0;
-/// Speed from which on something counts as moving, m/s.
+/// Speed above which something counts as moving, m/s.
 const MOVES_MPS: f64 = 0.5;
 
-/// Objects that move.
+/// Number of moving objects.
 const MOVING: usize = 5;
-/// Bounds at every scale. Measured: medians of 0.03 to 0.18 m/s an object, 67 to 94 % of their
-/// columns (an object's edge is as wide as a column), 2.5 to 3.4 % of the standing ones'.
+/// Bounds at every scale. Measured: medians of 0.03 to 0.18 m/s per object, 67 to 94 % of their
+/// columns (an object's edge is as wide as a column), 2.5 to 3.4 % of those of stationary ones.
 const ERROR_MAX_MPS: f64 = 0.25;
 const RECALL_MIN: f64 = 0.6;
 const FALSE_MOTION_MAX: f64 = 0.05;
 
-/// Vehicles at 0 to 15 m/s and a pedestrian, seen from a vehicle at 6 m/s, played `slower` times as
-/// slow.
+/// Vehicles at 0 to 15 m/s and a pedestrian, seen from a vehicle at 6 m/s, slowed down by a factor
+/// `slower`.
 fn scene(slower: f64) -> (Scene, Path) {
     let mut scene = Scene::empty();
     let along = |x: f64, y: f64, yaw: f64, speed: f64| {
@@ -49,7 +49,7 @@ fn scene(slower: f64) -> (Scene, Path) {
     (scene, along(0.0, 0.0, 0.0, 6.0))
 }
 
-/// The scene at a rate: the simulator turns at 10 Hz, so a faster sensor is a slower world.
+/// The scene at a rate: the simulator runs at 10 Hz, so a faster sensor is a slower world.
 fn cast(rate: f64) -> (Drive, Vec<SimSweep>) {
     let (scene, path) = scene(rate / 10.0);
     let sweeps = (DURATION_S * rate) as usize;
@@ -58,14 +58,14 @@ fn cast(rate: f64) -> (Drive, Vec<SimSweep>) {
     (drive, sweeps)
 }
 
-/// What is found of moving objects and of those that stand.
+/// Results for moving and for stationary objects.
 #[derive(Default)]
 struct Found {
     /// Errors of the velocity of columns, m/s, by moving object.
     errors: BTreeMap<u32, Vec<f64>>,
-    /// Columns of moving objects that move, and all.
+    /// Columns of moving objects found to move, and all of them.
     moving: [usize; 2],
-    /// The same of standing objects.
+    /// The same for stationary objects.
     standing: [usize; 2],
 }
 
@@ -89,7 +89,7 @@ fn inside(c: &ColumnFlow, object: &ObjectState) -> bool {
     at.x.abs() <= 0.5 * object.size[0] && at.y.abs() <= 0.5 * object.size[1]
 }
 
-/// Runs a profile over a scene that was cast at a rate.
+/// Runs a profile over a scene cast at this rate.
 fn run(profile: Profile, rate: f64, (drive, sweeps): &(Drive, Vec<SimSweep>)) -> Found {
     let faster = rate / 10.0;
     let mut setup = Setup::new(profile, Some(background_filter::SHIPPED.into()));

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Many recordings on many machines: the same bytes as from one process, whoever hands out the parts,
-# and where a task is killed and comes back. `shards.sh PROGRAM LAB`; parts without GNU parallel or
-# Slurm (Debian's slurm-wlm and munge, run here for the while, as root) are skipped, and say so.
+# Many recordings on many machines: the same bytes as from one process, whatever distributes the
+# shards, even if a task is killed and requeued. `shards.sh PROGRAM LAB`; steps that need GNU
+# parallel or Slurm (Debian's slurm-wlm and munge, run here temporarily, as root) are skipped with a
+# message if these are missing.
 set -euo pipefail
 program=$(realpath "$1")
 lab=$(realpath "$2")
@@ -19,7 +20,7 @@ exec "$program" run --list "$work/list" --out "\$1" --parquet --backend scalar -
 EOF
 chmod +x "$work/task"
 
-# Times are not the same; nor is what says them.
+# Times differ between runs, and so do the files that contain them.
 bytes_of() { (cd "$1" && find . -name '*.parquet' -exec sha256sum {} + | sort -k 2); }
 compare() {
     local found
@@ -33,7 +34,7 @@ compare() {
 expected=$(bytes_of "$work/one")
 [ "$(wc -l <<<"$expected")" = 24 ] || { echo "24 tables were to be written"; exit 1; }
 
-# Killed where it will, and started again.
+# Killed at arbitrary points, and started again.
 for delay in 0.2 0.5 0.9; do
     { timeout -s KILL "$delay" "$work/task" "$work/killed" "--shard=0/2" || true; } 2>/dev/null
 done
@@ -93,7 +94,7 @@ trap 'stop_slurm || true' EXIT
 if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
     job=$(sbatch --parsable --array=0-3 --requeue --output="$work/slurm/%a.log" \
         "$work/task" "$work/slurm/out")
-    # One task is killed at work, with all that it runs, and handed out anew.
+    # One task is killed while running, with everything it runs, and requeued.
     for _ in $(seq 100); do
         squeue --noheader --states=RUNNING --job "${job}_1" | grep -q . && break
         sleep 0.1
@@ -101,7 +102,7 @@ if command -v slurmctld >/dev/null && [ "$(id -u)" = 0 ] && slurm; then
     scontrol requeue "${job}_1"
     for _ in $(seq 240); do
         [ -z "$(squeue --noheader --job "$job")" ] && break
-        # Slurm holds back what it requeues for two minutes, unless told.
+        # Slurm holds requeued tasks back for two minutes unless told otherwise.
         scontrol update JobId="${job}_1" StartTime=now >/dev/null 2>&1 || true
         sleep 0.5
     done

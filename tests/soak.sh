@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Sweeps in a loop, with faults in between, for as many minutes on the CPU and on a device that is
-# lost now and then. `soak.sh LAB LAYER MINUTES`; what needs root (a full disk) or a device is
-# skipped without one, and says so.
+# Sweeps in a loop, with faults in between, for MINUTES each on the CPU and on a device that is lost
+# now and then. `soak.sh LAB LAYER MINUTES`; the full disk (needs root) and the device are skipped
+# with a message if not available.
 set -euo pipefail
 lab=$(realpath "$1")
 layer=$(realpath "$2")

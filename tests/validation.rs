@@ -1,4 +1,4 @@
-//! The validation layer and `spirv-val` have nothing to say.
+//! The validation layer and `spirv-val` have no complaints.
 
 #![forbid(unsafe_code)]
 
@@ -10,14 +10,14 @@ use raywake_tests::drives::{Setup, pairs, street, sweep};
 use raywake_tests::{vulkan, weights};
 use std::process::Command;
 
-/// The pipeline over the street.
+/// Runs the pipeline over the street.
 fn check(profile: Profile, validation: Validation) {
     let Some(options) = vulkan::under(validation) else { return };
     let setup = Setup::new(profile, Some(weights::filter(50, 14, 100, 0)));
     let backend = setup.device(&options).expect("the device that has just been there");
     let mut drive = setup.drive(backend);
     let mut valid = 0;
-    // Twice: twenty sweeps, and the reset between them.
+    // Twice: twenty sweeps, with a reset in between.
     for (now, before) in pairs(street()).chain(pairs(street())) {
         let points = before.map_or(&[][..], |b| &b.points);
         let stepped = drive.step(&sweep(now), points).unwrap_or_else(|e| panic!("{e}"));
@@ -43,7 +43,8 @@ fn no_access_out_of_bounds_is_found_in_the_largest_window() {
     check(Profile { side: 337, ..Profile::wide() }, Validation::GpuAssisted);
 }
 
-/// What newer versions say of strides that naga puts on arrays in workgroup memory: harmless.
+/// What newer versions report about the strides that naga puts on arrays in workgroup memory:
+/// harmless.
 const KNOWN: &str = "VUID-StandaloneSpirv-None-10684";
 
 #[test]

@@ -1,8 +1,8 @@
-"""What others write is read, and what raywake writes is read by others.
+"""Checks that raywake reads what others write, and that others read what raywake writes.
 
     python viewers.py RAYWAKE FOLDER
 
-needs mcap-ros2-support, numpy and rerun-sdk. FOLDER is for what the test writes.
+Needs mcap-ros2-support, numpy and rerun-sdk. FOLDER takes the files that the test writes.
 """
 import json
 import math
@@ -20,7 +20,7 @@ QUATERNION = POINT + "float64 w\n"
 
 
 def definition(own, **others):
-    """A message's definition, with those that it consists of."""
+    """A message's definition, with those of its parts."""
     parts = {k.replace("__", "/"): v for k, v in others.items()}
     head = "=" * 80
     return own + "".join(f"\n{head}\nMSG: {k}\n{v}" for k, v in parts.items())
@@ -71,7 +71,7 @@ def clouds(path, topic):
 
 
 def two_lidars(path, sweeps):
-    """A bag of two lidars, one turned by a right angle, without poses: a half of the returns each."""
+    """A bag of two lidars without poses, half of the returns each, one turned by a right angle."""
     with open(path, "wb") as file:
         writer = Writer(file)
         tf = writer.register_msgdef("tf2_msgs/msg/TFMessage", TF)
@@ -88,7 +88,7 @@ def two_lidars(path, sweeps):
         writer.write_message("/tf_static", tf, {"transforms": transforms}, ns, ns)
         for ns, returns in sweeps:
             x, y, z = (returns[axis].astype("<f4") for axis in "xyz")
-            # In the frame of the sensor that is turned to the left, +x is to the left.
+            # In the frame of the sensor turned to the left, +x points to the left.
             for frame, chosen, places in [("left", y > 0, (y, -x, z)), ("right", y <= 0, (x, y, z))]:
                 rows = np.stack([p[chosen] for p in places], axis=1)
                 fields = [{"name": n, "offset": 4 * i, "datatype": 7, "count": 1}

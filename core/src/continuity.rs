@@ -3,36 +3,36 @@
 use crate::pose::Pose;
 
 crate::params! {
-    /// How far two consecutive sweeps may be apart. Any road vehicle at any rate above 2 Hz stays
+    /// How far apart two consecutive sweeps may be. Any road vehicle at any rate above 2 Hz stays
     /// within the defaults.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ContinuityLimits {
-        /// Time between sweeps.
+        /// Maximum time between sweeps.
         pub gap_s: f64 = 0.5, "s", (above 0 to 10);
-        /// Speed between poses.
+        /// Maximum speed between poses.
         pub jump_mps: f64 = 70.0, "m/s", (above 0 to 1000);
-        /// Turn rate between poses.
+        /// Maximum turn rate between poses.
         pub spin_radps: f64 = 6.0, "rad/s", (above 0 to 100);
     }
 }
 
-/// Why a sweep does not continue the one before: tracklets are dropped, no flow is computed.
+/// Why a sweep does not continue the previous one: tracklets are dropped, no flow is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reset {
     /// The first sweep.
     First,
     /// Time stood still or went backwards by this much, s.
     Backwards(f64),
-    /// More time than the limit passed, s.
+    /// More time passed than the limit allows, s.
     Gap(f64),
-    /// The poses differ by a speed above the limit, m/s.
+    /// The poses imply a speed above the limit, m/s.
     Jump(f64),
-    /// The poses differ by a turning rate above the limit, rad/s.
+    /// The poses imply a turn rate above the limit, rad/s.
     Spin(f64),
 }
 
 impl ContinuityLimits {
-    /// Why the step from one pose to another in `dt_s` is no motion, if so.
+    /// Returns why the step between two poses in `dt_s` seconds cannot be continuous motion, if so.
     pub fn broken(&self, from: &Pose, to: &Pose, dt_s: f64) -> Option<Reset> {
         if dt_s <= 0.0 || dt_s.is_nan() {
             return Some(Reset::Backwards(dt_s));

@@ -1,6 +1,6 @@
-//! Counts that are declared once: their sums and their names come with them.
+//! Counters declared once, together with their sums and names.
 
-/// Declares a struct of counts (`u64`) that are added field by field and listed by name.
+/// Declares a struct of counts (`u64`) that can be added field by field and listed by name.
 #[macro_export]
 macro_rules! counters {
     ($(#[$doc:meta])* pub struct $name:ident {

@@ -1,25 +1,25 @@
-//! Constant turn rate and velocity (CTRV): what the filters of flow tracklets (section 3.6.1) and
-//! of object tracks (section 2.4) share.
+//! Constant turn rate and velocity (CTRV): shared by the filters of flow tracklets (section 3.6.1)
+//! and of object tracks (section 2.4).
 
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-/// Variance of a heading of which nothing is known: uniform over a turn, pi²/3.
+/// Variance of an unknown heading: uniform over a full turn, pi²/3.
 const HEADING_UNKNOWN: f32 = 3.289_868;
 
-/// What two measured positions tell of a motion.
+/// The motion implied by two measured positions.
 pub struct TwoPointStart {
     /// rad.
     pub heading: f32,
     /// m/s.
     pub speed: f32,
-    /// Of (x, y, heading, speed) at the second position.
+    /// Covariance of (x, y, heading, speed) at the second position.
     pub covariance: Matrix4<f32>,
 }
 
 impl TwoPointStart {
     /// From the displacement `moved` (m) over `dt` seconds between positions of covariance `noise`,
-    /// R. The errors of position and velocity are correlated: var(v) = 2 R / dt²,
-    /// cov(x, v) = R / dt, turned into heading and speed.
+    /// R. The errors of position and velocity are correlated: var(v) = 2 R / dt², cov(x, v) = R /
+    /// dt, converted to heading and speed.
     pub fn of(noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> TwoPointStart {
         let distance = libm::sqrtf(moved[0] * moved[0] + moved[1] * moved[1]);
         let (heading, speed) = (libm::atan2f(moved[1], moved[0]), distance / dt);

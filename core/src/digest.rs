@@ -1,5 +1,5 @@
-//! A digest of results: 64-bit FNV-1a over little-endian bytes, returns in one step each. It tells
-//! whether two runs put out the same bits; it is no protection against anybody.
+//! A digest of results: 64-bit FNV-1a over little-endian bytes, with each return added in one step.
+//! It tells whether two runs produced the same bits; it is not a cryptographic hash.
 
 #[cfg(feature = "pipeline")]
 use crate::output::{ColumnFlow, PointFlow, TrackletState};
@@ -7,8 +7,8 @@ use crate::output::{ColumnFlow, PointFlow, TrackletState};
 /// The prime of 64-bit FNV.
 const PRIME: u64 = 0x0000_0100_0000_01b3;
 
-/// Odd factors, one for each pair of a return's words, so that no two can trade places: the golden
-/// ratio's fraction, times 1, 3 and 5.
+/// Odd factors, one for each pair of a return's words, so that no two pairs are interchangeable:
+/// the fractional part of the golden ratio, times 1, 3 and 5.
 #[cfg(feature = "pipeline")]
 const ODD: [u64; 3] = [GOLDEN, GOLDEN.wrapping_mul(3), GOLDEN.wrapping_mul(5)];
 #[cfg(feature = "pipeline")]
@@ -25,15 +25,15 @@ impl Default for Digest {
 }
 
 impl Digest {
-    /// Of nothing.
+    /// The digest of no data.
     pub const START: Digest = Digest(0xcbf2_9ce4_8422_2325);
 
-    /// From [`Digest::value`], to go on with.
+    /// Resumes from a [`Digest::value`].
     pub const fn resume(value: u64) -> Digest {
         Digest(value)
     }
 
-    /// Digest of some bytes.
+    /// Returns the digest of some bytes.
     pub fn of(bytes: &[u8]) -> u64 {
         let mut d = Digest::default();
         for &b in bytes {
@@ -53,14 +53,14 @@ impl Digest {
         w.to_le_bytes().into_iter().for_each(|b| self.byte(b));
     }
 
-    /// Adds a number by its bits. The zeros of both signs are one.
+    /// Adds a number by its bits. Zeros of either sign are the same.
     #[inline]
     pub fn float(&mut self, v: f32) {
         self.word((v + 0.0).to_bits());
     }
 
-    /// Adds a number in double precision by its bits, the lower word first. The zeros of both signs
-    /// are one.
+    /// Adds a double-precision number by its bits, lower word first. Zeros of either sign are the
+    /// same.
     #[inline]
     pub fn double(&mut self, v: f64) {
         (v + 0.0).to_bits().to_le_bytes().into_iter().for_each(|b| self.byte(b));
@@ -91,8 +91,8 @@ impl Digest {
     }
 
     /// Adds a return's flow: velocity over ground, velocity relative to the vehicle, status,
-    /// P(moves). There are ten times as many returns as columns: each is summed up first, by
-    /// products that do not wait for each other, and enters in one step.
+    /// P(moves). There are ten times as many returns as columns, so each is first reduced to a sum
+    /// of products that do not depend on one another, which is added in one step.
     #[inline]
     pub fn point(&mut self, p: &PointFlow) {
         let bits = |v: f32| u64::from((v + 0.0).to_bits());

@@ -1,24 +1,24 @@
-//! Returns that are left out of a sweep: invalid, too far, or too many.
+//! Returns left out of a sweep: invalid, too far away, or too many.
 
 use crate::sweep::{Point, Rig};
 
-/// What a return is, before it is placed.
+/// The kind of a return, determined before it is placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReturnKind {
-    /// Of something around the vehicle.
+    /// From something around the vehicle.
     Valid,
-    /// On the own vehicle.
+    /// On the ego vehicle.
     OwnVehicle,
-    /// With a NaN or an infinity.
+    /// Contains a NaN or an infinity.
     NotFinite,
-    /// At exactly (0, 0, 0): a sensor's way to say that nothing came back.
+    /// At exactly (0, 0, 0), a sensor's way of reporting no echo.
     NoEcho,
-    /// Of a sensor the rig does not have.
+    /// From a sensor the rig does not have.
     UnknownSensor,
 }
 
 impl ReturnKind {
-    /// Of a return.
+    /// Returns the kind of a return.
     #[inline]
     pub fn of(rig: &Rig, point: &Point) -> ReturnKind {
         let p = point.position;
@@ -39,7 +39,7 @@ impl ReturnKind {
 /// How many returns were left out, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DroppedReturns {
-    /// Returns that a sweep had beyond [`returns_max`](crate::params::Profile::returns_max): it was
+    /// Returns beyond a sweep's [`returns_max`](crate::params::Profile::returns_max): the sweep was
     /// thinned evenly.
     pub over_capacity: u64,
     /// Returns with a NaN or an infinity.
@@ -49,9 +49,9 @@ pub struct DroppedReturns {
     /// Returns more than [`EXTENT_VOXELS`](crate::params::EXTENT_VOXELS) voxels from the window's
     /// corner along an axis.
     pub too_far: u64,
-    /// Returns of a sensor the rig does not have.
+    /// Returns from a sensor the rig does not have.
     pub unknown_sensor: u64,
-    /// Returns on the own vehicle: their rays count as free space, without an end.
+    /// Returns on the ego vehicle: their rays count as free space, with no end point.
     pub own_vehicle: u64,
 }
 
@@ -77,8 +77,8 @@ impl DroppedReturns {
         own_vehicle: 0,
     };
 
-    /// Whether a valid return lies on the own vehicle, which is not counted here; `None`, and
-    /// counted, where the return is not valid.
+    /// Returns whether a valid return lies on the ego vehicle (not counted here); counts an invalid
+    /// one and returns `None`.
     pub fn admit(&mut self, rig: &Rig, point: &Point) -> Option<bool> {
         match ReturnKind::of(rig, point) {
             ReturnKind::Valid => return Some(false),
@@ -90,13 +90,13 @@ impl DroppedReturns {
         None
     }
 
-    /// Those of which no ray is cast.
+    /// The number of returns for which no ray is cast.
     pub fn without_ray(&self) -> u64 {
         let invalid = self.not_finite + self.no_return + self.unknown_sensor;
         self.over_capacity + self.too_far + invalid
     }
 
-    /// Every count with the name of its field and a name for people.
+    /// Every count with its field name and a human-readable name.
     pub fn counts(&self) -> [(&'static str, &'static str, u64); 6] {
         [
             ("over_capacity", "over capacity", self.over_capacity),

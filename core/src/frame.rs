@@ -1,9 +1,9 @@
-//! The frame the grid lies in (B.2.2 leaves it open): all that depends on the choice.
+//! The frame of the grid (B.2.2 leaves it open), and everything that depends on the choice.
 //!
 //! [`Frame::Lattice`]: cell borders are fixed in the world and the window follows the vehicle by
 //! whole cells. The displacement of static objects is then exactly zero, each sweep is traced only
 //! once, and the search covers speed over ground. Points are quantised relative to the window's
-//! central voxel, so the size of the window changes no voxel: that is why the sparse map and the
+//! central voxel, so the size of the window affects no voxel: that is why the sparse map and the
 //! dense window agree. [`Frame::Sensor`]: the vehicle frame of each sweep, as in the dissertation;
 //! motion is relative to the vehicle.
 
@@ -35,7 +35,7 @@ pub fn central(profile: &Profile) -> [i32; 3] {
 }
 
 /// Places the window. `lattice_origin` is that of the drive, or `None` on its first sweep: the
-/// lattice then has a cell centre at the anchor, the point of the vehicle's axis
+/// lattice then has a cell centre at the anchor, the point on the vehicle's axis
 /// [`ANCHOR_ABOVE_GROUND_M`] above the ground.
 pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<DVec3>) -> Window {
     let anchor = DVec3::new(0.0, 0.0, rig.ground_m + ANCHOR_ABOVE_GROUND_M);
@@ -52,9 +52,9 @@ pub fn place(profile: &Profile, rig: &Rig, pose: &Pose, lattice_origin: Option<D
     }
 }
 
-/// [`place`] where the anchor is `at` in the world.
+/// [`place`] with the anchor at world position `at`.
 fn place_on_lattice(profile: &Profile, pose: &Pose, at: DVec3, origin: DVec3) -> Window {
-    // A pose a world away saturates; its sweep is no continuation of any other.
+    // A pose absurdly far away saturates; its sweep does not continue any other.
     let index = |c: f64| libm::floor(c + 0.5).clamp(-FAR_CELLS, FAR_CELLS) as i32;
     let cell = (to_grain(at - origin) / profile.voxel_m).to_array().map(index);
     let below = central(profile);
@@ -67,7 +67,7 @@ fn place_on_lattice(profile: &Profile, pose: &Pose, at: DVec3, origin: DVec3) ->
     }
 }
 
-/// The second pose in the frame of the first, its place in whole steps.
+/// The second pose in the frame of the first, its translation taken in whole steps.
 fn motion(from: &Pose, to: &Pose) -> Pose {
     let (by, turned_back) =
         (to_grain(to.translation - from.translation), from.rotation.conjugate());
@@ -75,7 +75,7 @@ fn motion(from: &Pose, to: &Pose) -> Pose {
     Pose { rotation, translation: turned_back * by }
 }
 
-/// Farther than any drive leads, and within what an integer holds, cells.
+/// Farther than any drive goes, yet within the range of an integer, cells.
 const FAR_CELLS: f64 = 1e9;
 
 /// One sweep's side of a pair.
@@ -88,13 +88,13 @@ pub(crate) struct Side {
     pub points: Thinning,
 }
 
-/// Rounding far from the drive's start, and places in whole steps, come to less; a cell is larger.
+/// Rounding far from the drive's start and to whole steps amounts to less; a cell is larger.
 const SLIP_MAX_M: f64 = 1e-3;
 
 impl Side {
-    /// By how much what stands comes to lie elsewhere than the window of the next sweep, which was
-    /// shifted, has it; unless nothing of it is in view, or windows lie so far off that places are
-    /// not told to a cell.
+    /// How far static structure is from where the shifted window of the next sweep has it, m.
+    /// `None` without a lattice, if none of it stays in view, or if the windows are so far away
+    /// that positions do not resolve cells.
     fn slip_m(&self, profile: &Profile, next: &Side, shift: [i32; 3]) -> Option<f64> {
         let far = |w: &Window| w.corner.iter().any(|c| f64::from(*c).abs() > FAR_CELLS / 2.0);
         let beyond = shift.iter().any(|cells| cells.unsigned_abs() >= profile.side);
@@ -108,27 +108,27 @@ impl Side {
     }
 }
 
-/// Where a sweep lies.
+/// The placement of a new sweep.
 pub(crate) struct Arrival {
     pub window: Window,
-    /// Cells from the window before.
+    /// Cells from the previous window.
     pub shift: [i32; 3],
-    /// Set where the sweep has no usable predecessor.
+    /// Set if the sweep has no usable predecessor.
     pub reset: Option<Reset>,
 }
 
-/// Two sweeps that follow each other.
+/// Two consecutive sweeps.
 pub(crate) struct SweepPair<'a> {
     pub profile: &'a Profile,
     pub before: Side,
     pub current: Side,
     /// Time between them, s.
     pub dt_s: f64,
-    /// The vehicle at the second in its frame at the first.
+    /// Pose of the vehicle at the second sweep in its frame at the first.
     moved: Pose,
     /// How much the vehicle turned in between, rad.
     pub turned_rad: f32,
-    /// The vehicle's motion from the one to the other, at the first: the odometry flow.
+    /// The vehicle's motion between the two, at the first: the odometry flow.
     pub ego: EgoMotion,
 }
 
@@ -145,7 +145,7 @@ impl Sides {
         Sides { lattice_origin: None, before: None, current: None }
     }
 
-    /// A sweep arrives. One that does not continue the one before has none before it.
+    /// Adds a sweep. One that does not continue the previous sweep has none before it.
     pub fn advance(&mut self, profile: &Profile, rig: &Rig, sweep: &Sweep) -> Arrival {
         let pose = sweep.world_from_vehicle;
         self.before = self.current.take();
@@ -170,7 +170,7 @@ impl Sides {
         Arrival { window, shift, reset }
     }
 
-    /// Both, where the second continues the first.
+    /// Both sweeps, if the second continues the first.
     pub fn pair<'a>(&self, profile: &'a Profile) -> Option<SweepPair<'a>> {
         Some(SweepPair::new(profile, self.before?, self.current?))
     }
@@ -195,9 +195,9 @@ impl<'a> SweepPair<'a> {
         grid_from_vehicle.inverse()
     }
 
-    /// Displacement over ground and velocities of an observed column at `at` (first sweep's vehicle
-    /// frame): its tracklet's velocity, or, where there was no room for one, that of the
-    /// displacement.
+    /// Sets the displacement over ground and the velocities of an observed column at `at` (first
+    /// sweep's vehicle frame): its tracklet's velocity or, if there was no room for one, that of
+    /// the displacement.
     pub fn set_motion(
         &self,
         at: DVec3,
@@ -222,8 +222,8 @@ impl<'a> SweepPair<'a> {
         }
     }
 
-    /// Puts out an observed column as static. It may move all the same as was found, with
-    /// [`ColumnFlow::probability`]; its covariances say so.
+    /// Outputs an observed column as static. It still moves as observed with
+    /// [`ColumnFlow::probability`]; its covariances include that.
     pub fn set_static(&self, at: DVec3, flow: &mut ColumnFlow) {
         let p = flow.probability;
         let despite = |covariance: &mut [f32; 3], by: &mut [f32; 2]| {
@@ -236,14 +236,14 @@ impl<'a> SweepPair<'a> {
         self.set_relative(at, flow);
     }
 
-    /// Velocity of a tracklet, which has gone over to the second sweep's axes, along the first's.
+    /// Velocity, along the first sweep's axes, of a tracklet already turned to the second's.
     fn velocity_at_first(&self, t: &Tracklet) -> ([f32; 2], [f32; 3]) {
         let (velocity, covariance) = t.ekf.velocity();
         turn(self.turned_rad, velocity, covariance)
     }
 
-    /// What goes over ground with a column's displacement and velocity (and its covariance) along
-    /// the vehicle's axes.
+    /// Sets the motion over ground from a column's displacement and its velocity (with covariance)
+    /// along the vehicle's axes.
     fn set_over_ground(
         &self,
         at: DVec3,
@@ -260,7 +260,7 @@ impl<'a> SweepPair<'a> {
         flow.covariance = self.ego.turn_covariance(covariance);
     }
 
-    /// The velocity relative to the vehicle that goes with a column's velocity over ground.
+    /// Sets the velocity relative to the vehicle from a column's velocity over ground.
     pub fn set_relative(&self, at: DVec3, flow: &mut ColumnFlow) {
         let planar = DVec3::new(at.x, at.y, 0.0);
         let [x, y, _] = self.ego.ego_from_world(planar, flow.velocity_world_mps);
@@ -269,8 +269,8 @@ impl<'a> SweepPair<'a> {
 }
 
 impl Frame {
-    /// Cells from the window before to the new one. Where there is none before, so many that
-    /// nothing of it comes into view.
+    /// Cells from the previous window to the new one; without a previous one, enough that none of
+    /// it stays in view.
     fn shift(self, side: i32, before: Option<&Window>, now: &Window) -> [i32; 3] {
         match (before, self) {
             (Some(before), Frame::Lattice) => core::array::from_fn(|a| {
@@ -304,7 +304,7 @@ impl Frame {
     }
 }
 
-/// The centre of a column, at the level of the anchor, from the window's central voxel, m.
+/// The centre of a column, at the level of the anchor, relative to the window's central voxel, m.
 pub(crate) fn centre_of(profile: &Profile, i: i32, j: i32) -> DVec3 {
     let [ci, cj, _] = central(profile);
     DVec3::new((i - ci) as f64, (j - cj) as f64, 0.0) * profile.voxel_m
@@ -315,7 +315,8 @@ mod tests {
     use super::*;
     use crate::sweep::Timing;
 
-    /// Cells from the window before, and whether there is one, for places in turn, 0.1 s apart.
+    /// Cells from the previous window, and whether there is one, for successive positions 0.1 s
+    /// apart.
     fn shifts<const N: usize>(places: [[f64; 3]; N]) -> [([i32; 3], bool); N] {
         let (profile, mut sides) = (Profile::hdl64(), Sides::new());
         let rig = Rig {

@@ -1,27 +1,28 @@
 //! Height of the ground under a window of square columns, from the returns in it.
 //!
 //! The third-lowest return of each cell, or of its neighbours where the ground descends that way:
-//! returns mirrored by glass or puddles come from below, but seldom together. What rises from
-//! there, a bank or a kerb, is climbed column by column, as far as it is thin and no steeper than
-//! ground is.
+//! returns mirrored by glass or puddles come from below, but seldom together. Whatever rises from
+//! there, such as a bank or a kerb, is climbed column by column, as long as it is thin and no
+//! steeper than ground can be.
 //!
-//! Parameters are in metres, places and heights in the caller's unit, the edge of a column.
+//! Parameters are in metres; positions and heights are in the caller's unit, the edge of a column.
 
 use crate::params::{COLUMNS_MAX, GroundParams, SIDE_MAX};
 
-/// Least number of columns along an edge of a cell: bounds the number of cells.
+/// Minimum number of columns along an edge of a cell: bounds the number of cells.
 const CELL_COLUMNS_MIN: usize = 4;
-/// Cells along an axis at most.
+/// Maximum number of cells along an axis.
 const CELLS_SIDE_MAX: usize = SIDE_MAX.div_ceil(CELL_COLUMNS_MIN);
 const CELLS_MAX: usize = CELLS_SIDE_MAX * CELLS_SIDE_MAX;
 
-/// Returns so much higher than the lowest of their column hang over it, m. Not measured on its own.
+/// Returns this much higher than the lowest of their column overhang it, m. Not measured in
+/// isolation.
 const OVERHANGING_M: f64 = 1.5;
-/// How often the columns are passed over, forth and back: one climbs a bank, a winding one takes
-/// more. Not measured on its own.
+/// Number of passes over the columns, each forward and back: one climbs a bank, a winding one takes
+/// more. Not measured in isolation.
 const CLIMBS: usize = 2;
 
-/// Height of the ground under every column; infinite where nothing tells it.
+/// Height of the ground under every column; infinite where unknown.
 pub struct GroundHeights([f32; COLUMNS_MAX]);
 
 impl Default for GroundHeights {
@@ -36,31 +37,31 @@ impl GroundHeights {
         GroundHeights([0.0; COLUMNS_MAX])
     }
 
-    /// Height of the ground under a column; infinite where nothing tells it.
+    /// Height of the ground under a column; infinite where unknown.
     pub fn height(&self, column: usize) -> f32 {
         self.0[column]
     }
 
-    /// Height above the ground of a place in a column.
+    /// Height above the ground of a point in a column.
     pub fn above(&self, column: usize, z: f32) -> f32 {
         z - self.height(column)
     }
 }
 
-/// Estimates [`GroundHeights`]: its scratch.
+/// Estimates [`GroundHeights`]; holds the scratch memory.
 pub struct GroundEstimator {
-    /// Columns along an axis of the window, and along an edge of a cell, that `cell` is for.
+    /// Columns along an axis of the window and along an edge of a cell for which `cell` is valid.
     columns: [usize; 2],
     /// Cells along an axis of the window.
     side: usize,
     cell: [u16; COLUMNS_MAX],
-    /// The three lowest returns of each.
+    /// The three lowest returns of each cell.
     lowest: [[f32; 3]; CELLS_MAX],
     height: [f32; CELLS_MAX],
     extrapolated: [f32; CELLS_MAX],
     /// The lowest return of every column; infinite where it has none.
     low: [f32; COLUMNS_MAX],
-    /// Columns whose returns are too far apart for ground, a bit each.
+    /// Columns whose returns are too far apart vertically to be ground, one bit each.
     thick: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
@@ -85,7 +86,7 @@ impl GroundEstimator {
         }
     }
 
-    /// Lists the cell of every column: divisions take longer than looking it up.
+    /// Lists the cell of every column: a look-up is faster than the divisions.
     fn list_cells(&mut self, side: usize, edge: usize) {
         if self.columns == [side, edge] {
             return;
@@ -101,8 +102,8 @@ impl GroundEstimator {
     }
 
     /// Estimates the ground of a window of `side` columns along an axis (at most [`SIDE_MAX`]),
-    /// whose edges measure `column_m`. `returns` are given by column and place, `under` is the
-    /// place of the ground beneath the vehicle.
+    /// whose edges measure `column_m`. `returns` are given by column and position; `under` is the
+    /// position of the ground beneath the vehicle.
     pub fn estimate(
         &mut self,
         params: &GroundParams,
@@ -142,7 +143,7 @@ impl GroundEstimator {
         }
     }
 
-    /// Columns with returns so much higher than their lowest.
+    /// Finds columns with returns that are higher than their lowest by an amount within `by`.
     fn find_thick(
         &mut self,
         returns: impl Iterator<Item = (usize, [f32; 3])>,
@@ -156,7 +157,7 @@ impl GroundEstimator {
     }
 
     /// Raises the ground of a thin column to its lowest return if the ground of a column beside it
-    /// goes on to there.
+    /// continues there.
     fn climb(
         &self,
         side: usize,
@@ -196,7 +197,7 @@ impl GroundEstimator {
         }
     }
 
-    /// Lowers each cell to what its lowest neighbour allows, which may fall by `fall` to it.
+    /// Lowers each cell to at most `fall` above its lowest neighbour.
     fn extrapolate(&mut self, fall: f32) {
         let n = self.side;
         for i in 0..n {

@@ -49,8 +49,8 @@ impl<const N: usize> DisjointSets<N> {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Lists the members of every group; groups are ordered by their least member. `count` is that
-    /// of [`DisjointSets::start`].
+    /// Lists the members of every group; groups are ordered by their least member. `count` is the
+    /// one passed to [`DisjointSets::start`].
     pub fn list(&mut self, count: usize) {
         self.members.clear();
         self.ends.clear();
@@ -58,7 +58,7 @@ impl<const N: usize> DisjointSets<N> {
             if self.parent[n as usize] != NONE {
                 let root = self.root(n);
                 self.parent[n as usize] = root;
-                // As many as there are numbers at most: there is room.
+                // At most as many as there are numbers, so there is room.
                 let _ = self.members.push(n);
             }
         }

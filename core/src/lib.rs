@@ -14,17 +14,17 @@
 //! │ velocities│◄─┤ EKF tracklets│◄─┤  refine  │◄─┤ expectation-max.│◄─┤  constancy cost │
 //! └───────────┘  └──────────────┘  └──────────┘  └─────────────────┘  └─────────────────┘
 //! ```
-//! That is figure 3.1 of the dissertation; [`pipeline::Pipeline::step`] is it in code.
+//! That is figure 3.1 of the dissertation; [`pipeline::Pipeline::step`] implements it.
 //!
 //! - A sweep: [`sweep`] (returns, rig), [`return_clock`] (the time of a return), [`continuity`]
 //!   (what makes two sweeps a pair), [`prepare`] and [`returns`] (rays), [`frame`] (the window).
-//! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (who runs them),
-//!   [`record`] (what crosses to a device).
-//! - What a column is: [`encoder`] (after chapter 4).
+//! - From rays to flow: [`stages`] (buffers, stages and their order), [`perceive`] (what runs
+//!   them), [`record`] (data exchanged with a device).
+//! - Column classes: [`encoder`] (after chapter 4).
 //! - From flow to velocities: [`refinement`], [`tracklet`], [`motion_compensation`], [`output`].
 //! - The sparse map of appendix B: [`map`].
-//! - Around them: [`mod@params`], [`weights`], [`team`] (threads), [`digest`], [`mod@counters`],
-//!   [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`], [`ctrv`].
+//! - Supporting modules: [`mod@params`], [`weights`], [`team`] (threads), [`digest`],
+//!   [`mod@counters`], [`dropped`], [`thinning`], [`ground`], [`groups`], [`pose`], [`ctrv`].
 
 pub mod continuity;
 #[cfg(feature = "pipeline")]

@@ -1,10 +1,11 @@
 //! The sparse map of appendix B: log-odds of every voxel any ray of a sweep touched.
 //!
-//! Section B.2 to the letter, but for exact sizes and bounded memory: count the updates, make room
-//! by a prefix sum, emit them, sort by key, sum equal keys. The window spans the sensor's range;
-//! its voxels are keyed in the order of [`crate::stages::grid`], and the key space is worked
-//! through in bands of at most [`BAND_UPDATES`] updates. A voxel gets one update per distinct ray
-//! at most, so a band can always be made small enough. The map equals the dense window inside that,
+//! Section B.2 to the letter, except for exact sizes and bounded memory: count the updates, make
+//! room by a prefix sum, emit them, sort by key, sum equal keys. The window spans the sensor's
+//! range; its voxels are keyed in the order of [`crate::stages::grid`], and the key space is
+//! processed in bands of at most [`BAND_UPDATES`] updates. A voxel gets at most one update per
+//! distinct ray, so a band can always be made small enough. Inside the dense window, the map equals
+//! it bit for bit.
 //! bit for bit.
 
 use crate::params::{BAND_UPDATES, LOG_ODDS_PER_NAT, POINTS_MAX, TILE};
@@ -15,10 +16,10 @@ const _: () = assert!(POINTS_MAX <= BAND_UPDATES);
 
 use crate::record::Update;
 
-/// Bands remembered from sweep to sweep.
+/// Maximum number of bands remembered from sweep to sweep.
 const BANDS_MAX: usize = 256;
 
-/// Cuts the key space into bands that hold.
+/// Divides the key space into bands that fit.
 pub struct Bands {
     keys: u32,
     ends: heapless::Vec<u32, BANDS_MAX>,
@@ -34,7 +35,8 @@ impl Bands {
     }
 
     /// Calls `band` with key ranges in ascending order until all keys are done. It returns whether
-    /// the range held; if not, it is halved. Ranges that held are where the next sweep starts.
+    /// the range fitted; if not, the range is halved. The next sweep starts with the ranges that
+    /// fitted.
     pub fn run<E>(&mut self, mut band: impl FnMut(u32, u32) -> Result<bool, E>) -> Result<(), E> {
         let planned = core::mem::take(&mut self.ends);
         let mut planned = planned.iter().copied();
@@ -47,7 +49,7 @@ impl Bands {
             while !band(from, to)? {
                 to = from + (to - from).div_ceil(2).min(to - from - 1).max(1);
             }
-            // Where there are more bands than fit, the next sweep finds the rest again.
+            // If there are more bands than there is room for, the next sweep finds the rest again.
             let _ = self.ends.push(to);
             from = to;
         }
@@ -55,7 +57,7 @@ impl Bands {
     }
 }
 
-/// Probability that a voxel is occupied (B.2, B.3): its log-odds, tenths of nats, cut off at
+/// Probability that a voxel is occupied (B.2, B.3): its log-odds, in tenths of nats, are clipped at
 /// `clip_nats` either way (l_min and l_max of table B.1).
 pub fn occupancy_probability(log_odds_tenths: i32, clip_nats: f32) -> f32 {
     let nats = (log_odds_tenths as f32 / LOG_ODDS_PER_NAT).max(-clip_nats).min(clip_nats);
@@ -95,7 +97,7 @@ mod tests {
     fn probabilities_of_log_odds() {
         let p = |tenths| occupancy_probability(tenths, 3.0);
         assert_eq!(p(0), 0.5);
-        // log(p / (1 - p)) gives the log-odds back, as far as they are not cut off.
+        // log(p / (1 - p)) gives the log-odds back, unless they are clipped.
         for tenths in [-30, -7, 1, 10, 29] {
             let nats = (p(tenths) / (1.0 - p(tenths))).ln();
             assert!((nats - tenths as f32 / 10.0).abs() < 1e-5, "{tenths}");

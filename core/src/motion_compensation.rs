@@ -13,7 +13,7 @@ pub struct EgoMotion {
 }
 
 impl EgoMotion {
-    /// Of a vehicle at `pose` moving with `twist`.
+    /// The motion of a vehicle at `pose` moving with `twist`.
     pub fn new(pose: &Pose, twist: &Twist) -> EgoMotion {
         let world_from_vehicle = pose.matrix();
         EgoMotion {
@@ -23,14 +23,15 @@ impl EgoMotion {
         }
     }
 
-    /// Velocity (m/s) along vehicle axes at which a point that stands still at `at` (vehicle
-    /// frame, m) seems to move: the odometry flow of section 3.4.2.
+    /// Apparent velocity (m/s, vehicle axes) of a stationary point at `at` (vehicle frame, m): the
+    /// odometry flow of section 3.4.2.
     #[inline]
     pub fn odometry(&self, at: DVec3) -> DVec3 {
         -self.twist.linear - self.twist.angular.cross(at)
     }
 
-    /// Velocity over ground (world axes) to velocity relative to the vehicle (vehicle axes).
+    /// Converts velocity over ground (world axes) to velocity relative to the vehicle (vehicle
+    /// axes).
     #[inline]
     pub fn ego_from_world(&self, at: DVec3, velocity: [f32; 2]) -> [f32; 3] {
         let ground = DVec3::new(velocity[0] as f64, velocity[1] as f64, 0.0);
@@ -38,21 +39,22 @@ impl EgoMotion {
         [v.x as f32, v.y as f32, v.z as f32]
     }
 
-    /// Velocity relative to the vehicle (vehicle axes) to velocity over ground (world axes).
+    /// Converts velocity relative to the vehicle (vehicle axes) to velocity over ground (world
+    /// axes).
     pub fn world_from_ego(&self, at: DVec3, velocity: [f32; 2]) -> [f32; 2] {
         let relative = DVec3::new(velocity[0] as f64, velocity[1] as f64, 0.0);
         let v = self.world_from_vehicle * (relative - self.odometry(at));
         [v.x as f32, v.y as f32]
     }
 
-    /// Covariance (xx, xy, yy) from vehicle axes to world axes.
+    /// Rotates a covariance (xx, xy, yy) from vehicle axes to world axes.
     pub fn turn_covariance(&self, c: [f32; 3]) -> [f32; 3] {
         let x = self.world_from_vehicle.col(0);
         turned_covariance(x.x as f32, x.y as f32, c)
     }
 }
 
-/// A velocity and its covariance (xx, xy, yy), turned by `angle` (rad).
+/// Rotates a velocity and its covariance (xx, xy, yy) by `angle` (rad).
 pub fn turn(angle: f32, [x, y]: [f32; 2], covariance: [f32; 3]) -> ([f32; 2], [f32; 3]) {
     let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
     ([cos * x - sin * y, sin * x + cos * y], turned_covariance(cos, sin, covariance))
@@ -77,13 +79,13 @@ mod tests {
         let ego =
             EgoMotion::new(&Pose::planar(3.0, 4.0, 0.0, core::f64::consts::FRAC_PI_2), &twist);
         let at = DVec3::new(20.0, 5.0, 0.0);
-        // v + w x r = (10 - 2.5, 10): a wall there seems to come the other way.
+        // v + w x r = (10 - 2.5, 10): a wall there appears to move the opposite way.
         let seen = ego.ego_from_world(at, [0.0, 0.0]);
         assert!((seen[0] + 7.5).abs() < 1e-6 && (seen[1] + 10.0).abs() < 1e-6);
         let back = ego.world_from_ego(at, [seen[0], seen[1]]);
         assert!(back[0].abs() < 1e-5 && back[1].abs() < 1e-5);
-        // Driving north at 10 m/s beside us: along +y of the world, still in our frame but for the
-        // turn.
+        // Driving north at 10 m/s beside us: along +y of the world, stationary in our frame apart
+        // from the rotation.
         let seen = ego.ego_from_world(DVec3::ZERO, [0.0, 10.0]);
         assert!(seen.iter().all(|v| v.abs() < 1e-5));
         let turned = ego.turn_covariance([4.0, 0.0, 1.0]);

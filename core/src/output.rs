@@ -1,8 +1,8 @@
-//! What one step hands back: records of plain numbers, one per column, point and tracklet.
+//! The results of one step: plain records, one per column, point and tracklet.
 //!
-//! Vehicle frame: of the pair's first sweep for columns and points, of its second sweep for
-//! tracklets. World frame: the frame of the poses. "World velocity" is over ground; "ego velocity"
-//! is relative to the moving vehicle, along the vehicle's axes (section 3.7).
+//! Vehicle frame: that of the pair's first sweep for columns and points, that of its second sweep
+//! for tracklets. World frame: the frame of the poses. "World velocity" is over ground; "ego
+//! velocity" is relative to the moving vehicle, along the vehicle's axes (section 3.7).
 
 use crate::continuity::Reset;
 use crate::dropped::DroppedReturns;
@@ -16,10 +16,10 @@ use crate::thinning::Thinning;
 use crate::tracklet::TrackletTurnover;
 use glam::DVec3;
 
-/// Numbers beyond are no place that a lidar sees, m: the velocity there may not be finite.
+/// No lidar sees coordinates beyond this, m: the velocity there might not be finite.
 const FARTHEST_M: f32 = 1e6;
 
-/// What one pair of sweeps yields. Borrowed from the pipeline until its next step.
+/// The results of one pair of sweeps. Borrowed from the pipeline until its next step.
 #[derive(Clone, Copy, Debug)]
 pub struct PairFlows<'a> {
     /// Solid columns of the first sweep.
@@ -30,30 +30,30 @@ pub struct PairFlows<'a> {
     pub dt_s: f64,
     /// What happened to tracklets.
     pub turnover: TrackletTurnover,
-    /// Matched columns.
+    /// Number of matched columns.
     pub valid: usize,
-    /// Solid columns beyond the capacity for foreground, which count as background, and those
-    /// beyond as many that moved, which count as unmatched; columns of clusters and columns that
-    /// there is no room for.
+    /// Columns beyond some capacity: solid ones beyond that for foreground, which count as
+    /// background, and moving ones beyond that for observations, which count as unmatched; columns
+    /// of clusters, and columns without room for a record.
     pub foreground_dropped: usize,
 }
 
-/// Flow of every return of a sweep, in the source's order. It is that of a column, and made up when
-/// it is asked for.
+/// Flow of every return of a sweep, in the source's order. It is that of a column, and computed on
+/// demand.
 #[derive(Clone, Copy, Debug)]
 pub struct PointFlows<'a> {
-    /// Those of the solid columns, then those of others whose returns move with a cluster.
+    /// Flow of the solid columns, then of other columns whose returns move with a cluster.
     pub(crate) columns: &'a [ColumnFlow],
-    /// Of those that were taken.
+    /// For the returns that were taken.
     pub(crate) taken: &'a [ReturnFlow],
-    /// The sweep.
+    /// The returns of the sweep.
     pub(crate) points: &'a [Point],
     pub(crate) thinning: Thinning,
     pub(crate) ego: EgoMotion,
 }
 
 impl<'a> PointFlows<'a> {
-    /// Of a sweep taken whole by a vehicle that stands. `taken` has an element for each of
+    /// The flow of a sweep taken whole by a stationary vehicle. `taken` has one element for each of
     /// `points`.
     pub fn at_rest(
         columns: &'a [ColumnFlow],
@@ -65,12 +65,12 @@ impl<'a> PointFlows<'a> {
         PointFlows { columns, taken, points, thinning, ego }
     }
 
-    /// Returns of the sweep.
+    /// Number of returns of the sweep.
     pub fn count(self) -> usize {
         self.thinning.of()
     }
 
-    /// That of a return of the sweep.
+    /// The flow of a return of the sweep.
     #[inline]
     pub fn get(self, index: usize) -> Option<PointFlow> {
         let point = self.points.get(index)?;
@@ -78,7 +78,7 @@ impl<'a> PointFlows<'a> {
         Some(taken.map_or(PointFlow::OVER_CAPACITY, |taken| self.of(*taken, point)))
     }
 
-    /// A return moves with its column; outside the window, and where nothing is solid, with the
+    /// A return moves with its column; outside the window and in columns without a record, with the
     /// ground.
     #[inline]
     fn of(self, taken: ReturnFlow, point: &Point) -> PointFlow {
@@ -94,30 +94,30 @@ impl<'a> PointFlows<'a> {
         let seen = |c: f32| (-FARTHEST_M..=FARTHEST_M).contains(&c);
         let finite = |c: f32| if seen(c) { c as f64 } else { 0.0 };
         let [x, y, z] = point.position;
-        // `map` of arrays is a call.
+        // Not `map`: on arrays it is a call.
         let at = DVec3::new(finite(x), finite(y), finite(z));
         out.velocity_ego_mps = self.ego.ego_from_world(at, out.velocity_world_mps);
         out
     }
 
-    /// What it is made of besides, to be copied: columns, and what is kept of returns.
+    /// The slices besides the points, to be copied: columns, and what is kept of returns.
     pub fn slices(self) -> (&'a [ColumnFlow], &'a [ReturnFlow]) {
         (self.columns, self.taken)
     }
 
-    /// All but the slices, to be kept beside them.
+    /// Everything but the slices, to be kept alongside them.
     pub fn keep(self) -> KeptPoints {
         let PointFlows { columns, taken, thinning, ego, .. } = self;
         KeptPoints { columns: columns.len(), taken: taken.len(), thinning, ego }
     }
 
-    /// Those of all returns.
+    /// The flow of every return.
     pub fn iter(self) -> impl ExactSizeIterator<Item = PointFlow> + 'a {
         (0..self.count()).map(move |n| self.get(n).unwrap_or(PointFlow::OVER_CAPACITY))
     }
 }
 
-/// [`PointFlows`] without the slices, for whoever keeps those.
+/// [`PointFlows`] without the slices, for callers that keep those.
 #[derive(Clone, Copy, Debug)]
 pub struct KeptPoints {
     columns: usize,
@@ -127,8 +127,8 @@ pub struct KeptPoints {
 }
 
 impl KeptPoints {
-    /// With the slices: of columns and returns those given to the step, of points its `before`.
-    /// Shorter ones have no flow.
+    /// Adds the slices: columns and returns as passed to the step, and as points its `before`.
+    /// Slices that are too short give no flow.
     pub fn over<'a>(
         &self,
         columns: &'a [ColumnFlow],
@@ -145,12 +145,12 @@ impl KeptPoints {
     }
 }
 
-/// What is kept of a return: the record of its column, and what became of it.
+/// What is kept of a return: the record of its column, and its status.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReturnFlow(u32);
 
 impl ReturnFlow {
-    /// A return whose column has the record `record` of its sweep's; none moves with the ground.
+    /// A return whose column has this record of its sweep; without one it moves with the ground.
     pub const fn new(record: Option<u32>, status: Status) -> ReturnFlow {
         let record = match record {
             Some(record) if record < ReturnFlow::NO_RECORD => record,
@@ -170,45 +170,46 @@ impl ReturnFlow {
     }
 
     const RECORD_BITS: u32 = 24;
-    /// Beyond all records.
+    /// Larger than any record.
     const NO_RECORD: u32 = (1 << ReturnFlow::RECORD_BITS) - 1;
 }
 
 const _: () = assert!(COLUMNS_MAX < ReturnFlow::NO_RECORD as usize);
 
-/// What one sweep yields. Borrowed from the caller's [`Output`].
+/// The results of one sweep. Borrowed from the caller's [`Output`].
 #[derive(Clone, Copy, Debug)]
 pub struct SweepOutput<'a> {
-    /// Flow of the pair that this sweep completes; none after a reset.
+    /// Flow of the pair that this sweep completes; `None` after a reset.
     pub flows: Option<PairFlows<'a>>,
     /// Returns left out.
     pub dropped: DroppedReturns,
-    /// Set where this sweep has no usable predecessor.
+    /// Set if this sweep has no usable predecessor.
     pub reset: Option<Reset>,
-    /// Returns beyond the capacity of the refinement: it does not see them.
+    /// Returns beyond the capacity of the refinement, which ignores them.
     pub unrefined: usize,
-    /// Foreground columns.
+    /// Number of foreground columns.
     pub foreground: usize,
-    /// Distinct rays.
+    /// Number of distinct rays.
     pub rays: usize,
 }
 
-/// Room for what a step puts out, the caller's.
+/// Caller-owned storage for the output of a step.
 pub struct Output<'a> {
     /// [`crate::params::SOLID_MAX`] elements, or as many as the profile has columns.
     pub columns: &'a mut [ColumnFlow],
-    /// As many as the profile takes returns.
+    /// As many elements as the profile takes returns.
     pub points: &'a mut [ReturnFlow],
 }
 
-/// What a column's flow rests on.
+/// The basis of a column's flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum FlowBasis {
     /// Not foreground: the flow follows from odometry (section 3.4.2).
     #[default]
     Background = 0,
-    /// Foreground, but the energy minimisation left no valid match; velocity is that of odometry.
+    /// Foreground, but the energy minimisation left no valid match; the velocity is that of
+    /// odometry.
     Unmatched = 1,
     /// Foreground with a valid match (section 3.5.2).
     Matched = 2,
@@ -227,60 +228,59 @@ pub struct ColumnFlow {
     pub position_world_m: [f64; 2],
     /// Centre of the column in the vehicle frame, m.
     pub position_vehicle_m: [f32; 2],
-    /// Raw displacement in cells (3.14); meaningful where matched.
+    /// Raw displacement in cells (3.14); meaningful if matched.
     pub displacement_cells: [i32; 2],
     /// Displacement over ground until the second sweep, world axes, m: refined below the cell's
-    /// size, zero where the column was found to stand still.
+    /// size, zero if the column was classified as static.
     pub displacement_m: [f32; 2],
-    /// Covariance of `displacement_m` (xx, xy, yy), m^2; zero where neither matched nor joined.
+    /// Covariance of `displacement_m` (xx, xy, yy), m^2; zero if neither matched nor joined.
     pub displacement_covariance: [f32; 3],
-    /// Energy of the match in thousandths of a nat; meaningful where matched.
+    /// Energy of the match in thousandths of a nat; meaningful if matched.
     pub energy: i32,
     /// Velocity over ground along world axes, m/s.
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 2],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor
-    /// joined.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero if neither matched nor joined.
     pub covariance: [f32; 3],
     /// Observations of the tracklet after its birth (section 3.6.2).
     pub age: u32,
     /// Where the flow comes from.
     pub basis: FlowBasis,
-    /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min) displacement and
-    /// velocity are those of what stands.
+    /// P(moves). Below [`moves_min`](crate::params::MovesParams::moves_min), displacement and
+    /// velocity are those of static structure.
     pub probability: f32,
-    /// What that was told by; zeros where nothing was found to move.
+    /// The cues behind that; zeros if nothing was found to move.
     pub cues: Cues,
-    /// What the encoder takes it for; none where there is no encoder.
+    /// Its class according to the encoder; `None` without an encoder.
     pub class: Option<ColumnClass>,
 }
 
-/// What became of a return.
+/// The status of a return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Status {
-    /// Stands.
+    /// Is static.
     #[default]
     Static = 0,
     /// Moves with its velocity.
     Moving = 1,
-    /// Foreground for which no match was found: put out as static.
+    /// Foreground for which no match was found: reported as static.
     Unmatched = 2,
-    /// Outside the window of the flow: put out as static.
+    /// Outside the window of the flow: reported as static.
     OutsideWindow = 3,
-    /// Left out of a sweep that has more than are taken; nothing is known of it.
+    /// Left out of a sweep that has more returns than are taken; nothing is known about it.
     OverCapacity = 4,
-    /// On the own vehicle.
+    /// On the ego vehicle.
     OwnVehicle = 5,
     /// No return: at exactly (0, 0, 0).
     NoEcho = 6,
-    /// Not finite, or of a sensor that the rig does not have.
+    /// Not finite, or from a sensor that the rig does not have.
     Invalid = 7,
 }
 
 impl Status {
-    /// All, in the order of their numbers.
+    /// All of them, in the order of their numbers.
     pub const ALL: [Status; 8] = [
         Status::Static,
         Status::Moving,
@@ -292,7 +292,7 @@ impl Status {
         Status::Invalid,
     ];
 
-    /// In words.
+    /// The name in words.
     pub const fn name(self) -> &'static str {
         match self {
             Status::Static => "static",
@@ -314,24 +314,23 @@ pub struct PointFlow {
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 3],
-    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero where neither matched nor
-    /// joined.
+    /// Covariance of the world velocity (xx, xy, yy), (m/s)^2; zero if neither matched nor joined.
     pub covariance: [f32; 3],
     /// Age of the column's tracklet.
     pub age: u32,
     /// Where the flow comes from; returns outside the window are background.
     pub basis: FlowBasis,
-    /// What became of it.
+    /// The status of the return.
     pub status: Status,
     /// P(moves), that of its column.
     pub probability: f32,
-    /// What the encoder takes its column for; none where that is not solid, outside the window and
-    /// without an encoder.
+    /// Class of its column according to the encoder; `None` if the column is not solid or outside
+    /// the window, and without an encoder.
     pub class: Option<ColumnClass>,
 }
 
 impl PointFlow {
-    /// Of a return that was not taken.
+    /// The flow of a return that was not taken.
     pub const OVER_CAPACITY: PointFlow = PointFlow {
         velocity_world_mps: [0.0; 2],
         velocity_ego_mps: [0.0; 3],
@@ -347,7 +346,7 @@ impl PointFlow {
 /// A flow tracklet after the step (section 3.6), at the time of the pair's second sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrackletState {
-    /// Cell it lies in, counted as in [`ColumnFlow::cell`].
+    /// The cell it lies in, counted as in [`ColumnFlow::cell`].
     pub cell: [i32; 2],
     /// Position in the world, m.
     pub position_world_m: [f64; 2],
@@ -357,13 +356,13 @@ pub struct TrackletState {
     pub heading_rad: f32,
     /// Speed over ground along the heading, m/s.
     pub speed_mps: f32,
-    /// Turning rate, rad/s.
+    /// Turn rate, rad/s.
     pub turn_rate_radps: f32,
     /// Velocity over ground along world axes, m/s.
     pub velocity_world_mps: [f32; 2],
     /// Velocity relative to the vehicle along vehicle axes, m/s.
     pub velocity_ego_mps: [f32; 2],
-    /// Covariance of the filter's (x, y, heading, speed, turn rate), row-major; under the
+    /// Covariance of the filter's (x, y, heading, speed, turn rate), row-major; with the
     /// `dissertation` preset its motion is relative to the vehicle, along vehicle axes.
     pub covariance: [[f32; 5]; 5],
     /// Observations after birth.

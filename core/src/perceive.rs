@@ -1,4 +1,4 @@
-//! From rays to flow: the part of a sweep that a device may do.
+//! From rays to flow: the part of a sweep's work that a device may do.
 
 use crate::params::{FOREGROUND_MAX, Profile};
 use crate::record::{Column, Flow, Proposal, Ray, SweepUniform, is_flow};
@@ -10,18 +10,18 @@ use crate::stages::{
 use crate::team::Team;
 use crate::weights::WeightsError;
 
-/// What perception finds in a pair of sweeps.
+/// The results of perception for a pair of sweeps.
 #[derive(Clone, Copy, Debug)]
 pub struct Perceived<'a> {
-    /// Columns of the sweep before, in the new window.
+    /// Columns of the previous sweep, in the new window.
     pub columns_before: &'a [Column],
     /// Columns of the new sweep.
     pub columns_now: &'a [Column],
     /// Foreground columns, ascending.
     pub foreground: &'a [u32],
-    /// Foreground columns found, those beyond the capacity included.
+    /// Foreground columns found, including those beyond the capacity.
     pub marked: usize,
-    /// Distinct rays traced.
+    /// Number of distinct rays traced.
     pub rays: usize,
     /// Flow of every column.
     pub flow: &'a [Flow],
@@ -29,7 +29,7 @@ pub struct Perceived<'a> {
     pub proposal: &'a [Proposal],
 }
 
-/// Buffers as perception leaves them, whoever holds them.
+/// Buffers as perception leaves them, wherever they are held.
 pub struct PerceptionBuffers<'a> {
     /// `counters`.
     pub counters: &'a [u32],
@@ -46,8 +46,8 @@ pub struct PerceptionBuffers<'a> {
 }
 
 impl PerceptionBuffers<'_> {
-    /// Whether what they hold can be: a device that fails may leave anything behind. `Err` with
-    /// what cannot be.
+    /// Checks that the contents are possible: a failing device may leave anything behind. The error
+    /// names what is not.
     pub fn check(&self, sweep: &SweepUniform) -> Result<(), &'static str> {
         let counter = |n: usize| self.counters[n] as usize;
         let (count, marked) = (counter(FOREGROUND_COUNT), counter(FOREGROUND_MARKED));
@@ -91,16 +91,16 @@ impl<'a> From<PerceptionBuffers<'a>> for Perceived<'a> {
     }
 }
 
-/// What is booked for what a sweep takes beyond the stages of perception: what the CPU does
-/// meanwhile as far as they are done before, and, of a device, submission and waiting.
+/// The entry for the time a sweep takes beyond the stages of perception: concurrent work on the
+/// CPU, as far as it outlasts them, and, for a device, submission and waiting.
 pub const MEANWHILE: &str = "meanwhile";
 
-/// Who keeps the times of the stages.
+/// Keeps the times of the stages.
 pub trait StageTimer {
-    /// Books the time since the last stage ended to `stage`.
+    /// Attributes the time since the last stage ended to `stage`.
     fn lap(&mut self, stage: &'static str);
-    /// Books time measured elsewhere, and to `rest` what else has passed since the last stage
-    /// ended.
+    /// Adds times measured elsewhere, and attributes any other time since the last stage ended to
+    /// `rest`.
     fn measured(
         &mut self,
         stages: &mut dyn Iterator<Item = (&'static str, f64)>,
@@ -108,13 +108,13 @@ pub trait StageTimer {
     );
 }
 
-/// Nobody does.
+/// Keeps no times.
 impl StageTimer for () {
     fn lap(&mut self, _: &'static str) {}
     fn measured(&mut self, _: &mut dyn Iterator<Item = (&'static str, f64)>, _: &'static str) {}
 }
 
-/// Where rays and the voxels of their origins go.
+/// Destination of rays and of the voxels of their origins.
 pub type RayInput<'a> = (&'a mut [Ray], &'a mut [[i32; 4]]);
 
 /// A backend of perception: the twins on the CPU, or the kernels on a device.
@@ -122,13 +122,14 @@ pub trait Perceive {
     /// Why it may fail.
     type Error;
 
-    /// Where the rays and the voxels of their origins go: [`crate::params::Profile::returns`] and
-    /// [`crate::params::ORIGINS_MAX`] elements, perhaps memory of a device that is slow to read.
+    /// The destination of rays and of the voxels of their origins:
+    /// [`crate::params::Profile::returns`] and [`crate::params::ORIGINS_MAX`] elements, possibly
+    /// device memory that is slow to read.
     ///
-    /// Fails where the backend has failed before.
+    /// Fails if the backend has failed before.
     fn input(&mut self) -> Result<RayInput<'_>, Self::Error>;
 
-    /// From rays to flow. `meanwhile` is done while a device works, or by another thread of the
+    /// Runs from rays to flow. `meanwhile` runs while a device works, or on another thread of the
     /// team.
     fn perceive(
         &mut self,
@@ -139,24 +140,24 @@ pub trait Perceive {
     ) -> Result<Perceived<'_>, Self::Error>;
 }
 
-/// Who does the work of a step, and who keeps its time.
+/// What does the work of a step, and what keeps its times.
 pub struct Machine<'a, P, T, C> {
     /// From rays to flow.
     pub backend: &'a mut P,
-    /// Threads of the CPU; how many makes no difference to what comes out.
+    /// CPU threads; their number makes no difference to the results.
     pub team: &'a T,
     /// Times of the stages.
     pub timer: &'a mut C,
 }
 
-/// The learned numbers in the form the kernels and their twins use: slices of the caller's.
+/// The learned numbers in the form the kernels and their twins use: slices owned by the caller.
 #[derive(Clone, Copy, Debug)]
 pub struct LearnedTables<'a> {
-    /// See [`crate::stages::background_filter::load`]; all zero where there is no filter.
+    /// See [`crate::stages::background_filter::load`]; all zero if there is no filter.
     pub filter_table: &'a [i32],
     /// See [`crate::stages::occupancy_constancy::load`].
     pub constancy_weights: &'a [i32],
-    /// Its costs.
+    /// The costs that belong to them.
     pub constancy_costs: &'a [u32],
 }
 
@@ -167,12 +168,12 @@ pub struct ScalarBackend<M> {
 }
 
 impl<M: AsMut<[u32]> + Send> ScalarBackend<M> {
-    /// Words of memory it needs for a profile.
+    /// Words of memory needed for a profile.
     pub fn words(profile: &Profile) -> usize {
         Storage::words(FLOW_PROGRAMS, profile)
     }
 
-    /// Over zeroed memory of [`ScalarBackend::words`].
+    /// A backend over zeroed memory of [`ScalarBackend::words`] words.
     pub fn new(memory: M, profile: &Profile, tables: &LearnedTables) -> ScalarBackend<M> {
         let mut scalar = ScalarBackend { memory, profile: profile.clone() };
         let storage = scalar.storage();
@@ -182,10 +183,10 @@ impl<M: AsMut<[u32]> + Send> ScalarBackend<M> {
         scalar
     }
 
-    /// The same with the shipped weights, read into their place; and the range of their scores.
+    /// The same with the shipped weights, read in place; and the range of their scores.
     ///
     /// # Errors
-    /// They are of another shape than the profile needs.
+    /// The weights have a different shape than the profile needs.
     pub fn shipped(
         memory: M,
         profile: &Profile,
@@ -236,7 +237,7 @@ impl<M: AsMut<[u32]> + Send> Perceive for ScalarBackend<M> {
             flow: s.flow,
             proposal: s.proposal,
         };
-        // What is not put up with from a device is a defect here.
+        // What would be tolerated as a device failure is a bug here.
         assert_eq!(left.check(sweep), Ok(()));
         Ok(left.into())
     }

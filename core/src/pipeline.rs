@@ -1,9 +1,9 @@
-//! Figure 3.1, a sweep at a time.
+//! Figure 3.1, one sweep at a time.
 //!
 //! ```text
 //! sweep -> rays -> perceive -> refine -> track -> out -> velocities of columns and returns
 //! ```
-//! Rays, refinement, tracklets and output are f32 on the CPU; perception is integers and bits, on
+//! Rays, refinement, tracklets and output use f32 on the CPU; perception uses integers and bits, on
 //! the CPU or on a device, with the same result.
 
 use crate::encoder::Encoder;
@@ -29,7 +29,7 @@ pub struct Pipeline {
     tracklets: Tracklets,
     observations: Observations,
     flow_of_column: FlowOfColumn,
-    /// What columns are; off until it has weights.
+    /// Classifies columns; off until it has weights.
     pub encoder: Encoder,
 }
 
@@ -40,7 +40,7 @@ impl Default for Pipeline {
 }
 
 impl Pipeline {
-    /// At rest, before the first sweep.
+    /// The state before the first sweep.
     pub const fn new() -> Pipeline {
         Pipeline {
             sides: Sides::new(),
@@ -53,12 +53,12 @@ impl Pipeline {
         }
     }
 
-    /// One sweep. `before` holds the points of the sweep before, whose flow comes back; `out` must
-    /// have room for a record of each of them and of every column.
+    /// Processes one sweep. `before` holds the points of the previous sweep, whose flow is
+    /// returned; `out` must have room for a record of each of them and of every column.
     ///
     /// # Panics
-    /// `before` has not as many points as the sweep before had, unless this one does not continue
-    /// it. Or what must hold does not: a defect.
+    /// If this sweep continues the previous one and `before` has a different number of points than
+    /// that had. Also if an invariant does not hold, which is a bug.
     pub fn step<'o, P: Perceive>(
         &mut self,
         setup: &Setup,
@@ -119,8 +119,9 @@ impl Pipeline {
         })
     }
 
-    /// Moves the tracklets into the new window; then refines displacements below the cell's size,
-    /// with the tracklets' velocities as priors. Returns how many tracklets left the window.
+    /// Moves the tracklets into the new window, then refines displacements below the cell's size,
+    /// with the tracklets' velocities as priors. Returns the number of tracklets that left the
+    /// window.
     fn refine(
         &mut self,
         team: &impl Team,
@@ -149,7 +150,7 @@ impl Pipeline {
         self.tracklets.update(profile, sweep, dt, turned, left, &mut observed.all)
     }
 
-    /// How many tracklets there are after the last step.
+    /// Number of tracklets after the last step.
     pub fn tracklet_count(&self) -> usize {
         self.sides.current.map_or(0, |_| self.tracklets.all().len())
     }

@@ -1,9 +1,9 @@
 //! Rigid motion in double precision.
 //!
 //! A pose named `target_from_source` maps points of `source` into `target`, so that
-//! `world_from_vehicle * vehicle_from_sensor` cancels visibly. Axes are right-handed, x forward,
-//! y left, z up; lengths in metres, angles in radians. Trigonometry comes from `libm`, so that the
-//! same bits come out on every machine.
+//! `world_from_vehicle * vehicle_from_sensor` cancels visibly. Axes are right-handed: x forward, y
+//! left, z up; lengths in metres, angles in radians. Trigonometry comes from `libm`, so that every
+//! machine gets the same bits.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -16,36 +16,36 @@ pub struct Pose {
     pub translation: DVec3,
 }
 
-/// Why twelve numbers are no pose.
+/// Why twelve numbers are not a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseError {
     /// A NaN or an infinity.
     NotFinite,
-    /// The 3x3 part is no rotation to within 1e-3 (scaled, sheared or mirrored).
+    /// The 3x3 part is not a rotation to within 1e-3 (scaled, sheared or mirrored).
     NotRigid,
 }
 
-/// Largest deviation of `R^T R` from the identity that is still read as a rounded rotation.
+/// Largest deviation of `R^T R` from the identity still accepted as a rounded rotation.
 const RIGID_TOLERANCE: f64 = 1e-3;
 
-/// Steps in which the pipeline takes differences of places, m, and velocities, m/s: 15 um. Poses
-/// err by hundreds of times as much, and 100 km away they are rounded by a millionth of it, so that
-/// the same bits come out wherever the world's origin lies.
+/// Step to which the pipeline rounds differences of positions, m, and velocities, m/s: 15 um.
+/// Errors of poses are hundreds of times as large, and the rounding of poses 100 km away is a
+/// millionth of it, so that the same bits come out wherever the world's origin lies.
 const GRAIN: f64 = 1.0 / 65_536.0;
-/// Numbers from here on are whole steps as they are.
+/// Numbers from here on are already whole steps.
 const WHOLE: f64 = GRAIN / f64::EPSILON;
 
-/// The nearest whole number of steps.
+/// Rounds to the nearest whole number of steps.
 pub fn to_grain(v: DVec3) -> DVec3 {
     let nearest = |c: f64| if c.abs() < WHOLE { libm::round(c / GRAIN) * GRAIN } else { c };
     DVec3::new(nearest(v.x), nearest(v.y), nearest(v.z))
 }
 
-/// Angles below this are taken to their limit at zero, rad.
+/// Below this angle, rad, the limit at zero is used.
 const TINY: f64 = 1e-12;
 
 impl Pose {
-    /// The pose that moves nothing.
+    /// The identity.
     pub const IDENTITY: Pose = Pose { rotation: DQuat::IDENTITY, translation: DVec3::ZERO };
 
     /// A pose from unit quaternion and translation; the quaternion is normalised.
@@ -93,7 +93,7 @@ impl Pose {
         self.rotation * p + self.translation
     }
 
-    /// A velocity along the world's axes, as it is along those of this pose; the plane's part.
+    /// Converts a velocity along the world's axes to one along this pose's axes; the planar part.
     pub fn along_axes(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let v = self.rotation.conjugate() * DVec3::new(x.into(), y.into(), 0.0);
         [v.x as f32, v.y as f32]
@@ -105,7 +105,7 @@ impl Pose {
         libm::atan2(x.y, x.x)
     }
 
-    /// The constant twist that leads from the identity to this pose in `dt_s`.
+    /// The constant twist that leads from the identity to this pose in `dt_s` seconds.
     pub fn twist(&self, dt_s: f64) -> Twist {
         let q = if self.rotation.w < 0.0 { -self.rotation } else { self.rotation };
         let v = DVec3::new(q.x, q.y, q.z);
@@ -136,17 +136,17 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// Standing still.
+    /// No motion.
     pub const ZERO: Twist = Twist { linear: DVec3::ZERO, angular: DVec3::ZERO };
 
-    /// The linear velocity in whole steps: that of poses far from the world's origin is what it is
-    /// near by.
+    /// The linear velocity in whole steps: far from the world's origin it is then the same as near
+    /// it.
     pub fn to_grain(self) -> Twist {
         Twist { linear: to_grain(self.linear), ..self }
     }
 
-    /// Motion over `dt_s`: rotation and translation interpolated apart, which at the time span of
-    /// one sweep differs from the screw motion by less than a millimetre.
+    /// Motion over `dt_s`: rotation and translation are interpolated separately, which over the
+    /// time span of one sweep differs from the screw motion by less than a millimetre.
     pub fn over(&self, dt_s: f64) -> Pose {
         let w = self.angular * dt_s;
         let angle = libm::sqrt(w.dot(w));

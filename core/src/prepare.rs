@@ -1,4 +1,4 @@
-//! Rays: returns in the grid's frame (B.2.2), time and motion included.
+//! Rays: returns in the grid's frame (B.2.2), with time and motion taken into account.
 //!
 //! A return is moved by the vehicle's pose at its own time slot (motion compensation, "deskewing")
 //! and quantised relative to the window's central voxel.
@@ -24,21 +24,21 @@ fn add(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// What stays the same from sweep to sweep.
+/// Everything that stays the same from sweep to sweep.
 pub struct Setup {
     /// Must pass [`Profile::check`].
     pub profile: Profile,
-    /// Where the sensors sit.
+    /// Where the sensors are mounted.
     pub rig: Rig,
     /// Range of the constancy classifier's scores.
     pub scores: Scores,
-    /// Every solid column is foreground.
+    /// Whether every solid column is foreground.
     pub unfiltered: bool,
     /// Turns sweeps into rays.
     pub preparation: Preparation,
 }
 
-/// What tracing `rays` rays through a profile's window needs to know.
+/// The uniform for tracing `rays` rays through a profile's window.
 pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
     SweepUniform {
         side: profile.side as i32,
@@ -49,7 +49,7 @@ pub fn uniform_of(profile: &Profile, rays: usize) -> SweepUniform {
     }
 }
 
-/// Parts of a sweep that threads share; one more costs another look at as many returns.
+/// Parts of a sweep that threads share; the returns of all but the last take an extra pass.
 const PARTS: usize = 4;
 
 /// Turns sweeps into rays.
@@ -57,7 +57,8 @@ pub struct Preparation {
     clock: ReturnClock,
 }
 
-/// A 3x4 matrix to voxel coordinates, half a voxel added so that rounding down finds the voxel.
+/// A 3x4 matrix to voxel coordinates, with half a voxel added so that rounding down finds the
+/// voxel.
 type ToVoxel = [[f32; 4]; 3];
 
 impl Default for Preparation {
@@ -67,12 +68,13 @@ impl Default for Preparation {
 }
 
 impl Preparation {
-    /// Makes the tables.
+    /// Builds the tables.
     pub fn new() -> Preparation {
         Preparation { clock: ReturnClock::new() }
     }
 
-    /// Rays of a sweep, the same however many are in the team; and what was left out.
+    /// Casts the rays of a sweep, the same for any size of the team; returns their number, and what
+    /// was left out.
     pub fn prepare(
         &self,
         team: &impl Team,
@@ -86,7 +88,7 @@ impl Preparation {
         assert!(rays.len() >= count && columns.len() >= count);
         let caster = Caster::new(&self.clock, team.simd(), placement, origins);
         let part = |n: usize| count * n / PARTS..count * (n + 1) / PARTS;
-        // The rays of each part lie behind those that the ones before it may have.
+        // The rays of each part start behind the room for those of the parts before it.
         let is_ray = |p: &&Point| DroppedReturns::default().admit(rig, p).is_some();
         let mut admitted = [0; PARTS];
         team::fill(team, 0, &mut admitted[..PARTS - 1], &|n| {
@@ -114,7 +116,7 @@ impl Preparation {
         for ((count, of_part), room) in found.into_iter().zip(admitted) {
             dropped += of_part;
             if end < from {
-                // Seldom: `rays` may be memory of a device, slow to read.
+                // Rare: `rays` may be device memory that is slow to read.
                 rays.copy_within(from..from + count, end);
             }
             (end, from) = (end + count, from + room);
@@ -128,9 +130,9 @@ impl Preparation {
 /// A sweep, where it was taken and where the window lies.
 #[derive(Clone, Copy)]
 pub struct Placement<'a> {
-    /// Sizes, deskewing.
+    /// Sizes and deskewing.
     pub profile: &'a Profile,
-    /// Where the sensors sit, and when a return was.
+    /// Where the sensors are mounted, and when a return was measured.
     pub rig: &'a Rig,
     /// Where the window lies.
     pub window: &'a Window,
@@ -139,7 +141,7 @@ pub struct Placement<'a> {
 }
 
 impl Placement<'_> {
-    /// Whether returns are moved to the stamp by their time.
+    /// Whether returns are moved to the stamp according to their time.
     fn deskews(&self) -> bool {
         self.profile.deskew && self.rig.distorted
     }
@@ -149,23 +151,23 @@ impl Placement<'_> {
         self.rig.timing != Timing::AtStamp && (self.deskews() || !self.rig.distorted)
     }
 
-    /// Where a sensor mounted so is at an offset from the stamp, s: voxels from the centre of the
-    /// central voxel.
+    /// Position of a sensor with this mounting at an offset from the stamp, s: voxels from the
+    /// centre of the central voxel.
     pub(crate) fn sensor(&self, mounted: &Pose, offset_s: f64) -> DVec3 {
         let moved = if self.is_moving() { self.sweep.twist.over(offset_s) } else { Pose::IDENTITY };
         (self.window.grid_from_vehicle * moved * *mounted).translation / self.profile.voxel_m
     }
 }
 
-/// Room for the rays of a sweep, the caller's.
+/// Caller-owned storage for the rays of a sweep.
 pub struct RayBuffers<'a> {
-    /// An element for every return taken, perhaps memory of a device that is slow to read.
+    /// One element per return taken, possibly in device memory that is slow to read.
     pub rays: &'a mut [Ray],
     /// [`ORIGINS_MAX`] elements; the voxels of the ray origins.
     pub origins: &'a mut [[i32; 4]],
-    /// As many; the column each return lies in, or [`NONE`].
+    /// One element per return taken; the column it lies in, or [`NONE`].
     pub columns: &'a mut [u32],
-    /// Where and when each return was, as far as there is room.
+    /// Where and when each return was measured, as far as there is room.
     pub placed: &'a mut [Placed],
 }
 
@@ -175,10 +177,10 @@ struct Caster<'a> {
     rig: &'a Rig,
     simd: Simd,
     lattice: RayLattice,
-    /// The vehicle's motion within the sweep counts.
+    /// Whether the vehicle's motion within the sweep counts.
     moving: bool,
     origin_ids: OriginIds,
-    /// Begin of the sweep after the stamp, and length of a slot, s.
+    /// Start of the sweep relative to the stamp, and length of a slot, s.
     from_s: f32,
     slot_s: f32,
 }
@@ -214,7 +216,7 @@ impl<'a> Caster<'a> {
         }
     }
 
-    /// Rays of some returns, their columns and places.
+    /// Casts the rays of some returns, and stores their columns and positions.
     fn cast_all<'p>(&self, points: impl Iterator<Item = &'p Point>, out: &mut Castings) {
         let mut batch = ReturnBatch::new();
         let count = out.columns.len();
@@ -232,7 +234,7 @@ impl<'a> Caster<'a> {
         self.cast(&mut batch, out);
     }
 
-    /// Rays of a batch, which is empty then.
+    /// Casts the rays of a batch and empties it.
     fn cast(&self, batch: &mut ReturnBatch, out: &mut Castings) {
         let lattice = &self.lattice;
         let found = self.simd.run(
@@ -264,10 +266,10 @@ impl<'a> Caster<'a> {
     }
 }
 
-/// What is cast of some returns.
+/// The result of casting some returns.
 struct Castings<'a> {
     rays: &'a mut [Ray],
-    /// Rays so far.
+    /// Number of rays so far.
     count: usize,
     columns: &'a mut [u32],
     placed: &'a mut [Placed],
@@ -279,7 +281,7 @@ impl<'a> Castings<'a> {
         Castings { rays, count: 0, columns, placed, dropped: DroppedReturns::ZERO }
     }
 
-    /// A return that ends nowhere.
+    /// Marks a return as one that ends nowhere.
     fn leave_out(&mut self, n: usize) {
         self.columns[n] = NONE;
         if let Some(placed) = self.placed.get_mut(n) {
@@ -288,12 +290,12 @@ impl<'a> Castings<'a> {
     }
 }
 
-/// What the vehicle's motion within a slot does to its returns: translation and yaw.
+/// The effect of the vehicle's motion within a slot on its returns: translation and yaw.
 struct Drift {
-    /// Voxels and radians a slot.
+    /// Voxels and radians per slot.
     by: [f32; 3],
     turn: f32,
-    /// About the vehicle, voxels from the window's corner.
+    /// Where the vehicle is, voxels from the window's corner.
     centre: [f32; 2],
 }
 
@@ -332,7 +334,7 @@ fn voxel_matrix(profile: &Profile, grid_from_point: &Pose) -> ToVoxel {
     })
 }
 
-/// Beyond any window, voxels: coordinates saturate there.
+/// Beyond any window, voxels: coordinates saturate here.
 const FAR: f32 = 1e6;
 
 /// The integer nearest to a coordinate, voxels.
@@ -343,13 +345,13 @@ fn nearest(coordinate: f64) -> i32 {
 /// Index of the origin of every sensor in every slot.
 type OriginIds = [[u32; SLOTS]; SENSORS_MAX];
 
-/// Voxels of the ray origins, and which of them each sensor and slot has. Slots whose origins
-/// share a voxel share an entry, so that equal rays can be recognised.
+/// Writes the voxels of the ray origins; returns which of them each sensor and slot has. Slots
+/// whose origins share a voxel share an entry, so that equal rays can be recognised.
 fn place_origins(placement: &Placement, origins: &mut [[i32; 4]]) -> OriginIds {
     assert!(origins.len() == ORIGINS_MAX);
     let Placement { profile, rig, .. } = *placement;
     let mut ids = [[0; SLOTS]; SENSORS_MAX];
-    // Looked up here, not in `origins`: that may be memory of a device, slow to read.
+    // Searched here, not in `origins`, which may be device memory that is slow to read.
     let mut table = heapless::Vec::<[i32; 4], ORIGINS_MAX>::new();
     let slots = if placement.is_moving() { SLOTS } else { 1 };
     for (sensor, mounted) in rig.sensors.iter().enumerate() {

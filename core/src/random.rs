@@ -1,4 +1,4 @@
-//! Random numbers of tests: always the same ones.
+//! Random numbers for tests: always the same ones.
 
 extern crate std;
 

@@ -1,5 +1,5 @@
-//! Records that cross to the device, each declared once: the Rust struct, its words and its WGSL
-//! text come from the same line. Everything else that crosses is a plain array of 32-bit words.
+//! Records exchanged with the device, each declared once: the Rust struct, its words and its WGSL
+//! text come from the same line. Everything else exchanged is a plain array of 32-bit words.
 
 macro_rules! record {
     ($(#[$m:meta])* $name:ident { $( $(#[$fm:meta])* $f:ident ),* $(,)? }) => {
@@ -23,7 +23,7 @@ macro_rules! record {
     };
 }
 
-/// Packed elements, each declared once: the type and the line of `memory-layout.md` about it.
+/// Packed elements, each declared once: the type and its line in `memory-layout.md`.
 macro_rules! packed {
     ($( $(#[doc = $doc:literal])+ $name:ident = $ty:ty; )*) => {
         $( $(#[doc = $doc])+ pub type $name = $ty; )*
@@ -36,26 +36,25 @@ macro_rules! packed {
 
 packed! {
     /// `[i | j << 16, k | origin << 16 | no_end << 31]`: a ray, with `i, j, k` the signed 16-bit
-    /// voxel of its end counted from the window's corner, `origin` an index of the table of
-    /// origins, and `no_end` set where nothing is hit there.
+    /// voxel of its end counted from the window's corner, `origin` an index into the table of
+    /// origins, and `no_end` set if nothing is hit there.
     Ray = [u32; 2];
-    /// `[free | occupied << 16, solid]`: a column of voxels, one bit a level (3.4, 3.5, epsilon =
+    /// `[free | occupied << 16, solid]`: a column of voxels, one bit per level (3.4, 3.5, epsilon =
     /// 0).
     Column = [u32; 2];
-    /// `1 << 31 | (du + REACH) << 8 | dv + REACH`: the flow of a column, cells; 0 where there is
-    /// none.
+    /// `1 << 31 | (du + REACH) << 8 | dv + REACH`: the flow of a column, cells; 0 if there is none.
     Flow = u32;
-    /// `[flow, energy]`: what a column proposes in a round; flow 0 where no target is feasible.
+    /// `[flow, energy]`: what a column proposes in a round; flow 0 if no target is feasible.
     Proposal = [u32; 2];
-    /// `[energy, place]`: the least energy of a column at any displacement, smoothing apart, and
-    /// its place in the column's row of costs.
+    /// `[energy, place]`: the minimum energy of a column over all displacements, without smoothing,
+    /// and its place in the column's row of costs.
     MinCost = [u32; 2];
     /// `[key, log-odds as i32]`: an update, or a voxel of the sparse map.
     Update = [u32; 2];
 }
 
 record! {
-    /// What the kernels need to know of a sweep besides its rays: sizes, shift and costs.
+    /// What the kernels need to know about a sweep besides its rays: sizes, shift and costs.
     SweepUniform {
         /// Columns of the window along x, and along y.
         side,
@@ -63,9 +62,9 @@ record! {
         levels,
         /// Rays of the sweep.
         rays,
-        /// Voxels a ray is traced for at most.
+        /// Maximum number of voxels for which a ray is traced.
         range_steps,
-        /// Window corner of this sweep minus that of the sweep before, cells along x.
+        /// Window corner of this sweep minus that of the previous sweep, cells along x.
         shift_x,
         /// Along y.
         shift_y,
@@ -79,7 +78,7 @@ record! {
         displacement_cost,
         /// Cost of a window neighbour outside the grid, thousandths of a nat.
         outside_cost,
-        /// Least sum of the constancy weights: entry 0 of the table of log-sigmoids.
+        /// Minimum sum of the constancy weights: entry 0 of the table of log-sigmoids.
         score_min,
         /// Sparse map: first key of the band.
         band_from,
@@ -122,7 +121,7 @@ pub fn flow_displacement(f: Flow) -> [i32; 2] {
     [(f >> 8 & 0xff) as i32 - reach, (f & 0xff) as i32 - reach]
 }
 
-/// Whether a word is none, or one that [`pack_flow`] makes.
+/// Whether a word is 0 or one that [`pack_flow`] makes.
 pub fn is_flow(flow: Flow) -> bool {
     let most = 2 * crate::params::REACH as u32;
     let within = (flow >> 8 & 0x7f_ffff) <= most && (flow & 0xff) <= most;

@@ -1,7 +1,7 @@
 //! When in its sweep a return was measured, and how far the vehicle had moved by then.
 //!
-//! A sweep is cut into [`SLOTS`] time slots of equal length; times are counted in slots from its
-//! beginning.
+//! A sweep is divided into [`SLOTS`] time slots of equal length; times are counted in slots from
+//! its beginning.
 
 use crate::params::SLOTS;
 use crate::pose::Pose;
@@ -10,9 +10,9 @@ use crate::sweep::{Point, Rig, Sweep, Timing};
 /// Entries of the table from azimuth to time.
 const AZIMUTHS: usize = 1024;
 
-/// Tells the time of a return by its offset or, for a spinning sensor, by its azimuth.
+/// Finds the time of a return from its offset or, for a spinning sensor, from its azimuth.
 pub struct ReturnClock {
-    /// Slots since the beginning of the turn, by [`pseudo_angle`].
+    /// Slots since the beginning of the revolution, by [`pseudo_angle`].
     slot_of_azimuth: [f32; AZIMUTHS + 1],
 }
 
@@ -23,7 +23,7 @@ impl Default for ReturnClock {
 }
 
 impl ReturnClock {
-    /// Makes the table.
+    /// Builds the table.
     pub fn new() -> ReturnClock {
         let mut slot_of_azimuth = [0.0; AZIMUTHS + 1];
         for (n, slot) in slot_of_azimuth.iter_mut().enumerate() {
@@ -63,20 +63,20 @@ impl ReturnClock {
     }
 }
 
-/// The slot that holds a time in slots.
+/// The slot that contains a time in slots.
 #[inline]
 pub fn slot_of(slots: f32) -> usize {
     (slots as i32 as usize).min(SLOTS - 1)
 }
 
 impl Timing {
-    /// Seconds after the stamp of a time in slots from the beginning of the sweep.
+    /// Offset from the stamp, s, of a time in slots from the beginning of the sweep.
     #[inline]
     pub fn offset_s(self, slots: f64) -> f64 {
         self.at(slots / SLOTS as f64)
     }
 
-    /// Seconds after the stamp at a part of the sweep, 0 to 1.
+    /// Offset from the stamp, s, at a fraction of the sweep, 0 to 1.
     #[inline]
     pub fn at(self, turn: f64) -> f64 {
         match self {
@@ -94,7 +94,7 @@ impl Sweep<'_> {
     }
 }
 
-/// A whole turn of [`pseudo_angle`].
+/// A full revolution in [`pseudo_angle`].
 pub(crate) const TURN: f32 = 4.0;
 
 /// A monotonic stand-in for the azimuth that needs no trigonometry, from 0 to 4, clockwise: 0 at

@@ -12,10 +12,10 @@ use crate::thinning::TakenPoints;
 
 /// Where the returns of the last two sweeps are.
 pub(crate) struct Returns {
-    /// Which of two is of the sweep, and not of the one before. Swapped, both would be copied, by
-    /// way of a stack of more than a megabyte.
+    /// Which of the two belongs to this sweep and not to the previous one. Swapping them would copy
+    /// both, by way of more than a megabyte of stack.
     now: usize,
-    /// Column of every return, of two sweeps.
+    /// Column of every return, for two sweeps.
     column: [[u32; POINTS_MAX]; 2],
     /// Whether a return belongs to none of the clusters that its column is part of.
     is_apart: [[bool; POINTS_MAX]; 2],
@@ -29,7 +29,7 @@ pub(crate) struct Sent {
 }
 
 impl Returns {
-    /// Of no sweep.
+    /// No sweep yet.
     pub const fn new() -> Returns {
         Returns {
             now: 0,
@@ -39,7 +39,7 @@ impl Returns {
         }
     }
 
-    /// Turns the sweep that has just come into rays. The window is shifted by so many cells.
+    /// Turns a new sweep into rays. The window is shifted by this many cells.
     pub fn send(
         &mut self,
         setup: &Setup,
@@ -67,8 +67,8 @@ impl Returns {
         Sent { uniform, dropped }
     }
 
-    /// Hands the sweep that was sent to the refinement. Returns how many returns that had no room
-    /// for: it does not see them.
+    /// Passes the sent sweep on to the refinement. Returns the number of returns that this had no
+    /// room for and ignores.
     pub fn insert(
         &mut self,
         refinement: &mut Refinement,
@@ -84,8 +84,8 @@ impl Returns {
         let side = profile.side as f32;
         let inside = |v: f32| v >= 0.0 && v < side;
         let columns = &mut self.column[self.now][..taken];
-        // Clusters on slopes reach out of the window's levels: their returns belong to its columns
-        // all the same.
+        // Clusters on slopes extend beyond the window's levels: their returns still belong to its
+        // columns.
         for (column, Placed { at: [x, y, _], .. }) in columns.iter_mut().zip(&self.placed) {
             if *column == NONE && inside(*x) && inside(*y) {
                 *column = *x as u32 * profile.side + *y as u32;
@@ -103,8 +103,8 @@ impl Returns {
         refinement.insert_cloud(team, returns, &mut self.is_apart[self.now][..taken])
     }
 
-    /// Column of the returns taken of the sweep before from the `from`-th on, and whether they are
-    /// apart.
+    /// Columns of the returns taken from the previous sweep, from the `from`-th on, and whether
+    /// they are apart.
     pub fn before(&self, from: usize) -> impl Iterator<Item = (u32, bool)> + '_ {
         let (column, is_apart) = (&self.column[1 - self.now], &self.is_apart[1 - self.now]);
         column[from..].iter().copied().zip(is_apart[from..].iter().copied())

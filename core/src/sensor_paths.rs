@@ -1,28 +1,28 @@
-//! Where each sensor is over a sweep, as the vehicle carries it along.
+//! The position of each sensor over a sweep, as the vehicle carries it along.
 
 use crate::frame::central;
 use crate::params::SENSORS_MAX;
 use crate::prepare::Placement;
 use core::array::from_fn;
 
-/// Where each sensor is over a sweep: on a straight line, from which one 2 m from the vehicle's
-/// centre strays by less than a millimetre where that turns by 0.05 rad in the time.
+/// The position of each sensor over a sweep: on a straight line, from which a sensor 2 m from the
+/// vehicle's centre strays by less than a millimetre if the vehicle turns by 0.05 rad in the time.
 #[derive(Clone, Copy)]
 pub(crate) struct SensorPaths {
-    /// How many there are.
+    /// Number of sensors.
     pub sensors: usize,
-    /// Where each is as the sweep begins, voxels from the window's corner.
+    /// Position of each as the sweep begins, voxels from the window's corner.
     from: [[f32; 3]; SENSORS_MAX],
-    /// How far it gets until the sweep ends.
+    /// Displacement of each until the sweep ends, voxels.
     by: [[f32; 3]; SENSORS_MAX],
-    /// When the sweep begins, s after its stamp.
+    /// Start of the sweep relative to its stamp, s.
     from_s: f32,
-    /// Sweeps in a second, 0 where a sweep takes no time.
+    /// Sweeps per second, 0 if a sweep takes no time.
     per_s: f32,
 }
 
 impl SensorPaths {
-    /// Of no sweep.
+    /// No sensors.
     pub const NOWHERE: SensorPaths = SensorPaths {
         sensors: 0,
         from: [[0.0; 3]; SENSORS_MAX],
@@ -31,7 +31,7 @@ impl SensorPaths {
         per_s: 0.0,
     };
 
-    /// Of a sweep.
+    /// The paths of a sweep.
     pub fn new(placement: &Placement) -> SensorPaths {
         let Placement { profile, rig, .. } = *placement;
         let [from_s, to_s] = [0.0, 1.0].map(|turn| rig.timing.at(turn));
@@ -55,7 +55,7 @@ impl SensorPaths {
         paths
     }
 
-    /// Of two sensors that stay where they are.
+    /// Two sensors at rest.
     #[cfg(test)]
     pub const fn at_rest([first, second]: [[f32; 3]; 2]) -> SensorPaths {
         let mut paths = SensorPaths { sensors: 2, ..SensorPaths::NOWHERE };
@@ -63,12 +63,12 @@ impl SensorPaths {
         paths
     }
 
-    /// The part of the sweep that has passed at an offset from its stamp, s: 0 to 1.
+    /// The fraction of the sweep that has passed at an offset from its stamp, s: 0 to 1.
     pub fn part(&self, offset_s: f32) -> f32 {
         ((offset_s - self.from_s) * self.per_s).clamp(0.0, 1.0)
     }
 
-    /// Where a sensor is when a part of the sweep has passed, voxels from the window's corner.
+    /// Position of a sensor at a fraction of the sweep, voxels from the window's corner.
     pub fn at(&self, sensor: usize, part: f32) -> [f32; 3] {
         from_fn(|a| self.from[sensor][a] + part * self.by[sensor][a])
     }

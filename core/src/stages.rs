@@ -1,9 +1,9 @@
 //! Every stage from rays to flow and from rays to the sparse map: the table of buffers, the stages
-//! and the order they run in, declared here and nowhere else.
+//! and the order in which they run, declared here and nowhere else.
 //!
-//! A stage is a function of this module's tree, its *twin*, and the kernel of the same name at the
-//! same path below `kernels/wgsl`. The twin is the formula; where the scalar backend needs a faster
-//! one, that stands beside it and is tested equal. The order below drives the scalar backend, the
+//! A stage is a function in this module's tree, its *twin*, and the kernel of the same name at the
+//! same path below `kernels/wgsl`. The twin is the formula; if the scalar backend needs a faster
+//! one, that is next to it and tested to be equal. The order below drives the scalar backend, the
 //! device's schedule, the sparse map and the lab.
 
 mod declare;
@@ -13,9 +13,9 @@ pub mod compact;
 pub mod flow {
     //! Energy minimisation (section 3.5.2) as expectation-maximisation.
     //!
-    //! Every foreground column seeks the displacement of least energy (3.14), in whole cells and
+    //! Every foreground column seeks the displacement of minimum energy (3.14), in whole cells and
     //! thousandths of a nat; then every target keeps its best claimant. Both steps are strict: all
-    //! columns of a round see the flow that the round before left (Jacobi), ties go to the first
+    //! columns of a round see the flow left by the previous round (Jacobi), ties go to the first
     //! candidate in scan order and to the first column, and the energies of the targets are rebuilt
     //! each round from their winners.
     pub mod expectation;
@@ -128,20 +128,20 @@ use GroupCount::{GroupPerColumn, One, ThreadPer, Threads, Tiles};
 use List::{Distinct, Foreground};
 use StageOp::{Fill, Fused, Part, ReadBack, Repeat, Rounds, Run, Upload};
 
-/// The programs of the flow pipeline: at start, and every sweep.
+/// The programs of the flow pipeline: one at start, and one for every sweep.
 pub const FLOW_PROGRAMS: &[StageProgram] = &[
     StageProgram { name: "load", ops: LOAD },
     StageProgram { name: "flow", ops: &[Part(GRID), Part(FLOW)] },
 ];
 
-/// The programs of the sparse map: every sweep, then two for every band.
+/// The programs of the sparse map: one for every sweep, then two for every band.
 pub const MAP_PROGRAMS: &[StageProgram] = &[
     StageProgram { name: "map rays", ops: MAP_RAYS },
     StageProgram { name: "map count", ops: MAP_COUNT },
     StageProgram { name: "map band", ops: MAP_BAND },
 ];
 
-/// Copies of the learned tables, once at start.
+/// Uploads the learned tables, once at start.
 pub const LOAD: &[StageOp] = &[
     Upload(Buffer::filter_table),
     Upload(Buffer::constancy_weights),
@@ -297,8 +297,8 @@ pub const MAP_COUNT: &[StageOp] = &[
     ReadBack(Buffer::count_tiles),
 ];
 
-/// Sparse map: emits, sorts and reduces the updates of the band just counted, which must not be
-/// more than [`BAND_UPDATES`]. `run_tiles` ends with the number of voxels, `scratch` holds them.
+/// Sparse map: emits, sorts and reduces the updates of the band just counted, which must not exceed
+/// [`BAND_UPDATES`]. `run_tiles` ends with the number of voxels, `scratch` holds them.
 pub const MAP_BAND: &[StageOp] = &[
     Run(stage!(
         emit in map::emit,
@@ -308,8 +308,8 @@ pub const MAP_BAND: &[StageOp] = &[
     Fused(
         stage!(radix_sort in map::radix_sort, (count_tiles, mut updates, mut scratch), []),
         &[
-            // The counters hold the shift of the digit too; a full sort leaves it at 32, where no
-            // shift is defined, so it starts anew.
+            // The counters also hold the digit's shift; a full sort leaves it at 32, where no shift
+            // is defined, so it is reset.
             Run(stage!(device first_digit, (mut counters), One)),
             Repeat(
                 4,

@@ -1,4 +1,4 @@
-//! What a source hands over: one sweep of returns, and the rig that made it.
+//! Input from a source: one sweep of returns, and the rig that made it.
 
 use crate::params::SENSORS_MAX;
 use crate::pose::{Pose, Twist};
@@ -8,26 +8,26 @@ use crate::pose::{Pose, Twist};
 pub struct Point {
     /// Position in the vehicle frame, m.
     pub position: [f32; 3],
-    /// 0..1 where the source has it.
+    /// 0..1 if the source has it.
     pub intensity: f32,
-    /// Time of the return after the sweep's stamp, s (may be negative); 0 where unknown.
+    /// Time of the return after the sweep's stamp, s (may be negative); 0 if unknown.
     pub offset_s: f32,
     /// Index of the sensor in [`Rig::sensors`].
     pub sensor: u32,
 }
 
-/// A return placed in the window of its sweep; NaN where it was left out.
+/// A return placed in the window of its sweep; NaN if it was left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placed {
-    /// Voxels from the window's corner, at its own time and not only its slot's: in half a slot a
-    /// fast vehicle goes a centimetre.
+    /// Voxels from the window's corner, at its own time rather than its slot's: in half a slot a
+    /// fast vehicle moves a centimetre.
     pub at: [f32; 3],
-    /// After the sweep's stamp, s.
+    /// Time after the sweep's stamp, s.
     pub offset_s: f32,
 }
 
 impl Placed {
-    /// Of a return that was left out.
+    /// A return that was left out.
     pub(crate) const NOWHERE: Placed = Placed { at: [f32::NAN; 3], offset_s: 0.0 };
 }
 
@@ -47,9 +47,9 @@ pub struct Sweep<'a> {
 /// Where a return's time within the sweep comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Timing {
-    /// Unknown: every return is taken at the stamp.
+    /// Unknown: every return is assumed to be at the stamp.
     AtStamp,
-    /// [`Point::offset_s`]; the sweep spans from `from_s` to `from_s + span_s` around the stamp.
+    /// [`Point::offset_s`]; the sweep extends from `from_s` to `from_s + span_s` around the stamp.
     Offset {
         /// Earliest offset, s.
         from_s: f64,
@@ -57,15 +57,15 @@ pub enum Timing {
         span_s: f64,
     },
     /// A sensor that spins clockwise seen from above, starts and ends at the rear, and is stamped
-    /// when it looks forward (KITTI's HDL-64E): the azimuth tells the time.
+    /// when it looks forward (KITTI's HDL-64E): the azimuth gives the time.
     Azimuth {
-        /// Duration of one turn, s.
+        /// Duration of one revolution, s.
         span_s: f64,
     },
 }
 
 impl Timing {
-    /// Whether its times are finite, and the sweep takes some.
+    /// Whether its times are finite and the sweep has a duration.
     pub fn is_sound(&self) -> bool {
         match *self {
             Timing::AtStamp => true,
@@ -79,26 +79,26 @@ fn is_span(span_s: f64) -> bool {
     span_s.is_finite() && span_s > 0.0
 }
 
-/// What is fixed about a source of sweeps.
+/// The fixed properties of a source of sweeps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// `vehicle_from_sensor` of every sensor, at most [`SENSORS_MAX`].
     pub sensors: heapless::Vec<Pose, SENSORS_MAX>,
     /// Where a return's time comes from.
     pub timing: Timing,
-    /// Whether returns are still distorted by the vehicle's motion, so that each is to be moved to
-    /// the stamp by its time. A declared property of the source: Argoverse 2 has times and is
-    /// already compensated, KITTI has none and is not.
+    /// Whether returns are still distorted by the vehicle's motion, so that each must be moved to
+    /// the stamp according to its time. A declared property of the source: Argoverse 2 has times
+    /// and is already compensated, KITTI has none and is not.
     pub distorted: bool,
     /// Height of the ground under the vehicle in the vehicle frame, m.
     pub ground_m: f64,
-    /// Returns from the own vehicle lie in this box of the vehicle frame: (x, y) minimum and
+    /// Returns from the ego vehicle lie in this box of the vehicle frame: (x, y) minimum and
     /// maximum, m, at any height.
     pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
 
 impl Rig {
-    /// Whether a place in the vehicle frame, m, lies on the own vehicle.
+    /// Whether a position in the vehicle frame, m, lies on the ego vehicle.
     #[inline]
     pub fn is_own_vehicle(&self, [x, y, _]: [f32; 3]) -> bool {
         self.own_vehicle

@@ -1,24 +1,24 @@
-//! Work that may be split over threads. Core has none; the caller may bring some.
+//! Work that may be split over threads. Core has none; the caller may provide some.
 //!
 //! Clusters are registered independently of each other, each into a slot of its own; the rays of a
-//! sweep and the velocities of its points are computed in parts. The number of threads
-//! therefore changes no bit of the results, nor do the instructions they use.
+//! sweep and the velocities of its points are computed in parts. Neither the number of threads nor
+//! the instructions they use therefore change any bit of the results.
 
 use core::ops::Range;
 use raywake_simd::Simd;
 
 /// Threads that share work by fork and join.
 pub trait Team: Sync {
-    /// Runs both, perhaps at the same time, and returns when both are done.
+    /// Runs both, possibly at the same time, and returns when both are done.
     fn join(&self, a: impl FnOnce() + Send, b: impl FnOnce() + Send);
 
-    /// The instructions they use.
+    /// The instruction set they use.
     fn simd(&self) -> Simd {
         Simd::BASELINE
     }
 }
 
-/// A team behind a pointer, for stages, which are called through one.
+/// A team as a trait object, for stages, which are called through pointers.
 pub trait Workers: Sync {
     /// [`Team::join`].
     fn join_both(&self, a: &mut (dyn FnMut() + Send), b: &mut (dyn FnMut() + Send));
@@ -37,7 +37,7 @@ impl<T: Team> Workers for T {
     }
 }
 
-/// One thread.
+/// A team of one thread.
 pub struct Alone;
 
 impl Team for Alone {
@@ -58,7 +58,7 @@ pub(crate) fn fill<T: Send>(
     each(team, first, slots, &|index, slot| *slot = value(index));
 }
 
-/// Does the work of each slot, by its index counted from `first`. By recursive halving, so that
+/// Does the work of each slot, given its index counted from `first`. Halves recursively, so that
 /// idle threads can steal work.
 #[cfg(feature = "pipeline")]
 pub(crate) fn each<T: Send>(
@@ -78,8 +78,8 @@ pub(crate) fn each<T: Send>(
     }
 }
 
-/// Calls `work` with some rows and what is written of them, `length` elements each, until all are
-/// done; no more than `least` are not split further.
+/// Calls `work` with ranges of rows and the output for them, `length` elements per row, until all
+/// are done; ranges of at most `least` rows are not split further.
 pub(crate) fn share<T: Send>(
     workers: &dyn Workers,
     least: usize,

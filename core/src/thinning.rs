@@ -1,8 +1,8 @@
-//! Which returns of a sweep are taken where it has more than there is room for.
+//! Which returns of a sweep are taken if it has more than there is room for.
 
 use crate::sweep::Point;
 
-/// Evenly spread indices: as many of a sweep's as are taken.
+/// Evenly spread indices: those of the returns taken from a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Thinning {
     of: usize,
@@ -10,22 +10,22 @@ pub struct Thinning {
 }
 
 impl Thinning {
-    /// Of a sweep of `of` returns where at most `room` are taken.
+    /// For a sweep of `of` returns, of which at most `room` are taken.
     pub fn new(of: usize, room: usize) -> Thinning {
         Thinning { of, taken: of.min(room) }
     }
 
-    /// How many returns the sweep has.
+    /// Number of returns of the sweep.
     pub fn of(self) -> usize {
         self.of
     }
 
-    /// How many are taken.
+    /// Number of returns taken.
     pub fn taken(self) -> usize {
         self.taken
     }
 
-    /// Index in the sweep of the `n`-th that is taken.
+    /// Index in the sweep of the `n`-th return taken.
     #[inline]
     pub fn index(self, n: usize) -> usize {
         // 64 bits: a sweep may have as many returns as a 32-bit machine has memory for.
@@ -36,7 +36,7 @@ impl Thinning {
         }
     }
 
-    /// Where among those taken a return of the sweep is, if it is.
+    /// Rank of a return of the sweep among those taken, if it is taken.
     #[inline]
     pub fn rank(self, index: usize) -> Option<usize> {
         if self.of == self.taken {
@@ -47,7 +47,7 @@ impl Thinning {
     }
 }
 
-/// The returns of a sweep that are taken.
+/// The returns taken from a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct TakenPoints<'a> {
     all: &'a [Point],
@@ -55,33 +55,33 @@ pub struct TakenPoints<'a> {
 }
 
 impl<'a> TakenPoints<'a> {
-    /// At most `room` of a sweep's, in its order.
+    /// At most `room` returns of a sweep, in its order.
     pub fn new(all: &'a [Point], room: usize) -> TakenPoints<'a> {
         TakenPoints { all, thinning: Thinning::new(all.len(), room) }
     }
 
-    /// How many.
+    /// Number of returns taken.
     pub fn count(self) -> usize {
         self.thinning.taken
     }
 
-    /// How many are left out.
+    /// Number of returns left out.
     pub fn left_out(self) -> usize {
         self.thinning.of - self.thinning.taken
     }
 
-    /// The `n`-th.
+    /// The `n`-th return taken.
     #[inline]
     pub fn get(self, n: usize) -> &'a Point {
         &self.all[self.thinning.index(n)]
     }
 
-    /// All of them, each with its index in the sweep.
+    /// All returns taken, each with its index in the sweep.
     pub fn indexed(self) -> impl Iterator<Item = (usize, &'a Point)> {
         (0..self.count()).map(move |n| (self.thinning.index(n), self.get(n)))
     }
 
-    /// Some of them.
+    /// A range of them.
     pub fn range(self, range: core::ops::Range<usize>) -> impl Iterator<Item = &'a Point> {
         range.map(move |n| self.get(n))
     }

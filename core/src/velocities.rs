@@ -1,4 +1,4 @@
-//! Out: a velocity for every column and every return (section 3.7).
+//! Output: a velocity for every column and every return (section 3.7).
 
 use crate::dropped::ReturnKind;
 use crate::encoder::{ColumnClass, ColumnScores, class_of};
@@ -17,10 +17,10 @@ use crate::tracklet::{TrackletTurnover, Tracklets};
 use core::ops::Range;
 use glam::DVec3;
 
-/// Returns that a thread looks at in one piece: an eighth of a sweep of an HDL-64E.
+/// Maximum number of returns a thread processes in one piece: an eighth of an HDL-64E sweep.
 const RETURNS_LEAST: usize = 1 << 14;
 
-/// Index of the record of every column of the first sweep's window, [`NONE`] where it has none.
+/// Record index of every column of the first sweep's window, [`NONE`] if it has none.
 pub(crate) struct FlowOfColumn([u32; COLUMNS_MAX]);
 
 impl FlowOfColumn {
@@ -30,7 +30,7 @@ impl FlowOfColumn {
     }
 }
 
-/// All that is known of a pair of sweeps.
+/// Everything known about a pair of sweeps.
 pub(crate) struct Found<'a> {
     pub pair: &'a SweepPair<'a>,
     pub rig: &'a Rig,
@@ -40,7 +40,7 @@ pub(crate) struct Found<'a> {
     pub tracklets: &'a Tracklets,
     pub refinement: &'a Refinement,
     pub returns: &'a Returns,
-    /// Of the columns of the first sweep's window; none without an encoder.
+    /// Scores of the columns of the first sweep's window; empty without an encoder.
     pub scores: &'a [ColumnScores],
 }
 
@@ -57,7 +57,7 @@ impl Found<'_> {
         let (solid, valid, unlisted) = self.columns(index, out.columns);
         let (records, unplaced) = self.clusters(index, out.columns, solid);
         let (columns, thinning) = (&out.columns[..records], self.pair.before.points);
-        // Of another sweep's, velocities would be those of other returns.
+        // With another sweep's points, velocities would go to the wrong returns.
         assert_eq!(points.len(), thinning.of(), "returns of the sweep before");
         let of_points = TakenPoints::new(points, thinning.taken());
         let taken = &mut out.points[..of_points.count()];
@@ -119,8 +119,8 @@ impl Found<'_> {
         (count, valid, beyond)
     }
 
-    /// Writes one record behind the `count` first per column that is not solid, but part of a
-    /// cluster that moves; returns how many there are then, and how many there was no room for.
+    /// Appends to the first `count` records one per column that is not solid but part of a moving
+    /// cluster; returns how many there are then, and how many there was no room for.
     fn clusters(
         &self,
         index: &mut FlowOfColumn,
@@ -164,7 +164,8 @@ impl Found<'_> {
         inside.then_some((i * side + j) as usize)
     }
 
-    /// Whether what moves with a probability is put out so. Whole cells have no other evidence.
+    /// Whether something with this P(moves) is output as moving. Whole cells have no other
+    /// evidence.
     fn moves(&self, probability: f32) -> bool {
         let profile = self.pair.profile;
         profile.refinement_sweeps == 0 || probability >= profile.moves.moves_min
@@ -183,12 +184,12 @@ impl Found<'_> {
         }
     }
 
-    /// What a column is taken for that both windows have.
+    /// The class of a column that both windows contain.
     fn class_at(&self, i: i32, j: i32) -> Option<ColumnClass> {
         Some(class_of(self.scores.get(self.in_first_window(i, j)?)?))
     }
 
-    /// The match of a column that is `rank`-th of the foreground; whether it has one.
+    /// Sets the match of a column that is `rank`-th of the foreground; returns whether it has one.
     fn set_match(&self, flow: &mut ColumnFlow, column: usize, rank: Option<usize>) -> bool {
         let Some(rank) = rank else { return false };
         flow.basis = FlowBasis::Unmatched;
@@ -201,7 +202,7 @@ impl Found<'_> {
         true
     }
 
-    /// Writes what is kept of every return taken of the first sweep, in its order.
+    /// Writes the [`ReturnFlow`] of every return taken from the first sweep, in its order.
     fn points(
         &self,
         team: &impl Team,
@@ -222,7 +223,7 @@ impl Found<'_> {
         team::share(team, RETURNS_LEAST, 0..out.len(), out, 1, &part);
     }
 
-    /// What became of a return with the flow of its column.
+    /// The status of a return, given the flow of its column.
     #[inline]
     fn status(&self, column: u32, point: &Point, flow: Option<&ColumnFlow>) -> Status {
         match ReturnKind::of(self.rig, point) {
@@ -238,7 +239,8 @@ impl Found<'_> {
         }
     }
 
-    /// Whether it is put out as moving. Whole cells, followed by a filter, are never quite at rest.
+    /// Whether a column is output as moving. Whole cells, tracked by a filter, are never quite at
+    /// rest.
     fn is_moving(&self, flow: &ColumnFlow) -> bool {
         flow.probability >= self.pair.profile.moves.moves_min && flow.velocity_world_mps != [0.0; 2]
     }

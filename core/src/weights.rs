@@ -1,4 +1,4 @@
-//! Learned numbers as text files, read by this one reader.
+//! Learned numbers as text files, all read by this one reader.
 //!
 //! ```text
 //! raywake-weights 1
@@ -9,9 +9,9 @@
 //! provenance <one line>
 //! <integers, white space between them>
 //! ```
-//! A weight is its integer divided by `scale`. The product of `shape`, plus one for the bias, which
-//! comes last where the kind has one, is how many integers there are. Text, so that a change shows
-//! in a review; integers, so that every machine computes with the same numbers.
+//! A weight is its integer divided by `scale`. The number of integers is the product of `shape`,
+//! plus one if the kind has a bias, which comes last. Text, so that a change shows in a review;
+//! integers, so that every machine computes with the same numbers.
 
 use crate::digest::Digest;
 use core::fmt;
@@ -19,31 +19,31 @@ use core::fmt;
 /// A weights file, parsed and verified; borrows the text.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights<'a> {
-    /// Weights per unit.
+    /// Integers per unit of weight.
     pub scale: i32,
     /// Where the numbers come from.
     pub provenance: &'a str,
     values: &'a str,
 }
 
-/// Why a text is no weights file of the kind wanted.
+/// Why a text is not a weights file of the kind wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WeightsError {
     /// Not a weights file, or of another version.
     Magic,
     /// The header line of this name is missing or malformed.
     Header(&'static str),
-    /// The bytes are not those the checksum was made of.
+    /// The bytes do not match the checksum.
     Checksum,
-    /// Weights of something else.
+    /// Weights of a different kind.
     Kind,
-    /// Another shape than the profile needs.
+    /// A different shape than the profile needs.
     Shape,
-    /// The value at this position (from 0) is missing or no integer of 24 bits.
+    /// The value at this position (from 0) is missing or not an integer of 24 bits.
     Value(usize),
-    /// More values than the shape has.
+    /// More values than the shape calls for.
     Surplus,
-    /// Their sums do not fit the arithmetic or the tables that take them.
+    /// Their sums do not fit the arithmetic or the tables that use them.
     Range,
 }
 
@@ -63,7 +63,7 @@ impl fmt::Display for WeightsError {
 }
 
 impl<'a> Weights<'a> {
-    /// Parses `text`, which must be of `kind` and `shape` and have so many biases after it.
+    /// Parses `text`, which must be of `kind` and `shape`, followed by this many biases.
     pub fn parse(
         text: &'a str,
         kind: &str,

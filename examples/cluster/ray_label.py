@@ -1,4 +1,4 @@
-"""Labels many recordings on a Ray cluster: share of returns that move, per recording and sweep.
+"""Labels many recordings on a Ray cluster: share of moving returns, per recording and sweep.
 
     pip install FOLDER/raywake-*.whl "ray[data]"
     python ray_label.py drives.txt labels.csv
@@ -14,7 +14,7 @@ import raywake
 
 @ray.remote(num_cpus=2)
 def label(path):
-    """A row per pair of sweeps: recording, stamp, returns, returns that move, fastest, m/s."""
+    """Returns a row per pair of sweeps: recording, stamp, returns, moving returns, fastest, m/s."""
     recording = raywake.Recording(path)
     pipeline = raywake.Pipeline(
         rig=recording.rig, find_poses=not recording.located, threads=2
@@ -31,7 +31,7 @@ def label(path):
 
 
 def main(listed, out):
-    """Labels all recordings of a list. One that cannot be read is told, and the others go on."""
+    """Labels all recordings of a list. One that fails is reported, and the others go on."""
     paths = [line.strip() for line in open(listed) if line.strip() and line[0] != "#"]
     waiting = [label.remote(path) for path in paths]
     failed = 0

@@ -1,4 +1,4 @@
-//! The buffer table in memory: one block per heap, one Vulkan buffer per row.
+//! The buffer table in memory: one block per heap and one Vulkan buffer per row.
 
 use crate::error::failed;
 use crate::owner::Gpu;
@@ -6,7 +6,7 @@ use crate::{Buffer, GpuError, Heap};
 use ash::vk;
 use std::ptr::NonNull;
 
-/// A buffer in its place.
+/// A buffer placed in memory.
 pub(crate) struct Slot {
     pub row: Buffer,
     pub handle: vk::Buffer,
@@ -21,21 +21,21 @@ impl Slot {
         (self.row.bytes / 4) as usize
     }
 
-    /// None in `Heap::Device`. The device must not be writing to the buffer.
+    /// The words; `None` in `Heap::Device`. The device must not be writing to the buffer.
     pub fn mapped(&self) -> Option<&[u32]> {
         // SAFETY: `allocate` mapped and zeroed this many words, which no other slot overlaps; they
-        // stay mapped as long as the executor that owns the slot, and borrow from it.
+        // stay mapped as long as the executor that owns the slot lives, and borrow from it.
         self.mapped.map(|p| unsafe { std::slice::from_raw_parts(p.as_ptr(), self.words()) })
     }
 
-    /// None in `Heap::Device`. The device must not be using the buffer.
+    /// The words; `None` in `Heap::Device`. The device must not be using the buffer.
     pub fn mapped_mut(&mut self) -> Option<&mut [u32]> {
         // SAFETY: as in `mapped`, and the borrow is exclusive.
         self.mapped.map(|p| unsafe { std::slice::from_raw_parts_mut(p.as_ptr(), self.words()) })
     }
 }
 
-/// Creates and places all buffers, in at most three allocations. Mapped ones become zeros.
+/// Creates and places all buffers, in at most three allocations. Mapped ones are zeroed.
 pub(crate) fn allocate(gpu: &mut Gpu, table: &[Buffer]) -> Result<Vec<Slot>, GpuError> {
     let mut slots: Vec<Option<Slot>> = table.iter().map(|_| None).collect();
     for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
@@ -65,7 +65,7 @@ fn allocate_heap(
         handles.collect::<Result<_, _>>().map_err(exhausted("vkCreateBuffer", heap, least))?;
     let need = |(&row, &handle): (&usize, &vk::Buffer)| {
         let need = gpu.requirements(handle);
-        // No driver says less, or all that is placed within it would not be.
+        // Never less, even if a driver says so: buffers would overlap or exceed the block.
         vk::MemoryRequirements { size: need.size.max(table[row].bytes), ..need }
     };
     let needs: Vec<_> = rows.iter().zip(&handles).map(need).collect();
@@ -99,7 +99,7 @@ fn mapped_zeros(gpu: &Gpu, memory: vk::DeviceMemory, bytes: u64) -> Result<NonNu
         call: "vkMapMemory",
         result: vk::Result::ERROR_MEMORY_MAP_FAILED,
     })?;
-    // SAFETY: the whole block was just mapped, and nobody else knows of it yet.
+    // SAFETY: the whole block was just mapped, and nothing else has access to it yet.
     unsafe { base.write_bytes(0, bytes as usize) };
     Ok(base)
 }
@@ -120,8 +120,8 @@ fn exhausted(call: &'static str, heap: Heap, bytes: u64) -> impl Fn(vk::Result) 
     }
 }
 
-/// One buffer after the other: their offsets, and the size of the block, all there is where it is
-/// beyond any.
+/// Places one buffer after another: their offsets and the size of the block, `u64::MAX` if it
+/// overflows.
 fn place(needs: &[vk::MemoryRequirements], alignment: u64) -> (Vec<u64>, u64) {
     let mut end = 0u64;
     let place_one = |need: &vk::MemoryRequirements| {
@@ -133,14 +133,14 @@ fn place(needs: &[vk::MemoryRequirements], alignment: u64) -> (Vec<u64>, u64) {
     (needs.iter().map(place_one).collect(), end)
 }
 
-/// The first memory type that suits the heap best. Drivers list the faster of equals first.
+/// The first memory type that suits the heap best. Drivers list the faster of equal ones first.
 fn memory_type(
     properties: &vk::PhysicalDeviceMemoryProperties,
     usable: u32,
     heap: Heap,
 ) -> Option<u32> {
     use vk::MemoryPropertyFlags as Flags;
-    // Coherent throughout, so that a run needs no flush and no invalidation.
+    // Always coherent, so that a run needs no flush or invalidation.
     let host = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
     let wanted: &[Flags] = match heap {
         Heap::Upload => &[host],
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(place(&needs, 16), (vec![0, 64, 176], 180));
         assert_eq!(place(&needs, 256), (vec![0, 256, 512], 516));
         assert_eq!(place(&[], 16), (vec![], 0));
-        // Of a driver that says nonsense.
+        // From a driver that reports nonsense.
         assert_eq!(place(&[need(u64::MAX - 7, 4), need(20, 4)], 16).1, u64::MAX);
         assert_eq!(place(&[need(20, 4), need(20, 1 << 63), need(20, 1 << 63)], 16).1, u64::MAX);
     }

@@ -1,11 +1,11 @@
-//! Refuses schedules that contradict themselves or the device's limits, before anything is made.
+//! Rejects schedules that contradict themselves or the device's limits, before anything is created.
 
 use crate::{Buffer, GpuError, Groups, Heap, Kernel, Limits, Op, Program};
 
 const SPIRV_MAGIC: u32 = 0x0723_0203;
 const INDIRECT_BYTES: u64 = 12;
 
-/// Ok if every program can be recorded as it stands.
+/// Returns `Ok` if every program can be recorded as it is.
 pub(crate) fn schedule(
     limits: &Limits,
     table: &[Buffer],
@@ -60,7 +60,7 @@ fn find(table: &[Buffer], index: usize) -> Result<&Buffer, String> {
     table.get(index).ok_or_else(missing)
 }
 
-/// The host may hold a mutable borrow of an upload buffer's contents, so nobody else writes there.
+/// The host may hold a mutable borrow of an upload buffer's contents, so the device must not write.
 fn written(buffer: &Buffer) -> Result<(), String> {
     ensure(buffer.heap != Heap::Upload, || format!("writes the upload buffer {}", buffer.name))
 }
@@ -79,7 +79,7 @@ fn shader(limits: &Limits, kernel: &Kernel) -> Result<(), String> {
     })
 }
 
-/// Bytes of a uniform buffer that every Vulkan device binds.
+/// Size of a uniform buffer that every Vulkan device can bind.
 const UNIFORM_BYTES: u64 = 16 << 10;
 
 fn bound(
@@ -102,7 +102,7 @@ fn bound(
         ensure(row.bytes <= most, text)?;
         if binding.writes {
             written(row)?;
-            // Shaders may take what they write for not aliased.
+            // Shaders may assume that what they write is not aliased.
             let mut others = (0..given).filter(|&j| j != i);
             let alone = others.all(|j| buffers[j] != buffer);
             ensure(alone, || format!("{} is bound twice and written", row.name))?;

@@ -1,4 +1,4 @@
-//! What devices there are, and which one to take.
+//! Which devices there are, and which one to use.
 
 use crate::GpuError;
 use crate::error::failed;
@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use ash::vk;
 use std::ffi::CStr;
 
-/// What a device is made of, fastest kind first.
+/// The kind of a device, fastest kind first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
     /// A graphics card.
@@ -26,23 +26,23 @@ pub enum DeviceKind {
 pub struct Limits {
     /// Largest buffer a kernel can bind.
     pub storage_buffer_bytes: u64,
-    /// Most storage buffers a kernel can bind.
+    /// Maximum number of storage buffers a kernel can bind.
     pub storage_buffers: u32,
     /// Alignment of storage buffers within a heap.
     pub storage_alignment_bytes: u64,
-    /// Largest single allocation, hence largest heap content.
+    /// Largest single allocation, hence the largest total of a heap's buffers.
     pub allocation_bytes: u64,
-    /// Most invocations in a workgroup.
+    /// Maximum number of invocations in a workgroup.
     pub invocations: u32,
     /// Largest workgroup along each axis.
     pub workgroup: [u32; 3],
-    /// Most workgroups of a dispatch along each axis.
+    /// Maximum number of workgroups of a dispatch along each axis.
     pub workgroups: [u32; 3],
     /// Workgroup memory of a kernel. Not checked: a kernel does not declare its use.
     pub shared_bytes: u32,
-    /// Length of a timestamp tick; zero where there are no timestamps.
+    /// Length of a timestamp tick; zero if there are no timestamps.
     pub timestamp_ns: f32,
-    /// Meaningful bits of a timestamp; zero where there are no timestamps.
+    /// Meaningful bits of a timestamp; zero if there are no timestamps.
     pub timestamp_bits: u32,
 }
 
@@ -53,7 +53,7 @@ pub struct DeviceInfo {
     pub index: usize,
     /// The driver's name for the device.
     pub name: String,
-    /// What it is made of.
+    /// Its kind.
     pub kind: DeviceKind,
     /// The Vulkan version it implements: major, minor, patch.
     pub api_version: [u32; 3],
@@ -65,7 +65,7 @@ pub struct DeviceInfo {
     pub missing: Vec<String>,
 }
 
-/// Lists all devices, also those that lack something.
+/// Lists all devices, including those that lack something.
 ///
 /// # Errors
 /// `NoLoader`; `NoDevice` if there is no driver; `Vulkan`.
@@ -74,14 +74,14 @@ pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
     Ok(found.into_iter().map(|found| found.info).collect())
 }
 
-/// A listed device with the handles that make it one.
+/// A listed device with what is needed to open it.
 pub(crate) struct Physical {
     pub handle: vk::PhysicalDevice,
     pub queue_family: u32,
     pub info: DeviceInfo,
 }
 
-/// The device asked for, or else the first of the fastest kind that lacks nothing.
+/// The requested device, or else the first of the fastest kind that lacks nothing.
 pub(crate) fn select(instance: &Instance, index: Option<usize>) -> Result<Physical, GpuError> {
     let mut found = enumerate(instance)?.into_iter();
     let chosen = match index {
@@ -143,7 +143,7 @@ fn describe(instance: &ash::Instance, index: usize, handle: vk::PhysicalDevice) 
 fn allocation_limit(instance: &ash::Instance, handle: vk::PhysicalDevice) -> u64 {
     let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
     let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance);
-    // SAFETY: the device implements Vulkan 1.1, of which query and structure are part.
+    // SAFETY: the device implements Vulkan 1.1, which includes the query and the structure.
     unsafe { instance.get_physical_device_properties2(handle, &mut chain) };
     maintenance.max_memory_allocation_size
 }
@@ -158,7 +158,7 @@ fn driver(
     }
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
-    // SAFETY: the device implements Vulkan 1.2, of which query and structure are part.
+    // SAFETY: the device implements Vulkan 1.2, which includes the query and the structure.
     unsafe { instance.get_physical_device_properties2(handle, &mut chain) };
     let name = text(driver.driver_name_as_c_str().ok());
     format!("{name} {}", text(driver.driver_info_as_c_str().ok()))

@@ -11,7 +11,7 @@ pub enum GpuError {
     /// There is no Vulkan loader (`libvulkan`) on this machine.
     #[error("no Vulkan loader found")]
     NoLoader,
-    /// The loader knows no device, or none of the index asked for.
+    /// The loader finds no device, or none with the requested index.
     #[error("no such Vulkan device")]
     NoDevice,
     /// The device or the Vulkan installation lacks something needed.
@@ -30,34 +30,34 @@ pub enum GpuError {
         /// What all its buffers need together.
         bytes: u64,
     },
-    /// The device stopped working. Final.
+    /// The device was lost. Final.
     #[error("device lost during {during}, says {call}")]
     DeviceLost {
-        /// The function that said so.
+        /// The function that reported it.
         call: &'static str,
-        /// How far it came.
+        /// How far the program got.
         during: During,
     },
-    /// A run missed its deadline. Final, because the device may still be at it.
+    /// A run missed its deadline. Final, because the device may still be running it.
     #[error("no end of {during} within {after:?}")]
     Timeout {
-        /// How far it came.
+        /// How far the program got.
         during: During,
         /// The deadline.
         after: Duration,
     },
-    /// What was done beside the device panicked, and nobody waited for the device. Final.
+    /// The work done beside the device panicked, so the device was not waited for. Final.
     #[error("`{program}` was abandoned")]
     Abandoned {
         /// The program's name.
         program: &'static str,
     },
-    /// What a program left behind cannot be. Final.
+    /// The results of a program are impossible. Final.
     #[error("`{program}` left nonsense behind: {what}")]
     Nonsense {
         /// The program's name.
         program: &'static str,
-        /// What cannot be.
+        /// What is impossible.
         what: &'static str,
     },
     /// The buffer table or a program contradicts itself or the device's limits.
@@ -80,13 +80,13 @@ pub enum GpuError {
     },
 }
 
-/// How far a program came before it failed.
+/// How far a program got before it failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct During {
     /// The program's name.
     pub program: &'static str,
-    /// Index and name of the last step known to have finished. None also where the device has no
-    /// timestamps or cannot be asked while it runs.
+    /// Index and name of the last step known to have finished. Also `None` if the device has no
+    /// timestamps or cannot be queried while it runs.
     pub last: Option<(usize, &'static str)>,
 }
 

@@ -1,4 +1,4 @@
-//! Set-up, the frame, and the end.
+//! Set-up, running a frame, and clean-up.
 
 use crate::arena::{self, Slot};
 use crate::error::failed;
@@ -11,7 +11,7 @@ use crate::{check, device};
 use ash::vk;
 use std::time::Duration;
 
-/// What merely missed its deadline gets this long to end before its objects are leaked.
+/// A run that merely missed its deadline gets this long to end before its objects are leaked.
 const GRACE: Duration = Duration::from_secs(1);
 
 /// A device with its buffers and recorded programs; see the [crate] for the contract.
@@ -43,7 +43,7 @@ impl Executor {
         Self::with(options, buffers, |_| programs)
     }
 
-    /// As [`Executor::new`], with the programs for the device that is found.
+    /// Like [`Executor::new`], with the programs chosen for the device that is found.
     ///
     /// # Errors
     /// As [`Executor::new`].
@@ -78,7 +78,7 @@ impl Executor {
     /// The words of a [`Heap::Upload`] buffer. The device reads them in later runs, as they are.
     ///
     /// # Errors
-    /// That of the run that failed, because the device may still be reading there.
+    /// The error of an earlier failed run, because the device may still be reading there.
     pub fn upload(&mut self, buffer: usize) -> Result<&mut [u32], GpuError> {
         self.uploads([buffer]).map(|[words]| words)
     }
@@ -113,20 +113,20 @@ impl Executor {
         slot.mapped().expect("readback buffers are mapped")
     }
 
-    /// Runs a program to its end. Allocates nothing.
+    /// Runs a program to completion. Allocates nothing.
     ///
     /// # Errors
     /// `Timeout` after [`Options::timeout`], `DeviceLost`, `Vulkan`. Once one of them has been
-    /// returned, every later run returns it again at once.
+    /// returned, every later run returns it again immediately.
     pub fn run(&mut self, program: usize) -> Result<(), GpuError> {
         self.run_beside(program, || ())
     }
 
-    /// Runs a program to its end, and `work` on this thread while the device is busy. The time of
-    /// `work` does not count against [`Options::timeout`].
+    /// Runs a program to completion, and `work` on this thread while the device is busy. The time
+    /// `work` takes does not count against [`Options::timeout`].
     ///
     /// # Errors
-    /// As [`Executor::run`]. `work` has not been done where the submission failed.
+    /// As [`Executor::run`]. `work` has not been done if the submission failed.
     pub fn run_beside(&mut self, program: usize, work: impl FnOnce()) -> Result<(), GpuError> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
@@ -141,7 +141,7 @@ impl Executor {
         let submitted = self.gpu.submit(commands, self.fence);
         submitted.map_err(|(call, result)| self.fault(call, result, program))?;
         self.in_flight = true;
-        // Stays where `work` panics and somebody catches it.
+        // Stays set if `work` panics and the panic is caught.
         self.failure = Some(GpuError::Abandoned { program: self.programs[program].name });
         work();
         let waited = self.gpu.wait(self.fence, self.timeout);
@@ -165,7 +165,7 @@ impl Executor {
 
     fn during(&mut self, program: usize) -> During {
         let Recorded { name, timer, .. } = &mut self.programs[program];
-        // Software drivers answer this question only when they are idle.
+        // Software drivers answer this query only when they are idle.
         let last = match self.gpu.info().kind {
             DeviceKind::Cpu => None,
             _ => timer.last_finished(&self.gpu),
@@ -173,8 +173,8 @@ impl Executor {
         During { program: name, last }
     }
 
-    /// Gives the device up, as what a program left behind cannot be: from now on every run fails
-    /// with the error that is returned.
+    /// Gives up on the device because the results of a program are impossible: from now on every
+    /// run fails with the returned error.
     pub fn give_up(&mut self, program: usize, what: &'static str) -> GpuError {
         let failure = GpuError::Nonsense { program: self.programs[program].name, what };
         self.failure = Some(failure.clone());
@@ -184,8 +184,8 @@ impl Executor {
     /// Name and duration in milliseconds of each step of the program's last run, in order.
     ///
     /// A step's time runs from the end of all steps before it to its own end. Steps without a
-    /// barrier between them may overlap, so the sum is meaningful and a single time only roughly.
-    /// Yields nothing before the first run, and on devices without timestamps. Allocates nothing.
+    /// barrier between them may overlap, so the sum is meaningful, a single time only roughly so.
+    /// Yields nothing before the first run or on devices without timestamps. Allocates nothing.
     pub fn times(&self, program: usize) -> impl Iterator<Item = (&'static str, f64)> {
         self.programs[program].timer.times(&self.gpu)
     }
@@ -217,12 +217,13 @@ impl Drop for Executor {
         let idle = !self.in_flight
             || match self.gpu.wait(self.fence, self.timeout.max(GRACE)) {
                 Ok(finished) => finished,
-                // What a lost device was doing counts as finished, once it has been waited for.
+                // The work of a lost device counts as finished once it has been waited for.
                 Err(result) => result == vk::Result::ERROR_DEVICE_LOST,
             };
-        // What still runs uses the objects, and might never end: they are leaked, device and all.
+        // A run in progress uses the objects and might never end: then all are leaked, with the
+        // device.
         if idle {
-            // SAFETY: dropped here only, and never used again.
+            // SAFETY: only destroyed here, and never used again.
             unsafe { self.gpu.destroy() };
         }
     }

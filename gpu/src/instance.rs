@@ -1,4 +1,4 @@
-//! The loader, the instance, and the validation layer if asked for.
+//! The loader, the instance, and the validation layer if requested.
 
 use crate::error::failed;
 use crate::messages::{Messages, messenger};
@@ -10,8 +10,8 @@ use std::sync::OnceLock;
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 const EXTENSIONS: [&CStr; 2] = [ash::ext::debug_utils::NAME, c"VK_EXT_validation_features"];
 
-/// The loader stays loaded until the process ends: drivers keep threads and exit handlers, which
-/// do not survive being unmapped.
+/// The loader stays loaded until the process ends: drivers keep threads and exit handlers that do
+/// not survive being unmapped.
 fn entry() -> Result<&'static Entry, GpuError> {
     static ENTRY: OnceLock<Option<Entry>> = OnceLock::new();
     // SAFETY: loading the system's Vulkan loader runs its initialisers, which we have to trust;
@@ -27,7 +27,7 @@ struct Messenger {
     messages: Box<Messages>,
 }
 
-/// An instance that is destroyed when dropped, after everything made from it.
+/// An instance that is destroyed when dropped, after everything created from it.
 pub(crate) struct Instance {
     raw: ash::Instance,
     messenger: Option<Messenger>,
@@ -52,7 +52,7 @@ impl Instance {
         &self.raw
     }
 
-    /// None without validation.
+    /// The validation messages; `None` without validation.
     pub fn messages(&self) -> Option<&Messages> {
         self.messenger.as_ref().map(|m| &*m.messages)
     }
@@ -70,7 +70,7 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        // SAFETY: the owner drops the instance last, so nothing made from it is left.
+        // SAFETY: the owner drops the instance last, so nothing created from it is left.
         unsafe {
             if let Some(m) = &self.messenger {
                 m.functions.destroy_debug_utils_messenger(m.handle, None);
@@ -119,7 +119,7 @@ fn create(entry: &Entry, validation: Option<Validation>) -> Result<ash::Instance
     }
     // SAFETY: the create info and all it points to live through the call.
     unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
-        // The loader's word for having found no driver.
+        // What the loader returns if it has found no driver.
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDevice,
         _ => failed("vkCreateInstance")(result),
     })

@@ -1,32 +1,32 @@
 //! Executes fixed schedules over preallocated buffers on raw Vulkan.
 //!
-//! The caller hands over a table of [`Buffer`]s and a few [`Program`]s, lists of fills, copies and
-//! kernel dispatches; [`Executor::new`] makes everything these need: memory, pipelines, descriptor
-//! sets, recorded command buffers. After that a frame is: write [`Executor::upload`], call
-//! [`Executor::run`], read [`Executor::readback`].
+//! The caller provides a table of [`Buffer`]s and a few [`Program`]s, lists of fills, copies and
+//! kernel dispatches; [`Executor::new`] creates everything these need: memory, pipelines,
+//! descriptor sets, recorded command buffers. After that, a frame is: write [`Executor::upload`],
+//! call [`Executor::run`], read [`Executor::readback`].
 //!
 //! # Contract
 //!
-//! - **Who allocates.** `Executor::new` alone, at most one device memory block per [`Heap`].
+//! - **Allocation.** Only `Executor::new` allocates, at most one device memory block per [`Heap`].
 //!   [`Executor::run`] and [`Executor::times`] allocate nothing on the host. They create, record
 //!   and update nothing on the device: that takes a mutable reference which only set-up has. What
-//!   a driver allocates inside a submit is its own affair.
-//! - **Who waits.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
+//!   a driver allocates inside a submit is outside this contract.
+//! - **Waiting.** `run` submits and waits, at most [`Options::timeout`]; [`Executor::run_beside`]
 //!   does the caller's work in between. Programs never overlap, so nothing needs ordering between
 //!   two runs.
-//! - **Who orders.** Within a program a barrier stands exactly where declared accesses conflict
-//!   ([`Binding::reads`], [`Binding::writes`]): a kernel that touches what it does not declare is
-//!   not ordered.
+//! - **Ordering.** Within a program there is a barrier exactly where declared accesses conflict
+//!   ([`Binding::reads`], [`Binding::writes`]): accesses that a kernel does not declare are not
+//!   ordered.
 //! - **Contents.** Mapped buffers start as zeros; [`Heap::Device`] buffers start undefined, so a
-//!   program has to fill or write what it reads. All contents stay from one run to the next.
-//! - **What is trusted.** The SPIR-V: it must be valid, stay within its bindings and use no
-//!   optional feature. Indirect group counts cannot be seen here either: the kernel that writes
+//!   program has to fill or write what it reads. All contents persist from one run to the next.
+//! - **Trust.** The SPIR-V is trusted: it must be valid, stay within its bindings and use no
+//!   optional feature. Indirect group counts cannot be checked here either: the kernel that writes
 //!   them keeps them within [`Limits::workgroups`]. [`Validation`] finds most violations.
 //! - **After a failure.** A lost device or a missed deadline is final: every later run returns the
-//!   same error at once. What is still running is left alone, its objects leaked, never destroyed
-//!   in use.
+//!   same error immediately. What is still running is left alone and its objects are leaked, never
+//!   destroyed in use.
 //!
-//! This is the only crate of the project that contains `unsafe`.
+//! Apart from a layer for tests, this is the only crate of the project that calls Vulkan.
 #![deny(missing_docs)]
 
 mod arena;
@@ -50,18 +50,18 @@ pub use owner::Census;
 
 use std::time::Duration;
 
-/// The kind of memory a buffer lives in, by who touches it.
+/// The kind of memory a buffer lives in, by who accesses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heap {
     /// Written by the host through a mapping, only read by the device.
     Upload,
-    /// Touched by the device alone.
+    /// Accessed only by the device.
     Device,
     /// Written by the device, read by the host through a mapping.
     Readback,
 }
 
-/// One row of the caller's buffer table. Buffers are named by their row from then on.
+/// One row of the caller's buffer table. From then on, buffers are identified by their row.
 #[derive(Clone, Copy, Debug)]
 pub struct Buffer {
     /// For messages.
@@ -72,16 +72,17 @@ pub struct Buffer {
     pub bytes: u64,
 }
 
-/// One buffer of a kernel: what the kernel does with it. Barriers derive from this.
+/// One buffer of a kernel and what the kernel does with it. Barriers derive from this.
 #[derive(Clone, Copy, Debug)]
 pub struct Binding {
     /// For messages.
     pub name: &'static str,
-    /// The kernel may read it.
+    /// Whether the kernel may read it.
     pub reads: bool,
-    /// The kernel may write it; atomics read and write.
+    /// Whether the kernel may write it; atomics read and write.
     pub writes: bool,
-    /// A uniform buffer, not a storage buffer: the same for every invocation, and only read.
+    /// Whether it is a uniform buffer rather than a storage buffer: the same for every invocation,
+    /// and only read.
     pub uniform: bool,
 }
 
@@ -104,7 +105,7 @@ impl Binding {
     }
 }
 
-/// A compiled compute shader. Each has one static of its own: its address tells it from others.
+/// A compiled compute shader. Each has its own static, whose address identifies it.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     /// The entry point's name in the module; also for messages.
@@ -113,7 +114,7 @@ pub struct Kernel {
     pub spirv: Spirv,
     /// Invocations per workgroup, as compiled in.
     pub workgroup: [u32; 3],
-    /// Storage buffers of set 0; the binding number is the index.
+    /// Buffers of set 0; the binding number is the index.
     pub bindings: &'static [Binding],
 }
 
@@ -122,12 +123,12 @@ pub struct Kernel {
 pub struct Spirv(&'static [u32]);
 
 impl Spirv {
-    /// Of these words.
+    /// A module of these words.
     ///
     /// # Safety
-    /// They are a module that is valid for Vulkan 1.1 (SPIR-V 1.3 or older), and its shader keeps
-    /// within the buffers that [`Kernel::bindings`] name, whatever these hold. Drivers take that on
-    /// trust.
+    /// They must be a module that is valid for Vulkan 1.1 (SPIR-V 1.3 or older), and its shader
+    /// must stay within the buffers of [`Kernel::bindings`], whatever these contain. Drivers do not
+    /// check this.
     pub const unsafe fn new(words: &'static [u32]) -> Spirv {
         Spirv(words)
     }
@@ -162,7 +163,7 @@ pub enum Op {
         /// The word.
         value: u32,
     },
-    /// Copies a whole buffer to another one of the same size.
+    /// Copies a whole buffer to another of the same size.
     Copy {
         /// Row of the buffer table.
         from: usize,
@@ -183,7 +184,7 @@ pub enum Op {
 }
 
 impl Op {
-    /// The dispatch's name, or what else it is.
+    /// The dispatch's name, or "fill" or "copy".
     pub fn name(&self) -> &'static str {
         match self {
             Op::Fill { .. } => "fill",
@@ -193,7 +194,7 @@ impl Op {
     }
 }
 
-/// A list of steps, recorded into one command buffer once and run as a whole.
+/// A list of steps, recorded once into one command buffer and run as a whole.
 #[derive(Clone, Debug)]
 pub struct Program {
     /// For messages.
@@ -202,21 +203,21 @@ pub struct Program {
     pub ops: Vec<Op>,
 }
 
-/// A run-time check by the Khronos validation layer; slow, for tests.
+/// A run-time check by the Khronos validation layer; slow, meant for tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Validation {
     /// Core checks and synchronisation hazards.
     Sync,
-    /// Core checks and instrumented shaders: out-of-bounds accesses.
+    /// Core checks and instrumented shaders, for out-of-bounds accesses.
     GpuAssisted,
 }
 
 /// Which device, and how to run it.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Index in [`devices()`]; if none, the first of the fastest kind that lacks nothing.
+    /// Index in [`devices()`]; if `None`, the first of the fastest kind that lacks nothing.
     pub device: Option<usize>,
-    /// Run under the validation layer.
+    /// What to check with the validation layer, if anything.
     pub validation: Option<Validation>,
     /// The longest a single run may take. Software devices compile kernels in their first run.
     pub timeout: Duration,

@@ -1,4 +1,4 @@
-//! What the validation layer has to say: counted, and the first few texts kept.
+//! Messages of the validation layer: counted, and the text of the first few kept.
 
 use ash::vk;
 use std::ffi::{CStr, c_void};
@@ -42,7 +42,7 @@ impl Messages {
     }
 }
 
-/// What a debug messenger needs to report to `messages`, which must outlive it at the same place.
+/// Create info of a debug messenger that reports to `messages`, which must outlive it and not move.
 pub(crate) fn messenger(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     use vk::DebugUtilsMessageSeverityFlagsEXT as Severity;
     use vk::DebugUtilsMessageTypeFlagsEXT as Type;
@@ -53,7 +53,8 @@ pub(crate) fn messenger(messages: &Messages) -> vk::DebugUtilsMessengerCreateInf
         .user_data(std::ptr::from_ref(messages).cast_mut().cast())
 }
 
-/// The loader's remarks about other drivers and the layer's about its own set-up are no findings.
+/// Whether a message is a finding. The loader's remarks about other drivers and the layer's about
+/// its own set-up are not.
 fn counts(error: bool, validation: bool, id: &[u8]) -> bool {
     let noise = id == b"Loader Message" || (!error && id.starts_with(b"UNASSIGNED-GPU-Assisted"));
     (error || validation) && !noise
@@ -62,7 +63,7 @@ fn counts(error: bool, validation: bool, id: &[u8]) -> bool {
 /// Notes a message that counts.
 ///
 /// # Safety
-/// `data` is valid during the call, and `user` a [`Messages`]: called by Vulkan, with what
+/// `data` is valid during the call, and `user` is a [`Messages`]: called by Vulkan, with what
 /// [`messenger`] was given.
 unsafe extern "system" fn receive(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -74,7 +75,7 @@ unsafe extern "system" fn receive(
     // given to `messenger`, which outlives it.
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
     let text = |p: *const std::ffi::c_char| {
-        // SAFETY: a string of the callback data is null or ends with a zero.
+        // SAFETY: a string of the callback data is null or null-terminated.
         (!p.is_null()).then(|| unsafe { CStr::from_ptr(p) })
     };
     let error = severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR);

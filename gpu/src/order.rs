@@ -1,4 +1,4 @@
-//! Which steps have to be ordered: the conflict rule, free of Vulkan.
+//! Which steps have to be ordered: the conflict rule, independent of Vulkan.
 
 use crate::{Groups, Op};
 
@@ -23,7 +23,7 @@ impl Access {
     }
 }
 
-/// Everything a step touches. An indirect dispatch also reads its group counts.
+/// Everything a step accesses. An indirect dispatch also reads its group counts.
 pub fn accesses(op: &Op) -> Vec<Access> {
     match op {
         Op::Fill { buffer, .. } => vec![Access::write(*buffer)],
@@ -52,7 +52,7 @@ struct Hazards {
 }
 
 impl Hazards {
-    /// Takes up the next step, and says whether a barrier has to stand before it.
+    /// Takes in the next step. Returns whether it needs a barrier before it.
     fn admit(&mut self, step: &[Access]) -> bool {
         let barrier = step.iter().any(|a| {
             let (read, written) = (self.read[a.buffer], self.written[a.buffer]);
@@ -70,7 +70,7 @@ impl Hazards {
     }
 }
 
-/// For each step, whether a barrier has to stand before it.
+/// For each step, whether it needs a barrier before it.
 pub(crate) fn barriers(steps: &[Vec<Access>], buffers: usize) -> Vec<bool> {
     let mut hazards = Hazards { read: vec![false; buffers], written: vec![false; buffers] };
     steps.iter().map(|step| hazards.admit(step)).collect()
@@ -86,7 +86,7 @@ mod tests {
     }
 
     /// The first two steps that conflict without a barrier between them. It compares every pair, so
-    /// that it can find the rule wrong.
+    /// that it can prove the rule wrong.
     fn unordered(steps: &[Vec<Access>], barriers: &[bool]) -> Option<(usize, usize)> {
         let pairs = (0..steps.len()).flat_map(|later| (0..later).map(move |first| (first, later)));
         pairs
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(missing(&[&w, &r, &w], &[false, true, false]), Some((1, 2)));
     }
 
-    /// Random schedules: the rule leaves no pair unordered, and none of its barriers can go.
+    /// Random schedules: the rule leaves no pair unordered, and none of its barriers is redundant.
     #[test]
     fn the_rule_and_the_pairs_agree() {
         let mut state = 1u32;

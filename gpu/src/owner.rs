@@ -1,9 +1,9 @@
 //! The logical device and everything created from it.
 //!
 //! Every create, allocate, record and update call of the crate goes through [`Gpu`], which counts
-//! what it creates and remembers what has to be destroyed: the census and the clean-up are
-//! complete because there is no other way to the device. All these calls take `&mut Gpu`, which
-//! ends with set-up: afterwards the executor has only shared access ([`Ready`]), so that code which
+//! what it creates and remembers what has to be destroyed: the census and the clean-up are complete
+//! because there is no other way to the device. All these calls take `&mut Gpu`, which is gone
+//! after set-up: from then on the executor has only shared access ([`Ready`]), so that code that
 //! creates something during a run does not compile.
 
 mod create;
@@ -20,7 +20,7 @@ use std::time::Duration;
 /// What an executor has created so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Census {
-    /// Calls of `vkAllocateMemory`; at most three.
+    /// Number of calls to `vkAllocateMemory`; at most three.
     pub memory_allocations: u64,
     /// Bytes allocated in [`crate::Heap::Upload`].
     pub upload_bytes: u64,
@@ -28,9 +28,9 @@ pub struct Census {
     pub device_bytes: u64,
     /// Bytes allocated in [`crate::Heap::Readback`].
     pub readback_bytes: u64,
-    /// Vulkan objects created, memory included.
+    /// Number of Vulkan objects created, including memory.
     pub objects: u64,
-    /// Barriers recorded between the steps of all programs.
+    /// Number of barriers recorded between the steps of all programs.
     pub barriers: u64,
 }
 
@@ -47,8 +47,8 @@ enum Object {
     Fence(vk::Fence),
 }
 
-/// A logical device with one queue. Dropping it destroys everything it created, so nothing may be
-/// running by then.
+/// A logical device with one queue. Dropping it destroys everything it created, so nothing may
+/// still be running.
 pub(crate) struct Gpu {
     raw: ash::Device,
     queue: vk::Queue,
@@ -70,7 +70,7 @@ impl Gpu {
         };
         let info =
             vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
-        // SAFETY: the physical device is of this instance, and offers the family and features.
+        // SAFETY: the physical device belongs to this instance and offers the family and features.
         let raw = unsafe { instance.raw().create_device(physical.handle, &info, None) }
             .map_err(failed("vkCreateDevice"))?;
         // SAFETY: one queue of this family was just requested.
@@ -88,13 +88,13 @@ impl Gpu {
         handle
     }
 
-    /// Begins `commands`, lets `record` fill it, and ends it.
+    /// Begins `commands`, has `record` fill it, and ends it.
     pub fn record<R>(
         &mut self,
         commands: vk::CommandBuffer,
         record: impl FnOnce(&ash::Device) -> R,
     ) -> Result<R, GpuError> {
-        // SAFETY: the command buffer is of this device and was not begun before.
+        // SAFETY: the command buffer belongs to this device and was not begun before.
         unsafe { self.raw.begin_command_buffer(commands, &Default::default()) }
             .map_err(failed("vkBeginCommandBuffer"))?;
         let result = record(&self.raw);
@@ -103,8 +103,7 @@ impl Gpu {
         Ok(result)
     }
 
-    /// Starts recorded commands. Nothing else is running.
-    /// Fails with the call that did.
+    /// Starts recorded commands; nothing else may be running. An error names the call that failed.
     pub fn submit(
         &self,
         commands: vk::CommandBuffer,
@@ -112,8 +111,8 @@ impl Gpu {
     ) -> Result<(), (&'static str, vk::Result)> {
         let commands = [commands];
         let submit = [vk::SubmitInfo::default().command_buffers(&commands)];
-        // SAFETY: the executor runs one program at a time, so fence and commands are idle; all
-        // that the commands refer to lives as long as `self`.
+        // SAFETY: the executor runs one program at a time, so fence and commands are idle;
+        // everything the commands refer to lives as long as `self`.
         unsafe {
             self.raw.reset_fences(&[fence]).map_err(|result| ("vkResetFences", result))?;
             let submitted = self.raw.queue_submit(self.queue, &submit, fence);
@@ -124,7 +123,7 @@ impl Gpu {
     /// Whether the submitted commands finished in time.
     pub fn wait(&self, fence: vk::Fence, timeout: Duration) -> Result<bool, vk::Result> {
         let ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
-        // SAFETY: the fence is of this device.
+        // SAFETY: the fence belongs to this device.
         match unsafe { self.raw.wait_for_fences(&[fence], true, ns) } {
             Ok(()) => Ok(true),
             Err(vk::Result::TIMEOUT) => Ok(false),
@@ -132,8 +131,8 @@ impl Gpu {
         }
     }
 
-    /// Reads timestamps as (ticks, available), without waiting for any. What cannot be read is not
-    /// available.
+    /// Reads timestamps as (ticks, available), without waiting for any. Those that cannot be read
+    /// are marked as not available.
     pub fn timestamps(&self, pool: vk::QueryPool, ticks: &mut [[u64; 2]]) {
         ticks.fill([0; 2]);
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
@@ -151,10 +150,10 @@ impl Ready {
         Self(ManuallyDrop::new(gpu))
     }
 
-    /// Destroys everything. Where this is never called, all of it is leaked.
+    /// Destroys everything. If this is never called, all of it is leaked.
     ///
     /// # Safety
-    /// Nothing is running, and `self` is not used again.
+    /// Nothing may be running, and `self` must not be used again.
     pub unsafe fn destroy(&mut self) {
         // SAFETY: the caller's promise.
         unsafe { ManuallyDrop::drop(&mut self.0) }
@@ -175,13 +174,13 @@ impl Drop for Gpu {
             // SAFETY: nothing runs any more, and what was created later is already destroyed.
             unsafe { destroy(&self.raw, object) };
         }
-        // SAFETY: all that was made from the device is destroyed.
+        // SAFETY: everything created from the device is destroyed.
         unsafe { self.raw.destroy_device(None) };
     }
 }
 
 /// # Safety
-/// The object is of this device, not in use, and not used again.
+/// The object must belong to this device, not be in use, and not be used again.
 unsafe fn destroy(device: &ash::Device, object: Object) {
     // SAFETY: the caller's promise.
     unsafe {
@@ -200,9 +199,9 @@ unsafe fn destroy(device: &ash::Device, object: Object) {
     }
 }
 
-/// What shader instrumentation writes its findings with, where the device has it.
+/// The features with which shader instrumentation writes its findings, if the device has them.
 fn instrumentation(instance: &Instance, physical: &Physical) -> vk::PhysicalDeviceFeatures {
-    // SAFETY: the physical device is of this instance.
+    // SAFETY: the physical device belongs to this instance.
     let offered = unsafe { instance.raw().get_physical_device_features(physical.handle) };
     vk::PhysicalDeviceFeatures {
         fragment_stores_and_atomics: offered.fragment_stores_and_atomics,

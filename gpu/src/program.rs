@@ -28,7 +28,7 @@ pub(crate) struct Bindings {
     pub set: vk::DescriptorSet,
 }
 
-/// All that the dispatches of all programs bind.
+/// Everything that the dispatches of all programs bind.
 pub(crate) struct Pipelines {
     pipelines: Vec<KernelPipeline>,
     sets: Vec<Set>,
@@ -61,7 +61,7 @@ impl Pipelines {
         Ok(all)
     }
 
-    /// For a dispatch of one of the programs given to `new`.
+    /// The bindings of a dispatch in one of the programs given to `new`.
     pub fn bound(&self, kernel: &Kernel, buffers: &[usize]) -> Option<Bindings> {
         let set = self
             .sets
@@ -71,7 +71,7 @@ impl Pipelines {
         Some(Bindings { pipeline: pipeline.handle, layout: pipeline.layout, set: set.handle })
     }
 
-    /// The kernel's pipeline, made if there is none yet.
+    /// Index of the kernel's pipeline, created if there is none yet.
     fn pipeline(&mut self, gpu: &mut Gpu, kernel: &'static Kernel) -> Result<usize, GpuError> {
         let known = self.pipelines.iter().position(|p| ptr::eq(p.kernel, kernel));
         if let Some(known) = known {

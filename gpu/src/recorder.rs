@@ -77,7 +77,7 @@ impl Recorder<'_> {
                 let (from, to) = (&self.slots[from], &self.slots[to]);
                 let whole = [vk::BufferCopy::default().size(from.row.bytes)];
                 let (from, to) = (from.handle, to.handle);
-                // SAFETY: recording; the check saw two different buffers of equal size.
+                // SAFETY: recording; the check made sure of two different buffers of equal size.
                 unsafe { self.device.cmd_copy_buffer(self.commands, from, to, &whole) }
             }
             Op::Dispatch { kernel, buffers, groups, .. } => {
@@ -91,8 +91,8 @@ impl Recorder<'_> {
         let (device, commands) = (self.device, self.commands);
         let compute = vk::PipelineBindPoint::COMPUTE;
         let sets = [bound.set];
-        // SAFETY: recording; the set was allocated with the layout the pipeline was made with, and
-        // the check saw the counts within limits or their place within the buffer.
+        // SAFETY: recording; the set was allocated with the layout the pipeline was created with,
+        // and the check made sure that the counts are within limits or their place in the buffer.
         unsafe {
             device.cmd_bind_pipeline(commands, compute, bound.pipeline);
             device.cmd_bind_descriptor_sets(commands, compute, bound.layout, 0, &sets, &[]);
@@ -106,7 +106,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// Orders all that came before against all that follows.
+    /// Orders everything before it against everything after it.
     fn barrier(&self) {
         let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER | Stage::DRAW_INDIRECT;
         let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
@@ -117,7 +117,7 @@ impl Recorder<'_> {
         self.memory_barrier(stages, written, stages, read | written);
     }
 
-    /// Makes what was written visible through the host's mappings once the fence is signalled.
+    /// Makes writes visible through the host's mappings once the fence is signalled.
     fn hand_to_host(&self) {
         let stages = Stage::TRANSFER | Stage::COMPUTE_SHADER;
         let written = Touch::TRANSFER_WRITE | Touch::SHADER_WRITE;
@@ -134,7 +134,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// Written when everything recorded so far has finished.
+    /// Records a timestamp, taken when everything recorded so far has finished.
     fn timestamp(&self, pool: vk::QueryPool, query: u32) {
         let stage = Stage::BOTTOM_OF_PIPE;
         // SAFETY: recording; the query is in the pool and was reset at the start.

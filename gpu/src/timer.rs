@@ -1,16 +1,16 @@
-//! Where a program's time goes: a timestamp before its first step and one after each.
+//! Where a program's time goes: a timestamp before its first step and one after each step.
 
 use crate::GpuError;
 use crate::owner::Gpu;
 use ash::vk;
 
-/// The timestamps of one program. Without any where the queue has none.
+/// The timestamps of one program; none if the queue does not support them.
 pub(crate) struct Timer {
     pub pool: Option<vk::QueryPool>,
     names: Vec<&'static str>,
-    /// Ticks and availability, of the last run that finished.
+    /// Ticks and availability of the last run that finished.
     ticks: Vec<[u64; 2]>,
-    /// Room to look at a run that did not.
+    /// Room to inspect a run that did not finish.
     probe: Vec<[u64; 2]>,
 }
 
@@ -43,7 +43,7 @@ impl Timer {
         })
     }
 
-    /// The last step that a run still going on, or lost, is known to have finished.
+    /// The last step known to have finished in a run that is still in progress or was lost.
     pub fn last_finished(&mut self, gpu: &Gpu) -> Option<(usize, &'static str)> {
         gpu.timestamps(self.pool?, &mut self.probe);
         // A timestamp equal to the previous run's was not written in this one: the reset at the
@@ -55,7 +55,7 @@ impl Timer {
     }
 }
 
-/// Ticks from `start` to `end` on a counter of so many bits, which may have wrapped once.
+/// Ticks from `start` to `end` on a counter of `bits` bits, which may have wrapped once.
 fn elapsed(start: u64, end: u64, bits: u32) -> u64 {
     let mask = u64::MAX.checked_shr(64 - bits.min(64)).unwrap_or(0);
     end.wrapping_sub(start) & mask

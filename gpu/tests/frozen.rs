@@ -1,4 +1,4 @@
-//! A run allocates nothing on this side of the driver.
+//! A run allocates nothing outside the driver.
 
 mod common;
 

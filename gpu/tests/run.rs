@@ -1,4 +1,4 @@
-//! Programs do what they say, and nothing is made after set-up.
+//! Programs do what they say, and nothing is created after set-up.
 
 mod common;
 
@@ -55,7 +55,8 @@ fn upload_copy_dispatch_readback() {
     }
 }
 
-/// The device is waited for before its objects go, and nobody sees what it is still writing.
+/// The device is waited for before its objects are destroyed, and what it is still writing cannot
+/// be read.
 #[test]
 fn work_that_panics_beside_the_device() {
     let table = [
@@ -146,8 +147,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 fn movable(_: &impl Send) {}
 
-/// Two programs share buffers, and what one leaves the other finds. The filled buffer and the
-/// counter conflict within a program, which costs the only barriers.
+/// Two programs share buffers, and one finds what the other left. The only barriers are for the
+/// conflicts over the counter within the second program.
 #[test]
 fn contents_last_and_runs_make_nothing() {
     let count = kernel(

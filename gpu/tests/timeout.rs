@@ -1,4 +1,4 @@
-//! A run that takes too long is given up, for good, and without a crash.
+//! A run that takes too long is given up, permanently, and without a crash.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! The validation layer finds nothing in what the recorder makes of honest declarations, and does
-//! find something in dishonest ones.
+//! The validation layer finds nothing in what the recorder makes of correct declarations, and does
+//! find something in false ones.
 
 mod common;
 
@@ -12,7 +12,7 @@ fn options(validation: Validation) -> Options {
     Options { validation: Some(validation), ..Options::default() }
 }
 
-/// Whether the layer is there to be asked.
+/// Whether the layer is available.
 fn layer(validation: Validation) -> bool {
     let Some(probe) = present(Executor::new(&options(validation), &[], &[])) else {
         return false;
@@ -26,7 +26,7 @@ fn layer(validation: Validation) -> bool {
     }
 }
 
-/// Copies, `beyond` words ahead of itself.
+/// A copy that reads `beyond` words ahead.
 fn shift(name: &'static str, beyond: u32, bindings: &'static [Binding]) -> &'static Kernel {
     let wgsl = format!(
         "
@@ -40,7 +40,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {{
     kernel(name, &wgsl, bindings)
 }
 
-/// Every kind of step and of conflict.
+/// Every kind of step and conflict.
 fn everything(copy: &'static Kernel) -> Vec<Op> {
     let fill = |buffer, value| Op::Fill { buffer, value };
     let indirect = Op::Dispatch {
@@ -72,7 +72,7 @@ fn table() -> [raywake_gpu::Buffer; 5] {
     ]
 }
 
-/// Runs twice and returns what the layer said.
+/// Runs twice and returns the layer's messages.
 fn said(validation: Validation, ops: Vec<Op>) -> Vec<String> {
     let mut gpu = executor(&options(validation), &table(), ops).expect("there is a device");
     for _ in 0..2 {

@@ -1,4 +1,4 @@
-//! The name that programs look the shared library up by: that of its ABI.
+//! Sets the name that programs look the shared library up by: that of its ABI.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds libraywake and puts it, its header and raywake.pc below a folder:
+# Builds libraywake and installs it, its header and raywake.pc under a folder:
 #
 #     host/capi/install.sh PREFIX [TARGET]
 set -euo pipefail

@@ -1,10 +1,10 @@
-# For scripts that build for a target: `cross TARGET` adds it, and where it is of another
-# architecture has Debian's compiler for that link, unless the environment names one.
+# Sourced by scripts that build for a target: `cross TARGET` adds it and, if its architecture
+# differs, links with Debian's compiler for that, unless the environment names one.
 
 cross() {
     local architecture=${1%%-*} linker compiler
     rustup target add "$1" >&2
-    # What is C in it, the compression, uses nothing that C libraries do differently.
+    # The C code in the program, the compression, uses nothing in which C libraries differ.
     compiler=CC_${1//-/_}
     if [ "$architecture" = "$(uname -m)" ]; then
         export "$compiler=${!compiler:-cc}"
@@ -14,7 +14,7 @@ cross() {
     export "$linker=${!linker:-$architecture-linux-gnu-gcc}"
     export "$compiler=${!compiler:-${!linker}}"
     case $1 in
-        # What it links is Rust's own.
+        # It links only what Rust ships.
         *-musl) export RUSTFLAGS="${RUSTFLAGS:-} -C link-self-contained=yes" ;;
     esac
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the Debian package, with all formats, manual pages and completions, by cargo-deb. It prints
-# where that is.
+# Builds the Debian package with cargo-deb, including all formats, manual pages and completions.
+# Prints its path.
 #
 #     host/package/deb.sh [PROFILE]
 set -euo pipefail

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds the program as one file that needs nothing else, for the CPU alone: a static program cannot
-# load Vulkan. It reads KITTI's and Argoverse's drives and clouds in files, and writes tables. With
-# features for more formats it goes on after a recording over which a decoder panics, for 12 % more
-# bytes. It prints where it is.
+# Builds the program as one file without dependencies, for the CPU only: a static program cannot
+# load Vulkan. It reads KITTI and Argoverse drives and clouds in files, and writes tables. With
+# features for more formats it survives a recording on which a decoder panics, for 12 % more bytes.
+# Prints its path.
 #
 #     host/package/static.sh x86_64|aarch64 [FEATURES]
 set -euo pipefail

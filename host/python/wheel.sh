@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the wheel for Linux on an architecture, with maturin on the path:
+# Builds the wheel for Linux on the given architecture, with maturin on the path:
 #
 #     host/python/wheel.sh x86_64|aarch64 FOLDER [PROFILE]
 set -euo pipefail
@@ -13,6 +13,7 @@ if [ "$1" != "$(uname -m)" ]; then
     cross "$1-unknown-linux-gnu"
     other=(--target "$1-unknown-linux-gnu")
 fi
-# With a profile where panics unwind: a defect is an exception, not the end of the interpreter.
+# With a profile in which panics unwind: a defect raises an exception and does not end the
+# interpreter.
 maturin build --quiet --profile "${3:-library}" --manifest-path host/python/Cargo.toml \
     --target-dir target "${other[@]}" --out "$folder"

@@ -1,6 +1,6 @@
-//! The command line; the help text of a field is its documentation.
+//! The command line; the doc comment of a field is its help text.
 
-// Flattened groups and plain choices have none.
+// Flattened groups and plain choices have no doc comments.
 #![allow(missing_docs)]
 
 mod clean;
@@ -69,13 +69,13 @@ pub enum Command {
     Live(Box<LiveArgs>),
     /// Write an occupancy map of every sweep over the sensor's full range
     Map(Box<MapArgs>),
-    /// Find the poses of a recording by registration of its sweeps
+    /// Estimate the poses of a recording by registering its sweeps
     #[command(after_help = EXIT_CODES)]
     Odometry(OdometryArgs),
-    /// Run on a small simulated drive and compare with ground truth
+    /// Run on a small simulated drive and compare the result with ground truth
     #[cfg(feature = "demo")]
     Demo(DemoArgs),
-    /// Print the memory layout: every buffer, its size, and who writes and reads it
+    /// Print the memory layout: every buffer, its size, and what writes and reads it
     #[command(after_help = EXIT_CODES)]
     Budget(BudgetArgs),
     /// List Vulkan devices
@@ -89,7 +89,7 @@ pub enum Command {
     /// Print a manual page
     #[cfg(feature = "shell")]
     Man {
-        /// Command that it is about [default: all, in short]
+        /// Command to describe [default: an overview of all]
         #[arg(value_name = "COMMAND")]
         of: Option<String>,
     },
@@ -126,8 +126,9 @@ pub struct OdometryArgs {
     /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
-    /// Poses to write, for `--poses` (KITTI odometry: with `--poses-frame vehicle`): 12 numbers (a
-    /// 3x4 matrix) per line, one line per sweep; the world is the vehicle's frame at the first
+    /// Poses to write, for use with `--poses` (KITTI odometry: with `--poses-frame vehicle`): 12
+    /// numbers (a 3x4 matrix) per line, one line per sweep; the world frame is the vehicle's frame
+    /// at the first sweep
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
     #[command(flatten)]
@@ -141,37 +142,37 @@ pub struct OdometryArgs {
 pub struct Recording {
     #[command(flatten)]
     pub kind: RecordingKind,
-    /// Poses: 12 numbers (a 3x4 matrix) per line, a line per sweep from the first one on, or TUM's
-    /// time, x, y, z and quaternion; or `register` to find them by registration [default: those of
-    /// the recording; without, by registration]
+    /// Poses: 12 numbers (a 3x4 matrix) per line, one line per sweep from the first one on, or
+    /// TUM's time, x, y, z and quaternion; or `register` to estimate them by registration [default:
+    /// those of the recording; if it has none, by registration]
     #[arg(long, value_name = "FILE|register")]
     pub poses: Option<PathBuf>,
     /// Frame the poses refer to
     #[arg(long, value_name = "FRAME")]
     pub poses_frame: Option<PosesFrame>,
-    /// Use the poses even where registration of the first sweeps says that they are poor
+    /// Use the poses even if registration of the first sweeps finds them poor
     #[arg(long)]
     pub trust_poses: bool,
 }
 
-/// What a recording is.
+/// The kind of recording and how to read it.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Recording")]
 pub struct RecordingKind {
     /// Recording format [default: detected]
     #[arg(long)]
     pub format: Option<Format>,
-    /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only
-    /// one, or all lidars that /tf_static connects]. Of a pcap file: the sensor, as ADDRESS:PORT.
-    /// Of nuScenes and Waymo: the scene or segment
+    /// Point cloud topic of an MCAP recording; repeat it for several lidars [default: the only one,
+    /// or all lidars that /tf_static connects]. For a pcap file: the sensor, as ADDRESS:PORT. For
+    /// nuScenes and Waymo: the scene or segment
     #[arg(long)]
     pub topic: Vec<String>,
-    /// Where the lidars of an MCAP recording sit, in place of /tf_static, a line each:
+    /// Mounting poses of the lidars of an MCAP recording, instead of /tf_static, one per line:
     /// PARENT CHILD x y z qx qy qz qw, where CHILD is a frame or a topic
     #[arg(long, value_name = "FILE")]
     pub extrinsics: Option<PathBuf>,
-    /// Numbers of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:
-    /// x,y,z,intensity, and for .pcd.bin those of nuScenes]
+    /// Fields of a return in .bin and .npy files, for example x,y,z,intensity,ring [default:
+    /// x,y,z,intensity; for .pcd.bin, those of nuScenes]
     #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
     pub bin_fields: Option<BinFields>,
     /// Whether sweeps still contain motion distortion
@@ -181,12 +182,12 @@ pub struct RecordingKind {
     /// Ground height in the vehicle frame, m (KITTI: -1.73)
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
-    /// Box around the own vehicle in its frame, m: returns in it, at any height, are left out
+    /// Box around the own vehicle in its frame, m: returns in it, at any height, are ignored
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = vehicle_box)]
     pub own_vehicle: Option<[[f32; 2]; 2]>,
 }
 
-/// What the flow is computed with.
+/// Profile, weights and backend the flow is computed with.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct FlowChoice {
     #[command(flatten)]
@@ -207,7 +208,7 @@ pub struct ProfileChoice {
     /// Custom profile (TOML): `base = "hdl64"` and the parameters to change
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Put out as moving what moves with this probability or more (`moves_min` of PARAMETERS.md)
+    /// Report as moving what moves with at least this probability (`moves_min` in PARAMETERS.md)
     #[arg(long, value_name = "P")]
     pub moving: Option<f32>,
     /// Set a parameter of the profile, as named in PARAMETERS.md; may be repeated
@@ -224,12 +225,12 @@ pub struct Learned {
     /// Occupancy constancy weights
     #[arg(long, value_name = "FILE")]
     pub constancy: Option<PathBuf>,
-    /// Encoder weights; `none` refines without what columns are told to be
+    /// Encoder weights; `none` refines without the classes of the columns
     #[arg(long, value_name = "FILE|none")]
     pub encoder: Option<PathBuf>,
 }
 
-/// What the grid and flow stages run on.
+/// Where the grid and flow stages run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum BackendKind {
     /// The fastest Vulkan GPU, or the CPU if there is none
@@ -254,8 +255,8 @@ pub struct BackendChoice {
     /// Compute backend
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub backend: BackendKind,
-    /// Instruction set of what the CPU does: sse2 or avx2, on Arm neon; the widest that it has
-    /// unless given. Results are the same
+    /// Instruction set used on the CPU: sse2 or avx2, on Arm neon [default: the widest it has].
+    /// Results are the same
     #[arg(long, value_name = "NAME", value_parser = simd)]
     pub simd: Option<Simd>,
     /// Device index, see `raywake devices`
@@ -280,7 +281,7 @@ pub struct MapArgs {
     /// observed voxel
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Log-odds beyond this do not make a voxel's probability any surer
+    /// Clip the log-odds of a voxel to this magnitude
     #[arg(long, value_name = "NATS", default_value = "3", value_parser = nats)]
     pub clip: f32,
     /// Also draw each map from above: DIR/FRAME.png
@@ -335,7 +336,7 @@ pub struct BudgetArgs {
 }
 
 impl Selection {
-    /// The sweeps asked for of a recording of `len`.
+    /// Returns the selected sweeps of a recording of `len`.
     pub fn range(&self, len: usize) -> Result<Range<usize>, Error> {
         let range = self.sweeps.unwrap_or_default().within(len)?;
         let count = self.count.unwrap_or(range.len()).min(range.len());
@@ -344,7 +345,7 @@ impl Selection {
 }
 
 impl Recording {
-    /// For [`raywake_io::source::open`].
+    /// Options for [`raywake_io::source::open`].
     pub fn options(&self) -> OpenOptions {
         let register = self.poses.as_deref() == Some(Path::new("register"));
         OpenOptions {
@@ -358,7 +359,7 @@ impl Recording {
 }
 
 impl RecordingKind {
-    /// The same, without poses.
+    /// Options for [`raywake_io::source::open`], without poses.
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             format: self.format,

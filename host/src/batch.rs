@@ -1,10 +1,10 @@
-//! Many recordings, one after another, each with results of its own: what `--list` does.
+//! Many recordings, one after another, each with its own results: `--list`.
 //!
-//! Results of a recording lie at its path below the folder of results. A file [`DONE`] beside them
-//! tells with what they were finished: settings, weights and algorithms, and names and sizes of the
-//! recording's files. Whoever comes back, on whatever machine, leaves them as they are. A part that
-//! was interrupted goes on, as a single recording does; where two do the same one, the later is
-//! told.
+//! Results of a recording are stored at its path below the output folder. A file [`DONE`] next to
+//! them records what they were made with: settings, weights and algorithms, and names and sizes of
+//! the recording's files. Later runs, on any machine, leave finished results as they are. A
+//! recording that was interrupted is resumed, as without a list; if two processes work on the same
+//! one, the later reports an error.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -23,24 +23,24 @@ use crate::error::RunError;
 use crate::inventory::inventory;
 use crate::weight_files::WeightFiles;
 
-/// Name of the file beside results that are whole.
+/// Name of the file next to complete results.
 const DONE: &str = "done";
 
-/// The digest that `raywake demo` prints: another one where results have become others. Those of
-/// before are not taken for done then.
+/// The digest that `raywake demo` prints. It changes whenever results do, so that earlier results
+/// no longer count as done.
 pub const DEMO_DIGEST: u64 = 0x9f9e_5903_edb2_806f;
 
 /// Arguments of every command that works on a recording.
 pub struct SharedArgs<'a> {
     /// Which recordings.
     pub recordings: &'a mut Recordings,
-    /// What the flow is computed with.
+    /// Profile, weights and backend the flow is computed with.
     pub flow: &'a mut FlowChoice,
-    /// Whether errors alone are printed.
+    /// Whether only errors are printed.
     pub quiet: &'a mut bool,
 }
 
-/// [`SharedArgs`] of fields of these names.
+/// Implements `shared` for a struct with fields of these names.
 macro_rules! shared_args {
     () => {
         fn shared(&mut self) -> crate::batch::SharedArgs<'_> {
@@ -51,37 +51,37 @@ macro_rules! shared_args {
 }
 pub(crate) use shared_args;
 
-/// What is asked of a command that works on a recording.
+/// A command that works on a recording.
 pub trait RecordingCommand: Clone + Debug {
-    /// Its name.
+    /// The command's name.
     const NAME: &'static str;
 
-    /// What every such command has.
+    /// The arguments that every such command has.
     fn shared(&mut self) -> SharedArgs<'_>;
 
-    /// Where results go, unless nowhere.
+    /// Where results go, if anywhere.
     fn out(&self) -> Option<&Path>;
 
-    /// Has the results go elsewhere.
+    /// Redirects the results.
     fn set_out(&mut self, out: PathBuf);
 
-    /// An option for a single file, which many recordings cannot share, if one was given.
+    /// The option given, if any, that names a single file, which several recordings cannot share.
     fn single_file(&self) -> Option<&'static str>;
 
-    /// Does it with one recording. Returns whether it got to the end.
+    /// Runs the command on one recording. Returns whether it ran to completion.
     fn carry_out(&self) -> Result<bool, RunError>;
 }
 
-/// A recording, and where its results go, below the folder of results.
+/// A recording, and where its results go below the output folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ListedRecording {
-    /// As it is listed.
+    /// The path as listed.
     pub data: PathBuf,
-    /// The same without a root: no other's but for the case of letters.
+    /// The path without its root: unique in the list even if letter case is ignored.
     pub place: PathBuf,
 }
 
-/// What became of recordings.
+/// Outcomes of the recordings.
 #[derive(Default)]
 struct Tally {
     done: usize,
@@ -89,10 +89,10 @@ struct Tally {
     failures: Vec<RunError>,
 }
 
-/// Does it with the recording, or with those of the list. Returns whether it got to the end.
+/// Runs the command on the recording, or on each of the list. Returns whether it ran to completion.
 ///
 /// # Errors
-/// Of several that fail the first, after all others were tried.
+/// The first failure, after all others were tried.
 pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     let mut own = command.clone();
     let SharedArgs { recordings: Recordings { list, shard, .. }, quiet, .. } = own.shared();
@@ -122,10 +122,10 @@ pub fn each<C: RecordingCommand>(command: &C) -> Result<bool, RunError> {
     tally.end().map(|()| whole)
 }
 
-/// Recordings of a part of a list, and a line about them.
+/// Returns the recordings of one part of a list, and a line about them.
 ///
 /// # Errors
-/// The list has what is no recording's path, or two whose results would be in each other's way.
+/// A path in the list does not exist, or the results of two recordings would collide.
 pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String), Error> {
     let Shard { index, of } = shard;
     let all = listed(list)?;
@@ -136,7 +136,7 @@ pub fn part(list: &Path, shard: Shard) -> Result<(Vec<ListedRecording>, String),
 }
 
 impl Tally {
-    /// One recording. Returns what is to be said of it.
+    /// Processes one recording. Returns a message about it, if any.
     fn one(
         &mut self,
         command: &impl RecordingCommand,
@@ -152,7 +152,7 @@ impl Tally {
             }
             Err(e) => {
                 let (text, path) = (e.to_string(), at.data.display().to_string());
-                // Most say where they are from.
+                // Most messages name the recording.
                 warn(&if text.contains(&path) { text } else { format!("{path}: {text}") });
                 self.failures.push(e);
             }
@@ -179,7 +179,7 @@ fn command_for<C: RecordingCommand>(command: &C, at: &ListedRecording) -> C {
     one
 }
 
-/// Does it unless it was done before: then there is none. Returns whether it got to the end.
+/// Runs the command unless that was done before (`None`). Returns whether it ran to completion.
 fn finish(
     command: &impl RecordingCommand,
     data: &Path,
@@ -200,8 +200,8 @@ fn finish(
     Ok(Some(whole))
 }
 
-/// With what results are made, but for the recording: part of a line. Fails where nothing can be
-/// made with that.
+/// Identifies what results are made with, apart from the recording: part of a line. Fails if the
+/// settings or weights are invalid.
 fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     let mut plain = command.clone();
     plain.set_out(PathBuf::new());
@@ -216,7 +216,7 @@ fn seal<C: RecordingCommand>(command: &C) -> Result<String, Error> {
     Ok(format!("raywake {version} {} {digest:016x}", C::NAME))
 }
 
-/// Recordings of a list: a path a line; empty lines and those that begin with `#` count for none.
+/// Recordings of a list: one path per line; empty lines and those that begin with `#` are skipped.
 fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
     let text = read_text(list)?;
     let mut places = BTreeMap::new();
@@ -232,7 +232,7 @@ fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
         if let Err(e) = data.metadata() {
             return Err(wrong(&e.to_string()));
         }
-        // File systems there are to which letters of both cases are one.
+        // Some file systems ignore case.
         let key = place.display().to_string().to_lowercase();
         if let Some(other) = places.insert(key, n) {
             let what = format!("its results would replace those of line {other}");
@@ -244,7 +244,7 @@ fn listed(list: &Path) -> Result<Vec<ListedRecording>, Error> {
     Ok(found)
 }
 
-/// Fails where results of one recording would lie within those of another.
+/// Fails if results of one recording would lie within those of another.
 fn apart(list: &Path, places: &BTreeMap<String, usize>) -> Result<(), Error> {
     for (place, line) in places {
         for above in Path::new(place).ancestors().skip(1) {
@@ -257,7 +257,7 @@ fn apart(list: &Path, places: &BTreeMap<String, usize>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Where results of a recording go: its path, without a root. None where that leads upwards.
+/// Where results of a recording go: its path without the root. `None` if that leads upwards.
 fn place(data: &Path) -> Option<PathBuf> {
     let mut place = PathBuf::new();
     for part in data.components() {
@@ -308,7 +308,7 @@ mod tests {
         }
     }
 
-    /// Notes what it is asked to do; fails where the recording is called `c`.
+    /// Records each call; fails if the recording is called `c`.
     #[derive(Clone, Debug)]
     struct Noted {
         recordings: Recordings,
@@ -376,14 +376,14 @@ mod tests {
         assert_eq!(names.clone().map(|name| times(&name)), [1, 1, 1, 1, 1]);
         command.recordings.shard = Some(Shard { index: 900, of: 1000 });
         assert!(matches!(each(&command), Ok(true)));
-        // Other settings are other work; what failed is tried again.
+        // Other settings are new work; failures are tried again.
         command.recordings.shard = None;
         command.flow.profile.moving = Some(0.4);
         assert_eq!(each(&command).unwrap_err().exit_code(), 3);
         command.flow.backend.simd = Some(raywake_simd::Simd::BASELINE);
         assert!(each(&command).is_err());
         assert_eq!(names.clone().map(|name| times(&name)), [2, 2, 3, 2, 2]);
-        // So is a recording that has become another.
+        // So is a recording that has changed.
         fs::write(names[0].join("more"), "x").unwrap();
         assert!(each(&command).is_err());
         assert_eq!(names.map(|name| times(&name)), [3, 2, 4, 2, 2]);

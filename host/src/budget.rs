@@ -1,4 +1,4 @@
-//! Every byte a run takes, known before its first sweep: `raywake budget` and `memory-layout.md`.
+//! Every byte a run uses, known before its first sweep: `raywake budget` and `memory-layout.md`.
 
 mod markdown;
 mod parameters;
@@ -32,18 +32,18 @@ use serde::Serialize;
 pub use markdown::memory_layout;
 pub use parameters::parameters;
 
-/// Every buffer begins at a multiple of this, bytes; of more where the device asks for it.
+/// Every buffer begins at a multiple of this, bytes, or of more if the device requires it.
 pub const ALIGNMENT: u64 = 16;
 
 const HEAPS: [Heap; 3] = [Heap::Upload, Heap::Device, Heap::Readback];
 
-/// The profiles `memory-layout.md` is about.
+/// The profiles described in `memory-layout.md`.
 pub fn shipped() -> Vec<Profile> {
     Profile::shipped().into_iter().chain([Profile::map()]).collect()
 }
 
-/// `raywake budget`: the layout of a profile, of all shipped ones where none is named. Fails where
-/// one of them takes more than the limit.
+/// `raywake budget`: the layout of a profile, or of all shipped ones if none is named. Fails if one
+/// of them needs more than the limit.
 pub fn budget(args: &args::BudgetArgs) -> Result<(), RunError> {
     if args.parameters {
         say(false, &parameters())?;
@@ -59,7 +59,7 @@ pub fn budget(args: &args::BudgetArgs) -> Result<(), RunError> {
     }
 }
 
-/// What a profile takes, as JSON has it.
+/// The memory of a profile, for JSON.
 #[derive(Serialize)]
 struct ProfileBudget {
     profile: String,
@@ -93,7 +93,7 @@ fn json(profiles: &[Profile]) -> Result<String, Error> {
     console::json(&profiles.iter().map(of).collect::<Vec<_>>())
 }
 
-/// The profiles asked for. `map` is one here only: nothing but `raywake map` runs on it.
+/// The profiles asked for. `map` counts as one only here: nothing but `raywake map` uses it.
 fn profiles(choice: &args::ProfileChoice) -> Result<Vec<Profile>, Error> {
     let map = Profile::map();
     match (&choice.profile, &choice.config) {
@@ -126,16 +126,16 @@ pub fn device_bytes(profile: &Profile) -> u64 {
 /// A part of the host's memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// What it is.
+    /// Description.
     pub name: &'static str,
-    /// The type it is made of.
+    /// The type it consists of.
     pub kind: &'static str,
     /// Its size.
     pub bytes: u64,
 }
 
-/// The parts of the host's memory held throughout a run; the scalar backend has its buffers there
-/// too. Sweeps grow to the largest one read; they are taken to be at the capacity.
+/// The parts of the host's memory held throughout a run, including the buffers of the scalar
+/// backend. Sweeps grow to the largest one read; they are counted at full capacity.
 pub fn host_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     if is_map(profile) { map_parts(profile, scalar) } else { flow_parts(profile, scalar) }
 }
@@ -169,7 +169,7 @@ fn flow_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     parts
 }
 
-/// [`host_parts`] of `raywake map`. Its scalar backend has no more than the device's buffers.
+/// [`host_parts`] of `raywake map`. Its scalar backend has no buffers beyond the device's.
 fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     let mut parts = vec![
         part("mapper", "Mapper", size_of::<Mapper>()),
@@ -184,8 +184,8 @@ fn map_parts(profile: &Profile, scalar: bool) -> Vec<Part> {
     parts
 }
 
-/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run; the last
-/// is in place of all others on board.
+/// What `raywake track` holds besides two sweeps and, with the flow, the parts of a run; on board,
+/// the last one replaces all others.
 pub fn track_parts() -> Vec<Part> {
     let on_board = part("objects on board", "ObjectTracker", size_of::<ObjectTracker>());
     let parts = Tracker::parts().map(|(name, kind, bytes)| part(name, kind, bytes));
@@ -197,7 +197,7 @@ pub fn host_bytes(profile: &Profile, scalar: bool) -> u64 {
     host_parts(profile, scalar).iter().map(|p| p.bytes).sum()
 }
 
-/// What a run takes, for the head of its report.
+/// A run's backend and its memory and time budgets, for the head of its report.
 pub fn paragraph(profile: &Profile, drive: &Drive, filter: &str) -> String {
     let backend = drive.backend();
     let scalar = matches!(backend, Backend::Scalar(_));

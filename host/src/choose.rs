@@ -1,4 +1,4 @@
-//! Which backend a run gets, and `raywake devices`.
+//! The choice of backend for a run, and `raywake devices`.
 
 use raywake_core::params::Profile;
 use raywake_core::sweep::Rig;
@@ -16,25 +16,25 @@ use crate::weight_files::WeightFiles;
 use raywake_io::Error;
 use serde::Serialize;
 
-/// The pipeline on a backend, everything allocated.
+/// The pipeline on a backend, with everything allocated.
 pub struct Chosen {
     /// The pipeline.
     pub drive: Drive,
     /// Where the background filter comes from.
     pub filter: String,
-    /// Why it is not on a device where one might be expected, for the user.
+    /// A note to the user on why it is not on a device, if one might be expected.
     pub note: Option<String>,
 }
 
 /// Where the grid and flow stages are to run.
 pub struct Wanted {
-    /// How to run on a device; none: on the CPU.
+    /// How to run on a device; `None` for the CPU.
     pub device: Option<Options>,
-    /// Why it is not a device where one might be expected.
+    /// Why it is not a device, if one might be expected.
     pub note: Option<String>,
 }
 
-/// Makes the pipeline for a rig on the backend asked for.
+/// Creates the pipeline for a rig on the backend asked for.
 pub fn drive(
     choice: &BackendChoice,
     weights: &WeightFiles,
@@ -74,7 +74,7 @@ pub fn wanted(choice: &BackendChoice) -> Result<Wanted, Error> {
     })
 }
 
-/// Why `auto` finds no device; none where there is one.
+/// Why `auto` finds no device; `None` if there is one.
 fn no_device() -> Option<String> {
     match devices() {
         Ok(list) if list.iter().any(|d| usable(d) && d.kind != DeviceKind::Cpu) => None,
@@ -95,7 +95,7 @@ fn options(choice: &BackendChoice) -> Options {
     Options { device: choice.device, validation, timeout: choice.timeout }
 }
 
-/// A device as JSON has it.
+/// A device, for JSON.
 #[derive(Serialize)]
 struct ListedDevice {
     index: usize,
@@ -103,7 +103,7 @@ struct ListedDevice {
     kind: &'static str,
     vulkan: String,
     driver: String,
-    /// Features that it would need to be usable.
+    /// Features it lacks to be usable.
     missing: Vec<String>,
 }
 
@@ -120,7 +120,7 @@ impl ListedDevice {
     }
 }
 
-/// The table of Vulkan devices, or why there is none; or a list of them as JSON.
+/// Returns a table of the Vulkan devices, or why there are none; or a list of them as JSON.
 pub fn list_devices(json: bool) -> Result<String, RunError> {
     match devices() {
         Ok(list) if json => listed(&list),
@@ -155,15 +155,16 @@ fn table(list: &[DeviceInfo]) -> String {
     rows.iter().map(line).chain(of_cpu).chain(of_mesa).collect()
 }
 
-/// Of devices that are CPUs.
+/// Printed below a table that contains CPUs.
 const CPU_NOTE: &str =
     "A CPU stands in for a GPU in tests: the scalar backend finds the same flow in less time.\n";
 
-/// Older versions of Mesa read memory lane by lane without AVX-512: 22.3.6 does, 25.0.7 does not.
+/// First major version of Mesa taken to gather. Without AVX-512, older ones read memory lane by
+/// lane: 22.3.6 does, 25.0.7 does not.
 const GATHERING_MESA: u32 = 23;
 
-/// Of an older Mesa. A sweep of KITTI drive 0005 takes 125 ms with 22.3.6, 63 with 25.0.7 and 32
-/// with the scalar backend (2 cores of an AMD EPYC, Zen 3, medians of 5 to 11 runs).
+/// The note on an older Mesa. A sweep of KITTI drive 0005 takes 125 ms with 22.3.6, 63 with 25.0.7
+/// and 32 with the scalar backend (2 cores of an AMD EPYC, Zen 3, medians of 5 to 11 runs).
 fn of_old_mesa(version: &str) -> String {
     format!(
         "Mesa {version} reads memory lane by lane where the processor has no AVX-512: with 25.0.7 \
@@ -171,7 +172,7 @@ fn of_old_mesa(version: &str) -> String {
     )
 }
 
-/// The version in a driver's description of llvmpipe, if that is so old.
+/// The Mesa version in a driver description of llvmpipe, if it is that old.
 fn old_mesa(driver: &str) -> Option<&str> {
     let (_, of_mesa) = driver.strip_prefix("llvmpipe")?.split_once("Mesa ")?;
     let version = of_mesa.split(' ').next()?;

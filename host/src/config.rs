@@ -1,4 +1,4 @@
-//! Profiles: built-in ones, or files named on the command line.
+//! Profiles: built in, or from files named on the command line.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -12,14 +12,14 @@ use crate::args::ProfileChoice;
 use raywake_io::Error;
 use raywake_io::source::whole::read_text;
 
-/// The group of the parameters of tracking, which has groups of its own.
+/// The group of the tracking parameters, which has groups of its own.
 const OBJECTS: &str = "objects";
 
-/// All that can be set.
+/// Everything that can be set.
 pub struct Settings {
-    /// The flow.
+    /// Flow parameters.
     pub profile: Profile,
-    /// Tracks of objects.
+    /// Object tracking parameters.
     pub objects: TrackingParams,
 }
 
@@ -29,17 +29,17 @@ impl Settings {
     }
 }
 
-/// The profile asked for, checked. Errors name the file, and the key in it.
+/// Returns the profile asked for, checked. Errors name the file and the key in it.
 pub fn profile(choice: &ProfileChoice) -> Result<Profile, Error> {
     settings(choice).map(|settings| settings.profile)
 }
 
-/// The same with the parameters of tracking.
+/// As [`profile`], with the tracking parameters.
 pub fn settings(choice: &ProfileChoice) -> Result<Settings, Error> {
     settings_over(choice, TrackingParams::DEFAULT)
 }
 
-/// The same where tracking starts from these parameters instead of the defaults.
+/// As [`settings`], with tracking parameters that start from these instead of the defaults.
 pub fn settings_over(choice: &ProfileChoice, objects: TrackingParams) -> Result<Settings, Error> {
     let mut settings = match (&choice.config, &choice.profile) {
         (Some(path), _) => parse(path, &read_text(path)?, objects)?,
@@ -71,13 +71,13 @@ fn assign(settings: &mut Settings, assignment: &str) -> Result<(), String> {
     let to = ParameterSetting::parse(assignment).ok_or("NAME=VALUE is needed")?;
     set(settings, &to)?;
     if to.group != Some(OBJECTS) && !settings.profile.name.ends_with('*') {
-        // Where there is no room for it, the name stays.
+        // If there is no room for it, the name stays as it is.
         let _ = settings.profile.name.push('*');
     }
     Ok(())
 }
 
-/// Sets a parameter of a group, or of the one that has it. Parameters have different names.
+/// Sets a parameter of the given group or, without one, of the group that has it. Names are unique.
 fn set(s: &mut Settings, to: &ParameterSetting) -> Result<(), String> {
     let ParameterSetting { group, name, value } = *to;
     if group == Some(OBJECTS) {
@@ -92,7 +92,7 @@ fn set(s: &mut Settings, to: &ParameterSetting) -> Result<(), String> {
     })
 }
 
-/// Sets a parameter of tracking by `name` or `group.name`.
+/// Sets a tracking parameter by `name` or `group.name`.
 fn set_of_objects(objects: &mut TrackingParams, path: &str, value: Value) -> Result<(), String> {
     let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
     let mut found = Vec::new();
@@ -158,7 +158,7 @@ fn parse(path: &Path, text: &str, objects: TrackingParams) -> Result<Settings, E
     Ok(settings)
 }
 
-/// The value of a parameter as it stands in a file.
+/// The value of a parameter as given in a file.
 fn value_of<'a>(value: &'a DeValue) -> Option<Value<'a>> {
     match value {
         DeValue::String(word) => Some(Value::Word(word)),

@@ -1,4 +1,4 @@
-//! The user's terminal: what a command says, and the signals that interrupt it.
+//! The user's terminal: what a command prints, and the signals that interrupt it.
 
 use std::io::{self, Write};
 #[cfg(unix)]
@@ -11,23 +11,23 @@ use raywake_io::Error;
 use raywake_io::sink::bag::BagSink;
 use serde::Serialize;
 
-/// How often it is asked whether a viewer is there.
+/// How often to check for a viewer.
 const VIEWER_POLL: Duration = Duration::from_millis(20);
 
-/// Exit code of a process ended by SIGINT, as shells have it.
+/// Exit code of a process ended by SIGINT, by shell convention.
 pub const INTERRUPTED_CODE: u8 = 130;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Whether a signal came.
+/// Returns whether a signal has been received.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// From now on SIGINT and SIGTERM end a command after the sweep in hand, and a second one at once:
-/// a disk that does not answer may hold up the sweep for ever.
+/// From now on SIGINT and SIGTERM end a command after the current sweep, and a second signal ends
+/// it at once: a disk that does not respond may block the sweep forever.
 pub fn listen() {
-    // Fails where a handler is there already: another run's, which sets the same flag.
+    // Fails if a handler is already installed: another run's, which sets the same flag.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
             process::exit(INTERRUPTED_CODE.into());
@@ -35,15 +35,15 @@ pub fn listen() {
     });
 }
 
-/// From now on a file that would grow beyond what the process may write is an error in writing it,
-/// not the end of the process.
+/// From now on a file that would exceed the process's file size limit is a write error, not the end
+/// of the process.
 #[cfg(unix)]
 pub fn survive_file_limits() {
-    // A signal that cannot be caught ends it as before.
+    // If the signal cannot be caught, it ends the process as before.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// Prints to standard output unless quiet. A reader that has gone away is not an error.
+/// Prints to standard output unless quiet. A closed pipe is not an error.
 pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
     if quiet {
         return Ok(());
@@ -57,18 +57,18 @@ pub fn say(quiet: bool, text: &str) -> Result<(), Error> {
     }
 }
 
-/// Tells of what went wrong.
+/// Reports a problem on standard error.
 pub fn warn(text: &str) {
-    // Nobody is left to tell where standard error is closed.
+    // If standard error is closed, nobody is left to report to.
     let _ = writeln!(io::stderr(), "raywake: {text}");
 }
 
-/// Prints what the user should know, a line each.
+/// Prints notes to the user, one per line.
 pub fn note<'a>(quiet: bool, notes: impl IntoIterator<Item = &'a String>) -> Result<(), Error> {
     notes.into_iter().try_for_each(|note| say(quiet, &format!("note: {note}\n")))
 }
 
-/// Waits until a viewer sees what is sent to viewers, or a signal comes.
+/// Waits until a viewer has connected, or a signal is received.
 pub fn await_viewer(quiet: bool, sink: Option<&BagSink>) -> Result<(), Error> {
     let is_watched = || sink.is_none_or(BagSink::is_watched);
     if !is_watched() {
@@ -81,7 +81,7 @@ pub fn await_viewer(quiet: bool, sink: Option<&BagSink>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Bytes in the unit that suits them.
+/// Formats bytes in a suitable unit.
 pub fn bytes(bytes: u64) -> String {
     match bytes {
         0..10_000 => format!("{bytes} B"),
@@ -90,7 +90,7 @@ pub fn bytes(bytes: u64) -> String {
     }
 }
 
-/// What is to be read by programs, as lines of JSON.
+/// Formats output for programs as pretty-printed JSON.
 pub fn json(what: &impl Serialize) -> Result<String, Error> {
     let text = serde_json::to_string_pretty(what);
     Ok(text.map_err(|e| Error::Unsupported(format!("no JSON: {e}")))? + "\n")

@@ -1,4 +1,4 @@
-//! Files of text, damaged at random, for tests of what reads them.
+//! Randomly damaged text files, for tests of their parsers.
 
 #[path = "../../core/src/random.rs"]
 #[allow(dead_code)]
@@ -6,7 +6,7 @@ mod random;
 
 use random::Random;
 
-/// What readers have stumbled over.
+/// Tokens that parsers tend to stumble over.
 const TOKENS: [&str; 16] = [
     "nan",
     "-inf",
@@ -26,8 +26,8 @@ const TOKENS: [&str; 16] = [
     "é\u{0}",
 ];
 
-/// Damages a text so often: `read`, which says whether it could be read, must neither panic nor
-/// always say the same.
+/// Damages a text this many times: `read`, which returns whether it could be read, must neither
+/// panic nor always return the same.
 pub fn check(text: &str, times: usize, read: impl Fn(&str) -> bool) {
     assert!(read(text), "whole it is read");
     let mut random = Random(20);
@@ -46,7 +46,7 @@ fn damage(text: &mut Vec<char>, random: &mut Random) {
     let at = random.below(text.len().max(1));
     let end = (at + random.below(20)).min(text.len());
     match random.below(4) {
-        // Numbers in place of numbers reach furthest.
+        // Numbers replaced by numbers get furthest.
         0 => {
             let digits = text.iter().skip(at).take_while(|c| c.is_ascii_digit()).count();
             text.splice(at..at + digits, TOKENS[random.below(TOKENS.len())].chars());

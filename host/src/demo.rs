@@ -1,4 +1,4 @@
-//! `raywake demo`: a small simulated drive, and how far the flow is from its truth.
+//! `raywake demo`: a small simulated drive, and the error of its flow.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -21,7 +21,7 @@ use raywake_io::sink::streams::StreamTargets;
 use raywake_io::source::simulated::Simulated;
 use raywake_io::source::{Source, SweepData};
 
-/// Observations of a tracklet before its velocity is compared with the truth.
+/// Minimum observations of a tracklet for its velocity to be compared with the truth.
 const AGE: u32 = 5;
 /// Objects slower than this do not count as moving, m/s.
 const MOVING_MPS: f32 = 1.0;
@@ -51,7 +51,7 @@ pub fn demo(args: &DemoArgs) -> Result<RunSummary, RunError> {
     Ok(summary)
 }
 
-/// All that this build can write.
+/// Everything this build can write.
 fn files(out: &Path) -> RunFiles {
     let png = |name: &str| cfg!(feature = "png").then(|| out.join(name));
     RunFiles {
@@ -65,14 +65,15 @@ fn files(out: &Path) -> RunFiles {
     }
 }
 
-/// True velocities of moving objects by cell of the world.
+/// True velocities of moving objects by world cell.
 struct VelocityField {
     sums: HashMap<[i64; 2], ([f32; 2], f32)>,
     cell_m: f64,
 }
 
 impl VelocityField {
-    /// From the returns of a sweep, each at the place where the vehicle was at its time.
+    /// Creates the field from the returns of a sweep, each placed by the vehicle's pose at its
+    /// time.
     fn new(source: &Simulated, sweep: &SweepData, truth: &[Truth], cell_m: f64) -> VelocityField {
         let mut field = VelocityField { sums: HashMap::new(), cell_m };
         for (point, truth) in sweep.points.iter().zip(truth) {
@@ -93,14 +94,14 @@ impl VelocityField {
         place.map(|v| (v / self.cell_m).floor() as i64)
     }
 
-    /// Mean velocity of what moves in the cell of a column.
+    /// Mean velocity of the moving returns in the cell of a column.
     fn at(&self, column: &ColumnFlow) -> Option<[f32; 2]> {
         let (sum, count) = self.sums.get(&self.cell(column.position_world_m))?;
         Some(sum.map(|v| v / count))
     }
 }
 
-/// How far velocities are from the truth.
+/// Errors of velocities.
 #[derive(Default)]
 struct SpeedErrors {
     speed_mps: Vec<f64>,
@@ -108,7 +109,7 @@ struct SpeedErrors {
 }
 
 impl SpeedErrors {
-    /// Matched columns of moving objects whose tracklet is old enough.
+    /// Adds matched columns of moving objects whose tracklet is old enough.
     fn add(&mut self, truth: &VelocityField, flows: &PairFlows) {
         let old = |c: &&ColumnFlow| c.basis == FlowBasis::Matched && c.age >= AGE;
         for column in flows.columns.iter().filter(old) {

@@ -1,5 +1,5 @@
-//! One sweep through figure 3.1 on the chosen backend. Nothing in a step allocates, but where a
-//! device fails and the CPU takes its place.
+//! One sweep through figure 3.1 on the chosen backend. A step allocates nothing, except when a
+//! device fails and the CPU takes over.
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::{ColumnFlow, Output, ReturnFlow, SweepOutput, TrackletState};
@@ -18,15 +18,15 @@ use crate::error::RunError;
 use crate::laps::Laps;
 use crate::team::ThreadTeam;
 
-/// The pipeline with its backend and the storage of its results. Nothing is allocated once it is
-/// made, unless a device fails.
+/// The pipeline with its backend and the storage of its results. Once created, it allocates nothing
+/// unless a device fails.
 pub struct Drive {
     parts: Sealed<Parts>,
     spare: Option<Spare>,
     failover: Option<Failover>,
 }
 
-/// What the scalar backend would be made of, should the device fail.
+/// What is needed to create the scalar backend should the device fail.
 struct Spare {
     profile: Profile,
     rig: Rig,
@@ -34,7 +34,8 @@ struct Spare {
     team: ThreadTeam,
 }
 
-/// What came of a device that failed: it is kept, as waiting for its end may take long.
+/// The replacement of a device that failed. The device itself is kept, as waiting for it to finish
+/// may take long.
 struct Failover {
     failure: GpuError,
     parts: Sealed<Parts>,
@@ -49,21 +50,21 @@ struct Parts {
     points: Vec<ReturnFlow>,
 }
 
-/// Room for columns that are put out.
+/// Capacity for output columns.
 fn solid(profile: &Profile) -> usize {
     profile.columns().min(SOLID_MAX)
 }
 
-/// What one sweep yields, and how long it took.
+/// The output of one sweep, and its timing.
 pub struct Stepped<'a> {
-    /// What comes out.
+    /// The output.
     pub output: SweepOutput<'a>,
-    /// Time of every stage.
+    /// Time of each stage.
     pub laps: Laps,
 }
 
 impl Drive {
-    /// Allocates for a checked profile. `simd` as of [`ThreadTeam::new`].
+    /// Allocates for a checked profile. `simd` is as in [`ThreadTeam::new`].
     pub fn new(
         profile: &Profile,
         rig: &Rig,
@@ -75,7 +76,7 @@ impl Drive {
         Drive { parts, spare: None, failover: None }
     }
 
-    /// The same, with the scalar backend to go on with where a device fails.
+    /// The same, with the scalar backend to fall back on if the device fails.
     pub fn with_spare(self, tables: Tables) -> Drive {
         let Setup { profile, rig, .. } = &self.parts.setup;
         let (profile, rig) = (profile.clone(), rig.clone());
@@ -84,31 +85,31 @@ impl Drive {
         Drive { spare: on_device.then_some(spare), ..self }
     }
 
-    /// Bytes of host memory held for a profile, the backend's apart.
+    /// Bytes of host memory held for a profile, excluding the backend's.
     pub fn bytes(profile: &Profile) -> usize {
         size_of::<Pipeline>()
             + solid(profile) * size_of::<ColumnFlow>()
             + profile.returns() * size_of::<ReturnFlow>()
     }
 
-    /// The backend, that of the device where it has failed.
+    /// The original backend, even if its device has failed.
     pub fn backend(&self) -> &Backend {
         &self.parts.backend
     }
 
-    /// How the device failed, where the scalar backend has taken its place.
+    /// How the device failed, if the scalar backend has taken over.
     pub fn failure(&self) -> Option<&GpuError> {
         self.failover.as_ref().map(|failover| &failover.failure)
     }
 
-    /// One sweep. `before` holds the points of the sweep before, whose flow comes back.
+    /// Processes one sweep. `before` holds the points of the sweep before, whose flow is returned.
     ///
-    /// Where the device fails and there is a spare, the user is told and the sweep is done again by
-    /// the scalar backend, as the first one.
+    /// If the device fails and there is a spare, the user is warned and the sweep is processed
+    /// again by the scalar backend, as the first one.
     ///
     /// # Errors
     /// [`RunError::Device`] without a spare, after which every later step fails;
-    /// [`RunError::Allocation`], after which the next sweep may be given.
+    /// [`RunError::Allocation`], after which the next sweep may be passed in.
     pub fn step<'a>(
         &'a mut self,
         sweep: &Sweep,
@@ -119,10 +120,10 @@ impl Drive {
         Ok(Stepped { output, laps })
     }
 
-    /// The same, with somebody else to keep the times of the stages.
+    /// As [`Drive::step`], with the stages timed by the caller's timer.
     ///
     /// # Errors
-    /// As above.
+    /// As for [`Drive::step`].
     pub fn step_timed<'a>(
         &'a mut self,
         sweep: &Sweep,
@@ -143,17 +144,17 @@ impl Drive {
         }
     }
 
-    /// Those that are in use.
+    /// The parts in use.
     fn active(&self) -> &Parts {
         self.failover.as_ref().map_or(&self.parts, |failover| &failover.parts)
     }
 
-    /// The instructions that the CPU's part of a step uses.
+    /// The instruction set used by the CPU's part of a step.
     pub fn simd(&self) -> Simd {
         self.parts.team.simd()
     }
 
-    /// Whether columns and returns come with a class.
+    /// Whether columns and returns are classified.
     pub fn tells_classes(&self) -> bool {
         self.active().pipeline.encoder.is_on()
     }
@@ -180,7 +181,7 @@ impl Parts {
         backend: Backend,
         team: ThreadTeam,
     ) -> Sealed<Parts> {
-        // A constant is written to its place: by way of the stack it would need 30 MiB of it.
+        // A constant is written in place; via the stack it would need 30 MiB of it.
         let mut pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
         pipeline.encoder.set_weights(tables.encoder.as_deref());
         let parts = Parts {
@@ -201,7 +202,7 @@ impl Parts {
     }
 }
 
-/// One sweep by some parts.
+/// Processes one sweep with the given parts.
 fn step<'a>(
     parts: &'a mut Sealed<Parts>,
     sweep: &Sweep,

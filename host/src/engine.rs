@@ -1,4 +1,4 @@
-//! `raywake run` and what works like it: a source through the pipeline, its results to files.
+//! `raywake run` and similar commands: a source through the pipeline, its results to files.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -30,11 +30,11 @@ use crate::weight_files::WeightFiles;
 use raywake_gpu::GpuError;
 use raywake_io::source::{Source, SweepData};
 
-/// What is to be done with a source.
+/// What to do with a source.
 pub struct RunPlan<'a> {
-    /// Checked.
+    /// The profile, checked.
     pub profile: Profile,
-    /// Read and checked.
+    /// The weights, read and checked.
     pub weights: WeightFiles,
     /// Where the heavy half runs.
     pub backend: &'a BackendChoice,
@@ -42,9 +42,9 @@ pub struct RunPlan<'a> {
     pub sweeps: Range<usize>,
     /// Where results go.
     pub files: RunFiles,
-    /// File for the figures; in the folder of the results where none is named.
+    /// File for the figures; by default in the output folder.
     pub summary: Option<PathBuf>,
-    /// Errors only.
+    /// Print errors only.
     pub quiet: bool,
 }
 
@@ -52,21 +52,21 @@ pub struct RunPlan<'a> {
 pub struct Pair<'a> {
     /// Index of the first sweep in the source.
     pub index: usize,
-    /// The first sweep, whose flow it is.
+    /// The first sweep, which the flow belongs to.
     pub first: &'a SweepData,
     /// The second sweep.
     pub second: &'a SweepData,
     /// Flow of the first sweep.
     pub flows: &'a PairFlows<'a>,
-    /// Time of every stage.
+    /// Time of each stage.
     pub laps: &'a Laps,
 }
 
-/// Sees every pair.
+/// Called with every pair.
 pub type Observer<'a, S> = &'a mut dyn FnMut(&S, &Pair);
 
-/// Runs to the end, or to a signal: then the sweep in hand is finished and the summary says so.
-/// After an error the files already written stay.
+/// Runs to the end, or to a signal: then the current sweep is finished and the summary says so.
+/// After an error the files already written remain.
 pub fn execute<S: Source + ?Sized>(
     plan: &RunPlan,
     source: &mut S,
@@ -83,7 +83,7 @@ pub fn execute<S: Source + ?Sized>(
         objects: None,
         weights: &plan.weights.digest(),
     };
-    // After all that can be wrong, and before anything there is replaced.
+    // After all checks, and before anything there is replaced.
     let _claim = made.claim(root)?;
     let figures = FiguresFile::create(plan.summary.as_deref(), root)?;
     let outputs = Outputs::create(&plan.files, source.overview(), plan.sweeps.len(), profile)?;
@@ -127,13 +127,13 @@ pub fn execute<S: Source + ?Sized>(
     Ok(summary)
 }
 
-/// Bytes of host memory that are held for a pipeline: where its device failed, for both backends.
+/// Bytes of host memory held for a pipeline; if its device failed, for both backends.
 fn host_bytes(drive: &Drive, profile: &Profile) -> u64 {
     budget::host_bytes(profile, matches!(drive.backend(), Backend::Scalar(_)))
         + drive.failure().map_or(0, |_| budget::host_bytes(profile, true))
 }
 
-/// A run under way.
+/// A run in progress.
 struct Running {
     drive: Drive,
     outputs: Outputs,

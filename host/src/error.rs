@@ -1,40 +1,40 @@
-//! What can end a command, and the exit code of each.
+//! The errors that end a command, and their exit codes.
 
 use crate::console;
 use raywake_alloc_guard::Allocation;
 use raywake_gpu::GpuError;
 use raywake_io::Error;
 
-/// A failure of a command: of a file, of the device, or of a limit.
+/// A failure of a command: a file, the device, or a limit.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// A file, or a request that does not fit together.
+    /// A file, or inconsistent arguments.
     #[error(transparent)]
     Io(#[from] Error),
     /// The Vulkan device, or the lack of one.
     #[error("{}", device(.0))]
     Device(#[from] GpuError),
-    /// Memory allocated within a sweep.
+    /// Memory was allocated within a sweep.
     #[error("a defect of this program: {0}")]
     Allocation(#[from] Allocation),
-    /// More memory than the system gives.
+    /// More memory than the system provides.
     #[error("{} needed, which the system does not give", console::bytes(*.bytes))]
     NoMemory {
-        /// What is needed, bytes.
+        /// Bytes needed.
         bytes: u64,
     },
-    /// More memory than the user allows.
+    /// More memory than the user's limit.
     #[error("{} needed, over the limit of {}", console::bytes(*.bytes), console::bytes(*.limit))]
     OverBudget {
-        /// What is needed, bytes.
+        /// Bytes needed.
         bytes: u64,
-        /// What is allowed, bytes.
+        /// Bytes allowed.
         limit: u64,
     },
 }
 
 impl RunError {
-    /// Exit code of the process: those of [`Error`], 5 for the device, 6 for memory over a limit
+    /// Exit code of the process: that of [`Error`], 5 for the device, 6 for memory over the limit
     /// or refused, 7 for memory allocated within a sweep.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -46,7 +46,7 @@ impl RunError {
     }
 }
 
-/// The text of a device's error, with a way out where there is no device.
+/// The text of a device error, with advice if there is no device.
 fn device(e: &GpuError) -> String {
     match e {
         GpuError::NoLoader | GpuError::NoDevice => {

@@ -1,4 +1,4 @@
-//! The file of a command's figures: `--summary FILE`, or `summary.json` among the results.
+//! The file with a command's figures: `--summary FILE`, or `summary.json` among the results.
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
@@ -13,11 +13,11 @@ use serde::Serialize;
 pub struct FiguresFile(Option<PathBuf>);
 
 impl FiguresFile {
-    /// `named` by the user, else in the folder `out`. Makes the folder, so that a wrong path shows
-    /// before the first sweep.
+    /// `named` by the user, otherwise in the folder `out`. Creates the folder, so that a wrong path
+    /// fails before the first sweep.
     pub fn create(named: Option<&Path>, out: Option<&Path>) -> Result<FiguresFile, Error> {
         let path = named.map(Path::to_path_buf).or(out.map(|out| out.join("summary.json")));
-        // That of an earlier run would vouch for this one, should this one fail.
+        // The file of an earlier run would pass for this one's, should this run fail.
         if let Some(old) = path.as_deref().filter(|p| p.is_file()) {
             fs::remove_file(old).map_err(Error::writing(old))?;
         }
@@ -31,8 +31,8 @@ impl FiguresFile {
         Ok(FiguresFile(path))
     }
 
-    /// Writes the figures as JSON, whole or not at all; to what is not a file (a pipe, a terminal)
-    /// as it comes, because a file must not take its place.
+    /// Writes the figures as JSON, whole or not at all; to something other than a file (a pipe, a
+    /// terminal) directly, as a file must not replace it.
     pub fn write(&self, figures: &impl Serialize) -> Result<(), Error> {
         let Some(path) = &self.0 else { return Ok(()) };
         let text = json(figures)?;

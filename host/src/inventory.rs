@@ -1,4 +1,4 @@
-//! What lies at the path of a recording: whether it is still the same, without reading it.
+//! A recording's files by name and size: detects changes without reading them.
 
 use std::fs::Metadata;
 use std::path::Path;
@@ -6,12 +6,12 @@ use std::path::Path;
 use raywake_core::digest::Digest;
 use raywake_io::Error;
 
-/// A line of a file, or of a folder and of those in it, but for folders that links lead to: another
-/// one where names or sizes are. Times of change are left out: a copy beside the processor that
-/// works on it has others.
+/// Returns a line for a file, or for a folder and everything in it except linked folders; it
+/// changes if names or sizes do. Modification times are left out: a copy local to the machine that
+/// processes it has different ones.
 ///
 /// # Errors
-/// Something in it cannot be looked at.
+/// Something in it cannot be accessed.
 pub fn inventory(path: &Path) -> Result<String, Error> {
     let mut found = Vec::new();
     let metadata = path.metadata().map_err(Error::reading(path))?;
@@ -22,7 +22,7 @@ pub fn inventory(path: &Path) -> Result<String, Error> {
     Ok(format!("{} files of {bytes} bytes, {digest:016x}", found.len()))
 }
 
-/// Adds the files at a path, called `name` below the recording's, with their sizes.
+/// Adds the files at a path, whose name relative to the recording is `name`, with their sizes.
 fn list(
     path: &Path,
     name: &str,

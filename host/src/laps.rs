@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use raywake_core::perceive::StageTimer;
 
-/// Time since a moment, ms.
+/// Time since an instant, ms.
 pub fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 
-/// Stages a sweep may have.
+/// Maximum number of stages of a sweep.
 const LAPS_MAX: usize = 24;
 
 /// Stage names and times in the order they first finished.
@@ -32,12 +32,12 @@ impl Laps {
         }
     }
 
-    /// Names and milliseconds.
+    /// Stage names and milliseconds.
     pub fn stages(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
         self.names[..self.count].iter().copied().zip(self.milliseconds)
     }
 
-    /// Books milliseconds; names beyond the capacity share the last entry.
+    /// Adds milliseconds to a stage; names beyond the capacity share the last entry.
     fn add(&mut self, name: &'static str, milliseconds: f64) {
         let known = self.names[..self.count].iter().position(|n| *n == name);
         let at = known.unwrap_or(self.count.min(LAPS_MAX - 1));
@@ -46,7 +46,7 @@ impl Laps {
         self.count = self.count.max(at + 1);
     }
 
-    /// Milliseconds since this was last asked.
+    /// Milliseconds since the last call.
     fn elapsed(&mut self) -> f64 {
         let now = Instant::now();
         let milliseconds = (now - self.last).as_secs_f64() * 1e3;

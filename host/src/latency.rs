@@ -1,21 +1,21 @@
-//! Latencies counted in a memory that does not grow.
+//! Latency statistics in constant memory.
 
 use serde::Serialize;
 
-/// Steps a millisecond that are told apart.
+/// Steps per millisecond: the resolution.
 const STEPS_OF_MS: f64 = 10.0;
-/// Steps that have a count of their own: a second.
+/// Number of steps with a count of their own: one second.
 const STEPS: usize = 10_000;
 
-/// How often each latency was seen, to 0.1 ms.
+/// A histogram of latencies, in steps of 0.1 ms.
 pub struct Latencies {
     counts: Box<[u64; STEPS]>,
-    /// What is longer than the steps reach.
+    /// Latencies longer than the steps cover.
     beyond: u64,
     max_ms: f64,
 }
 
-/// What is told of latencies, ms; to 0.1 ms up to a second, beyond that the longest.
+/// Latency figures, ms: to 0.1 ms up to a second; beyond that, the maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LatencyFigures {
     /// Half are no longer.
@@ -27,16 +27,16 @@ pub struct LatencyFigures {
 }
 
 impl Default for Latencies {
-    /// None so far.
+    /// No latencies yet.
     fn default() -> Latencies {
         Latencies { counts: Box::new([0; STEPS]), beyond: 0, max_ms: 0.0 }
     }
 }
 
 impl Latencies {
-    /// Counts one.
+    /// Counts a latency.
     pub fn add(&mut self, ms: f64) {
-        // It lies below the end of its step.
+        // Reported as the end of its step, which is no less.
         match self.counts.get_mut((ms * STEPS_OF_MS) as usize) {
             Some(count) => *count += 1,
             None => self.beyond += 1,
@@ -44,7 +44,7 @@ impl Latencies {
         self.max_ms = self.max_ms.max(ms);
     }
 
-    /// None without any.
+    /// Returns the figures; `None` if nothing was counted.
     pub fn figures(&self) -> Option<LatencyFigures> {
         let total = self.counts.iter().sum::<u64>() + self.beyond;
         let share = |share: f64| {
@@ -62,7 +62,7 @@ impl Latencies {
 }
 
 impl LatencyFigures {
-    /// For people.
+    /// Formats the figures for the user.
     pub fn line(&self) -> String {
         let LatencyFigures { median, p99, max } = self;
         format!("{median:.1} ms median, {p99:.1} p99, {max:.1} max")

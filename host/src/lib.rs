@@ -1,25 +1,25 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
-//! The onboard program: sweeps and poses in, temporal scene flow out.
+//! The command-line program: sweeps and poses in, temporal scene flow out.
 //!
 //! Commands over three libraries: `raywake-core` and its kernels (chapter 3 of the dissertation),
-//! `raywake-objects` and `raywake-registration`, with files by `raywake-io`.
+//! `raywake-objects` and `raywake-registration`; files are handled by `raywake-io`.
 //!
 //! | module | subject |
 //! |---|---|
 //! | [`args`] | the command line |
-//! | [`config`], [`weight_files`], [`choose`] | profile, model weights and backend it asks for |
-//! | `batch` | many recordings, shared among machines |
+//! | [`config`], [`weight_files`], [`choose`] | its profile, model weights and backend |
+//! | `batch` | many recordings, distributed over machines |
 //! | [`engine`] | `run` and `demo`: a source through the pipeline, results to files |
 //! | [`track`], [`map`], `flow`, `clean`, `odometry`, [`budget`] | the other commands |
 //! | `session` | the run loop over a source's sweeps, until the last one or a signal |
-//! | `live` | a sensor's packets as they come |
-//! | [`locate`] | sweeps without poses, by registration |
-//! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, by several threads |
-//! | [`outputs`], [`summary`], `figures`, `settings_file` | files of a run, its figures, settings |
+//! | `live` | a sensor's packets as they arrive |
+//! | [`locate`] | poses of sweeps by registration |
+//! | [`drive`], [`backend`], [`team`] | one sweep, on the CPU or a device, with several threads |
+//! | [`outputs`], [`summary`], `figures`, `settings_file` | files, figures and settings of a run |
 //! | [`statistics`], [`order_statistics`], [`laps`], [`latency`] | what is counted and timed |
-//! | [`console`], [`progress`], `report`, `shell` | what the user reads, and types |
-//! | [`error`] | what can end a command, and its exit code |
+//! | [`console`], [`progress`], `report`, `shell` | what the user reads and types |
+//! | [`error`] | the errors that end a command, and their exit codes |
 
 pub mod args;
 pub mod backend;
@@ -68,11 +68,11 @@ use args::{Args, Command};
 use clap::{ArgMatches, FromArgMatches};
 use error::RunError;
 
-/// Carries out a command line, on as many threads as pay, and tells what went wrong. Returns the
-/// exit code of the process.
+/// Carries out a command line, on as many threads as pay off, and reports errors. Returns the exit
+/// code of the process.
 ///
 /// # Errors
-/// The command line is none.
+/// The command line is invalid.
 pub fn carry_out(line: &ArgMatches) -> Result<u8, clap::Error> {
     let command = Args::from_arg_matches(line)?.command;
     let run =
@@ -87,7 +87,7 @@ pub fn carry_out(line: &ArgMatches) -> Result<u8, clap::Error> {
     })
 }
 
-/// Carries out a command. Returns whether it got to the end: a signal ends it early.
+/// Carries out a command. Returns whether it ran to completion: a signal ends it early.
 pub fn execute(command: Command) -> Result<bool, RunError> {
     match command {
         Command::Run(args) => batch::each(&*args),

@@ -1,5 +1,5 @@
-//! Sweeps located by registration as they come: those without poses, and those whose poses are too
-//! poor to tell what moves.
+//! Locating sweeps by registration one after another: those without poses, and those whose poses
+//! are too poor to distinguish what moves.
 
 use std::time::Instant;
 
@@ -18,45 +18,47 @@ use crate::laps::milliseconds;
 use crate::memory;
 use crate::order_statistics::Spread;
 
-/// Steps from sweep to sweep that decide whether poses are of use.
+/// Number of steps from sweep to sweep after which the poses are judged.
 const CHECKED: u32 = 10;
-/// How far from the vehicle poses and registration are compared, m: there a turn counts, too.
+/// Distance from the vehicle at which poses and registration are compared, m, so that rotation
+/// counts too.
 const AWAY_M: f64 = 20.0;
-/// Poses are replaced where they disagree by more, m (root mean square of steps): three times what
-/// `pose_noise_m` takes them to err. Scan-matched KITTI drives have 0.6 to 1.0 cm, those of an
-/// inertial unit with satellites 2.5 cm and more.
+/// Poses that disagree by more are replaced, m (root mean square of steps): three times the error
+/// that `pose_noise_m` assumes. Scan-matched poses of KITTI drives have 0.6 to 1.0 cm, those of a
+/// GNSS-aided inertial unit 2.5 cm or more.
 const DISAGREEMENT_MAX_M: f64 = 0.015;
 
-/// What errs to and fro are poses, and what slips away is registration, as between guard rails: it
-/// replaces them where all steps together differ by less than this share of the single ones' sum.
+/// Differences that alternate are errors of the poses; differences that accumulate are slip of the
+/// registration, as between guard rails. The poses are replaced only if the sum of the differences
+/// is less than this share of their count times their root mean square.
 const SLIP_MAX: f64 = 0.3;
 
-/// What becomes of poses.
+/// What is done with the recording's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PoseUse {
     /// There are none.
     Find,
-    /// They are compared.
+    /// They are being compared with registration.
     Check,
-    /// They are used as they are.
+    /// They are used unchanged.
     Keep,
-    /// Steps are by registration from here on.
+    /// Steps are taken from registration from here on.
     Replace,
 }
 
-/// Locates one sweep after the other. Nothing is allocated while it does.
+/// Locates one sweep after another, without allocation.
 pub struct Locator {
     odometry: Sealed<Box<Odometry>>,
     poses: PoseUse,
-    /// Poses of the sweep before: as it was handed on, and as found.
+    /// Poses of the sweep before: as output, and as registered.
     last: [Pose; 2],
     compared: Compared,
     counts: [u64; 4],
     times_ms: Vec<f64>,
 }
 
-/// Differences of steps by poses and by registration: along, across, and of a turn `AWAY_M` away.
+/// Differences of steps between poses and registration: along, across, and by rotation at `AWAY_M`.
 #[derive(Clone, Copy, Default)]
 struct Compared {
     count: u32,
@@ -80,7 +82,7 @@ impl Compared {
         (self.count > 0).then(|| (self.squares / f64::from(self.count)).sqrt())
     }
 
-    /// Whether registration is to replace the poses.
+    /// Whether registration should replace the poses.
     fn poor(&self) -> bool {
         let rms_m = self.rms_m().unwrap_or(0.0);
         let slip = self.sum.length() / (f64::from(self.count) * rms_m);
@@ -91,23 +93,23 @@ impl Compared {
 /// How sweeps were located.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LocatedSweeps {
-    /// Root mean square of the difference between steps by the recording's poses and by
-    /// registration, of places 20 m away, m; null without such poses.
+    /// Root mean square difference between steps by the recording's poses and by registration, of
+    /// points 20 m away, m; null without such poses.
     pub disagreement_m: Option<f64>,
     /// What became of the recording's poses.
     pub poses: PoseUse,
-    /// Sweeps whose motion was found.
+    /// Sweeps whose motion was determined.
     pub registered: u64,
-    /// Sweeps that show too little, as a wall, a tunnel or a motorway among others that are as fast
-    /// does: a part of their motion is that of the sweep before, or a guess.
+    /// Sweeps that show too little, such as a wall, a tunnel, or a motorway with traffic as fast as
+    /// the vehicle: part of their motion is taken from the sweep before, or guessed.
     pub degenerate: u64,
-    /// Sweeps that fit nothing known: their motion is that of the sweep before.
+    /// Sweeps that match nothing known: their motion is taken from the sweep before.
     pub lost: u64,
-    /// Time of a sweep, ms; null for a single sweep.
+    /// Time per sweep, ms; null for a single sweep.
     pub ms: Option<Spread>,
 }
 
-/// What registers sweeps, at rest.
+/// Allocates the registration of sweeps, starting at rest.
 ///
 /// # Errors
 /// [`RunError::NoMemory`].
@@ -118,10 +120,10 @@ pub fn registration() -> Result<Sealed<Box<Odometry>>, RunError> {
 }
 
 impl Locator {
-    /// Bytes that registration works in.
+    /// Bytes of memory used by registration.
     pub const BYTES: u64 = size_of::<Odometry>() as u64;
 
-    /// Allocates all it needs for a source; nothing is needed for poses that are trusted.
+    /// Allocates what a source needs; trusted poses need nothing.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
@@ -133,7 +135,7 @@ impl Locator {
         }
     }
 
-    /// For sweeps without poses.
+    /// A locator for sweeps without poses.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
@@ -152,8 +154,7 @@ impl Locator {
         })
     }
 
-    /// Gives a sweep that follows those before its pose and twist, unless those that it has are
-    /// kept.
+    /// Sets the pose and twist of the next sweep, unless those it has are kept.
     ///
     /// # Errors
     /// [`RunError::Allocation`].
@@ -176,7 +177,7 @@ impl Locator {
             PoseUse::Check => match found.locating {
                 Locating::Registered => self.compare(sweep, &step),
                 Locating::Start => {}
-                // Registration that is not sure of itself is no judge of poses.
+                // Uncertain registration cannot judge poses.
                 Locating::Degenerate | Locating::Lost => self.poses = PoseUse::Keep,
             },
             PoseUse::Keep => {}
@@ -186,7 +187,7 @@ impl Locator {
         Ok(())
     }
 
-    /// Compares a step with that of the recording's poses; after enough of them, decides.
+    /// Compares a step with that of the recording's poses, and decides after enough steps.
     fn compare(&mut self, sweep: &SweepData, step: &Pose) {
         let given = self.last[0].inverse() * sweep.world_from_vehicle;
         self.compared.add(step, &given);
@@ -195,7 +196,7 @@ impl Locator {
         }
     }
 
-    /// How it went.
+    /// Returns how sweeps were located so far.
     pub fn located(&self) -> LocatedSweeps {
         let count = |locating: Locating| self.counts[locating as usize];
         LocatedSweeps {
@@ -214,7 +215,7 @@ fn place(sweep: &mut SweepData, pose: Pose, twist: Twist) {
 }
 
 impl LocatedSweeps {
-    /// Lines for people.
+    /// Lines for the user.
     pub fn text(&self) -> String {
         match self.poses {
             PoseUse::Find => self.line(),

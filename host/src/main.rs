@@ -11,7 +11,8 @@ use raywake::args::Args;
 use raywake::console::warn;
 use raywake_alloc_guard::Guard;
 
-/// Ends with what clap says, or with the command for a recording that stands where one is missing.
+/// Exits with clap's message or, if a recording was given without a command, with a suggested
+/// command.
 fn explain(e: &clap::Error) -> ! {
     let first = std::env::args_os().nth(1).filter(|first| Path::new(first).exists());
     if let Some(path) = first.filter(|_| e.kind() == ErrorKind::InvalidSubcommand) {
@@ -25,8 +26,7 @@ fn explain(e: &clap::Error) -> ! {
     e.exit()
 }
 
-/// A decoder that panics has met a damaged file, and that is what is told. Where panics do not
-/// unwind, it is the end.
+/// Reports a panic in a decoder as a damaged file, and exits if panics do not unwind.
 #[cfg(any(feature = "arrow", feature = "mcap"))]
 fn tell_of_damaged_files() {
     let usual = std::panic::take_hook();

@@ -1,16 +1,16 @@
-//! Memory that the system gives, or not.
+//! A check that the system has enough memory.
 
 use crate::error::RunError;
 
-/// Asks the system for memory and gives it back: a refusal ends the process later, and here the
-/// command.
+/// Requests memory from the system and frees it again: refused here, only the command fails;
+/// refused later, the process aborts.
 ///
 /// # Errors
 /// [`RunError::NoMemory`].
 pub fn ask_for(bytes: u64) -> Result<(), RunError> {
     let mut room = Vec::<u8>::new();
     let given = room.try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
-    // Else the compiler may leave out what is not used.
+    // Otherwise the compiler may remove the unused allocation.
     std::hint::black_box(&room);
     given.map_err(|_| RunError::NoMemory { bytes })
 }

@@ -10,8 +10,8 @@ use crate::console::{note, say};
 use crate::error::RunError;
 use crate::session::each_sweep;
 
-/// Locates all sweeps and writes their poses. Returns whether it got to the end: a signal ends it
-/// after the sweep in hand, and the poses so far are written.
+/// Locates all sweeps and writes their poses. Returns whether it ran to completion: a signal ends
+/// it after the current sweep, and the poses so far are written.
 pub fn odometry(args: &args::OdometryArgs) -> Result<bool, RunError> {
     let options = source::OpenOptions { unlocated: Unlocated::Always, ..args.kind.options() };
     let mut source = source::open(&args.data, &options)?;

@@ -1,4 +1,4 @@
-//! Order statistics of samples: quantiles, the median, and how a quantity is spread.
+//! Order statistics of samples: quantiles, the median, and the spread.
 
 use serde::Serialize;
 
@@ -8,8 +8,8 @@ fn ascending(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// For each share, 0 to 1, the smallest value that at least this share of the values does not
-/// exceed (nearest rank); NaN without values.
+/// Returns, for each share from 0 to 1, the smallest value that at least this share of the values
+/// does not exceed (nearest rank); NaN without values.
 pub fn quantiles<const N: usize>(
     values: impl IntoIterator<Item = f64>,
     shares: [f64; N],
@@ -23,7 +23,7 @@ fn nearest_rank(sorted: &[f64], share: f64) -> f64 {
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
-/// The middle value, or the mean of the middle two; NaN without values.
+/// Returns the middle value, or the mean of the middle two; NaN without values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let sorted = ascending(values);
     match sorted.len() {
@@ -41,14 +41,14 @@ pub struct Spread {
     pub median: f64,
     /// Standard deviation.
     pub sd: f64,
-    /// 99 % lie at or below.
+    /// 99 % of the values lie at or below this.
     pub p99: f64,
-    /// Greatest.
+    /// The maximum.
     pub max: f64,
 }
 
 impl Spread {
-    /// None without values.
+    /// Returns the spread of some values; `None` without any.
     pub fn of(values: &[f64]) -> Option<Spread> {
         let sorted = ascending(values.iter().copied());
         let (n, max) = (sorted.len(), *sorted.last()?);
@@ -63,7 +63,7 @@ impl Spread {
         })
     }
 
-    /// Of times in ms, with so many decimals, for people.
+    /// Formats the spread of times in ms for the user, with the given number of decimals.
     pub fn line(&self, decimals: usize) -> String {
         let shown = [self.median, self.sd, self.p99, self.max].map(|v| format!("{v:.decimals$}"));
         let [median, sd, p99, max] = shown;

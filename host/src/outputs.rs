@@ -8,13 +8,13 @@
 //! | `png/FRAME.png` | picture of a pair's first sweep |
 //! | `argoverse/LOG/TIMESTAMP.feather` | returns of a pair's first sweep, for graders |
 //!
-//! Beside them a film, a page and messages ([`raywake_io::sink::bag`]), where they are asked for.
+//! Besides these, a film, a page and messages ([`raywake_io::sink::bag`]) if asked for.
 //!
-//! In place of the first three kinds there may be a Parquet file each for all sweeps. Feather files
-//! that are there are kept: a run that was interrupted finds the same again, and goes on.
+//! The first three kinds may be replaced by one Parquet file each for all sweeps. Existing feather
+//! files are kept: an interrupted run recomputes the same results, and continues.
 //!
-//! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is whole
-//! or absent.
+//! `FRAME` is the sweep's frame number with ten digits, or its timestamp, ns. Every file is either
+//! complete or absent.
 
 use std::path::{Path, PathBuf};
 
@@ -41,7 +41,7 @@ pub struct Kinds {
     pub points: bool,
     /// One Parquet file for all sweeps of a table.
     pub parquet: bool,
-    /// Velocities in pictures.
+    /// Which velocities pictures show.
     pub frame: PictureFrame,
     /// Submission files of Argoverse 2.
     pub argoverse: bool,
@@ -50,9 +50,9 @@ pub struct Kinds {
 /// The files of a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunFiles {
-    /// Folder of all that is a file each sweep.
+    /// Folder for everything with a file per sweep.
     pub root: Option<PathBuf>,
-    /// Which files are there.
+    /// Which files are written.
     pub kinds: Kinds,
     /// Messages of all sweeps.
     pub streams: StreamTargets,
@@ -98,7 +98,7 @@ impl Kinds {
         }
     }
 
-    /// Creates the folders. Fails where this build lacks a feature that the files need.
+    /// Creates the folders. Fails if this build lacks a feature that the files need.
     fn tables(&self, root: &Path) -> Result<Option<FlowTables>, Error> {
         if !cfg!(feature = "arrow") && (self.columns || self.points || self.argoverse) {
             return Err(Error::lacking("--out", "arrow"));
@@ -119,8 +119,7 @@ impl Kinds {
 }
 
 impl Outputs {
-    /// Creates folders and files for some sweeps of a recording; where nothing is named nothing
-    /// will be written.
+    /// Creates folders and files for some sweeps of a recording; what is not named is not written.
     pub fn create(
         files: &RunFiles,
         recording: &Overview,
@@ -140,12 +139,12 @@ impl Outputs {
         })
     }
 
-    /// Waits for a viewer, where one is to look.
+    /// Waits for a viewer, if one is expected.
     pub fn await_viewer(&self, quiet: bool) -> Result<(), Error> {
         await_viewer(quiet, self.bag.as_ref())
     }
 
-    /// Writes what a pair of sweeps yields for its first sweep, found in so many milliseconds.
+    /// Writes the results of a pair of sweeps for its first sweep; `ms` is the time they took.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows, ms: f64) -> Result<(), Error> {
         if let Some(bag) = &mut self.bag {
             bag.pair(first, flows)?;
@@ -172,7 +171,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// Completes the files that all sweeps go to; the page ends with this text.
+    /// Completes the files that span all sweeps; the page ends with the summary.
     pub fn finish(self, summary: &str) -> Result<(), Error> {
         self.pictures.finish(summary)?;
         self.tables.map_or(Ok(()), FlowTables::finish)?;

@@ -1,14 +1,14 @@
-//! How far a run is, on standard error.
+//! The progress of a run, on standard error.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::time::{Duration, Instant};
 
-/// Time between updates of a terminal's line.
+/// Time between updates of the line on a terminal.
 const ON_TERMINAL: Duration = Duration::from_millis(200);
 /// Time between lines of a log.
 const IN_LOG: Duration = Duration::from_secs(5);
 
-/// A line that is kept up to date on a terminal, and repeated now and then in a log.
+/// A progress line, kept up to date on a terminal and repeated now and then in a log.
 pub struct Progress {
     what: &'static str,
     total: usize,
@@ -19,13 +19,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Starts the clock of a run over `total` sweeps, or whatever `what` is one of.
+    /// Starts the clock of a run over `total` items; `what` names one of them.
     pub fn new(what: &'static str, total: usize, quiet: bool) -> Progress {
         let started = Instant::now();
         Progress { what, total, started, shown: None, terminal: stderr().is_terminal(), quiet }
     }
 
-    /// So many are done. Shown if the last update is old enough, or it is the last one.
+    /// Reports the number done. Shown if the last update is old enough, or this is the last one.
     pub fn update(&mut self, done: usize) {
         let now = Instant::now();
         let pause = if self.terminal { ON_TERMINAL } else { IN_LOG };
@@ -35,7 +35,7 @@ impl Progress {
         }
         self.shown = Some(now);
         let text = line(self.what, done, self.total, (now - self.started).as_secs_f64());
-        // Nobody is told less of a run because its progress cannot be shown.
+        // Failure to show progress does not affect the run.
         let _ = match self.terminal {
             true => write!(stderr(), "\r{text}\x1b[K"),
             false => writeln!(stderr(), "{text}"),

@@ -1,4 +1,4 @@
-//! The table a run ends with.
+//! The report printed at the end of a run.
 
 use std::fmt::Write;
 
@@ -6,7 +6,7 @@ use crate::console::bytes;
 use crate::order_statistics::Spread;
 use crate::summary::RunSummary;
 
-/// Everything a summary holds, for people.
+/// Formats everything in a summary for the user.
 pub fn text(s: &RunSummary) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.

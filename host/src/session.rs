@@ -1,6 +1,6 @@
 //! The run loop of `run`, `track`, `map` and `odometry`: the sweeps of a recording, one by one,
-//! until the last one or a signal. Where the recording has no poses, or poor ones, each is located
-//! by registration.
+//! until the last one or a signal. If the recording has no poses, or poor ones, each sweep is
+//! located by registration.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -23,20 +23,20 @@ pub struct Visit<'a> {
 }
 
 pub struct SessionEnd {
-    /// A signal came before the last sweep.
+    /// Whether a signal came before the last sweep.
     pub interrupted: bool,
     /// The last sweep visited.
     pub last: SweepData,
-    /// How sweeps were located, where the source's poses were not trusted.
+    /// How sweeps were located, unless the source's poses are trusted.
     pub located: Option<LocatedSweeps>,
 }
 
-/// Reads the sweeps in order and hands each to `visit`. After a signal the sweep in hand is
+/// Reads the sweeps in order and passes each to `visit`. After a signal the current sweep is
 /// finished and no further one is read.
 ///
 /// # Errors
-/// What the source or `visit` returns, at once; [`RunError::Allocation`] and
-/// [`RunError::NoMemory`] of registration.
+/// The first error of the source or `visit`; [`RunError::Allocation`] and [`RunError::NoMemory`]
+/// from registration.
 pub fn each_sweep<S: Source + ?Sized>(
     source: &mut S,
     sweeps: Range<usize>,

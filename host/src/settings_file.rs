@@ -1,8 +1,8 @@
-//! `settings.toml` beside results: what they were made with, as `--config` takes it (the parameters
-//! of `raywake map` are fixed).
+//! `settings.toml` next to results: what they were made with, in the form `--config` takes (the
+//! parameters of `raywake map` are fixed).
 //!
 //! It keeps results of different settings or recordings from being mixed: a folder that has one
-//! takes only results that would leave the same one.
+//! accepts only results that would write an identical one.
 
 use std::fmt::Write;
 use std::io::Write as _;
@@ -17,7 +17,7 @@ use raywake_objects::params::TrackingParams;
 
 /// Name of the file.
 pub const NAME: &str = "settings.toml";
-/// Differences that an error tells, at most.
+/// Maximum number of differences listed in an error.
 const LINES_TOLD: usize = 3;
 
 /// What results are made with.
@@ -26,23 +26,23 @@ pub struct Made<'a> {
     pub command: &'static str,
     /// The recording.
     pub recording: &'a Overview,
-    /// Index of the first sweep: what is known of movers grows from there.
+    /// Index of the first sweep, from which knowledge of movers accumulates.
     pub first: usize,
     /// Parameters of the flow or the map.
     pub profile: &'a Profile,
-    /// Parameters of tracking, where it is done.
+    /// Tracking parameters, if objects are tracked.
     pub objects: Option<&'a TrackingParams>,
-    /// Digest of the model weights, or what takes their place.
+    /// Digest of the model weights, or a placeholder.
     pub weights: &'a str,
 }
 
 impl Made<'_> {
-    /// Writes the file into the folder of the results, where there is one, and keeps other
-    /// processes from writing there while the value lives.
+    /// Writes the file into the output folder, if there is one, and keeps other processes from
+    /// writing there while the returned value lives.
     ///
     /// # Errors
-    /// Where the folder has results of another recording or other settings, where another process
-    /// writes to it, and where the file cannot be written.
+    /// If the folder has results of another recording or other settings, if another process is
+    /// writing to it, or if the file cannot be written.
     pub fn claim(&self, root: Option<&Path>) -> Result<Option<FolderClaim>, Error> {
         let Some(root) = root else { return Ok(None) };
         let claim = atomic::claim_folder(root)?;
@@ -87,7 +87,7 @@ impl Made<'_> {
     }
 }
 
-/// That a folder has other results, with the first lines that tell.
+/// The error that a folder has other results, with the first differing lines.
 fn different(root: &Path, there: &str, here: &str) -> Error {
     let lines = there.lines().zip(here.lines());
     let told = lines.filter(|(a, b)| a != b).take(LINES_TOLD);
@@ -99,7 +99,7 @@ fn different(root: &Path, there: &str, here: &str) -> Error {
     ))
 }
 
-/// Adds a group of parameters, with its name as the head of a table.
+/// Appends a group of parameters as a table with its name.
 fn add(text: &mut String, group: &str, parameters: &dyn Parameters) {
     if !group.is_empty() {
         let _ = write!(text, "\n[{group}]\n");

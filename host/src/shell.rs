@@ -1,4 +1,4 @@
-//! `raywake completions` and `raywake man`, from the declaration of the command line.
+//! `raywake completions` and `raywake man`, generated from the declaration of the command line.
 
 use clap::CommandFactory;
 use clap_complete::Shell;
@@ -16,7 +16,7 @@ pub fn completions(shell: Shell) -> Result<(), RunError> {
     Ok(say(false, &String::from_utf8_lossy(&script))?)
 }
 
-/// Prints the manual page of a command, or of the program. Fails where there is no such command.
+/// Prints the manual page of a command, or of the program. Fails if there is no such command.
 pub fn man(of: Option<&str>) -> Result<(), RunError> {
     let mut program = Args::command();
     program.build();

@@ -1,4 +1,4 @@
-//! What a run counts and times, sweep by sweep.
+//! Counts and times of a run, sweep by sweep.
 
 use std::fmt;
 
@@ -14,10 +14,10 @@ use crate::drive::Stepped;
 use crate::laps::Laps;
 use raywake_io::source::SweepData;
 
-/// Classes of tracklets by age: name and least age.
+/// Age classes of tracklets: name and minimum age.
 pub const AGES: [(&str, u32); 5] = [("0", 0), ("1-2", 1), ("3-5", 3), ("6-9", 6), ("10+", 10)];
 
-/// The time a sweep may take: sweeps come at 10 Hz, ms.
+/// Time budget of a sweep, ms: sweeps come at 10 Hz.
 pub const BUDGET_MS: f64 = 100.0;
 
 /// A sweep that had no usable predecessor.
@@ -40,7 +40,7 @@ impl ResetAt {
     }
 }
 
-/// A key for a reset, and its reason in words.
+/// Returns a key for a reset, and its reason in words.
 pub fn in_words(reset: Reset) -> (&'static str, String) {
     match reset {
         Reset::First => ("first", "first sweep".to_string()),
@@ -51,14 +51,14 @@ pub fn in_words(reset: Reset) -> (&'static str, String) {
     }
 }
 
-/// Left out, and why. Counts over all sweeps.
+/// What was dropped, and why. Counts over all sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// Returns left out by preparation.
+    /// Returns dropped by preparation.
     pub returns: DroppedReturns,
-    /// Rows without a coordinate in the source's files.
+    /// Rows in the source's files that lack a coordinate.
     pub null_rows: u64,
-    /// Sweeps the source's frame numbers say are missing.
+    /// Sweeps that are missing according to the source's frame numbers.
     pub missing_sweeps: u64,
     /// Solid columns beyond the capacity for foreground.
     pub foreground: u64,
@@ -67,7 +67,7 @@ pub struct Dropped {
 }
 
 impl Dropped {
-    /// Every count with its key and a name for people.
+    /// Returns every count with its key and a name for the user.
     pub fn counts(&self) -> impl Iterator<Item = (&'static str, &'static str, u64)> {
         self.returns.counts().into_iter().chain([
             ("null_rows", "null rows", self.null_rows),
@@ -92,11 +92,11 @@ impl fmt::Display for Dropped {
     }
 }
 
-/// Everything counted and timed. Times are of sweeps that complete a pair; a sweep after a reset,
-/// the first one too, yields no flow and counts for no time.
+/// Everything counted and timed. Times cover only sweeps that complete a pair; a sweep after a
+/// reset, and the first one, yields no flow and is not timed.
 #[derive(Debug, Default)]
 pub struct Statistics {
-    /// Sweeps done.
+    /// Sweeps processed.
     pub sweeps: u64,
     /// Sweeps that completed a pair.
     pub pairs: u64,
@@ -110,7 +110,7 @@ pub struct Statistics {
     pub foreground: u64,
     /// Valid flows of all pairs.
     pub valid: u64,
-    /// Times by stage, in the order of the first pair: name and, for every pair, ms.
+    /// Times by stage, in the order of the first pair: name, and ms for every pair.
     pub stages: Vec<(&'static str, Vec<f64>)>,
     /// Sums of the stages of each pair, ms.
     pub totals: Vec<f64>,
@@ -118,7 +118,7 @@ pub struct Statistics {
     pub read_ms: f64,
     /// Time to write results, ms.
     pub write_ms: f64,
-    /// Left out.
+    /// What was dropped.
     pub dropped: Dropped,
     /// Tracklets born and ended.
     pub turnover: TrackletTurnover,
@@ -128,12 +128,12 @@ pub struct Statistics {
     pub ages_sum: [u64; AGES.len()],
     /// Resets.
     pub resets: Vec<ResetAt>,
-    /// Of all results, see [`Statistics::tracklets`].
+    /// Digest of all results, see [`Statistics::tracklets`].
     pub digest: Digest,
 }
 
 impl Statistics {
-    /// Counts a sweep; its columns and returns go to the digest.
+    /// Counts a sweep, and adds its columns and returns to the digest.
     pub fn sweep(&mut self, index: usize, data: &SweepData, stepped: &Stepped) {
         self.dropped.returns += stepped.output.dropped;
         self.dropped.unrefined += stepped.output.unrefined as u64;
@@ -178,7 +178,7 @@ impl Statistics {
 
     /// Counts the tracklets after a sweep.
     ///
-    /// The digest is over every column of a pair in the order of the output, every return in the
+    /// The digest covers every column of a pair in the order of the output, every return in the
     /// order of the sweep, then every tracklet after the pair in the order of the output, pair by
     /// pair.
     pub fn tracklets(&mut self, tracklets: &[TrackletState], paired: bool) {
@@ -194,7 +194,7 @@ impl Statistics {
         }
     }
 
-    /// Share of pairs within [`BUDGET_MS`]; none without pairs.
+    /// Returns the share of pairs within [`BUDGET_MS`]; `None` without pairs.
     pub fn share_in_time(&self) -> Option<f64> {
         let within = self.totals.iter().filter(|ms| **ms < BUDGET_MS).count();
         (!self.totals.is_empty()).then(|| within as f64 / self.totals.len() as f64)

@@ -21,7 +21,7 @@ fn by_name<S: Serializer>(counts: &TrackletTurnover, serializer: S) -> Result<S:
     serializer.collect_map(counts.counts())
 }
 
-/// Tracklets of one class of age.
+/// Tracklets of one age class.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Aged {
     /// After the last sweep.
@@ -30,14 +30,14 @@ pub struct Aged {
     pub mean: f64,
 }
 
-/// What a run was and what came of it. Means are per sweep for points and rays, per pair of sweeps
-/// for the rest; times are of sweeps that complete a pair, without reading and writing files.
+/// The facts and results of a run. Means are per sweep for points and rays, per pair of sweeps for
+/// the rest; times are of sweeps that complete a pair, excluding file I/O.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunSummary {
     /// What was run.
     #[serde(flatten)]
     pub facts: Facts,
-    /// Sweeps done.
+    /// Sweeps processed.
     pub sweeps: u64,
     /// Of these, sweeps that completed a pair.
     pub pairs: u64,
@@ -45,7 +45,7 @@ pub struct RunSummary {
     pub digest: String,
     /// Valid flows of all pairs.
     pub valid_flows: u64,
-    /// Their mean.
+    /// Mean valid flows.
     pub valid_flows_per_sweep: f64,
     /// Mean foreground columns.
     pub foreground_columns: f64,
@@ -55,17 +55,17 @@ pub struct RunSummary {
     pub points: f64,
     /// Mean distinct rays.
     pub distinct_rays: f64,
-    /// Time of every stage, ms.
+    /// Time of each stage, ms.
     pub stage_ms: Ordered<Spread>,
     /// Time of all stages, ms; null without a pair.
     pub total_ms: Option<Spread>,
-    /// Share (0..1) of pairs done within 100 ms; null without a pair.
+    /// Share (0..1) of pairs processed within 100 ms; null without a pair.
     pub share_under_100_ms: Option<f64>,
     /// Mean time to read a sweep, ms.
     pub read_ms: f64,
     /// Mean time to write a sweep's results, ms.
     pub write_ms: f64,
-    /// Left out.
+    /// What was dropped.
     pub dropped: Dropped,
     /// Tracklets born and ended.
     #[serde(serialize_with = "by_name")]
@@ -91,31 +91,31 @@ pub struct Facts {
     pub device: String,
     /// Threads that share the CPU's part of a sweep.
     pub threads: usize,
-    /// Instruction set of what the CPU did.
+    /// Instruction set used on the CPU.
     pub simd: &'static str,
     /// Where the background filter comes from.
     pub filter: String,
-    /// Whether the run was ended by a signal.
+    /// Whether a signal ended the run.
     pub interrupted: bool,
     /// How sweeps were located, and how poses were checked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub registration: Option<LocatedSweeps>,
     /// Bytes allocated on the device, all heaps; 0 for the scalar backend.
     pub device_bytes: u64,
-    /// Bytes of host memory held: throughout, or from the failure of a device on.
+    /// Bytes of host memory held: throughout, or since a device failed.
     pub host_bytes: u64,
     /// Calls of vkAllocateMemory.
     pub vulkan_allocations: u64,
-    /// How the device failed, where it did, and the scalar backend took its place.
+    /// How the device failed, if it did and the scalar backend took over.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device_failure: Option<String>,
-    /// Messages of the validation layer, where it is on.
+    /// Messages of the validation layer, if enabled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation_messages: Option<Vec<String>>,
 }
 
 impl RunSummary {
-    /// Puts the figures together.
+    /// Assembles the figures.
     pub fn new(facts: Facts, s: &Statistics) -> RunSummary {
         let per = |sum: u64, count: u64| sum as f64 / count.max(1) as f64;
         let spreads = s.stages.iter().filter_map(|(name, ms)| Some((*name, Spread::of(ms)?)));

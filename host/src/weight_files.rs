@@ -1,4 +1,4 @@
-//! Model weights: built-in ones, or files named on the command line.
+//! Model weights: built in, or from files named on the command line.
 
 use std::path::PathBuf;
 
@@ -13,25 +13,25 @@ use crate::backend::{LearnedPart, Tables, TablesError};
 use raywake_io::Error;
 use raywake_io::source::whole::read_text;
 
-/// The texts of the weights files.
+/// The contents of the weights files.
 #[derive(Clone)]
 pub struct WeightFiles {
-    /// None: every solid column is foreground.
+    /// `None`: every solid column is foreground.
     filter: Option<WeightFile>,
     constancy: WeightFile,
-    /// None: nothing is encoded.
+    /// `None`: nothing is encoded.
     encoder: Option<WeightFile>,
 }
 
 #[derive(Clone)]
 struct WeightFile {
-    /// None: built in.
+    /// `None`: built in.
     path: Option<PathBuf>,
     text: String,
 }
 
 impl WeightFiles {
-    /// Reads what the command line names, takes what is built in for the rest.
+    /// Reads the files named on the command line, and uses the built-in weights for the rest.
     pub fn read(learned: &Learned, profile: &Profile) -> Result<WeightFiles, Error> {
         let file = |path: &Option<PathBuf>, shipped: &str| match path {
             Some(path) => Ok(WeightFile { path: Some(path.clone()), text: read_text(path)? }),
@@ -65,7 +65,7 @@ impl WeightFiles {
         WeightFiles { encoder: None, ..self }
     }
 
-    /// The same with another occupancy constancy, known by its text.
+    /// The same with another occupancy constancy, given as text.
     pub fn with_constancy(self, text: &str) -> WeightFiles {
         WeightFiles { constancy: WeightFile { path: None, text: text.into() }, ..self }
     }
@@ -78,8 +78,8 @@ impl WeightFiles {
         format!("{:016x}", Digest::of(all.as_bytes()))
     }
 
-    /// The tables made of them for a profile. Errors name the file and the value in it, or the
-    /// option for a file where what is built in does not fit.
+    /// Builds the tables for a profile. Errors name the file and the value in it, or the option to
+    /// set if the built-in weights do not fit.
     pub fn tables(&self, profile: &Profile) -> Result<Tables, Error> {
         let filter = self.filter.as_ref().map(|f| f.text.as_str());
         let encoder = self.encoder.as_ref().map(|f| f.text.as_str());

@@ -1,4 +1,4 @@
-//! The program as a user meets it: exit codes, messages, files.
+//! The program from the user's side: exit codes, messages, files.
 
 mod common;
 
@@ -6,7 +6,7 @@ use std::fs;
 
 use common::{BACKEND, Temp, raywake, run, weights};
 
-/// Shape of a background filter, and how many weights come before its bias.
+/// Shape of a background filter, and its number of weights before the bias.
 const FILTER: [usize; 3] = [25, 2, 14];
 const FILTER_WEIGHTS: usize = 25 * 2 * 14;
 #[test]
@@ -199,7 +199,7 @@ fn gaps_and_jumps() {
     assert_eq!(s["pairs"], 6);
 }
 
-/// The vehicle does not move at the speed of a jump, neither in its own sweep nor in the next pair.
+/// The vehicle does not take on the speed of a jump, neither in that sweep nor in the next pair.
 #[test]
 fn after_a_jump_all_is_as_before() {
     let t = Temp::new();
@@ -265,7 +265,7 @@ fn outputs_do_not_replace_inputs() {
     let config = t.path().join("small.toml");
     run(&t, &["--mcap", config.to_str().unwrap()]).failed(2, &["--mcap", "is an input"]);
     assert_eq!(std::fs::read(&poses).unwrap(), before);
-    // Results may lie in a folder of their own, again and again.
+    // Results may go to a folder of their own, repeatedly.
     let out = data.join("results");
     for _ in 0..2 {
         run(&t, &["--out", out.to_str().unwrap()]).succeeded();
@@ -297,7 +297,7 @@ fn budgets() {
     };
     let of = |name: &str| json[0][name].as_u64().unwrap();
     assert_eq!((json[0]["profile"].as_str(), sum("host_parts")), (Some("wide"), of("host_bytes")));
-    // Between buffers there may be room.
+    // There may be padding between buffers.
     assert!((0..1000).contains(&(of("device_bytes") - sum("buffers"))), "{json}");
 }
 
@@ -336,7 +336,7 @@ fn a_run_for_nothing_says_so() {
     let out = t.path().join("o");
     assert!(!run(&t, &["-o", out.to_str().unwrap()]).stdout.contains(says));
     assert!(out.join("summary.json").is_file());
-    // Results of other settings stay apart, and what is there stays.
+    // Results of other settings are rejected, and the existing ones stay.
     let other = run(&t, &["-o", out.to_str().unwrap(), "--set", "em_rounds=2"]);
     other.failed(2, &["holds other results", "`em_rounds = 3`, not `em_rounds = 2`"]);
     assert!(out.join("summary.json").is_file());
@@ -350,7 +350,7 @@ fn a_demo() {
     let o = raywake(&[&["demo", "--out", out.to_str().unwrap()], &BACKEND[..]].concat());
     o.succeeded();
     assert!(o.stdout.contains("median speed error"), "{}", o.stdout);
-    // Where results have become others, work that was done before is not taken for done.
+    // If results have changed, earlier work must not count as done.
     let digest = format!("{:016x}", raywake::batch::DEMO_DIGEST);
     assert!(o.stdout.contains(&digest), "{digest} is not in {}", o.stdout);
     assert!(o.summary(&out.join("summary.json"))["valid_flows"].as_u64() > Some(1000));

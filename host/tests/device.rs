@@ -1,5 +1,5 @@
-//! A device that fails: at its set-up the program says which call did, and in a run the scalar
-//! backend goes on, with the bits it would have from there on.
+//! A device that fails: during set-up the program reports which call failed; during a run the
+//! scalar backend takes over, with the bits it would produce from there on.
 
 #![cfg(unix)]
 
@@ -13,7 +13,7 @@ use std::path::Path;
 use common::{Outcome, SMALL, Temp};
 use raywake_faulty_layer::{FAULT, GARBAGE, NAME, NAMES, NULL, environment};
 
-/// Results of Vulkan.
+/// Vulkan result codes.
 const OUT_OF_HOST_MEMORY: i32 = -1;
 const OUT_OF_DEVICE_MEMORY: i32 = -2;
 const LOST: i32 = -4;
@@ -21,7 +21,7 @@ const TIMEOUT: i32 = 2;
 
 const SWEEPS: usize = 8;
 
-/// `raywake run DRIVE` on the device, with a fault as [`FAULT`] has it, or without one.
+/// `raywake run DRIVE` on the device, with a fault in the form of [`FAULT`], or without one.
 fn run(t: &Temp, fault: &str, more: &[&str]) -> Outcome {
     let config = t.write("small.toml", SMALL);
     let data = t.path().join("drive");
@@ -36,8 +36,8 @@ fn run(t: &Temp, fault: &str, more: &[&str]) -> Outcome {
     o
 }
 
-/// Variables that switch on the validation layer, too, where it is installed. It keeps an account
-/// of objects, and tells on standard output which are left at the end.
+/// Variables that also enable the validation layer, if it is installed. It tracks objects, and
+/// reports on standard output those left at the end.
 fn under_validation(folder: &Path) -> Option<[(&'static str, String); 2]> {
     let installed = Path::new("/usr/share/vulkan/explicit_layer.d");
     if !installed.join("VkLayer_khronos_validation.json").is_file() {
@@ -78,7 +78,7 @@ fn every_call_of_the_set_up() {
     run(&t, &format!("vkMapMemory 1 {NULL}"), &[]).failed(5, &["vkMapMemory"]);
 }
 
-/// What is there by then is destroyed.
+/// What exists by then is destroyed.
 #[test]
 fn the_second_call_of_the_set_up() {
     let Some(t) = drive() else { return };
@@ -87,7 +87,7 @@ fn the_second_call_of_the_set_up() {
         let o = run(&t, &format!("{name} 2 {OUT_OF_DEVICE_MEMORY}"), &[]);
         match o.code {
             Some(5) => failed.push(*name),
-            // There is no second one, or it is that of a sweep.
+            // There is no second call, or it belongs to a sweep.
             _ => o.succeeded(),
         }
     }
@@ -96,12 +96,13 @@ fn the_second_call_of_the_set_up() {
     }
 }
 
-/// Then none are told, not those of the run before; and they take no part in what is found.
+/// Then no times are reported, not even those of the run before; and the results do not depend on
+/// them.
 #[test]
 fn times_that_cannot_be_read() {
     let Some(t) = drive() else { return };
     let json = t.path().join("s.json");
-    // From the fourth run on, the second sweep's, with which the first pair ends.
+    // From the fourth run on: the second sweep's, which completes the first pair.
     let [all, fewer] = ["", &format!("vkGetQueryPoolResults 4 {LOST}")].map(|fault| {
         let o = run(&t, fault, &["--summary", json.to_str().unwrap()]);
         o.succeeded();
@@ -114,14 +115,14 @@ fn times_that_cannot_be_read() {
     assert!(kernel(&all) && !kernel(&fewer), "{}", fewer["stage_ms"]);
 }
 
-/// Tables of a run's results by name, from a frame on.
+/// Tables of a run's results by name, starting at a frame.
 fn tables(out: &Path, from: usize) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for kind in ["columns", "points", "tracklets"] {
         for entry in fs::read_dir(out.join(kind)).unwrap() {
             let path = entry.unwrap().path();
             let frame: usize = path.file_stem().unwrap().to_str().unwrap().parse().unwrap();
-            // Tracklets are those of a pair's second sweep.
+            // Tracklets belong to a pair's second sweep.
             if frame >= from + usize::from(kind == "tracklets") {
                 found.insert(format!("{kind} {frame}"), fs::read(path).unwrap());
             }
@@ -164,9 +165,9 @@ fn in_a_run_the_scalar_backend_goes_on() {
             assert!(s["device_failure"].as_str().unwrap().contains(told), "{fault}: {s}");
             assert!(stderr.contains(told) && stderr.contains("going on with the scalar backend"));
             assert_eq!(tables(&out, failing), wanted, "{fault}");
-            // Both are there then.
+            // Both backends are held then.
             assert!(s["host_bytes"].as_u64() > host_bytes.map(|bytes| 2 * bytes), "{fault}: {s}");
-            // The pair that ends with the sweep in which it failed is lost.
+            // The pair completed by the sweep in which the device failed is lost.
             let pairs = (SWEEPS - 1 - usize::from(failing > 0)) as u64;
             assert_eq!(s["pairs"].as_u64(), Some(pairs), "{fault}");
         }

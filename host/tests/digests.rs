@@ -1,5 +1,5 @@
-//! One digest, however the program is run: on which backend, how wide, on how many threads, as
-//! which build. `RAYWAKE_DIGEST_OF` names further builds to compare, separated by `:`.
+//! One digest, however the program is run: on any backend, vector width, number of threads or
+//! build. `RAYWAKE_DIGEST_OF` names further builds to compare, separated by `:`.
 
 #[allow(dead_code)]
 mod common;
@@ -14,15 +14,15 @@ use common::{Outcome, Temp};
 use raywake_sim::{Drive, Ego, Options, SimSweep};
 use raywake_simd::Simd;
 
-/// Widths of software Vulkan's vectors, bits.
+/// Vector widths of software Vulkan, bits.
 const WIDTHS: [u32; 3] = [128, 256, 512];
-/// Numbers of its threads besides the calling one, and the width they are tried at.
+/// Its numbers of threads besides the calling one, and the width they are tested at.
 const THREADS: [u32; 3] = [0, 1, 2];
 const THREADS_AT: u32 = 256;
-/// What a run of the default profile may take on the device.
+/// Maximum device memory of a run of the default profile, bytes.
 const DEVICE_BYTES: u64 = 64 << 20;
 
-/// The simulated street, turning, in KITTI's layout.
+/// A left turn on the simulated street, in KITTI's layout.
 fn drive(t: &Temp) -> PathBuf {
     for (n, sweep) in sweeps().iter().enumerate() {
         let values = sweep.points.iter().flat_map(|p| {
@@ -37,7 +37,7 @@ fn drive(t: &Temp) -> PathBuf {
     t.path().join("drive")
 }
 
-/// Its sweeps.
+/// The sweeps of that drive.
 fn sweeps() -> &'static [SimSweep] {
     static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
     let ego = Ego::Turn { left: true, speed: 6.0 };
@@ -45,12 +45,12 @@ fn sweeps() -> &'static [SimSweep] {
     SWEEPS.get_or_init(|| Drive::new(3, options).collect())
 }
 
-/// A row for each of them.
+/// One row per sweep.
 fn rows(row: &dyn Fn(&SimSweep) -> String) -> String {
     sweeps().iter().map(row).collect()
 }
 
-/// A row of `poses.txt`, where the world's origin lies elsewhere by `away`, m, along each axis.
+/// A row of `poses.txt`, with the world's origin shifted by `away`, m, along each axis.
 fn pose(sweep: &SimSweep, away: f64) -> String {
     let pose = sweep.world_from_vehicle;
     let (turn, place) = (pose.matrix(), (pose.translation + away).to_array());
@@ -65,12 +65,12 @@ fn pose(sweep: &SimSweep, away: f64) -> String {
 #[derive(Clone, Copy, Debug)]
 enum Way {
     Scalar,
-    /// Vulkan. Where a CPU plays the device: the width of its vectors and the number of threads.
+    /// Vulkan. If the device is a CPU: its vector width and number of threads.
     Vulkan(u32, Option<u32>),
 }
 
 impl Way {
-    /// A command of a program that will run this way.
+    /// The command of a program, run this way.
     fn command(self, program: &Path, what: &str, data: &Path) -> Command {
         let mut command = Command::new(program);
         command.arg(what).arg(data);
@@ -80,7 +80,7 @@ impl Way {
         };
         command.args(["--backend", "vulkan", "--timeout", "120"]);
         command.env("LP_NATIVE_VECTOR_WIDTH", width.to_string());
-        // Kept from test to test, but one for each width: the driver does not tell them apart.
+        // Kept across tests, but one per width: the driver does not distinguish them.
         let cache = env::temp_dir().join(format!("raywake-shaders-{width}"));
         command.env("MESA_SHADER_CACHE_DIR", cache);
         match threads {
@@ -96,7 +96,7 @@ fn own() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_raywake"))
 }
 
-/// Whether a program finds a Vulkan device. `RAYWAKE_VULKAN=required` says that ours must.
+/// Whether a program finds a Vulkan device. With `RAYWAKE_VULKAN=required` ours must.
 fn vulkan(program: &Path) -> bool {
     let devices = Outcome::of(Command::new(program).arg("devices").output().unwrap());
     devices.succeeded();
@@ -109,7 +109,7 @@ fn vulkan(program: &Path) -> bool {
     found
 }
 
-/// The digest of `run`, whose summary must be in order.
+/// The digest of `run`, whose summary is checked.
 fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
     let file = t.path().join("summary.json");
     let mut command = way.command(program, "run", &t.path().join("drive"));
@@ -131,7 +131,7 @@ fn digest(t: &Temp, program: &Path, way: Way, more: &[&str]) -> String {
     s["digest"].as_str().unwrap().to_string()
 }
 
-/// The bytes of a table, if the program can write any.
+/// The bytes of a table, if the program can write one.
 fn table(t: &Temp, program: &Path) -> Option<Vec<u8>> {
     let out = t.path().join("tables");
     let _ = fs::remove_dir_all(&out);
@@ -154,7 +154,7 @@ fn map_digest(t: &Temp, way: Way) -> String {
     digest.unwrap_or_else(|| panic!("{}", outcome.stdout)).to_string()
 }
 
-/// The digest of `track`, whose summary must be in order.
+/// The digest of `track`, whose summary is checked.
 fn track_digest(t: &Temp, program: &Path, way: Way, front_end: &str) -> String {
     let file = t.path().join("tracks.json");
     let mut command = way.command(program, "track", &t.path().join("drive"));

@@ -1,4 +1,4 @@
-//! `raywake flow` as a user meets it: clouds in, a row per point out.
+//! `raywake flow` from the user's side: clouds in, one row per point out.
 
 #[allow(dead_code)]
 mod common;
@@ -12,11 +12,10 @@ use raywake::order_statistics::median;
 use raywake_core::pose::Pose;
 use raywake_sim::{Drive, Options, Path as Track, Scene, SimSweep, State};
 
-/// Rows without a place, put into the first cloud.
+/// Rows without a position, inserted into the first cloud.
 const BAD: [usize; 3] = [0, 1000, 40_000];
 
-/// Two sweeps of a vehicle that turns left on a street, and the number of a car that comes towards
-/// it.
+/// Two sweeps of a vehicle that turns left on a street, and the number of an oncoming car.
 fn sweeps() -> &'static ([SimSweep; 2], u32) {
     static SWEEPS: OnceLock<([SimSweep; 2], u32)> = OnceLock::new();
     SWEEPS.get_or_init(|| {
@@ -40,7 +39,7 @@ fn positions(sweep: &SimSweep) -> Vec<[f32; 3]> {
     sweep.points.iter().map(|p| p.position).collect()
 }
 
-/// The first sweep with rows without a place.
+/// The first sweep with the rows without a position.
 fn first_cloud() -> Vec<[f32; 3]> {
     let mut cloud = positions(&sweeps().0[0]);
     BAD.iter().for_each(|row| cloud.insert(*row, [1.0, f32::NAN, 0.0]));
@@ -80,7 +79,7 @@ fn rows(path: &Path) -> Vec<[DVec3; 2]> {
     rows.iter().map(|r| [DVec3::from_slice(&r[..3]), DVec3::from_slice(&r[3..])]).collect()
 }
 
-/// The motion that was printed.
+/// The printed motion.
 fn printed(o: &Outcome) -> Pose {
     let line = o.stdout.lines().find(|l| l.starts_with("motion")).unwrap();
     let words = line.split([' ', ',']).filter_map(|w| w.parse().ok());
@@ -118,7 +117,7 @@ fn a_vehicle_that_moves_and_a_car_that_comes() {
         let expected = found.inverse().transform(at + *motion) - at;
         assert!((expected - *flow).length() < 0.02, "row {row}: {flow} {expected}");
     }
-    // What was put in has no truth.
+    // The inserted rows have no ground truth.
     let mut measured = rows;
     for row in BAD.iter().rev() {
         measured.remove(*row);
@@ -155,7 +154,7 @@ fn far_apart_and_turned() {
     o.succeeded();
     let off = (apart.inverse() * printed(&o)).twist(1.0);
     assert!(off.linear.length() < 0.01 && off.angular.length() < 1e-3, "{}", o.stdout);
-    // The same as no motion that a vehicle makes within 0.1 s.
+    // Too much motion for a vehicle in 0.05 s.
     let o = flow(&a, &b, &t.path().join("f.bin"), &["--dt", "0.05"]);
     o.failed(2, &["b.bin does not follow", "jump at 121 m/s"]);
     flow(&a, &b, &t.path().join("f.bin"), &["--dt", "2"]).failed(2, &["gap of 2.000 s"]);
@@ -210,7 +209,7 @@ fn clouds_that_tell_nothing() {
     let other = Drive::new(78, Options { sweeps: 1, ..Options::default() }).sweep(0);
     let other = t.write("other.bin", bin(&positions(&other)));
     refused(&good, &other, &["other.bin", "cannot be registered", "overlap"]);
-    // A floor and nothing on it.
+    // A bare floor.
     let floor: Vec<[f32; 3]> = (0..40_000)
         .map(|n| [(n % 200) as f32 * 0.2 - 20.0, (n / 200) as f32 * 0.2 - 20.0, -1.7])
         .collect();

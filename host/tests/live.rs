@@ -1,4 +1,4 @@
-//! Packets as they come: from a capture, or from a sensor that is made up.
+//! Live packets: from a capture, or from a synthetic sensor.
 
 #![cfg(unix)]
 
@@ -19,12 +19,12 @@ use raywake_sim::packets::OusterPackets;
 use raywake_sim::{Drive, Options, Sensor, SensorRig};
 use serde_json::Value;
 
-/// Turns of a capture; it begins within the first one.
+/// Revolutions of a capture, which begins within the first one.
 const TURNS: usize = 24;
-/// Those that are whole, and of which another packet shows that they are.
+/// Those that are complete, as shown by a packet after them.
 const WHOLE: u64 = TURNS as u64 - 2;
 
-/// A capture of a small sensor in a street.
+/// A capture from a small sensor in a street.
 fn recorded(t: &Temp) -> PathBuf {
     let mut sensor = Sensor { columns: 512, ..Sensor::os1_128() };
     let beams = sensor.beams.iter().step_by(4).copied().collect();
@@ -40,7 +40,7 @@ fn recorded(t: &Temp) -> PathBuf {
     path
 }
 
-/// `raywake live` on a small window, its figures to `s.json`.
+/// `raywake live` on a small window, with its figures in `s.json`.
 fn live(t: &Temp, more: &[&str]) -> Command {
     let (config, json) = (t.write("small.toml", SMALL), t.path().join("s.json"));
     let mut command = common::command(&["live", "--config", config.to_str().unwrap()]);
@@ -48,7 +48,7 @@ fn live(t: &Temp, more: &[&str]) -> Command {
     command
 }
 
-/// What came of a replay.
+/// The outcome of a replay.
 fn replayed(t: &Temp, more: &[&str]) -> (Outcome, Value) {
     let path = t.path().join("street.pcap");
     let mut command = live(t, &["--replay", path.to_str().unwrap()]);
@@ -62,15 +62,15 @@ fn count(summary: &Value, group: &str, name: &str) -> u64 {
     summary[group][name].as_u64().unwrap_or_else(|| panic!("{group}.{name} of {summary}"))
 }
 
-/// Every packet and every sweep is accounted for, and nothing was allocated.
+/// Asserts that every packet and every sweep is accounted for, and nothing was allocated.
 fn accounted(summary: &Value) {
     assert_eq!(count(summary, "sweeps", "allocating"), 0, "{summary}");
-    // A busy system that allows small buffers throws some away, and says so.
+    // A busy system that allows only small buffers drops some, and reports them.
     let lost = summary["overflowed"].as_u64().unwrap_or(0);
     let packets = count(summary, "packets", "packets") + lost;
     assert_eq!(packets, (TURNS * 32 - 16) as u64, "{summary}");
     let all = ["done", "left_out", "before_start"].map(|name| count(summary, "sweeps", name));
-    // The sweep that the rig is learned from comes first.
+    // The first sweep is used up for learning the rig.
     let all = all.iter().sum::<u64>();
     assert!(all == WHOLE - 1 || all < WHOLE - 1 && lost > 0, "{summary}");
 }
@@ -82,7 +82,7 @@ fn socket() -> (UdpSocket, String) {
     (socket, address)
 }
 
-/// Kinds of datagrams that arrived, and records in them, until none come any more.
+/// Numbers of records received by kind, until no more datagrams arrive.
 fn received(socket: &UdpSocket) -> [u64; 4] {
     let (mut records, mut datagram) = ([0; 4], [0; 2000]);
     while let Ok(length) = socket.recv(&mut datagram) {
@@ -92,7 +92,7 @@ fn received(socket: &UdpSocket) -> [u64; 4] {
     records
 }
 
-/// Live the same bits come out as of the capture. Messages are recorded, datagrams sent.
+/// A live replay gives the same bits as the capture. Messages are recorded, datagrams sent.
 #[test]
 fn a_replay_has_the_digest_of_the_capture() {
     let t = Temp::new();
@@ -122,7 +122,7 @@ fn a_replay_has_the_digest_of_the_capture() {
     assert!(s["latency_ms"]["median"].as_f64() > Some(0.0) && s["turn_ms"] == 100.0);
     let read = common::raywake(&["run", mcap.to_str().unwrap(), "-n", "2", "--backend", "scalar"]);
     read.succeeded();
-    // On a machine that is too busy some were left out: then there is nothing to compare.
+    // On a busy machine some may have been dropped: then there is nothing to compare.
     let frames = [0, 1].map(|n| s["frames"][n].as_u64().unwrap());
     if count(&s, "sweeps", "left_out") + s["overflowed"].as_u64().unwrap_or(0) > 0 {
         eprintln!("not compared: sweeps or packets were left out");
@@ -137,7 +137,8 @@ fn a_replay_has_the_digest_of_the_capture() {
     assert_eq!(o.summary(&json)["digest"], s["digest"]);
 }
 
-/// With all cores busy, and ten times as fast: the queue stays bounded, and all is counted.
+/// With all cores busy, and at ten times the speed, the queue stays bounded and everything is
+/// counted.
 #[test]
 fn more_than_it_can_do() {
     let t = Temp::new();
@@ -155,7 +156,7 @@ fn more_than_it_can_do() {
     assert!(count(&s, "sweeps", "done") > 0 && s["deadline_ms"] == 5.0);
 }
 
-/// Poses that come as datagrams, before the sweeps of their times do.
+/// Poses received as datagrams, before the sweeps of their times.
 #[test]
 fn poses_that_come() {
     let t = Temp::new();
@@ -216,7 +217,7 @@ fn a_device_that_fails() {
     }
 }
 
-/// A disk that is full ends the recording, not the run.
+/// A full disk ends the recording, not the run.
 #[test]
 fn a_full_disk() {
     let t = Temp::new();
@@ -242,7 +243,7 @@ fn is_partial(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "partial")
 }
 
-/// Datagrams of others, and a signal: it ends in order, before and after the first sweep.
+/// Foreign datagrams, and a signal: an orderly end, before and after the first sweep.
 #[test]
 fn a_signal_ends_it() {
     let t = Temp::new();
@@ -294,8 +295,8 @@ fn a_signal_ends_it() {
     }
 }
 
-/// A program that gets no time for half a second, while its sensor goes on: a second later sweeps
-/// come without a gap again.
+/// A program stopped for half a second, while its sensor continues: a second later sweeps arrive
+/// without gaps again.
 #[test]
 fn a_stall() {
     let t = Temp::new();
@@ -318,7 +319,7 @@ fn a_stall() {
             thread::sleep(Duration::from_micros(1327));
             let mut datagram = [0; 2000];
             while results.recv(&mut datagram).is_ok() {
-                // Of a sweep: the time since the one before, and how many were left out so far.
+                // For a sweep: the time since the one before, and the number dropped so far.
                 if datagram[4] == 0 {
                     let dt_s = f32::from_le_bytes(datagram[80..84].try_into().unwrap());
                     let left_out = u64::from_le_bytes(datagram[88..96].try_into().unwrap());
@@ -345,7 +346,8 @@ fn a_stall() {
     assert!(last.iter().all(|sweep| sweep.0 > 0.0 && sweep.1 == last[0].1), "{swept:?}");
 }
 
-/// A packet of a VLP-16 in the middle of a room, 16 m by 24 m; `n` counts packets, 75 a turn.
+/// A packet of a VLP-16 in the middle of a room, 16 m by 24 m; `n` counts packets, 75 per
+/// revolution.
 fn vlp16(n: u32) -> Vec<u8> {
     let block = |block: u32| {
         let azimuth = ((n * 12 + block) * 40 % 36_000) as u16;
@@ -366,7 +368,7 @@ fn what_does_not_fit_together() {
         let mut command = live(&t, more);
         let mut child = command.stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         let since = Instant::now();
-        // What is taken for right would listen for ever.
+        // If accepted by mistake, it would listen forever.
         while child.try_wait().unwrap().is_none() {
             thread::sleep(Duration::from_millis(5));
             if since.elapsed() > Duration::from_secs(30) {
@@ -383,7 +385,7 @@ fn what_does_not_fit_together() {
     wrong(&["--model", "vlp16", "--listen", "here"], 2, &["ADDRESS:PORT"]);
     wrong(&["--model", "vlp16", "--listen", "203.0.113.1:9"], 2, &["--listen 203.0.113.1:9"]);
     wrong(&["--replay", "no.pcap"], 3, &["no.pcap"]);
-    // At once, before any sweep comes.
+    // At once, before any sweep arrives.
     let nowhere = ["--model", "vlp16", "--listen", "127.0.0.1:0", "--mcap", "/nowhere/x.mcap"];
     wrong(&nowhere, 4, &["/nowhere/x.mcap"]);
     let (_held, address) = socket();

@@ -1,4 +1,4 @@
-//! Recordings without poses, as a user meets them.
+//! Recordings without poses, from the user's side.
 
 #[allow(dead_code)]
 mod common;
@@ -10,7 +10,7 @@ use raywake_sim::{Drive, Ego, Options};
 
 const SWEEPS: usize = 6;
 
-/// A folder of clouds, and where they were made since the first of them.
+/// Writes a folder of clouds. Returns their poses relative to the first one.
 fn recording(t: &Temp, sweeps: usize) -> Vec<Pose> {
     let ego = Ego::Straight { speed: 9.0 };
     let drive = Drive::new(3, Options { sweeps, ego, ..Options::default() });
@@ -56,7 +56,7 @@ fn poses_are_found_and_of_use() {
     assert_eq!(digest(&given), digest(&trusted));
 }
 
-/// Poses that err to and fro by 3 cm are replaced; those that slip are not.
+/// Poses that alternate by 3 cm are replaced; those that slip are not.
 #[test]
 fn poses_that_are_given() {
     let t = Temp::new();

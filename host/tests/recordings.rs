@@ -1,4 +1,4 @@
-//! Recordings of ROS out and in, and what `clean` leaves of one.
+//! ROS recordings written and read back, and what `clean` leaves of a recording.
 
 #[allow(dead_code)]
 mod common;
@@ -32,7 +32,7 @@ fn what_is_written_as_mcap_can_be_read() {
     raywake(&["run", drive, "--topic", "/other"]).failed(2, &["--topic"]);
 }
 
-/// Three sweeps of an OS1 on the road: what moves there is found without anything but the file.
+/// Three sweeps of an OS1 on the road: motion is found from the file alone.
 #[test]
 #[cfg(feature = "pcap")]
 fn packets_of_a_sensor() {
@@ -75,7 +75,7 @@ fn a_recording_is_cleaned() {
     raywake(&["clean", drive.to_str().unwrap(), "-o", "x", "--voxel", "0"]).failed(2, &["--voxel"]);
 }
 
-/// What is left of a bag is a bag, in the order of time, and of other clouds clouds like them.
+/// What is left of a bag is a bag, in time order; other clouds leave clouds of the same format.
 #[test]
 #[cfg(feature = "mcap")]
 fn what_is_clean_is_stored_as_it_came() {

@@ -1,4 +1,4 @@
-//! The program and its system: signals, and memory that there is not.
+//! The program and the system: signals, and lack of memory.
 
 #![cfg(unix)]
 
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use common::{BACKEND, Outcome, SMALL, Temp, run};
 
-/// Where the shell can limit it.
+/// Linux only, where the shell can limit memory.
 #[cfg(target_os = "linux")]
 #[test]
 fn too_little_memory_is_told_before_the_first_sweep() {
@@ -22,8 +22,8 @@ fn too_little_memory_is_told_before_the_first_sweep() {
     let program = env!("CARGO_BIN_EXE_raywake");
     let data = t.path().join("drive").display().to_string();
     let out = t.path().join("out").display().to_string();
-    // The program starts within 20 MB; what is asked for fits from 50 on (registration), or from 75
-    // and more.
+    // The program starts within 20 MB; the memory requested fits from 50 MB (registration) or from
+    // 75 MB and more.
     for (kib, command) in [
         (70_000, format!("run {data} --backend scalar")),
         (40_000, format!("odometry {data} --out {out}")),
@@ -40,7 +40,7 @@ fn too_little_memory_is_told_before_the_first_sweep() {
 fn a_second_interrupt_ends_at_once() {
     let t = Temp::new();
     t.drive(3);
-    // Nobody reads the figures, so that the program waits for ever when it has said everything.
+    // Nobody reads the figures, so the program waits forever once it has printed everything.
     let pipe = t.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let mut child = common::command(&["run", t.path().join("drive").to_str().unwrap()])
@@ -97,7 +97,7 @@ fn an_interrupt_ends_the_run_in_order() {
         let whole = |name: &str| !name.ends_with(".partial");
         assert!(names.iter().all(|n| whole(n.as_ref().unwrap().file_name().to_str().unwrap())));
     }
-    // It goes on where it was, and leaves what one run leaves.
+    // It continues where it was, and leaves the same files as a single run.
     let kept = out.join("points/0000000000.feather");
     let written = fs::metadata(&kept).unwrap().modified().unwrap();
     let count = (sweeps + 3).to_string();

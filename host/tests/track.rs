@@ -1,4 +1,4 @@
-//! `raywake track` as a user meets it.
+//! `raywake track` from the user's side.
 
 #[allow(dead_code)]
 mod common;
@@ -7,7 +7,7 @@ use std::fs;
 
 use common::{Outcome, Temp, raywake};
 
-/// A drive of twenty sweeps past a parked car, with a car that drives ahead at 8 m/s.
+/// Writes a drive of twenty sweeps past a parked car, with a car driving ahead at 8 m/s.
 fn drive(t: &Temp) {
     for n in 0..20 {
         t.write(&format!("drive/velodyne_points/data/{n:010}.bin"), cloud(n));
@@ -17,7 +17,7 @@ fn drive(t: &Temp) {
     t.write("drive/times.txt", lines(&|n| format!("{}\n", n as f64 * 0.1)));
 }
 
-/// Ground 1.73 m below, and two boxes; all as from where the vehicle is at the stamp.
+/// Ground 1.73 m below, and two boxes, all seen from the vehicle's position at the stamp.
 fn cloud(n: usize) -> Vec<u8> {
     let own = n as f32 * 0.5;
     let mut points: Vec<[f32; 4]> = Vec::new();
@@ -40,7 +40,8 @@ fn cloud(n: usize) -> Vec<u8> {
 fn track(t: &Temp, more: &[&str]) -> Outcome {
     let data = t.path().join("drive");
     let head = ["track", data.to_str().unwrap(), "--deskew", "off", "--backend", "scalar"];
-    // Hollow boxes are like nothing that was learned: they would move some sweeps late.
+    // Hollow boxes resemble nothing that was learned: with the encoder they would move some sweeps
+    // late.
     let bare = ["--encoder", "none"];
     raywake(&[&head[..], &bare, more].concat())
 }
@@ -77,7 +78,7 @@ fn figures_and_files() {
         }
         assert!(out.join("tracks.feather").is_file());
         assert_eq!(fs::read_dir(out.join("returns")).unwrap().count(), 20);
-        // What was written is a recording, too.
+        // The output is a recording, too.
         let o = raywake(&[
             "odometry",
             bag.to_str().unwrap(),
@@ -119,7 +120,7 @@ fn chapter_2_as_printed() {
     track(&t, &["--estimate", "exact"]).failed(2, &["printed"]);
 }
 
-/// A map that says the ground is above all of it leaves nothing to follow.
+/// A map with the ground above everything leaves nothing to track.
 #[test]
 fn a_map_of_the_ground() {
     let t = Temp::new();
@@ -147,7 +148,7 @@ fn bad_input() {
     let below = t.write("file", "").join("out");
     track(&t, &["--out", below.to_str().unwrap()]).failed(4, &[below.to_str().unwrap()]);
     track(&t, &["--ground-map", "absent.asc"]).failed(3, &["absent.asc"]);
-    // Nothing seen, NaN, times that jump.
+    // Empty sweeps, NaN, jumps in time.
     t.write("drive/velodyne_points/data/0000000003.bin", []);
     let nan: Vec<u8> = (0..400).flat_map(|_| f32::NAN.to_le_bytes()).collect();
     t.write("drive/velodyne_points/data/0000000004.bin", nan);
@@ -160,7 +161,7 @@ fn bad_input() {
         o.succeeded();
         let s = o.summary(&json);
         assert_eq!((&s["dropped"]["not_finite"], &s["sweeps"]), (&100.into(), &20.into()), "{s}");
-        // The gap ends them all.
+        // The gap ends all tracks.
         let spans = s["tracks"].as_array().unwrap().iter().map(|l| l["for_s"].as_f64().unwrap());
         assert!(spans.fold(0.0, f64::max) < 1.0, "{s}");
         assert!(s["tracks"].as_array().unwrap().len() >= 4, "{s}");

@@ -1,4 +1,4 @@
-//! Integer expressions of constants, as they stand in kernels.
+//! Integer expressions of constants, as they appear in kernels.
 
 use raywake_core::stages::CONSTANTS;
 use std::collections::HashMap;
@@ -7,7 +7,7 @@ use std::collections::HashMap;
 pub struct Constants(HashMap<String, i64>);
 
 impl Constants {
-    /// Those of core and those that the file itself declares.
+    /// Those of core and those declared by the file itself.
     pub fn of(source: &str) -> Constants {
         let shared = CONSTANTS.iter().map(|(name, value, _)| (name.to_string(), *value));
         let mut all = Constants(shared.collect());
@@ -24,7 +24,7 @@ impl Constants {
         all
     }
 
-    /// The value of an expression of numbers, constants, `+ - * / %`, brackets, `i32()` and
+    /// The value of an expression of numbers, constants, `+ - * / %`, parentheses, `i32()` and
     /// `u32()`.
     pub fn value(&self, text: &str) -> Option<i64> {
         let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
@@ -34,7 +34,7 @@ impl Constants {
         rest.is_empty().then_some(value)
     }
 
-    /// Iterations of `for (var n = A; n < B; n += C)`, where these are constants.
+    /// Number of iterations of `for (var n = A; n < B; n += C)`, if A, B and C are constants.
     pub fn iterations(&self, code: &str) -> Option<i64> {
         let header = code.trim().strip_prefix("for (")?.strip_suffix(") {")?;
         let mut parts = header.split(';').map(str::trim);

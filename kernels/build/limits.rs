@@ -1,17 +1,18 @@
-//! Limits every kernel keeps, so that it runs on the least of Vulkan devices.
+//! Limits that every kernel observes, so that it runs on even the most limited Vulkan devices.
 
 use crate::arithmetic::Constants;
 use crate::reflect::Bound;
 use naga::{AddressSpace, Block, EntryPoint, Module, Statement};
 use std::path::Path;
 
-/// Storage buffers of a kernel.
+/// Maximum number of storage buffers of a kernel.
 const BUFFERS_MAX: usize = 8;
-/// Invocations of a workgroup.
+/// Maximum number of invocations of a workgroup.
 const INVOCATIONS_MAX: u32 = 256;
-/// Bytes of workgroup memory.
+/// Maximum size of workgroup memory.
 const SHARED_BYTES_MAX: u32 = 16 << 10;
-/// Iterations of all loops of an invocation: a software device ends loops, silently, after 65,535.
+/// Maximum number of iterations of all loops of an invocation: a software device silently ends
+/// loops after 65,535.
 const ITERATIONS_MAX: u64 = 50_000;
 
 /// Checks an entry point.
@@ -36,9 +37,9 @@ pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &
     if shared > SHARED_BYTES_MAX {
         fail(format!("{shared} bytes of workgroup memory, {SHARED_BYTES_MAX} allowed"));
     }
-    // A barrier some invocations do not reach is undefined, and the compiler does not look. A break
-    // out of a loop that holds one is not seen here either: the bounds of those loops are
-    // constants.
+    // A barrier that some invocations do not reach is undefined behaviour, and the compiler does
+    // not check for it. A break out of a loop with a barrier is not detected here either: the
+    // bounds of such loops are constants.
     if has_conditional_barrier(&entry.function.body, false) {
         fail("a barrier under a condition, or behind an early return".into());
     }
@@ -49,15 +50,15 @@ pub fn check_entry(file: &Path, module: &Module, entry: &EntryPoint, bindings: &
     }
 }
 
-/// Whether a barrier stands inside an `if` or `switch`, or after a possible return. Loops may hold
-/// barriers: the bounds of those that do are constants.
+/// Whether there is a barrier inside an `if` or `switch`, or after a possible return. Loops may
+/// contain barriers: the bounds of those that do are constants.
 fn has_conditional_barrier(block: &Block, conditional: bool) -> bool {
     let mut returned = false;
     for statement in block.iter() {
         let bad = match statement {
             Statement::ControlBarrier(_) => conditional || returned,
             Statement::If { condition: _, accept, reject } => {
-                // The exit of a loop is an `if` with nothing but a break in it.
+                // The exit of a loop is an `if` with only a break in it.
                 returned |= returns(accept) || returns(reject);
                 has_conditional_barrier(accept, true) || has_conditional_barrier(reject, true)
             }
@@ -88,9 +89,9 @@ fn returns(block: &Block) -> bool {
     })
 }
 
-/// Bounds the iterations of all loops of a file: nested loops multiply, the others add up. A loop
-/// whose header counts from constant to constant is computed; any other states on its line,
-/// `// <= N`, an expression of constants that it never exceeds.
+/// Bounds the iterations of all loops in a file: nested loops multiply, others add up. The count of
+/// a loop whose header runs from constant to constant is computed; any other loop states on its
+/// line, as `// <= N`, an expression of constants that it never exceeds.
 pub fn check_loops(file: &Path, source: &str) {
     let constants = Constants::of(source);
     let mut open: Vec<u64> = Vec::new();

@@ -1,11 +1,10 @@
-//! What stands in front of a kernel: constants, records and bindings as `raywake-core` declares
-//! them.
+//! What is prepended to a kernel: constants, records and bindings as `raywake-core` declares them.
 
 use raywake_core::record::SweepUniform;
 use raywake_core::stages::{Argument, Buffer, CONSTANTS, View};
 use std::fmt::Write;
 
-/// Constants and the uniform record, in front of every kernel.
+/// Constants and the uniform record, prepended to every kernel.
 pub fn prelude() -> String {
     let mut text = String::new();
     for (name, value, signed) in CONSTANTS {
@@ -17,8 +16,8 @@ pub fn prelude() -> String {
     text
 }
 
-/// Bindings of a file: those of one entry point first, numbered, then what others of the file bind.
-/// Arrays are wrapped in structs: a bare array would hide from the validation layer.
+/// Bindings of a file, numbered: those of one entry point first, then what others in the file bind.
+/// Arrays are wrapped in structs: the validation layer would not see a bare array.
 pub fn bindings(arguments: &[Argument]) -> String {
     let mut text = String::new();
     for (n, a) in arguments.iter().enumerate() {
@@ -50,8 +49,8 @@ fn element(a: &Argument) -> String {
     }
 }
 
-/// Bytes from one element of a buffer to the next that the kernels must come to as well, where they
-/// see its elements: two of 16 bits share a word.
+/// Bytes from one element of a buffer to the next, which the kernels must agree on if they view it
+/// by elements; at least a word, which two 16-bit elements share.
 pub fn stride(a: &Argument) -> Option<u32> {
     let elements = a.view == View::Elements && a.buffer != Buffer::sweep;
     elements.then_some((a.buffer.row().element_bytes as u32).max(4))

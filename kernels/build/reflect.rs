@@ -1,4 +1,4 @@
-//! What an entry point binds, from naga's analysis.
+//! What an entry point binds, according to naga's analysis.
 
 use naga::valid::{FunctionInfo, GlobalUse};
 use naga::{AddressSpace, Module, StorageAccess, TypeInner};
@@ -9,15 +9,15 @@ pub struct Bound {
     pub name: String,
     /// Bytes from one element of its array to the next.
     pub stride: Option<u32>,
-    /// Read.
+    /// Whether it is read.
     pub reads: bool,
-    /// Written; atomics are both.
+    /// Whether it is written; atomics are both read and written.
     pub writes: bool,
-    /// A uniform buffer.
+    /// Whether it is a uniform buffer.
     pub uniform: bool,
 }
 
-/// The buffers of the whole module in binding order, with the access of this entry point.
+/// The buffers of the whole module in binding order, with how this entry point accesses them.
 pub fn bindings(module: &Module, info: &FunctionInfo) -> Vec<Bound> {
     let mut bound = Vec::new();
     for (handle, global) in module.global_variables.iter() {

@@ -1,4 +1,4 @@
-//! What the table of stages says of a file of kernels.
+//! What the table of stages says about a file of kernels.
 
 use raywake_core::stages::{Argument, FLOW_PROGRAMS, MAP_PROGRAMS, Runner, StageOp, walk};
 
@@ -9,8 +9,8 @@ pub struct Entry {
     pub arguments: Vec<Argument>,
 }
 
-/// Every entry point of every stage, once. Where a stage serves several buffers, the kernels see
-/// the same names and types of each.
+/// Every entry point of every stage, once. If a stage serves several buffers, the kernels see the
+/// same names and types for each.
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     for program in FLOW_PROGRAMS.iter().chain(MAP_PROGRAMS) {
@@ -34,15 +34,15 @@ fn check_alike(entry: &Entry, arguments: &[Argument]) {
     assert!(alike, "`{}` is declared with different arguments", entry.name);
 }
 
-/// Those whose functions stand in a file.
+/// Those whose functions are in a file.
 pub fn of_source(declared: &[Entry], source: &str) -> Vec<Entry> {
     let has = |e: &&Entry| source.contains(&format!("\nfn {}(", e.name));
     declared.iter().filter(has).cloned().collect()
 }
 
-/// The arguments of an entry point, then those that the other entry points of its file have beside
-/// them: a file is compiled as a whole, for one entry point at a time. What one of them writes is
-/// writable to all.
+/// The arguments of an entry point, then the additional ones of the other entry points in its file:
+/// a file is compiled as a whole, for one entry point at a time. What one of them writes is
+/// writable for all.
 pub fn of_file(entries: &[Entry], index: usize) -> Vec<Argument> {
     let mut all = entries[index].arguments.clone();
     for argument in entries.iter().flat_map(|e| &e.arguments) {

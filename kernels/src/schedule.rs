@@ -1,5 +1,5 @@
-//! The programs of `raywake_core::stages` as a device runs them. Barriers follow from what the
-//! kernels read and write.
+//! The programs of `raywake_core::stages` as run by a device. Barriers follow from what the kernels
+//! read and write.
 
 use raywake_core::params::{Profile, TILE};
 use raywake_core::stages::{
@@ -10,25 +10,25 @@ use raywake_gpu::{self as gpu, Heap, Kernel};
 
 use crate::kernel::KERNELS;
 
-/// Some programs and the memory that they share on a device.
+/// Some programs and the memory they share on a device.
 pub struct Schedule {
     /// Everything that is allocated.
     pub rows: Vec<MemoryRow>,
-    /// The programs, in the order given, by rows.
+    /// The programs, in the order given, referring to the rows.
     pub programs: Vec<gpu::Program>,
     /// The same for devices that are CPUs.
     pub on_cpus: Vec<gpu::Program>,
 }
 
-/// Which of a stage's kernels run.
+/// Selects which of a stage's kernels run.
 type KernelsOf = fn(&'static Stage) -> &'static [(&'static str, GroupCount)];
 
-/// A buffer on the device, or the mapped one through which it crosses.
+/// A buffer on the device, or the mapped one through which it is transferred.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryRow {
     /// What it holds.
     pub buffer: Buffer,
-    /// Who touches it.
+    /// Who accesses it.
     pub heap: Heap,
 }
 
@@ -45,7 +45,7 @@ impl MemoryRow {
 }
 
 impl Schedule {
-    /// For a profile's sizes.
+    /// A schedule with the sizes of a profile.
     pub fn new(programs: &[stages::StageProgram], profile: &Profile) -> Schedule {
         let mut rows = Vec::new();
         for heap in [Heap::Upload, Heap::Device, Heap::Readback] {
@@ -67,7 +67,7 @@ impl Schedule {
         if device.kind == gpu::DeviceKind::Cpu { &self.on_cpus } else { &self.programs }
     }
 
-    /// The table as the executor takes it.
+    /// The table in the executor's form.
     pub fn buffers(&self, profile: &Profile) -> Vec<gpu::Buffer> {
         let of = |row: &MemoryRow| gpu::Buffer {
             name: row.name(),
@@ -77,7 +77,7 @@ impl Schedule {
         self.rows.iter().map(of).collect()
     }
 
-    /// Index of a row. The programs do not touch what is not there.
+    /// Index of a row. The programs only touch rows that exist.
     pub fn index(&self, heap: Heap, buffer: Buffer) -> usize {
         let found = self.rows.iter().position(|r| r.heap == heap && r.buffer == buffer);
         found.unwrap_or_else(|| panic!("`{}` is in no {heap:?} row", buffer.row().name))
@@ -148,7 +148,7 @@ impl Schedule {
     }
 }
 
-/// The kernel of an entry point; the build has seen that there is one for each.
+/// The kernel of an entry point; the build has checked that there is one for each.
 pub fn kernel(entry: &str) -> &'static Kernel {
     let found = KERNELS.iter().find(|k| k.name == entry);
     found.unwrap_or_else(|| panic!("no kernel `{entry}`"))

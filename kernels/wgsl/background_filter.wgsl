@@ -1,4 +1,4 @@
-// Marks the foreground of the sweep before. Twin: core/src/stages/background_filter.rs
+// Marks the foreground of the previous sweep. Twin: core/src/stages/background_filter.rs
 
 fn score(column: i32) -> i32 {
     let side = sweep.side;
@@ -25,8 +25,8 @@ fn score(column: i32) -> i32 {
 var<workgroup> count: atomic<u32>;
 var<workgroup> solid: array<u32, TILE>;
 
-// Lists the solid ones of TILE columns, then scores them. The columns are from all over the window,
-// so that every workgroup has as many.
+// Lists the solid ones among TILE columns, then scores them. The columns are spread over the whole
+// window, so that every workgroup has about as many solid ones.
 @compute @workgroup_size(ROW_WORKGROUP)
 fn background_filter(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -51,8 +51,7 @@ fn background_filter(
     workgroupBarrier();
     let listed = atomicLoad(&count);
     var n = lane;
-    // The exit comes last: software devices go through a loop once more behind one that comes
-    // first.
+    // The exit comes last: if it came first, software devices would go through the loop once more.
     loop { // <= TILE / ROW_WORKGROUP
         if n < listed {
             let column = solid[n];

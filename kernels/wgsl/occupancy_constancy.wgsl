@@ -1,9 +1,9 @@
-// Costs of a foreground column at every displacement, one workgroup a column.
+// Costs of a foreground column at every displacement, one workgroup per column.
 // Twin: core/src/stages/occupancy_constancy.rs
 
 var<workgroup> bits: array<i32, 32>;
 
-// What a mask bit of a target adds to the score of the source.
+// What a mask bit of a target contributes to the score of the source.
 fn bit_weight(source: u32, bit: u32) -> i32 {
     let k = bit & 15u;
     let free = constancy_weights.d[k];
@@ -23,15 +23,15 @@ fn four(first: u32) -> vec4<i32> {
 }
 
 // Sums of the weights of four bits for two targets at once, whose masks are the halves of `masks`,
-// shifted so that the bits come first: the sum for the low half plus 65536 times that for the high.
+// shifted so that the bits are lowest: the sum of the low half plus 65536 times that of the high.
 fn sums_of(masks: u32, weights: vec4<i32>) -> i32 {
     let chosen = (vec4<u32>(masks) >> vec4<u32>(0u, 1u, 2u, 3u)) & vec4<u32>(0x10001u);
     let w = vec4<i32>(chosen) * weights;
     return (w.x + w.y) + (w.z + w.w);
 }
 
-// Mask of the target at element `at` of the row; the padding is unknown, as a target outside the
-// window is.
+// Mask of the target at element `at` of the row; the padding is unknown, like a target outside the
+// window.
 fn target_at(i: i32, j: i32, at: u32) -> u32 {
     let ti = i + i32(at / LINE) - REACH;
     let tj = j + i32(at % LINE) - REACH;
@@ -71,7 +71,7 @@ fn occupancy_constancy(
             + sums_of(free >> 8u, w2) + sums_of(free >> 12u, w3)
             + sums_of(occupied, w4) + sums_of(occupied >> 4u, w5)
             + sums_of(occupied >> 8u, w6) + sums_of(occupied >> 12u, w7);
-        // Scores fit 16 bits with their sign: the low one is taken out before the high one.
+        // Scores fit in 16 bits with their sign: the low one is taken out before the high one.
         let first = (both << 16u) >> 16u;
         let second = (both - first) >> 16u;
         pair_cost.d[group.x * ROW_WORDS + word] = constancy_costs.d[first + offset]

@@ -1,5 +1,5 @@
-// Group counts of the indirect dispatches, from the counts so far. No twin: the scalar backend
-// loops over slices.
+// Group counts of the indirect dispatches, from the counts so far. It has no twin: the scalar
+// backend loops over slices.
 
 fn set_groups(at: u32, groups: u32) {
     counters.d[at] = groups;

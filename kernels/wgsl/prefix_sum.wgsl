@@ -1,8 +1,8 @@
 // Exclusive prefix sum of a whole buffer: reduce, then scan. Twin: core/src/stages/prefix_sum.rs
 //
 // `reduce` sums tiles of TILE values, `spine` scans the sums of up to TILE tiles in one workgroup
-// and leaves the sum of all behind them, `scan` scans within each tile and adds the tile's offset.
-// Workgroup memory only: no subgroups, no progress between workgroups assumed.
+// and stores the total after them, `scan` scans within each tile and adds the tile's offset.
+// Uses workgroup memory only: no subgroups or forward progress between workgroups are assumed.
 
 const EACH = TILE / WORKGROUP;
 const SPAN = 16u;
@@ -16,8 +16,8 @@ fn value_at(index: u32) -> u32 {
     return 0u;
 }
 
-// Exclusive prefix over the workgroup of one number per invocation: within spans, then of their
-// sums. Few barriers: software devices pay for each of them by the invocation.
+// Exclusive prefix sum over the workgroup of one number per invocation: within spans, then over
+// their sums. Few barriers: on software devices each costs time per invocation.
 fn scan_workgroup(lane: u32, mine: u32) -> u32 {
     partial[lane] = mine;
     workgroupBarrier();

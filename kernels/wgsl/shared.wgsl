@@ -1,4 +1,4 @@
-// Packed records, as in core/src/record.rs. Put in front of every kernel, behind the constants.
+// Packed records, as in core/src/record.rs. Prepended to every kernel, after the constants.
 const I32_MAX: i32 = 0x7fffffff;
 
 fn ray_end(ray: vec2<u32>) -> vec3<i32> {
@@ -26,7 +26,7 @@ fn displacement_at(index: u32) -> vec2<i32> {
     return vec2<i32>(i32(index / LINE), i32(index % LINE)) - vec2<i32>(REACH);
 }
 
-// Bresenham's walk in three dimensions, as `Walk` in core/src/stages/grid/walk.rs.
+// Bresenham's walk in three dimensions, like `Walk` in core/src/stages/grid/walk.rs.
 struct Walk {
     voxel: vec3<i32>,
     left: i32,
@@ -62,14 +62,14 @@ fn inside_square(i: i32, j: i32, side: i32) -> bool {
     return i >= 0 && i < side && j >= 0 && j < side;
 }
 
-// `a / n` to the nearest integer, halves upwards; `n` is positive.
+// `a / n` rounded to the nearest integer, halves upwards; `n` is positive.
 fn round_div(a: i32, n: i32) -> i32 {
     let twice = 2 * a + n;
     let quotient = twice / (2 * n);
     return quotient - select(0, 1, quotient * 2 * n > twice);
 }
 
-// The `n`-th column of the square that reaches so far around one, -1 outside the window.
+// The `n`-th column of the square with this reach around a column, -1 outside the window.
 fn column_around(i: i32, j: i32, reach: i32, n: i32, side: i32) -> i32 {
     let line = 2 * reach + 1;
     let at = vec2<i32>(i, j) + vec2<i32>(n / line, n % line) - vec2<i32>(reach);

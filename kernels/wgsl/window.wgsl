@@ -1,4 +1,4 @@
-// The least energy of a column at any displacement, smoothing apart, one workgroup a column.
+// The least energy of a column at any displacement, without smoothing, one workgroup per column.
 // Twin: core/src/stages/window.rs
 
 const ROW_QUADS = ROW_WORDS / 4u;
@@ -7,7 +7,7 @@ var<workgroup> rows: array<u32, 9>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> place: atomic<u32>;
 
-// Energy and place of the displacement at an element of the row, NONE where it leads outside.
+// Energy and place of the displacement at an element of the row, NONE if it leads outside.
 fn energy_at(i: i32, j: i32, at: u32, cost: u32, outside: i32) -> vec2<u32> {
     let d = displacement_at(at);
     let square = d.x * d.x + d.y * d.y;
@@ -30,7 +30,7 @@ fn window(
     let j = column % sweep.side;
     if lane < 9u {
         let neighbour = column_around(i, j, 1, i32(lane), sweep.side);
-        // One outside costs nothing here: it is the same at every displacement.
+        // The cost of one outside the window is the same at every displacement: added below.
         rows[lane] = NONE - 1u;
         if neighbour >= 0 {
             rows[lane] = foreground_index.d[neighbour];
@@ -49,7 +49,7 @@ fn window(
     }
     var mine = vec2<u32>(NONE);
     for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= ROW_QUADS / ROW_WORKGROUP + 1
-        // Eight costs at once: nine of at most COST_MAX never carry.
+        // Eight costs at once: sums of nine of at most COST_MAX never carry.
         var sum = vec4<u32>(unknown | (unknown << 16u));
         for (var n = 0; n < 9; n += 1) {
             if rows[n] < FOREGROUND_MAX {

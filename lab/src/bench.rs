@@ -1,7 +1,8 @@
-//! `raywake-lab bench`: two builds of the program side by side on one machine.
+//! `raywake-lab bench`: compares two builds of the program side by side on one machine.
 //!
-//! Each runs in turn on the same sweeps, so that what else the machine does meets both. What
-//! travels is the ratio, pair by pair; times are those of this machine at that hour.
+//! They take turns on the same sweeps, so that other load on the machine affects both. Only the
+//! ratio, pair by pair, carries over to other machines; the times hold for this machine at that
+//! moment.
 
 use crate::program::{ProgramBuild, beside_this};
 use crate::report::{Cell, Report, Results, Table, TableRow};
@@ -26,7 +27,7 @@ pub struct Args {
     /// Folder of results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Runs of each, after one that does not count
+    /// Runs of each, after one that is not counted
     #[arg(long, value_name = "COUNT", default_value = "5")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
@@ -39,10 +40,10 @@ pub struct Args {
     setting: Vec<String>,
 }
 
-/// Name, what goes before the program, and arguments.
+/// Name, words before the program on the command line, and arguments.
 type Setting = (&'static str, &'static [&'static str], &'static [&'static str]);
 
-/// What is compared.
+/// The settings that can be compared.
 const SETTINGS: [Setting; 5] = [
     ("one core", &["taskset", "-c", "0"], &["--backend", "scalar"]),
     ("all cores", &[], &["--backend", "scalar"]),
@@ -51,14 +52,14 @@ const SETTINGS: [Setting; 5] = [
     ("vulkan", &[], &["--backend", "vulkan"]),
 ];
 
-/// What is measured of a run: name, decimals.
+/// Figures measured in a run: name, decimals.
 const FIGURES: [(&str, usize); 4] =
     [("sweep, median, ms", 2), ("sweep, mean, ms", 2), ("CPU, s", 2), ("wall, s", 2)];
 
 /// The figures of a run.
 type Figures = [f64; FIGURES.len()];
 
-/// Runs both in turn, writes and prints.
+/// Runs both builds in turn, writes the report and prints it.
 pub fn run(args: &Args) -> Result<(), RunError> {
     let settings = settings(&args.setting)?;
     atomic::create_folder(&args.out)?;
@@ -69,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
         let mut pairs = Vec::new();
         for turn in 0..=args.runs {
             let pair = [of(&program)?, of(&args.against)?];
-            // The first one fills the caches.
+            // The first run only fills the caches.
             pairs.extend((turn > 0).then_some(pair));
         }
         rows.extend(compared(name, &pairs));

@@ -1,11 +1,11 @@
-//! How well scores tell two classes apart, at every threshold.
+//! How well scores separate two classes, at every threshold.
 
 use serde::Serialize;
 
-/// What a threshold does: everything that scores above it is kept.
+/// The effect of a threshold: everything that scores above it is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Operating {
-    /// Just below the least score that is kept.
+    /// Just below the lowest score kept.
     pub threshold: f64,
     /// Share of the foreground that is kept.
     pub recall: f64,
@@ -24,8 +24,8 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Of rows of score, class (true: foreground) and weight; scores are finite. None unless both
-    /// classes are there.
+    /// Builds the curve from rows of score, class (true: foreground) and weight; scores must be
+    /// finite. `None` unless both classes are present.
     pub fn of(rows: impl Iterator<Item = (f64, bool, f64)>) -> Option<Curve> {
         let mut rows: Vec<_> = rows.collect();
         rows.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -34,7 +34,7 @@ impl Curve {
         for same in rows.chunk_by(|a, b| a.0 == b.0) {
             let sum = |class: bool| same.iter().filter(|r| r.1 == class).map(|r| r.2).sum::<f64>();
             let (more, worse) = (sum(true), sum(false));
-            // A tie is won half the time.
+            // Ties count half.
             area += worse * (kept + 0.5 * more);
             (kept, wrong) = (kept + more, wrong + worse);
             steps.push((same[0].0, kept, wrong));
@@ -43,7 +43,7 @@ impl Curve {
         both.then_some(Curve { steps, total: [kept, wrong], area })
     }
 
-    /// What every threshold does, the strictest first.
+    /// The effect of every threshold, strictest first.
     pub fn points(&self) -> impl Iterator<Item = Operating> {
         (0..self.steps.len()).map(|at| self.operating(at))
     }
@@ -60,7 +60,7 @@ impl Curve {
         self.operating(at)
     }
 
-    /// What marking all that scores above `threshold` does.
+    /// The effect of keeping everything that scores above `threshold`.
     pub fn above(&self, threshold: f64) -> Operating {
         match self.steps.partition_point(|s| s.0 > threshold) {
             0 => Operating { threshold, recall: 0.0, precision: 1.0, background_accuracy: 1.0 },

@@ -1,5 +1,5 @@
-//! `raywake-lab device`: the program on a Vulkan device and on the CPU alone, with every built-in
-//! profile: the same results, and what each takes.
+//! `raywake-lab device`: runs the program on a Vulkan device and on the CPU alone, with every
+//! built-in profile: the results must be the same, and the times are compared.
 
 use crate::program::{ProgramBuild, Ran, beside_this};
 use crate::report::{Cell, Report, Results, Table, TableRow};
@@ -33,7 +33,7 @@ pub struct Args {
     device: Option<usize>,
 }
 
-/// Numbers of CPU cores that are tried, as far as there are so many.
+/// Numbers of CPU cores tried, as far as the machine has that many.
 const CORES: [usize; 5] = [1, 2, 4, 8, 16];
 
 /// A run on the device, and one without it.
@@ -46,7 +46,7 @@ struct Both {
 /// Runs, compares, writes and prints.
 ///
 /// # Errors
-/// A run fails, or results differ; an output that cannot be written.
+/// If a run fails, results differ or an output cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     atomic::create_folder(&args.out)?;
     let path = args.program.clone().unwrap_or_else(beside_this);
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Stages that a device does, in their order.
+/// Stages that run on a device, in order.
 fn on_device() -> Vec<&'static str> {
     let programs = Schedule::new(FLOW_PROGRAMS, &Profile::hdl64()).programs;
     let mut names = Vec::new();
@@ -106,7 +106,7 @@ fn conclude(args: &Args, profiles: &[Both], threads: &[Both]) -> Result<Results,
     report.write(&args.out)
 }
 
-/// Whole sweeps, and what of them the CPU does beside the device.
+/// Whole sweeps, and the part of them that the CPU does alongside the device.
 fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
     let on_device = on_device();
     let beside = |run: &Ran| -> Vec<(String, f64)> {
@@ -132,7 +132,7 @@ fn totals(id: &str, what: &str, runs: &[Both]) -> Result<Table, Error> {
     Ok(Table::new(id, "Medians, ms; the last columns with the device", &columns, rows))
 }
 
-/// Each stage of each profile.
+/// Times of each stage in each profile.
 fn stages(profiles: &[Both]) -> Table {
     let row = |name: &str| {
         let times = profiles.iter().map(|both| Cell::Number(both.device.stage_ms(name), 3));

@@ -1,4 +1,4 @@
-//! The columns of one sweep, by the core's own stages.
+//! The columns of one sweep, computed by the core's own stages.
 
 use glam::DVec3;
 use raywake_core::frame::{Window, central, place};
@@ -10,10 +10,10 @@ use raywake_core::sweep::{Rig, Sweep};
 use raywake_core::team::Alone;
 use raywake_core::thinning::Thinning;
 
-/// All that a grid runs, and so all that its storage holds.
+/// Everything that a grid runs, and hence everything that its storage holds.
 const GRID_ALONE: &[StageProgram] = &[StageProgram { name: "grid", ops: GRID }];
 
-/// What [`Grid::sweep`] works with and leaves behind.
+/// Working state and results of [`Grid::sweep`].
 pub struct Grid {
     profile: Profile,
     preparation: Preparation,
@@ -24,9 +24,9 @@ pub struct Grid {
     pub step: SweepUniform,
     /// Columns of the window.
     pub columns: Vec<Column>,
-    /// Column of every point that was taken.
+    /// Column of every point taken.
     of_taken: Vec<u32>,
-    /// Column of every point of the sweep, [`NONE`] where it has none or was not taken.
+    /// Column of every point of the sweep; [`NONE`] if it has none or was not taken.
     pub of_point: Vec<u32>,
 }
 
@@ -51,16 +51,16 @@ impl Grid {
         Grid { lattice_origin: Some(window.lattice_origin), ..Grid::new(profile) }
     }
 
-    /// Another drive begins. Its lattice lies `offset` (m, along the world's axes) from where a run
-    /// would lay it: after some time on the road any offset within half a cell is as likely.
+    /// Starts another drive. Its lattice lies `offset` (m, along the world's axes) from where a run
+    /// would place it: after some time on the road any offset within half a cell is equally likely.
     pub fn restart(&mut self, offset: DVec3) {
         self.lattice_origin = None;
         self.offset = offset;
     }
 
-    /// Fills `columns` and `of_point` from a sweep; returns where the window lies.
+    /// Fills `columns` and `of_point` from a sweep; returns the window's placement.
     pub fn sweep(&mut self, rig: &Rig, sweep: &Sweep) -> Window {
-        // As the pipeline takes it.
+        // As the pipeline does.
         let sweep = &Sweep { twist: sweep.twist.to_grain(), ..*sweep };
         let pose = &sweep.world_from_vehicle;
         let origin = self
@@ -111,7 +111,7 @@ impl Grid {
         0.5 * 2f64.sqrt() * self.profile.side as f64 * self.profile.voxel_m
     }
 
-    /// Where a column's centre lies in the vehicle frame, m; the height is that of the anchor.
+    /// Centre of a column in the vehicle frame, m; its height is that of the anchor.
     pub fn centre(&self, window: &Window, column: usize) -> DVec3 {
         let (i, j) = (column as i32 / self.step.side, column as i32 % self.step.side);
         let [ci, cj, _] = central(&self.profile);

@@ -1,7 +1,7 @@
-//! `raywake-lab growth`: how the time of a sweep grows with its returns, with the window and with
-//! what moves.
+//! `raywake-lab growth`: how the time of a sweep grows with its returns, the window and the
+//! traffic.
 //!
-//! Every row is a simulated drive through one street; one thing changes in each group of rows.
+//! Every row is a simulated drive through one street; each group of rows varies one quantity.
 
 use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::args::FlowChoice;
@@ -34,15 +34,16 @@ pub struct Args {
     flow: FlowChoice,
 }
 
-/// Columns of an OS1-128 of ten turns a second: its own settings, one below and one above them.
+/// Columns of an OS1-128 at ten revolutions a second: its own settings, plus one below and one
+/// above.
 const COLUMNS: [usize; 5] = [256, 512, 1024, 2048, 2720];
 /// Amounts of traffic; 1 is a busy street.
 const DENSITIES: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 /// Height of the sensor, m.
 const HEIGHT_M: f64 = 1.9;
-/// Sweeps that do not count: memory is touched, and tracks begin.
+/// Sweeps not counted, while memory is touched for the first time and tracks begin.
 const UNCOUNTED: usize = 3;
-/// Stages whose times have columns of their own; the others are in the sum.
+/// Stages that have their own column of times; the others appear only in the sum.
 const STAGES: [&str; 4] = ["ray_trace", "occupancy_constancy", "refine", "track"];
 
 /// One row.
@@ -53,21 +54,21 @@ struct Case {
     density: f64,
 }
 
-/// What a drive came to.
+/// Measurements of a drive.
 #[derive(Default)]
 struct Measured {
     returns: f64,
     foreground: f64,
     total_ms: Vec<f64>,
     stages_ms: BTreeMap<&'static str, Vec<f64>>,
-    /// What did the work.
+    /// The backend and device that did the work.
     backend: String,
 }
 
 /// Drives, measures, writes and prints.
 ///
 /// # Errors
-/// What a step returns; an output that cannot be written.
+/// Any error of a step; an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     team::lead(team::available(), || {
         let profile = config::profile(&args.flow.profile)?;

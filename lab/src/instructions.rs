@@ -1,7 +1,7 @@
-//! `raywake-lab instructions`: what a sweep takes by instructions, stage by stage, as Valgrind
-//! counts them. However busy a machine is, they are the same.
+//! `raywake-lab instructions`: instructions per sweep, stage by stage, as counted by Valgrind. The
+//! counts do not depend on how busy the machine is.
 //!
-//! The command runs itself under Callgrind, and there asks for a count at the end of every stage.
+//! The command runs itself under Callgrind and there requests a count at the end of every stage.
 
 use crate::report::{Cell, Report, Results, Table, TableRow};
 use raywake::args::{BackendChoice, BackendKind, Learned, ProfileChoice};
@@ -28,7 +28,7 @@ pub struct Args {
     /// Folder of results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Sweeps; under Valgrind one takes a second
+    /// Sweeps; one takes a second under Valgrind
     #[arg(short = 'n', value_name = "COUNT", default_value = "24")]
     #[arg(value_parser = clap::value_parser!(u16).range(2..=1000))]
     sweeps: u16,
@@ -38,18 +38,18 @@ pub struct Args {
     learned: Learned,
 }
 
-/// What is counted between two sweeps.
+/// Name given to what is counted between two sweeps.
 const BETWEEN: &str = "between sweeps";
-/// What Callgrind writes before a name and before a count.
+/// What Callgrind writes before a name, and before a count.
 const NAMED: &str = "desc: Trigger: Client Request: ";
 const COUNTED: &str = "totals: ";
-/// Longest name of a stage that is told apart.
+/// Longest stage name kept; longer ones are cut.
 const NAME_MAX: usize = 63;
 
-/// Runs itself under Callgrind, writes and prints; there, runs the sweeps.
+/// Runs itself under Callgrind, writes and prints; under Callgrind, runs the sweeps.
 ///
 /// # Errors
-/// Valgrind is not there, or counts nothing; what a step returns; an output that cannot be written.
+/// If Valgrind is missing or counts nothing; any error of a step; an output that cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     if raywake_callgrind::is_watched() {
         return step_by_step(args);
@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Runs this program, with these arguments, under Callgrind.
+/// Runs this program under Callgrind with the same arguments.
 fn watched(file: &Path) -> Result<(), Error> {
     let failed = |what: String| Error::Usage(format!("valgrind: {what}"));
     let own = std::env::current_exe().map_err(|e| failed(e.to_string()))?;
@@ -82,12 +82,12 @@ fn watched(file: &Path) -> Result<(), Error> {
     }
 }
 
-/// Asks for a count at the end of each stage.
+/// Requests a count at the end of each stage.
 struct Counter;
 
 impl StageTimer for Counter {
     fn lap(&mut self, stage: &'static str) {
-        // A step allocates nothing.
+        // A step must not allocate.
         let mut name = [0; NAME_MAX + 1];
         let length = stage.len().min(NAME_MAX);
         name[..length].copy_from_slice(&stage.as_bytes()[..length]);
@@ -101,7 +101,7 @@ impl StageTimer for Counter {
     }
 }
 
-/// The sweeps, on one thread.
+/// Runs the sweeps on one thread.
 fn step_by_step(args: &Args) -> Result<(), RunError> {
     let sweeps = usize::from(args.sweeps);
     let mut source: Box<dyn Source> = match &args.data {
@@ -122,16 +122,16 @@ fn step_by_step(args: &Args) -> Result<(), RunError> {
     Ok(())
 }
 
-/// What was counted, but for the first sweep, which has no pair.
+/// The counts, without the first sweep, which has no pair.
 #[derive(Default)]
 struct Counts {
     sweeps: u64,
-    /// Instructions of all sweeps by stage, in the order of a sweep.
+    /// Instructions of all sweeps by stage, in the order they run in a sweep.
     stages: Vec<(String, u64)>,
 }
 
 impl Counts {
-    /// Reads what Callgrind has written.
+    /// Reads Callgrind's output.
     fn of(text: &str) -> Counts {
         let (mut counts, mut name, mut first) = (Counts::default(), None, true);
         for line in text.lines() {
@@ -155,7 +155,7 @@ impl Counts {
         }
     }
 
-    /// A row for each stage, and one for all.
+    /// A row for each stage, and one for the total.
     fn rows(&self) -> Vec<TableRow> {
         let all: u64 = self.stages.iter().map(|(_, count)| count).sum();
         let row = |(name, count): (&str, u64)| {
@@ -184,7 +184,7 @@ fn report(args: &Args, counts: &Counts) -> Result<Results, Error> {
 mod tests {
     use super::*;
 
-    /// As Callgrind writes it, without the costs of functions.
+    /// Callgrind's output, without the costs of functions.
     fn part(name: &str, count: u64) -> String {
         format!("part: 1\n\ndesc: Trigger: Client Request: {name}\n\ntotals: {count}\n")
     }

@@ -23,29 +23,29 @@ enum Command {
     Train(train::Command),
     /// Run labelled drives through the pipeline and compare flow and tracklets with the truth.
     Eval(Box<Eval>),
-    /// Evaluate variants of a profile, one thing changed in each: one table.
+    /// Evaluate variants of a profile, each with one change, in one table.
     Ablate(Box<eval::ablate::Args>),
     /// Grade scene flow on an Argoverse 2 log with the official metrics.
     Grade(grade::Args),
-    /// Poses by registration of a drive's sweeps, against its own.
+    /// Register a drive's sweeps and compare the poses with the drive's own.
     Match(matching::Args),
     /// Write RESULTS.md from the results of evaluations.
     Results(results::Args),
     /// Feature learning on digits (section 4.3): table 4.1, figures 4.2 and 4.3.
     Toy(toy::Args),
-    /// Time two builds of the program in turn: ratios of sweeps, CPU and wall time.
+    /// Time two builds of the program in turn: ratios of sweep, CPU and wall times.
     Bench(bench::Args),
-    /// Run on a Vulkan device and on the CPU alone: the same results, and what each takes.
+    /// Run on a Vulkan device and on the CPU alone: the results must agree; both are timed.
     Device(device::Args),
-    /// Time simulated sweeps: how they grow with returns, the window and traffic.
+    /// Time simulated sweeps: how the time grows with returns, the window and traffic.
     Growth(Box<growth::Args>),
-    /// Count the instructions of every stage of a sweep, by Valgrind: the same on a busy machine.
+    /// Count the instructions of every stage of a sweep with Valgrind, whatever the machine's load.
     Instructions(Box<instructions::Args>),
     /// Run sweeps in a loop for hours, with faults in between: digests, memory, times.
     Soak(Box<soak::Args>),
     /// Write simulated drives with exact truth, in the layout of KITTI's raw recordings.
     Sim(simulate::Args),
-    /// Write the packets that a simulated sensor sends, as a capture.
+    /// Write the packets that a simulated sensor sends, as a capture file.
     Packets(simulate::packets::PacketsArgs),
 }
 
@@ -63,7 +63,7 @@ struct Eval {
 enum Other {
     /// Trajectory and shape of objects against their truth (chapter 2).
     Tracks(Box<tracks::Args>),
-    /// Learned features as chapter 4 prints them: table 4.2 and figure 4.8.
+    /// Learned features as printed in chapter 4: table 4.2 and figure 4.8.
     Flsf(flsf::evaluate::Args),
     /// A cleaned recording against its truth: static kept, dynamic removed.
     Clean(eval::clean::Args),
@@ -109,7 +109,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// That of the program for the same error; 1 for those that only the lab has.
+/// The program's exit code for the same error; 1 for errors that only the lab has.
 fn exit_code(error: &(dyn Error + 'static), interrupted: bool) -> u8 {
     if interrupted {
         return INTERRUPTED_CODE;

@@ -1,4 +1,4 @@
-//! Runs of the program `raywake`, and what their summaries say.
+//! Runs of the program `raywake`, and their summaries.
 
 use raywake_io::Error;
 use raywake_io::source::whole;
@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// A build of the program, and what it runs on.
+/// A build of the program, and the data it runs on.
 pub struct ProgramBuild<'a> {
-    /// The file.
+    /// The executable.
     pub path: &'a Path,
     /// Recording.
     pub data: &'a Path,
@@ -19,7 +19,7 @@ pub struct ProgramBuild<'a> {
     pub out: &'a Path,
 }
 
-/// What a run came to.
+/// Outcome of a run.
 pub struct Ran {
     /// Its summary.
     pub summary: Value,
@@ -30,17 +30,17 @@ pub struct Ran {
     file: PathBuf,
 }
 
-/// The program that lies where this one does.
+/// The program in the same folder as this one.
 pub fn beside_this() -> PathBuf {
     std::env::current_exe().map_or_else(|_| "raywake".into(), |own| own.with_file_name("raywake"))
 }
 
 impl ProgramBuild<'_> {
-    /// Runs it once, with something before it on its command line. A shell between tells the CPU
-    /// time, as POSIX has it.
+    /// Runs it once, with `before` in front of it on its command line. A shell in between reports
+    /// the CPU time, by the POSIX `times`.
     ///
     /// # Errors
-    /// It cannot be run, or fails; a summary that is none.
+    /// If it cannot be run, fails, or writes an invalid summary.
     pub fn run(&self, before: &[&str], arguments: &[&str]) -> Result<Ran, Error> {
         let failed = |what: String| Error::Usage(format!("{}: {what}", self.path.display()));
         let file = self.out.join("summary.json");
@@ -66,35 +66,35 @@ impl Ran {
     /// A figure of the time of a sweep, ms: `median`, `mean`, `p99`.
     ///
     /// # Errors
-    /// There was no pair of sweeps.
+    /// If there was no pair of sweeps.
     pub fn total_ms(&self, figure: &str) -> Result<f64, Error> {
         let none = || Error::input(&self.file, "", "no pair of sweeps, no time");
         self.summary["total_ms"][figure].as_f64().ok_or_else(none)
     }
 
-    /// Median time of a stage, ms; none where a sweep has none of it.
+    /// Median time of a stage, ms; 0 if sweeps do not have that stage.
     pub fn stage_ms(&self, name: &str) -> f64 {
         self.summary["stage_ms"][name]["median"].as_f64().unwrap_or_default()
     }
 
-    /// Those of all stages, by their names.
+    /// Median times of all stages, ms, by name.
     pub fn stages_ms(&self) -> impl Iterator<Item = (&str, f64)> {
         let stages = self.summary["stage_ms"].as_object().into_iter().flatten();
         stages.filter_map(|(name, of)| Some((name.as_str(), of["median"].as_f64()?)))
     }
 
-    /// A text of the summary, empty where there is none.
+    /// A string of the summary, empty if missing.
     pub fn text(&self, name: &str) -> &str {
         self.get(name).unwrap_or_default()
     }
 
-    /// A text of the summary.
+    /// A string of the summary.
     pub fn get(&self, name: &str) -> Option<&str> {
         self.summary[name].as_str()
     }
 }
 
-/// CPU time of a shell's children, s: the second line of `times`, user and system, as `0m1.25s`.
+/// CPU time of a shell's children, s: the second line of `times`, user and system, like `0m1.25s`.
 fn cpu_s(times: &str) -> Option<f64> {
     let seconds = |word: &str| {
         let (minutes, seconds) = word.strip_suffix('s')?.split_once('m')?;

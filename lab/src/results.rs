@@ -1,4 +1,4 @@
-//! `raywake-lab results`: `RESULTS.md` from the results of evaluations.
+//! `raywake-lab results`: writes `RESULTS.md` from the results of evaluations.
 
 use crate::report::{COMMAND, Results};
 use raywake_io::Error;
@@ -13,12 +13,12 @@ pub struct Args {
     results: Vec<PathBuf>,
 }
 
-/// Tables that only the report shows: details and second views of what others tell.
+/// Tables that only the report shows: details and second views of what other tables show.
 const REPORT_ONLY: [&str; 4] = ["table-3-1-voxels", "references-smooth", "kinds-", "worst-"];
 
-/// Prints the document. Nothing is computed: the results have every figure.
+/// Prints the document. Nothing is computed: the results contain every figure.
 ///
-/// Fails where a file cannot be read or is no `results.json`.
+/// Fails if a file cannot be read or is not a `results.json`.
 pub fn run(args: &Args) -> Result<(), Error> {
     print!("{}", document(&args.results)?);
     Ok(())
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use crate::scratch::Scratch;
 
-    /// Measured, and carried along with the code.
+    /// The measured results, kept in the repository.
     const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/results");
 
     #[test]

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A folder of its own that goes away with the value.
+/// A temporary folder that is removed when the value is dropped.
 pub struct Scratch(TempDir);
 
 impl Scratch {

@@ -1,8 +1,8 @@
-//! What a sweep costs: variants side by side in one run, medians over simulated sweeps, digests of
-//! the results. Variants that must agree are compared; the program fails where they do not.
+//! The cost of a sweep: variants side by side in one run, medians over simulated sweeps, digests of
+//! the results. Variants that must agree are compared; the program fails if they do not.
 //!
-//! `cargo bench -p raywake-tests` measures; any other start, as `cargo test --benches`, or the
-//! argument `--test` takes two sweeps, just to see that everything runs.
+//! `cargo bench -p raywake-tests` measures; anything else, such as `cargo test --benches` or the
+//! argument `--test`, runs two sweeps, just to check that everything works.
 
 #![forbid(unsafe_code)]
 
@@ -57,9 +57,8 @@ fn flow(sweeps: &[SimSweep]) {
     table(title, &variants, &[(0, 2), (1, 3), (0, 1), (2, 3)], &[(0, 2), (1, 3)]);
 }
 
-/// A step of the program beside one of the estimator that the libraries for C and Python have:
-/// that copies the sweep, and is called through its desk. Sweep by sweep, first the one and then
-/// the other.
+/// A step of the program next to one of the estimator behind the C and Python libraries, which
+/// copies the sweep and is called through its desk. They take turns sweep by sweep.
 fn embedded(sweeps: &[SimSweep]) {
     let setup = Setup::new(Profile::hdl64(), Some(background_filter::SHIPPED.into()));
     let mut drive = setup.drive(setup.scalar());
@@ -125,12 +124,12 @@ fn map(sweeps: &[SimSweep]) {
     table("sparse map, profile map, ms a sweep", &variants, &[(0, 1)], &[(0, 1)]);
 }
 
-/// Objects that appear in one sweep, each as the given one; and how often it is tried: a sweep
-/// takes as long as its fastest try, as what else the machine does is none of ours.
+/// Number of objects that appear in one sweep, each a copy of the given one; and number of tries: a
+/// sweep takes as long as its fastest try, to exclude other load on the machine.
 const OBJECTS: usize = 20;
 const TRIES: usize = 5;
 
-/// The longest sweep of the fixed lag where many objects appear at once.
+/// The longest sweep of the fixed lag when many objects appear at once.
 fn born_at_once(estimator: &mut Estimator, batches: &[Vec<ObjectReturn>], history: &[ObjectState]) {
     let mut fastest = vec![f64::MAX; batches.len()];
     for _ in 0..TRIES {
@@ -149,8 +148,8 @@ fn born_at_once(estimator: &mut Estimator, batches: &[Vec<ObjectReturn>], histor
     );
 }
 
-/// Trajectory and shape of the object with most returns: one iteration of the batch over all sweeps
-/// (2.6.6), and a push of the fixed lag with every sweep.
+/// Trajectory and shape of the object with the most returns: one iteration of the batch over all
+/// sweeps (2.6.6), and one push of the fixed lag with every sweep.
 fn tracks(sweeps: &[SimSweep]) {
     let all =
         || sweeps.iter().flat_map(|s| s.points.iter().zip(&s.truth).map(move |(p, t)| (s, p, t)));
@@ -240,7 +239,7 @@ fn main() {
     let given = |argument: &str| std::env::args().any(|a| a == argument);
     let count = if given("--bench") && !given("--test") { 20 } else { 2 };
     let ego = Ego::Turn { left: true, speed: 6.0 };
-    // One more, which the first pair begins with.
+    // One more, as the start of the first pair.
     let options = raywake_sim::Options { sweeps: count + 1, ego, ..Default::default() };
     let sweeps: Vec<SimSweep> = Drive::new(3, options).collect();
     let points = sweeps.iter().map(|s| s.points.len()).sum::<usize>() / sweeps.len();

@@ -1,5 +1,5 @@
-//! Choices that the dissertation's text leaves open, by preset. Shown here are those that core's
-//! own tests do not show: there are the clip (`grid`), the window that moves with the source
+//! Choices that the dissertation's text leaves open, by preset. Covered here are those that core's
+//! own tests do not cover: these cover the clip (`grid`), the window that moves with the source
 //! (`window`), smoothing, extra term, targets outside, ties and rounds (`flow`), gate and first
 //! update (`tracklet::ekf`), deskew (`prepare`).
 
@@ -25,12 +25,12 @@ fn rig(mounted: Pose) -> Rig {
     }
 }
 
-/// A quarter turn, so that the lattice's axes are not the vehicle's.
+/// A quarter turn, so that the lattice's axes differ from the vehicle's.
 fn heading() -> Pose {
     Pose::planar(0.0, 0.0, 0.0, FRAC_PI_2)
 }
 
-/// A sweep of some returns at rest, and an empty one after it that shows its columns.
+/// A sweep of some returns at rest, followed by an empty one that reveals its columns.
 fn stages(profile: &Profile, mounted: Pose, points: &[[f32; 3]]) -> [Stages; 2] {
     let setup = Setup { profile: profile.clone(), rig: rig(mounted), filter: None };
     let point = |p: &[f32; 3]| Point { position: *p, ..Point::default() };
@@ -54,7 +54,7 @@ fn rays_begin_at_the_sensor() {
         let [first, _] = stages(&profile, mounted, &[[10.0, 0.0, 0.0]]);
         let ray = [first.words("rays")[0], first.words("rays")[1]];
         let origin = &first.words("origins")[4 * ray_origin(ray)..][..3];
-        // The vehicle frame's origin, 1.73 m above ground, lies in the middle of the window.
+        // The vehicle frame's origin, 1.73 m above ground, lies at the centre of the window.
         let at = match profile.frame {
             Frame::Sensor => mounted.translation,
             Frame::Lattice => (heading() * mounted).translation,
@@ -72,7 +72,7 @@ fn seen(stages: &[Stages; 2]) -> [usize; 2] {
     [count(0), count(16)]
 }
 
-/// How many columns the ray to a return frees, and how many it occupies.
+/// Checks how many columns the ray to a return frees, and how many it occupies.
 fn check_traced(case: &str, change: fn(Profile) -> Profile, point: [f32; 3], wanted: [usize; 2]) {
     for preset in PRESETS {
         let profile = change(preset());
@@ -102,7 +102,7 @@ fn costs_of_a_preset() {
     for (preset, outside) in PRESETS.into_iter().zip([693, 17_289]) {
         let step = step_of(&preset());
         let last = (step.side * step.side) as usize - 1;
-        // (i, j) of a corner lacks five neighbours, of a border three, elsewhere none.
+        // (i, j) of a corner lacks five neighbours, of an edge three, elsewhere none.
         for (column, missing) in [(0, 5), (last, 5), (1, 3), (step.side as usize, 3), (last / 2, 0)]
         {
             assert_eq!(outside_cost(&step, column), missing * outside);

@@ -1,4 +1,4 @@
-//! The background filter concerns sources alone (section 3.4.2, before 3.5).
+//! The background filter applies to sources only (section 3.4.2, before 3.5).
 
 use glam::DVec3;
 use raywake_core::output::FlowBasis;
@@ -14,7 +14,7 @@ fn run(profile: &Profile, filter: Option<String>, sweeps: usize) -> Vec<Stages> 
     pairs(&street()[..sweeps]).map(|(now, before)| side.step(now, before)).collect()
 }
 
-/// `-v - w x p` with the motion from the one sweep to the next.
+/// `-v - w x p` with the motion from one sweep to the next.
 fn odometry(sweep: &SimSweep, next: &SimSweep, at: DVec3) -> DVec3 {
     let moved = sweep.world_from_vehicle.inverse() * next.world_from_vehicle;
     let twist = moved.twist(next.stamp_s - sweep.stamp_s);
@@ -40,7 +40,7 @@ fn check_odometry(sweep: &SimSweep, next: &SimSweep, stages: &Stages) {
 
 #[test]
 fn where_nothing_may_move_all_flow_is_odometry() {
-    // The refinement moves things whose columns the filter took.
+    // The refinement moves objects whose columns the filter removed.
     let cells = Profile { refinement_sweeps: 0, ..Profile::hdl64() };
     for profile in [cells, Profile::dissertation()] {
         let all = run(&profile, Some(weights::closed_filter(14)), 6);
@@ -62,7 +62,7 @@ fn targets_are_never_filtered() {
         let some = run(&profile, Some(weights::filter(43, 14, 100, 0)), 5);
         let closed = run(&profile, Some(weights::closed_filter(14)), 5);
         for (n, open) in open.iter().enumerate().skip(1) {
-            // What the sweep before saw as targets comes back as sources, in the new window.
+            // The previous sweep's targets come back as sources, in the new window.
             for other in [&some[n], &closed[n]] {
                 assert!(other.words("shift") == open.words("shift"), "sweep {n}");
             }

@@ -1,5 +1,5 @@
-//! The frame of the grid: what stands still does so in the lattice, and comes the other way in the
-//! sensor's frame. Both end at the same velocity over ground.
+//! The frame of the grid: static structure stays in place in the lattice, and moves towards the
+//! vehicle in the sensor's frame. Both yield the same velocity over ground.
 
 use glam::DVec2;
 use raywake::order_statistics::median;
@@ -11,12 +11,12 @@ use raywake_tests::drives::{Setup, ideal, pairs};
 use raywake_tests::pair::Side;
 use raywake_tests::weights;
 
-/// Where posts stand, m.
+/// Positions of the posts, m.
 fn posts() -> impl Iterator<Item = DVec2> {
     (0..24).map(|n| DVec2::new(6.0 + 1.7 * n as f64, if n % 2 == 0 { 5.0 } else { -6.5 }))
 }
 
-/// Along a road with posts at 8 m/s.
+/// Sweeps along a road with posts at 8 m/s.
 fn sweeps() -> Vec<SimSweep> {
     let mut scene = Scene::empty();
     for at in posts() {
@@ -34,7 +34,7 @@ fn near_a_post(c: &&ColumnFlow) -> bool {
 
 /// Median displacement (cells), velocity over ground and relative to the vehicle, along the road.
 fn posts_seen_with(profile: Profile) -> [f64; 3] {
-    // The rings of returns from flat ground stand still in the sensor's frame.
+    // The rings of returns from flat ground are stationary in the sensor's frame.
     let setup = Setup::new(profile, Some(weights::tall_filter(14)));
     let mut side = Side::new(&setup, setup.scalar());
     let sweeps = sweeps();
@@ -60,12 +60,12 @@ fn posts_stand_still_in_either_frame() {
     assert!(world.abs() < 0.2 && (ego + 8.0).abs() < 0.3, "{world} {ego}");
     let [cells, world, ego] = posts_seen_with(Profile::dissertation());
     assert!((-3.0..=-2.0).contains(&cells), "0.8 m a sweep: {cells} cells");
-    // His filter starts a step late and so too fast: see `tracklet::ekf`.
+    // The author's filter starts a step late and hence too fast: see `tracklet::ekf`.
     assert!(world.abs() < 2.0 && (ego - world + 8.0).abs() < 0.1, "{world} {ego}");
 }
 
-/// In the sensor's frame a tracklet goes over to the second sweep's axes; its column's velocity is
-/// told along those of the first, like the raw flow.
+/// In the sensor's frame a tracklet changes to the second sweep's axes; its column's velocity is
+/// expressed in those of the first, like the raw flow.
 #[test]
 fn columns_keep_the_axes_of_their_sweep_in_a_turn() {
     let setup = Setup::new(Profile::dissertation(), Some(weights::tall_filter(14)));
@@ -80,7 +80,7 @@ fn columns_keep_the_axes_of_their_sweep_in_a_turn() {
     let mut born = 0;
     for (now, before) in pairs(&sweeps) {
         for c in side.step(now, before).columns {
-            // A tracklet just born has the velocity of its displacement, in the same axes.
+            // A newly born tracklet has the velocity of its displacement, in the same axes.
             if c.basis == FlowBasis::Matched && c.age == 0 && c.displacement_cells != [0, 0] {
                 let raw = c.displacement_cells.map(|d| d as f32 * 3.0);
                 let off = (c.velocity_ego_mps[0] - raw[0]).hypot(c.velocity_ego_mps[1] - raw[1]);

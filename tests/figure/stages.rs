@@ -11,7 +11,7 @@ use raywake_tests::pair::Side;
 use raywake_tests::weights;
 use std::sync::Mutex;
 
-/// Both backends over the first sweeps of the street.
+/// Compares both backends over the first sweeps of the street.
 fn check(profile: Profile, filter: Option<String>, sweeps: usize) {
     let setup = Setup::new(profile, filter);
     let Some(device) = setup.device(&Options::default()) else { return };
@@ -28,12 +28,12 @@ fn check(profile: Profile, filter: Option<String>, sweeps: usize) {
     assert!(most.iter().all(|m| *m > 100), "the case says something: {most:?}");
 }
 
-/// What the program runs with.
+/// The filter that the program runs with.
 fn shipped_filter() -> Option<String> {
     Some(background_filter::SHIPPED.into())
 }
 
-/// Keeps about half of the columns, without any sense.
+/// Keeps about half of the columns, arbitrarily.
 fn some_filter() -> Option<String> {
     Some(weights::filter(40, 14, 100, 0))
 }
@@ -77,7 +77,7 @@ fn dissertation_filtered() {
 fn a_window_of_other_sizes() {
     let profile = Profile { side: 31, levels: 16, em_rounds: 3, ..Profile::hdl64() };
     let setup = Setup::new(profile, Some(weights::filter(41, 16, 100, 0)));
-    // The shipped classifier has 14 levels: another one for 16.
+    // The shipped classifier has 14 levels, so another one is used for 16.
     let text = weights::constancy(42, 16, 150);
     let tables = Tables::load(&setup.profile, setup.filter.as_deref(), &text, None).expect("set");
     let device = Device::new(&setup.profile, &tables, &Options::default());

@@ -1,11 +1,11 @@
-//! Runs single kernels over buffers that the host fills and reads.
+//! Runs individual kernels over buffers that the host fills and reads.
 
 use raywake_core::record::SweepUniform;
 use raywake_gpu::{Buffer, Executor, Groups, Heap, Kernel, Op, Options, Program};
 
 use crate::{difference, vulkan};
 
-/// Buffers by the names kernels know them by, and dispatches over them.
+/// Buffers by the names that kernels use, and dispatches over them.
 #[derive(Default)]
 pub struct Bench {
     names: Vec<&'static str>,
@@ -13,7 +13,7 @@ pub struct Bench {
     dispatches: Vec<(&'static Kernel, u32, &'static [Bound])>,
 }
 
-/// A variable of a kernel and the buffer it stands for.
+/// A variable of a kernel and the buffer bound to it.
 pub type Bound = (&'static str, &'static str);
 
 /// The buffers after a run.
@@ -23,7 +23,7 @@ pub struct Outcome {
 }
 
 impl Bench {
-    /// Without anything, or with the record `sweep`.
+    /// Empty, or with the record `sweep`.
     pub fn new(step: Option<&SweepUniform>) -> Bench {
         let mut words = vec![0; SweepUniform::WORDS];
         match step {
@@ -35,7 +35,7 @@ impl Bench {
         }
     }
 
-    /// Adds a buffer with its content. A buffer has a word at least.
+    /// Adds a buffer with its content. A buffer has at least one word.
     pub fn buffer(mut self, name: &'static str, mut words: Vec<u32>) -> Bench {
         if words.is_empty() {
             words.push(0);
@@ -45,18 +45,19 @@ impl Bench {
         self
     }
 
-    /// Adds a dispatch with an invocation per item.
+    /// Adds a dispatch with one invocation per item.
     pub fn threads(self, kernel: &'static Kernel, items: usize) -> Bench {
         let groups = items.div_ceil(kernel.workgroup[0] as usize);
         self.groups(kernel, groups)
     }
 
-    /// Adds a dispatch of some workgroups.
+    /// Adds a dispatch of this many workgroups.
     pub fn groups(self, kernel: &'static Kernel, groups: usize) -> Bench {
         self.bound(kernel, groups, &[])
     }
 
-    /// Adds a dispatch of some workgroups in which variables stand for buffers of other names.
+    /// Adds a dispatch of this many workgroups in which variables are bound to buffers of other
+    /// names.
     pub fn bound(
         mut self,
         kernel: &'static Kernel,
@@ -67,12 +68,12 @@ impl Bench {
         self
     }
 
-    /// Runs everything. None where there is no device.
+    /// Runs everything. Returns `None` if there is no device.
     pub fn run(self) -> Option<Outcome> {
         self.run_on(&Options::default())
     }
 
-    /// Runs everything on a device: where that is under the validation layer, without a message.
+    /// Runs everything on a device; under the validation layer, there must be no message.
     pub fn run_on(self, options: &Options) -> Option<Outcome> {
         let mut executor =
             vulkan::expect(Executor::new(options, &self.table(), &[self.program()]))?;
@@ -86,7 +87,7 @@ impl Bench {
         Some(Outcome { before: self, after })
     }
 
-    /// For every buffer its upload, then its device, then its readback half.
+    /// The upload, then the device, then the readback part of every buffer.
     fn table(&self) -> Vec<Buffer> {
         let heaps = [Heap::Upload, Heap::Device, Heap::Readback];
         let rows = heaps.into_iter().flat_map(|heap| {
@@ -132,7 +133,7 @@ impl Outcome {
         &self.after[self.before.index(name)]
     }
 
-    /// The named buffers hold what is expected, all others what they held before.
+    /// Checks that the named buffers hold what is expected, and all others what they held before.
     #[track_caller]
     pub fn check(&self, case: &str, expected: &[(&str, &[u32])]) {
         for (n, name) in self.before.names.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Simulated drives, and the pipeline set up for them.
+//! Simulated drives, and pipelines set up for them.
 
 use raywake::backend::device::Device;
 use raywake::backend::{Backend, Tables};
@@ -19,12 +19,12 @@ pub struct Setup {
     pub profile: Profile,
     /// Rig.
     pub rig: Rig,
-    /// Text of a weights file.
+    /// Text of a weights file, if there is a filter.
     pub filter: Option<String>,
 }
 
 impl Setup {
-    /// For a simulated drive.
+    /// Setup for a simulated drive.
     pub fn new(profile: Profile, filter: Option<String>) -> Setup {
         let nowhere = raywake_sim::Path::standing(0.0, 0.0, 0.0);
         let drive = Drive::through(Scene::empty(), nowhere, 0, raywake_sim::Options::default());
@@ -43,19 +43,19 @@ impl Setup {
         Backend::scalar(&self.profile, &self.tables())
     }
 
-    /// A device. None, with a remark, where there is none.
+    /// A device. Prints a remark and returns `None` if there is none.
     pub fn device(&self, options: &Options) -> Option<Backend> {
         let device = vulkan::expect(Device::new(&self.profile, &self.tables(), options))?;
         Some(Backend::Device(Box::new(device)))
     }
 
-    /// The pipeline with a backend.
+    /// The pipeline on a backend.
     pub fn drive(&self, backend: Backend) -> raywake::drive::Drive {
         raywake::drive::Drive::new(&self.profile, &self.rig, &self.tables(), backend, None)
     }
 }
 
-/// A simulated sweep as the core takes it.
+/// Converts a simulated sweep to core's form.
 pub fn sweep(simulated: &SimSweep) -> Sweep<'_> {
     Sweep {
         stamp_s: simulated.stamp_s,
@@ -65,13 +65,13 @@ pub fn sweep(simulated: &SimSweep) -> Sweep<'_> {
     }
 }
 
-/// Sweeps with the one before each.
+/// Each sweep with the one before it.
 pub fn pairs(sweeps: &[SimSweep]) -> impl Iterator<Item = (&SimSweep, Option<&SimSweep>)> {
     let before = std::iter::once(None).chain(sweeps.iter().map(Some));
     sweeps.iter().zip(before)
 }
 
-/// A busy street: ten sweeps, from the third on turning left more and more.
+/// A busy street: ten sweeps, turning left more and more from the third on.
 pub fn street() -> &'static [SimSweep] {
     static SWEEPS: OnceLock<Vec<SimSweep>> = OnceLock::new();
     SWEEPS.get_or_init(|| {
@@ -81,7 +81,7 @@ pub fn street() -> &'static [SimSweep] {
     })
 }
 
-/// Sweeps along a path (street frame) through a scene put together by hand, without noise.
+/// Sweeps along a path (street frame) through a scene built by hand, without noise.
 pub fn ideal(scene: Scene, path: raywake_sim::Path, sweeps: usize) -> Drive {
     let options = raywake_sim::Options { sweeps, rig: SensorRig::ideal(), ..Default::default() };
     Drive::through(scene, path, 1, options)

@@ -1,4 +1,4 @@
-//! The dense window of a sweep, apart from the pipeline.
+//! The dense window of a sweep, independent of the pipeline.
 
 use raywake_core::frame::Window;
 use raywake_core::params::{MERGE_SLOTS, ORIGINS_MAX, POINTS_MAX, Profile};
@@ -16,7 +16,7 @@ pub struct Rays {
     pub step: SweepUniform,
     /// Rays.
     pub rays: Vec<Ray>,
-    /// Where they begin.
+    /// Origins of the rays.
     pub origins: Vec<[i32; 4]>,
 }
 
@@ -55,7 +55,7 @@ impl Default for Tracer {
 }
 
 impl Tracer {
-    /// Merges equal rays; returns how many are left.
+    /// Merges equal rays; returns the number left.
     pub fn merge(&mut self, rays: &Rays) -> usize {
         self.slots.fill([0; 2]);
         let mut counters = [0; COUNTERS];
@@ -65,7 +65,7 @@ impl Tracer {
         self.used
     }
 
-    /// Traces what was merged.
+    /// Traces the merged rays.
     pub fn trace(&self, rays: &Rays, log_odds: &mut [i32]) {
         log_odds.fill(0);
         let distinct = &self.distinct[..self.used];

@@ -1,6 +1,6 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
-//! Shared by the tests of raywake.
+//! Support code shared by the tests of raywake.
 
 pub mod bench;
 pub mod drives;
@@ -13,12 +13,12 @@ pub mod weights;
 
 use std::path::{Path, PathBuf};
 
-/// The folder that holds all packages.
+/// The folder containing all packages.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a package of a workspace").into()
 }
 
-/// Every file below a folder, in order, that ends like this.
+/// Every file below a folder whose name ends like this, in order.
 pub fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
@@ -38,7 +38,7 @@ pub fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Where two sequences first differ, as text; none where they are equal.
+/// Where two sequences first differ, as text; `None` if they are equal.
 pub fn difference<T: PartialEq + std::fmt::Debug>(found: &[T], wanted: &[T]) -> Option<String> {
     if let Some(n) = found.iter().zip(wanted).position(|(f, w)| f != w) {
         return Some(format!("element {n} is {:?} instead of {:?}", found[n], wanted[n]));

@@ -15,14 +15,14 @@ use std::ops::DerefMut;
 use crate::difference;
 use crate::drives::{self, sweep};
 
-/// A backend with its pipeline, looked at stage by stage.
+/// A backend with its pipeline, inspected stage by stage.
 pub struct Side<P = Box<Pipeline>> {
     setup: Setup,
     pipeline: P,
     backend: Backend,
 }
 
-/// A backend that writes down what goes in and what comes out.
+/// A backend that records its inputs and outputs.
 struct Witness<'a> {
     backend: &'a mut Backend,
     stages: Stages,
@@ -53,7 +53,7 @@ impl Perceive for Witness<'_> {
     }
 }
 
-/// What each stage of one sweep left behind, in the order of figure 3.1.
+/// Output of each stage of one sweep, in the order of figure 3.1.
 #[derive(Default)]
 pub struct Stages {
     /// Name and words of the stages up to the flow of columns.
@@ -69,12 +69,12 @@ pub struct Stages {
 }
 
 impl Side {
-    /// At rest.
+    /// Before the first sweep.
     pub fn new(setup: &drives::Setup, backend: Backend) -> Side {
         Side::with(setup, &setup.tables(), backend)
     }
 
-    /// At rest, with tables of one's own.
+    /// Before the first sweep, with the given tables.
     pub fn with(setup: &drives::Setup, tables: &Tables, backend: Backend) -> Side {
         let pipeline = raywake_alloc_guard::boxed!(Pipeline, Pipeline::new());
         Side::on(pipeline, setup, tables, backend)
@@ -82,7 +82,7 @@ impl Side {
 }
 
 impl<P: DerefMut<Target = Pipeline>> Side<P> {
-    /// On a pipeline at rest, wherever that is kept.
+    /// On a pipeline before its first sweep, wherever it is stored.
     pub fn on(
         mut pipeline: P,
         setup: &drives::Setup,
@@ -100,7 +100,7 @@ impl<P: DerefMut<Target = Pipeline>> Side<P> {
         Side { setup, pipeline, backend }
     }
 
-    /// One sweep; `before` is the sweep before it.
+    /// Runs one sweep; `before` is the one before it.
     pub fn step(&mut self, now: &SimSweep, before: Option<&SimSweep>) -> Stages {
         let mut columns = vec![ColumnFlow::default(); self.setup.profile.columns()];
         let mut points = vec![ReturnFlow::default(); POINTS_MAX];
@@ -132,13 +132,13 @@ impl Stages {
         ]);
     }
 
-    /// What a stage left behind.
+    /// Output of a stage.
     pub fn words(&self, stage: &str) -> &[u32] {
         let found = self.words.iter().find(|w| w.0 == stage);
         &found.unwrap_or_else(|| panic!("no stage `{stage}`")).1
     }
 
-    /// The first stage that left something else behind, and where.
+    /// The first stage whose output differs, and where.
     pub fn difference(&self, wanted: &Stages) -> Option<String> {
         let words = self.words.iter().zip(&wanted.words);
         let stages = words.map(|((name, f), (_, w))| (*name, difference(f, w)));

@@ -1,9 +1,9 @@
-//! Numbers without a pattern, the same in every run.
+//! Random numbers, the same in every run.
 
 use raywake_core::record::Column;
 use raywake_sim::Rng;
 
-/// The simulator's generator, in whole numbers; equal seeds give equal ones.
+/// The simulator's generator, as integers; equal seeds give equal sequences.
 pub struct Random(Rng);
 
 impl Random {
@@ -27,12 +27,12 @@ impl Random {
         low + self.below((high - low + 1) as u32) as i32
     }
 
-    /// So many words.
+    /// `count` words.
     pub fn words(&mut self, count: usize) -> Vec<u32> {
         (0..count).map(|_| self.word()).collect()
     }
 
-    /// Columns as ray tracing makes them: no voxel both free and occupied, solid only where
+    /// Columns as ray tracing produces them: no voxel both free and occupied, solid only where
     /// occupied.
     pub fn columns(&mut self, count: usize, levels: i32) -> Vec<Column> {
         let mask = (1u32 << levels) - 1;

@@ -3,25 +3,25 @@
 use raywake::order_statistics::median;
 use raywake_core::digest::Digest;
 
-/// Rows that are no stages: printed last.
+/// Rows that are not stages: printed last.
 const SUMS: [&str; 4] = ["total", "foreground columns", "rays traced", "voxels"];
 
 /// A variant: a value per row and sweep, and the digest of its results.
 pub struct Variant {
-    /// What it is.
+    /// Description.
     pub name: String,
     rows: Vec<(&'static str, Vec<f64>)>,
-    /// Of all results.
+    /// Digest of all results.
     pub digest: Digest,
 }
 
 impl Variant {
-    /// Without any value.
+    /// A variant without values.
     pub fn new(name: String) -> Variant {
         Variant { name, rows: Vec::new(), digest: Digest::default() }
     }
 
-    /// Adds to a row of a sweep. The first sweep has no pair and warms up: it does not count.
+    /// Adds to a row of a sweep. The first sweep, which has no pair and warms up, is not counted.
     pub fn add(&mut self, n: usize, row: &'static str, value: f64) {
         let Some(n) = n.checked_sub(1) else { return };
         let known = self.rows.iter().position(|r| r.0 == row);
@@ -40,7 +40,7 @@ impl Variant {
     }
 }
 
-/// Prints variants and ratios of pairs of them, then checks that variants of equal results agree.
+/// Prints variants and ratios of pairs of them, then checks that variants with equal results agree.
 pub fn table(
     title: &str,
     variants: &[Variant],

@@ -1,9 +1,9 @@
-//! What to do without a device.
+//! Handling of a missing device.
 
 use raywake_gpu::{Executor, GpuError, Options, Validation};
 
-/// The result, unless it says that there is nothing to run on: then none, with a remark.
-/// `RAYWAKE_VULKAN=required` lets it through as the failure it is.
+/// Returns the result, unless it says that there is nothing to run on: then prints a remark and
+/// returns `None`. With `RAYWAKE_VULKAN=required` that failure is passed through.
 pub fn present<T>(result: Result<T, GpuError>) -> Option<Result<T, GpuError>> {
     match result {
         Err(GpuError::NoLoader | GpuError::NoDevice) if !required() => {
@@ -14,17 +14,17 @@ pub fn present<T>(result: Result<T, GpuError>) -> Option<Result<T, GpuError>> {
     }
 }
 
-/// As [`present`], for what must not fail in another way.
+/// Like [`present`], for results that must not fail in any other way.
 pub fn expect<T>(result: Result<T, GpuError>) -> Option<T> {
     present(result).map(|r| r.unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// Whether there is a device; remarks and requirement as in [`present`].
+/// Whether there is a device; remark and requirement as in [`present`].
 pub fn available() -> bool {
     expect(Executor::new(&Options::default(), &[], &[])).is_some()
 }
 
-/// Options for a run under the validation layer, unless layer or device are missing.
+/// Options for a run under the validation layer, unless the layer or a device is missing.
 pub fn under(validation: Validation) -> Option<Options> {
     let options = Options { validation: Some(validation), ..Options::default() };
     match present(Executor::new(&options, &[], &[]))? {

@@ -1,11 +1,11 @@
-//! Weights files made on the spot.
+//! Generated weights files.
 
 use raywake_core::digest::Digest;
 use std::fmt::Write;
 
 use crate::random::Random;
 
-/// A weights file with the number of values its shape asks for, and the bias.
+/// A weights file with as many values as its shape requires, plus the bias.
 pub fn file(
     kind: &str,
     shape: &[usize],
@@ -24,7 +24,7 @@ pub fn file(
     format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()))
 }
 
-/// A background filter with weights up to `most` and some bias.
+/// A background filter with weights up to `most` and the given bias.
 pub fn filter(seed: u64, levels: usize, most: i32, bias: i32) -> String {
     let mut random = Random::new(seed);
     file("background", &[25, 2, levels], 1000, bias, || random.between(-most, most))
@@ -36,7 +36,7 @@ pub fn closed_filter(levels: usize) -> String {
 }
 
 /// A background filter that keeps columns with something more than 0.7 m above the ground, on a
-/// grid of 0.3 m whose middle lies 1.73 m above it.
+/// grid of 0.3 m whose centre lies 1.73 m above it.
 pub fn tall_filter(levels: usize) -> String {
     let mut at = 0;
     let values = || {

@@ -1,4 +1,4 @@
-//! What functions and types look like.
+//! Sizes and contents of functions and types.
 
 use crate::source::Source;
 use std::collections::BTreeMap;
@@ -8,20 +8,20 @@ use syn::{Block, Expr, ExprLit, Ident, ImplItemFn, Item, ItemFn, Lit, Signature,
 /// Floats that need no name.
 const PLAIN: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
-/// What a file is made of.
+/// Contents of a file.
 #[derive(Default)]
 pub struct Contents {
     /// Name and length in lines of every function with a body.
     pub functions: Vec<(String, usize)>,
     /// Names of types and traits.
     pub types: Vec<String>,
-    /// Floats in bodies of functions, but for those that need no name.
+    /// Number of floats in bodies of functions, except those that need no name.
     pub floats: usize,
     in_body: bool,
 }
 
 impl Contents {
-    /// Of one file.
+    /// Collects the contents of one file.
     pub fn of(source: &Source) -> Contents {
         let mut contents = Contents::default();
         if let Some(file) = &source.syntax {
@@ -61,7 +61,7 @@ impl<'a> Visit<'a> for Contents {
 
     fn visit_item(&mut self, item: &'a Item) {
         match item {
-            // A declaration, wherever it stands.
+            // A declaration, wherever it is.
             Item::Const(_) | Item::Static(_) => return,
             Item::Struct(i) => self.named(&i.ident),
             Item::Enum(i) => self.named(&i.ident),

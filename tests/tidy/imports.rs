@@ -1,12 +1,12 @@
-//! Which file of a package names what another one defines. That a module's files name what the
-//! module itself defines does not count.
+//! Which file of a package uses names that another one defines. A module's files using names that
+//! the module itself defines does not count.
 
 use crate::source::Source;
 use std::collections::{BTreeMap, BTreeSet};
 use syn::visit::{self, Visit};
 use syn::{ItemUse, UseTree, Visibility};
 
-/// Names that lead from a re-export to where a thing is defined, at most.
+/// Maximum number of steps from a re-export to the definition.
 const STEPS: usize = 8;
 
 type Names = Vec<String>;
@@ -16,11 +16,11 @@ type Names = Vec<String>;
 struct Package<'a> {
     /// File of every module.
     modules: BTreeMap<Names, &'a str>,
-    /// What a module hands on under a name of its own.
+    /// Names that a module re-exports.
     handed_on: BTreeMap<(Names, String), Names>,
 }
 
-/// Groups of files that name each other in a circle.
+/// Groups of files that depend on each other in a circle.
 pub fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
     let mut packages: BTreeMap<&str, Vec<(&Source, Names)>> = BTreeMap::new();
     for source in sources.iter().filter(|s| s.syntax.is_some()) {
@@ -31,7 +31,7 @@ pub fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
     packages.values().flat_map(|files| of_package(files)).collect()
 }
 
-/// The path of a file's module; none outside of `src`.
+/// The path of a file's module; `None` outside `src`.
 fn module(source: &Source) -> Option<Names> {
     let inside = source.path.strip_prefix(&source.package)?.strip_prefix("/src/")?;
     let names = inside.strip_suffix(".rs")?.split('/').map(String::from);
@@ -56,7 +56,7 @@ fn of_package<'a>(files: &[(&'a Source, Names)]) -> Vec<Vec<&'a str>> {
     groups(&edges)
 }
 
-/// Every path in a file that begins in its own package, made to begin at the root.
+/// Every path in a file that begins in its own package, made absolute.
 fn paths(source: &Source, module: &Names, package: &mut Package) -> BTreeSet<Names> {
     let file = source.syntax.as_ref().expect("only parsed files");
     let mut found = Paths { module, package, found: BTreeSet::new() };
@@ -65,7 +65,7 @@ fn paths(source: &Source, module: &Names, package: &mut Package) -> BTreeSet<Nam
 }
 
 impl<'a> Package<'a> {
-    /// The file that defines what a path names.
+    /// The file that defines what a path refers to.
     fn file(&self, path: &Names) -> &'a str {
         let mut path = path.clone();
         for _ in 0..STEPS {
@@ -88,7 +88,7 @@ struct Paths<'a, 'b> {
 }
 
 impl Paths<'_, '_> {
-    /// The path from the root; none if it begins elsewhere.
+    /// The path from the root; `None` if it begins elsewhere.
     fn absolute(&self, path: &[String]) -> Option<Names> {
         let (first, rest) = path.split_first()?;
         let mut start = self.module.clone();
@@ -152,11 +152,11 @@ impl<'a> Visit<'a> for Paths<'_, '_> {
         visit::visit_path(self, path);
     }
 
-    /// Paths within a module written out in a file begin elsewhere.
+    /// Paths within an inline module begin elsewhere.
     fn visit_item_mod(&mut self, _: &'a syn::ItemMod) {}
 }
 
-/// Files that reach each other.
+/// Groups of files that reach each other.
 fn groups<'a>(edges: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> Vec<Vec<&'a str>> {
     let reached: BTreeMap<_, _> = edges.keys().map(|file| (*file, reach(edges, file))).collect();
     let mut groups = BTreeSet::new();

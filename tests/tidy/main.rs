@@ -1,8 +1,8 @@
 //! Limits on the code's sizes and shapes, and what still exceeds them.
 //!
-//! `limits.txt` lists every excess with its size. It only shrinks: a new or larger one fails, and
-//! so does one that has become smaller until the list says so. `UPDATE=1` writes what has
-//! become smaller, and nothing else.
+//! `limits.txt` lists every excess with its size. The list only shrinks: a new or larger excess
+//! fails, and so does one that has become smaller until the list is updated. `UPDATE=1` writes
+//! those that have become smaller, and nothing else.
 
 #![forbid(unsafe_code)]
 
@@ -16,16 +16,16 @@ use source::{Source, sources};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Most columns of a line.
+/// Maximum number of columns of a line.
 const COLUMNS: usize = 100;
-/// Most lines of a file.
+/// Maximum number of lines of a file.
 const FILE_LINES: usize = 400;
-/// Most lines of a function.
+/// Maximum number of lines of a function.
 const FUNCTION_LINES: usize = 60;
-/// Most lines of half of a package's functions, and of nine tenths.
+/// Maximum number of lines of half of a package's functions, and of nine tenths.
 const SHARES: [(&str, f64, usize); 2] = [("median", 0.5, 8), ("ninth-decile", 0.9, 24)];
 
-/// What exceeds a limit, by kind and place.
+/// Excesses over a limit, by kind and place.
 type Excesses = BTreeMap<String, usize>;
 
 fn measure(all: &[Source]) -> Excesses {
@@ -75,7 +75,7 @@ fn nothing_exceeds_its_limit_by_more_than_the_list_says() {
     let found = measure(&sources(&root()));
     let mut listed = listed();
     if std::env::var_os("UPDATE").is_some() {
-        // What is new or larger stays an error: the list never grows.
+        // New or larger excesses remain errors: the list never grows.
         listed.retain(|excess, _| found.contains_key(excess));
         listed.iter_mut().for_each(|(excess, size)| *size = found[excess].min(*size));
         let lines = listed.iter().map(|(excess, size)| format!("{excess} {size}\n"));
@@ -85,7 +85,7 @@ fn nothing_exceeds_its_limit_by_more_than_the_list_says() {
     assert!(differences.is_empty(), "\n{}\n", differences.join("\n"));
 }
 
-/// The list as it is.
+/// The current list.
 fn listed() -> Excesses {
     let split = |line: &str| {
         let (excess, size) = line.rsplit_once(' ').expect("an excess and its size");
@@ -122,8 +122,8 @@ fn the_list_only_shrinks() {
     assert_eq!(told(&[("a x", 3), ("b y", 5), ("c z", 1)]), ["new: c z 1"]);
 }
 
-/// `cargo test -p raywake-tests --test tidy lines -- --nocapture` prints them; `RAYWAKE_TREE` names
-/// another tree.
+/// `cargo test -p raywake-tests --test tidy lines -- --nocapture` prints the counts; `RAYWAKE_TREE`
+/// selects another tree.
 #[test]
 fn lines_of_product_are_counted() {
     let tree = std::env::var_os("RAYWAKE_TREE").map_or_else(root, PathBuf::from);

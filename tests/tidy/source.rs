@@ -1,29 +1,29 @@
-//! The project's files, without what is there for tests only.
+//! The project's files, without anything that exists only for tests.
 
 use proc_macro2::Span;
 use std::path::{Path, PathBuf};
 use syn::spanned::Spanned;
 use syn::{Attribute, Expr, File, Item, ItemMod, Lit, Meta, MetaNameValue};
 
-/// Folders of a package that hold no product.
+/// Folders of a package that do not count as product.
 const FOR_TESTS: [&str; 3] = ["tests", "benches", "examples"];
 
 /// One file of Rust or WGSL.
 pub struct Source {
-    /// From the root of the project.
+    /// Path from the root of the project.
     pub path: String,
     /// Folder of its package.
     pub package: String,
-    /// As it stands.
+    /// The text, unchanged.
     pub text: String,
-    /// Parsed, without test items; none of WGSL and of files for tests.
+    /// Parsed, without test items; `None` for WGSL and for test files.
     pub syntax: Option<File>,
-    /// Lines of product.
+    /// Number of product lines.
     pub lines: usize,
 }
 
 impl Source {
-    /// Whether it belongs to what runs on board.
+    /// Whether it is part of what runs on board.
     pub fn shipped(&self) -> bool {
         !["lab", "tests"].contains(&self.package.split('/').next().unwrap_or_default())
     }
@@ -34,7 +34,7 @@ impl Source {
     }
 }
 
-/// All files, in order of their path.
+/// All files, ordered by path.
 pub fn sources(root: &Path) -> Vec<Source> {
     let mut paths = Vec::new();
     walk(root, &mut paths);
@@ -85,7 +85,7 @@ fn read(root: &Path, path: &Path) -> Source {
     }
 }
 
-/// Takes test items away. Returns the paths, without ending, of modules that are for tests.
+/// Removes test items. Returns the paths, without extension, of modules that are for tests.
 fn strip(source: &mut Source) -> Vec<String> {
     let mut modules = Vec::new();
     let Some(file) = &mut source.syntax else { return modules };
@@ -93,7 +93,7 @@ fn strip(source: &mut Source) -> Vec<String> {
     modules
 }
 
-/// The folder where the modules of a file lie.
+/// The folder in which the modules of a file lie.
 fn folder_of_modules(path: &str) -> String {
     let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
     match name {
@@ -121,7 +121,7 @@ fn strip_items(items: &mut Vec<Item>, folder: &str, modules: &mut Vec<String>) -
     lines
 }
 
-/// The path, without ending, of a module in a file of its own.
+/// The path, without extension, of a module in its own file.
 fn place(module: &ItemMod, folder: &str) -> String {
     let named = module.attrs.iter().find_map(|a| match &a.meta {
         Meta::NameValue(MetaNameValue { path, value: Expr::Lit(value), .. }) => {
@@ -131,7 +131,7 @@ fn place(module: &ItemMod, folder: &str) -> String {
         _ => None,
     });
     match named {
-        // Beside the file that names it.
+        // Next to the file that names it.
         Some(name) => {
             let beside = folder.rsplit_once('/').map_or("", |(beside, _)| beside);
             format!("{beside}/{}", name.trim_end_matches(".rs"))
@@ -140,7 +140,7 @@ fn place(module: &ItemMod, folder: &str) -> String {
     }
 }
 
-/// Lines from the first to the last.
+/// Number of lines from the first to the last.
 pub fn length(span: Span) -> usize {
     span.end().line + 1 - span.start().line
 }

@@ -15,7 +15,7 @@ use super::{POISON, packed, window, words};
 
 pub const KERNELS: &[&Kernel] = &[&OCCUPANCY_CONSTANCY, &WINDOW];
 
-/// A classifier as it is loaded.
+/// A classifier in its loaded form.
 struct Classifier {
     weights: Vec<i32>,
     costs: Vec<u32>,
@@ -62,7 +62,7 @@ fn check_constancy(
     }
 }
 
-/// Corners, borders, centre.
+/// Corners, edges, centre.
 fn places(side: u32) -> Vec<u32> {
     let last = side * side - 1;
     vec![0, 1, side - 1, side, last / 2, last - side + 1, last - 1, last]
@@ -103,7 +103,7 @@ fn costs_of_every_column() {
     }
 }
 
-/// `window` over these columns and costs.
+/// Checks `window` over these columns and costs.
 fn check_window(case: &str, side: u32, foreground: &[u32], cost: &[u16]) {
     let step = SweepUniform { displacement_cost: 3, outside_cost: 99, ..window(side as i32, 14) };
     let mut rank = vec![NONE; (side * side) as usize];

@@ -15,7 +15,7 @@ use super::{POISON, around, extremes, roomy, window};
 
 pub const KERNELS: &[&Kernel] = &[&COUNT, &EMIT];
 
-/// Rays, what is left of the table that merged them, and entries of either kind.
+/// Rays, the contents of the table that merged them, and entries of either kind.
 struct Distinct {
     rays: Vec<Ray>,
     slots: Vec<[u32; 2]>,
@@ -23,7 +23,7 @@ struct Distinct {
 }
 
 impl Distinct {
-    /// Every third ray found no place in the table; the others stand in it back to front.
+    /// Every third ray found no slot in the table; the others are stored in it in reverse order.
     fn of(rays: Vec<Ray>, mut weight: impl FnMut() -> u32) -> Distinct {
         let count = rays.len() as u32;
         let slots = (0..count).rev().map(|n| [n + 1, weight()]).collect();
@@ -31,7 +31,7 @@ impl Distinct {
         Distinct { rays, slots, entries: (0..count).map(entry).collect() }
     }
 
-    /// Around `centre`, some ends near, some at the border of what a ray can say.
+    /// Rays around `centre`: some ends nearby, some at the limit of what a ray can represent.
     fn any(random: &mut Random, count: usize, centre: [i32; 3], origins: usize) -> Distinct {
         let mut one = || {
             let reach = [0, 2, 40, 400, EXTENT_VOXELS][random.below(5) as usize];
@@ -47,7 +47,7 @@ impl Distinct {
     }
 }
 
-/// Both kernels over a band. Returns the number of updates.
+/// Checks both kernels over a band. Returns the number of updates.
 fn check(case: &str, step: &SweepUniform, origins: &[[i32; 4]], d: &Distinct) -> usize {
     let used = d.entries.len();
     let room = (used + 70).next_multiple_of(ROW_WORKGROUP);
@@ -82,7 +82,7 @@ fn check(case: &str, step: &SweepUniform, origins: &[[i32; 4]], d: &Distinct) ->
     total
 }
 
-/// All of a window's keys, some of them, none; cut at slabs of equal x and beside these cuts.
+/// All of a window's keys, some of them, none; cut at slabs of equal x and next to these cuts.
 fn bands(step: &SweepUniform) -> [[i32; 2]; 10] {
     let (slab, keys) = (step.side * step.levels, step.side * step.side * step.levels);
     let middle = step.side / 2;
@@ -119,7 +119,7 @@ fn bands_of_every_kind() {
             let bands = bands(&step);
             let of = |band: [i32; 2]| check(case, &banded(&step, band), &origins, &rays);
             let counts = bands.map(of);
-            // The second, fourth and third band are the first one, cut; the last two are empty.
+            // The second, fourth and third band together are the first; the last two are empty.
             assert_eq!(counts[0], counts[1] + counts[3] + counts[2], "{case}, {step:?}");
             assert!(counts[8..] == [0, 0], "{case}, {step:?}: {counts:?}");
             most = most.max(counts[3]);

@@ -16,7 +16,7 @@ use super::{POISON, around, packed, window};
 
 pub const KERNELS: &[&Kernel] = &[&EXPECTATION, &EXPECTATION_BY_RINGS];
 
-/// What a round of expectation looks at.
+/// Inputs of a round of expectation.
 struct Round {
     step: SweepUniform,
     foreground: Vec<u32>,
@@ -28,7 +28,7 @@ struct Round {
 }
 
 impl Round {
-    /// The first round of some columns: no flow yet, nobody at any target.
+    /// The first round of some columns: no flow yet, no target taken.
     fn first(step: SweepUniform, foreground: Vec<u32>, mut cost: impl FnMut() -> u16) -> Round {
         let columns = (step.side * step.side) as usize;
         let mut rank = vec![NONE; columns];
@@ -47,19 +47,19 @@ impl Round {
         }
     }
 
-    /// Both kernels, compared with the twin. Returns the proposals.
+    /// Compares both kernels with the twin. Returns the proposals.
     fn check(&self, case: &str) -> Vec<Proposal> {
         self.check_on(&Options::default(), case)
     }
 
-    /// The same on a device.
+    /// The same on a given device.
     fn check_on(&self, options: &Options, case: &str) -> Vec<Proposal> {
         let count = self.foreground.len();
         let mut proposal = vec![[POISON; 2]; count];
         let mut counters = vec![POISON; COUNTERS];
         counters[FOREGROUND_COUNT] = count as u32;
         let mut foreground = self.foreground.clone();
-        // Left from a sweep with more of them.
+        // Left over from a sweep with more of them.
         foreground.extend([0; 3]);
         let poisoned = padded(bytemuck::cast_slice(&proposal));
         let bench = || {
@@ -97,7 +97,7 @@ impl Round {
     }
 }
 
-/// With words behind the last one that must stay as they are.
+/// Appends words that must stay unchanged.
 fn padded(words: &[u32]) -> Vec<u32> {
     [words, &[POISON; 3]].concat()
 }
@@ -106,7 +106,7 @@ fn any_flow(random: &mut Random) -> u32 {
     pack_flow([random.between(-REACH, REACH), random.between(-REACH, REACH)])
 }
 
-/// Settings from nothing to the ceilings of a profile.
+/// Settings from zero to the upper limits of a profile.
 const SETTINGS: [[i32; 3]; 5] =
     [[1000, 1, 693], [1000, 1, 17_289], [0, 0, 0], [10_000, 1000, 100_000], [100, 0, 693]];
 
@@ -128,7 +128,7 @@ fn check_rounds(case: &str, mut round: Round, seed: u64) {
             *energy = if random.below(3) == 0 { NONE } else { random.below(30_000) };
         }
         round.check(&format!("{case}, {filled} with flow, targets taken"));
-        // The own flow alone is feasible.
+        // Only the column's own flow is feasible.
         round.target_energy.fill(0);
         round.check(&format!("{case}, {filled} with flow, no target left"));
     }
@@ -181,7 +181,7 @@ fn nothing_is_feasible_where_every_target_is_taken() {
     assert!(proposal.iter().all(|p| *p == [0, NONE]));
 }
 
-/// A device runs one of the two in the whole pipeline, which `validation.rs` looks at: here both.
+/// In the whole pipeline, which `validation.rs` covers, a device runs one of the two; here both.
 #[test]
 fn no_access_out_of_bounds_is_found() {
     let Some(options) = vulkan::under(Validation::GpuAssisted) else { return };

@@ -13,7 +13,7 @@ use super::{POISON, window, words};
 
 pub const KERNELS: &[&Kernel] = &[&BACKGROUND_FILTER];
 
-/// Greatest weight with which no sum over 25 columns leaves 32 bits.
+/// Largest weight with which no sum over 25 columns exceeds 32 bits.
 const WEIGHT_MAX: i32 = 5_000_000;
 
 fn table(text: &str, levels: i32) -> Vec<i32> {

@@ -21,10 +21,10 @@ use raywake_gpu::Kernel;
 use raywake_tests::bench::Bench;
 use std::collections::BTreeSet;
 
-/// Content of what a kernel must not touch, or has to write itself.
+/// Content of buffers that a kernel must not touch or has to overwrite.
 const POISON: u32 = 0xdead_beef;
 
-/// The kernels these tests run.
+/// The kernels that these tests run.
 const COVERED: [&[&Kernel]; 11] = [
     constancy::KERNELS,
     emit::KERNELS,
@@ -39,13 +39,13 @@ const COVERED: [&[&Kernel]; 11] = [
     voxels::KERNELS,
 ];
 
-/// Counts around the borders of a workgroup or tile.
+/// Counts around the boundaries of a workgroup or tile.
 fn around(size: usize) -> [usize; 5] {
     [0, 1, size - 1, size, size + 1]
 }
 
-/// A window, ray origins, and the ends of rays that strain a walk: what each is, where it ends, and
-/// which origin it has.
+/// A window, ray origins, and ends of rays that are hard to walk: a description, the end, and the
+/// index of the origin.
 #[allow(clippy::type_complexity)]
 fn extremes() -> (SweepUniform, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7]) {
     let step = SweepUniform { range_steps: 2000, ..window(337, 16) };
@@ -62,24 +62,24 @@ fn extremes() -> (SweepUniform, [[i32; 4]; 2], [(&'static str, [i32; 3], u32); 7
     (step, [[127, 127, 8, 0], [-e, e, 0, 0]], ends)
 }
 
-/// Columns as a buffer holds them.
+/// Columns in the layout of a buffer.
 fn words(columns: &[Column]) -> Vec<u32> {
     columns.as_flattened().to_vec()
 }
 
-/// 16-bit costs as a buffer holds them: two a word, the first in the low half.
+/// 16-bit costs in the layout of a buffer: two per word, the first in the low half.
 fn packed(costs: &[u16]) -> Vec<u32> {
     costs.chunks_exact(2).map(|c| c[0] as u32 | (c[1] as u32) << 16).collect()
 }
 
-/// A list of pairs as a buffer holds it, with room behind it.
+/// A list of pairs in the layout of a buffer, with spare room at the end.
 fn roomy(pairs: &[[u32; 2]], room: usize) -> Vec<u32> {
     let mut words = pairs.as_flattened().to_vec();
     words.resize(2 * room, POISON);
     words
 }
 
-/// The tiles of a prefix sum of which the kernels of the sparse map read nothing but the total.
+/// Tiles of a prefix sum of which the sparse map's kernels read only the total.
 fn total(count: usize) -> Vec<u32> {
     let mut tiles = vec![POISON; TILE + 1];
     tiles[TILE] = count as u32;
@@ -91,7 +91,7 @@ fn window(side: i32, levels: i32) -> SweepUniform {
     SweepUniform { side, levels, ..SweepUniform::default() }
 }
 
-/// Names of the functions behind `@compute`.
+/// Names of the functions following `@compute`.
 fn entry_points(source: &str) -> impl Iterator<Item = &str> {
     source.split("@compute").skip(1).filter_map(|rest| {
         let (_, rest) = rest.split_once("fn ")?;

@@ -20,7 +20,7 @@ struct Round {
     proposal: Vec<Proposal>,
 }
 
-/// The buffers a round changes.
+/// The buffers that a round changes.
 #[derive(Clone)]
 struct Changed {
     target_energy: Vec<u32>,
@@ -29,7 +29,7 @@ struct Changed {
 }
 
 impl Round {
-    /// Targets drawn by `aim`, energies below `energies`: few of them make many ties.
+    /// Targets drawn by `aim`, energies below `energies`: a small number causes many ties.
     fn new(
         foreground: Vec<u32>,
         energies: u32,
@@ -55,7 +55,7 @@ impl Round {
         counters[FOREGROUND_COUNT] = count as u32;
         let [mut foreground, mut proposal] =
             [self.foreground.clone(), bytemuck::cast_slice(&self.proposal).to_vec()];
-        // Left from a round with more columns.
+        // Left over from a round with more columns.
         foreground.extend([0; 2]);
         proposal.extend([pack_flow([0, 0]), 0, pack_flow([1, 1]), 0]);
         Bench::new(Some(&self.step))
@@ -67,7 +67,7 @@ impl Round {
             .buffer("flow", start.state.clone())
     }
 
-    /// One kernel for itself, then all of them in a row.
+    /// Each kernel alone, then all of them in a row.
     fn check(&self, case: &str) {
         let count = self.foreground.len();
         let case = format!("{case}, {count} columns");
@@ -121,7 +121,7 @@ fn claimants_of_every_number() {
         for energies in [1, 3, 1 << 30] {
             let round = Round::new(columns.clone(), energies, &mut random, anywhere);
             round.check(&format!("any target, {energies} energies"));
-            // Within reach of everybody there is one target only: the centre.
+            // Only one target is within reach of all: the centre.
             let round = Round::new(columns.clone(), energies, &mut random, |_| [15, 15]);
             round.check(&format!("one target, {energies} energies"));
         }

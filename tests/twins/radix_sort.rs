@@ -1,4 +1,4 @@
-//! The sparse map's updates, sorted by key: a pass by itself, and all eight.
+//! Sorting of the sparse map's updates by key: each pass alone, and all eight.
 
 use raywake_core::params::{BAND_UPDATES, RADIX, TILE};
 use raywake_core::record::Update;
@@ -15,12 +15,12 @@ use super::{POISON, around, roomy, total};
 
 pub const KERNELS: &[&Kernel] = &[&FIRST_DIGIT, &HISTOGRAM, &SCATTER, &NEXT_DIGIT];
 
-/// Sizes around a tile, and of several.
+/// Sizes around a tile, and of several tiles.
 fn sizes() -> Vec<usize> {
     [&around(TILE)[..], &[2 * TILE - 1, 5 * TILE + 77]].concat()
 }
 
-/// Updates by what their keys are like. Values are positions: they show whether a sort is stable.
+/// Updates by the kind of their keys. Values are positions: they show whether a sort is stable.
 fn lists(count: usize) -> Vec<(&'static str, Vec<Update>)> {
     let mut random = Random::new(count as u64);
     let list = |key: &mut dyn FnMut(u32) -> u32| (0..count as u32).map(|n| [key(n), n]).collect();
@@ -34,7 +34,7 @@ fn lists(count: usize) -> Vec<(&'static str, Vec<Update>)> {
     ]
 }
 
-/// The digits that a pass at `shift` counts: a number for every digit and tile.
+/// The histograms of a pass at `shift`: a count for every digit and tile.
 fn counted(list: &[Update], shift: u32, tiles: usize) -> Vec<u32> {
     let mut histograms = vec![0; RADIX * tiles];
     for (tile, updates) in list.chunks(TILE).enumerate() {
@@ -45,9 +45,9 @@ fn counted(list: &[Update], shift: u32, tiles: usize) -> Vec<u32> {
     histograms
 }
 
-/// The kernels of one pass, each looked at for itself.
+/// Checks the kernels of one pass, each separately.
 fn check_pass(case: &str, list: &[Update], shift: u32) {
-    // A tile more than needed, as in a band that is not full.
+    // One tile more than needed, as in a band that is not full.
     let tiles = list.len().div_ceil(TILE) + 1;
     let histograms = counted(list, shift, tiles);
     let mut offsets = vec![0; histograms.len()];
@@ -90,7 +90,7 @@ fn passes_of_every_digit() {
     }
 }
 
-/// All passes, as the map's schedule has them.
+/// Checks all passes, in the order of the map's schedule.
 fn check_sort(case: &str, list: &[Update], tiles: usize) {
     let room = tiles * TILE;
     let mut bench = Bench::new(None)
@@ -120,7 +120,7 @@ fn check_sort(case: &str, list: &[Update], tiles: usize) {
     }
     let mut sorted = list.to_vec();
     radix_sort(&total(list.len()), &mut sorted, &mut vec![[0; 2]; list.len()]);
-    // Before the last pass the keys were in the order of all digits but the highest.
+    // Before the last pass the keys were sorted by all digits but the highest.
     let mut but_one = list.to_vec();
     but_one.sort_by_key(|u| u[0] << 4);
     let Some(outcome) = bench.run() else { return };

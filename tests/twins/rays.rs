@@ -1,4 +1,4 @@
-//! Rays merged and traced.
+//! Merging and tracing of rays.
 
 use raywake_core::params::{EXTENT_VOXELS, MERGE_PROBES, MERGE_SLOTS, POINTS_MAX, WORKGROUP};
 use raywake_core::record::{Ray, SweepUniform, ray};
@@ -33,10 +33,10 @@ impl Merged {
         Merged { rays: rays.to_vec(), slots, distinct }
     }
 
-    /// None where there is no device.
+    /// `None` if there is no device.
     fn by_kernel(rays: &[Ray]) -> Option<Merged> {
         let step = SweepUniform { rays: rays.len() as i32, ..SweepUniform::default() };
-        // Rays behind the last one, as a sweep before might have left them, must not count.
+        // Rays after the last one, as left over from an earlier sweep, must not count.
         let mut more = rays.to_vec();
         more.extend([ray([1, 2, 3], 4, false); 3]);
         let outcome = Bench::new(Some(&step))
@@ -56,7 +56,7 @@ impl Merged {
         })
     }
 
-    /// Every entry with its weight, in an order that does not depend on who came first.
+    /// Every entry with its weight, in an order independent of which came first.
     fn entries(&self) -> Vec<(Ray, i32)> {
         let entry = |e: &u32| merged(*e, &self.rays, &self.slots);
         let mut all: Vec<_> = self.distinct.iter().map(entry).collect();
@@ -64,7 +64,7 @@ impl Merged {
         all
     }
 
-    /// Entries without a place in the table.
+    /// Number of entries without a slot in the table.
     fn crowded_out(&self) -> usize {
         self.distinct.iter().filter(|e| **e >= MERGE_SLOTS as u32).count()
     }
@@ -107,7 +107,8 @@ fn first_slot(ray: Ray) -> u32 {
     (mixed ^ mixed >> 13) & (MERGE_SLOTS as u32 - 1)
 }
 
-/// More rays with the same first slot than there are probes, the last slot so that they wrap.
+/// More rays with the same first slot than there are probes; it is the last slot, so that they
+/// wrap.
 fn crowd() -> Vec<Ray> {
     let ends = (0..60).flat_map(|i| (0..60).flat_map(move |j| (-9..45).map(move |k| [i, j, k])));
     let rays = ends.flat_map(|end| (0..512).map(move |origin| ray(end, origin, false)));
@@ -144,7 +145,7 @@ fn check_trace(case: &str, step: &SweepUniform, origins: &[[i32; 4]], merged: &M
     let used = merged.distinct.len();
     let mut counters = vec![POISON; COUNTERS];
     counters[DISTINCT_COUNT] = used as u32;
-    // What is in the grid before is added to.
+    // Values already in the grid are added to.
     let mut log_odds: Vec<i32> = (0..step.side * step.side * step.levels).collect();
     let mut distinct = merged.distinct.clone();
     distinct.extend([POISON; 9]);

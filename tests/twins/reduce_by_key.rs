@@ -1,4 +1,4 @@
-//! The sparse map's updates, summed by key.
+//! Summation of the sparse map's updates by key.
 
 use raywake_core::params::{BAND_UPDATES, TILE, WORKGROUP};
 use raywake_core::record::Update;
@@ -13,7 +13,7 @@ use super::{POISON, around, roomy, total};
 
 pub const KERNELS: &[&Kernel] = &[&MARK_HEADS, &FOLD];
 
-/// All kernels, by themselves and one after the other.
+/// Checks all kernels, alone and one after another.
 fn check(case: &str, sorted: &[Update], room: usize) {
     let count = sorted.len();
     let case = format!("{case}, {count} updates, room for {room}");
@@ -32,7 +32,7 @@ fn check(case: &str, sorted: &[Update], room: usize) {
     let bench = |heads: &[u32], runs: &[u32]| {
         Bench::new(None)
             .buffer("count_tiles", total(count))
-            // What lies behind the updates seems to go on with the last key.
+            // What follows the updates appears to continue the last key.
             .buffer("updates", {
                 let mut all = roomy(sorted, room);
                 let last = sorted.last().map_or(0, |u| u[0]);
@@ -66,7 +66,7 @@ fn check(case: &str, sorted: &[Update], room: usize) {
     outcome.check(&case, &expected);
 }
 
-/// Updates of any value whose keys change as `new` says.
+/// Updates with random values whose keys change when `new` says so.
 fn list(count: usize, new: &mut dyn FnMut(&mut Random) -> bool) -> Vec<Update> {
     let mut random = Random::new(count as u64);
     let mut key = 0u32;

@@ -13,11 +13,11 @@ use super::{POISON, around};
 
 pub const KERNELS: &[&Kernel] = &[&REDUCE, &SPINE, &SCAN, &COMPACT];
 
-/// All three kernels of the sum, each looked at for itself.
+/// Checks all three kernels of the sum, each also separately.
 fn check_sum(case: &str, values: &[u32]) {
     let count = values.len();
     let groups = count.div_ceil(TILE);
-    // Behind the tiles, the spine leaves the sum of all.
+    // Behind the tiles, the spine stores the total.
     let mut totals = vec![POISON; TILE + 1];
     for (total, tile) in totals.iter_mut().zip(values.chunks(TILE)) {
         *total = tile.iter().sum();
@@ -57,7 +57,7 @@ fn sums_of_every_length() {
     sizes.sort();
     sizes.dedup();
     for size in sizes {
-        // Just small enough for the sum of the longest to fit a word.
+        // Just small enough for the longest sum to fit into a word.
         let values: Vec<u32> = (0..size).map(|_| random.below(4096)).collect();
         check_sum(&format!("{size} values"), &values);
     }
@@ -120,7 +120,7 @@ fn the_prefix_sum_feeds_the_list() {
     let marks: Vec<u32> = (0..COLUMNS_MAX).map(|_| random.below(2)).collect();
     let mut index = vec![POISON; marks.len()];
     let mut list = vec![POISON; FOREGROUND_MAX];
-    // The prefix sum knows the marks as `values` and the indices as `sums`.
+    // To the prefix sum the marks are `values` and the indices are `sums`.
     let bench = Bench::new(None)
         .buffer("values", marks.clone())
         .buffer("tiles", vec![POISON; TILE + 1])

@@ -1,4 +1,4 @@
-//! Columns from log-odds, and columns moved into the next window.
+//! Columns from log-odds, and columns shifted into the next window.
 
 use raywake_core::record::SweepUniform;
 use raywake_core::stages::grid::{columns::columns, shift::shift};
@@ -11,7 +11,7 @@ use super::{POISON, window, words};
 
 pub const KERNELS: &[&Kernel] = &[&COLUMNS, &SHIFT];
 
-/// Sides whose squares lie around a workgroup, and the largest.
+/// Sides whose squares lie around a workgroup's size, and the largest one.
 const SIDES: [i32; 5] = [1, 15, 16, 17, 337];
 
 fn check_columns(step: &SweepUniform, log_odds: Vec<i32>) {

@@ -1,12 +1,12 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
-//! Object tracks with shape (chapter 2): what the returns of one object say of its trajectory and
-//! its shape, together and in continuous time.
+//! Object tracks with shape (chapter 2): estimates an object's trajectory and shape from its
+//! returns, jointly and in continuous time.
 //!
-//! A track has an anchor, a place in the world near its birth, and a start, the time of its birth.
+//! A track has an anchor, a point in the world near its birth, and a start, the time of its birth.
 //! Positions of a track are metres from its anchor along the world's axes (z up), times seconds
-//! after its start: single precision then holds a return wherever and whenever one drives.
+//! after its start: single precision then suffices wherever and whenever one drives.
 
 pub mod centroid_ekf;
 pub mod estimate;
@@ -21,7 +21,7 @@ mod random;
 pub mod spline;
 pub mod tracked;
 
-/// Returns that a track keeps, and an estimate is made of, at most.
+/// Maximum number of returns that a track keeps and an estimate uses.
 pub const RETURNS_MAX: usize = 8192;
 
 /// One return of an object.
@@ -31,23 +31,24 @@ pub struct ObjectReturn {
     pub position: [f32; 3],
     /// Where the ray began, m from the track's anchor.
     pub origin: [f32; 3],
-    /// When, s after the track's start.
+    /// Time, s after the track's start.
     pub time_s: f32,
-    /// Sensor that saw it, index in [`raywake_core::sweep::Rig::sensors`].
+    /// Sensor that saw it: index in [`raywake_core::sweep::Rig::sensors`].
     pub sensor: u8,
-    /// Whether the next rays pass it, to its left and to its right as the sensor sees it: there the
-    /// object ends. See [`panorama`].
+    /// Whether the neighbouring rays pass it, on its left and on its right as the sensor sees it:
+    /// the object ends there. See [`panorama`].
     pub passed: [bool; 2],
 }
 
 /// State of an object at a time (2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectState {
-    /// s after the track's start.
+    /// Time, s after the track's start.
     pub time_s: f64,
     /// Origin of the object's frame, m from the track's anchor.
     pub position: [f64; 3],
-    /// Direction of its x axis about +z, rad, unwrapped: no jump by a turn along a track.
+    /// Direction of its x axis about +z, rad, unwrapped: it never jumps by a full turn along a
+    /// track.
     pub heading: f64,
     /// Speed along its x axis, m/s.
     pub speed: f64,
@@ -58,14 +59,14 @@ pub struct ObjectState {
 }
 
 impl ObjectState {
-    /// A place, m from the track's anchor, in the frame of the object.
+    /// Converts a point, m from the track's anchor, to the frame of the object.
     pub fn local(&self, at: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = [0, 1, 2].map(|a| f64::from(at[a]) - self.position[a]);
         let (sin, cos) = libm::sincos(self.heading);
         [cos * x + sin * y, cos * y - sin * x, z].map(|v| v as f32)
     }
 
-    /// A place in the frame of the object, m from the track's anchor.
+    /// Converts a point in the frame of the object to m from the track's anchor.
     pub fn placed(&self, at: [f32; 3]) -> [f64; 3] {
         let [x, y, z] = at.map(f64::from);
         let (sin, cos) = libm::sincos(self.heading);
@@ -74,7 +75,7 @@ impl ObjectState {
     }
 }
 
-/// An angle within half a turn of zero.
+/// Wraps an angle to within half a turn of zero.
 pub fn wrap_angle(angle: f64) -> f64 {
     angle - core::f64::consts::TAU * libm::round(angle / core::f64::consts::TAU)
 }

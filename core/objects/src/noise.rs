@@ -1,7 +1,7 @@
 //! Process noise of the unicycle (2.6), for the centroid filter and for the estimate.
 
 raywake_core::params! {
-    /// Square root of the diagonal of `Q_u`: standard deviations after a second.
+    /// Square root of the diagonal of `Q_u`: standard deviations after one second.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ProcessNoise {
         /// Along each axis of the position.
@@ -20,7 +20,7 @@ raywake_core::params! {
 }
 
 impl ProcessNoise {
-    /// By the state's elements: x, y, z, heading, speed, climb, turn rate.
+    /// Sigmas in the order of the state's elements: x, y, z, heading, speed, climb, turn rate.
     pub const fn sigmas(&self) -> [f64; 7] {
         let position = self.position_sigma_m;
         let [heading, speed] = [self.heading_sigma_rad, self.speed_sigma_mps];

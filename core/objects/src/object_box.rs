@@ -1,40 +1,40 @@
-//! The box of an object: where it is, which way, how large.
+//! The box of an object: its position, direction and size.
 //!
-//! What moves is long in the direction of its motion. What stands is laid out along its sides, by
-//! the criterion of closeness of Zhang, Xu, Dong and Dolan (Efficient L-shape fitting for vehicle
-//! detection using laser scanners, IV 2017): of all directions the one in which returns lie near
-//! the box's edges.
+//! A moving object is long in the direction of its motion. The box of a stationary one is aligned
+//! with its sides, by the closeness criterion of Zhang, Xu, Dong and Dolan (Efficient L-shape
+//! fitting for vehicle detection using laser scanners, IV 2017): of all directions, the one in
+//! which returns lie near the box's edges.
 //!
-//! A box ends where the returns do: of an object that was only seen from behind its length is not
-//! known, and the box is as short as what was seen.
+//! A box ends where the returns do: if an object was seen only from behind, its length is unknown,
+//! and the box is as short as the part that was seen.
 
 use core::f32::consts::FRAC_PI_2;
 
 use crate::front_end::Thinned;
 
-/// Places that a box is laid around, at most; of more, every second counts, and so on.
+/// Maximum number of points a box is fitted to; of more, every second one is used, and so on.
 const PLACES_MAX: usize = 1024;
 
 raywake_core::params! {
     /// Boxes of objects.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct BoxParams {
-        /// Share of the returns, at each end of each axis, that a box need not contain.
+        /// Share of the returns at each end of each axis that a box need not contain.
         pub box_trim: f32 = 0.01, "", (0 to 0.2);
-        /// Way from which on an object is long in the direction of its motion.
+        /// Distance moved from which an object is long in the direction of its motion.
         pub box_along_motion_m: f64 = 1.0, "m", (above 0),
             "Parked tracks of `kitti_raw_0005` come up to 0.16 m far, 60 sweeps of them.";
-        /// Step of the directions of what stands.
+        /// Step between the directions tried for a stationary object.
         pub box_step_rad: f32 = 0.035, "rad", (0.001 to 0.5);
-        /// Distance from an edge that counts as none.
+        /// Distance from an edge below which closer does not count more.
         pub box_edge_m: f32 = 0.05, "m", (above 0), "Noise of a return.";
     }
 }
 
-/// A box in the frame of an object, upright.
+/// An upright box in the frame of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObjectBox {
-    /// Its middle, m.
+    /// Its centre, m.
     pub centre: [f32; 3],
     /// Direction of its length about +z from the object's x axis, rad, from 0 to half a turn.
     pub turn: f32,
@@ -43,9 +43,9 @@ pub struct ObjectBox {
 }
 
 impl ObjectBox {
-    /// Around places in the frame of an object, m. One that has come `moved_m` far is long in the
-    /// direction of its motion, its x axis; else its longer side counts as its length, and which of
-    /// its ends is the front is not known. None without a place that is finite.
+    /// Fits a box to points in the frame of an object, m. If `moved_m` is large enough, the box is
+    /// long in the direction of motion, its x axis; otherwise its longer side counts as its length,
+    /// and which end is the front is unknown. None without a finite point.
     pub fn around(
         params: &BoxParams,
         places: impl Iterator<Item = [f32; 3]>,
@@ -72,7 +72,7 @@ impl ObjectBox {
     }
 }
 
-/// Where values begin and end, but for a share of them at either end.
+/// Minimum and maximum of values, ignoring a share of them at either end.
 struct Ends {
     trim: f32,
     values: heapless::Vec<f32, PLACES_MAX>,
@@ -81,7 +81,7 @@ struct Ends {
 impl Ends {
     fn of(&mut self, values: impl Iterator<Item = f32>) -> Option<[f32; 2]> {
         self.values.clear();
-        // There is room for as many as are kept.
+        // There is room for as many points as are kept.
         self.values.extend(values.take(PLACES_MAX));
         self.values.sort_unstable_by(f32::total_cmp);
         let cut = (self.trim * self.values.len() as f32) as usize;
@@ -90,7 +90,7 @@ impl Ends {
     }
 }
 
-/// A place along a direction and to its left.
+/// Coordinates of a point along a direction and to its left.
 fn turned([x, y, _]: &[f32; 3], (sin, cos): (f32, f32)) -> [f32; 2] {
     [cos * x + sin * y, cos * y - sin * x]
 }
@@ -102,7 +102,7 @@ fn sides(places: &[[f32; 3]], turn: f32, ends: &mut Ends) -> Option<[[f32; 2]; 2
     Some([side(0)?, side(1)?])
 }
 
-/// The direction, from 0 to a quarter turn, in which places are closest to the edges.
+/// The direction, from 0 to a quarter turn, in which points are closest to the edges.
 fn direction(params: &BoxParams, places: &[[f32; 3]], ends: &mut Ends) -> Option<f32> {
     let mut best = (f32::NEG_INFINITY, 0.0);
     let steps = (FRAC_PI_2 / params.box_step_rad) as u32;
@@ -116,7 +116,7 @@ fn direction(params: &BoxParams, places: &[[f32; 3]], ends: &mut Ends) -> Option
     Some(best.1)
 }
 
-/// How close places are to the nearest edges, 1/m.
+/// Sum of the points' inverse distances from their nearest edges, 1/m.
 fn closeness(params: &BoxParams, places: &[[f32; 3]], turn: f32, sides: [[f32; 2]; 2]) -> f32 {
     let by = libm::sincosf(turn);
     let one = |place: &[f32; 3]| {
@@ -136,7 +136,7 @@ mod tests {
 
     const PARAMS: BoxParams = BoxParams::DEFAULT;
 
-    /// Places on two sides of a car of 4.2 m x 1.8 m x 1.5 m around a middle, turned, with noise.
+    /// Points on two sides of a car of 4.2 m x 1.8 m x 1.5 m around a centre, turned, with noise.
     fn car(turn: f32, [x, y]: [f32; 2], random: &mut Random) -> Vec<[f32; 3]> {
         let (sin, cos) = turn.sin_cos();
         let mut place = |along: f32, left: f32| {
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn what_moves_is_long_along_its_motion() {
-        // A bus seen from behind: what is seen is wider than long.
+        // A bus seen from behind: the visible part is wider than long.
         let places = (0..200).map(|n| [0.02 * (n % 10) as f32, 0.0125 * n as f32, 1.0]);
         let moving = ObjectBox::around(&PARAMS, places.clone(), 5.0).unwrap();
         assert_eq!(moving.turn, 0.0);
@@ -186,7 +186,7 @@ mod tests {
         let one = ObjectBox::around(&PARAMS, [[1.0, 2.0, 3.0]; 2].into_iter(), 0.0).unwrap();
         assert_eq!(one.size, [0.0; 3]);
         assert!(one.centre.iter().zip([1.0, 2.0, 3.0]).all(|(is, of)| (is - of).abs() < 1e-5));
-        // A stray return of five hundred is left out.
+        // One stray return of five hundred is left out.
         let many = (0..500).map(|n| [if n == 250 { 90.0 } else { 0.004 * n as f32 }, 0.0, 0.0]);
         let found = ObjectBox::around(&PARAMS, many, 9.0).unwrap();
         assert!(found.size[0] < 2.1, "{found:?}");

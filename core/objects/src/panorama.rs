@@ -1,38 +1,37 @@
 //! Free space beside what a sensor sees: rays that pass an object and end farther away.
 //!
-//! Where an object ends and where it is only hidden by another look alike in its own returns; the
-//! rays next to it know. Directions from a sensor are binned by azimuth and rise, and each bin
-//! holds the nearest and the farthest return. Without this, a tram that drives past a gap between
-//! houses would pass for a static object: its visible part begins and ends with the gap.
+//! An object's own returns do not show whether it ends or is merely hidden by another; the rays
+//! next to them do. Directions from a sensor are binned by azimuth and rise, and each bin holds the
+//! nearest and the farthest return. Without this, a tram that drives past a gap between houses
+//! would pass for a static object: its visible part begins and ends with the gap.
 
-/// Bins of a turn; they are as wide as 0.22 to 0.45 degrees.
+/// Bins per revolution; they are 0.22 to 0.45 degrees wide.
 const AZIMUTHS: usize = 1024;
-/// Bins of the rise, height over distance on the plane, from the lowest on.
+/// Bins of the rise, height over horizontal distance, from the lowest up.
 const RISES: usize = 64;
 const LOWEST: f32 = -0.6;
 const RISE: f32 = 0.015;
-/// Bins beside a return whose rays may pass.
+/// Number of bins beside a return whose rays may pass.
 const BESIDE: usize = 3;
 raywake_core::params! {
     /// Rays that pass an object.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PassingParams {
-        /// What is farther than a return by more than this is another object,
+        /// Margin: a return farther than another by more than this is of another object.
         pub passing_margin_m: f32 = 1.0, "m", (0 to 10);
-        /// and by this for each metre of its distance: a side that is seen at a slant goes on that
-        /// far.
+        /// Increase of the margin per metre of distance: a side seen at a slant recedes that much.
         pub passing_margin_ratio: f32 = 0.05, "", (0 to 1);
-        /// Directions that rays must pass in, for each in which they end at the object or before
-        /// it.
+        /// Number of directions in which rays must pass for each one in which they end at the
+        /// object or before it.
         pub passing_ratio: u32 = 3, "", (1 to 100);
     }
 }
 
-/// Nearest and farthest distance, m; none has the first beyond the second.
+/// Nearest and farthest distance, m; if there is no return, the first exceeds the second.
 type Reach = [f32; 2];
 const NOTHING: Reach = [f32::INFINITY, 0.0];
 
-/// What a sensor sees around it in some 100 ms.
+/// What a sensor sees around it in about 100 ms.
 pub struct Panorama {
     reach: [[Reach; RISES]; AZIMUTHS],
 }
@@ -44,14 +43,14 @@ impl Default for Panorama {
 }
 
 impl Panorama {
-    /// Nothing seen. 512 KB: keep it in a box.
+    /// A panorama with nothing seen. 512 KB: keep it in a box.
     pub const fn new() -> Panorama {
         Panorama { reach: [[[0.0; 2]; RISES]; AZIMUTHS] }
     }
 
     /// Finds which rays pass the returns that are `wanted` by their index, among all returns of
-    /// some 100 ms. `ray` tells of a return its sensor, and where its ray began and ended, m;
-    /// `found` is told whether the next rays pass on its left and on its right.
+    /// about 100 ms. `ray` gives a return's sensor and where its ray began and ended, m; `found`
+    /// receives whether the neighbouring rays pass on its left and on its right.
     pub fn look<T>(
         &mut self,
         params: &PassingParams,
@@ -75,21 +74,21 @@ impl Panorama {
         }
     }
 
-    /// For the next sensor.
+    /// Clears it for the next sensor.
     fn clear(&mut self) {
         self.reach.fill([NOTHING; RISES]);
     }
 
-    /// Adds a return, from where its ray began.
+    /// Adds a return and the origin of its ray.
     fn add(&mut self, from: [f32; 3], to: [f32; 3]) {
         let Some(Direction { azimuth, rise, range }) = direction(from, to) else { return };
         let [near, far] = &mut self.reach[azimuth][rise];
         (*near, *far) = (near.min(range), far.max(range));
     }
 
-    /// Whether the next rays to the left and to the right of a return, as the sensor sees it, pass
-    /// what it is of: over the whole height of that, nearly all that end, end farther away. Through
-    /// a window or between wheels only some do.
+    /// Whether the neighbouring rays to the left and to the right of a return, as the sensor sees
+    /// it, pass its object: over the object's whole height, nearly all that have a return end
+    /// farther away. Through a window or between wheels, only some do.
     fn passed(&self, params: &PassingParams, from: [f32; 3], to: [f32; 3]) -> [bool; 2] {
         let Some(Direction { azimuth, rise: own, range }) = direction(from, to) else {
             return [false; 2];
@@ -100,7 +99,7 @@ impl Panorama {
             let beside: [_; BESIDE] =
                 core::array::from_fn(|n| &self.reach[(azimuth + (n + 1) * step) % AZIMUTHS]);
             let ends = |rise: usize| beside.iter().any(|bins| bins[rise][0] < farther);
-            // Of most returns it is soon told.
+            // This settles most returns early.
             if ends(own) {
                 return false;
             }
@@ -123,11 +122,11 @@ impl Panorama {
 struct Direction {
     azimuth: usize,
     rise: usize,
-    /// Along the plane, m.
+    /// Horizontal distance, m.
     range: f32,
 }
 
-/// None beneath and above what is binned, and for what is no number.
+/// None below and above the binned range, and for input that is not finite.
 fn direction(from: [f32; 3], to: [f32; 3]) -> Option<Direction> {
     let [x, y, z]: [f32; 3] = core::array::from_fn(|d| to[d] - from[d]);
     let range = libm::sqrtf(x * x + y * y);
@@ -135,7 +134,7 @@ fn direction(from: [f32; 3], to: [f32; 3]) -> Option<Direction> {
     if !(range > 0.0 && range.is_finite() && (0.0..RISES as f32).contains(&rise)) {
         return None;
     }
-    // Grows with the azimuth from 0 to 4, without a trigonometric function.
+    // Grows with the azimuth from 0 to 4, without trigonometric functions.
     let share = y / (x.abs() + y.abs());
     let quarters = match (x < 0.0, y < 0.0) {
         (true, _) => 2.0 - share,
@@ -162,8 +161,8 @@ mod tests {
         [FROM[0] + range * c, FROM[1] + range * s, FROM[2] + range * BEAMS[beam]]
     }
 
-    /// A wall at 40 m, an object at 20 m from 10 degrees before to 10 degrees behind `middle`, but
-    /// for what is seen of other things by a beam and so many degrees off.
+    /// A wall at 40 m and an object at 20 m from 10 degrees before to 10 degrees after `middle`,
+    /// except where `other` gives the range of something else, by beam and offset in degrees.
     fn scene(middle: f32, other: impl Fn(usize, f32) -> Option<f32>) -> Box<Panorama> {
         let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
         panorama.clear();
@@ -214,7 +213,7 @@ mod tests {
     fn every_sensor_looks_for_itself() {
         let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
         panorama.clear();
-        // An edge at 60 degrees, its wall seen by the other sensor or by the same one.
+        // An edge at 60 degrees; the wall beyond it is seen by the other sensor or by the same one.
         for (of_wall, expected) in [(1, [false; 2]), (0, [true, false])] {
             let returns = (0..100).map(|n| 50.0 + 0.2 * n as f32);
             let mut returns: Vec<_> = returns

@@ -1,11 +1,11 @@
-//! All parameters of this package, by group.
+//! All parameters of this crate, by group.
 
 use crate::estimate::EstimateParams;
 use crate::front_end::FrontEndParams;
 use crate::object_box::BoxParams;
 use raywake_core::params::{Parameters, ProfileError};
 
-/// What tracking can be set to.
+/// Parameters of tracking.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackingParams {
     /// From sweeps to tracks.
@@ -42,7 +42,7 @@ impl TrackingParams {
         visit("boxes", boxes);
     }
 
-    /// Whether every parameter lies within its bounds.
+    /// Checks that every parameter is within its bounds.
     pub fn check(mut self) -> Result<(), ProfileError> {
         let mut result = Ok(());
         self.each(&mut |_, group| result = result.and(group.within_bounds()));

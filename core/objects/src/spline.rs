@@ -1,19 +1,19 @@
 //! B-splines of degree 4 on uniform knots (2.5.2.1).
 //!
-//! The knots run on evenly for four spacings beyond either end of the splines' domain, so that
-//! every basis function has the same shape and every time of the domain has five of them. One over
+//! The knots continue evenly for four spacings beyond either end of the domain, so that every basis
+//! function has the same shape and every time of the domain is covered by five of them. A spline of
 //! `n` basis functions has `n - 4` pieces.
 
 /// Degree of the polynomials.
 pub const DEGREE: usize = 4;
-/// Number of basis functions that are not zero at a time.
+/// Number of basis functions that are nonzero at a time.
 pub const SUPPORT: usize = DEGREE + 1;
-/// Basis functions of the longest splines.
+/// Maximum number of basis functions of a spline.
 pub const BASES_MAX: usize = 64;
-/// Shortest domain, s: so that returns of one instant have a basis.
+/// Shortest domain, s, so that returns at a single instant have a basis.
 pub const DOMAIN_MIN_S: f64 = 0.1;
 
-/// A domain this little longer than a whole number of spacings has as many.
+/// A domain that exceeds a whole number of spacings by less than this still has that number.
 const ROUNDING: f64 = 1e-9;
 
 /// Uniform knots.
@@ -27,15 +27,15 @@ pub struct Knots {
 /// The basis functions at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Basis {
-    /// Index of the first that is not zero there.
+    /// Index of the first one that is nonzero there.
     pub first: usize,
-    /// Its value, and that of the four after it.
+    /// Its value, and those of the four after it.
     pub values: [f64; SUPPORT],
 }
 
 impl Basis {
-    /// The first four elements of splines with the given control points: position and heading of a
-    /// state.
+    /// Returns the first four elements, position and heading, of splines with the given control
+    /// points.
     pub fn pose<const D: usize>(&self, control_points: &[[f64; D]]) -> [f64; 4] {
         let mut pose = [0.0; 4];
         for (control_point, value) in control_points[self.first..].iter().zip(self.values) {
@@ -48,7 +48,7 @@ impl Basis {
 }
 
 impl Knots {
-    /// No knots: no spline is over these.
+    /// No knots: no spline uses these.
     pub const NONE: Knots = Knots { start: 0.0, spacing: 0.0, pieces: 0 };
 
     /// One basis function for every `every` seconds from `start` to `end`, at least five and at
@@ -61,17 +61,17 @@ impl Knots {
         Knots { start, spacing: domain / pieces as f64, pieces }
     }
 
-    /// A number of pieces of a given length.
+    /// The given number of pieces of the given length.
     pub fn pieces(start: f64, spacing: f64, pieces: usize) -> Knots {
         Knots { start, spacing, pieces: pieces.clamp(1, BASES_MAX - DEGREE) }
     }
 
-    /// Basis functions.
+    /// Number of basis functions.
     pub fn bases(&self) -> usize {
         self.pieces + DEGREE
     }
 
-    /// Polynomial pieces of the domain.
+    /// Number of polynomial pieces of the domain.
     pub fn spans(&self) -> usize {
         self.pieces
     }
@@ -102,8 +102,8 @@ impl Knots {
         self.knot(i) + 0.5 * SUPPORT as f64 * self.spacing
     }
 
-    /// The piece that `time` falls into, and how far into it, 0 to 1. Times outside the domain are
-    /// clamped to its ends.
+    /// The piece that `time` falls into, and the position in it, 0 to 1. Times outside the domain
+    /// are clamped to its ends.
     fn locate(&self, time: f64) -> (usize, f64) {
         let at = ((time - self.start) / self.spacing).clamp(0.0, self.pieces as f64);
         let piece = (at as usize).min(self.pieces - 1);
@@ -146,7 +146,7 @@ impl Knots {
     }
 }
 
-/// Basis functions of degree `P` that are not zero at `u`, 0 to 1, of a piece, in order; then
+/// Basis functions of degree `P` that are nonzero at `u`, 0 to 1, of a piece, in order; followed by
 /// zeros.
 fn cox_de_boor<const P: usize>(u: f64) -> [f64; SUPPORT] {
     let mut values = [0.0; SUPPORT];
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// (2.16) and (2.17) as they are written.
+    /// (2.16) and (2.17) as written.
     fn defined(knots: &Knots, i: usize, p: usize, x: f64) -> f64 {
         let t = |i| knots.knot(i);
         if p == 0 {

@@ -1,4 +1,4 @@
-//! Objects as they are known while their tracks live, sweep by sweep.
+//! Objects as known while their tracks live, sweep by sweep.
 
 use glam::DVec3;
 use raywake_core::encoder::ColumnClass;
@@ -11,11 +11,11 @@ use crate::front_end::{Flows, FrontEnd, Life, StateVariances, TRACKS_MAX, Track,
 use crate::object_box::ObjectBox;
 use crate::params::TrackingParams;
 
-/// Without the flow: what is slower, or has come less far, is shown as static; m/s and m.
+/// Without the flow, whatever is slower or has moved less than this is shown as static; m/s and m.
 const MOVING_MPS: f64 = 1.0;
 const MOVED_M: f64 = 1.0;
-/// Updates before a track is shown, and, without the flow, before it is shown as moving: filters
-/// begin with any velocity.
+/// Updates before a track is shown and, without the flow, before it is shown as moving: a filter
+/// may start with any velocity.
 const UPDATES_MIN: u32 = 3;
 const MOVING_UPDATES_MIN: u32 = 6;
 
@@ -26,33 +26,33 @@ pub struct TrackedObject {
     pub id: u32,
     /// Updates of its track.
     pub observations: u32,
-    /// Time of the last one, s: earlier than the sweep where it was not seen.
+    /// Time of the last one, s: earlier than the sweep if it was not seen in it.
     pub time_s: f64,
-    /// Middle of the box around the returns of that update, m.
+    /// Centre of the box around the returns of that update, m.
     pub centre: [f64; 3],
-    /// Direction of its length about +z, rad. Of what stands either end may be the front.
+    /// Direction of its length about +z, rad. If it is static, either end may be the front.
     pub heading: f64,
     /// Length, width and height, m.
     pub size: [f32; 3],
-    /// Along x and y, m/s; none where it stands.
+    /// Along x and y, m/s; none if it is static.
     pub velocity: Option<[f64; 2]>,
     /// About +z, rad/s.
     pub turn_rate: f64,
-    /// How sure the filter is of it.
+    /// The filter's uncertainty.
     pub variances: StateVariances,
-    /// Mean P(moves) of its returns; none where the flow does not tell.
+    /// Mean P(moves) of its returns; none if the flow does not give it.
     pub p_moves: Option<f32>,
-    /// What the encoder takes most of its returns for, and the share of them, 0 to 1.
+    /// The class that the encoder assigns to most of its returns, and their share, 0 to 1.
     pub class: Option<(ColumnClass, f32)>,
 }
 
 impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
-    /// A place given from its anchor, in the world, m.
+    /// Converts a position relative to its anchor to the world, m.
     pub fn in_world(&self, at: [f64; 3]) -> [f64; 3] {
         (DVec3::from(self.anchor) + DVec3::from(at)).to_array()
     }
 
-    /// The object, of a track that lives and is old enough to be shown.
+    /// Returns the object, if the track lives and is old enough to be shown.
     pub fn object(&self, params: &TrackingParams) -> Option<TrackedObject> {
         let shown = self.life == Life::Live && self.observations >= UPDATES_MIN;
         let state = self.state().filter(|_| shown)?;
@@ -75,7 +75,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         })
     }
 
-    /// Whether it moves: as the flow tells, where it does.
+    /// Whether it moves: by the flow if that gives a probability.
     fn moves(&self, params: &TrackingParams, state: &ObjectState) -> bool {
         match self.p_moves_now() {
             Some(p) => p >= params.front_end.track_moves_min,
@@ -88,11 +88,11 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
     }
 }
 
-/// A track without what an estimate at its end takes: of its states the first.
+/// A track without the data that an estimate at its end needs: of its states it keeps the first.
 type ShortTrack = Track<0, 2>;
 
-/// Objects on board: the front end with tracks that keep nothing of the past. Large: keep it where
-/// it is made.
+/// Online object tracking: the front end with tracks that keep nothing of the past. Large: keep it
+/// where it is made.
 pub struct ObjectTracker {
     front_end: FrontEnd,
     tracks: [ShortTrack; TRACKS_MAX],
@@ -106,7 +106,7 @@ impl Default for ObjectTracker {
 }
 
 impl ObjectTracker {
-    /// No tracks yet.
+    /// A tracker without tracks.
     pub const fn new() -> ObjectTracker {
         ObjectTracker {
             front_end: FrontEnd::new(),
@@ -115,8 +115,8 @@ impl ObjectTracker {
         }
     }
 
-    /// Continues the tracks with a sweep and the flow of its returns by a profile, where there is
-    /// one.
+    /// Continues the tracks with a sweep and, if there is one, the flow of its returns under a
+    /// profile.
     pub fn step(
         &mut self,
         params: &TrackingParams,
@@ -134,8 +134,9 @@ impl ObjectTracker {
         counts
     }
 
-    /// The objects of the last step's sweep: of tracks that were seen to move and came somewhere,
-    /// or that the encoder takes for vehicles, people or two-wheelers. At most [`TRACKS_MAX`].
+    /// The objects of the last step's sweep: those whose tracks were seen to move and to get
+    /// somewhere, or that the encoder classifies as vehicles, people or two-wheelers. At most
+    /// [`TRACKS_MAX`].
     pub fn objects(&self) -> &[TrackedObject] {
         &self.seen
     }
@@ -151,8 +152,7 @@ mod tests {
 
     const PARAMS: TrackingParams = TrackingParams::DEFAULT;
 
-    /// Without the flow, a car that drives and one that stands: what is kept of the past makes no
-    /// difference.
+    /// Without the flow, a moving and a parked car: what is kept of the past makes no difference.
     #[test]
     fn what_a_track_keeps_does_not_matter() {
         let mut short = raywake_alloc_guard::boxed!(ObjectTracker, ObjectTracker::new());
@@ -189,7 +189,7 @@ mod tests {
         assert!((moving.centre[0] - (-20.0 + 2.9 * 12.0)).abs() < 0.3, "{moving:?}");
         assert!((standing.centre[0] - 8.0).abs() < 0.2 && standing.observations == 30);
         assert!((standing.size[0] - 4.0).abs() < 0.4, "{standing:?}");
-        // Nobody tells what they are.
+        // Nothing says what they are.
         assert_eq!(short.objects(), []);
     }
 }

@@ -1,7 +1,7 @@
-//! Clouds ready for registration: points in the order of a k-d tree, with normals.
+//! Clouds ready for registration: points in k-d tree order, with normals.
 //!
 //! The normal of a point is the direction in which its nearest neighbours vary least (principal
-//! components: Hoppe et al. 1992), and there is none where these are not flat.
+//! components: Hoppe et al. 1992); a point whose neighbours are not flat has none.
 
 use crate::moments::PointMoments;
 use crate::point::OrientedPoint;
@@ -9,13 +9,14 @@ use crate::{compact, tree};
 use core::ops::RangeInclusive;
 use glam::DVec3;
 
-/// Neighbours that give a normal, and the distance of the farthest, m. Not measured on their own.
+/// Number of neighbours that give a normal, and the maximum distance of the farthest, m. Not tuned
+/// separately.
 const NEIGHBOURS: RangeInclusive<usize> = 5..=12;
 const NEIGHBOUR_M: f64 = 1.5;
 /// Coordinates beyond this are not measurements, m; their squares stay finite.
 const REACH_M: f64 = 1e4;
 
-/// Points with normals where their surroundings are flat.
+/// Points, with normals where their surroundings are flat.
 #[derive(Clone, Copy, Debug)]
 pub struct OrientedCloud<'a> {
     points: &'a [OrientedPoint],
@@ -38,7 +39,7 @@ impl<'a> OrientedCloud<'a> {
         OrientedCloud { points, flat }
     }
 
-    /// All points, in the order of the tree.
+    /// All points, in tree order.
     pub fn points(&self) -> &'a [OrientedPoint] {
         self.points
     }
@@ -49,13 +50,13 @@ impl<'a> OrientedCloud<'a> {
     }
 }
 
-/// Normal of the flat patch around a place, or zero.
+/// Normal of the flat patch around a place, or zero if there is none.
 fn normal(points: &[OrientedPoint], at: DVec3) -> DVec3 {
     let near = tree::nearest_few::<{ *NEIGHBOURS.end() }>(points, at, NEIGHBOUR_M * NEIGHBOUR_M);
     if near.len() < *NEIGHBOURS.start() {
         return DVec3::ZERO;
     }
-    // Relative to the place, so that the difference of squares loses nothing.
+    // Relative to the place, so that the difference of squares loses no precision.
     let mut moments = PointMoments::NONE;
     near.iter().for_each(|(_, index)| moments.add(points[*index].position - at));
     moments.normal().map_or(DVec3::ZERO, |(normal, _)| normal)

@@ -1,4 +1,4 @@
-//! Sweeps thinned for registration, and moved to their stamp by the vehicle's motion.
+//! Sweeps thinned for registration and moved to their stamp by the vehicle's motion.
 
 use crate::compact;
 use core::f64::consts::TAU;
@@ -6,10 +6,10 @@ use glam::DVec3;
 use raywake_core::pose::Twist;
 use raywake_core::sweep::{Point, Rig, Timing};
 
-/// Side of the voxels that keep one return each, m. Not measured on its own.
+/// Side of the voxels that keep one return each, m. Not tuned separately.
 pub const VOXEL_M: f64 = 0.4;
-/// Returns nearer or farther than this are left out, m: near ones are often of the own vehicle, far
-/// ones too sparse for normals.
+/// Returns nearer or farther than this are left out, m: near ones are often from the own vehicle,
+/// far ones too sparse for normals.
 const RANGE_M: [f64; 2] = [2.0, 100.0];
 
 /// A return in the vehicle frame at its own time.
@@ -17,7 +17,7 @@ const RANGE_M: [f64; 2] = [2.0, 100.0];
 pub struct TimedPoint {
     /// Where it is, m.
     pub position: DVec3,
-    /// Time after the stamp, s; zero where nothing is to be moved.
+    /// Time after the stamp, s; zero if it need not be moved.
     pub time_s: f64,
     voxel: [i32; 3],
     order: u32,
@@ -31,7 +31,7 @@ impl From<DVec3> for TimedPoint {
 }
 
 impl TimedPoint {
-    /// A return, at the time that the rig tells.
+    /// A return, at the time given by the rig.
     pub(crate) fn of(point: &Point, rig: &Rig) -> TimedPoint {
         let moves = rig.distorted && rig.timing != Timing::AtStamp;
         let time_s = if moves { time_s(rig, point) } else { 0.0 };
@@ -40,7 +40,7 @@ impl TimedPoint {
 
     /// Whether a return is finite, within range and not on the own vehicle.
     pub(crate) fn is_usable(point: &Point, rig: &Rig) -> bool {
-        // A distance that is not finite is not within range.
+        // A non-finite distance is not within range.
         (RANGE_M[0]..RANGE_M[1]).contains(&at(point).length())
             && point.offset_s.is_finite()
             && !rig.is_own_vehicle(point.position)
@@ -56,9 +56,9 @@ impl TimedPoint {
     }
 }
 
-/// The returns of a sweep that registration uses, one a voxel: those that are finite, within range
-/// and not on the own vehicle. `storage` has room for as many as there are `points`; what is over
-/// its capacity is left out.
+/// The returns of a sweep that registration uses, one per voxel: those that are finite, within
+/// range and not on the own vehicle. `storage` should have room for as many as there are `points`;
+/// those beyond its capacity are left out.
 pub fn thin_sweep<'a>(
     points: &[Point],
     rig: &Rig,
@@ -70,10 +70,10 @@ pub fn thin_sweep<'a>(
     thin(&mut storage[..count], VOXEL_M)
 }
 
-/// Moves the first point in every voxel of a side of `voxel_m` to the front, in their order, and
-/// returns these. Points that are not finite are left out.
+/// Moves the first point in every voxel of side `voxel_m` to the front, preserving their order, and
+/// returns these. Non-finite points are left out.
 ///
-/// One point and not the mean: it keeps its time, and lies on a surface.
+/// A point rather than the mean: it keeps its time and lies on a surface.
 pub fn thin(points: &mut [TimedPoint], voxel_m: f64) -> &mut [TimedPoint] {
     let finite = compact(points, |p| p.position.is_finite());
     let points = &mut points[..finite];
@@ -88,7 +88,7 @@ pub fn thin(points: &mut [TimedPoint], voxel_m: f64) -> &mut [TimedPoint] {
     &mut points[..kept]
 }
 
-/// Time of one sweep, s; `None` where all returns are at the stamp.
+/// Duration of one sweep, s; `None` if all returns are at the stamp.
 pub fn span_s(rig: &Rig) -> Option<f64> {
     match rig.timing {
         Timing::AtStamp => None,
@@ -100,8 +100,8 @@ fn at(point: &Point) -> DVec3 {
     DVec3::from_array(point.position.map(f64::from))
 }
 
-/// Time of a return after the stamp, s; [`Timing`] says how it is known. In contrast to the grid's
-/// preparation it is not rounded to slots, in which a car moves by centimetres.
+/// Time of a return after the stamp, s; [`Timing`] says how it is known. Unlike in the grid's
+/// preparation it is not rounded to slots, within which a car moves by centimetres.
 fn time_s(rig: &Rig, point: &Point) -> f64 {
     match rig.timing {
         Timing::AtStamp => 0.0,
@@ -147,7 +147,7 @@ mod tests {
             moved.map(|x| (x * 1e3).round() / 1e3).collect()
         };
         let mut rig = rig(Timing::Azimuth { span_s: 0.1 });
-        // Left is a quarter of a turn before the stamp, the rear's right side half a turn after it.
+        // Left is a quarter revolution before the stamp, the rear's right side half of one after.
         assert_eq!(moved(&rig), [20.0, -0.25, -19.5]);
         rig.timing = Timing::Offset { from_s: -0.05, span_s: 0.1 };
         assert_eq!(moved(&rig), [20.1, -0.2, -20.0]);

@@ -1,16 +1,16 @@
-//! One Gauss-Newton step of point-to-plane ICP: the rigid motion that brings points closer to
+//! One Gauss-Newton step of point-to-plane ICP: the rigid motion that brings points closer to their
 //! planes.
 
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix6, SymmetricEigen, U6, Vector6};
 use raywake_core::pose::{Pose, Twist};
 
-/// A point of the source and the plane of the target that it belongs to.
+/// A point of the source and the plane of the target it belongs to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Correspondence {
     /// The point as the current pose places it, m.
     pub point: DVec3,
-    /// A point of the plane, m.
+    /// A point on the plane, m.
     pub on: DVec3,
     /// Unit normal of the plane.
     pub normal: DVec3,
@@ -19,36 +19,37 @@ pub struct Correspondence {
 }
 
 impl Correspondence {
-    /// One that asks for nothing.
+    /// One without any effect.
     pub const NONE: Correspondence =
         Correspondence { point: DVec3::ZERO, on: DVec3::ZERO, normal: DVec3::ZERO, weight: 0.0 };
 
-    /// Distance of the point from the plane, m, with the sign of the normal.
+    /// Distance of the point from the plane, m, signed along the normal.
     pub fn residual(&self) -> f64 {
         self.normal.dot(self.point - self.on)
     }
 }
 
-/// What a set of correspondences asks for.
+/// The step that a set of correspondences calls for.
 #[derive(Clone, Copy, Debug)]
 pub struct GaussNewtonStep {
     /// To be applied after the current pose.
     pub motion: Pose,
-    /// Root mean square of what the step changes the residuals by, m.
+    /// Root mean square of the changes the step makes to the residuals, m.
     pub change_m: f64,
-    /// Least eigenvalue of the normal matrix, for weights that sum to one and rotations in units of
-    /// the points' spread: at most 1/3, and zero where some motion changes no residual.
+    /// Smallest eigenvalue of the normal matrix, for weights that sum to one and rotations in units
+    /// of the points' spread: at most 1/3, and zero if some motion changes no residual.
     pub least_eigenvalue: f64,
-    /// Motions that the correspondences do not determine; the step undoes what was done of them.
+    /// Motions that the correspondences do not determine; the step undoes what earlier ones did in
+    /// these.
     pub unobserved: Unobserved,
 }
 
-/// Number of independent motions that no residual tells of.
+/// Number of independent motions that no residual determines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unobserved {
-    /// Mostly along the ground or a turn on it: x, y, yaw.
+    /// Mostly translation along the ground or rotation on it: x, y, yaw.
     pub planar: usize,
-    /// Mostly height, roll or pitch, of which a vehicle does little within a sweep.
+    /// Mostly height, roll or pitch, which change little within a sweep.
     pub upright: usize,
 }
 
@@ -56,7 +57,7 @@ impl Unobserved {
     /// Nothing is known.
     pub const ALL: Unobserved = Unobserved { planar: 3, upright: 3 };
 
-    /// Of both kinds.
+    /// The number of both kinds.
     pub fn count(&self) -> usize {
         self.planar + self.upright
     }
@@ -65,12 +66,12 @@ impl Unobserved {
 /// Points closer together than this have no direction, m.
 const SPREAD_MIN_M: f64 = 1e-9;
 
-/// The step that minimises the weighted squares of the linearised residuals. In motions whose
-/// eigenvalue is not above `observable` it undoes what `done`, the motion of all steps before it,
-/// has of them. `None` where the weights sum to nothing.
+/// The step that minimises the weighted squares of the linearised residuals. For motions whose
+/// eigenvalue is not above `observable`, it undoes their part of `done`, the motion of all steps
+/// before it. `None` if the weights sum to zero.
 ///
-/// Unknowns are a rotation (times the spread) about the points' centre, then a translation, so that
-/// all six are lengths and the two do not mix.
+/// The unknowns are a rotation (times the spread) about the points' centre, then a translation, so
+/// that all six are lengths and the two do not mix.
 pub fn solve(
     correspondences: &[Correspondence],
     done: &Pose,
@@ -100,7 +101,7 @@ pub fn solve(
     })
 }
 
-/// Weighted mean of the points, and the root mean square of their distance from it, m.
+/// Weighted mean of the points and the root mean square of their distances from it, m.
 fn centre_and_spread(correspondences: &[Correspondence], total: f64) -> (DVec3, f64) {
     let centre = correspondences.iter().map(|c| c.weight * c.point).sum::<DVec3>() / total;
     let square = |c: &Correspondence| c.weight * c.point.distance_squared(centre);
@@ -108,8 +109,8 @@ fn centre_and_spread(correspondences: &[Correspondence], total: f64) -> (DVec3, 
     (centre, spread.max(SPREAD_MIN_M))
 }
 
-/// The solution in the eigenvectors whose eigenvalue is above `observable`, the way back in the
-/// others, and what these are.
+/// The solution along the eigenvectors whose eigenvalue is above `observable`, the way back along
+/// the others, and how many of which kind those are.
 fn observed(
     eigen: &SymmetricEigen<f64, U6>,
     right: &Vector6<f64>,
@@ -132,7 +133,8 @@ fn observed(
     (x, unobserved)
 }
 
-/// Derivatives of the residual by rotation about the centre (times the spread) and translation.
+/// Derivatives of the residual with respect to rotation about the centre (times the spread) and
+/// translation.
 fn jacobian(of: &Correspondence, centre: DVec3, spread: f64) -> Vector6<f64> {
     let turn = (of.point - centre).cross(of.normal) / spread;
     Vector6::new(turn.x, turn.y, turn.z, of.normal.x, of.normal.y, of.normal.z)

@@ -2,23 +2,23 @@
 
 use raywake_core::sweep::Point;
 
-/// Farthest from the vertical axis that the ground is looked for, cells.
+/// Farthest from the vertical axis that the ground is searched for, cells.
 const REACH: i32 = 20;
 /// Side of the cells that give one height each, m.
 const CELL_M: f32 = 1.0;
-/// Cells that are used, the nearest to the axis: a circle of 8 m where all are seen. Farther off, a
-/// road rises and falls.
+/// Number of cells used, the nearest to the axis: a circle of radius 8 m if all are seen. Farther
+/// away, a road rises and falls.
 const CELLS_MAX: usize = 200;
-/// The ground is the most frequent height within this width, m: what slopes, kerbs and noise leave
-/// of a plane.
+/// The ground is the interval of this width, m, that contains the most heights: slopes, kerbs and
+/// noise spread a plane this far.
 const WIDTH_M: f32 = 0.3;
-/// Fewest cells that make a ground.
+/// Minimum number of cells that make a ground.
 const CELLS_MIN: usize = 20;
 
 const SIDE: usize = 2 * REACH as usize;
 
 /// Height of the ground around the vertical axis, m, in the cloud's frame (z up): the median of the
-/// most frequent heights of the lowest returns of cells. `None` where too few cells agree.
+/// most frequent heights of the lowest returns in cells. `None` if too few cells agree.
 pub fn ground_height(points: &[Point]) -> Option<f64> {
     let mut cells = lowest_returns(points);
     cells.sort_unstable_by_key(|(i, j, _)| (i * i + j * j, *i, *j));
@@ -29,7 +29,7 @@ pub fn ground_height(points: &[Point]) -> Option<f64> {
         let count = heights(from).take_while(|h| *h <= cells[from].2 + WIDTH_M).count();
         (count, from)
     };
-    // The lowest where several widths hold as many.
+    // The lowest of several intervals that contain equally many.
     let (count, from) = (0..cells.len()).map(within).rev().max_by_key(|w| w.0)?;
     (count >= CELLS_MIN).then(|| f64::from(cells[from + count / 2].2))
 }
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn ground_under_walls_roofs_and_strays() {
         let mut points = plane(|x, y| -1.7 + 0.003 * x + 0.01 * ((x * y) as i32 % 5) as f32);
-        // A wall, a canopy wider than what is seen of the ground in any cell, strays below.
+        // A wall, a canopy covering every cell in which ground is seen, stray returns below.
         points.extend((0..2000).map(|n| point(8.0, (n % 40) as f32 * 0.5 - 10.0, n as f32 * 1e-3)));
         points.extend(plane(|_, _| 3.0));
         points.extend((0..15).map(|n| point(n as f32, 2.0, -4.0 - n as f32 * 0.02)));
@@ -82,7 +82,7 @@ mod tests {
     fn no_ground() {
         assert_eq!(ground_height(&[]), None);
         assert_eq!(ground_height(&[point(f32::NAN, 0.0, 0.0), point(1.0, 0.0, 0.0)]), None);
-        // A pole is no ground, nor is what is far away.
+        // A pole is not ground, nor is anything far away.
         let pole: Vec<_> = (0..1000).map(|n| point(3.0, 0.0, n as f32 * 0.01)).collect();
         assert_eq!(ground_height(&pole), None);
         let far: Vec<_> =

@@ -1,58 +1,58 @@
 //! Point-to-plane ICP (Chen and Medioni 1992): the rigid motion between two clouds.
 //!
 //! Points are matched to their nearest neighbours, the residual is the distance along the target's
-//! normal, Geman and McClure's kernel discounts what moves by itself, and Gauss-Newton steps find
-//! the motion. Kernel and search radius shrink in three levels, so that it can start far off.
+//! normal, Geman and McClure's kernel discounts moving objects, and Gauss-Newton steps find the
+//! motion. Kernel and search radius shrink over three levels, so that it can start far off.
 
 use crate::cloud::OrientedCloud;
 use crate::gauss_newton::{Correspondence, Unobserved, solve};
 use crate::tree;
 use raywake_core::pose::Pose;
 
-/// A good number of correspondences for [`register`]. Not measured on its own.
+/// A good number of correspondences for [`register`]. Not tuned separately.
 pub const CORRESPONDENCES: usize = 6000;
 
 /// How to register.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IcpOptions {
-    /// Farthest that matched points lie apart at first, m: what the unknown part of the motion may
-    /// displace points by. The later levels have a half and a quarter of it.
+    /// Maximum distance of matched points at first, m: how far the unknown part of the motion may
+    /// displace points. The later levels use a half and a quarter of it.
     pub distance_m: f64,
     /// Residual at which a correspondence counts a quarter in the last level, m; the earlier ones
-    /// have eight times and three times of it.
+    /// use eight times and three times as much.
     pub kernel_m: f64,
-    /// Steps of each level at most.
+    /// Maximum number of steps of each level.
     pub iterations: usize,
 }
 
 impl IcpOptions {
-    /// Motions that are unknown up to 3 m and 5 degrees. The dissertation's search radius is 3 m,
-    /// too.
+    /// For motions that are uncertain by up to 3 m and 5 degrees. The dissertation's search radius
+    /// is also 3 m.
     pub const DEFAULT: IcpOptions = IcpOptions { distance_m: 3.0, kernel_m: 0.1, iterations: 30 };
 }
 
-/// What came of it.
+/// The result of a registration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Registration {
-    /// `target_from_source`; always finite. Where nothing could be matched, the initial one.
+    /// `target_from_source`; always finite. The initial pose if nothing could be matched.
     pub pose: Pose,
-    /// Whether the steps died out in the last level with enough correspondences. Otherwise the pose
+    /// Whether the steps died out in the last level with enough correspondences. If not, the pose
     /// is not to be trusted.
     pub converged: bool,
-    /// Steps of all levels.
+    /// Number of steps over all levels.
     pub iterations: usize,
     /// Root mean square distance of the inliers from their planes, m; 0 without any.
     pub rms_m: f64,
-    /// Correspondences of the last step whose residual is below the kernel's width.
+    /// Number of correspondences of the last step whose residual is below the kernel's width.
     pub inliers: usize,
-    /// Their share (0..1) of the source's points that were to be matched: how much of the one cloud
-    /// the other one shows.
+    /// Their share (0..1) of the source's points that were to be matched: how much of one cloud the
+    /// other one shows.
     pub overlap: f64,
-    /// Least eigenvalue of the normal matrix (dimensionless, at most 1/3): zero where some motion
+    /// Smallest eigenvalue of the normal matrix (dimensionless, at most 1/3): zero if some motion
     /// changes no residual.
     pub least_eigenvalue: f64,
-    /// Motions that the clouds do not determine (a plane leaves three): in those the pose keeps
-    /// what the initial one has.
+    /// Motions that the clouds do not determine (a plane leaves three): in those the pose keeps the
+    /// initial value.
     pub unobserved: Unobserved,
 }
 
@@ -71,34 +71,34 @@ impl Registration {
     }
 }
 
-/// Fewest correspondences that determine a motion.
+/// Minimum number of correspondences that determine a motion.
 pub(crate) const CORRESPONDENCES_MIN: usize = 30;
 /// A step that changes the residuals by less than this ends a level, m (root mean square). The pose
-/// itself may go on: where little tells of a motion, as of height without ground, neighbours that
-/// change sides move it to and fro for ever.
+/// itself may not settle: if little determines a motion, such as height without ground, points that
+/// keep switching neighbours move it back and forth for ever.
 const SETTLED_M: f64 = 2e-4;
-/// Motions with a smaller eigenvalue are not told apart from noise of the normals.
+/// Motions with a smaller eigenvalue are indistinguishable from noise in the normals.
 pub(crate) const OBSERVABLE: f64 = 2e-3;
 /// Matched normals are at most 45 degrees apart (cosine).
 const ALIGNED: f64 = 0.7;
 
-/// A level from coarse to fine.
+/// One of the levels from coarse to fine.
 struct Level {
     /// Search radius, m.
     radius_m: f64,
     /// Width of the kernel, m.
     kernel_m: f64,
-    /// Of the source's flat points every such one is matched.
+    /// Stride at which the source's flat points are matched.
     stride: usize,
 }
 
 /// Share of the search radius, multiple of the kernel and multiple of the stride of each level. Not
-/// measured on their own.
+/// tuned separately.
 const LEVELS: [(f64, f64, usize); 3] = [(1.0, 8.0, 4), (0.5, 3.0, 2), (0.25, 1.0, 1)];
 
-/// The motion that lays `source` onto `target`, started at `initial` (`target_from_source`).
-/// At most as many points are matched as `correspondences` has room for, evenly chosen;
-/// [`CORRESPONDENCES`] is a good number.
+/// Finds the motion that aligns `source` with `target`, starting at `initial`
+/// (`target_from_source`). At most as many points are matched as `correspondences` has room for,
+/// evenly chosen; [`CORRESPONDENCES`] is a good number.
 ///
 /// Never fails: clouds without enough flat patches, or an initial pose that is not finite (then
 /// taken as the identity), give `converged: false`.
@@ -135,8 +135,8 @@ pub fn register(
     result
 }
 
-/// Matches the source's flat points with the planes of their nearest neighbours. Returns how many
-/// `correspondences` there are.
+/// Matches the source's flat points with the planes of their nearest neighbours. Returns the number
+/// of `correspondences`.
 fn match_points(
     source: &OrientedCloud,
     target: &OrientedCloud,
@@ -168,7 +168,7 @@ pub(crate) fn geman_mcclure(ratio: f64) -> f64 {
 }
 
 impl Registration {
-    /// One step. Returns whether another one may follow.
+    /// Takes one step. Returns whether another one may follow.
     pub(crate) fn advance(&mut self, correspondences: &[Correspondence], initial: &Pose) -> bool {
         if correspondences.len() < CORRESPONDENCES_MIN {
             return false;
@@ -183,7 +183,7 @@ impl Registration {
         !self.converged
     }
 
-    /// Counts the inliers, also as a share of the points tried, and how far they are off.
+    /// Determines the number of inliers, their share of the points tried, and how far they are off.
     pub(crate) fn judge(
         &mut self,
         correspondences: &[Correspondence],

@@ -1,23 +1,23 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
-//! Scan matching: the rigid motion between two clouds of one sensor, and the ground below it.
+//! Scan matching: the rigid motion between two clouds of one sensor, and the ground below.
 //!
 //! Section 3.8.3 of the dissertation takes the vehicle's motion from scan matching (generalised
 //! ICP, Segal, Haehnel and Thrun 2009). Here it is point-to-plane ICP (Chen and Medioni 1992) with
-//! Geman and McClure's kernel, from coarse to fine and, where needed, from several starts.
+//! Geman and McClure's kernel, from coarse to fine and, if needed, from several starts.
 //!
 //! | module | subject |
 //! |---|---|
 //! | [`deskew`] | voxel thinning of a sweep; its returns moved to the stamp |
-//! | [`cloud`] | points in the order of a k-d tree, with normals |
+//! | [`cloud`] | points in k-d tree order, with normals |
 //! | [`icp`] | point-to-plane ICP from one initial pose |
 //! | [`multi_start`] | ICP from several initial poses; when a result is accepted |
-//! | [`odometry`] | the way of a vehicle from its sweeps alone |
+//! | [`odometry`] | the trajectory of a vehicle from its sweeps alone |
 //! | [`ground`] | height of the ground around the sensor |
 //!
-//! Nothing is allocated: all storage is slices that the caller owns. Nothing is random and nothing
-//! depends on threads: same input, same bits. Lengths are in metres, angles in radians.
+//! Nothing is allocated: all storage is slices owned by the caller. Nothing is random or depends on
+//! threads: the same input gives the same bits. Lengths are in metres, angles in radians.
 
 #[cfg(test)]
 extern crate std;
@@ -40,7 +40,7 @@ pub use multi_start::register_multi_start;
 pub use odometry::Odometry;
 pub use point::OrientedPoint;
 
-/// Moves the items to keep to the front, in their order. Returns their number.
+/// Moves the items to keep to the front, preserving their order. Returns their number.
 fn compact<T: Copy>(items: &mut [T], mut keep: impl FnMut(&T) -> bool) -> usize {
     let mut kept = 0;
     for n in 0..items.len() {

@@ -1,18 +1,18 @@
-//! PointMoments of points, and the plane they lie on.
+//! Moments of points and the plane they lie on.
 
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
 
-/// A patch is flat where its least variance is below this share of the middle one.
+/// A patch is flat if its smallest variance is below this share of the middle one.
 const FLAT: f64 = 0.1;
-/// A patch is not a line where its middle variance is above this share of the largest one. Along a
-/// line, as a single beam leaves it on the ground, the normal is arbitrary.
+/// A patch is not a line if its middle variance is above this share of the largest one. Along a
+/// line, such as a single beam leaves on the ground, the normal is arbitrary.
 const WIDE: f64 = 0.05;
 
 /// Number, sum and squares of points near the origin.
 #[derive(Clone, Copy, Debug)]
 pub struct PointMoments {
-    /// Points; halves may remain of old ones.
+    /// Number of points; old ones may count as fractions.
     pub count: f64,
     sum: DVec3,
     /// xx, yy, zz.
@@ -22,7 +22,7 @@ pub struct PointMoments {
 }
 
 impl PointMoments {
-    /// Of no points.
+    /// The moments of no points.
     pub const NONE: PointMoments =
         PointMoments { count: 0.0, sum: DVec3::ZERO, squares: DVec3::ZERO, products: DVec3::ZERO };
 
@@ -34,7 +34,7 @@ impl PointMoments {
         self.products += DVec3::new(p.y * p.z, p.z * p.x, p.x * p.y);
     }
 
-    /// Every point counts half from now on.
+    /// Makes every point so far count half from now on.
     pub fn halve(&mut self) {
         self.count *= 0.5;
         self.sum *= 0.5;
@@ -48,7 +48,7 @@ impl PointMoments {
     }
 
     /// Unit normal of the plane of the points (principal components: Hoppe et al. 1992), and the
-    /// variance of its direction (rad^2); nothing where they lie on none.
+    /// variance of its direction (rad^2); `None` if they do not lie on a plane.
     pub fn normal(&self) -> Option<(DVec3, f64)> {
         let m = self.mean();
         let [xx, yy, zz] = (self.squares / self.count - m * m).to_array();

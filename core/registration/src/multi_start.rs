@@ -1,19 +1,21 @@
-//! Registration without an initial pose: ICP from several starts, and when a result is accepted.
+//! Registration without an initial pose: ICP from several starts, and when to accept a result.
 
 use crate::cloud::OrientedCloud;
 use crate::gauss_newton::Correspondence;
 use crate::icp::{IcpOptions, Registration, register};
 use raywake_core::pose::Pose;
 
-/// Least share of a cloud's flat patches that must lie on the other's: of clouds of different
-/// places it is below 0.32, of sweeps 5 m apart above 0.5 (KITTI).
+/// Minimum share of a cloud's flat patches that must lie on the other's: for clouds of different
+/// places it is below 0.32, for sweeps 5 m apart above 0.5 (KITTI).
 pub const OVERLAP_MIN: f64 = 0.4;
-/// From this share on no better pose is looked for: of neighbours in a drive it is above 0.65, of
-/// a street displaced along itself below 0.5 (KITTI, Argoverse 2, simulated streets at 33 m/s).
+/// From this share on, no better pose is searched for: for consecutive sweeps of a drive it is
+/// above 0.65, for a street shifted along itself below 0.5 (KITTI, Argoverse 2, simulated streets
+/// at 33 m/s).
 const OVERLAP_SURE: f64 = 0.5;
-/// What registration from no motion does not reach is started this far off, in four directions, m.
+/// Further starts are this far off, in four directions, m, for motions that registration from no
+/// motion does not reach.
 const AWAY_M: f64 = 5.0;
-/// And turned by this much to both sides, rad.
+/// They are also rotated by this much to either side, rad.
 const TURNED_RAD: f64 = 0.17;
 
 impl Registration {
@@ -27,9 +29,9 @@ impl Registration {
     }
 }
 
-/// The motion that lays `source` onto `target`, both of sweeps of one sensor near each other: from
-/// no motion, and where that is not a clear answer from starts around it. The result with the
-/// largest overlap; [`Registration::is_accepted`] tells whether it will do.
+/// Finds the motion that aligns `source` with `target`, both from sweeps of one sensor close to
+/// each other: starting at no motion and, if the result is not clear, at poses around it. Returns
+/// the result with the largest overlap, accepted ones first; see [`Registration::is_accepted`].
 pub fn register_multi_start(
     source: &OrientedCloud,
     target: &OrientedCloud,
@@ -50,7 +52,7 @@ pub fn register_multi_start(
     best
 }
 
-/// Where to start besides no motion.
+/// Starts other than no motion.
 fn starts() -> impl Iterator<Item = Pose> {
     let places = [(0.0, 0.0), (AWAY_M, 0.0), (-AWAY_M, 0.0), (0.0, AWAY_M), (0.0, -AWAY_M)];
     let turned = move |yaw| places.map(|(x, y)| Pose::planar(x, y, 0.0, yaw));
@@ -77,8 +79,8 @@ mod tests {
         thinned.iter().map(|p| p.at_stamp(&Twist::ZERO).into()).collect()
     }
 
-    /// Motion from one sweep of a drive to the next as found and as it was, with what lies higher
-    /// than this over the ground alone.
+    /// Motion from one sweep of a drive to the next, as found and as it was, using only what is
+    /// more than this far above the ground.
     fn found_above(drive: &Drive, above_m: f64) -> (Registration, Pose) {
         let rig = Rig { distorted: false, ..drive.rig() };
         let [mut first, mut second] = [0, 1].map(|index| drive.sweep(index));
@@ -97,7 +99,7 @@ mod tests {
         register_multi_start(&source, &target, &mut correspondences)
     }
 
-    /// What is found on the ground, and how it tilts, are close to the truth.
+    /// Checks that the motion found, along the ground and in tilt, is close to the truth.
     fn close(found: &Registration, truth: &Pose, limit_m: f64) {
         let off = (truth.inverse() * found.pose).twist(1.0);
         let (metres, [_, _, yaw]) = (off.linear.length(), off.angular.to_array());
@@ -106,8 +108,8 @@ mod tests {
         assert!(yaw.abs() < 1e-3 && off.angular.length() < 5e-3, "{off:?}, {found:?}");
     }
 
-    /// A street looks like itself a few metres on; at 33 m/s and more no motion is a wrong answer
-    /// that registration settles on.
+    /// A street looks much the same a few metres further on; at 33 m/s and above, registration may
+    /// wrongly settle on no motion.
     #[test]
     fn fast_along_a_street() {
         for (seed, speed) in [(2, 33.0), (8, 40.0)] {
@@ -117,7 +119,7 @@ mod tests {
         }
     }
 
-    /// Without ground hardly anything tells height, roll and pitch.
+    /// Without ground hardly anything determines height, roll and pitch.
     #[test]
     fn clouds_without_ground() {
         for (seed, curvature) in (1..7).zip([0.0, 0.03].into_iter().cycle()) {
@@ -143,7 +145,8 @@ mod tests {
         points
     }
 
-    /// What looks the same along some way, seen twice: no motion would be a guess.
+    /// Scenes that look the same when displaced along some direction, seen twice: no motion would
+    /// be a guess.
     #[test]
     fn what_determines_too_little_is_refused() {
         let wall = |u: f64, v: f64| [40.0 * u - 20.0, 6.0, 8.0 * v - 1.7];

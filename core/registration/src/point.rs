@@ -1,13 +1,13 @@
-//! A point of a surface and its place in the k-d tree.
+//! A point on a surface and its place in the k-d tree.
 
 use glam::DVec3;
 
-/// A point of a surface.
+/// A point on a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OrientedPoint {
     /// Where it is, m.
     pub position: DVec3,
-    /// Unit normal of either sign; zero where the surroundings are not flat.
+    /// Unit normal of either sign; zero if the surroundings are not flat.
     pub normal: DVec3,
     /// Axis along which the k-d tree splits at this point.
     pub(crate) axis: u8,

@@ -1,4 +1,4 @@
-//! Clouds whose motion is known.
+//! Clouds with known motion.
 
 use super::*;
 use crate::point::OrientedPoint;
@@ -7,7 +7,7 @@ use raywake_sim::Rng;
 use std::vec;
 use std::vec::Vec;
 
-/// Walls, a ground and a slope, every 0.3 m.
+/// A wall, ground and a slope, sampled every 0.3 m.
 fn corner() -> Vec<DVec3> {
     let mut points = Vec::new();
     for i in 0..60 {
@@ -21,7 +21,7 @@ fn corner() -> Vec<DVec3> {
     points
 }
 
-/// Registers copies of two sets of points.
+/// Registers copies of two point sets.
 fn registered(source: &[DVec3], target: &[DVec3], initial: Pose) -> Registration {
     let oriented =
         |points: &[DVec3]| -> Vec<_> { points.iter().copied().map(OrientedPoint::from).collect() };
@@ -35,7 +35,7 @@ fn moved(points: &[DVec3], pose: &Pose) -> Vec<DVec3> {
     points.iter().map(|p| pose.transform(*p)).collect()
 }
 
-/// Length and angle (rad) between two poses.
+/// Distance and angle (rad) between two poses.
 fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
     let between = (a.inverse() * *b).twist(1.0);
     (between.linear.length(), between.angular.length())
@@ -68,7 +68,7 @@ fn an_exact_motion_comes_back() {
 fn moving_objects_do_not_count() {
     let truth = motion(2.0, DVec3::Z, DVec3::new(0.6, 0.0, 0.0));
     let mut rng = Rng::new(5);
-    // A lorry's side and back, a seventh of all points, that goes half a metre its own way.
+    // A lorry's side and rear, a seventh of all points, that moves half a metre by itself.
     let lorry: Vec<DVec3> = (0..600)
         .map(|n| match n % 2 {
             0 => DVec3::new(rng.range(0.0, 8.0), 2.5, rng.range(-1.5, 1.5)),

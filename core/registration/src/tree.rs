@@ -1,16 +1,16 @@
-//! Nearest neighbours among points in the order of a k-d tree (Bentley 1975).
+//! Nearest neighbours among points in k-d tree order (Bentley 1975).
 //!
-//! The tree is balanced and nothing but an order of the points: the median of a range splits it,
-//! along the axis in which the range is widest.
+//! The tree is balanced and merely an order of the points: the median of a range splits it, along
+//! the axis in which the range is widest.
 
 use crate::point::OrientedPoint;
 use core::ops::Range;
 use glam::DVec3;
 
-/// Points that are compared one by one. Not measured on its own.
+/// Maximum number of points that are compared one by one. Not tuned separately.
 const LEAF: usize = 8;
 
-/// Brings finite points into the tree's order, in which neighbours in space are close.
+/// Brings finite points into tree order, in which neighbours in space are close together.
 pub fn build(points: &mut [OrientedPoint]) {
     if points.len() <= LEAF {
         return;
@@ -52,15 +52,15 @@ pub fn nearest_few<const N: usize>(
             found.pop();
         }
         let at = found.partition_point(|f| f.0 <= d2);
-        // There is room: a full list has just lost its farthest.
+        // There is room: a full list has just lost its farthest point.
         let _ = found.insert(at, (d2, index));
         if found.is_full() { found[N - 1].0 } else { within2 }
     });
     found
 }
 
-/// Calls `accept(index, d2)` for points of a range nearer than the bound, which becomes what it
-/// returns.
+/// Calls `accept(index, d2)` for each point of a range nearer than the bound, and makes the result
+/// the new bound.
 fn visit(
     points: &[OrientedPoint],
     range: Range<usize>,

@@ -1,8 +1,8 @@
-//! The layers, many cells at a time.
+//! The layers, evaluated for many cells at a time.
 //!
-//! Sums lie in memory, those of a cell side by side, and every loop over them has a fixed length:
-//! compilers make vectors of that for every instruction set, which they do not reliably do of sums
-//! that they have put into registers one by one.
+//! Sums are kept in memory, those of a cell contiguous, and every loop over them has a fixed
+//! length: compilers vectorise that for every instruction set, which they do not reliably do for
+//! sums held in individual registers.
 
 use super::layers::*;
 use super::load::EncoderWeights;
@@ -10,13 +10,13 @@ use super::rows::{Plane, each_row, gathered};
 use super::{ColumnScores, FINE, PaddedWindow};
 use crate::team::Team;
 
-/// Cells whose sums are formed together. With 8, layers take up to a fifth longer (AVX2, one core
-/// of an AMD EPYC, each layer alone).
+/// Cells whose sums are computed together. With 8, layers take up to a fifth longer (AVX2, one core
+/// of an AMD EPYC, each layer measured alone).
 const CELLS: usize = 16;
-/// Inputs that a sum takes in at a time.
+/// Inputs accumulated into a sum at a time.
 const INPUTS: usize = 8;
 
-/// Sums of a cell with their biases, and what brings them back to activations.
+/// Sums of a cell, biases included, and the shifts that scale them back to activations.
 struct CellSums<'a, const OUT: usize> {
     sums: &'a [i32; OUT],
     shifts: &'a [u8; OUT],
@@ -28,7 +28,7 @@ impl<const OUT: usize> CellSums<'_, OUT> {
         core::array::from_fn(|n| activation(self.sums[n], 0, u32::from(self.shifts[n])))
     }
 
-    /// Adds them to the activations of a cell.
+    /// Adds the shifted sums to the activations of a cell.
     #[inline(always)]
     fn add_to(&self, cell: &mut [u8; OUT]) {
         for (n, value) in cell.iter_mut().enumerate() {
@@ -50,7 +50,7 @@ fn cells<const CHANNELS: usize>(row: &mut [u8]) -> &mut [[u8; CHANNELS]] {
 }
 
 impl EncoderWeights {
-    /// What a column is.
+    /// The activations of a column, from its masks.
     #[inline(always)]
     fn column(&self, masks: u32) -> [u8; COLUMN_CHANNELS] {
         let bytes = masks.to_le_bytes();
@@ -76,7 +76,8 @@ impl EncoderWeights {
         (&self.weights[first..][..IN * OUT], biases, shifts)
     }
 
-    /// A dense layer of `count` cells: `input` is what enters one, `done` takes what comes out.
+    /// Applies a dense layer to `count` cells: `input` supplies a cell's inputs, `done` receives
+    /// its sums.
     #[inline(always)]
     fn dense<const IN: usize, const OUT: usize>(
         &self,
@@ -103,7 +104,7 @@ impl EncoderWeights {
         }
     }
 
-    /// A depthwise layer: a row of its outputs.
+    /// Computes one row of a depthwise layer's outputs.
     #[inline(always)]
     fn depthwise<const CHANNELS: usize>(
         &self,
@@ -118,7 +119,7 @@ impl EncoderWeights {
         let sums = &mut sums[..side];
         sums.fill(*biases);
         for (tap, weights) in weights.iter().enumerate() {
-            // Wraps below zero, and is then not within the level, which zeros surround.
+            // Wraps below zero and is then outside the level, which is padded with zeros.
             let i = (row + tap).wrapping_sub(1);
             if i < side {
                 add_depthwise(sums, level.row(i), weights);
@@ -129,7 +130,7 @@ impl EncoderWeights {
         }
     }
 
-    /// The finest level, of 2 x 2 columns a cell.
+    /// Computes the finest level, with 2 x 2 columns per cell.
     pub(super) fn down_from_columns(
         &self,
         team: &impl Team,
@@ -155,7 +156,7 @@ impl EncoderWeights {
         );
     }
 
-    /// From a level to the next coarser one, `ALL` numbers of 2 x 2 cells to a cell.
+    /// Computes the next coarser level, each cell from the `ALL` numbers of 2 x 2 cells.
     pub(super) fn down<const IN: usize, const ALL: usize, const OUT: usize>(
         &self,
         team: &impl Team,
@@ -177,7 +178,8 @@ impl EncoderWeights {
         );
     }
 
-    /// A block on a level: depthwise into `beside`, then dense, added to the level.
+    /// Applies a block to a level: a depthwise layer into `beside`, then a dense one added to the
+    /// level.
     pub(super) fn block<const CHANNELS: usize>(
         &self,
         team: &impl Team,
@@ -197,7 +199,7 @@ impl EncoderWeights {
         self.add_dense_layer(team, first + 1, Plane::<CHANNELS> { side, cells: beside }, level);
     }
 
-    /// Adds a dense layer's outputs to a level of as many cells.
+    /// Adds a dense layer's outputs to a level with the same number of cells.
     fn add_dense_layer<const CHANNELS: usize>(
         &self,
         team: &impl Team,
@@ -217,7 +219,7 @@ impl EncoderWeights {
         );
     }
 
-    /// From a level to the one before it, to whose cells the result is added.
+    /// Applies a layer from a level to the next finer one, adding the result to its cells.
     pub(super) fn up<const IN: usize, const OUT: usize>(
         &self,
         team: &impl Team,
@@ -248,7 +250,7 @@ impl EncoderWeights {
         );
     }
 
-    /// What is around the columns of each pair.
+    /// Computes the features around the columns of each pair.
     pub(super) fn around_columns(
         &self,
         team: &impl Team,
@@ -268,7 +270,7 @@ impl EncoderWeights {
         );
     }
 
-    /// The scores of some columns from their masks and from what is around them.
+    /// Computes the scores of `count` columns from their masks and the features around them.
     #[inline(always)]
     pub(super) fn head<'a>(
         &self,
@@ -292,8 +294,8 @@ impl EncoderWeights {
     }
 }
 
-/// Adds products of some inputs of a cell to its sums: pairs of products, which processors form at
-/// once.
+/// Adds the products of some of a cell's inputs to its sums, in pairs, which processors compute in
+/// one instruction.
 #[inline(always)]
 fn add_dense<const OUT: usize>(
     sums: &mut [i32; OUT],
@@ -310,7 +312,7 @@ fn add_dense<const OUT: usize>(
     }
 }
 
-/// Adds products of a line of cells, and of those before and after each, to the sums of a row.
+/// Adds the products of a line of cells, and of the cells before and after each, to a row's sums.
 #[inline(always)]
 fn add_depthwise<const CHANNELS: usize>(
     sums: &mut [[i32; CHANNELS]],

@@ -1,21 +1,22 @@
-//! The layers: declared once, for the network, its file of weights and its training.
+//! The layers, declared once for the network, its weights file and its training.
 
-/// Levels of voxels that the encoder is trained for.
+/// Voxel levels that the encoder is trained for.
 pub const LEVELS: usize = 14;
-/// Free and occupied voxels of a column.
+/// Bits for the free and occupied voxels of a column.
 pub const BITS: usize = 2 * LEVELS;
 /// Columns along an axis of the coarsest cell.
 pub const OCTET: usize = 8;
-/// The activation that stands for 1.
+/// The activation that represents 1.
 pub const ONE: i32 = 16;
 /// Largest activation.
 pub const TOP: i32 = 127;
 /// Largest shift.
 pub const SHIFT_MAX: i32 = 14;
-/// Biases are smaller: with the products of the widest layer, 127 x 127 x 128, they fit 32 bits.
+/// Exclusive bound on biases: with the widest layer's products, 127 x 127 x 128, they fit in 32
+/// bits.
 pub const BIAS_MAX: i32 = 1 << 22;
 
-/// Channels of columns, and of pairs, quads and octets of them. Multiples of 8: whole vectors.
+/// Channels of columns, and of pairs, quads and octets of them. Multiples of 8, to fill vectors.
 pub const COLUMN_CHANNELS: usize = 16;
 /// See [`COLUMN_CHANNELS`].
 pub const FINE_CHANNELS: usize = 24;
@@ -28,21 +29,21 @@ pub const HEAD_CHANNELS: usize = 32;
 /// Scores of a column.
 pub const SCORES: usize = 9;
 
-/// Products of a channel with its 3 x 3 neighbours (depthwise), or of all channels with each other.
+/// A layer: a channel times its 3 x 3 neighbourhood (depthwise), or all channels times all (dense).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layer {
-    /// Numbers that enter one output: [`TAPS`] in a depthwise layer, else an even number.
+    /// Inputs per output: [`TAPS`] in a depthwise layer, otherwise an even number.
     pub inputs: usize,
-    /// Channels that come out.
+    /// Output channels.
     pub outputs: usize,
 }
 
-/// Inputs of a depthwise layer's output: the 3 x 3 cells around it.
+/// Inputs per output of a depthwise layer: the 3 x 3 cells around it.
 pub const TAPS: usize = 9;
 
 impl Layer {
-    /// Where the weight of an input to an output lies among the layer's: outputs side by side, so
-    /// that a processor works on several at once, and a dense layer's inputs by pairs.
+    /// The index of the weight from an input to an output within the layer: outputs are contiguous,
+    /// so that a processor handles several at once, and a dense layer's inputs come in pairs.
     pub const fn place(self, output: usize, input: usize) -> usize {
         match self.inputs {
             TAPS => input * self.outputs + output,
@@ -51,11 +52,11 @@ impl Layer {
     }
 }
 
-/// Place of a layer in [`LAYERS`].
+/// Index of a layer in [`LAYERS`].
 pub const COLUMN: usize = 0;
 /// See [`COLUMN`]: from 2 x 2 cells of a level to one of the next, and so on.
 pub const DOWN_FINE: usize = 1;
-/// Where a block of two layers begins: depthwise, then dense and added to what entered.
+/// Where each block of two layers begins: depthwise, then dense, added to the block's input.
 pub const BLOCKS_FINE: [usize; 2] = [2, 4];
 /// See [`COLUMN`].
 pub const DOWN_MIDDLE: usize = 6;
@@ -65,7 +66,7 @@ pub const BLOCKS_MIDDLE: [usize; 3] = [7, 9, 11];
 pub const DOWN_COARSE: usize = 13;
 /// See [`BLOCKS_FINE`].
 pub const BLOCKS_COARSE: [usize; 2] = [14, 16];
-/// From a cell to the 2 x 2 of the level before, added to what they hold.
+/// From a cell to the 2 x 2 cells of the next finer level, added to their values.
 pub const UP_MIDDLE: usize = 18;
 /// See [`UP_MIDDLE`].
 pub const UP_FINE: usize = 19;
@@ -73,9 +74,9 @@ pub const UP_FINE: usize = 19;
 pub const BLOCK_AFTER: usize = 20;
 /// From a pair's cell to its columns.
 pub const UP_COLUMN: usize = 22;
-/// What is around a column and what it is, to the head.
+/// The head's first layer: from the features around a column and its own.
 pub const HEAD: usize = 23;
-/// Its scores.
+/// The head's second layer: the scores.
 pub const SCORE: usize = 24;
 
 const fn layer(inputs: usize, outputs: usize) -> Layer {
@@ -111,7 +112,7 @@ const fn with_blocks(mut all: [Layer; 25], firsts: &[usize], channels: usize) ->
     all
 }
 
-/// Weights, and outputs, of the layers before a layer.
+/// Number of weights and of outputs in the layers before `layer`.
 pub const fn before(layer: usize) -> [usize; 2] {
     let mut sums = [0; 2];
     let mut n = 0;
@@ -122,11 +123,11 @@ pub const fn before(layer: usize) -> [usize; 2] {
     sums
 }
 
-/// Weights, and outputs, of all layers.
+/// Number of weights and of outputs in all layers.
 pub const TOTAL: [usize; 2] = before(LAYERS.len());
 
-/// Numbers of a weights file: of each layer its weights, an output's after another's,
-/// then a bias an output, then a shift an output.
+/// Count of numbers in a weights file: for each layer its weights, output by output, then a bias
+/// per output, then a shift per output.
 pub const NUMBERS: usize = TOTAL[0] + 2 * TOTAL[1];
 
 /// The activation of a sum, its bias and its shift.

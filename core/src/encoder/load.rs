@@ -3,17 +3,17 @@
 use super::layers::*;
 use crate::weights::{Weights, WeightsError};
 
-/// Sums of a byte of a column's masks: byte, its value, channel.
+/// Sums for each byte of a column's masks, indexed by byte, its value, and channel.
 type ByteTable = [[[i16; COLUMN_CHANNELS]; 256]; 4];
 
 /// The weights of the layers.
 #[derive(Clone)]
 pub struct EncoderWeights {
-    /// A layer's after another's, each in the order of [`Layer::place`].
+    /// Layer by layer, each in the order of [`Layer::place`].
     pub(super) weights: [i16; TOTAL[0]],
     pub(super) biases: [i32; TOTAL[1]],
     pub(super) shifts: [u8; TOTAL[1]],
-    /// The first layer's.
+    /// Table of the first layer's sums.
     pub(super) bytes: ByteTable,
 }
 
@@ -24,7 +24,7 @@ impl Default for EncoderWeights {
 }
 
 impl EncoderWeights {
-    /// Before they are loaded, all zeros.
+    /// Weights before they are loaded: all zeros.
     pub const fn new() -> EncoderWeights {
         EncoderWeights {
             weights: [0; TOTAL[0]],
@@ -34,8 +34,8 @@ impl EncoderWeights {
         }
     }
 
-    /// Replaces them by those of a file of kind `encoder`; see [`NUMBERS`]. Left as they
-    /// were where it fails.
+    /// Replaces the weights with those of a file of kind `encoder`; see [`NUMBERS`]. On failure
+    /// they stay as they were.
     pub fn load(&mut self, text: &str, levels: usize) -> Result<(), WeightsError> {
         let file = Weights::parse(text, "encoder", &[NUMBERS], 0)?;
         if levels != LEVELS {

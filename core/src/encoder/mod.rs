@@ -1,12 +1,13 @@
-//! The encoder (after chapter 4): what a column is, told from about 24 m around it.
+//! The encoder (after chapter 4): classifies a column from about 24 m around it.
 //!
 //! A pyramid of small convolutions over free and occupied voxels. Its cells are pairs, quads and
-//! octets of the *world's* columns, so that what stands has the same phase in every sweep. Chapter
-//! 4's network has 41.9 billion products a sweep; this one has 80 million, which a CPU does.
+//! octets of the *world's* columns, so that static structure has the same phase in every sweep.
+//! Chapter 4's network takes 41.9 billion products per sweep; this one takes 80 million, which a
+//! CPU can do.
 //!
-//! Integers throughout: activations of 0 to 127, weights of -127 to 127, sums of 32 bits, and a
-//! shift per channel that brings a sum back to an activation. The result is the same on every
-//! machine and for any number of threads. It runs on the CPU beside whatever device perceives.
+//! Integers throughout: activations of 0 to 127, weights of -127 to 127, 32-bit sums, and a shift
+//! per channel that scales a sum back to an activation. The result is the same on every machine and
+//! for any number of threads. It runs on the CPU alongside whatever device perceives.
 
 mod forward;
 pub mod layers;
@@ -25,13 +26,13 @@ use crate::weights::WeightsError;
 use layers::*;
 use rows::{Plane, each_row};
 
-/// What a column may be.
+/// The class of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum ColumnClass {
     /// Nothing but ground.
     Ground = 0,
-    /// Buildings, walls, fences and whatever else is put up to stay.
+    /// Buildings, walls, fences and other permanent structures.
     Structure = 1,
     /// Trees, hedges and bushes.
     Vegetation = 2,
@@ -41,14 +42,14 @@ pub enum ColumnClass {
     Car = 4,
     /// Trucks, buses and trams.
     LargeVehicle = 5,
-    /// Somebody on foot.
+    /// People on foot.
     Person = 6,
     /// Bicycles and motorcycles.
     TwoWheeler = 7,
 }
 
 impl ColumnClass {
-    /// All of them, in their order.
+    /// All classes, in order.
     pub const ALL: [ColumnClass; 8] = [
         ColumnClass::Ground,
         ColumnClass::Structure,
@@ -60,15 +61,15 @@ impl ColumnClass {
         ColumnClass::TwoWheeler,
     ];
 
-    /// What stands for none where classes are numbers.
+    /// The number that represents no class.
     pub const NONE: u8 = u8::MAX;
 
-    /// Its number, or [`ColumnClass::NONE`].
+    /// The number of a class, or [`ColumnClass::NONE`].
     pub fn number(of: Option<ColumnClass>) -> u8 {
         of.map_or(ColumnClass::NONE, |class| class as u8)
     }
 
-    /// In words.
+    /// The name in words.
     pub const fn name(self) -> &'static str {
         match self {
             ColumnClass::Ground => "ground",
@@ -82,22 +83,22 @@ impl ColumnClass {
         }
     }
 
-    /// Whether it takes part in traffic.
+    /// Whether the class takes part in traffic.
     pub const fn could_move(self) -> bool {
         self as u8 >= ColumnClass::Car as u8
     }
 }
 
-/// Scores of a column in units of 1/16 nat, -127 to 127: those of [`ColumnClass::ALL`], then that
-/// of what could move (cars to two-wheelers) against what could not.
+/// Scores of a column in units of 1/16 nat, -127 to 127: one for each of [`ColumnClass::ALL`], then
+/// that of classes that could move (cars to two-wheelers) against those that could not.
 pub type ColumnScores = [i8; SCORES];
 
-/// Score, in nats, of what could move against what could not.
+/// The score, in nats, of classes that could move against those that could not.
 pub fn could_move(scores: &ColumnScores) -> f32 {
     f32::from(scores[SCORES - 1]) / ONE as f32
 }
 
-/// The class that scores highest; of equal ones the first.
+/// The class with the highest score; the first one if equal.
 pub fn class_of(scores: &ColumnScores) -> ColumnClass {
     let mut best = ColumnClass::Ground;
     for class in ColumnClass::ALL {
@@ -114,22 +115,22 @@ pub const SHIPPED: &str = include_str!("../../weights/encoder.txt");
 /// Cells along an axis of the finest level.
 const FINE: usize = (SIDE_MAX + OCTET - 1).next_multiple_of(OCTET) / 2;
 
-/// What the network works in.
+/// The network's working memory.
 pub struct Activations {
-    /// Of pairs of columns, quads and octets: the level, and what a block makes of it on the way.
+    /// For pairs of columns, quads and octets: the level, and the intermediate result of a block.
     fine: [[u8; FINE * FINE * FINE_CHANNELS]; 2],
     middle: [[u8; FINE * FINE / 4 * MIDDLE_CHANNELS]; 2],
     coarse: [[u8; FINE * FINE / 16 * COARSE_CHANNELS]; 2],
 }
 
-/// One sweep's columns, what they are told to be, and what that is worked out in.
+/// One sweep's columns, their scores, and the working memory.
 pub struct Encoder {
     weights: EncoderWeights,
     is_on: bool,
     columns: [Column; COLUMNS_MAX],
-    /// Columns of the window along an axis; 0 where none are kept.
+    /// Columns of the window along an axis; 0 if none are kept.
     side: usize,
-    /// The world's column that is the window's first.
+    /// The world column that is the window's first.
     corner: [i32; 2],
     activations: Activations,
     scores: [ColumnScores; COLUMNS_MAX],
@@ -142,7 +143,7 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// Before the first sweep, all zeros.
+    /// An encoder before the first sweep: all zeros.
     pub const fn new() -> Encoder {
         Encoder {
             weights: EncoderWeights::new(),
@@ -159,14 +160,14 @@ impl Encoder {
         }
     }
 
-    /// Encodes with these weights from now on, or nothing.
+    /// Encodes with these weights from now on; `None` turns encoding off.
     pub fn set_weights(&mut self, weights: Option<&EncoderWeights>) {
         self.clear();
         self.is_on = weights.is_some();
         self.weights = weights.cloned().unwrap_or_default();
     }
 
-    /// Encodes with the weights that `load` reads into their place from now on; with none where it
+    /// Encodes from now on with the weights that `load` reads in place; turns encoding off if it
     /// fails.
     pub fn load_weights<E>(
         &mut self,
@@ -183,7 +184,7 @@ impl Encoder {
         self.is_on
     }
 
-    /// Keeps the columns of a square window, whose first is the world's column `corner`.
+    /// Keeps the columns of a square window whose first is world column `corner`.
     pub fn keep(&mut self, columns: &[Column], side: usize, corner: [i32; 2]) {
         if !self.is_on {
             return;
@@ -192,13 +193,13 @@ impl Encoder {
         self.columns[..side * side].copy_from_slice(&columns[..side * side]);
     }
 
-    /// Forgets them.
+    /// Discards the columns kept.
     pub fn clear(&mut self) {
         self.side = 0;
     }
 
-    /// Scores of the columns kept, once they are encoded: zeros where a column is not solid, none
-    /// where nothing is encoded.
+    /// Scores of the columns kept, once encoded: zeros for a column that is not solid; empty if
+    /// nothing is encoded.
     pub fn scores(&self) -> &[ColumnScores] {
         &self.scores[..self.side * self.side]
     }
@@ -238,7 +239,7 @@ impl Encoder {
 }
 
 impl Activations {
-    /// The part that a window needs whose finest level has `side` cells along an axis.
+    /// The part needed by a window whose finest level has `side` cells along an axis.
     fn levels(&mut self, side: usize) -> Levels<'_> {
         let cells = side * side;
         Levels {
@@ -250,9 +251,9 @@ impl Activations {
     }
 }
 
-/// The pyramid of one window: each level, and room for what a block makes of it on the way.
+/// The pyramid of one window: each level, and room for the intermediate result of a block.
 struct Levels<'a> {
-    /// Cells of the finest along an axis.
+    /// Cells of the finest level along an axis.
     side: usize,
     fine: [&'a mut [u8]; 2],
     middle: [&'a mut [u8]; 2],
@@ -260,7 +261,7 @@ struct Levels<'a> {
 }
 
 impl Levels<'_> {
-    /// Down to the coarsest level, and up again.
+    /// Computes all levels, down to the coarsest and back up.
     fn fill(&mut self, team: &impl Team, weights: &EncoderWeights, window: &PaddedWindow) {
         let n = self.side;
         let [fine, beside_fine] = &mut self.fine;
@@ -297,7 +298,7 @@ impl Levels<'_> {
         weights.block::<FINE_CHANNELS>(team, BLOCK_AFTER, n, fine, beside_fine);
     }
 
-    /// What is around the columns of each pair.
+    /// Computes the features around the columns of each pair.
     fn around_columns(
         &mut self,
         team: &impl Team,
@@ -320,7 +321,7 @@ struct PaddedWindow<'a> {
 }
 
 impl PaddedWindow<'_> {
-    /// Masks of the column at a place of the padded window; unknown outside.
+    /// Masks of the column at a position in the padded window; unknown outside.
     fn masks(&self, i: usize, j: usize) -> u32 {
         let [i, j] = [i.wrapping_sub(self.phase[0]), j.wrapping_sub(self.phase[1])];
         if i < self.side && j < self.side { self.columns[i * self.side + j][0] } else { 0 }

@@ -2,7 +2,7 @@
 
 use crate::team::{Team, share};
 
-/// A square level, all channels of a cell together.
+/// A square level, with all channels of a cell contiguous.
 #[derive(Clone, Copy)]
 pub struct Plane<'a, const CHANNELS: usize> {
     /// Cells along an axis.
@@ -23,7 +23,7 @@ impl<'a, const CHANNELS: usize> Plane<'a, CHANNELS> {
     }
 }
 
-/// The 2 x 2 cells below one of the next level, one after another.
+/// The 2 x 2 cells below one of the next level, concatenated.
 #[inline(always)]
 pub fn gathered<const CHANNELS: usize, const ALL: usize>(
     below: &Plane<CHANNELS>,
@@ -37,8 +37,8 @@ pub fn gathered<const CHANNELS: usize, const ALL: usize>(
     all
 }
 
-/// Fills rows of `length`, perhaps several at a time. `fill` is inlined: its instructions are the
-/// team's.
+/// Fills rows of `length`, possibly several at a time. `fill` is inlined so that it is compiled for
+/// the team's instruction set.
 #[inline(always)]
 pub fn each_row<T: Send>(
     team: &impl Team,

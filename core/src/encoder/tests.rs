@@ -1,4 +1,4 @@
-//! The layers against their formulas, and what the shipped weights say of simple shapes.
+//! The layers against their formulas, shifted windows with the shipped weights, and bad files.
 
 extern crate std;
 use super::*;
@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
 
-/// A weights file of these numbers.
+/// A weights file with these numbers.
 fn file(numbers: &[i32]) -> String {
     let mut body = std::format!("kind encoder\nshape {NUMBERS}\nscale 16\nprovenance test\n");
     numbers.iter().for_each(|n| writeln!(body, "{n}").unwrap());
@@ -20,7 +20,7 @@ fn whole(random: &mut Random, range: core::ops::Range<i32>) -> i32 {
     range.start + random.below(range.len()) as i32
 }
 
-/// Numbers anywhere in their ranges, by layer.
+/// Random numbers, layer by layer.
 fn drawn(random: &mut Random) -> Vec<i32> {
     let mut numbers = Vec::new();
     for layer in LAYERS {
@@ -31,7 +31,7 @@ fn drawn(random: &mut Random) -> Vec<i32> {
     numbers
 }
 
-/// Columns of a window, two fifths of them solid.
+/// Random columns of a window, two fifths of them solid.
 fn columns(random: &mut Random, side: usize) -> Vec<Column> {
     let one = |random: &mut Random| {
         let [free, occupied] = [0; 2].map(|_| random.below(1 << LEVELS) as u32);
@@ -53,7 +53,7 @@ fn encoded(
     encoder.scores().to_vec()
 }
 
-/// The network as it is drawn on paper: levels of `[row][column][channel]`, loops over all.
+/// The network written out plainly: levels of `[row][column][channel]`, loops over everything.
 struct Naive<'a> {
     numbers: &'a [i32],
 }
@@ -61,7 +61,7 @@ struct Naive<'a> {
 type Level = Vec<Vec<Vec<i32>>>;
 
 impl Naive<'_> {
-    /// Sums of a layer, shifted; not cut.
+    /// Sums of a layer, shifted but not clamped.
     fn shifted(&self, layer: usize, x: &[i32]) -> Vec<i32> {
         let Layer { inputs, outputs } = LAYERS[layer];
         let [weights, all] = before(layer);
@@ -172,7 +172,7 @@ fn what_stands_keeps_its_scores_when_the_window_shifts() {
     weights.load(SHIPPED, LEVELS).unwrap();
     let mut random = Random(12);
     let (side, shift) = (160, 3);
-    // Of the world, as two windows see it; what is near the rim is told by what lies beyond.
+    // World columns as two windows see them; near the rim, scores depend on what lies beyond.
     let world = columns(&mut random, side + shift);
     let window = |from: usize| -> Vec<Column> {
         let rows = (from..from + side).map(|i| &world[i * (side + shift)..][..side]);
@@ -180,8 +180,8 @@ fn what_stands_keeps_its_scores_when_the_window_shifts() {
     };
     let first = encoded(&weights, &window(0), side, [100, 7]);
     let second = encoded(&weights, &window(shift), side, [100 + shift as i32, 7]);
-    // The receptive field reaches 63 columns: a cell of eight and two of them on either side, and
-    // blocks of finer cells.
+    // The receptive field reaches 63 columns: an octet and two more on either side, plus blocks of
+    // finer cells.
     let middle = |n: usize| (66..side - 66 - shift).contains(&n);
     let both = (0..side * side).filter(|n| middle(n / side) && middle(n % side));
     assert!(both.clone().count() > 500);

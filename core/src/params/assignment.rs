@@ -1,11 +1,11 @@
-//! Parameters that are set by a text, as `--set NAME=VALUE` has it.
+//! Parameters set from text, as in `--set NAME=VALUE`.
 
 use super::{Profile, Value};
 
 /// A parameter and a value for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterSetting<'a> {
-    /// Of this group; where none is given, of the one that has it.
+    /// Its group; if none is given, the one that has it.
     pub group: Option<&'a str>,
     /// Its name.
     pub name: &'a str,
@@ -16,14 +16,14 @@ pub struct ParameterSetting<'a> {
 /// Why a parameter was not set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignError {
-    /// There is none of this name, or not in this group.
+    /// There is no parameter of this name, or not in this group.
     Unknown,
-    /// The value is not of its type, but must be this.
+    /// The value has the wrong type; it must be this.
     Must(&'static str),
 }
 
 impl<'a> ParameterSetting<'a> {
-    /// From `NAME=VALUE` or `GROUP.NAME=VALUE`; none where there is no `=`.
+    /// Parses `NAME=VALUE` or `GROUP.NAME=VALUE`; `None` if there is no `=`.
     pub fn parse(text: &'a str) -> Option<ParameterSetting<'a>> {
         let (path, word) = text.split_once('=')?;
         let (path, word) = (path.trim(), word.trim());
@@ -35,7 +35,7 @@ impl<'a> ParameterSetting<'a> {
         Some(ParameterSetting::new(path, value))
     }
 
-    /// Of `NAME` or `GROUP.NAME`.
+    /// The setting for `NAME` or `GROUP.NAME`.
     pub fn new(path: &'a str, value: Value<'a>) -> ParameterSetting<'a> {
         let (group, name) = path.split_once('.').map_or((None, path), |(g, n)| (Some(g), n));
         ParameterSetting { group, name, value }
@@ -43,7 +43,7 @@ impl<'a> ParameterSetting<'a> {
 }
 
 impl Profile {
-    /// Sets a parameter, unchecked but for its type.
+    /// Sets a parameter, checking only its type.
     pub fn assign(&mut self, to: &ParameterSetting) -> Result<(), AssignError> {
         let groups = self.groups().map(|(group, of)| (group, of.get(to.name).is_some()));
         let mut having = groups.iter().filter(|(_, has)| *has);

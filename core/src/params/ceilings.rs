@@ -1,7 +1,7 @@
 //! Ceilings that size storage, and the constants of the wire format shared with the kernels.
 
-/// Returns of one sweep that any profile may take: those of four HDL-32E at their full rate, or of
-/// an OS1-128 at 2048 x 10. (The dissertation's n_max is 150,000.)
+/// Returns of one sweep that any profile may take: those of four HDL-32E at full rate, or of an
+/// OS1-128 at 2048 x 10. (The dissertation's n_max is 150,000.)
 pub const POINTS_MAX: usize = 262_144;
 /// Levels of a column: free and occupied masks share one 32-bit word. No profile needs more.
 /// Compared with 32 levels this halves the memory traffic, and a pair of columns is scored with
@@ -11,11 +11,11 @@ pub const LEVELS_MAX: usize = 16;
 pub const SIDE_MAX: usize = 337;
 /// Columns of the flow window.
 pub const COLUMNS_MAX: usize = (SIDE_MAX * SIDE_MAX).next_multiple_of(TILE);
-/// Solid columns of one sweep that flow is put out of; further ones, in column order, are left out
-/// and counted. The busiest sweep seen has 8,795 in a window of 50 m.
+/// Solid columns of one sweep for which flow is output; further ones, in column order, are left out
+/// and counted. The busiest sweep seen has 8,795 in a 50 m window.
 pub const SOLID_MAX: usize = 32_768;
-/// Clusters of one sweep, whole and in parts; columns of further ones are taken to stand, and
-/// counted. Eight times what every sweep seen has room in, in a window of 100 m too.
+/// Clusters of one sweep, whole and in parts; columns of further ones are taken to be static, and
+/// counted. Eight times enough for every sweep seen, in a 100 m window too.
 pub const CLUSTERS_MAX: usize = 8192;
 /// Foreground columns of one sweep; further ones, in column order, are dropped and counted.
 /// The busiest sweep seen has 8,795 solid columns in a 50 m window.
@@ -37,52 +37,55 @@ pub const LINE: usize = 32;
 /// Elements of a row of costs, one row per foreground column: displacement `(du, dv)` is element
 /// `(du + REACH) * LINE + dv + REACH`, the order in which ties are broken.
 pub const ROW: usize = SIDE * LINE;
-/// Words of a row: two 16-bit costs a word.
+/// Words of a row: two 16-bit costs per word.
 pub const ROW_WORDS: usize = ROW / 2;
 /// Slots of the table that merges equal rays: twice the points, so that it is at most half full.
 pub const MERGE_SLOTS: usize = 2 * POINTS_MAX;
-/// Probes of that table before a ray is traced alone.
+/// Probes of that table before a ray is traced on its own.
 pub const MERGE_PROBES: u32 = 64;
-/// Voxels a return may lie from the window's corner along an axis; farther ones are dropped.
+/// Maximum distance of a return from the window's corner along an axis, voxels; farther ones are
+/// dropped.
 pub const EXTENT_VOXELS: i32 = 4095;
-/// Voxels a ray may be traced for.
+/// Maximum number of voxels for which a ray may be traced.
 pub const RANGE_STEPS_MAX: i32 = 2000;
-/// Sweeps the refinement of the flow may look at.
+/// Maximum number of sweeps that the refinement of the flow may use.
 pub const REFINEMENT_SWEEPS_MAX: usize = 5;
-/// Levels above the ground that clusters may have: a column's share one 32-bit word.
+/// Maximum number of levels above the ground in a cluster: those of a column share one 32-bit word.
 pub const CLUSTER_LEVELS_MAX: usize = 32;
 /// Sub-voxels along an axis of a voxel, each of which keeps one return.
 pub const SUBVOXELS_MAX: usize = 4;
 /// Thinned returns of one sweep that the refinement keeps; those of the last columns are dropped
 /// and counted.
 pub const CLOUD_MAX: usize = 65_535;
-/// Rays of one sweep that tell whether something was seen; of more, evenly spread ones. With all of
-/// them recall on simulated streets is 94.8 % instead of 94.7 (21 drives of 25 sweeps).
+/// Rays of one sweep that serve as sightlines to decide whether something was visible; of more, an
+/// evenly spread subset. With all of them, recall on simulated streets is 94.8 % instead of 94.7
+/// (21 drives of 25 sweeps).
 pub const SIGHTLINES_MAX: usize = 65_536;
 /// Updates (voxel, log-odds) of one band of the sparse map.
 pub const BAND_UPDATES: usize = 1 << 20;
-/// Threads of a workgroup of every one-dimensional kernel.
+/// Threads per workgroup of every one-dimensional kernel.
 pub const WORKGROUP: usize = 256;
-/// Threads of a workgroup where each handles a ray or a foreground column, or all of them one
+/// Threads per workgroup if each handles a ray or a foreground column, or all of them one
 /// column.
 pub const ROW_WORKGROUP: usize = 64;
-/// Items a workgroup of the prefix sum and of the radix sort handles.
+/// Items that a workgroup of the prefix sum or of the radix sort handles.
 pub const TILE: usize = 1024;
 /// Digit values of one radix pass (4 bits).
 pub const RADIX: usize = 16;
 
 /// Units of log-odds in a nat: tenths, so that sums of updates are exact.
 pub const LOG_ODDS_PER_NAT: f32 = 10.0;
-/// Log-odds of a voxel a ray passes, tenths (Table B.1: -0.1).
+/// Log-odds of a voxel that a ray passes, tenths (Table B.1: -0.1).
 pub const LOG_ODDS_FREE: i32 = -1;
-/// Log-odds of a voxel a ray ends in, tenths (Table B.1: 1.0).
+/// Log-odds of a voxel in which a ray ends, tenths (Table B.1: 1.0).
 pub const LOG_ODDS_OCCUPIED: i32 = 10;
-/// From these tenths on a voxel is solid: p > 0.6, the author's test for a column worth matching.
+/// Minimum log-odds of a solid voxel, tenths: p > 0.6, the author's test for a column worth
+/// matching.
 pub const LOG_ODDS_SOLID: i32 = 5;
-/// `-log 0.5` in thousandths of a nat: the cost of a window neighbour that says nothing.
+/// `-log 0.5` in thousandths of a nat: the cost of an uninformative window neighbour.
 pub const COST_UNKNOWN: u32 = 693;
 /// Height of the HDL-64E above ground on KITTI's car, m: levels are anchored to it, so that the
-/// learned weights of a level meet the same height on any vehicle.
+/// learned weights of a level apply to the same height on any vehicle.
 pub const ANCHOR_ABOVE_GROUND_M: f64 = 1.73;
 
 const _: () = assert!(SIDE < LINE && LINE.is_power_of_two() && ROW_WORDS.is_multiple_of(4));

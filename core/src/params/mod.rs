@@ -1,9 +1,9 @@
-//! Every number a person chose: what it is called, its unit, its range, its default and the reason
-//! for it, declared once.
+//! Every hand-chosen number: its name, its unit, its range, its default and the reason for that,
+//! declared once.
 //!
-//! [`params!`](crate::params!) turns a declaration into a struct, its default and a table of what
-//! was declared. The table serves the keys of a configuration file, `--set name=value` and
-//! `PARAMETERS.md`. [`ceilings`] holds what sizes storage and therefore cannot be set.
+//! [`params!`](crate::params!) turns a declaration into a struct, its default and a table of the
+//! declared parameters. The table serves the keys of a configuration file, `--set name=value` and
+//! `PARAMETERS.md`. [`ceilings`] holds the numbers that size storage and therefore cannot be set.
 
 mod assignment;
 mod ceilings;
@@ -33,9 +33,9 @@ pub struct ProfileError {
 /// The declaration of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its name, which ends in its unit where it has one; unique among all parameters.
+    /// Its name, which ends in its unit if it has one; unique among all parameters.
     pub name: &'static str,
-    /// Its unit, or what is counted; empty for a ratio.
+    /// Its unit, or what it counts; empty for a ratio.
     pub unit: &'static str,
     /// Values it may have.
     pub bounds: Bounds,
@@ -48,13 +48,13 @@ pub struct Parameter {
 /// Values a parameter may have. Only numbers are bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least value, or that which all must exceed.
+    /// Minimum, or the limit that every value must exceed.
     pub from: f64,
     /// Whether `from` itself is excluded.
     pub above: bool,
-    /// Largest value.
+    /// Maximum.
     pub to: f64,
-    /// Whether 0 is allowed besides.
+    /// Whether 0 is also allowed.
     pub or_zero: bool,
     /// The same in words.
     pub text: &'static str,
@@ -63,7 +63,7 @@ pub struct Bounds {
 /// The value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value<'a> {
-    /// Double precision; any number may be set from it.
+    /// Double precision; sets a number of any type.
     Number(f64),
     /// Single precision.
     Single(f32),
@@ -71,7 +71,7 @@ pub enum Value<'a> {
     Whole(u64),
     /// Yes or no.
     Flag(bool),
-    /// One of several names.
+    /// One of a set of names.
     Word(&'a str),
 }
 
@@ -88,7 +88,7 @@ impl fmt::Display for Value<'_> {
 }
 
 impl Bounds {
-    /// Whether a value lies within them; NaN never does.
+    /// Whether a value lies within the bounds; NaN never does.
     pub fn hold(&self, value: Value) -> bool {
         // Single precision is compared as such: 0.7 is not less than 0.7.
         let (v, from, to) = match value {
@@ -104,13 +104,13 @@ impl Bounds {
 
 /// A type a parameter may have.
 pub trait Kind: Copy {
-    /// What a value of it must be, in words.
+    /// What a value of this type must be, in words.
     const MUST: &'static str;
 
-    /// As a value.
+    /// Converts to a [`Value`].
     fn value(self) -> Value<'static>;
 
-    /// From a value, if that is one of this type.
+    /// Converts from a [`Value`], if it is of this type.
     fn of(value: Value) -> Option<Self>;
 }
 
@@ -149,13 +149,13 @@ fn whole(v: f64) -> Option<u32> {
 
 /// A group of parameters, by name.
 pub trait Parameters {
-    /// What was declared, in the order of the declaration.
+    /// The declared parameters, in order of declaration.
     fn declared(&self) -> &'static [Parameter];
 
     /// The value of a parameter.
     fn get(&self, name: &str) -> Option<Value<'static>>;
 
-    /// Sets a parameter, unchecked but for its type. Fails with what it must be.
+    /// Sets a parameter, checking only its type. The error says what the value must be.
     fn set(&mut self, name: &str, value: Value) -> Result<(), &'static str>;
 
     /// Whether every parameter lies within its bounds.
@@ -191,12 +191,12 @@ pub trait Parameters {
 /// assert_eq!(search.within_bounds().unwrap_err().must, "above 0, at most 100");
 /// ```
 ///
-/// Each line is a documented field: type, default, unit (of a ratio ""), range, and the reason for
-/// the default, without which it was "not measured on its own". Types are those that implement
-/// [`Kind`]: numbers, `bool`, and enums that say so. A range is `(a to b)`, `(above a)`, `(above a
-/// to b)`, `(0 or a to b)`, `(at least a)` or `(any)`. Fields that are no parameters, such as
-/// nested groups, follow in a second block: `} and { pub name: Type = default; }`. `DEFAULT` is
-/// constant, so presets can say `Group { field: value, ..Group::DEFAULT }`.
+/// Each line is a documented field: type, default, unit ("" for a ratio), range, and the reason for
+/// the default; if there is none, it was not measured in isolation. Types are those that implement
+/// [`Kind`]: numbers, `bool`, and some enums. A range is `(a to b)`, `(above a)`, `(above a to b)`,
+/// `(0 or a to b)`, `(at least a)` or `(any)`. Fields that are not parameters, such as nested
+/// groups, follow in a second block: `} and { pub name: Type = default; }`. `DEFAULT` is constant,
+/// so presets can use `Group { field: value, ..Group::DEFAULT }`.
 #[macro_export]
 macro_rules! params {
     // The reason for a default.
@@ -210,7 +210,7 @@ macro_rules! params {
         $crate::params!(@ $from as f64, true, $to as f64, false,
             concat!("above ", $from, ", at most ", $to))
     };
-    // Who says no more has a million in mind: squares of squares are finite.
+    // The limit when none is given is a million: squares of squares are finite.
     (@bounds above $from:literal) => {
         $crate::params!(@bounds above $from to 1e6)
     };
@@ -304,7 +304,7 @@ mod tests {
             /// Three.
             pub frame: Frame = Frame::Sensor, "", (any);
         } and {
-            /// No parameter.
+            /// Not a parameter.
             pub other: u8 = 3;
         }
     }

@@ -1,6 +1,6 @@
-//! Parameters of whether a column moves: see [`crate::refinement::cues`].
+//! Parameters for deciding whether a column moves: see [`crate::refinement::cues`].
 
-/// Where the weights come from.
+/// The source of the weights.
 const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simulated drives \
                       (`raywake-lab sim`, each rig: `--drives 3 --sweeps 25 --seed 9100`, \
                       `--drives 5 --sweeps 20 --seed 9200 --scenery street-fast`, `--drives 3 \
@@ -8,10 +8,10 @@ const FITTED: &str = "Fitted by `raywake-lab train moves` to columns of 44 simul
                       could_move_min=-8`).";
 
 crate::params! {
-    /// How cues become P(moves): logistic regression, one weight a cue.
+    /// How cues become P(moves): logistic regression, one weight per cue.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MovesParams {
-        /// What is put out as moving has at least this P(moves).
+        /// Minimum P(moves) of anything reported as moving.
         pub moves_min: f32 = 0.4, "", (0 to 1),
             "The least (of 0.3, 0.4, 0.5) at which fewer than one in 2,000 returns of a still \
              simulated street move. Precision and recall of columns on simulated streets of \
@@ -20,7 +20,7 @@ crate::params! {
              here; 96.2 and 89.4, 96.8 and 97.0 at 0.5.";
         /// Logit without any cue.
         pub moves_bias: f32 = -5.87, "nat", (-100 to 100), FITTED;
-        /// Weight of the evidence beyond what the hypothesis test asked for.
+        /// Weight of the evidence in excess of what the hypothesis test required.
         pub moves_margin: f32 = 5.97, "nat", (-100 to 100), FITTED;
         /// Weight of the share of a cluster's columns whose tracklets moved.
         pub moves_share: f32 = 3.52, "nat", (-100 to 100), FITTED;
@@ -28,17 +28,17 @@ crate::params! {
         pub moves_residual: f32 = 2.26, "nat", (-100 to 100), FITTED;
         /// Weight of the logarithm of the number of returns that were registered.
         pub moves_returns: f32 = 0.85, "nat", (-100 to 100), FITTED;
-        /// Weight of how certain those tracklets were.
+        /// Weight of the certainty of the tracklets that moved.
         pub moves_certainty: f32 = -0.59, "nat", (-100 to 100), FITTED;
         /// Weight of the share of earlier looks at a cluster's voxels that found something.
         pub moves_worn: f32 = -0.51, "nat", (-100 to 100), FITTED;
-        /// Weight of the share that found nothing.
+        /// Weight of the share of those looks that found nothing.
         pub moves_fresh: f32 = 1.44, "nat", (-100 to 100), FITTED;
-        /// Weight of by how much a column's own returns fit rest worse than the motion.
+        /// Weight of how much worse a column's own returns fit rest than the motion.
         pub moves_misfit: f32 = 1.51, "nat", (-100 to 100), FITTED;
-        /// Weight of the encoder's score of what could move.
+        /// Weight of the encoder's could-move score.
         pub moves_could_move: f32 = 0.36, "", (-100 to 100), FITTED;
-        /// Weight of that the test found that it stands.
+        /// Weight of the test's finding that the cluster is static.
         pub moves_stands: f32 = 0.75, "nat", (-100 to 100), FITTED;
     }
 }

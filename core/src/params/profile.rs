@@ -47,11 +47,12 @@ crate::params! {
         pub voxel_m: f64 = 0.30, "m", (0.05 to 2.0),
             "Dissertation, section 3.8.1 and table B.1 (r). Cells of 0.20 m in a window of 38 m: \
              3.3 cm mean error of what moves against 4.0 cm (`raywake-lab ablate`).";
-        /// Returns taken of a sweep; of one that has more, so many, spread evenly over it.
+        /// Maximum number of returns taken from a sweep; one with more is thinned evenly to this
+        /// many.
         pub returns_max: u32 = POINTS_MAX as u32, "returns", (1 to 262144),
             "Four HDL-32E at their full rate, or an OS1-128 at 2048 x 10.";
-        /// Greatest range of a return, counted in voxels along the ray's longest axis as the update
-        /// list of B.2.1 does; at most 2,000 voxels.
+        /// Maximum range of a return, counted in voxels along the ray's longest axis, as in the
+        /// update list of B.2.1; at most 2,000 voxels.
         pub range_m: f64 = 100.0, "m", (above 0), "Dissertation, table B.1 (m_r).";
         /// Frame of the grid.
         pub frame: Frame = Frame::Lattice, "", (any),
@@ -73,8 +74,8 @@ crate::params! {
         /// Cost of a window neighbour outside the grid.
         pub outside_cost: u32 = COST_UNKNOWN, "millinats", (0 to 100000),
             "As one that tells nothing: -log 0.5.";
-        /// Sweeps whose returns refine the flow below the cell's size, the pair's own two included,
-        /// of those before it every other one; 0 leaves whole cells.
+        /// Sweeps whose returns refine the flow below the cell's size: the pair's own two and, of
+        /// those before it, every other one; 0 leaves whole cells.
         pub refinement_sweeps: u32 = 5, "sweeps", (0 or 2 to 5),
             "2 sweeps: 5.8 cm mean error of what moves against 4.4 cm with 3, whole cells 38.8 cm \
              (`raywake-lab ablate`). Recall at a precision of 95 % on simulated outskirts \
@@ -91,7 +92,7 @@ crate::params! {
         pub moves: MovesParams = MovesParams::DEFAULT;
         /// Tracklet filter.
         pub tracklet: TrackletParams = TrackletParams::DEFAULT;
-        /// Beyond these two sweeps make no pair, and tracklets are dropped.
+        /// Beyond these, two sweeps form no pair and tracklets are dropped.
         pub limits: ContinuityLimits = ContinuityLimits::DEFAULT;
     }
 }
@@ -102,13 +103,13 @@ impl Profile {
         Profile { name: short("hdl64"), ..Profile::DEFAULT }
     }
 
-    /// ±35 m: what the graders of Argoverse 2 score.
+    /// ±35 m: the area that the graders of Argoverse 2 score.
     pub fn wide() -> Profile {
-        // Farther away the energy minimisation takes longer to settle.
+        // Farther away the energy minimisation takes longer to converge.
         Profile { name: short("wide"), side: 235, em_rounds: 20, ..Profile::DEFAULT }
     }
 
-    /// ±50 m, in 128 MiB: two VLP-32C fire 115,200 times a sweep.
+    /// ±50 m, in 128 MiB: two VLP-32C fire 115,200 times per sweep.
     pub fn far() -> Profile {
         Profile { name: short("far"), side: 335, returns_max: 131_072, ..Profile::DEFAULT }
     }
@@ -132,7 +133,7 @@ impl Profile {
 
     /// The sparse map: the sensor's whole range, in all directions.
     pub fn map() -> Profile {
-        // 334 voxels either way: 100 m at 0.30 m; the keys of its voxels fit 31 bits.
+        // 334 voxels either way: 100 m at 0.30 m; the keys of its voxels fit in 31 bits.
         Profile { name: short("map"), side: 669, levels: 669, ..Profile::DEFAULT }
     }
 
@@ -141,12 +142,12 @@ impl Profile {
         [Profile::hdl64(), Profile::wide(), Profile::far(), Profile::dissertation()]
     }
 
-    /// That of a name.
+    /// The shipped profile with a name.
     pub fn named(name: &str) -> Option<Profile> {
         Profile::shipped().into_iter().find(|p| p.name == name)
     }
 
-    /// Its groups of parameters, each with its name; that of the first is empty.
+    /// The groups of parameters, each with its name; that of the first is empty.
     pub fn groups(&self) -> [(&'static str, &dyn Parameters); 6] {
         [
             ("", self),
@@ -158,7 +159,7 @@ impl Profile {
         ]
     }
 
-    /// One of these groups, to change it. An unknown name is that of the first.
+    /// One of these groups, to change it. An unknown name selects the first.
     pub fn group_mut(&mut self, name: &str) -> &mut dyn Parameters {
         match name {
             "ground" => &mut self.ground,
@@ -170,27 +171,28 @@ impl Profile {
         }
     }
 
-    /// Returns taken of a sweep at most.
+    /// Maximum number of returns taken from a sweep.
     pub fn returns(&self) -> usize {
         self.returns_max as usize
     }
 
-    /// Columns of the window.
+    /// Number of columns of the window.
     pub fn columns(&self) -> usize {
         self.side as usize * self.side as usize
     }
 
-    /// Voxels of the window.
+    /// Number of voxels of the window.
     pub fn voxels(&self) -> usize {
         self.columns() * self.levels as usize
     }
 
-    /// Voxels a ray is traced for at most, the slots per ray of B.2.1: m_r / r, rounded up.
+    /// Maximum number of voxels for which a ray is traced, the slots per ray of B.2.1: m_r / r,
+    /// rounded up.
     pub fn range_steps(&self) -> i32 {
         libm::ceil(self.range_m / self.voxel_m) as i32
     }
 
-    /// Checks every parameter against its range, and what concerns more than one.
+    /// Checks every parameter against its range, and the rules that concern more than one.
     pub fn check(&self) -> Result<(), ProfileError> {
         for (_, group) in self.groups() {
             group.within_bounds()?;
@@ -217,7 +219,7 @@ const _: () = assert!(SIDE_MAX == 337 && LEVELS_MAX == 16 && POINTS_MAX == 262_1
 
 fn short(name: &str) -> String<24> {
     let mut s = String::new();
-    // Literals of this file fit.
+    // The literals in this file fit.
     let _ = s.push_str(name);
     s
 }

@@ -1,212 +1,216 @@
-//! Parameters of the refinement and of the ground it stands on.
+//! Parameters of the refinement and of the ground estimate it relies on.
 
-/// What the constants of the refinement were chosen on, unless they say more.
+/// The source of the refinement's constants, unless stated otherwise.
 const SIMULATED: &str = "Chosen on six simulated drives (`raywake-lab sim --drives 6 --sweeps 40 \
                          --seed 1100`), not measured on its own.";
-/// The same of the spread of covariances.
+/// The source of those that set the spread of covariances.
 const CALIBRATED: &str = "Chosen on sixty simulated drives so that the 68 % and 95 % ellipses hold \
                           75.5 % and 90.4 % of the true displacements.";
-/// The same of what climbs the ground.
+/// The source of those for climbing ground.
 const CLIMBED: &str = "Columns true / false / missed on `kitti_raw_0005` 6,069 / 1,454 / 365 with \
                        it, 5,972 / 1,401 / 462 where nothing is climbed; simulated streets as \
                        before. With columns of any thickness and two columns beside, cars become \
                        ground: recall of streets falls by 1 to 8 points.";
 
 crate::params! {
-    /// How the ground is found, see [`crate::ground`].
+    /// How the ground is estimated, see [`crate::ground`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GroundParams {
-        /// Edge of the square cells that have a ground height each; rounded to whole columns, and
-        /// at least four of them.
+        /// Edge of the square cells with one ground height each; rounded to whole columns, at least
+        /// four of them.
         pub ground_cell_m: f64 = 1.5, "m", (0.1 to 20), SIMULATED;
-        /// How far below the vehicle's ground other ground may begin; lower returns are mirrored.
+        /// How far below the ground under the vehicle other ground may begin; lower returns are
+        /// mirrored.
         pub ground_drop_m: f64 = 0.45, "m", (0 to 10), SIMULATED;
         /// How much farther below it may lie per metre of distance.
         pub ground_drop_slope: f32 = 0.1, "", (0 to 10), SIMULATED;
-        /// Steepest descent of the ground from a cell to the next.
+        /// Steepest descent of the ground from one cell to the next.
         pub ground_fall_slope: f64 = 0.066, "", (0 to 10), SIMULATED;
-        /// How many cells the ground is extrapolated: behind a car nothing is seen of it.
+        /// How many cells the ground is extrapolated: behind a car none of it is seen.
         pub ground_passes: u32 = 3, "cells", (0 to 20), SIMULATED;
-        /// Lowest returns of columns so near above the ground lie on it.
+        /// A column's lowest return this little above the ground, or less, lies on it.
         pub ground_tolerance_m: f64 = 0.105, "m", (0 to 10), SIMULATED;
-        /// Columns whose returns are farther apart in height are no ground, unless the others
-        /// hang over it.
+        /// Columns whose returns are farther apart in height are not ground, unless the upper ones
+        /// overhang it.
         pub ground_thickness_m: f64 = 0.25, "m", (0 to 10), CLIMBED;
-        /// Steepest ascent of the ground from a column to the next; 0: what rises is no ground.
+        /// Steepest ascent of the ground from one column to the next; 0: nothing that rises is
+        /// ground.
         pub ground_slope: f32 = 0.5, "", (0 to 10), CLIMBED;
     }
 }
 
 crate::params! {
-    /// The refinement's numbers, see [`crate::refinement`].
+    /// The refinement's parameters, see [`crate::refinement`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RefinementParams {
-        /// Returns lower above the ground than this belong to it, in any column.
+        /// Returns lower than this above the ground belong to it, in any column.
         pub ground_height_m: f64 = 0.105, "m", (0 to 2), SIMULATED;
-        /// Returns higher above the ground than this belong to clusters.
+        /// Returns higher than this above the ground belong to clusters.
         pub cluster_height_min_m: f64 = 0.18, "m", (0 to 2), SIMULATED;
-        /// Returns from this height on belong to none; at most 32 voxels count.
+        /// Returns from this height up belong to none; at most 32 voxels count.
         pub cluster_height_max_m: f64 = 4.2, "m", (0.5 to 64), SIMULATED;
-        /// Edge of the sub-voxels that keep one return each; a voxel is divided in at most four.
+        /// Edge of the sub-voxels that keep one return each; a voxel is divided into at most four
+        /// per axis.
         pub thinning_m: f64 = 0.10, "m", (0.01 to 2), SIMULATED;
-        /// Levels so far apart still touch, as parts of one cluster.
+        /// Levels this far apart still touch, as parts of one cluster.
         pub cluster_gap_m: f64 = 0.6, "m", (0 to 10), SIMULATED;
-        /// Matched neighbours whose displacements differ by more are two clusters.
+        /// Matched neighbours whose displacements differ by more belong to different clusters.
         pub cluster_disparity_cells: u32 = 2, "cells", (0 to 30), SIMULATED;
         /// Larger clusters are static.
         pub cluster_extent_max_m: f64 = 30.0, "m", (1 to 1000), "The longest trams.";
 
-        /// Radius around a return in which others tell the orientation of its surface.
+        /// Radius around a return within which others determine the orientation of its surface.
         pub surface_radius_m: f64 = 0.45, "m", (0.01 to 5), SIMULATED;
-        /// The same where those lie on a line, as of one ring on a bonnet.
+        /// The same if those lie on a line, as from one ring on a bonnet.
         pub surface_radius_wide_m: f64 = 0.75, "m", (0.01 to 5), SIMULATED;
-        /// Returns whose variance across their longest direction is less lie on a line.
+        /// Returns whose variance across their longest direction is smaller lie on a line.
         pub surface_line_m2: f64 = 0.0045, "m²", (0 to 1),
             "A ring with its noise is below, two rings 0.3 m apart above.";
         /// Standard deviation of a return.
         pub return_sigma_m: f64 = 0.045, "m", (0.001 to 1), SIMULATED;
 
-        /// Farthest nearest neighbour, at most a voxel's edge.
+        /// Maximum distance of the nearest neighbour, at most a voxel's edge.
         pub match_distance_m: f64 = 0.30, "m", (0.01 to 2), SIMULATED;
         /// Width of the Geman-McClure kernel in the first iterations.
         pub kernel_wide_m: f64 = 0.30, "m", (0.01 to 5), SIMULATED;
-        /// Its width in those that follow.
+        /// Its width in later iterations.
         pub kernel_m: f64 = 0.105, "m", (0.01 to 5), SIMULATED;
-        /// Iterations with the wide kernel, at most.
+        /// Maximum number of iterations with the wide kernel.
         pub iterations_wide: u32 = 3, "", (0 to 100), SIMULATED;
-        /// Gauss-Newton iterations, at most.
+        /// Maximum number of Gauss-Newton iterations.
         pub iterations: u32 = 8, "", (1 to 100), SIMULATED;
-        /// A step that moves by less is the last with its kernel; a turn counts as what it moves at
-        /// one voxel's distance.
+        /// A step that moves by less is the last with its kernel; a rotation counts as the movement
+        /// it causes at one voxel's distance.
         pub converged_m: f64 = 0.003, "m", (0 to 1), SIMULATED;
-        /// Share of the information of a pair of returns that is its own: neighbours err alike.
+        /// Share of the information of a pair of returns that is independent: errors of neighbours
+        /// are alike.
         pub information_ratio: f32 = 0.25, "", (0.001 to 1), CALIBRATED;
-        /// Standard deviation of the turn between two sweeps.
+        /// Standard deviation of the rotation between two sweeps.
         pub turn_sigma_rad: f32 = 0.03, "rad", (0.0001 to 10), SIMULATED;
-        /// Standard deviation of the prior that holds a displacement where nothing is near.
+        /// Standard deviation of the prior that holds a displacement where no return is near.
         pub hold_sigma_m: f64 = 9.486833, "m", (0.01 to 1000), SIMULATED;
 
         /// A return within this distance fits.
         pub inlier_m: f64 = 0.045, "m", (0.001 to 2), SIMULATED;
-        /// Truncation of the residual: a return farther off than this across its surface is missed.
+        /// Truncation of the residual: a return farther away across its surface counts as missed.
         pub truncation_m: f64 = 0.15, "m", (0.001 to 2), SIMULATED;
 
-        /// A return with so high a residual, or that nothing is near, is told by the rays that
-        /// passed there.
+        /// A return with at least this residual, or with nothing near it, is judged by the rays
+        /// that passed there.
         pub sight_residual: f32 = 0.1, "", (0 to 1),
             "Columns put out as moving of simulated streets (`raywake-lab sim --drives 3 --sweeps \
              25 --seed 9001`, slow, plain and fast, `vlp32x2` and `hdl64`, and plain \
              `hdl32x4-full`), with 0.03 for `evidence_min`: precision 95.1 %, recall 94.6 here, \
              94.8 and 94.6 at 0.05. Before rays told, 94.2 and 94.4.";
-        /// How near to a place a ray must pass to tell of it.
+        /// How near a ray must pass to a point to count as evidence about it.
         pub sight_distance_m: f64 = 0.1, "m", (0.001 to 5),
             "Precision and recall as above: 95.2 and 94.7 at 0.07 m, 95.1 and 94.7 at 0.15 m.";
-        /// The same as an angle, where that is farther: rings lie farther apart there.
+        /// The same as an angle, if that is farther: rings are farther apart there.
         pub sight_angle_rad: f32 = 0.008, "rad", (0 to 1),
             "Half the angle between the rings of an HDL-32E is 0.012. Precision and recall as \
              above are the same at 0.004.";
 
-        /// A cluster with so low a residual at rest is static without further test.
+        /// A cluster with a lower residual at rest is static without further test.
         pub residual_static: f32 = 0.05, "", (0 to 1),
             "Precision and recall as above, with `evidence_min` as shipped: 95.0 and 94.7 at 0.08, \
              94.7 and 95.1 here, 94.6 and 95.2 at 0.03, where a sweep of `kitti_raw_0005` takes 3 \
              ms longer on one core than at 0.08.";
-        /// A start that leads to so low a residual is the last.
+        /// A start that leads to a residual this low is the last.
         pub residual_good: f32 = 0.05, "", (0 to 1), SIMULATED;
         /// A residual above this is a bad fit: it calls for a search, and for twice the evidence.
         pub residual_bad: f32 = 0.3, "", (0 to 1), SIMULATED;
-        /// Evidence against rest from which on a cluster is dynamic, see [`crate::refinement`].
+        /// Minimum evidence against rest for a cluster to be dynamic, see [`crate::refinement`].
         pub evidence_min: f32 = 0.02, "", (0 to 1),
             "So low that what moves is among what P(moves) decides of. Precision and recall as \
              above: 95.1 and 94.6 at 0.03, 95.0 and 94.8 here, with 0.03 for `residual_static`.";
-        /// Difference in evidence that makes motion e times likelier.
+        /// Difference in evidence that makes motion e times as likely.
         pub evidence_scale: f32 = 0.04, "", (0.0001 to 1), CALIBRATED;
         /// Share of `evidence_min` and `residual_static` that suffices for a cluster that moved in
-        /// the last sweep, or beside one that moves.
+        /// the last sweep, or is beside one that moves.
         pub evidence_prior_ratio: f32 = 0.4, "", (0 to 1),
             "The least that keeps false motion in a still simulated street within its bound.";
-        /// Share of a cluster's columns whose tracklets must have moved for it to need only so
-        /// much; of fewer it needs more in proportion: a car's tracklets touch the road.
+        /// Share of a cluster's columns whose tracklets must have moved for that reduction to apply
+        /// in full; with fewer it applies in proportion: a car's tracklets touch the road.
         pub prior_quorum: f32 = 0.5, "", (0.01 to 1),
             "Without, 4,581 columns move that stand on `kitti_raw_0005`; with it 2,952 (before \
              what stands below was its footprint).";
-        /// Columns whose score of what could move (see [`crate::encoder`]) is below this go with no
-        /// cluster that moves, unless most of that cluster is like them and it was seen to come.
+        /// Columns whose could-move score (see [`crate::encoder`]) is below this join no moving
+        /// cluster, unless most of that cluster is like them and it was seen to arrive.
         pub could_move_min: f32 = -5.5, "nat", (-8 to 8),
             "So low that P(moves) decides of what the encoder doubts: whole groups of people are \
              below -4 where it has seen nothing like their place. Recall at a precision of 95 % on \
              simulated streets (`raywake-lab sim --drives 3 --sweeps 25 --seed 9001`; slow and \
              plain, `vlp32x2`): 91.0 and 97.4 % at -4, 91.9 and 97.7 here, 91.5 and 97.8 at -8, \
              each with weights of its own.";
-        /// Columns whose score is above this and that touch a cluster that moves go with it where
-        /// they fit its motion about as well as rest (`remainder_residual`).
+        /// Columns whose score is above this and that touch a moving cluster join it if they fit
+        /// its motion about as well as rest (`remainder_residual`).
         pub body_min: f32 = 1.0, "nat", (-8 to 8),
             "At 0 precision and recall are the same to 0.1 points on simulated streets as above; \
              far from movers four HDL-32E on outskirts (`--drives 6 --sweeps 25 --seed 7070`) put \
              out 649 columns that stand, 528 here.";
-        /// A cluster stands if something was hit in more than this share of looks at its voxels
+        /// A cluster is static if something was hit in more than this share of looks at its voxels
         /// in sweeps in which, by its motion, it was not there yet.
         pub worn_max: f32 = 0.5, "", (0 to 1),
             "Of simulated columns that move 2 % are of such clusters, of those that stand far from \
              any a quarter.";
-        /// From this length on a cluster that moved needs less, in inverse proportion: its sides
-        /// slide along themselves.
+        /// Beyond this length a cluster that moved needs less evidence, in inverse proportion: its
+        /// sides slide along themselves.
         pub evidence_length_m: f64 = 4.5, "m", (0.1 to 1000), SIMULATED;
-        /// Least displacement of what moves.
+        /// Minimum displacement of anything that moves.
         pub displacement_min_m: f64 = 0.039, "m", (0 to 10), SIMULATED;
         /// Returns that a cluster needs to move by itself.
         pub returns_min: u32 = 5, "returns", (1 to 96), SIMULATED;
-        /// Returns that it needs for a search: fewer fit anywhere.
+        /// Returns that a cluster needs for a search: fewer fit anywhere.
         pub search_returns_min: u32 = 12, "returns", (1 to 96), SIMULATED;
-        /// Speed up to which is searched, at most 15 cells from sweep to sweep.
+        /// Maximum speed of the search, at most 15 cells from sweep to sweep.
         pub search_speed_mps: f64 = 28.6, "m/s", (0 to 1000), SIMULATED;
-        /// Starts nearer to each other are one.
+        /// Starts nearer to each other count as one.
         pub start_spacing_m: f64 = 0.225, "m", (0 to 10), SIMULATED;
         /// A start is first tried with every k-th return.
         pub start_stride: u32 = 3, "returns", (1 to 96), SIMULATED;
 
-        /// Mean residual at rest from which on a column may belong to a part that moves.
+        /// Minimum mean residual at rest of a column that may belong to a moving part.
         pub column_residual: f32 = 0.15, "", (0 to 1), SIMULATED;
-        /// Returns of a column that are looked at for that.
+        /// Returns of a column examined for that.
         pub column_returns: u32 = 4, "returns", (1 to 1000), SIMULATED;
-        /// Columns in which nothing was hit in sweeps that are older by so much, as far as they are
-        /// remembered, may belong to a part that moves, too.
+        /// Columns in which nothing was hit in sweeps that are older by at least this much, as far
+        /// as they are remembered, may also belong to a moving part.
         pub part_since_s: f64 = 0.25, "s", (0 to 10),
             "Columns of people who walk on `kitti_raw_0005` (94), found with a margin of 0: 14 at \
              10 s, where nothing is remembered, 26 at 0.15 s, 37 here, 33 at 0.4 s.";
-        /// By how much the evidence of such a part must exceed what the test asks for: what comes
-        /// out of a shadow was not there before, too.
+        /// How much the evidence of such a part must exceed what the test requires: anything that
+        /// comes out of a shadow was not there before either.
         pub part_since_margin: f32 = 0.1, "", (0 to 1),
             "Columns true / false of two simulated drives (`raywake-lab sim --drives 2 --sweeps 20 \
              --seed 1100`): 9,073 / 318 without such parts, 9,073 / 397 at 0, 9,073 / 320 here. Of \
              the 94 of people as above 37 at 0, 0.05 and here, 29 at 0.15.";
-        /// By how much the motion of a part may fit a column beside it worse than rest does.
+        /// How much worse than rest the motion of a part may fit a column beside it.
         pub growth_residual: f32 = 0.03, "", (0 to 1), SIMULATED;
-        /// By how much the motion of its larger part may fit the remainder of a cluster worse than
-        /// rest does, and the motion of a body what could move and touches it.
+        /// How much worse than rest the motion of a cluster's larger part may fit the remainder of
+        /// it, and the motion of a body columns that could move and touch it.
         pub remainder_residual: f32 = 0.05, "", (0 to 1), SIMULATED;
         /// Share of a cluster's extent that a part must exceed to take the remainder along.
         pub remainder_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
-        /// Share of its returns that must be visible before rest is believed, and before a motion
-        /// of what could move is judged by those alone.
+        /// Share of a cluster's returns that must be visible before rest is accepted, and before a
+        /// motion of something that could move is judged by those alone.
         pub visible_ratio: f32 = 0.5, "", (0 to 1), SIMULATED;
         /// How far a fragment may lie from a moving cluster that takes it along.
         pub fragment_distance_m: f64 = 1.2, "m", (0 to 20), SIMULATED;
-        /// How far the ground that a moving cluster stands on reaches beyond its returns.
+        /// How far the ground under a moving cluster extends beyond its returns.
         pub footprint_margin_m: f64 = 0.1, "m", (0 to 5),
             "Of the matched columns of ground beside movers on `kitti_raw_0005`, labelled boxes \
              hold 589 so near to the returns registered and 65 are others; 467 and 12 at 0 m, 702 \
              and 293 at 0.2 m.";
 
-        /// Standard deviation of the displacement of what is static and fits perfectly.
+        /// Standard deviation of the displacement of a static cluster that fits perfectly.
         pub static_sigma_m: f64 = 0.0075, "m", (0.0001 to 10), CALIBRATED;
         /// The residual that doubles a variance.
         pub inflation_residual: f32 = 0.008, "", (0.0001 to 1), CALIBRATED;
         /// Area, range times edge of the footprint, at which the covariance of a perfect fit is
-        /// kept: a near cluster shows another side with every sweep, a small one has returns that
-        /// err alike.
+        /// left unchanged: a near cluster shows another side with every sweep, a small one has
+        /// returns whose errors are alike.
         pub confidence_m2: f64 = 0.117, "m²", (0.0001 to 1000), CALIBRATED;
-        /// Nearest range of a cluster for that: the vehicle's own sides.
+        /// Minimum range of a cluster for that: the vehicle's own sides.
         pub range_min_m: f64 = 2.1, "m", (0.1 to 100), SIMULATED;
         /// Standard deviation of a motion as a share of itself, however well it fits.
         pub motion_sigma_ratio: f32 = 0.01, "", (0 to 1), CALIBRATED;

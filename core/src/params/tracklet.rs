@@ -8,7 +8,7 @@ pub const CHI2_99_2DOF: f64 = 9.2103;
 /// Where a tracklet is born.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Birth {
-    /// At the target cell, the vehicle's present.
+    /// At the target cell, in the vehicle's present.
     Target,
     /// At the source cell: one step behind its first prediction, as the author's program does.
     Source,
@@ -31,33 +31,33 @@ impl Kind for Birth {
 }
 
 crate::params! {
-    /// The tracklet filter's numbers (section 3.6.1).
+    /// The tracklet filter's parameters (section 3.6.1).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TrackletParams {
-        /// Standard deviation of a measured position where the flow is in whole cells.
+        /// Standard deviation of a measured position if the flow is in whole cells.
         pub measurement_cells: f32 = 0.5, "cells", (above 0), "Half a cell, whatever its size.";
         /// Standard deviation of the error of the poses from one sweep to the next, added to the
         /// covariance of a displacement, which is relative to the poses.
         pub pose_noise_m: f32 = 0.005, "m", (0 to 1),
             "A guess, which `innovation_sweeps` corrects.";
-        /// Process noise of the speed: standard deviation of its change in a second.
+        /// Process noise of the speed: standard deviation of its change in one second.
         pub speed_noise_mps2: f32 = 1.0, "m/s²", (above 0);
-        /// Process noise of the turn rate: standard deviation of its change in a second.
+        /// Process noise of the turn rate: standard deviation of its change in one second.
         pub turn_noise_radps2: f32 = 0.6, "rad/s²", (above 0);
         /// Standard deviation of the turn rate at birth.
         pub turn_birth_radps: f32 = 0.2, "rad/s", (above 0);
-        /// Limit of the squared Mahalanobis distance of an innovation (3.25).
+        /// Limit on the squared Mahalanobis distance of an innovation (3.25).
         pub gate_d2: f32 = CHI2_99_2DOF as f32, "", (above 0),
             "99 % quantile of chi-square with two degrees of freedom.";
-        /// Sweeps over which the normalised innovations squared of a tracklet scale its noise, as
-        /// an exponential mean; 0: noise as assumed.
+        /// Sweeps over which the normalised innovations squared of a tracklet, as an exponential
+        /// mean, scale its noise; 0: noise as assumed.
         pub innovation_sweeps: f32 = 8.0, "sweeps", (0 or 1 to 1000);
-        /// Least scale of the noise: a few innovations may happen to be small.
+        /// Minimum scale of the noise: a few innovations may happen to be small.
         pub scale_min: f32 = 0.1, "", (0.0001 to 1);
-        /// Largest scale of the noise: one outlier must not open the gate ever wider.
+        /// Maximum scale of the noise: one outlier must not open the gate ever wider.
         pub scale_max: f32 = 10.0, "", (1 to 10000);
-        /// Time over which the first displacement of a tracklet at rest is taken to have happened,
-        /// at most; whole cells only, as finer displacements show at once.
+        /// Maximum time over which the first displacement of a tracklet at rest is taken to have
+        /// happened; whole cells only, as finer displacements show at once.
         pub departure_s: f32 = 1.0, "s", (0.001 to 100);
         /// Where a tracklet is born.
         pub birth: Birth = Birth::Target, "", (any),

@@ -1,4 +1,4 @@
-//! Several returns at once: where they lie in the window.
+//! Placing several returns in the window at once.
 
 use super::{Drift, FAR, ToVoxel};
 use crate::params::{EXTENT_VOXELS, SLOTS};
@@ -6,44 +6,44 @@ use crate::record::NONE;
 use crate::sweep::Point;
 use core::array::from_fn;
 
-/// Returns that are placed together.
+/// Number of returns placed together.
 pub(super) const LANES: usize = 8;
 
-/// Returns that wait to be placed.
+/// Returns waiting to be placed.
 pub(super) struct ReturnBatch {
     pub len: usize,
-    /// Position of each in the vehicle frame by axis, m.
+    /// Position of each in the vehicle frame, by axis, m.
     position: [[f32; LANES]; 3],
-    /// When each was, slots from the beginning of the sweep.
+    /// Time of each, slots from the beginning of the sweep.
     pub when: [f32; LANES],
-    /// The slot it is moved with.
+    /// The slot whose motion is applied to it.
     pub slot: [usize; LANES],
     pub sensor: [usize; LANES],
-    /// Whether it lies on the own vehicle.
+    /// Whether it lies on the ego vehicle.
     pub own: [bool; LANES],
-    /// Its place in the sweep.
+    /// Its index in the sweep.
     pub index: [usize; LANES],
 }
 
-/// Where the returns of a batch lie.
+/// Positions of the returns of a batch.
 pub(super) struct PlacedBatch {
-    /// Voxel of each by axis.
+    /// Voxel of each, by axis.
     pub end: [[i32; LANES]; 3],
     /// Whether that is farther than rays can reach.
     pub far: [bool; LANES],
     /// Column of each, or [`NONE`].
     pub column: [u32; LANES],
-    /// Place of each by axis, voxels, at its own time.
+    /// Position of each, by axis, voxels, at its own time.
     pub at: [[f32; LANES]; 3],
 }
 
-/// The window that returns are placed in.
+/// The window in which returns are placed.
 pub(super) struct RayLattice {
     pub side: u32,
     pub levels: u32,
     /// Its central voxel.
     pub centre: [i32; 3],
-    /// To voxels from that one, for each slot.
+    /// Transform to voxels relative to that one, for each slot.
     pub to_voxel: [ToVoxel; SLOTS],
     pub drift: Drift,
 }
@@ -61,7 +61,7 @@ impl ReturnBatch {
         }
     }
 
-    /// Adds a return to a batch that is not full. Returns whether it is now.
+    /// Adds a return to a batch that is not full. Returns whether it is full now.
     #[inline]
     pub fn push(&mut self, index: usize, point: &Point, own: bool, when: f32, slot: usize) -> bool {
         let n = self.len;
@@ -76,7 +76,7 @@ impl ReturnBatch {
 }
 
 impl RayLattice {
-    /// Places a batch. What lies beyond its length is of no meaning.
+    /// Places a batch. Entries beyond its length are meaningless.
     #[inline(always)]
     pub fn place(&self, batch: &ReturnBatch) -> PlacedBatch {
         let mut out = PlacedBatch {

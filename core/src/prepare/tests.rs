@@ -1,4 +1,4 @@
-//! Rays of simple sweeps, by hand.
+//! Rays of simple sweeps, worked out by hand.
 
 extern crate std;
 use super::*;
@@ -84,7 +84,7 @@ fn a_sweep_beyond_the_capacity_is_thinned_evenly() {
     let points: Vec<Point> = (0..150).map(|n| at(1.0 + 0.1 * n as f32, 6.0, 0.0)).collect();
     let out = run(&profile, &rig(Timing::AtStamp), Pose::IDENTITY, Twist::ZERO, &points);
     assert_eq!((out.dropped.over_capacity, out.rays.len()), (50, 100));
-    // The first and the last lie two thirds of a return from the sweep's ends at most.
+    // The first and the last lie at most two thirds of a return from the sweep's ends.
     let [first, last] = [out.placed[0], out.placed[99]].map(|p| p.at[0]);
     assert!((last - first - 148.0 * 0.1 / 0.3).abs() < 0.5, "{first} {last}");
 }
@@ -120,7 +120,7 @@ fn static_points_keep_their_lattice_cell() {
 
 #[test]
 fn a_return_is_placed_at_its_own_time() {
-    // A fast, turning vehicle sees a post at any time of its turn: always at the same place.
+    // A fast, turning vehicle sees a post at any time of a revolution: always at the same place.
     let profile = Profile::hdl64();
     let twist = Twist { linear: DVec3::new(20.0, 1.0, 0.0), angular: DVec3::Z * 0.5 };
     let post = DVec3::new(9.0, -14.0, 0.4);
@@ -137,11 +137,11 @@ fn a_return_is_placed_at_its_own_time() {
         assert!((placed.offset_s - *t as f32).abs() < 1e-6);
         for a in 0..3 {
             let at = f64::from(placed.at[a]) - 0.5 - f64::from(centre[a]);
-            // By slots it would be 1 cm.
+            // Slot by slot the error would be 1 cm.
             assert!((at * profile.voxel_m - post[a]).abs() < 1e-3, "{placed:?}");
         }
     }
-    // The direction of a return tells its time where nothing else does.
+    // The direction of a return gives its time if nothing else does.
     let timing = Timing::Azimuth { span_s: 0.1 };
     let around: Vec<Point> = (0..500)
         .map(|n| {
@@ -161,7 +161,7 @@ fn azimuth_moves_points_and_origins() {
     let profile = Profile::hdl64();
     let rig = rig(Timing::Azimuth { span_s: 0.1 });
     let twist = Twist { linear: DVec3::new(12.0, 0.0, 0.0), angular: DVec3::ZERO };
-    // Just left of the rear: the start of the turn, 50 ms before the stamp.
+    // Just left of the rear: the start of the revolution, 50 ms before the stamp.
     let points = [at(-20.0, 0.05, 0.0), at(20.0, 0.0, 0.0), at(-20.0, -0.05, 0.0)];
     let out = run(&profile, &rig, Pose::IDENTITY, twist, &points);
     let x = |n: usize| ray_end(out.rays[n])[0] - 83;

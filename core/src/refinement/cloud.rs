@@ -1,4 +1,4 @@
-//! What clusters are made of and compared with: the returns of a sweep, and its rays.
+//! What clusters are made of and compared with: the returns of a sweep and its rays.
 
 use super::cloud_detail::CloudDetail;
 use super::places::{MomentSums, Moments, Nearest};
@@ -31,7 +31,7 @@ impl Scratch {
     }
 }
 
-/// Thinned returns of one sweep, voxels from the window's corner, and its rays: what clusters of
+/// Thinned returns of one sweep, in voxels from the window's corner, and its rays: what clusters of
 /// another sweep are compared with.
 pub struct Cloud {
     /// Columns along an axis of the window.
@@ -40,10 +40,10 @@ pub struct Cloud {
     pub corner: [i32; 3],
     /// Time of the sweep, s.
     pub stamp_s: f64,
-    /// The instructions it is searched with.
+    /// The instruction set it is searched with.
     pub simd: Simd,
     thinned: ThinnedReturns,
-    /// Its rays, those of the ground among them.
+    /// Its rays, including those that hit the ground.
     pub sightlines: Sightlines,
 }
 
@@ -63,12 +63,12 @@ impl Deref for DetailedCloud<'_> {
 }
 
 impl DetailedCloud<'_> {
-    /// Levels of a column in which something was hit, a bit each.
+    /// Levels of a column in which something was hit, one bit each.
     pub fn levels(&self, column: usize) -> u32 {
         self.detail.levels[column]
     }
 
-    /// Whether something was hit in the voxel of a place.
+    /// Whether something was hit in the voxel that contains a place.
     pub fn is_hit(&self, at: [f32; 3]) -> bool {
         let Some(column) = self.column_at([at[0], at[1]]) else { return false };
         let height = self.detail.ground.above(column, at[2]);
@@ -76,7 +76,7 @@ impl DetailedCloud<'_> {
         in_levels && self.levels(column) >> height as u32 & 1 != 0
     }
 
-    /// What the returns of its sensor around a return tell about the surface it lies on.
+    /// What the surrounding returns of the same sensor say about the surface a return lies on.
     pub fn weight(&self, scaled: &Scaled, n: u32) -> SurfaceWeight {
         let around = |radius| self.sums_around(n as usize, radius);
         self.detail.weights[n as usize].get(|| surface::weight(scaled, around))
@@ -95,9 +95,8 @@ impl Cloud {
         }
     }
 
-    /// Takes over a sweep. `apart` becomes whether a return is of the ground, or higher than
-    /// clusters are. Returns how many returns were left out for want of room: those of the
-    /// last columns.
+    /// Takes over a sweep. `apart` is set to whether each return is ground or above the height of
+    /// clusters. Returns how many returns were dropped for lack of room: those of the last columns.
     pub(super) fn fill(
         &mut self,
         detail: &mut CloudDetail,
@@ -123,7 +122,7 @@ impl Cloud {
         dropped
     }
 
-    /// The column of a place, if that lies in the window.
+    /// The column of a place, if it lies in the window.
     pub fn column_at(&self, [x, y]: [f32; 2]) -> Option<usize> {
         let side = self.side as f32;
         let inside = x >= 0.0 && x < side && y >= 0.0 && y < side;
@@ -135,15 +134,15 @@ impl Cloud {
         self.thinned.start[column] as usize..self.thinned.start[column + 1] as usize
     }
 
-    /// Indices of the thinned returns in columns `j_from..j_to` of row `i`: they lie side by side.
+    /// Indices of the thinned returns in columns `j_from..j_to` of row `i`: they are contiguous.
     fn row(&self, i: usize, j_from: usize, j_to: usize) -> Range<usize> {
         let row = i * self.side;
         self.thinned.start[row + j_from] as usize..self.thinned.start[row + j_to] as usize
     }
 
-    /// The nearest return of a sensor closer than `reach` to `at`, 1 at most: its squared distance
-    /// (voxels²) and itself; of several as near, always the same. The first one found within
-    /// `enough` will do.
+    /// The nearest return of a sensor closer than `reach`, at most 1, to `at`, and its squared
+    /// distance (voxels²). Ties are broken deterministically. The search may stop at the first
+    /// return found within `enough`.
     pub fn nearest(&self, at: [f32; 3], sensor: u32, reach: [f32; 2]) -> Option<(f32, CloudPoint)> {
         let found = self.simd.run(
             #[inline(always)]
@@ -164,19 +163,19 @@ impl Cloud {
         if !(near(at[0]) && near(at[1])) {
             return None;
         }
-        // One beyond the window on either side would still have neighbours inside.
+        // A place up to one voxel outside the window still has neighbours inside.
         let (i, j) = ((at[0] + 1.0) as usize, (at[1] + 1.0) as usize);
         let (j_from, j_to) = (j.saturating_sub(2), (j + 1).min(self.side));
         let mut nearest = Nearest::within(reach * reach);
         let mut least = reach * reach;
         let (in_row, in_column) = (at[0] + 1.0 - i as f32, at[1] + 1.0 - j as f32);
-        // The row it lies in first: what is found there often excludes the others.
+        // The row it lies in first: what is found there often rules out the others.
         for (row, gap) in [(i, 0.0), (i.wrapping_sub(1), in_row), (i + 1, 1.0 - in_row)] {
             let row = row.wrapping_sub(1);
             if row >= self.side || gap * gap >= least {
                 continue;
             }
-            // In a column so far off nothing can be nearer.
+            // A column this far off cannot hold a nearer return.
             let left = gap * gap + in_column * in_column < least;
             let right = gap * gap + (1.0 - in_column) * (1.0 - in_column) < least;
             let from = if left { j_from } else { j.saturating_sub(1).max(j_from) };

@@ -1,4 +1,4 @@
-//! What only clouds of a pair's two sweeps have.
+//! Data that only the clouds of a pair's two sweeps have.
 
 use super::surface::LazyWeight;
 use super::sweep_returns::SweepReturns;
@@ -7,10 +7,10 @@ use crate::ground::{GroundEstimator, GroundHeights};
 use crate::params::{ANCHOR_ABOVE_GROUND_M, CLOUD_MAX, COLUMNS_MAX};
 use crate::record::NONE;
 
-/// What is kept besides of the two sweeps of a pair.
+/// What is additionally kept for the two sweeps of a pair.
 pub struct CloudDetail {
     pub ground: GroundHeights,
-    /// Levels above the ground of each column in which something was hit, a bit each.
+    /// Levels above the ground in which something was hit, one bit each, by column.
     pub levels: [u32; COLUMNS_MAX],
     pub weights: [LazyWeight; CLOUD_MAX],
 }

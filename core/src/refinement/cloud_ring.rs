@@ -11,9 +11,9 @@ use crate::team::Team;
 
 pub type Targets<'a> = heapless::Vec<Target<'a>, TARGETS_MAX>;
 
-/// Sweeps of which detail is kept: those of a pair.
+/// Number of sweeps that detail is kept for: those of a pair.
 const DETAILS: usize = 2;
-/// Sweeps after which one is kept again where another was, and its detail, too.
+/// Number of sweeps after which the slots of both a cloud and its detail repeat.
 const CYCLE: usize = REFINEMENT_SWEEPS_MAX * DETAILS;
 
 /// The last sweeps.
@@ -22,7 +22,7 @@ pub struct CloudRing {
     details: [CloudDetail; DETAILS],
     /// Sweeps held in `clouds`.
     held: usize,
-    /// The newest sweep's number in its cycle: the rest by the length of either array is its place.
+    /// The newest sweep's number in its cycle: modulo the length of either array it is its slot.
     newest: usize,
 }
 
@@ -40,7 +40,7 @@ impl CloudRing {
         self.held = 0;
     }
 
-    /// Inserts a sweep instead of the oldest: see [`Cloud::fill`].
+    /// Inserts a sweep in place of the oldest: see [`Cloud::fill`].
     pub fn insert(
         &mut self,
         team: &impl Team,
@@ -56,7 +56,7 @@ impl CloudRing {
         cloud.fill(detail, team, scaled, returns, apart, scratch)
     }
 
-    /// The cloud `age` sweeps before the newest, with the detail of one of the pair's.
+    /// The cloud `age` sweeps before the newest; the detail is only its own for sweeps of the pair.
     fn of_age(&self, age: usize) -> DetailedCloud<'_> {
         let number = self.newest + CYCLE - age;
         let cloud = &self.clouds[number % REFINEMENT_SWEEPS_MAX];
@@ -73,14 +73,14 @@ impl CloudRing {
         self.of_age(0)
     }
 
-    /// From the stamp of the newest pair's first sweep to that of its second, s; nothing where
+    /// Time from the stamp of the newest pair's first sweep to that of its second, s; `None` if
     /// there is no pair.
     pub fn span_s(&self) -> Option<f64> {
         (self.held >= 2).then(|| self.second().stamp_s - self.first().stamp_s)
     }
 
-    /// What clusters of the first sweep are compared with: the second, and every other sweep before
-    /// the first.
+    /// What clusters of the first sweep are compared with: the second sweep and every other sweep
+    /// before that.
     pub fn targets(&self, span_s: f64) -> Targets<'_> {
         let first = self.first();
         let ages = (0..self.held).step_by(2).map(|age| self.of_age(age).cloud);

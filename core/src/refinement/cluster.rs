@@ -5,17 +5,17 @@ use super::sample::{CloudPoint, Mean};
 use super::scans::{Scans, Target};
 use crate::params::COLUMNS_MAX;
 
-/// Returns of a cluster that are registered, at most; as many of the second sweep are registered
-/// back. Bounds the time a cluster takes.
+/// Maximum number of a cluster's returns that are registered; up to as many of the second sweep
+/// are registered back. Bounds the time a cluster takes.
 pub const SAMPLES_MAX: usize = 96;
-/// Columns of the second sweep that are looked at, at most; bounds the stack.
+/// Maximum number of columns of the second sweep that are examined; bounds the stack.
 const TARGET_COLUMNS_MAX: usize = 1024;
-/// Residual from which on a return is rather missed than found.
+/// Residual from which a return counts as missed rather than found.
 const HALF_MISSED: f32 = 0.5;
 
 pub type CloudPoints = heapless::Vec<CloudPoint, SAMPLES_MAX>;
 
-/// Columns that were visited, a bit each: small enough for a stack.
+/// Columns that were visited, one bit each: small enough for the stack.
 pub struct VisitedColumns([u64; COLUMNS_MAX.div_ceil(64)]);
 
 impl VisitedColumns {
@@ -23,7 +23,7 @@ impl VisitedColumns {
         VisitedColumns([0; COLUMNS_MAX.div_ceil(64)])
     }
 
-    /// Adds a column. Returns whether it was not among them.
+    /// Adds a column. Returns whether it was new.
     fn insert(&mut self, column: usize) -> bool {
         let (word, bit) = (&mut self.0[column / 64], 1 << (column % 64));
         let first = *word & bit == 0;
@@ -36,11 +36,11 @@ impl VisitedColumns {
     }
 }
 
-/// Residuals in one sweep of what can be seen there.
+/// Residuals in one sweep, of the returns that can be seen there.
 #[derive(Clone, Copy)]
 pub struct SeenResidual {
     mean: Mean,
-    /// The share of the returns that can be seen.
+    /// Share of the returns that can be seen.
     visible: f32,
 }
 
@@ -54,12 +54,12 @@ pub struct Cluster<'a> {
     pub centre: [f32; 2],
     /// Largest extent along an axis, voxels.
     pub extent: f32,
-    /// Whether the encoder takes it rather for what could move, or it moved in the last sweep.
+    /// Whether the encoder takes it for something that could move, or it moved in the last sweep.
     pub could_move: bool,
 }
 
 impl<'a> Cluster<'a> {
-    /// Of some columns of the first sweep.
+    /// A cluster of some columns of the first sweep.
     pub fn new(scans: Scans<'a>, columns: &'a [u32]) -> Cluster<'a> {
         let first = scans.first;
         let returns = || columns.iter().flat_map(|c| first.column(*c as usize));
@@ -72,21 +72,23 @@ impl<'a> Cluster<'a> {
             along(a).fold(f32::NEG_INFINITY, f32::max) - along(a).fold(f32::INFINITY, f32::min)
         });
         let extent = extent[0].max(extent[1]);
-        // Rather than not. At 1 nat recall at a precision of 95 % is 0.1 points lower (streets).
+        // More likely than not. With a threshold of 1 nat, recall at a precision of 95 % is 0.1
+        // points lower (streets).
         let could_move = columns.iter().map(|c| scans.could_move(*c as usize)).sum::<f32>() > 0.0;
         Cluster { scans, columns, samples, centre, extent, could_move }
     }
 
-    /// Distance from the middle of the window, where the vehicle is, voxels, but not below the
-    /// least range there is.
+    /// Distance from the middle of the window, where the vehicle is, voxels, but not less than the
+    /// minimum range.
     pub fn range(&self) -> f32 {
         let middle = 0.5 * self.scans.first.side as f32;
         let [x, y] = self.centre.map(|c| c - middle);
         libm::sqrtf(x * x + y * y).max(self.scans.scaled.range_min)
     }
 
-    /// Columns of the second sweep, beside those the cluster would be in, that have returns, and
-    /// how many. Of a cluster too large for the list the first columns tell enough.
+    /// Lists the columns of the second sweep that have returns and lie in or next to those the
+    /// cluster would be in; returns how many returns they have. If a cluster is too large for the
+    /// list, its first columns are enough.
     fn target_columns(
         &self,
         motion: &Motion,
@@ -129,9 +131,9 @@ impl<'a> Cluster<'a> {
         returns.step_by(stride).map(|n| cloud.sample(n)).collect()
     }
 
-    /// Mean truncated residual of a motion, both ways, 0 (all lie on something) to 1 (none does).
-    /// What comes to lie where nothing can be seen is missed, unless the cluster could move and
-    /// most of it is seen in the second sweep: behind a corner anything fits.
+    /// Mean truncated residual of a motion, both ways: 0 (all returns lie on something) to 1 (none
+    /// does). A return that ends up where nothing can be seen counts as missed, unless the cluster
+    /// could move and most of it is seen in the second sweep: behind a corner anything fits.
     pub fn residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
         if self.could_move {
             let (residual, visible) = self.seen_residual(motion, visited);
@@ -150,7 +152,7 @@ impl<'a> Cluster<'a> {
         let mut mean = Mean::default();
         for s in self.samples.iter().step_by(target.stride()) {
             let [x, y, _] = target.predict(s, motion);
-            // What has just come into the window was beyond it before.
+            // What has just entered the window was outside it before.
             if target.index > 0 && target.cloud.column_at([x, y]).is_none() {
                 continue;
             }
@@ -160,7 +162,7 @@ impl<'a> Cluster<'a> {
         mean
     }
 
-    /// The same by what can be seen, and the share of the returns of which that can.
+    /// The same from the returns that can be seen, and their share of all returns.
     fn seen_in(&self, target: &Target, motion: &Motion) -> SeenResidual {
         let mut mean = Mean::default();
         let looked_at = self.samples.iter().step_by(target.stride());
@@ -170,7 +172,7 @@ impl<'a> Cluster<'a> {
         SeenResidual { mean, visible: mean.count / count.max(1) as f32 }
     }
 
-    /// Whether that share of its returns is most of them.
+    /// Whether this share of its returns counts as most of them.
     fn is_most(&self, visible: f32) -> bool {
         visible > self.scans.scaled.params.visible_ratio
     }
@@ -182,14 +184,14 @@ impl<'a> Cluster<'a> {
             let at = target.retrace(q, motion);
             let found = scans.first.nearest(at, q.sensor, scans.reach_inlier());
             let residual = scans.residual(scans.second(), q, at, found);
-            // What is static was there before.
+            // Static structure was there before.
             if residual < HALF_MISSED || !self.was_there(q) {
                 mean.add(residual);
             }
         }
     }
 
-    /// The same by what can be seen.
+    /// The same from the returns that can be seen.
     fn add_seen_back(&self, mean: &mut Mean, motion: &Motion, visited: &mut VisitedColumns) {
         let (scans, target) = (&self.scans, &self.scans.targets[0]);
         for q in &self.target_samples(motion, visited) {
@@ -200,8 +202,8 @@ impl<'a> Cluster<'a> {
         }
     }
 
-    /// [`Cluster::seen_residual`] at rest. `in_earliest` is [`Cluster::seen_in_earliest`], where
-    /// that is known.
+    /// [`Cluster::seen_residual`] at rest. `in_earliest` is [`Cluster::seen_in_earliest`], if that
+    /// is known.
     pub fn static_residual(
         &self,
         in_earliest: Option<SeenResidual>,
@@ -210,9 +212,9 @@ impl<'a> Cluster<'a> {
         self.residual_after(in_earliest, &Motion::around(self.centre), visited)
     }
 
-    /// The residual at rest to compare that of a motion with, without the sweeps that show little
-    /// of where the cluster would have been: they may show all of it at rest, and then tell of
-    /// that alone.
+    /// The residual at rest to compare with that of a motion. It leaves out the sweeps that show
+    /// little of where the cluster would have been: they may show all of it at rest, and would then
+    /// contribute to that residual only.
     pub fn compared_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> f32 {
         let rest = Motion::around(self.centre);
         let mut mean = Mean::default();
@@ -225,29 +227,29 @@ impl<'a> Cluster<'a> {
         mean.value()
     }
 
-    /// The residual of its returns at rest in the second sweep alone, 0 where none can be seen.
+    /// The residual of its returns at rest in the second sweep alone, 0 if none can be seen.
     pub fn second_residual(&self) -> f32 {
         self.seen_in(&self.scans.targets[0], &Motion::around(self.centre)).mean.value()
     }
 
-    /// Residuals at rest in the earliest sweep, if that is one before the pair.
+    /// Residuals at rest in the earliest sweep, if that is before the pair.
     pub fn seen_in_earliest(&self) -> Option<SeenResidual> {
         let [_, .., earliest] = self.scans.targets else { return None };
         Some(self.seen_in(earliest, &Motion::around(self.centre)))
     }
 
-    /// The mean of those, if most can be seen there.
+    /// The mean of those, if most returns can be seen there.
     pub fn standing_residual(&self, in_earliest: SeenResidual) -> Option<f32> {
         self.is_most(in_earliest.visible).then(|| in_earliest.mean.value())
     }
 
-    /// The residual of a motion, by what can be seen, 0 where nothing can; and the share of its
-    /// returns that can be seen in the second sweep.
+    /// The residual of a motion over the returns that can be seen, 0 if none can, and the share of
+    /// its returns that can be seen in the second sweep.
     pub fn seen_residual(&self, motion: &Motion, visited: &mut VisitedColumns) -> (f32, f32) {
         self.residual_after(None, motion, visited)
     }
 
-    /// The same where that in the earliest sweep may be known.
+    /// The same if the residuals in the earliest sweep may already be known.
     fn residual_after(
         &self,
         earliest: Option<SeenResidual>,
@@ -269,7 +271,7 @@ impl<'a> Cluster<'a> {
         (mean.value(), visible)
     }
 
-    /// Whether something was where a return of the second sweep is.
+    /// Whether something was already where a return of the second sweep is.
     fn was_there(&self, q: &CloudPoint) -> bool {
         let at = self.scans.targets[0].retrace(q, &Motion::default());
         let truncation = self.scans.scaled.truncation;

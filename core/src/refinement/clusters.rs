@@ -1,5 +1,5 @@
-//! The clusters of a pair's first sweep: as they touch, then their moving parts, then what those
-//! take along.
+//! The clusters of a pair's first sweep: columns that touch, then their moving parts, then what
+//! those take along.
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::cues::{ColumnCues, Cues, Looks, Prediction};
@@ -12,19 +12,19 @@ use crate::params::{CLUSTERS_MAX, COLUMNS_MAX};
 use crate::record::{Flow, NONE, VALID};
 use crate::team::{Team, fill, share};
 
-/// Moving clusters near a fragment that are tried; the first ones are enough.
+/// Maximum number of moving clusters near a fragment that are tried; the first ones are enough.
 const NEIGHBOURS_MAX: usize = 8;
 
-/// The clusters, and what became of them.
+/// The clusters and what was found about each.
 pub struct Clusters {
     segments: Segments,
     /// Cluster of each column of the first sweep's window.
     of_column: [u32; COLUMNS_MAX],
     found: heapless::Vec<Hypothesis, CLUSTERS_MAX>,
     column_cues: [ColumnCues; COLUMNS_MAX],
-    /// Columns of those that there was no room for.
+    /// Number of columns in clusters that there was no room for.
     pub beyond: usize,
-    /// Columns that may be part of something that moves, a bit each.
+    /// Columns that may be part of something that moves, one bit each.
     suspects: [u64; COLUMNS_MAX.div_ceil(64)],
 }
 
@@ -46,12 +46,12 @@ impl Clusters {
         self.of_column.fill(NONE);
     }
 
-    /// What became of the cluster of a column.
+    /// What was found about the cluster of a column.
     pub fn of(&self, column: usize) -> Option<&Hypothesis> {
         self.found.get(*self.of_column.get(column)? as usize)
     }
 
-    /// What tells whether a column moves.
+    /// The cues to whether a column moves.
     pub fn cues(&self, column: usize) -> Cues {
         let of_column = self.column_cues.get(column).unwrap_or(&ColumnCues::NONE);
         match self.of(column) {
@@ -61,18 +61,18 @@ impl Clusters {
         }
     }
 
-    /// Whether a column is of a cluster that was seen to come from elsewhere.
+    /// Whether a column belongs to a cluster that was seen to come from elsewhere.
     pub fn came(&self, column: usize) -> bool {
         self.of(column).is_some_and(|f| f.is_dynamic && f.came())
     }
 
-    /// What became of all of them.
+    /// What was found about all of them.
     #[cfg(test)]
     pub fn found(&self) -> &[Hypothesis] {
         &self.found
     }
 
-    /// Finds the clusters and their motion. `flow` is the match of a column, `predicted` what
+    /// Finds the clusters and their motion. `flow` gives the match of a column, `predicted` what
     /// its tracklet predicts.
     pub fn find(
         &mut self,
@@ -94,7 +94,7 @@ impl Clusters {
             flow(c) & VALID != 0
                 && scans.column_residual(c, |s| scans.static_residual(s)) > params.column_residual
         });
-        // Who walks beside a wall moves by less than a column from sweep to sweep.
+        // Someone walking beside a wall moves by less than a column from sweep to sweep.
         self.find_moving_parts(team, scans, flow, predicted, params.part_since_margin, |c| {
             !scans.stays(c) && history.is_new(scans.first, c, params.part_since_s)
         });
@@ -110,7 +110,7 @@ impl Clusters {
         let (of_column, found) = (&self.of_column, &self.found);
         let cues = |c: usize| {
             let found = found.get(of_column[c] as usize);
-            // What neither moves nor did tells nothing.
+            // A cluster that neither moves nor did before provides no cues.
             let found = found.filter(|f| f.is_dynamic || f.cues.share > 0.0);
             found.map_or(ColumnCues::NONE, |f| ColumnCues {
                 misfit: scans.misfit(c, &f.motion),
@@ -124,7 +124,7 @@ impl Clusters {
         });
     }
 
-    /// Appends the best motion of each segment to what was found.
+    /// Appends the hypothesis for each segment to `found`.
     fn test_segments(
         &mut self,
         team: &impl Team,
@@ -143,8 +143,8 @@ impl Clusters {
         });
     }
 
-    /// A static cluster may have parts that move: of its `suspect` columns, where the evidence
-    /// exceeds what the test asks for by `margin_min`.
+    /// Finds moving parts of static clusters: segments of their `suspect` columns for which the
+    /// evidence exceeds what the test asks for by `margin_min`.
     fn find_moving_parts(
         &mut self,
         team: &impl Team,
@@ -169,7 +169,7 @@ impl Clusters {
         self.keep_moving_parts(scans, whole);
     }
 
-    /// Keeps those parts, from the index `whole` on, that move, and grows them.
+    /// Keeps and grows the parts, from index `whole` on, that move.
     fn keep_moving_parts(&mut self, scans: Scans, whole: usize) {
         let mut kept = whole;
         for n in whole..self.found.len() {
@@ -188,8 +188,8 @@ impl Clusters {
         self.found.truncate(kept);
     }
 
-    /// What remains of a cluster with a moving part, and fragments beside others that move, go with
-    /// these where they fit.
+    /// Lets the remainder of a cluster with a moving part, and fragments next to moving clusters,
+    /// go with these if they fit.
     fn take_along(&mut self, scans: Scans) {
         let visited = &mut VisitedColumns::new();
         self.segments.find(&scans, |c| is_static(&self.of_column, &self.found, c), |_| 0);
@@ -209,8 +209,8 @@ impl Clusters {
         }
     }
 
-    /// What could move and touches a cluster that moves goes with it where it fits about as well:
-    /// the sides of a bus slide along themselves, its ends tell.
+    /// Lets whatever could move and touches a moving cluster go with it if its motion fits about as
+    /// well as rest: the sides of a bus slide along themselves; only its ends show the motion.
     fn complete_bodies(
         &mut self,
         scans: Scans,
@@ -233,7 +233,7 @@ impl Clusters {
                 hypothesis::along_with(&rest, static_residual, body, predicted, visited)
             });
             let best = with.min_by(|a, b| a.cues.residual.total_cmp(&b.cues.residual));
-            // Without room for one more it stands.
+            // If there is no room for one more, it stays static.
             if best.is_some_and(|best| self.found.push(best).is_ok()) {
                 let id = self.found.len() as u32 - 1;
                 columns.iter().for_each(|c| self.of_column[*c as usize] = id);
@@ -241,8 +241,9 @@ impl Clusters {
         }
     }
 
-    /// Takes columns that could not move from clusters that do. A cluster of mostly such stands,
-    /// unless it was seen to come: what is like nothing that was learned may still move.
+    /// Takes columns that could not move out of moving clusters. A cluster consisting mostly of
+    /// such columns keeps them if it was seen to come from elsewhere: something unlike anything
+    /// learned may still move.
     fn leave_behind(&mut self, scans: Scans) {
         self.found.iter_mut().for_each(|f| f.likeness = 0);
         for c in 0..self.of_column.len() {
@@ -259,7 +260,7 @@ impl Clusters {
         }
     }
 
-    /// Finds what was hit before where moving clusters came to.
+    /// Finds what was hit before at the places that moving clusters came to.
     fn look_back(&mut self, scans: Scans, history: &History) {
         let (of_column, found) = (&self.of_column, &mut self.found);
         found.iter_mut().for_each(|f| f.looks = Looks::default());
@@ -270,7 +271,7 @@ impl Clusters {
         }
     }
 
-    /// The ground below a moving cluster, where nothing else stands, goes with it, unless the
+    /// Lets the ground below a moving cluster, where nothing else stands, go with it, unless the
     /// encoder takes it for road beside the cluster.
     fn cover_ground(&mut self, scans: Scans) {
         let (side, margin) = (scans.first.side, scans.scaled.footprint_margin);
@@ -296,7 +297,7 @@ impl Clusters {
         }
     }
 
-    /// Which of some moving clusters a fragment goes with.
+    /// Which of the nearby moving clusters a fragment goes with.
     fn joined(
         &self,
         fragment: &Cluster,
@@ -324,7 +325,7 @@ impl Clusters {
         best.1
     }
 
-    /// Moving clusters that have columns up to `reach` columns from those of a fragment.
+    /// Moving clusters that have columns within `reach` columns of those of a fragment.
     fn moving_neighbours(
         &self,
         scans: Scans,
@@ -350,13 +351,13 @@ impl Clusters {
     }
 }
 
-/// Whether a column is part of a cluster that is static.
+/// Whether a column is part of a static cluster.
 fn is_static(of_column: &[u32], found: &[Hypothesis], column: usize) -> bool {
     found.get(of_column[column] as usize).is_some_and(|f| !f.is_dynamic)
 }
 
-/// Gives columns of the `parent` beside one of its moving part to that if their returns fit its
-/// motion about as well as rest.
+/// Gives columns of the `parent` next to a column of its moving part to that part if their returns
+/// fit its motion about as well as rest.
 fn grow(
     scans: Scans,
     column: usize,

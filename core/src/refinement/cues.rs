@@ -1,22 +1,22 @@
-//! P(moves): whether what was found to move does.
+//! P(moves): whether what was found to move really does.
 //!
-//! The hypothesis test says what a cluster most likely did. How likely that is, is told by cues of
-//! the cluster and of the column, weighed by logistic regression (`raywake-lab train moves`). What
-//! pairs of sweeps tell adds up over time in two of them: the tracklets that moved before.
+//! The hypothesis test says what a cluster most likely did. How likely that is follows from cues of
+//! the cluster and of the column, weighted by logistic regression (`raywake-lab train moves`). Two
+//! of them accumulate evidence over time: those of the tracklets that moved before.
 
 use crate::params::MovesParams;
 
-/// The largest margin that counts: with more, it is plain.
+/// The largest margin that counts: beyond it the case is clear.
 const MARGIN_MAX: f32 = 0.5;
 
-/// The highest score of what could move that counts, nats: with more, it is plain. Not measured on
-/// its own.
+/// The largest score of what could move that counts, nats: beyond it the case is clear. Not tuned
+/// separately.
 const COULD_MOVE_MAX: f32 = 4.0;
 
-/// Looks at a voxel that count as having found nothing, so that few do not tell much.
+/// Pseudo-count added to the looks at voxels, so that few looks do not say much.
 const FEW_LOOKS: f32 = 8.0;
 
-/// Declares cues, each with the parameter that weighs it.
+/// Declares cues, each with the parameter that is its weight.
 macro_rules! cues {
     (
         $(#[$doc:meta])* pub struct $name:ident {
@@ -30,10 +30,10 @@ macro_rules! cues {
         }
 
         impl $name {
-            /// Nothing told.
+            /// No cue at all.
             pub const NONE: $name = $name { $($field: 0.0),* };
 
-            /// Names of the parameters that weigh them, in order.
+            /// Names of the parameters that are their weights, in order.
             pub const WEIGHTS: &[&str] = &[$(stringify!($weight)),*];
 
             /// Their values, in order.
@@ -49,34 +49,33 @@ macro_rules! cues {
 }
 
 cues! {
-    /// What tells whether a column moves.
+    /// Cues to whether a column moves.
     pub struct Cues {
-        /// Evidence of the cluster's motion beyond what the test asked for, at most 0.5.
+        /// Evidence for the cluster's motion beyond what the test asked for, at most 0.5.
         pub margin: moves_margin,
-        /// Share of the cluster's columns whose tracklets moved, of the quorum.
+        /// Share of the cluster's columns whose tracklets moved, relative to the quorum.
         pub share: moves_share,
-        /// Mean truncated residual of the motion, of rest where none was tried, 0 to 1.
+        /// Mean truncated residual of the motion, or of rest if none was tried, 0 to 1.
         pub residual: moves_residual,
         /// Logarithm of the number of returns that were registered.
         pub returns: moves_returns,
-        /// Mean logarithm of 1 + speed over its standard deviation, of the tracklets that moved.
+        /// Mean of log(1 + speed / its standard deviation) over the tracklets that moved.
         pub certainty: moves_certainty,
-        /// Of looks at the cluster's voxels in sweeps in which, by its motion, it was not there
-        /// yet, the share that found something.
+        /// Share of looks that found something, of those at the cluster's voxels in sweeps in
+        /// which, by its motion, it was not there yet.
         pub worn: moves_worn,
-        /// The share that found nothing.
+        /// Share of the same looks that found nothing.
         pub fresh: moves_fresh,
         /// By how much the column's own returns fit rest worse than the motion, -1 to 1.
         pub misfit: moves_misfit,
-        /// The encoder's score of what could move, nats: -4 to 4, 0 where it is not heard.
+        /// The encoder's score of what could move, nats: -4 to 4, 0 if it is ignored.
         pub could_move: moves_could_move,
-        /// 1 where the test found that it stands. Of the others only `share` and `could_move` tell
-        /// anything then.
+        /// 1 if the test found it static. Of the others only `share` and `could_move` are set then.
         pub stands: moves_stands,
     }
 }
 
-/// What a column tells beside its cluster.
+/// Cues of a column, in addition to those of its cluster.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ColumnCues {
     /// By how much its returns fit rest worse than its cluster's motion.
@@ -86,12 +85,12 @@ pub(super) struct ColumnCues {
 }
 
 impl ColumnCues {
-    /// Nothing told.
+    /// No cue at all.
     pub const NONE: ColumnCues = ColumnCues { misfit: 0.0, could_move: 0.0 };
 }
 
 impl Cues {
-    /// Of a cluster; those of a column are missing.
+    /// Cues of a cluster, without those of a column.
     pub(super) fn of_cluster(margin: f32, residual: f32, returns: usize, prior: &Prior) -> Cues {
         Cues {
             margin: margin.min(MARGIN_MAX),
@@ -107,13 +106,13 @@ impl Cues {
         }
     }
 
-    /// Of what stands, with this [`Cues::share`] and [`Cues::could_move`].
+    /// Cues of something static, with this [`Cues::share`] and [`Cues::could_move`].
     pub(super) fn standing(share: f32, could_move: f32) -> Cues {
         Cues { share, stands: 1.0, ..Cues::NONE }
             .with(ColumnCues { could_move, ..ColumnCues::NONE })
     }
 
-    /// The same with those of a column.
+    /// The same with the cues of a column.
     pub(super) fn with(self, ColumnCues { misfit, could_move }: ColumnCues) -> Cues {
         Cues { misfit, could_move: could_move.clamp(-COULD_MOVE_MAX, COULD_MOVE_MAX), ..self }
     }
@@ -125,12 +124,12 @@ impl Cues {
 }
 
 /// Looks at a cluster's voxels in sweeps in which, by its motion, it was not there yet, and how
-/// many found something.
+/// many of them found something.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Looks {
-    /// Voxels times sweeps.
+    /// Number of looks: voxels times sweeps.
     pub made: u32,
-    /// Those that found something.
+    /// How many found something.
     pub hits: u32,
 }
 
@@ -140,7 +139,7 @@ impl Looks {
         self.hits as f32 / (self.made as f32 + FEW_LOOKS)
     }
 
-    /// The same of looks that found nothing.
+    /// The same for looks that found nothing.
     pub fn fresh(&self) -> f32 {
         (self.made - self.hits) as f32 / (self.made as f32 + FEW_LOOKS)
     }
@@ -151,23 +150,24 @@ impl Looks {
 pub(crate) struct Prediction {
     /// Displacement, voxels.
     pub by: [f32; 2],
-    /// Logarithm of 1 + speed over its standard deviation.
+    /// log(1 + speed / its standard deviation).
     pub certainty: f32,
 }
 
 /// What the tracklets of a cluster predict.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Prior {
-    /// Mean displacement, voxels, if that is one.
+    /// Mean displacement, voxels, if it is large enough to count as one.
     pub by: Option<[f32; 2]>,
-    /// Share of its columns whose tracklets moved, of the quorum: 0 to 1.
+    /// Share of its columns whose tracklets moved, relative to the quorum: 0 to 1.
     pub share: f32,
-    /// Mean certainty of those.
+    /// Mean certainty of those tracklets.
     pub certainty: f32,
 }
 
 impl Prior {
-    /// Of `columns` columns with these predictions. Less than `least` is no displacement.
+    /// The prior of `columns` columns with these predictions. A displacement of less than `least`
+    /// does not count as one.
     pub fn of(
         columns: usize,
         quorum: f32,
@@ -214,7 +214,7 @@ mod tests {
             [0.0, 0.05, 0.5, 1.0, 1.0]
         );
         assert_eq!(prior(20, 0).by, Some([1.0, 0.0]));
-        // One that moves among many that rest is no displacement, and its certainty its own.
+        // One that moves among many at rest makes no displacement, and its certainty is its own.
         let one = prior(1, 39);
         assert_eq!((one.by, one.certainty), (None, 2.0));
         assert_eq!(prior(0, 40).certainty, 0.0);

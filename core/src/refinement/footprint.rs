@@ -1,4 +1,4 @@
-//! The ground a moving cluster stands on: the rectangle along its motion that holds its returns.
+//! The ground a moving cluster stands on: the rectangle along its motion that contains its returns.
 
 use super::motion::Motion;
 
@@ -7,7 +7,7 @@ use super::motion::Motion;
 pub struct Footprint {
     /// Unit vector of its first axis.
     along: [f32; 2],
-    /// Least and largest coordinate along both axes.
+    /// Smallest and largest coordinate along both axes.
     from: [f32; 2],
     to: [f32; 2],
 }
@@ -19,7 +19,7 @@ impl Default for Footprint {
 }
 
 impl Footprint {
-    /// Of nothing yet, along a motion.
+    /// An empty footprint, along a motion.
     pub fn along(motion: &Motion) -> Footprint {
         let by = motion.delta.xy();
         let along = if by.norm() > 0.0 { by.normalize().into() } else { [1.0, 0.0] };
@@ -31,20 +31,20 @@ impl Footprint {
         [c * x + s * y, c * y - s * x]
     }
 
-    /// Grows to hold a place.
+    /// Grows to contain a place.
     pub fn add(&mut self, at: [f32; 2]) {
         let at = self.coordinates(at);
         self.from = [0, 1].map(|a| self.from[a].min(at[a]));
         self.to = [0, 1].map(|a| self.to[a].max(at[a]));
     }
 
-    /// Whether a place is no farther outside than `margin`.
+    /// Whether a place is inside, or outside by no more than `margin`.
     pub fn holds(&self, at: [f32; 2], margin: f32) -> bool {
         let at = self.coordinates(at);
         (0..2).all(|a| at[a] >= self.from[a] - margin && at[a] <= self.to[a] + margin)
     }
 
-    /// Rows and columns of cells, fewer than `side`, among which are all it holds.
+    /// Ranges of rows and columns, below `side`, that include all the cells it holds.
     pub fn cells(&self, margin: f32, side: usize) -> [core::ops::Range<usize>; 2] {
         let [c, s] = self.along;
         let half = [0, 1].map(|a| 0.5 * (self.to[a] - self.from[a]) + margin);
@@ -53,7 +53,7 @@ impl Footprint {
         let reach = [c.abs() * half[0] + s.abs() * half[1], s.abs() * half[0] + c.abs() * half[1]];
         [0, 1].map(|a| {
             let [from, to] = [centre[a] - reach[a], centre[a] + reach[a] + 1.0];
-            // A negative or NaN limit is the first cell.
+            // A negative or NaN limit becomes the first cell.
             (from as usize).min(side)..(to as usize).min(side)
         })
     }

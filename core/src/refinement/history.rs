@@ -1,16 +1,16 @@
-//! Where something was hit in earlier sweeps: what moves comes to where nothing stood.
+//! Where something was hit in earlier sweeps: a moving object comes to where nothing stood.
 //!
-//! Registration looks at a few sweeps. What stands may be seen so differently from one to the next
-//! that a motion explains it better; but its places were hit long before the motion would have
-//! brought it there.
+//! Registration considers only a few sweeps. A static object may look so different from one sweep
+//! to the next that a motion explains it better; but its places were hit long before the motion
+//! would have brought it there.
 
 use super::cloud::{Cloud, DetailedCloud};
 use super::hypothesis::Hypothesis;
 use crate::params::{CLUSTER_LEVELS_MAX, COLUMNS_MAX};
 use crate::record::NONE;
 
-/// Sweeps before the pair's first that are remembered: of 0.6 s at 10 Hz. The vehicle ahead was
-/// where one is now a second ago, if it keeps its distance.
+/// Number of sweeps before the pair's first that are remembered: 0.6 s at 10 Hz. The vehicle ahead
+/// was where one is now a second ago, if it keeps its distance.
 const HISTORY: usize = 6;
 
 const _: () = assert!(CLUSTER_LEVELS_MAX == u32::BITS as usize);
@@ -46,8 +46,8 @@ impl History {
         (self.held, self.next) = (0, 0);
     }
 
-    /// Remembers a sweep instead of the oldest, without the columns of what was seen to come from
-    /// elsewhere: one that follows comes to where the other was.
+    /// Remembers a sweep in place of the oldest, without the columns of what was seen to come from
+    /// elsewhere: a vehicle that follows another comes to where that one was.
     pub fn push(&mut self, cloud: DetailedCloud, came: impl Fn(usize) -> bool) {
         let columns = cloud.side * cloud.side;
         let past = &mut self.sweeps[self.next];
@@ -58,8 +58,8 @@ impl History {
         self.held = (self.held + 1).min(HISTORY);
     }
 
-    /// Whether a column of the pair's first sweep holds something that came since: in no sweep at
-    /// least `since_s` older was anything hit there, and there was such a sweep.
+    /// Whether a column of the pair's first sweep holds something new: nothing was hit there in any
+    /// sweep at least `since_s` older, there is such a sweep, and each of them covers the column.
     pub fn is_new(&self, first: DetailedCloud, column: usize, since_s: f64) -> bool {
         let levels = first.levels(column);
         let at = [column / first.side, column % first.side];
@@ -69,8 +69,8 @@ impl History {
         levels != 0 && old.peek().is_some() && old.all(unseen)
     }
 
-    /// What the columns of moving clusters, those of the pair's first sweep, were before; the pair
-    /// spans `span_s`.
+    /// Counts what was hit before in the columns of the moving clusters of the pair's first sweep;
+    /// the pair spans `span_s`.
     pub fn find(
         &self,
         first: DetailedCloud,
@@ -88,7 +88,7 @@ impl History {
             let by = one.motion.of(at.map(|c| c as f32 + 0.5));
             for past in &self.sweeps[..self.held] {
                 let spans = ((first.stamp_s - past.stamp_s) / span_s) as f32;
-                // What was here then is now, if it is of this cluster, that much farther on.
+                // If what was here then is part of this cluster, it is now that much farther on.
                 let on = [0, 1].map(|a| at[a] as f32 + 0.5 + spans * by[a]);
                 if first.column_at(on).is_some_and(|on| of_column[on] == n) {
                     continue;
@@ -102,8 +102,8 @@ impl History {
 }
 
 impl Past {
-    /// Levels hit in a column of a later sweep's window, a level farther up and down, because the
-    /// ground is estimated anew in every sweep; nothing where the column lay outside.
+    /// Levels hit in a column of a later sweep's window, widened by a level up and down because the
+    /// ground is estimated anew in every sweep; `None` if the column lay outside.
     fn around(&self, later: &Cloud, at: [usize; 2]) -> Option<u32> {
         let here = |a: usize| at[a] as i32 + later.corner[a] - self.corner[a];
         let [i, j] = [here(0), here(1)];

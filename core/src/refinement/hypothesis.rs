@@ -1,10 +1,10 @@
 //! Static or dynamic: the motion that explains a cluster best, against rest.
 //!
-//! Two or three sweeps are thin evidence for the motion of a truck that drives alongside, because
-//! its side slides along itself. The prediction of its tracklets therefore acts as a prior: a
-//! cluster that keeps moving as predicted needs only a share of the evidence that one needs to
-//! start moving (`evidence_prior_ratio` of [`RefinementParams`](crate::params::RefinementParams)),
-//! and less still if it is long.
+//! Two or three sweeps are thin evidence for the motion of a truck driving alongside, because its
+//! side slides along itself. The prediction of its tracklets therefore acts as a prior: a cluster
+//! that keeps moving as predicted needs only a share of the evidence required to start moving
+//! (`evidence_prior_ratio` of [`RefinementParams`](crate::params::RefinementParams)), and even less
+//! if it is long.
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::cues::{Cues, Looks, Prediction, Prior};
@@ -17,32 +17,32 @@ use super::slide::slide;
 use super::starts::Votes;
 use crate::record::Flow;
 
-/// Displacements that many columns voted for, tried as starts. A choice of time: each start costs a
-/// registration.
+/// Number of displacements many columns voted for that are tried as starts. Limited to save time:
+/// each start costs a registration.
 const VOTED_STARTS: usize = 3;
-/// Beside them: rest, the prediction and the search.
+/// In addition to those: rest, the prediction and the search.
 const STARTS_MAX: usize = VOTED_STARTS + 3;
 /// A motion that fits badly is left to the parts of its cluster unless it has this many times the
 /// evidence.
 const BAD_FIT_EVIDENCE: f32 = 2.0;
 
-/// Share of `residual_static` up to which what stood in the earliest sweep, by far the longest time
-/// to move in, is not looked at any further.
+/// A cluster without a predicted displacement whose residual at rest in the earliest sweep, by far
+/// the longest time to move in, is below this share of `residual_static` is not examined further.
 const STANDING_RATIO: f32 = 0.5;
 
-/// Share of looks that found nothing from which on a cluster was seen to come: of clusters that
-/// move 0.9 in the median, of those that stand far from any 0.2, of a tenth of them more than 0.75
-/// (simulated drives).
+/// Share of looks that found nothing from which a cluster counts as seen to come. It is 0.9 in the
+/// median for clusters that move; for static ones far from any of those it is 0.2, and above 0.75
+/// for a tenth of them (simulated drives).
 const FRESH_MIN: f32 = 0.85;
 
-/// What became of a cluster.
+/// What was found about a cluster.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Hypothesis {
     /// The motion that explains it best.
     pub motion: Motion,
-    /// Whether it moved so, or was static.
+    /// Whether it moved like that, rather than being static.
     pub is_dynamic: bool,
-    /// Variance of whether it did: p (1 - p) where p is how likely that is.
+    /// Variance of that decision: p (1 - p), where p is the probability that it moved.
     pub variance: f32,
     /// Residual at rest.
     pub static_residual: f32,
@@ -50,13 +50,13 @@ pub struct Hypothesis {
     pub extent: f32,
     /// The cluster it is a part of, or itself.
     pub parent: u32,
-    /// What tells whether it moves; those of its columns are missing.
+    /// Cues to whether it moves, without those of its columns.
     pub cues: Cues,
-    /// How many more of its columns could move than could not, where it is dynamic.
+    /// How many more of its columns could move than could not, if it is dynamic.
     pub likeness: i32,
-    /// What was there before it came, where it is dynamic.
+    /// What was there before it came, if it is dynamic.
     pub looks: Looks,
-    /// The ground it stands on, where it is dynamic.
+    /// The ground it stands on, if it is dynamic.
     pub footprint: Footprint,
 }
 
@@ -66,8 +66,8 @@ impl Hypothesis {
         self.cues.fresh >= FRESH_MIN
     }
 
-    /// Whether it was seen to come and is like nothing that could move: the encoder, which learned
-    /// nothing like it, is not heard then.
+    /// Whether it was seen to come and resembles nothing that could move: the encoder, which
+    /// learned nothing like it, is ignored then.
     fn is_strange(&self) -> bool {
         self.likeness < 0 && self.came()
     }
@@ -77,24 +77,25 @@ impl Hypothesis {
         self.is_strange() || !scans.stays(column)
     }
 
-    /// The encoder's score of what could move of one of its columns, nats; 0 where it is not heard.
+    /// The encoder's score of what could move for one of its columns, nats; 0 if it is ignored.
     pub fn could_move(&self, scans: &Scans, column: usize) -> f32 {
         if self.is_strange() { 0.0 } else { scans.could_move(column) }
     }
 }
 
-/// Evidence for a motion against rest, by the residuals of both: 0 to 1.
+/// Evidence for a motion against rest, from the residuals of both: 0 to 1.
 pub fn evidence(rest: f32, moved: f32) -> f32 {
     if moved < rest { (1.0 - moved / rest) * libm::sqrtf(rest - moved) } else { 0.0 }
 }
 
-/// By how much more uncertain a motion is than its returns say, for how badly it fits them.
+/// Factor by which the variance of a motion is larger than its returns suggest, given how badly it
+/// fits them.
 pub fn variance_inflation(scaled: &Scaled, residual: f32) -> f32 {
     let ratio = residual / scaled.params.inflation_residual;
     1.0 + ratio * ratio
 }
 
-/// Whether two displacements are one start.
+/// Whether two displacements count as the same start.
 fn is_same(scaled: &Scaled, a: &[f32; 2], b: [f32; 2]) -> bool {
     (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) < scaled.start_spacing
 }
@@ -109,8 +110,8 @@ struct Trials<'a> {
 }
 
 impl Trials<'_> {
-    /// Registers the cluster from a start, with few returns, and with all of them where that leads
-    /// to a better fit than the best so far.
+    /// Registers the cluster from a start, with few returns, then with all of them if that leads to
+    /// a better fit than the best so far.
     fn start(&mut self, by: [f32; 2]) {
         let (cluster, scaled) = (self.cluster, self.cluster.scans.scaled);
         if self.tried.iter().any(|t| is_same(scaled, t, by)) {
@@ -134,8 +135,8 @@ impl Trials<'_> {
         }
     }
 
-    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; from
-    /// the best of these it slides along itself.
+    /// Tries rest, the prediction, what the columns voted for and, if nothing fits, a search; then
+    /// slides the cluster along itself from the best of these.
     fn run(&mut self, predicted: Option<[f32; 2]>, flow: impl Fn(usize) -> Flow) {
         let cluster = self.cluster;
         let params = &cluster.scans.scaled.params;
@@ -163,7 +164,7 @@ impl Trials<'_> {
     }
 }
 
-/// Tests whether a cluster is dynamic. `predicted` is what the tracklet of a column predicts,
+/// Tests whether a cluster is dynamic. `predicted` gives what the tracklet of a column predicts,
 /// `flow` the match of a column.
 pub fn test(
     mut cluster: Cluster,
@@ -174,7 +175,7 @@ pub fn test(
     let scaled = cluster.scans.scaled;
     let params = &scaled.params;
     let prior = prior_of(&cluster, predicted);
-    // What moved can.
+    // What moved before can move.
     cluster.could_move |= prior.share >= 1.0;
     let cluster = &cluster;
     let at_rest = |static_residual: f32| Hypothesis {
@@ -188,7 +189,7 @@ pub fn test(
         ),
         ..Hypothesis::default()
     };
-    // Too large or too small to move by itself: how well it fits only tells how certain that is.
+    // Too large or too small to move by itself: the fit only determines how certain that is.
     if cluster.extent > scaled.extent_max || cluster.samples.len() < params.returns_min as usize {
         return at_rest(cluster.second_residual());
     }
@@ -211,7 +212,7 @@ pub fn test(
     let mut trials = Trials { cluster, visited, tried, residual: static_residual, motion };
     trials.run(prior.by, flow);
     let Trials { residual, motion, visited, .. } = trials;
-    // Of all else what is not seen is missed.
+    // For all others, returns that are not seen count as missed.
     let static_residual = if cluster.could_move {
         cluster.compared_residual(&motion, visited)
     } else {
@@ -234,7 +235,7 @@ fn prior_of(cluster: &Cluster, predicted: impl Fn(usize) -> Option<Prediction>) 
     Prior::of(count, scaled.params.prior_quorum, scaled.displacement_min, predictions)
 }
 
-/// The rest of a body that moves, if it fits that motion about as well as rest, of which the
+/// The rest of a moving body, if it fits the body's motion about as well as being at rest, whose
 /// residual is `static_residual`.
 pub fn along_with(
     rest: &Cluster,
@@ -263,7 +264,7 @@ pub fn along_with(
     })
 }
 
-/// Whether a motion is believed, which takes `needed` evidence, and how uncertain it is.
+/// Decides whether a motion is accepted, which takes `needed` evidence, and how uncertain it is.
 fn decide(
     cluster: &Cluster,
     found: Hypothesis,
@@ -286,7 +287,7 @@ fn decide(
     }
 }
 
-/// A motion with the covariance that is put out, for how well it fits.
+/// A motion with the covariance that is output, given how well it fits.
 fn with_confidence(cluster: &Cluster, motion: Motion, residual: f32) -> Motion {
     let scaled = cluster.scans.scaled;
     let footprint = libm::sqrtf(cluster.columns.len() as f32);

@@ -1,36 +1,37 @@
-//! Refinement of the flow below the cell's size: clusters of returns, and how each of them moved.
+//! Refinement of the flow below cell size: clusters of returns, and how each of them moved.
 //!
-//! Cells of 0.3 m bound what whole displacements can tell; this stage goes back to the returns. It
-//! works on clusters rather than columns: all columns of a cluster share one rigid motion. It has
-//! no counterpart in the dissertation. Per pair of sweeps:
+//! Cells of 0.3 m limit what displacements by whole cells can express; this stage goes back to the
+//! returns. It works on clusters rather than columns: all columns of a cluster share one rigid
+//! motion. It has no counterpart in the dissertation. Per pair of sweeps:
 //!
-//! 1. Returns above the ground are thinned to one a sub-voxel ([`thinned_returns`]).
-//! 2. Columns that touch make a cluster ([`segments`]).
-//! 3. Each cluster is registered with the second sweep, and with one before the pair where
+//! 1. Returns above the ground are thinned to one per sub-voxel ([`thinned_returns`]).
+//! 2. Columns that touch form a cluster ([`segments`]).
+//! 3. Each cluster is registered with the second sweep, and with one before the pair if
 //!    [`refinement_sweeps`](crate::params::Profile::refinement_sweeps) allows ([`align`]):
 //!    generalised ICP with a Geman-McClure kernel, both ways, from several starts: rest, what its
-//!    tracklets predict, the displacements most of its columns found by energy minimisation and,
-//!    where none of these fits, a search. Its ends tell how far it slid along itself ([`slide`]).
-//! 4. A hypothesis test tells dynamic clusters from static ones ([`hypothesis`]): with r0 and r the
-//!    mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman, 2000),
-//!    the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair are
-//!    compared, the earlier one from 0.3 s before it at 10 Hz: who walks has moved by then. At rest
-//!    only what can be seen counts: where a return fits badly, or nothing is near, a ray must have
-//!    passed to tell ([`sightlines`]). Of a motion that holds, too, if the encoder says that the
-//!    cluster could move, or if it moved in the last sweep; of all else what comes to lie unseen is
-//!    missed, because behind a corner anything fits, but not what was beyond the window before the
-//!    pair. A cluster that moved in the last sweep needs less.
-//! 5. A static cluster may have a part that moves: columns that fit badly at rest, or that came to
-//!    where nothing was before. What remains of it, fragments beside it and what the encoder takes
-//!    for the rest of its body may go with that ([`clusters`]).
-//! 6. All columns of a dynamic cluster move with it, also those that the background filter took or
-//!    that found no match, and the ground below it ([`footprint`]), unless the encoder takes that
-//!    for road beside it. Covariances are inflated by the residual ([`refined`]).
-//! 7. Cues tell how likely it is that a column moves ([`cues`]), among them what was hit before at
-//!    the places it came to ([`history`]).
+//!    tracklets predict, the displacements most of its columns found by energy minimisation and, if
+//!    none of these fits, a search. Its ends show how far it slid along itself ([`slide`]).
+//! 4. A hypothesis test separates dynamic clusters from static ones ([`hypothesis`]): with r0 and r
+//!    the mean truncated residuals at rest and of the motion (as in MSAC: Torr and Zisserman,
+//!    2000), the evidence for motion is (1 - r / r0) sqrt(r0 - r). Up to two sweeps before the pair
+//!    are compared, the earlier one from 0.3 s before it at 10 Hz: a pedestrian has moved by then.
+//!    At rest only what can be seen counts: where a return fits badly, or nothing is near, a ray
+//!    must have passed to decide ([`sightlines`]). The same holds for a motion if the encoder says
+//!    that the cluster could move, or if it moved in the last sweep; otherwise returns that end up
+//!    out of sight count as missed, because behind a corner anything fits, except those that were
+//!    outside the window before the pair. A cluster that moved in the last sweep needs less
+//!    evidence.
+//! 5. A static cluster may have a moving part: columns that fit badly at rest, or that came to
+//!    where nothing was before. The remainder of the cluster, fragments next to the part and what
+//!    the encoder takes for the rest of its body may go with it ([`clusters`]).
+//! 6. All columns of a dynamic cluster move with it, including those that the background filter
+//!    removed or that found no match, and the ground below it ([`footprint`]), unless the encoder
+//!    takes that for road beside it. Covariances are inflated by the residual ([`refined`]).
+//! 7. Cues determine how likely it is that a column moves ([`cues`]), among them what was hit
+//!    before at the places it came to ([`history`]).
 //!
 //! Parameters are those of [`RefinementParams`](crate::params::RefinementParams), in metres;
-//! inside, lengths are in voxels ([`scaled`]).
+//! internally, lengths are in voxels ([`scaled`]).
 
 mod align;
 mod cloud;
@@ -99,8 +100,8 @@ impl Refinement {
         self.history.clear();
     }
 
-    /// Inserts the cloud of a sweep. `apart` becomes whether each return is of the ground, or
-    /// higher than clusters are. Returns how many returns had no room.
+    /// Inserts the cloud of a sweep. `apart` is set to whether each return is ground or above the
+    /// height of clusters. Returns how many returns had no room.
     pub(crate) fn insert_cloud(
         &mut self,
         team: &impl Team,
@@ -111,9 +112,10 @@ impl Refinement {
         self.clouds.insert(team, scaled, returns, apart, &mut self.scratch)
     }
 
-    /// Motion of the clusters of the pair's first sweep. `flow` is what the columns of the new
-    /// window were matched with, `scores` are the encoder's of its columns, none where nothing is
-    /// encoded, and `predicted` is what the tracklet of a column of the new window predicts.
+    /// Finds the motion of the clusters of the pair's first sweep. `flow` holds the matches of the
+    /// columns of the new window, `scores` the encoder's scores of the first sweep's columns, empty
+    /// if nothing is encoded; `predicted` gives what the tracklet of a column of the new window
+    /// predicts.
     pub(crate) fn run(
         &mut self,
         team: &impl Team,
@@ -142,12 +144,12 @@ impl Refinement {
         self.history.push(first, |c| self.clusters.came(c));
     }
 
-    /// Columns of clusters that there was no room for: they are taken to stand.
+    /// Number of columns in clusters that there was no room for: they are taken as static.
     pub(crate) fn beyond_capacity(&self) -> usize {
         self.clusters.beyond
     }
 
-    /// How a column of the first sweep's window moved, as part of a cluster that does.
+    /// How a column of the first sweep's window moved, if it is part of a moving cluster.
     pub(crate) fn at(&self, column: u32) -> Option<Refined> {
         let cluster = self.clusters.of(column as usize).filter(|f| f.is_dynamic)?;
         let side = self.clouds.first().side as u32;

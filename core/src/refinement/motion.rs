@@ -3,31 +3,31 @@
 use crate::params::REFINEMENT_SWEEPS_MAX;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 
-/// Sweeps that a cluster is compared with, at most: the pair's second, and of those before the pair
-/// every other. Of those in between what is slow looks much as in their neighbours.
+/// Maximum number of sweeps that a cluster is compared with: the pair's second, and every other one
+/// before the pair. In those in between, slow objects look much as in the neighbouring sweeps.
 pub const TARGETS_MAX: usize = REFINEMENT_SWEEPS_MAX.div_ceil(2);
 
 /// Rigid motion in the plane over one pair of sweeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Displacement of the centre, voxels, and turn about it, rad.
+    /// Displacement of the centre, voxels, and rotation about it, rad.
     pub delta: Vector3<f32>,
     /// Centre, voxels from the first sweep's window corner.
     pub centre: [f32; 2],
     /// Covariance of `delta`.
     pub covariance: Matrix3<f32>,
-    /// How much later after its stamp each target sweep sees the cluster, in spans of the pair: one
-    /// that passes by is not seen at the same time of every turn.
+    /// How much later after its stamp each target sweep sees the cluster, in spans of the pair: a
+    /// cluster passing by is not seen at the same time in every revolution.
     pub delay: [f32; TARGETS_MAX],
 }
 
 impl Motion {
-    /// No motion of what lies around a centre.
+    /// No motion, about a centre.
     pub fn around(centre: [f32; 2]) -> Motion {
         Motion { centre, ..Motion::default() }
     }
 
-    /// The same, displaced by so much more.
+    /// The same motion with this displacement added.
     pub fn displaced(self, by: [f32; 2]) -> Motion {
         Motion { delta: self.delta + Vector3::new(by[0], by[1], 0.0), ..self }
     }
@@ -38,7 +38,7 @@ impl Motion {
         Motion { delta: Vector3::new(x, y, self.delta.z), centre, ..*self }
     }
 
-    /// Whether it displaces its centre by less than `distance` differently than another.
+    /// Whether it displaces its centre within `distance` of where another motion does.
     pub fn is_near(&self, other: &Motion, distance: f32) -> bool {
         let [x, y] = other.of(self.centre);
         libm::hypotf(self.delta.x - x, self.delta.y - y) < distance

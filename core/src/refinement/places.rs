@@ -1,33 +1,33 @@
-//! Places of returns, an array per axis: a processor compares several of them at once. Compilers
-//! see to that where nothing in a lane can branch: hence no sums with a check for overflow.
+//! Places of returns, one array per axis, so that several are compared at once. Compilers vectorise
+//! this only if nothing in a lane can branch: hence no sums with overflow checks.
 
 use crate::params::{CLOUD_MAX, SENSORS_MAX};
 use core::array::from_fn;
 use core::ops::Range;
 
-/// Returns that are compared at once.
+/// Number of returns that are compared at once.
 const LANES: usize = 8;
-/// The last ones are compared together with what lies behind them.
+/// The last returns are compared together with whatever follows them in memory.
 const ROOM: usize = CLOUD_MAX + LANES;
 /// No return.
 const NONE: u32 = u32::MAX;
 
-/// Moments over differences x, y, z to a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
+/// Moments of the differences x, y, z from a place: 1, x, y, z, xx, xy, xz, yy, yz, zz.
 pub type Moments = [f32; 10];
 
 /// Places of returns, voxels from the window's corner, with the sensor that saw each and when:
-/// every sensor sees a thing at a time of its own.
+/// every sensor sees an object at a different time.
 pub struct Places {
     len: usize,
     at: [[f32; ROOM]; 3],
     seen: [Seen; ROOM],
 }
 
-/// The sensor that saw a return, and in the lower bits when, ticks after the sweep's stamp.
+/// The sensor that saw a return and, in the lower bits, when: ticks after the sweep's stamp.
 type Seen = u32;
 
 const TICK_BITS: u32 = 24;
-/// Of a microsecond, in which what passes at 40 m/s goes 40 µm: 8 s either way.
+/// A tick is a microsecond, in which an object at 40 m/s moves 40 µm; the range is 8 s either way.
 const TICKS_PER_S: f32 = 1e6;
 const TICKS_MAX: f32 = ((1 << (TICK_BITS - 1)) - 1) as f32;
 const _: () = assert!(SENSORS_MAX <= 1 << (u32::BITS - TICK_BITS));
@@ -37,7 +37,7 @@ fn seen(sensor: u32, offset_s: f32) -> Seen {
     sensor << TICK_BITS | ticks & ((1 << TICK_BITS) - 1)
 }
 
-/// Added to an index for each look before it.
+/// Added to an index once for each earlier look.
 const LOOK: u32 = 1 << 24;
 const _: () = assert!(CLOUD_MAX < LOOK as usize);
 
@@ -45,20 +45,20 @@ const _: () = assert!(CLOUD_MAX < LOOK as usize);
 pub struct Nearest {
     /// Squared distances.
     least: [f32; LANES],
-    /// Their indices, and in which look they were found, or [`NONE`].
+    /// Their indices and the looks they were found in, or [`NONE`].
     best: [u32; LANES],
-    /// How many looks there were.
+    /// [`LOOK`] times the number of looks so far.
     looks: u32,
 }
 
 impl Nearest {
-    /// Nothing within this squared distance.
+    /// Nothing found yet within this squared distance.
     #[inline(always)]
     pub fn within(d2: f32) -> Nearest {
         Nearest { least: [d2; LANES], best: [NONE; LANES], looks: 0 }
     }
 
-    /// Its squared distance, or that within which there is none.
+    /// Its squared distance, or the one within which nothing was found.
     #[inline(always)]
     pub fn squared_distance(&self) -> f32 {
         let mut least = self.least[0];
@@ -68,10 +68,10 @@ impl Nearest {
         least
     }
 
-    /// Its squared distance and index: of several as near, the first of the first look.
+    /// Its squared distance and index; among equally near ones, the first of the first look.
     #[inline(always)]
     pub fn found(&self) -> Option<(f32, usize)> {
-        // Bits of numbers that are not negative are in their order.
+        // The bit patterns of non-negative floats sort like their values.
         let mut keys = [0; LANES];
         for (l, key) in keys.iter_mut().enumerate() {
             *key = (self.least[l].to_bits() as u64) << 32 | self.best[l] as u64;
@@ -85,13 +85,13 @@ impl Nearest {
     }
 }
 
-/// Blocks of those in a range.
+/// The values in a range as blocks.
 #[inline(always)]
 fn blocks<'a, T>(of: &'a [T; ROOM], range: &Range<usize>) -> &'a [[T; LANES]] {
     of[range.start..range.end].as_chunks().0
 }
 
-/// A number, or zero.
+/// A number, or zero if the mask is.
 #[inline(always)]
 fn masked(v: f32, mask: u32) -> f32 {
     f32::from_bits(v.to_bits() & mask)
@@ -103,7 +103,7 @@ pub struct MomentSums([[f32; LANES]; 10]);
 impl MomentSums {
     pub const ZERO: MomentSums = MomentSums([[0.0; LANES]; 10]);
 
-    /// Those of all lanes, always in the same order.
+    /// The sums over all lanes, always added in the same order.
     #[inline(always)]
     pub fn total(&self) -> Moments {
         self.0.map(|[a, b, c, d, e, f, g, h]| ((a + b) + (c + d)) + ((e + f) + (g + h)))
@@ -143,12 +143,12 @@ impl Places {
     /// The sensor that saw a return, and when, s after the sweep's stamp.
     pub fn seen(&self, n: usize) -> (u32, f32) {
         let seen = self.seen[n];
-        // Shifted up and down again for the sign.
+        // Shifted up and down again to extend the sign.
         let ticks = (seen << (u32::BITS - TICK_BITS)) as i32 >> (u32::BITS - TICK_BITS);
         (seen >> TICK_BITS, ticks as f32 / TICKS_PER_S)
     }
 
-    /// Looks for the return of a sensor that is nearest to a place among some.
+    /// Looks in a range for the return of a sensor that is nearest to a place.
     #[inline(always)]
     pub fn look(&self, range: Range<usize>, at: [f32; 3], sensor: u32, nearest: &mut Nearest) {
         let padded = range.start..range.start + range.len().next_multiple_of(LANES);
@@ -171,7 +171,7 @@ impl Places {
         (nearest.least, nearest.best) = (least, best);
     }
 
-    /// Adds those returns of a sensor, among some, that are closer to a place than `radius`.
+    /// Adds those returns of a sensor in a range that are closer to a place than `radius`.
     #[inline(always)]
     pub fn add_around(
         &self,
@@ -191,7 +191,7 @@ impl Places {
                 let d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let own = n.wrapping_add(l as u32);
                 let near = (d2 < radius * radius) & (seen[l] >> TICK_BITS == sensor) & (own < end);
-                // What is not near adds zeros, which changes no sum.
+                // Returns that are not near add zeros, which change no sum.
                 let mask = if near { u32::MAX } else { 0 };
                 let [x, y, z] = [masked(d[0], mask), masked(d[1], mask), masked(d[2], mask)];
                 sums.0[0][l] += masked(1.0, mask);

@@ -1,36 +1,38 @@
-//! Several rays at once: their direction, and how steep they are.
+//! Several rays at once: their directions and how steep they are.
 
 use crate::return_clock::{TURN, pseudo_angle};
 use crate::sensor_paths::SensorPaths;
 use crate::sweep::Placed;
 use core::array::from_fn;
 
-/// Directions in the plane that are told apart, by [`pseudo_angle`]: of 0.2 to 0.5 degrees.
+/// Number of directions in the plane that are distinguished, by [`pseudo_angle`]: each 0.2 to 0.5
+/// degrees wide.
 pub const AZIMUTHS: usize = 1024;
-/// Rays that are looked at together; the last ones with what lies behind them.
+/// Number of rays that are examined together; the last ones with whatever follows them in memory.
 pub const LANES: usize = 8;
-/// Steps of a voxel that ends of rays are rounded to, 5 mm.
+/// Steps per voxel that ends of rays are rounded to, 5 mm.
 pub const STEPS: f32 = 64.0;
-/// Farther ends, voxels along an axis, are moved up along their ray: what a step's type holds.
+/// Ends farther than this, voxels along an axis, are pulled in along their ray: what the type of a
+/// step can hold.
 const FAR: f32 = 500.0;
 const _: () = assert!(FAR * STEPS <= i16::MAX as f32);
-/// The slope half way from level to upright: as many bands are below it as above. Most rays of a
-/// sensor that spins are below.
+/// The slope half way from level to vertical: there are as many bands below it as above. Most rays
+/// of a spinning sensor are below it.
 const MIDDLE_SLOPE: f32 = 0.25;
 
-/// Rays that wait to be sorted.
+/// Rays waiting to be sorted.
 pub struct RayBatch {
     pub len: usize,
-    /// Where each ended by axis, voxels from the window's corner.
+    /// Where each ended, by axis, voxels from the window's corner.
     at: [[f32; LANES]; 3],
-    /// The part of the sweep that had passed.
+    /// The part of the sweep that had passed by then.
     pub part: [f32; LANES],
     pub sensor: [usize; LANES],
 }
 
-/// Rays of a batch as they are kept. What lies beyond its length is of no meaning.
+/// Rays of a batch as they are kept. Entries beyond its length are meaningless.
 pub struct KeptRays {
-    /// Their ends by axis, steps from the sensor.
+    /// Their ends, by axis, steps from the sensor.
     pub end: [[i16; LANES]; 3],
     /// [`azimuth`] of each.
     pub azimuth: [u16; LANES],
@@ -43,7 +45,7 @@ impl RayBatch {
         RayBatch { len: 0, at: [[0.0; LANES]; 3], part: [0.0; LANES], sensor: [0; LANES] }
     }
 
-    /// Adds a ray to a batch that is not full. Returns whether it is now.
+    /// Adds a ray to a batch that is not full. Returns whether it is full now.
     #[inline(always)]
     pub fn push(&mut self, paths: &SensorPaths, sensor: usize, placed: &Placed) -> bool {
         let n = self.len;
@@ -77,7 +79,7 @@ impl RayBatch {
     }
 }
 
-/// The direction in the plane of a ray.
+/// The direction of a ray in the plane, as an index.
 #[inline(always)]
 pub fn azimuth([x, y]: [f32; 2]) -> u16 {
     let azimuth = (pseudo_angle(x, y) * (AZIMUTHS as f32 / TURN)) as i32;

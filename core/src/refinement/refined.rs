@@ -1,7 +1,7 @@
 //! How a column moved, and how certain that is.
 //!
-//! A static column gets a displacement of exactly zero rather than a small residual motion. What is
-//! uncertain about that goes into its covariance, which grows with the residual at rest and where
+//! A static column gets a displacement of exactly zero rather than a small residual motion. The
+//! uncertainty about that goes into its covariance, which grows with the residual at rest and if
 //! the column's match disagrees.
 
 use super::cues::Cues;
@@ -11,18 +11,18 @@ use super::scaled::Scaled;
 /// How a column moved over the pair, voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Refined {
-    /// Displacement; zero where it is static.
+    /// Displacement; zero if it is static.
     pub by: [f32; 2],
     /// Its covariance (xx, xy, yy).
     pub covariance: [f32; 3],
     /// Whether it is part of a cluster that moves.
     pub is_dynamic: bool,
-    /// What tells whether it does.
+    /// Cues to whether it does.
     pub cues: Cues,
 }
 
 impl Refined {
-    /// As part of a cluster.
+    /// How a column moved as part of a cluster.
     pub fn of(scaled: &Scaled, cluster: &Hypothesis, at: [f32; 2]) -> Refined {
         let by = cluster.motion.of(at);
         let ratio = scaled.params.motion_sigma_ratio;
@@ -39,19 +39,20 @@ impl Refined {
         own.with_alternative(by, variance)
     }
 
-    /// As one of two motions `by` apart, of which one is right: so large is the variance of which.
+    /// The same with the uncertainty about which of two motions, that far apart, is right;
+    /// `variance` is that of the choice.
     fn with_alternative(self, [x, y]: [f32; 2], variance: f32) -> Refined {
         let apart = [x * x, x * y, y * y];
         let covariance = [0, 1, 2].map(|n| self.covariance[n] + variance * apart[n]);
         Refined { covariance, ..self }
     }
 
-    /// As static although its column's match, cells, may say otherwise.
+    /// The same, static, although its column's match, cells, may say otherwise.
     pub fn despite(self, scaled: &Scaled, matched: Option<[f32; 2]>) -> Refined {
         self.with_alternative(matched.unwrap_or_default(), scaled.params.mismatch_variance)
     }
 
-    /// Where nothing is known.
+    /// A column that nothing is known about.
     pub fn nothing() -> Refined {
         let cues = Cues::standing(0.0, 0.0);
         Refined { by: [0.0; 2], covariance: [0.0; 3], is_dynamic: false, cues }

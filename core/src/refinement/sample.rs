@@ -1,8 +1,9 @@
-//! A return as it is registered, and what it tells of its surface.
+//! A return as it is registered, and what is known about its surface.
 
-/// Information on the surface a return lies on, the upper half of a symmetric matrix: the inverse
-/// covariance of the returns around it and of their noise, relative to the noise's. 1 across a
-/// surface, little along it: point-to-plane without a plane to fit (generalised ICP).
+/// Information about the surface a return lies on, the upper triangle of a symmetric matrix: the
+/// inverse of the covariance of the returns around it plus that of their noise, relative to the
+/// noise alone. 1 across a surface, little along it: point-to-plane without fitting a plane
+/// (generalised ICP).
 pub type SurfaceWeight = [f32; 6];
 
 /// A return of a cluster.
@@ -24,7 +25,7 @@ pub fn squared_distance(weight: &SurfaceWeight, [x, y, z]: [f32; 3]) -> f32 {
     x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z
 }
 
-/// A difference weighed by what is known across each direction.
+/// A difference weighted by what is known across each direction.
 pub fn weighed(weight: &SurfaceWeight, [x, y, z]: [f32; 3]) -> [f32; 3] {
     let [xx, xy, xz, yy, yz, zz] = *weight;
     [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
@@ -34,7 +35,7 @@ pub fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// A running mean, 0 of nothing.
+/// A running mean, 0 if empty.
 #[derive(Clone, Copy, Default)]
 pub struct Mean {
     sum: f32,

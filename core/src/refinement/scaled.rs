@@ -1,11 +1,11 @@
-//! The refinement's parameters as it works with them: lengths in voxels.
+//! The refinement's parameters as used internally: lengths in voxels.
 
 use crate::params::{CLUSTER_LEVELS_MAX, Profile, REACH, RefinementParams, SUBVOXELS_MAX};
 
 /// Parameters of a profile, with lengths in voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scaled {
-    /// Those without a length among them.
+    /// The original parameters, for those that are not lengths.
     pub params: RefinementParams,
     voxel_m: f64,
     pub ground_height: f32,
@@ -80,12 +80,12 @@ impl Scaled {
         }
     }
 
-    /// How near to a place that is so far away a ray must pass to tell of it, voxels.
+    /// How close a ray must pass to a place at this distance to say anything about it, voxels.
     pub fn sight_reach(&self, distance: f32) -> f32 {
         self.sight_distance.max(self.params.sight_angle_rad * distance)
     }
 
-    /// Displacements that are searched either way in `span_s` seconds, voxels.
+    /// How far displacements over `span_s` seconds are searched either way, voxels.
     pub fn search_reach(&self, span_s: f64) -> i32 {
         let reach = libm::round(self.params.search_speed_mps * span_s / self.voxel_m);
         reach.min(REACH as f64) as i32

@@ -7,8 +7,8 @@ use super::sample::{CloudPoint, Mean, minus, squared_distance};
 use super::scaled::Scaled;
 use crate::encoder::{ColumnScores, could_move};
 
-/// A sweep that clusters are registered with: where its window lies seen from the first sweep's,
-/// and how much of the motion over the pair has happened from stamp to stamp.
+/// A sweep that clusters are registered with: where its window lies relative to the first sweep's,
+/// and what share of the motion over the pair has happened from stamp to stamp.
 #[derive(Clone, Copy)]
 pub struct Target<'a> {
     pub index: usize,
@@ -17,24 +17,24 @@ pub struct Target<'a> {
     pub share: f32,
 }
 
-/// Of a cluster's returns, all are compared with the pair's second sweep, and every other with each
-/// earlier one, where it counts twice. With all there, precision and recall are the same to 0.3 %
-/// (18 drives of 25 sweeps on simulated outskirts, three rigs), and a sweep of KITTI drive 0005
-/// takes 5 % longer on one core.
+/// All of a cluster's returns are compared with the pair's second sweep, but only every other one,
+/// counted twice, with each earlier sweep. With all of them there, precision and recall are the
+/// same to within 0.3 % (18 drives of 25 sweeps on simulated outskirts, three rigs), and a sweep of
+/// KITTI drive 0005 takes 5 % longer on one core.
 const EARLIER_STRIDE: usize = 2;
 
 impl Target<'_> {
-    /// Every how many returns are compared with it.
+    /// The stride at which a cluster's returns are compared with it.
     pub fn stride(&self) -> usize {
         if self.index == 0 { 1 } else { EARLIER_STRIDE }
     }
 
-    /// How much of a motion over the pair has happened when a cluster is seen in this sweep.
+    /// What share of a motion over the pair has happened when a cluster is seen in this sweep.
     pub fn share(&self, motion: &Motion) -> f32 {
         self.share + motion.delay[self.index]
     }
 
-    /// Where a return of the first sweep is seen in this one, voxels of this one's window.
+    /// Where a return of the first sweep is expected in this one, voxels of this one's window.
     pub fn predict(&self, s: &CloudPoint, motion: &Motion) -> [f32; 3] {
         let d = motion.of([s.at[0], s.at[1]]);
         let share = self.share(motion);
@@ -45,7 +45,7 @@ impl Target<'_> {
         ]
     }
 
-    /// Where a return of this sweep was, voxels of the first sweep's window.
+    /// Where a return of this sweep was in the first one, voxels of the first sweep's window.
     pub fn retrace(&self, q: &CloudPoint, motion: &Motion) -> [f32; 3] {
         let share = self.share(motion);
         let at = minus(q.at, self.offset);
@@ -58,13 +58,13 @@ impl Target<'_> {
 #[derive(Clone, Copy)]
 pub struct Scans<'a> {
     pub scaled: &'a Scaled,
-    /// The pair's first sweep, which the clusters are of.
+    /// The pair's first sweep, which the clusters are taken from.
     pub first: DetailedCloud<'a>,
     /// The pair's second sweep, then earlier ones.
     pub targets: &'a [Target<'a>],
-    /// Of the pair's second sweep.
+    /// Detail of the pair's second sweep.
     pub detail: &'a CloudDetail,
-    /// What the first sweep's columns are, nothing where nothing is encoded.
+    /// The encoder's scores of the first sweep's columns, empty if nothing is encoded.
     pub scores: &'a [ColumnScores],
     /// From the pair's first stamp to the second, s.
     pub span_s: f64,
@@ -76,23 +76,23 @@ impl<'a> Scans<'a> {
         DetailedCloud { cloud: self.targets[0].cloud, detail: self.detail }
     }
 
-    /// Score of a column of the first sweep, nats, of what could move; 0 where that is not told.
+    /// Score of what could move for a column of the first sweep, nats; 0 if it has none.
     pub fn could_move(&self, column: usize) -> f32 {
         self.scores.get(column).map_or(0.0, could_move)
     }
 
-    /// Whether a column goes with no cluster.
+    /// Whether a column goes with no moving cluster.
     pub fn stays(&self, column: usize) -> bool {
         self.could_move(column) < self.scaled.params.could_move_min
     }
 
-    /// Whether ground in a column may be below a cluster that moves, not road beside it.
+    /// Whether ground in a column may be below a moving cluster rather than road beside it.
     pub fn may_be_below(&self, column: usize) -> bool {
         self.could_move(column) >= 0.0
     }
 
-    /// Truncated residual of a return of the cloud `of` against what was found at the place it is
-    /// predicted to be, 0 to 1: whatever is missed counts the same.
+    /// Truncated residual of a return of the cloud `of` against what was found at its predicted
+    /// place, 0 to 1: all returns that are missed count the same.
     pub fn residual(
         &self,
         of: DetailedCloud,
@@ -102,7 +102,7 @@ impl<'a> Scans<'a> {
     ) -> f32 {
         let Some((d2, q)) = found else { return 1.0 };
         let Scaled { inlier, truncation, .. } = *self.scaled;
-        // So near that the surface hardly matters.
+        // Near enough that the surface hardly matters.
         if d2 < inlier * inlier {
             return 0.0;
         }
@@ -116,20 +116,20 @@ impl<'a> Scans<'a> {
         self.residual(self.first, s, at, target.cloud.nearest(at, s.sensor, self.reach_inlier()))
     }
 
-    /// The same as far as it can be told.
+    /// The same, if it can be determined.
     pub fn seen_residual(&self, s: &CloudPoint, motion: &Motion, target: &Target) -> Option<f32> {
         self.told_residual(self.first, s, target.cloud, target.predict(s, motion))
     }
 
-    /// Residual of a return of the first sweep in the second, if it was static, as far as that can
-    /// be told.
+    /// Residual of a return of the first sweep in the second, if it was static; `None` if it cannot
+    /// be determined.
     pub fn static_residual(&self, s: &CloudPoint) -> Option<f32> {
         self.seen_residual(s, &Motion::default(), &self.targets[0])
     }
 
-    /// Residual of a return of the cloud `of` in another if it is predicted to be `at` there. Where
-    /// it fits badly what is near may be another part of its surface: a ray must have passed to
-    /// tell. One that was stopped before tells nothing.
+    /// Residual of a return of the cloud `of` in another if it is predicted to be `at` there. If it
+    /// fits badly, what is near may be another part of its surface, and a ray must have passed to
+    /// decide. A ray that was stopped earlier decides nothing.
     pub fn told_residual(
         &self,
         of: DetailedCloud,
@@ -142,7 +142,7 @@ impl<'a> Scans<'a> {
         if near < self.scaled.params.sight_residual {
             return Some(near);
         }
-        // Beyond the window no returns are kept to be near, and along a wall rays end farther on.
+        // Outside the window no returns are kept, and along a wall rays end farther on.
         if other.column_at([at[0], at[1]]).is_none() {
             return found.map(|_| near);
         }
@@ -152,7 +152,7 @@ impl<'a> Scans<'a> {
         (ratio > -1.0).then(|| near.min(ratio * ratio))
     }
 
-    /// Mean residual of some returns of a column, 0 where it cannot be told.
+    /// Mean residual of some returns of a column, 0 if it cannot be determined.
     pub fn column_residual(
         &self,
         column: usize,
@@ -167,8 +167,7 @@ impl<'a> Scans<'a> {
         mean.value()
     }
 
-    /// By how much the returns of a column fit rest worse than a motion, 0 where that cannot be
-    /// seen.
+    /// By how much the returns of a column fit rest worse than a motion, 0 if that cannot be seen.
     pub fn misfit(&self, column: usize, motion: &Motion) -> f32 {
         let mut mean = Mean::default();
         for s in self.first.column(column).map(|n| self.first.sample(n)) {
@@ -179,12 +178,12 @@ impl<'a> Scans<'a> {
         mean.value()
     }
 
-    /// The search of nearest returns: how far it goes, and how near is near enough.
+    /// Limits of the search for the nearest return: how far it goes, and how near is near enough.
     pub fn reach_inlier(&self) -> [f32; 2] {
         [self.scaled.match_distance, self.scaled.inlier]
     }
 
-    /// The same where the nearest of all is needed.
+    /// The same if the very nearest is needed.
     pub fn reach_exact(&self) -> [f32; 2] {
         [self.scaled.match_distance, 0.0]
     }

@@ -1,9 +1,10 @@
-//! Where a cluster may have gone if nothing else tells: every displacement within reach, by voxels.
+//! Where a cluster may have gone if nothing else shows it: tries every displacement within reach,
+//! by whole voxels.
 
 use super::cluster::Cluster;
 
-/// The displacement that puts most of the cluster's returns on returns of the second sweep; what
-/// was occupied before counts half. The first of those as good.
+/// The displacement that puts most of the cluster's returns on returns of the second sweep; places
+/// that were occupied before count half. Among equally good ones, the first.
 pub fn search(cluster: &Cluster) -> [f32; 2] {
     let scans = &cluster.scans;
     let target = &scans.targets[0];

@@ -1,4 +1,4 @@
-//! Segmentation: columns of the first sweep that touch and may move together are one cluster.
+//! Segmentation: columns of the first sweep that touch and may move together form one cluster.
 
 use super::scans::Scans;
 use crate::groups::DisjointSets;
@@ -13,8 +13,8 @@ impl Segments {
         Segments(DisjointSets::new())
     }
 
-    /// Finds the segments of those columns of the first sweep that may be `part` of any. `flow`
-    /// tells the match of a column, if there is one.
+    /// Finds the segments of those columns of the first sweep that may be `part` of one. `flow`
+    /// gives the match of a column, if there is one.
     pub(super) fn find(
         &mut self,
         scans: &Scans,
@@ -49,7 +49,7 @@ impl Segments {
         self.0.list(side * side);
     }
 
-    /// How many there are.
+    /// The number of segments.
     pub fn len(&self) -> usize {
         self.0.count()
     }
@@ -60,7 +60,7 @@ impl Segments {
     }
 }
 
-/// By how many cells two matches differ along an axis, 0 where one is missing.
+/// By how many cells two matches differ along an axis, 0 if one is missing.
 fn disparity(a: Flow, b: Flow) -> u32 {
     if a & b & VALID == 0 {
         return 0;

@@ -1,8 +1,9 @@
-//! The rays of a sweep by direction: whether what stands at a place would have been seen there.
+//! The rays of a sweep by direction: whether something at a place would have been seen there.
 //!
 //! Rings of returns on a wall, a barrier or a bonnet move with the sensor. Where one was in the
-//! sweep before there is none now, though what it lay on still stands: that no return is near tells
-//! nothing there. A ray that passed tells: it went through, or ended where the surface is.
+//! previous sweep there is none now, though the surface it lay on is still there: the lack of a
+//! nearby return proves nothing there. A ray that passed does: it went through, or ended at the
+//! surface.
 //!
 //! As in registration by projection (Blais and Levine, "Registering multiview range data to create
 //! 3D computer objects", PAMI 1995) a place is compared with what its direction shows, not with
@@ -20,17 +21,17 @@ use raywake_simd::Simd;
 
 /// Steps of a sweep that the time of a ray is rounded to, 0.4 ms.
 const PARTS: f32 = 255.0;
-/// Times that the moment is sought at which a sensor looked in a direction: between two sweeps it
-/// has moved, and with it the direction.
+/// Maximum number of iterations to find the time at which a sensor looked towards a place: between
+/// two sweeps it has moved, and the direction has changed with it.
 const ROUNDS: usize = 3;
 
-/// Bands that the slopes of rays are sorted into, those of all sensors together: only rays of bands
-/// within reach of a place are looked at. A choice of time alone: three directions have 190 rays in
-/// the mean, of which 40 are left (KITTI drive 0005).
+/// Number of bands that the slopes of rays are sorted into, over all sensors: only rays in bands
+/// within reach of a place are examined. This only saves time: three directions have 190 rays on
+/// average, of which 40 are left (KITTI drive 0005).
 const BANDS: usize = 16;
 const _: () = assert!(SENSORS_MAX <= BANDS);
 
-/// Scratch of [`Sightlines::fill`]: rays as they come.
+/// Scratch of [`Sightlines::fill`]: rays in the order they come.
 pub(super) type Unsorted = [UnsortedRay; SIGHTLINES_MAX];
 
 /// A ray, and the cell that it belongs to.
@@ -45,25 +46,25 @@ impl UnsortedRay {
     pub const NONE: UnsortedRay = UnsortedRay { end: [0; 3], cell: 0 };
 }
 
-/// By how much farther a ray may pass than computed, voxels: at the farthest end an f32 is exact to
-/// less than a hundredth of that.
+/// By how much farther away a ray may pass than computed, voxels: at the farthest end an f32 is
+/// exact to less than a hundredth of this.
 const ROUNDING: f32 = 0.01;
 
-/// Of a direction that no ray has: states are zeros at the start, which take no room in a program.
-/// Other parts are one more.
+/// The part of a direction without a ray: an all-zero initial state takes no room in the
+/// executable. Other parts are stored plus one.
 const NO_PART: u16 = 0;
 
-/// The rays of one sweep, thinned evenly to the capacity.
+/// The rays of one sweep, evenly thinned to the capacity.
 pub struct Sightlines {
     paths: SensorPaths,
-    /// Bands of each sensor: a division for every ray would take longer.
+    /// Bands per sensor: a division for every ray would take longer.
     bands: usize,
-    /// Where the rays of a cell begin, and those of the last one end. A cell is a band of a
-    /// direction; those of one band lie side by side, the bands of one sensor, too.
+    /// Where the rays of each cell begin, and where those of the last one end. A cell is a band of
+    /// a direction; the cells of a band are contiguous, and so are the bands of a sensor.
     start: [u32; BANDS * AZIMUTHS + 1],
-    /// Their ends by axis, steps from the sensor.
+    /// Their ends, by axis, steps from the sensor.
     end: [[i16; SIGHTLINES_MAX + LANES]; 3],
-    /// The part of the sweep, of [`PARTS`], that had passed at the first ray of a direction.
+    /// The part of the sweep, out of [`PARTS`], that had passed at the first ray of a direction.
     part: [[u16; AZIMUTHS]; SENSORS_MAX],
 }
 
@@ -108,7 +109,8 @@ impl Sightlines {
                 count + self.count(&batch, &mut rays[count..])
             },
         );
-        // Behind each cell its start, which becomes its end, where the next one starts.
+        // The entry after each cell's own holds its start, which becomes its end, where the next
+        // cell starts.
         let mut total = 0;
         for start in &mut self.start[1..] {
             total += core::mem::replace(start, total);
@@ -123,8 +125,8 @@ impl Sightlines {
         }
     }
 
-    /// Adds a batch to the counts by cell and to the rays not sorted. Returns how many there was
-    /// room for.
+    /// Adds a batch to the counts by cell and to the unsorted rays. Returns how many there was room
+    /// for.
     #[inline(always)]
     fn count(&mut self, batch: &RayBatch, rays: &mut [UnsortedRay]) -> usize {
         let kept = batch.kept(&self.paths);
@@ -143,7 +145,7 @@ impl Sightlines {
         added
     }
 
-    /// The band that a slope is in.
+    /// The band of a slope.
     fn band(&self, slope: f32) -> usize {
         (((slope + 1.0) * (0.5 * self.bands as f32)) as usize).min(self.bands - 1)
     }
@@ -153,9 +155,9 @@ impl Sightlines {
         (sensor * self.bands + band) * AZIMUTHS
     }
 
-    /// How far behind a place of a surface, voxels across it, the ray ended that met the surface
-    /// nearest to there: nothing where none came near. `offset_s` is when the place is thought to
-    /// be seen, s after the stamp.
+    /// How far behind the surface at a place, voxels across it, the ray ended that met the surface
+    /// nearest to the place; `None` if none came near. `offset_s` is when the place is assumed to
+    /// have been seen, s after the stamp.
     pub fn depth(
         &self,
         simd: Simd,
@@ -185,7 +187,7 @@ impl Sightlines {
         nearest.depth
     }
 
-    /// Where a sensor was as it looked at a place, and the azimuth of that.
+    /// Where a sensor was when it looked at a place, and the azimuth of the place from there.
     fn eye(&self, sensor: usize, at: [f32; 3], offset_s: f32) -> ([f32; 3], usize) {
         let look = |part: f32| {
             let eye = self.paths.at(sensor, part);
@@ -205,12 +207,12 @@ impl Sightlines {
         (eye, azimuth)
     }
 
-    /// Indices of the rays of some cells.
+    /// Indices of the rays in a range of cells.
     fn rays(&self, cells: Range<usize>) -> Range<usize> {
         self.start[cells.start] as usize..self.start[cells.end] as usize
     }
 
-    /// The ray of an azimuth, or of those beside it, that meets a surface nearest to its place,
+    /// The ray of an azimuth, or of those next to it, that meets a surface nearest to its place,
     /// within a squared distance, voxels². `bands` are given by their first cells.
     #[inline(always)]
     fn nearest(
@@ -243,18 +245,18 @@ impl Sightlines {
     }
 }
 
-/// How many of 2³² returns are kept where a sweep has so many.
+/// How many of every 2³² returns are kept if a sweep has this many.
 fn share_kept(of: usize) -> u64 {
     ((SIGHTLINES_MAX as u64) << 32) / of.max(1) as u64
 }
 
-/// Whether a return is among those kept: in steps of the golden ratio they are spread evenly,
-/// however the source orders them.
+/// Whether a return is kept: steps of the golden ratio spread those evenly, however the source
+/// orders them.
 fn is_kept(n: usize, share: u64) -> bool {
     u64::from((n as u32).wrapping_mul(0x9E37_79B1)) < share
 }
 
-/// An azimuth and those beside it: of the first and the last one lies apart.
+/// An azimuth and those next to it; at either end of the range one of them wraps around.
 fn beside(azimuth: usize) -> [Range<usize>; 2] {
     const LAST: usize = AZIMUTHS - 1;
     match azimuth {
@@ -264,7 +266,7 @@ fn beside(azimuth: usize) -> [Range<usize>; 2] {
     }
 }
 
-/// Between which slopes a ray lies that passes within `reach` of a place, both as seen from the
+/// The lowest and the highest slope of a ray that passes within `reach` of a place, relative to the
 /// sensor.
 fn slopes_within(reach: f32, [x, y, z]: [f32; 3]) -> [f32; 2] {
     let reach = reach + ROUNDING;
@@ -282,18 +284,19 @@ fn slopes_within(reach: f32, [x, y, z]: [f32; 3]) -> [f32; 2] {
 
 /// The ray that meets a surface nearest to its place.
 struct NearestRay {
-    /// Between the two, voxels²; before there is one, of the farthest that counts.
+    /// Between the place and where it meets the surface, voxels²; until a ray is found, that of the
+    /// farthest one that counts.
     squared_distance: f32,
     /// How far behind the surface it ended, voxels across it.
     depth: Option<f32>,
 }
 
-/// A surface through a place, seen from a sensor: across it where the returns around tell, across
-/// the line of sight where they do not.
+/// A surface through a place, seen from a sensor: oriented as the surrounding returns say, or
+/// perpendicular to the line of sight if they say nothing.
 struct SurfacePatch {
     /// The place, voxels from the sensor.
     at: [f32; 3],
-    /// Unit vector across, away from the sensor.
+    /// Unit normal, away from the sensor.
     across: [f32; 3],
     /// The sensor's distance from it, voxels.
     away: f32,
@@ -310,8 +313,8 @@ impl SurfacePatch {
         libm::sqrtf(dot(self.at, self.at))
     }
 
-    /// Where each of `left` rays, steps from the sensor, meets it: takes those nearer to the place
-    /// than the squared distance so far, and how far behind they end.
+    /// Intersects `left` rays, steps from the sensor, with it: where one meets it nearer to the
+    /// place than the squared distance so far, stores the distance and how far behind the ray ends.
     #[inline(always)]
     fn meet(
         &self,

@@ -1,31 +1,31 @@
-//! How far a cluster slid along itself: its ends tell.
+//! How far a cluster slid along itself, judged by its ends.
 //!
-//! The side of a bus looks the same wherever along itself it is. Registration to the surfaces of
-//! its returns finds how it moved across them and leaves the rest to its start; but returns beyond
-//! the ends of what the other sweep shows are missed. This tries displacements along the direction
-//! that registration knows least about.
+//! The side of a bus looks the same however far it has moved along itself. Registration to the
+//! surfaces of its returns finds how it moved across them and leaves the rest at the start value;
+//! but returns beyond the ends of what the other sweep shows are missed. This tries displacements
+//! along the direction that registration knows least about.
 
 use super::cluster::{Cluster, VisitedColumns};
 use super::motion::Motion;
 
-/// Displacements that are tried either way, and from one to the next, voxels: 4.8 m, in steps of
-/// 0.3 m. The better of those beside the best is then sought at half the distance, and again: 37
-/// residuals. With all of them at half a voxel, 65, as much of what moves is within 30 cm, to 0.4 %
-/// (18 drives of 25 sweeps on simulated outskirts, three rigs).
+/// Number of displacements tried either way, and their spacing, voxels: 4.8 m in steps of 0.3 m.
+/// Then those next to the best are tried at half the spacing, and again: 37 residuals. With half a
+/// voxel throughout, 65 residuals, the share of what moves that is within 30 cm is the same to
+/// 0.4 % (18 drives of 25 sweeps on simulated outskirts, three rigs).
 const STEPS: i32 = 16;
 const STEP: f32 = 1.0;
 const HALVINGS: usize = 2;
-/// How many times as uncertain one direction must be as the other, standard deviations, for it to
-/// be a side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on six of those
-/// drives, seen by four HDL-32E, 95.0 % are within 30 cm, 94.7 with 4 and 3.6 m, 93.9 without
+/// How many times as uncertain as the other, in standard deviations, one direction must be for a
+/// side, and the shortest cluster that may slide, voxels: 1.8 m. Of what moves on six of those
+/// drives, seen by four HDL-32E, 95.0 % is within 30 cm, 94.7 with 4 and 3.6 m, 93.9 without
 /// slides (each compared with two sweeps).
 const ASPECT: f32 = 2.0;
 const EXTENT_MIN: f32 = 6.0;
-/// By how much the residual must fall. With 4 and 3.6 m they are 94.9 % with 0.02, and 94.7 here.
+/// By how much the residual must fall. With 4 and 3.6 m, 0.02 gives 94.9 %, and this value 94.7.
 const GAIN: f32 = 0.005;
 
-/// The motion that explains a cluster better than `motion`, of which the residual is `residual`,
-/// and differs from it along the cluster.
+/// A motion that explains a cluster better than `motion`, which has this residual, and differs from
+/// it along the cluster only.
 pub fn slide(
     cluster: &Cluster,
     motion: &Motion,
@@ -51,7 +51,7 @@ pub fn slide(
     best.1.map(slid)
 }
 
-/// The direction of a cluster's side: that in which its displacement is most uncertain, if it is
+/// The direction of a cluster's side: the one in which its displacement is most uncertain, if it is
 /// much more so than across.
 fn side(motion: &Motion) -> Option<[f32; 2]> {
     let [xx, xy, yy] = motion.covariance_of(motion.centre);

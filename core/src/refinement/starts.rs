@@ -1,4 +1,4 @@
-//! Starts of a registration: what the columns of a cluster voted for.
+//! Starts of a registration: the displacements that the columns of a cluster voted for.
 
 use crate::params::{REACH, SIDE};
 use crate::record::{Flow, VALID, flow_displacement};
@@ -16,7 +16,7 @@ impl Votes {
         Votes(votes)
     }
 
-    /// The mean of the most frequent displacement and its neighbours, which are counted no more.
+    /// The mean of the most frequent displacement and its neighbours, which are then removed.
     pub fn take_mode(&mut self) -> Option<[f32; 2]> {
         let mut top = (0, 0, 0);
         for (u, line) in self.0.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Which way the surface faces that a return lies on, from the returns around it.
+//! Which way the surface that a return lies on faces, from the returns around it.
 //!
-//! Their covariance, and their noise, are that of generalised ICP (Segal, Haehnel and Thrun,
-//! "Generalized-ICP", RSS 2009), of one cloud alone: a return counts across its surface, little
+//! Their covariance plus their noise is that of generalised ICP (Segal, Haehnel and Thrun,
+//! "Generalized-ICP", RSS 2009), for one cloud alone: a return counts across its surface, little
 //! along it, so that rings of returns on a bonnet, which move with the sensor, do not hold a car.
 
 use super::places::Moments;
@@ -11,9 +11,9 @@ use core::sync::atomic::AtomicU32;
 use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use nalgebra::Matrix3;
 
-/// A weight, packed, all zero until it is asked for. Threads that ask at the same time find the
-/// same. Few are asked for: finding all at once took 9 % more processor time a sweep (KITTI drive
-/// 0005, 60 sweeps, scalar, `user` of `time`: 4.11 s against 3.77 s).
+/// A packed weight, all zero until first requested. Threads that request it at the same time
+/// compute the same. Few are requested: computing all of them took 9 % more processor time per
+/// sweep (KITTI drive 0005, 60 sweeps, scalar, `user` of `time`: 4.11 s against 3.77 s).
 pub struct LazyWeight([AtomicU32; 3]);
 
 impl LazyWeight {
@@ -21,9 +21,9 @@ impl LazyWeight {
         LazyWeight([const { AtomicU32::new(0) }; 3])
     }
 
-    /// The weight, or what `find` says it is.
+    /// The weight, computed by `find` if it is not known yet.
     pub fn get(&self, find: impl FnOnce() -> SurfaceWeight) -> SurfaceWeight {
-        // That of a known weight is not zero. It is written last and read first.
+        // The first word of a known weight is not zero. It is written last and read first.
         let [first, rest @ ..] = &self.0;
         let known = first.load(Acquire);
         if known != 0 {
@@ -37,10 +37,10 @@ impl LazyWeight {
     }
 }
 
-/// Steps of a weight, which is 1 at most.
+/// Quantisation steps of a weight, which is at most 1.
 const STEPS: f32 = 32_767.0;
 
-/// A weight in steps, two a word. The first is positive.
+/// A weight in steps, two per word. The first is positive.
 fn packed(weight: SurfaceWeight) -> [u32; 3] {
     let [xx, steps @ ..] = weight.map(|w| u32::from((w * STEPS) as i16 as u16));
     let [xy, xz, yy, yz, zz] = steps;
@@ -56,11 +56,11 @@ fn unpacked(words: [u32; 3]) -> SurfaceWeight {
 /// The weight of a return from the sums over the returns within a radius around it.
 pub fn weight(scaled: &Scaled, sums_within: impl Fn(f32) -> Moments) -> SurfaceWeight {
     let mut spread = covariance(sums_within(scaled.surface_radius));
-    // A line, as of one ring, would hold a cluster across the surface and along it.
+    // A line, such as from a single ring, would hold a cluster along the surface as well as across.
     if across(&spread) < scaled.surface_line {
         spread = covariance(sums_within(scaled.surface_radius_wide));
     }
-    // Positive definite by the noise.
+    // The noise makes it positive definite.
     let variance = scaled.return_sigma * scaled.return_sigma;
     let noise = Matrix3::from_diagonal_element(variance);
     let w = (spread + noise).try_inverse().unwrap_or_default() * variance;
@@ -75,7 +75,7 @@ fn covariance([n, x, y, z, square @ ..]: Moments) -> Matrix3<f32> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// Variance across the longest direction, voxels²: the middle eigenvalue where the least is small.
+/// Variance across the longest direction, voxels²: the middle eigenvalue if the smallest is small.
 fn across(spread: &Matrix3<f32>) -> f32 {
     let minor =
         |a: usize, b: usize| spread[(a, a)] * spread[(b, b)] - spread[(a, b)] * spread[(b, a)];

@@ -1,4 +1,4 @@
-//! What the refinement gets of a sweep.
+//! What the refinement receives of a sweep.
 
 use crate::params::Profile;
 use crate::sensor_paths::SensorPaths;
@@ -8,7 +8,7 @@ use crate::thinning::TakenPoints;
 /// The returns of a sweep.
 #[derive(Clone, Copy)]
 pub struct SweepReturns<'a> {
-    /// What it was placed by.
+    /// The profile it was placed with.
     pub profile: &'a Profile,
     /// Lattice index of the window's first voxel.
     pub corner: [i32; 3],

@@ -1,4 +1,4 @@
-//! The returns of a sweep that rise above the ground, sorted by column, then thinned.
+//! The returns of a sweep above the ground, sorted by column, then thinned.
 
 use super::cloud_detail::CloudDetail;
 use super::places::Places;
@@ -11,11 +11,11 @@ use crate::params::{
 use crate::record::NONE;
 use crate::sweep::Placed;
 
-/// Words of a mask of the sub-voxels of a column.
+/// Words in a mask of the sub-voxels of a column.
 const MASK_WORDS: usize =
     (SUBVOXELS_MAX * SUBVOXELS_MAX * SUBVOXELS_MAX * CLUSTER_LEVELS_MAX).div_ceil(32);
 
-/// Scratch: indices of returns, as they come and by column, and where those of each column end.
+/// Scratch: indices of returns, in source order and by column, and where those of a column end.
 pub struct ColumnSort {
     listed: [u32; POINTS_MAX],
     order: [u32; POINTS_MAX],
@@ -25,19 +25,19 @@ pub struct ColumnSort {
 /// Thinned returns by column, voxels from the window's corner.
 pub struct ThinnedReturns {
     pub places: Places,
-    /// Where those of each column begin, and those of the last one end.
+    /// Where those of each column begin, and where those of the last one end.
     pub start: [u16; COLUMNS_MAX + 1],
 }
 
 const _: () = assert!(CLOUD_MAX <= u16::MAX as usize);
 
-/// What is thinned, and what with.
+/// What is thinned, and how.
 #[derive(Clone, Copy)]
 struct ThinningSource<'a> {
     side: usize,
     subvoxels: usize,
     returns: SweepReturns<'a>,
-    /// The sensors that saw any, a bit each.
+    /// The sensors that saw any, one bit each.
     sensors: u32,
 }
 
@@ -46,9 +46,9 @@ impl ColumnSort {
         ColumnSort { listed: [0; POINTS_MAX], order: [0; POINTS_MAX], end: [0; COLUMNS_MAX] }
     }
 
-    /// Lists the returns of clusters and adds them to the counts by column. `apart` becomes whether
-    /// a return is of the ground, or higher than clusters are. Returns how many there are, and the
-    /// sensors that saw them, a bit each.
+    /// Lists the returns that may be part of clusters and adds them to the counts by column.
+    /// `apart` is set to whether each return is ground or above the height of clusters. Returns how
+    /// many were listed, and the sensors that saw them, one bit each.
     fn count(
         &mut self,
         ground: &GroundHeights,
@@ -75,7 +75,7 @@ impl ColumnSort {
         (count, sensors)
     }
 
-    /// A counting sort of `count` listed returns into so many columns, `column` of each, which
+    /// Counting sort of the `count` listed returns into `columns` columns, by the `column` of each;
     /// keeps the source's order within a column.
     fn sort(&mut self, columns: usize, column: &[u32], count: usize) {
         let mut total = 0;
@@ -95,9 +95,9 @@ impl ThinnedReturns {
         ThinnedReturns { places: Places::new(), start: [0; COLUMNS_MAX + 1] }
     }
 
-    /// Takes over the returns of a sweep that rise above the ground `detail` has found. `apart`
-    /// becomes whether a return is of the ground, or higher than clusters are. Returns how many
-    /// had no room: those of the last columns.
+    /// Takes over the returns of a sweep above the ground found in `detail`. `apart` is set to
+    /// whether each return is ground or above the height of clusters. Returns how many had no room:
+    /// those of the last columns.
     pub fn fill(
         &mut self,
         detail: &mut CloudDetail,
@@ -114,7 +114,7 @@ impl ThinnedReturns {
         self.thin(detail, source, columns)
     }
 
-    /// Keeps of each sub-voxel the first return of each sensor. Returns how many had no room.
+    /// Keeps the first return of each sensor in each sub-voxel. Returns how many had no room.
     fn thin(
         &mut self,
         detail: &mut CloudDetail,
@@ -122,7 +122,7 @@ impl ThinnedReturns {
         sorted: &ColumnSort,
     ) -> usize {
         let ThinningSource { side, returns, sensors, .. } = source;
-        // By column they are looked up far apart: only where there are several.
+        // In column order these look-ups are scattered: only done if there are several sensors.
         let only = sensors.is_power_of_two().then(|| sensors.trailing_zeros());
         let sensor_of = |n: u32| only.unwrap_or_else(|| returns.points.get(n as usize).sensor);
         self.places.clear();
@@ -143,7 +143,7 @@ impl ThinnedReturns {
         dropped
     }
 
-    /// The same of one column and sensor.
+    /// The same for one column and sensor.
     fn thin_column(
         &mut self,
         detail: &mut CloudDetail,

@@ -2,7 +2,7 @@
 //!
 //! A logistic classifier over the free and occupied voxels of 5x5 columns (3.4-3.7). Its decision,
 //! score > 0, needs no sigmoid; the threshold is part of the bias. Weights are integers, in a table
-//! of sums by whole bytes of a column's masks: 100 lookups take the place of 700 products.
+//! of sums by whole bytes of a column's masks: 100 lookups replace 700 products.
 
 use crate::params::{Frame, LEVELS_MAX};
 use crate::record::{Column, SweepUniform};
@@ -12,7 +12,7 @@ use crate::weights::{Weights, WeightsError};
 pub const PATCH: usize = 5;
 /// Entries of the lookup table: patch column, byte of its masks, value of the byte.
 pub const FILTER_TABLE: usize = PATCH * PATCH * 4 * 256;
-/// Words of the table with the bias behind it.
+/// Words of the table followed by the bias.
 pub const TABLE_WORDS: usize = FILTER_TABLE + 1;
 
 /// Fills `table`, which must hold [`TABLE_WORDS`] elements, from a weights file of kind
@@ -47,7 +47,7 @@ pub fn fill_byte_table(bits: &[i32], bytes: &mut [i32]) {
     }
 }
 
-/// Score of a column (3.6) times the scale of the weights: the bias and the weight of every free
+/// Score of a column (3.6) times the scale of the weights: the bias plus the weight of every free
 /// and every occupied voxel of the 5x5 columns around it. Columns outside the window are unknown.
 pub fn score(sweep: &SweepUniform, filter_table: &[i32], columns: &[Column], column: usize) -> i32 {
     let mut sum = filter_table[FILTER_TABLE];
@@ -75,13 +75,13 @@ fn score_by_bytes(
     sum
 }
 
-/// Where the table has a value of a byte of a patch column's masks.
+/// Table index of a value of a byte of a patch column's masks.
 #[inline]
 fn table_at(patch: usize, byte: usize, value: usize) -> usize {
     (patch * 4 + byte) * 256 + value
 }
 
-/// Calls `each` with the place in the patch and the masks of every column of it in the window.
+/// Calls `each` with the position in the patch and the masks of its columns that are in the window.
 #[inline]
 fn each_of_patch(
     sweep: &SweepUniform,
@@ -103,8 +103,8 @@ fn each_of_patch(
     }
 }
 
-/// Marks the foreground of the sweep before: 1 where a column is solid and scores above zero (or,
-/// unfiltered, is solid), else 0.
+/// Marks the foreground of the previous sweep: 1 if a column is solid and scores above zero (or,
+/// unfiltered, is solid), otherwise 0.
 pub fn background_filter(
     sweep: &SweepUniform,
     filter_table: &[i32],
@@ -155,8 +155,8 @@ fn mark(
 /// The filter shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../../weights/background.txt");
 
-/// What is shipped for a frame: on the lattice ours; in the vehicle's frame, as section 3.4.2
-/// trains it.
+/// The filter shipped for a frame: for the lattice, ours; for the vehicle's frame, trained as in
+/// section 3.4.2.
 pub fn shipped(frame: Frame) -> &'static str {
     match frame {
         Frame::Lattice => SHIPPED,

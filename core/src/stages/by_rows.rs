@@ -1,7 +1,7 @@
-//! Stages of the scalar backend whose rows the threads of a team share.
+//! Stages of the scalar backend whose rows are shared among the threads of a team.
 //!
 //! A row is a foreground column with its costs, or a line of the window. Each is written by one
-//! thread and reads what no thread writes: how they are shared makes no difference.
+//! thread and reads only what no thread writes, so how they are shared makes no difference.
 
 use super::background_filter::mark_by_bytes;
 use super::flow::expectation_by_rings::expectation_by_rings;
@@ -11,7 +11,7 @@ use super::{FOREGROUND_COUNT, Storage};
 use crate::params::ROW;
 use crate::team::{Workers, share};
 
-/// Rows that are not split further: up to 50 microseconds of work. Not measured on its own.
+/// Rows that are not split further: up to 50 microseconds of work. Not measured in isolation.
 const ROWS_MIN: usize = 32;
 
 /// See [`super::background_filter::background_filter`].

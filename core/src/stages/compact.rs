@@ -4,8 +4,9 @@ use crate::record::NONE;
 use crate::stages::{FOREGROUND_COUNT, FOREGROUND_MARKED};
 
 /// Lists the marked columns in `foreground`, in ascending order, and turns `foreground_index`, the
-/// prefix sum of the marks, into their positions there ([`NONE`] elsewhere). What does not fit is
-/// left out: the highest indices. `counters` says how many are listed and how many were marked.
+/// prefix sum of the marks, into their positions there ([`NONE`] elsewhere). Those that do not fit,
+/// with the highest indices, are left out. `counters` receives how many are listed and how many
+/// were marked.
 pub fn compact(
     foreground_marks: &[u32],
     foreground_index: &mut [u32],

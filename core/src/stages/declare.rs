@@ -1,6 +1,6 @@
-//! What a buffer and a stage are, and the macros that declare them in [`super`].
+//! Buffers and stages, and the macros that declare them in [`super`].
 //!
-//! A declaration there is the only one: the slices the scalar backend works on, the bytes of
+//! The declaration there is the only one: the slices the scalar backend works on, the bytes of
 //! `memory-layout.md`, the bindings and struct wrappers of the kernels, the device's schedule and
 //! the names in every table of times come from it.
 
@@ -58,19 +58,19 @@ elements! {
 /// One row of the table of buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct BufferRow {
-    /// Name, the same in the kernels and of the twins' arguments.
+    /// Name, the same in the kernels and in the twins' arguments.
     pub name: &'static str,
-    /// Type of an element of the twins.
+    /// Type of an element in the twins.
     pub element: &'static str,
     /// Type of an element in the kernels.
     pub wgsl: &'static str,
-    /// Bytes of an element of the twins.
+    /// Bytes of an element in the twins.
     pub element_bytes: usize,
-    /// Elements for a profile.
+    /// Number of elements for a profile.
     pub count: fn(&Profile) -> usize,
-    /// Name of the mapped buffer it is uploaded through, where it is.
+    /// Name of the mapped buffer it is uploaded through, if it is.
     pub upload: &'static str,
-    /// Name of the mapped buffer it is read back through, where it is.
+    /// Name of the mapped buffer it is read back through, if it is.
     pub readback: &'static str,
     /// What it holds.
     pub doc: &'static str,
@@ -83,14 +83,14 @@ impl BufferRow {
     }
 }
 
-/// How a kernel sees a buffer where that is not as its elements.
+/// How a kernel sees a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// An array of the buffer's elements.
     Elements,
     /// Atomic words.
     Atomic,
-    /// Words by four.
+    /// Words in groups of four.
     Quads,
 }
 
@@ -103,9 +103,9 @@ pub struct Argument {
     pub buffer: Buffer,
     /// How the kernel sees it.
     pub view: View,
-    /// The stage writes it.
+    /// Whether the stage writes it.
     pub writes: bool,
-    /// It is a list, whose length `counters` holds.
+    /// Whether it is a list, whose length `counters` holds.
     pub is_list: bool,
 }
 
@@ -118,34 +118,35 @@ pub enum List {
     Foreground,
 }
 
-/// Workgroups of a kernel.
+/// Number of workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
 pub enum GroupCount {
     /// One.
     One,
-    /// A thread per item.
+    /// One thread per item.
     Threads(fn(&Profile) -> usize),
-    /// [`crate::params::TILE`] items a workgroup.
+    /// [`crate::params::TILE`] items per workgroup.
     Tiles(fn(&Profile) -> usize),
-    /// A thread per entry of a list.
+    /// One thread per entry of a list.
     ThreadPer(List),
-    /// A workgroup per foreground column.
+    /// One workgroup per foreground column.
     GroupPerColumn,
 }
 
 /// A stage: a twin, and the kernels that together do the same on a device.
 #[derive(Clone, Copy, Debug)]
 pub struct Stage {
-    /// Name, in every table of times too.
+    /// Name, also in every table of times.
     pub name: &'static str,
     /// Entry points in order, all with the stage's arguments.
     pub kernels: &'static [(&'static str, GroupCount)],
-    /// The kernels for devices that are CPUs, where those want others: a barrier costs them much,
-    /// and they take both ways at a branch. None where they do not.
+    /// The kernels for devices that are CPUs, if those need different ones: barriers are expensive
+    /// there, and both sides of a branch are executed. Empty otherwise.
     pub on_cpus: &'static [(&'static str, GroupCount)],
     /// Arguments of the twin.
     pub arguments: &'static [Argument],
-    /// What the scalar backend runs. Twins that wider instructions help are inlined, and use them.
+    /// What the scalar backend runs. Twins that benefit from wider instructions are inlined, to use
+    /// them.
     pub scalar: fn(&mut Storage, &dyn Workers),
 }
 
@@ -160,8 +161,8 @@ impl Stage {
         if self.on_cpus.is_empty() { self.kernels } else { self.on_cpus }
     }
 
-    /// What the kernels bind, in order: the arguments, and `counters` behind a list where threads
-    /// have to know its length.
+    /// What the kernels bind, in order: the arguments, and `counters` after a list if threads have
+    /// to know its length.
     pub fn bindings(&self) -> impl Iterator<Item = Argument> {
         let by_group = |(_, groups): &(_, GroupCount)| matches!(groups, GroupCount::GroupPerColumn);
         let counted = !self.all_kernels().all(by_group);
@@ -228,7 +229,7 @@ macro_rules! buffers {
         }
 
         impl<'a> Storage<'a> {
-            /// Cuts up `words`, of which there must be [`Storage::words`]. Buffers that the
+            /// Divides up `words`, of which there must be [`Storage::words`]. Buffers that the
             /// programs do not need are empty.
             pub fn over(
                 words: &'a mut [u32],
@@ -262,11 +263,10 @@ macro_rules! buffers {
 
 /// A stage: `stage!(NAME in MODULE, (ARGUMENTS), GROUPS)`. Its twin is the function of that name in
 /// the module, its kernel the entry point of that name. An argument is
-/// `[mut] [atomic|quads] BUFFER`, `[mut] NAME is BUFFER` where the stage serves several
-/// buffers, or `list BUFFER` where `counters` says how many elements of it there are.
-/// `scalar: FUNCTION` names what the scalar backend runs in the twin's place on the whole
-/// [`Storage`], `[ENTRY: GROUPS, ..]`
-/// the entry points where there are several.
+/// `[mut] [atomic|quads] BUFFER`, `[mut] NAME is BUFFER` if the stage serves several buffers, or
+/// `list BUFFER` if `counters` holds its number of elements. `scalar: FUNCTION` names what the
+/// scalar backend runs instead of the twin on the whole [`Storage`], `[ENTRY: GROUPS, ..]` the
+/// entry points if there are several.
 macro_rules! stage {
     (
         $name:ident in $($seg:ident)::+, $args:tt, scalar: $fast:path, $groups:expr

@@ -1,37 +1,37 @@
 //! Occupancy constancy (section 3.5.1): how well two columns agree.
 //!
-//! Three binary features per level say whether both columns are free, both occupied, or one of
-//! each (3.8-3.10); a logistic classifier weighs them (3.11, 3.12). Free and occupied exclude each
-//! other, so with the source fixed the score is linear in the target's mask bits.
+//! Three binary features per level say whether both columns are free, both occupied, or one of each
+//! (3.8-3.10); a logistic classifier weighs them (3.11, 3.12). Free and occupied are mutually
+//! exclusive, so with the source fixed the score is linear in the target's mask bits.
 //!
 //! Costs are negative log-probabilities in thousandths of a nat, so that sums over the window
 //! (3.13) and energies are integers on every machine. They are unsigned costs rather than scores:
-//! nine of them fit in 16 bits, `atomicMin` finds the winners, and the largest number can stand for
-//! "none yet" ([`NONE`](crate::record::NONE)).
+//! the sum of nine fits in 16 bits, `atomicMin` finds the winners, and the largest number can
+//! represent "none yet" ([`NONE`](crate::record::NONE)).
 
 use crate::params::{Frame, LEVELS_MAX, LINE, REACH, ROW, SIDE};
 use crate::record::{Column, SweepUniform};
 use crate::stages::background_filter::fill_byte_table;
 use crate::weights::{Weights, WeightsError};
 
-/// Entries the table of log-sigmoids may have: sums of weights, bias included.
+/// Maximum entries of the table of log-sigmoids: sums of weights, bias included.
 pub const SCORES_MAX: usize = 8192;
 /// Words of the weights on the device: free, occupied, mixed per level, then the bias.
 pub const WEIGHT_WORDS: usize = 3 * LEVELS_MAX + 1;
-/// Largest cost of a pair: nine of them fit 16 bits.
+/// Largest cost of a pair: the sum of nine fits in 16 bits.
 pub const COST_MAX: u32 = u16::MAX as u32 / 9;
 
-/// The classifier, ready for use.
+/// The range of the classifier's scores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Scores {
-    /// Least sum of weights.
+    /// Minimum sum of weights.
     pub min: i32,
     /// Number of possible sums.
     pub count: i32,
 }
 
 impl Scores {
-    /// A level contributes one of its three weights or nothing.
+    /// Each level contributes one of its three weights or nothing.
     fn of(weights: &[i32]) -> Scores {
         let bias = weights[3 * LEVELS_MAX];
         let (mut min, mut max) = (bias, bias);
@@ -77,7 +77,7 @@ fn cost_of(x: f64) -> u32 {
     (libm::floor(nats * MILLINATS + 0.5) as u32).min(COST_MAX)
 }
 
-/// Parts of a nat that costs count.
+/// Units of cost in a nat.
 const MILLINATS: f64 = 1000.0;
 
 /// What each mask bit of a target adds to the score of `source`: free in the low half, occupied in
@@ -97,8 +97,8 @@ pub fn bit_weights(source: Column, weights: &[i32]) -> [i32; 32] {
 }
 
 /// Costs of every foreground column at every displacement: row `n` of `pair_cost` belongs to
-/// `foreground[n]`, its elements are ordered as [`ROW`] says. A target outside the window, and the
-/// padding, is unknown. `pair_cost` must hold [`ROW`] elements per foreground column.
+/// `foreground[n]`, its elements are ordered as in [`ROW`]. Targets outside the window, and the
+/// padding, are unknown. `pair_cost` must hold [`ROW`] elements per foreground column.
 pub fn occupancy_constancy(
     sweep: &SweepUniform,
     constancy_weights: &[i32],
@@ -164,8 +164,8 @@ pub fn occupancy_constancy_by_bytes(
 /// The classifier shipped with the program: see the file's provenance.
 pub const SHIPPED: &str = include_str!("../../weights/constancy.txt");
 
-/// What is shipped for a frame: on the lattice ours; in the vehicle's frame, as section 3.5.1
-/// trains it.
+/// The classifier shipped for a frame: for the lattice, ours; for the vehicle's frame, trained as
+/// in section 3.5.1.
 pub fn shipped(frame: Frame) -> &'static str {
     match frame {
         Frame::Lattice => SHIPPED,

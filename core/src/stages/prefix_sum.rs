@@ -3,7 +3,7 @@
 use crate::params::TILE;
 
 /// `sums[n]` becomes the sum of `values[..n]`, element [`TILE`] of `tiles` the sum of all. The
-/// kernels leave the sums of their tiles before it.
+/// kernels leave the sums of their tiles in the elements before it.
 pub fn prefix_sum(values: &[u32], tiles: &mut [u32], sums: &mut [u32]) {
     assert!(values.len() == sums.len());
     let mut total = 0;

@@ -7,34 +7,34 @@ use crate::team::Workers;
 /// A step of a program.
 #[derive(Clone, Copy, Debug)]
 pub enum StageOp {
-    /// The host's words go to the device.
+    /// Copies a buffer from the host to the device.
     Upload(Buffer),
-    /// Every word of a buffer is set.
+    /// Sets every word of a buffer.
     Fill(Buffer, u32),
-    /// A stage.
+    /// Runs a stage.
     Run(&'static Stage),
     /// One stage of the scalar backend that is several steps on a device.
     Fused(&'static Stage, &'static [StageOp]),
-    /// Steps that are a list of their own.
+    /// A list of steps declared separately.
     Part(&'static [StageOp]),
-    /// As often as there are rounds of the energy minimisation.
+    /// Steps repeated for every round of the energy minimisation.
     Rounds(&'static [StageOp]),
-    /// A fixed number of times.
+    /// Steps repeated a fixed number of times.
     Repeat(u32, &'static [StageOp]),
-    /// The device's words go to the host.
+    /// Copies a buffer from the device to the host.
     ReadBack(Buffer),
 }
 
 /// Steps that run as a whole.
 #[derive(Clone, Copy, Debug)]
 pub struct StageProgram {
-    /// For messages and documents.
+    /// Name, for messages and documents.
     pub name: &'static str,
     /// The steps, in order.
     pub ops: &'static [StageOp],
 }
 
-/// Who runs a program.
+/// What runs a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Runner {
     /// The twins.
@@ -83,7 +83,7 @@ pub fn run(
 }
 
 impl StageOp {
-    /// Whether this step, which [`walk`] has come to, touches a buffer.
+    /// Whether this step, as passed on by [`walk`], touches a buffer.
     pub fn touches(&self, buffer: Buffer) -> bool {
         match *self {
             StageOp::Upload(b) | StageOp::ReadBack(b) | StageOp::Fill(b, _) => b == buffer,
@@ -93,7 +93,7 @@ impl StageOp {
     }
 }
 
-/// Whether some of the programs need a buffer.
+/// Whether any of the programs needs a buffer.
 pub fn needed(programs: &[StageProgram], runner: Runner, buffer: Buffer) -> bool {
     let mut found = false;
     for program in programs {
@@ -103,7 +103,7 @@ pub fn needed(programs: &[StageProgram], runner: Runner, buffer: Buffer) -> bool
 }
 
 impl Storage<'_> {
-    /// 32-bit words that the buffers of some programs take.
+    /// Number of 32-bit words that the buffers of some programs take.
     pub fn words(programs: &[StageProgram], profile: &Profile) -> usize {
         Buffer::ALL.iter().map(|b| words_of(*b, programs, profile)).sum()
     }

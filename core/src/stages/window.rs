@@ -1,19 +1,19 @@
 //! The window that promotes spatial smoothness (3.13): sums of costs over the 3x3 columns around
-//! the source, as the author programmed it. They are formed where they are asked for and stored
-//! nowhere: a table of them would be as large as that of the pairs.
+//! the source, as the author programmed it. They are computed on demand and never stored: a table
+//! of them would be as large as that of the pairs.
 
 use crate::params::{COST_UNKNOWN, LINE, REACH, ROW, SIDE};
 use crate::record::{MinCost, NONE, SweepUniform};
 
-/// Costs of a column at its displacements, ordered as [`ROW`] says.
+/// Costs of a column at its displacements, ordered as in [`ROW`].
 pub trait Costs {
-    /// At one displacement.
+    /// The cost at one displacement.
     fn at(&self, index: usize) -> u16;
-    /// At all of them.
+    /// Fills a row with the costs at all displacements.
     fn fill_row(&self, row: &mut [u16; ROW]);
 }
 
-/// Costs that are stored.
+/// Stored costs.
 impl Costs for [u16; ROW] {
     fn at(&self, index: usize) -> u16 {
         self[index]
@@ -24,17 +24,17 @@ impl Costs for [u16; ROW] {
     }
 }
 
-/// Sums of costs over the columns of the grid around one, itself included: those of the foreground
-/// as `pair_cost` has them, [`COST_UNKNOWN`] for each that is empty or filtered. Neighbours outside
-/// are [`outside_cost`], a constant of the column.
+/// Sums of costs over the columns of the grid around one, itself included: from `pair_cost` for
+/// those of the foreground, [`COST_UNKNOWN`] for each that is empty or filtered out. Neighbours
+/// outside cost [`outside_cost`], a constant of the column.
 pub struct WindowCosts<'a> {
     rows: heapless::Vec<&'a [u16; ROW], 9>,
     unknown: u16,
 }
 
 impl<'a> WindowCosts<'a> {
-    /// Around `column`. Row `n` of `pair_cost` belongs to the column whose `foreground_index` is
-    /// `n`; [`NONE`] has none.
+    /// The costs around `column`. Row `n` of `pair_cost` belongs to the column whose
+    /// `foreground_index` is `n`; columns with [`NONE`] have no row.
     #[inline(always)]
     pub fn of(
         sweep: &SweepUniform,
@@ -72,8 +72,8 @@ impl Costs for WindowCosts<'_> {
     }
 }
 
-/// The least energy of every column of `foreground` at any displacement, smoothing apart, and its
-/// place: what a column pays at least, whatever its neighbours do.
+/// The minimum energy of every column of `foreground` over all displacements, without smoothing,
+/// and its place: a lower bound of what a column pays, whatever its neighbours do.
 #[inline(always)]
 pub fn window(
     sweep: &SweepUniform,
@@ -89,7 +89,7 @@ pub fn window(
     }
 }
 
-/// The least energy of a column with these costs, and its place: the first in scan order among
+/// The minimum energy of a column with these costs, and its place: the first in scan order among
 /// equals.
 #[inline(always)]
 pub fn least(sweep: &SweepUniform, column: u32, row: &[u16; ROW]) -> MinCost {
@@ -97,7 +97,7 @@ pub fn least(sweep: &SweepUniform, column: u32, row: &[u16; ROW]) -> MinCost {
     let [lines, places] = [column as i32 / sweep.side, column as i32 % sweep.side]
         .map(|at| (-REACH).max(-at)..=REACH.min(sweep.side - 1 - at));
     let mut least = [NONE; 2];
-    // From the middle, where a displacement costs least, so that most lines end at the first look.
+    // From the middle, where displacement costs least, so that most lines are skipped by the bound.
     for n in 0..SIDE as i32 {
         let du = if n % 2 == 0 { n / 2 } else { -(n / 2) - 1 };
         if !lines.contains(&du) {
@@ -118,7 +118,7 @@ pub fn least(sweep: &SweepUniform, column: u32, row: &[u16; ROW]) -> MinCost {
     least
 }
 
-/// The least cost of a line, its padding included; by lanes.
+/// The minimum cost of a line, its padding included; vectorised.
 #[inline(always)]
 fn lowest(line: &[u16]) -> u16 {
     line.iter().fold(u16::MAX, |least, cost| least.min(*cost))
@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    /// By looking at every displacement in scan order.
+    /// By examining every displacement in scan order.
     fn first_of_least(sweep: &SweepUniform, [i, j]: [i32; 2], row: &[u16; ROW]) -> MinCost {
         let outside = outside_cost(sweep, (i * sweep.side + j) as usize);
         let energies = (0..ROW as i32).filter_map(|n| {

@@ -2,14 +2,14 @@
 //! constant turn rate and velocity (CTRV).
 //!
 //! State (3.15): position, heading, speed, turn rate. Positions are metres from the point the
-//! tracklet follows, so that they keep their precision wherever the vehicle drives. The
-//! innovations, normalised and squared (NIS; Bar-Shalom, Li and Kirubarajan, "Estimation with
-//! Applications to Tracking and Navigation", 2001, section 5.4), scale all noise together, which
-//! leaves the gains as they are. The noise has to be measured because poses, stamps and drivers
-//! differ from one recording to the next.
+//! tracklet follows, so that they keep their precision wherever the vehicle drives. The normalised
+//! innovations squared (NIS; Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to
+//! Tracking and Navigation", 2001, section 5.4) scale all noise together, which leaves the gains
+//! unchanged. The noise has to be measured because poses, stamps and drivers differ from one
+//! recording to the next.
 //!
-//! The poses themselves are not corrected. Static clusters do show a common displacement, some 6 mm
-//! a sweep on KITTI's drive 0005, but the errors of dynamic ones do not follow it.
+//! The poses themselves are not corrected. Static clusters do show a common displacement, about
+//! 6 mm per sweep on KITTI drive 0005, but the errors of dynamic ones do not follow it.
 
 use crate::ctrv::TwoPointStart;
 use crate::params::{Birth, TrackletParams};
@@ -20,22 +20,21 @@ use nalgebra::{Matrix2, Matrix5, Matrix5x2, Vector2, Vector5};
 pub struct Ekf {
     /// m, m, rad, m/s, rad/s.
     pub mean: Vector5<f32>,
-    /// Symmetric, under the noise assumed; the estimated covariance is `scale` times this.
+    /// Symmetric, under the assumed noise; the estimated covariance is `scale` times this.
     pub covariance: Matrix5<f32>,
-    /// Factor of the variances of all noise, of the process and of the measurements, as the
-    /// innovations tell over [`TrackletParams::innovation_sweeps`].
+    /// Factor on the variances of all noise, of the process and of the measurements, estimated from
+    /// the innovations over [`TrackletParams::innovation_sweeps`].
     pub scale: f32,
 }
 
-/// Standard deviations at birth in the author's program, in the units of the state.
+/// Standard deviations at birth in the author's program, in units of the state.
 const BIRTH_SOURCE: [f32; 5] = [0.1, 0.1, 0.2, 1.5, 0.2];
 
 impl Ekf {
     /// A tracklet born from the displacement `moved` (m) of its first match over `dt` seconds,
     /// relative to where it moved to; `noise` is the covariance of a measured position, m².
     ///
-    /// At the target: as [`TwoPointStart`] has it. At the source: the author's start, one step
-    /// late.
+    /// At the target: as in [`TwoPointStart`]. At the source: the author's start, one step late.
     pub fn birth(params: &TrackletParams, noise: Matrix2<f32>, moved: [f32; 2], dt: f32) -> Ekf {
         let TwoPointStart { heading, speed, covariance } = TwoPointStart::of(noise, moved, dt);
         let mut mean = Vector5::new(0.0, 0.0, heading, speed, 0.0);
@@ -53,16 +52,15 @@ impl Ekf {
         Ekf { mean, covariance: p, scale: 1.0 }
     }
 
-    /// Whether it has not moved since birth. Then the speed is zero and the heading, which a polar
-    /// state needs to let the speed grow, is unknown.
+    /// Whether it has not moved since birth. Its speed is then zero and its heading, without which
+    /// the speed of a polar state cannot grow, is unknown.
     pub fn at_rest(&self) -> bool {
         self.mean[3] == 0.0
     }
 
     /// A tracklet at rest after its first displacement, `elapsed` seconds after the match before
-    /// its birth: born again from that displacement over that time, or nothing if it lies beyond
-    /// the gate, which is isotropic here. The filter alone would learn motion along its x axis
-    /// only.
+    /// its birth: reborn from that displacement over that time, or `None` if it is outside the
+    /// gate, which is isotropic here. The filter alone would only pick up motion along its x axis.
     pub fn depart(
         &self,
         params: &TrackletParams,
@@ -96,7 +94,7 @@ impl Ekf {
     }
 
     /// Resets the position to zero, measured with errors of covariance `noise` that are independent
-    /// of the velocity's.
+    /// of those of the velocity.
     pub fn measure_place(&mut self, noise: Matrix2<f32>) {
         let mut keep = Matrix5::identity();
         keep.fixed_view_mut::<2, 2>(0, 0).fill(0.0);
@@ -105,8 +103,8 @@ impl Ekf {
         self.covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&noise);
     }
 
-    /// Observes a position (3.22-3.24, Joseph form) unless it lies beyond the gate (3.25): then
-    /// nothing changes and `false` comes back. The gate widens with the scale of the noise.
+    /// Observes a position (3.22-3.24, Joseph form). Returns `false` and changes nothing if it is
+    /// outside the gate (3.25). The gate widens with the scale of the noise.
     pub fn update(
         &mut self,
         params: &TrackletParams,
@@ -121,7 +119,7 @@ impl Ekf {
         let inverse =
             Matrix2::new(s[(1, 1)], -s[(0, 1)], -s[(1, 0)], s[(0, 0)]) * (1.0 / determinant);
         let d2 = (innovation.transpose() * inverse * innovation)[0];
-        // NaN, should it ever arise, ends the tracklet.
+        // A NaN, should one ever occur, ends the tracklet.
         if d2 > params.gate_d2 * self.scale.max(1.0) || d2.is_nan() {
             return false;
         }
@@ -132,7 +130,7 @@ impl Ekf {
         of_position -= gain;
         let joseph = keep * p * keep.transpose() + gain * r * gain.transpose();
         self.covariance = (joseph + joseph.transpose()) * 0.5;
-        // At rest innovations tell nothing: static columns have displacement zero exactly.
+        // At rest innovations say nothing: the displacement of static columns is exactly zero.
         if params.innovation_sweeps > 0.0 && !self.at_rest() {
             let per_axis = 0.5 * d2;
             let scale = self.scale + (per_axis - self.scale) / params.innovation_sweeps;
@@ -142,8 +140,7 @@ impl Ekf {
         true
     }
 
-    /// Turns a state with a negative speed round: backwards at one heading is forwards at the
-    /// opposite one.
+    /// Flips a state with negative speed: backwards at one heading is forwards at the opposite one.
     fn face_forward(&mut self) {
         if self.mean[3] < 0.0 {
             self.mean[3] = -self.mean[3];
@@ -156,7 +153,7 @@ impl Ekf {
         self.mean[2] = wrap(self.mean[2]);
     }
 
-    /// Expresses the state in axes turned by `angle`, rad (a vehicle frame that turned, section
+    /// Expresses the state in axes rotated by `angle`, rad (a vehicle frame that turned, section
     /// 3.7).
     pub fn turn_axes(&mut self, angle: f32) {
         let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
@@ -177,7 +174,7 @@ impl Ekf {
             // All directions are equally likely.
             return ([0.0; 2], [ss, 0.0, ss]);
         }
-        // Rows of the Jacobian of (v cos h, v sin h) by (h, v).
+        // Rows of the Jacobian of (v cos h, v sin h) with respect to (h, v).
         let (a, b) = ([-speed * sin, cos], [speed * cos, sin]);
         let product = |l: [f32; 2], r: [f32; 2]| {
             l[0] * r[0] * hh + (l[0] * r[1] + l[1] * r[0]) * hs + l[1] * r[1] * ss
@@ -187,14 +184,15 @@ impl Ekf {
 }
 
 impl Ekf {
-    /// Logarithm of 1 + speed over its standard deviation.
+    /// log(1 + speed / its standard deviation).
     pub fn certainty(&self) -> f32 {
         let sigma = libm::sqrtf(self.scale * self.covariance[(3, 3)]).max(SIGMA_MIN_MPS);
         libm::log1pf(self.mean[3].abs() / sigma)
     }
 }
 
-/// No speed is known better than this, m/s: a filter that has seen the same for long thinks so.
+/// Lower bound on the standard deviation of a speed, m/s: a filter that has long seen the same
+/// becomes overconfident.
 const SIGMA_MIN_MPS: f32 = 0.05;
 
 /// The same angle in (-pi, pi]; the argument must lie within three turns of it.

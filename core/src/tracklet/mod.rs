@@ -2,11 +2,11 @@
 //!
 //! A tracklet follows a point of an object from cell to cell: the middle of the column it was born
 //! in, moved by every displacement since. Positions are relative to that point, so f32 suffices
-//! wherever one drives. One step: a tracklet whose cell was observed is predicted, gated, updated
-//! and moved on; one whose cell was not takes over the nearest observed column beside it that no
-//! other has; an observed column without a tracklet gives birth to one; the rest coast for
-//! [`crate::params::TrackletParams::coast_sweeps`], then end. Of two tracklets that come to lie in
-//! one cell the older stays.
+//! wherever the vehicle drives. One step: a tracklet whose cell was observed is predicted, gated,
+//! updated and moved on; one whose cell was not takes over the nearest adjacent observed column
+//! that no other has; an observed column without a tracklet gives birth to one; the rest coast for
+//! [`crate::params::TrackletParams::coast_sweeps`], then end. If two tracklets end up in one cell,
+//! a moving one is kept rather than one at rest, and of two alike the older.
 
 pub mod ekf;
 pub(crate) mod observe;
@@ -23,15 +23,15 @@ use nalgebra::Matrix2;
 /// A flow tracklet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracklet {
-    /// Filter; positions relative to the point it follows, axes of the grid.
+    /// Filter; positions are relative to the point it follows, along the axes of the grid.
     pub ekf: Ekf,
-    /// Observations after birth.
+    /// Number of observations after birth.
     pub age: u32,
-    /// Sweeps since the last one.
+    /// Sweeps since the last observation.
     pub missed: u32,
     /// Column of the window.
     pub column: u32,
-    /// The point it follows, from the column's corner, cells: 0 to 1.
+    /// The point it follows, relative to the column's corner, cells: 0 to 1.
     pub place: [f32; 2],
     /// P(moves), as last observed.
     pub probability: f32,
@@ -46,7 +46,7 @@ pub struct Observation {
     pub moved: [f32; 2],
     /// Its covariance (xx, xy, yy), m².
     pub covariance: [f32; 3],
-    /// What tells whether it moves.
+    /// Cues to whether it moves.
     pub cues: Cues,
     /// P(moves).
     pub probability: f32,
@@ -65,9 +65,9 @@ crate::counters! {
         pub gated,
         /// Coasting unobserved.
         pub waiting,
-        /// Ended for another one in the same cell.
+        /// Ended in favour of another one in the same cell.
         pub merged,
-        /// Ended unobserved, or for want of room.
+        /// Ended unobserved, or for lack of room.
         pub lost,
         /// Ended because their cell left the window.
         pub left,
@@ -86,12 +86,12 @@ pub(crate) fn observe(
     let noise = position_noise(params, covariance);
     let refined = profile.refinement_sweeps > 0;
     if refined {
-        // Registrations err independently of each other: the next displacement does not make good
+        // The errors of registrations are independent: the next displacement does not make up for
         // the error of this one, as it does in whole cells.
         t.ekf.measure_place(noise);
     }
     if t.ekf.at_rest() && moved != [0.0; 2] && params.birth == Birth::Target {
-        // From the sweep before its birth to this one.
+        // Number of sweeps from the one before its birth to this one.
         let sweeps = if refined { 1 } else { t.age + 2 };
         let elapsed = (dt * sweeps as f32).min(params.departure_s.max(dt));
         let departed = t.ekf.depart(params, noise, moved, elapsed, dt);
@@ -105,14 +105,14 @@ pub(crate) fn observe(
     passed
 }
 
-/// Covariance of a position. A displacement lies between two that err alike: half of its covariance
-/// belongs to each, and half of that of the poses between them.
+/// Covariance of a position. A displacement lies between two positions with equal errors: half of
+/// its covariance belongs to each, as does half of that of the poses between them.
 fn position_noise(params: &TrackletParams, [xx, xy, yy]: [f32; 3]) -> Matrix2<f32> {
     let of_poses = params.pose_noise_m * params.pose_noise_m;
     Matrix2::new(xx + of_poses, xy, xy, yy + of_poses) * 0.5
 }
 
-/// All tracklets: fixed capacity; beyond it none are born.
+/// All tracklets, with a fixed capacity beyond which none are born.
 pub struct Tracklets {
     now: heapless::Vec<Tracklet, FOREGROUND_MAX>,
     next: heapless::Vec<Tracklet, FOREGROUND_MAX>,
@@ -149,21 +149,22 @@ impl Tracklets {
         self.now.get(self.slot_of_column[column] as usize)
     }
 
-    /// What it predicts over `dt_s` seconds, voxels; nothing before it was observed again.
+    /// What the tracklet in a column predicts over `dt_s` seconds, voxels; `None` until it has been
+    /// observed again.
     pub(crate) fn predict(&self, column: usize, dt_s: f32, voxel_m: f32) -> Option<Prediction> {
         let ekf = self.at(column).filter(|t| t.age > 0)?.ekf;
         let by = ekf.velocity().0.map(|v| v * dt_s / voxel_m);
         Some(Prediction { by, certainty: ekf.certainty() })
     }
 
-    /// Drops all.
+    /// Drops all tracklets.
     pub fn clear(&mut self) {
         self.now.clear();
     }
 
-    /// One step over `dt` seconds, after [`Tracklets::place`], with the observed columns,
-    /// ascending; `left` is what that returned, `turned` by how much the grid's axes turned since
-    /// the sweep before, rad.
+    /// One step over `dt` seconds, after [`Tracklets::place`], with the observed columns in
+    /// ascending order; `left` is what that returned, `turned` how far the grid's axes have turned
+    /// since the previous sweep, rad.
     pub(crate) fn update(
         &mut self,
         profile: &Profile,
@@ -180,7 +181,7 @@ impl Tracklets {
             self.take_over(step, observed);
         }
         self.next.clear();
-        // From here on that of the cells moved to.
+        // From here on, indexed by the cells moved to.
         self.slot_of_column.fill(NONE);
         for o in observed {
             let known = self.now.get(core::mem::replace(&mut o.slot, NONE) as usize);
@@ -192,7 +193,7 @@ impl Tracklets {
             o.slot = self.put(step, o.column, by, t, &mut turnover);
         }
         self.coast(profile, step, dt, &mut turnover);
-        // Swapped, the whole of both would go by way of the stack.
+        // Swapping them would move both entirely through the stack.
         self.now.clear();
         self.now.extend(self.next.iter().copied());
         let TrackletTurnover { born, gated, merged, lost, left, .. } = turnover;
@@ -201,7 +202,7 @@ impl Tracklets {
         turnover
     }
 
-    /// Gives each observation the tracklet in its column.
+    /// Assigns each observation the tracklet in its column.
     fn claim(&mut self, observed: &mut [Observation]) {
         self.observation_of_column.fill(NONE);
         self.claimed.fill(false);
@@ -214,7 +215,8 @@ impl Tracklets {
         }
     }
 
-    /// Tracklets whose cell was not observed take the nearest column beside it that was.
+    /// Lets each tracklet whose cell was not observed take the nearest adjacent free column that
+    /// was.
     fn take_over(&mut self, step: &SweepUniform, observed: &mut [Observation]) {
         let side = step.side;
         for (slot, t) in self.now.iter_mut().enumerate() {
@@ -244,8 +246,8 @@ impl Tracklets {
         }
     }
 
-    /// Puts a tracklet into the cell it comes to lie in, `by` cells from `column`. Where two meet,
-    /// one that moves stays rather than one at rest, and of two alike the older. Returns the slot.
+    /// Puts a tracklet into the cell it ends up in, `by` cells from `column`. If two meet, a moving
+    /// one is kept rather than one at rest, and of two alike the older. Returns the slot.
     fn put(
         &mut self,
         step: &SweepUniform,
@@ -258,7 +260,7 @@ impl Tracklets {
         let from = [column as i32 / side, column as i32 % side];
         let at: [f32; 2] = core::array::from_fn(|a| t.place[a] + by[a]);
         let cells = at.map(|v| libm::floorf(v) as i32);
-        // Two sweeps a nanosecond apart let a speed grow beyond all cells.
+        // Two sweeps a nanosecond apart can give a speed that overflows the cell indices.
         let [i, j] = [0, 1].map(|a| from[a].saturating_add(cells[a]));
         if !(0..side).contains(&i) || !(0..side).contains(&j) {
             turnover.left += 1;
@@ -270,7 +272,7 @@ impl Tracklets {
         let there = self.slot_of_column[column as usize];
         if let Some(other) = self.next.get_mut(there as usize) {
             turnover.merged += 1;
-            // Put out with the velocity of what stands there, what moves would be taken to stand.
+            // With the output velocity of the one at rest, a moving object would appear static.
             let rank = |t: &Tracklet| (!t.ekf.at_rest(), t.age);
             if rank(&t) > rank(other) {
                 *other = t;
@@ -286,7 +288,7 @@ impl Tracklets {
         slot
     }
 
-    /// Unobserved tracklets move on as predicted for a while, their covariance growing (5.2.2).
+    /// Lets unobserved tracklets move on as predicted for a while, with growing covariance (5.2.2).
     fn coast(
         &mut self,
         profile: &Profile,
@@ -315,8 +317,8 @@ impl Tracklets {
         }
     }
 
-    /// Finds the tracklets' columns in the new window. Returns how many are no longer in it; those
-    /// have [`NONE`] for a column.
+    /// Finds the tracklets' columns in the new window. Returns how many are no longer in it; their
+    /// column is [`NONE`].
     pub(crate) fn place(&mut self, step: &SweepUniform) -> u32 {
         let side = step.side;
         self.slot_of_column.fill(NONE);
@@ -339,7 +341,7 @@ impl Tracklets {
 /// Largest coordinate inside a cell: the float before 1.
 const INSIDE: f32 = 1.0 - f32::EPSILON;
 
-/// What a tracklet, or none, becomes with an observation of its column; nothing where it ends.
+/// What a known tracklet, or none, becomes with an observation of its column; `None` if it ends.
 fn continued(
     known: Option<&Tracklet>,
     profile: &Profile,

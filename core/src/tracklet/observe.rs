@@ -1,4 +1,4 @@
-//! The door in: what a pair of sweeps says of the motion of columns.
+//! The input side: what a pair of sweeps says about the motion of columns.
 
 use super::Observation;
 use crate::params::{FOREGROUND_MAX, Profile};
@@ -7,11 +7,12 @@ use crate::record::{NONE, SweepUniform, VALID, flow_displacement};
 use crate::refinement::Refinement;
 use crate::refinement::cues::Cues;
 
-/// How solid columns moved: those with a match, and those that a moving cluster took along.
+/// How solid columns moved: those with a match and those that a moving cluster took along.
 pub(crate) struct Observations {
     /// Ascending by column.
     pub all: heapless::Vec<Observation, FOREGROUND_MAX>,
-    /// Observed columns beyond the capacity, the last in column order: they put out no motion.
+    /// Number of observed columns beyond the capacity, the last in column order: no motion is
+    /// output for them.
     pub beyond_capacity: usize,
 }
 
@@ -20,7 +21,7 @@ impl Observations {
         Observations { all: heapless::Vec::new(), beyond_capacity: 0 }
     }
 
-    /// Lists those of a pair.
+    /// Collects those of a pair.
     pub fn collect(
         &mut self,
         profile: &Profile,
@@ -53,7 +54,7 @@ impl Observations {
     }
 }
 
-/// Displacement, m, its covariance, m², and, of a refined one, what tells whether it moves.
+/// Displacement, m, its covariance, m², and, if it was refined, cues to whether it moves.
 type Moved = ([f32; 2], [f32; 3], Option<Cues>);
 
 /// What the refinement found.

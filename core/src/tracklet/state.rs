@@ -1,4 +1,4 @@
-//! The door out: tracklets as records.
+//! The output side: tracklets as records.
 
 use super::Tracklet;
 use crate::frame::{Side, centre_of};

@@ -1,4 +1,4 @@
-//! What becomes of tracklets from step to step.
+//! What happens to tracklets from step to step.
 
 extern crate std;
 use super::*;
@@ -18,7 +18,7 @@ fn step(side: i32, shift: [i32; 2]) -> SweepUniform {
     SweepUniform { side, shift_x: shift[0], shift_y: shift[1], ..SweepUniform::default() }
 }
 
-/// A column that moves by cells.
+/// An observed column and its displacement, cells.
 fn seen(column: i32, by: [f32; 2]) -> Observation {
     let variance = 0.03 * 0.03;
     Observation {
@@ -31,7 +31,7 @@ fn seen(column: i32, by: [f32; 2]) -> Observation {
     }
 }
 
-/// One step in a window that moved; also how many tracklets' cells it left behind.
+/// One step in a window that moved; also returns how many tracklets it left behind.
 fn advance(
     tracklets: &mut Tracklets,
     profile: &Profile,
@@ -57,7 +57,7 @@ fn a_column_beside_takes_the_tracklet_over() {
         let mut profile = profile();
         profile.tracklet.takes_over = takes_over;
         profile.tracklet.coast_sweeps = 0;
-        // Where it goes on from: the middle, or the edge of the column it takes.
+        // It goes on from the middle or the edge of the column it takes.
         for (by, to) in [([0, 1], 14), ([-1, -1], 14), ([1, 0], 15)] {
             let mut tracklets = new();
             advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(10, 10), [2.0, 0.0])]);
@@ -69,7 +69,7 @@ fn a_column_beside_takes_the_tracklet_over() {
             let to = if takes_over { to } else { 14 + by[0] };
             assert_eq!(tracklets.all()[0].column as i32, cell(to, 10 + by[1]));
         }
-        // Two cells off is not beside.
+        // Two cells off is not adjacent.
         let mut tracklets = new();
         advance(&mut tracklets, &profile, [0, 0], &mut [seen(cell(10, 10), [2.0, 0.0])]);
         let far = &mut [seen(cell(14, 10), [2.0, 0.0])];
@@ -80,7 +80,7 @@ fn a_column_beside_takes_the_tracklet_over() {
 #[test]
 fn of_several_columns_beside_the_nearest_is_taken() {
     let mut tracklets = new();
-    // The place it follows comes to lie at the upper edge of cell (12, 10) along y.
+    // The point it follows ends up at the upper edge of cell (12, 10) along y.
     let (first, second) = ([2.0, 0.4], [2.0, 0.0]);
     advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(10, 10), first)]);
     let mut observed = [seen(cell(12, 9), second), seen(cell(12, 11), second)];
@@ -105,7 +105,7 @@ fn what_meets_in_one_cell_becomes_the_older() {
 
 #[test]
 fn what_moves_to_where_something_stands_still_moves() {
-    // Put in before the one that stands, and after it.
+    // Inserted before the one at rest, and after it.
     for (from, by) in [(10, 2.0), (14, -2.0)] {
         let standing = seen(cell(12, 10), [0.0, 0.0]);
         let mut tracklets = new();
@@ -165,14 +165,14 @@ fn what_leaves_the_window_is_counted() {
     let (turnover, _) = advance(&mut tracklets, &profile(), [0, 0], outwards);
     assert_eq!((turnover.born, turnover.left), (2, 2));
     assert!(tracklets.all().is_empty() && outwards.iter().all(|o| o.slot == NONE));
-    // By that of the window.
+    // By the motion of the window.
     advance(&mut tracklets, &profile(), [0, 0], &mut [seen(cell(2, 10), [0.0, 0.0])]);
     let (turnover, left) = advance(&mut tracklets, &profile(), [3, 0], &mut []);
     assert_eq!((turnover, left), (TrackletTurnover { left: 1, ..TrackletTurnover::default() }, 1));
     assert!(tracklets.all().is_empty());
 }
 
-/// Where every tracklet went, and where those that are there came from.
+/// Checks that every tracklet is accounted for: where it went, and where those present came from.
 fn check_counts(before: usize, after: usize, turnover: &TrackletTurnover, left_behind: u32) {
     let t = turnover;
     let left_behind = u64::from(left_behind);
@@ -235,7 +235,7 @@ fn beyond_the_capacity_none_are_born() {
         assert_eq!(tracklets.all().len(), FOREGROUND_MAX);
         assert!(observed.iter().all(|o| o.slot != NONE));
     }
-    // The old ones, waiting, found no room beside as many new ones.
+    // The old ones, coasting, found no room next to as many new ones.
     assert!(tracklets.all().iter().all(|t| t.age == 0));
 }
 
@@ -248,7 +248,7 @@ fn a_speed_beyond_all_cells_leaves_the_window() {
         let left = tracklets.place(&step);
         tracklets.update(&profile, &step, dt, 0.0, left, observed)
     };
-    // Stamps a nanosecond apart, then none of it is seen for half a second.
+    // Stamps a nanosecond apart, then nothing is seen for half a second.
     step_over(1e-9, &mut [seen(cell(1, 10), [14.0, 0.0])]);
     assert_eq!(step_over(1e-9, &mut [seen(cell(15, 10), [14.0, 0.0])]).updated, 1);
     let turnover = step_over(0.5, &mut []);

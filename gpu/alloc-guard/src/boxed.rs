@@ -2,16 +2,16 @@
 
 use std::mem::MaybeUninit;
 
-/// A constant by the name of a type, for [`boxed`]; [`boxed!`](crate::boxed!) makes one.
+/// A constant identified by a type, for [`boxed`]; [`boxed!`](crate::boxed!) makes one.
 pub trait Constant {
-    /// Its type.
+    /// The type of the constant.
     type Value;
-    /// It.
+    /// The constant.
     const VALUE: Self::Value;
 }
 
-/// A box of a constant. It is written to its place on the heap, never by way of the stack, in
-/// optimised builds and others: states of tens of MiB need no stack of that size.
+/// A box of a constant. It is written directly to the heap, never via the stack, in optimised and
+/// unoptimised builds: states of tens of MiB need no stack of that size.
 pub fn boxed<C: Constant>() -> Box<C::Value> {
     let mut place = Box::<C::Value>::new_uninit();
     *place = const { MaybeUninit::new(C::VALUE) };

@@ -1,6 +1,6 @@
-//! Memory is allocated during set-up and never again: a global allocator that checks this.
+//! A global allocator that checks that memory is allocated during set-up and never again.
 //!
-//! What works under this rule goes through three states, each a type:
+//! A value under this rule goes through three states, each a type:
 //!
 //! 1. **starting**: a plain value, under construction, which allocates what it needs;
 //! 2. **sealed**: [`Sealed`], whose value can be changed only in [`Sealed::step`]. An allocation
@@ -29,10 +29,10 @@
 //!
 //! Allocations and reallocations through the global allocator, on threads inside a step or inside
 //! [`watch`]. Other threads, and what a driver or another C library takes from its own `malloc`,
-//! are not seen. Nothing is seen where [`Guard`] is not the global allocator. Releases are allowed.
+//! are not seen. Nothing is seen if [`Guard`] is not the global allocator. Releases are allowed.
 //!
-//! An allocator cannot fail the code that called it without ending the process. It therefore notes
-//! the first allocation and serves it; the step that ends next returns the note.
+//! An allocator cannot make the code that called it fail without ending the process. It therefore
+//! notes the first allocation and serves it; the step that ends next returns the note.
 #![deny(missing_docs)]
 
 mod boxed;
@@ -52,18 +52,18 @@ thread_local! {
     static SECTION: Cell<Option<&'static str>> = const { Cell::new(None) };
 }
 
-/// The first allocation that no step has returned yet. The allocator is the process's, and so is
-/// this: where two threads step at once, either may return what one of them did.
+/// The first allocation that no step has returned yet. Like the allocator it is global to the
+/// process: if two threads step at once, either may return what the other did.
 static NOTED: Mutex<Option<Allocation>> = Mutex::new(None);
 
-/// An allocation where there must be none: a defect of the program.
+/// An allocation where there must be none: a bug in the program.
 #[derive(Debug)]
 pub struct Allocation {
     /// The name given to [`Sealed::new`] or [`watch`].
     pub section: &'static str,
-    /// Size asked for.
+    /// The requested size.
     pub bytes: usize,
-    /// The code that asked for it; empty unless `RUST_BACKTRACE` is set.
+    /// The code that requested it; empty unless `RUST_BACKTRACE` is set.
     pub backtrace: Backtrace,
 }
 
@@ -87,18 +87,18 @@ pub struct Sealed<T> {
 }
 
 impl<T> Sealed<T> {
-    /// From starting to sealed. `section` names the steps in errors. What watched threads have
-    /// allocated so far belongs to set-up.
+    /// Goes from starting to sealed. `section` names the steps in errors. What watched threads have
+    /// allocated so far counts as set-up.
     pub fn new(section: &'static str, value: T) -> Self {
         noted();
         Self { section, value }
     }
 
-    /// The only way to change the value.
+    /// Does `work` on the value; the only way to change it.
     ///
     /// # Errors
     /// That of `work`; otherwise an [`Allocation`] in this step, or by a watched thread since the
-    /// step before. The value is then as `work` left it.
+    /// previous step. The value is then as `work` left it.
     pub fn step<'a, R, E: From<Allocation>>(
         &'a mut self,
         work: impl FnOnce(&'a mut T) -> Result<R, E>,
@@ -110,7 +110,7 @@ impl<T> Sealed<T> {
         }
     }
 
-    /// From sealed to finished.
+    /// Goes from sealed to finished.
     pub fn finish(self) -> T {
         self.value
     }
@@ -124,13 +124,13 @@ impl<T> Deref for Sealed<T> {
     }
 }
 
-/// The note, which is thereby taken.
+/// Takes the note.
 fn noted() -> Option<Allocation> {
     NOTED.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
-/// Does `work` with this thread watched: the step that ends next anywhere returns an [`Allocation`]
-/// made here. For threads that help with steps. Sections nest, and end when `work` unwinds.
+/// Does `work` with this thread watched: whichever step ends next returns an [`Allocation`] made
+/// here. For threads that help with steps. Sections nest, and also end when `work` unwinds.
 pub fn watch<R>(section: &'static str, work: impl FnOnce() -> R) -> R {
     struct Restore(Option<&'static str>);
     impl Drop for Restore {
@@ -151,7 +151,7 @@ pub struct Guard<A: GlobalAlloc>(
 fn note(bytes: usize) {
     // A thread that is being torn down has left every section.
     let Ok(Some(section)) = SECTION.try_with(Cell::get) else { return };
-    // What follows may allocate.
+    // The following may allocate.
     SECTION.set(None);
     let mut noted = NOTED.lock().unwrap_or_else(PoisonError::into_inner);
     noted.get_or_insert_with(|| Allocation { section, bytes, backtrace: Backtrace::capture() });

@@ -1,4 +1,4 @@
-//! What the guard sees, and who is told. One test, because what is noted is the process's.
+//! What the guard sees, and which step returns it. One test, because the note is process-wide.
 
 #![forbid(unsafe_code)]
 
@@ -8,7 +8,7 @@ use std::hint::black_box;
 #[global_allocator]
 static ALLOCATOR: Guard<std::alloc::System> = Guard(std::alloc::System);
 
-/// The section and size that a step of `section` is told.
+/// The section and size that a step of `section` returns.
 fn told(section: &'static str, work: impl FnOnce()) -> Option<(&'static str, usize)> {
     tell(&mut Sealed::new(section, ()), work)
 }

@@ -1,5 +1,5 @@
-//! Requests to Valgrind's Callgrind by the program that it watches: instructions that do nothing
-//! on a processor, and that Valgrind knows (`valgrind.h`, "client requests").
+//! Requests to Valgrind's Callgrind from the program it watches: instructions that do nothing on a
+//! processor and that Valgrind recognises (`valgrind.h`, "client requests").
 
 #![no_std]
 #![deny(missing_docs)]
@@ -11,20 +11,21 @@ const RUNNING_ON_VALGRIND: usize = 0x1001;
 /// `VG_USERREQ__DUMP_STATS_AT`: the tool's letters, "CT", and its number.
 const DUMP_STATS_AT: usize = (b'C' as usize) << 24 | (b'T' as usize) << 16 | 3;
 
-/// Whether Valgrind watches; on other processors than x86-64 it is not asked.
+/// Whether Valgrind is watching; always false on processors other than x86-64, where it is not
+/// asked.
 pub fn is_watched() -> bool {
     // SAFETY: it has no argument.
     unsafe { request(RUNNING_ON_VALGRIND, core::ptr::null()) != 0 }
 }
 
-/// Has the instructions since the last time written down under a name. Nothing where nobody
-/// watches.
+/// Has the instruction counts since the last dump written out under a name. Does nothing if not
+/// watched.
 pub fn dump(name: &CStr) {
-    // SAFETY: the argument is a text that ends in zero, and is only read.
+    // SAFETY: the argument is a null-terminated string and is only read.
     unsafe { request(DUMP_STATS_AT, name.as_ptr()) };
 }
 
-/// A request and its argument. Returns the answer, 0 where nobody watches.
+/// Makes a request with its argument. Returns the answer, 0 if not watched.
 ///
 /// # Safety
 /// The argument must be what that request takes.
@@ -32,9 +33,9 @@ pub fn dump(name: &CStr) {
 unsafe fn request(number: usize, argument: *const core::ffi::c_char) -> usize {
     let words = [number, argument as usize, 0, 0, 0, 0];
     let mut answer = 0;
-    // SAFETY: rotations by 128 bits in all leave `rdi` as it was, and an exchange of a register
-    // with itself changes nothing. Valgrind reads the words; what they point to is the caller's
-    // care.
+    // SAFETY: rotations by 128 bits in total leave `rdi` unchanged, and exchanging a register with
+    // itself changes nothing. Valgrind reads the words; the caller is responsible for what they
+    // point to.
     unsafe {
         core::arch::asm!(
             "rol rdi, 3", "rol rdi, 13", "rol rdi, 61", "rol rdi, 51", "xchg rbx, rbx",
@@ -53,8 +54,8 @@ unsafe fn request(_: usize, _: *const core::ffi::c_char) -> usize {
 mod tests {
     use super::*;
 
-    /// A register that were not as before, or a word that were written to, would show in what is
-    /// worked out around it.
+    /// A register not as it was before, or a word that was written to, would show in the values
+    /// kept around it.
     #[test]
     fn nothing_changes_where_nobody_watches() {
         let around: [u64; 16] = core::array::from_fn(|n| u64::MAX / (n as u64 + 1));

@@ -8,7 +8,7 @@ use std::ptr;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Bytes of allocations, and the addresses of those that are mapped, by handle.
+/// Sizes of allocations in bytes, and the addresses of those that are mapped, by handle.
 static ALLOCATED: Mutex<BTreeMap<u64, u64>> = Mutex::new(BTreeMap::new());
 static MAPPED: Mutex<BTreeMap<u64, usize>> = Mutex::new(BTreeMap::new());
 
@@ -21,9 +21,9 @@ struct FaultyCalls {
     function: String,
     /// The number of the first call that fails.
     from: u64,
-    /// Its multiples fail, and not all after it.
+    /// Whether only its multiples fail, not all calls after it.
     each: bool,
-    /// What such a call returns.
+    /// What a failing call returns.
     result: i32,
 }
 
@@ -41,7 +41,7 @@ impl FaultyCalls {
     }
 }
 
-/// Counts a call of a function. What it is to return, if not what it returns.
+/// Counts a call of a function. Returns what the call is to return instead, if it is to fail.
 pub fn fault(name: &str) -> Option<i32> {
     static CALLS: Mutex<u64> = Mutex::new(0);
     let wanted = FaultyCalls::read().filter(|wanted| wanted.function == name)?;
@@ -50,7 +50,7 @@ pub fn fault(name: &str) -> Option<i32> {
     wanted.fails(*calls).then_some(wanted.result)
 }
 
-/// What a call of a function comes to; `next` is what it would be.
+/// Performs a call of a function, or fails it; `next` performs it.
 fn call(name: &str, next: impl FnOnce() -> vk::Result) -> vk::Result {
     match fault(name) {
         None => next(),
@@ -65,7 +65,7 @@ fn call(name: &str, next: impl FnOnce() -> vk::Result) -> vk::Result {
 
 /// A function as it is handed out.
 pub fn handed_out(function: *const c_void) -> vk::PFN_vkVoidFunction {
-    // SAFETY: who asks for a function by name casts it to the type of that name.
+    // SAFETY: whoever asks for a function by name casts it to the type of that name.
     unsafe { std::mem::transmute::<*const c_void, vk::PFN_vkVoidFunction>(function) }
 }
 
@@ -82,10 +82,10 @@ fn littered(result: vk::Result) -> vk::Result {
     result
 }
 
-/// The function whose address is kept somewhere.
+/// The function whose address is stored in `at`.
 ///
 /// # Safety
-/// A function of this type is kept there.
+/// The address is that of a function of this type.
 pub unsafe fn kept<F: Copy>(at: &AtomicUsize) -> F {
     // SAFETY: the caller's promise; function pointers have the size of addresses.
     unsafe { std::mem::transmute_copy(&at.load(Relaxed)) }
@@ -95,7 +95,7 @@ macro_rules! calls {
     ($(
         $name:ident($($arg:ident: $type:ty),*) $(before $before:block)? $(after $after:block)?;
     )*) => {
-        /// Names of the functions that may fail, but for those that create what calls them.
+        /// Names of the functions that may fail, except those that create the instance and device.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         $(#[allow(non_snake_case)]
@@ -113,7 +113,7 @@ macro_rules! calls {
                 let result = super::call(stringify!($name), || {
                     // SAFETY: `take` has put the address there.
                     let next: Next = unsafe { kept(&NEXT) };
-                    // SAFETY: with what this one was called with.
+                    // SAFETY: with the arguments of this call.
                     unsafe { next($($arg),*) }
                 });
                 $(if result == vk::Result::SUCCESS $after)?
@@ -121,7 +121,7 @@ macro_rules! calls {
             }
         })*
 
-        /// This layer's function of a name, or the next one's, whose address is kept.
+        /// This layer's function of a name, keeping the next one's address, or else the next one's.
         pub fn take(name: &[u8], next: vk::PFN_vkVoidFunction) -> vk::PFN_vkVoidFunction {
             $(if name == stringify!($name).as_bytes() {
                 $name::NEXT.store(next? as usize, Relaxed);
@@ -150,7 +150,7 @@ calls! {
         device: vk::Device, memory: vk::DeviceMemory, offset: u64, size: u64,
         flags: vk::MemoryMapFlags, data: *mut *mut c_void
     ) before {
-        // SAFETY: the caller's place for it.
+        // SAFETY: the caller's place for the address.
         unsafe { *data = ptr::null_mut() };
     } after {
         // SAFETY: the same.

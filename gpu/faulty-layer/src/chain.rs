@@ -1,17 +1,17 @@
-//! How the loader reaches this layer, and this layer the next one. Structures as in the loader's
-//! `vk_layer.h`.
+//! How the loader reaches this layer, and this layer the next one. Structures are as in the
+//! loader's `vk_layer.h`.
 
 use crate::calls::{fault, handed_out, kept, take};
 use ash::vk::{self, Handle};
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
-/// The interface of layers that this one has.
+/// Version of the layer interface that this one implements.
 const INTERFACE: u32 = 2;
-/// What the loader adds to the information of `vkCreateInstance` and `vkCreateDevice`.
+/// Types of what the loader adds to the create info of `vkCreateInstance` and `vkCreateDevice`.
 const LOADER_INSTANCE: i32 = 47;
 const LOADER_DEVICE: i32 = 48;
-/// Of these, that which leads to the next layer.
+/// Of these, the kind that leads to the next layer.
 const LINK: i32 = 0;
 
 #[repr(C)]
@@ -24,7 +24,7 @@ struct Negotiation {
     physical: *const c_void,
 }
 
-/// A member of a chain of information.
+/// A member of a create info's chain.
 #[repr(C)]
 struct Information {
     kind: i32,
@@ -38,7 +38,7 @@ struct Information {
 struct Link {
     next: *mut Link,
     instance: vk::PFN_vkGetInstanceProcAddr,
-    /// Of a device's chain; of an instance's it is something else.
+    /// Only in a device's chain; in an instance's it is something else.
     device: vk::PFN_vkGetDeviceProcAddr,
 }
 
@@ -51,7 +51,7 @@ fn instance() -> vk::Instance {
     vk::Instance::from_raw(INSTANCE.load(Relaxed))
 }
 
-/// Agrees with the loader.
+/// Agrees on the interface with the loader.
 ///
 /// # Safety
 /// The loader's promise: `with` is a valid structure of its kind.
@@ -65,12 +65,12 @@ unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(with: *mut c_vo
     vk::Result::SUCCESS
 }
 
-/// The next layer in a chain; the one after it takes its place there.
+/// Takes the next layer from a chain; the one after it takes its place there.
 ///
 /// # Safety
-/// A chain as the loader makes it.
+/// The chain is as the loader makes it.
 unsafe fn advance<'a>(mut at: *mut Information, kind: i32) -> Option<&'a Link> {
-    // SAFETY: the caller's promise: members are valid, and end with a null pointer.
+    // SAFETY: the caller's promise: members are valid and end with a null pointer.
     unsafe {
         while !at.is_null() {
             let member = &mut *at;
@@ -85,7 +85,7 @@ unsafe fn advance<'a>(mut at: *mut Information, kind: i32) -> Option<&'a Link> {
     None
 }
 
-/// The next one's function of a name.
+/// The next layer's function of a name.
 fn next_of(
     link: Option<&Link>,
     owner: vk::Instance,
@@ -147,7 +147,7 @@ unsafe extern "system" fn create_device(
     }
 }
 
-/// Functions of this layer that are no others' with a fault.
+/// The functions that this layer implements itself, apart from those of `take`.
 fn of_the_chain(name: &[u8]) -> Option<*const c_void> {
     match name {
         b"vkGetInstanceProcAddr" => Some(instance_function as *const c_void),
@@ -168,7 +168,7 @@ unsafe extern "system" fn instance_function(
     let bytes = unsafe { CStr::from_ptr(name) }.to_bytes();
     match of_the_chain(bytes) {
         Some(own) => handed_out(own),
-        // Asked before there is an instance.
+        // Called before there is an instance.
         None if NEXT_INSTANCE.load(Relaxed) == 0 => None,
         None => {
             // SAFETY: put there by `create_instance`.

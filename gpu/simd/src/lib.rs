@@ -1,11 +1,11 @@
 //! Instruction sets of the processor, chosen at run time.
 //!
-//! A program for x86-64 may count on the instructions of 2003, SSE2. [`Simd::run`] calls a function
-//! that the compiler has translated a second time, for AVX2, where the processor has that. Only the
-//! width differs: no sum is taken in another order and nothing is contracted to a fused
-//! multiply-add, so that every bit of a result is the same. On aarch64 the baseline is NEON.
-//! AVX-512 was tried and gained nothing: 38.6 ms a sweep against 37.8 with AVX2 (KITTI drive 0005,
-//! 40 sweeps, scalar, one core of an AMD EPYC, medians of three runs in turn).
+//! A program for x86-64 can only rely on the instructions of 2003, SSE2. [`Simd::run`] calls a
+//! function compiled a second time, for AVX2, if the processor has that. Only the width differs: no
+//! sum is taken in another order and nothing is contracted to a fused multiply-add, so that every
+//! bit of a result is the same. On aarch64 the baseline is NEON. AVX-512 was tried and gained
+//! nothing: 38.6 ms per sweep against 37.8 with AVX2 (KITTI drive 0005, 40 sweeps, scalar, one core
+//! of an AMD EPYC, medians of three alternating runs).
 
 #![no_std]
 #![deny(missing_docs)]
@@ -36,7 +36,7 @@ impl Simd {
     /// What every processor of this architecture has.
     pub const BASELINE: Simd = Simd(Width::Baseline);
 
-    /// Those that this processor has, the widest last.
+    /// The instruction sets that this processor has, the widest last.
     #[cfg(feature = "detect")]
     pub fn available() -> impl DoubleEndedIterator<Item = Simd> {
         #[cfg(target_arch = "x86_64")]
@@ -50,7 +50,7 @@ impl Simd {
         core::iter::once(Simd::BASELINE).chain(wide)
     }
 
-    /// The widest that this processor has.
+    /// The widest one that this processor has.
     #[cfg(feature = "detect")]
     pub fn widest() -> Simd {
         Simd::available().next_back().unwrap_or(Simd::BASELINE)
@@ -67,13 +67,13 @@ impl Simd {
         }
     }
 
-    /// Does `work` with these instructions. What is to use them must be inlined into `work`, and
-    /// that itself: `#[inline(always)]` stands at the closure and at what it calls.
+    /// Does `work` with these instructions. Code that is to use them must be inlined into `work`,
+    /// and `work` itself too: put `#[inline(always)]` on the closure and on what it calls.
     #[inline(always)]
     pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
         match self.0 {
             Width::Baseline => work(),
-            // SAFETY: the processor has them: `available`, which asks, is all that makes this one.
+            // SAFETY: the processor has them: only `available` makes this value, after checking.
             #[cfg(target_arch = "x86_64")]
             Width::Avx2 => unsafe { avx2(work) },
         }

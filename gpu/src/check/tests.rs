@@ -44,7 +44,7 @@ fn dispatch(kernel: &'static Kernel, buffers: &[usize], groups: Groups) -> Op {
     Op::Dispatch { name: "d", kernel, buffers: buffers.to_vec(), groups }
 }
 
-/// What is said against a program of these steps; nothing if they are fine.
+/// The objection to a program of these steps; empty if they are fine.
 fn said(ops: &[Op]) -> String {
     let program = Program { name: "p", ops: ops.to_vec() };
     match schedule(&LIMITS, &TABLE, &[program]) {

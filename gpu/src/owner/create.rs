@@ -1,4 +1,4 @@
-//! What the device creates. Each call is counted, each object remembered.
+//! Creation of device objects. Each call is counted, each object remembered.
 
 use super::{Gpu, Object};
 use crate::error::failed;
@@ -16,7 +16,7 @@ impl Gpu {
                 | Usage::TRANSFER_DST
                 | Usage::INDIRECT_BUFFER,
         );
-        // SAFETY: the create info is valid; `bytes` was checked not to be zero.
+        // SAFETY: the create info is valid; `bytes` was checked to be non-zero.
         let buffer = unsafe { self.raw.create_buffer(&info, None) }?;
         Ok(self.own(buffer, Object::Buffer))
     }
@@ -28,7 +28,7 @@ impl Gpu {
 
     pub fn memory_properties(&self) -> vk::PhysicalDeviceMemoryProperties {
         let instance = self.instance.raw();
-        // SAFETY: the physical device is of this instance.
+        // SAFETY: the physical device belongs to this instance.
         unsafe { instance.get_physical_device_memory_properties(self.physical.handle) }
     }
 
@@ -39,7 +39,7 @@ impl Gpu {
         kind: u32,
     ) -> Result<vk::DeviceMemory, vk::Result> {
         let info = vk::MemoryAllocateInfo::default().allocation_size(bytes).memory_type_index(kind);
-        // SAFETY: `kind` is a memory type of this device and `bytes` within its heap.
+        // SAFETY: `kind` is a memory type of this device, and `bytes` fits in its heap.
         let memory = unsafe { self.raw.allocate_memory(&info, None) }?;
         self.census.memory_allocations += 1;
         *match heap {
@@ -50,19 +50,19 @@ impl Gpu {
         Ok(self.own(memory, Object::Memory))
     }
 
-    /// Gives an unbound buffer its place. `offset` satisfies its requirements.
+    /// Binds an unbound buffer to memory. `offset` satisfies its requirements.
     pub fn bind(
         &self,
         buffer: vk::Buffer,
         memory: vk::DeviceMemory,
         offset: u64,
     ) -> Result<(), GpuError> {
-        // SAFETY: both are of this device; the arena computed the offset from the requirements.
+        // SAFETY: both belong to this device; the arena computed the offset from the requirements.
         unsafe { self.raw.bind_buffer_memory(buffer, memory, offset) }
             .map_err(failed("vkBindBufferMemory"))
     }
 
-    /// Maps all of a host-visible memory, for as long as it lives.
+    /// Maps a whole host-visible memory block, for as long as it lives.
     pub fn map(&self, memory: vk::DeviceMemory) -> Result<*mut u8, GpuError> {
         let flags = vk::MemoryMapFlags::empty();
         // SAFETY: the arena maps each host-visible block once.
@@ -87,7 +87,7 @@ impl Gpu {
     ) -> Result<vk::PipelineLayout, GpuError> {
         let sets = [set];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-        // SAFETY: the set layout is of this device.
+        // SAFETY: the set layout belongs to this device.
         let layout = unsafe { self.raw.create_pipeline_layout(&info, None) }
             .map_err(failed("vkCreatePipelineLayout"))?;
         Ok(self.own(layout, Object::PipelineLayout))
@@ -110,13 +110,13 @@ impl Gpu {
             .name(entry);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         let cache = vk::PipelineCache::null();
-        // SAFETY: module and layout are of this device; the kernel's bindings describe the module.
+        // SAFETY: module and layout belong to this device; the kernel's bindings match the module.
         let made = unsafe { self.raw.create_compute_pipelines(cache, &info, None) };
         let made = made.map_err(|(_, result)| failed("vkCreateComputePipelines")(result))?;
         Ok(self.own(made[0], Object::Pipeline))
     }
 
-    /// A pool for exactly `sets` sets with these descriptors in all.
+    /// A pool for exactly `sets` sets with these descriptors in total.
     pub fn descriptor_pool(
         &mut self,
         sets: u32,
@@ -124,7 +124,7 @@ impl Gpu {
     ) -> Result<vk::DescriptorPool, GpuError> {
         let of = |kind: vk::DescriptorType| {
             let count = descriptors.iter().filter(|d| **d == kind).count() as u32;
-            // Vulkan knows no empty pool.
+            // Vulkan has no empty pools.
             vk::DescriptorPoolSize::default().ty(kind).descriptor_count(count.max(1))
         };
         let sizes =
@@ -136,8 +136,8 @@ impl Gpu {
         Ok(self.own(pool, Object::DescriptorPool))
     }
 
-    /// A set whose binding `i` is the whole of the buffer `buffers[i]`, bound as its kind. It lives
-    /// as long as its pool.
+    /// A set whose binding `i` is the whole buffer `buffers[i]`, bound as its kind. It lives as
+    /// long as its pool.
     pub fn descriptor_set(
         &mut self,
         pool: vk::DescriptorPool,
@@ -147,7 +147,7 @@ impl Gpu {
         let layouts = [layout];
         let info =
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-        // SAFETY: pool and layout are of this device, and only this thread uses the pool.
+        // SAFETY: pool and layout belong to this device, and only this thread uses the pool.
         let set = unsafe { self.raw.allocate_descriptor_sets(&info) }
             .map_err(failed("vkAllocateDescriptorSets"))?[0];
         let whole = |(buffer, _): &(vk::Buffer, _)| {
@@ -161,7 +161,7 @@ impl Gpu {
         for (write, (n, (_, kind))) in writes.iter_mut().zip((0..).zip(buffers)) {
             *write = write.dst_binding(n).descriptor_type(*kind);
         }
-        // SAFETY: the set is new and in no command buffer yet; the buffers are of this device.
+        // SAFETY: the set is new and in no command buffer yet; the buffers belong to this device.
         unsafe { self.raw.update_descriptor_sets(&writes, &[]) };
         Ok(set)
     }
@@ -196,7 +196,7 @@ impl Gpu {
         self.own(pool, Object::CommandPool);
         let info =
             vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(count);
-        // SAFETY: the pool is of this device, and only this thread uses it.
+        // SAFETY: the pool belongs to this device, and only this thread uses it.
         let buffers = unsafe { self.raw.allocate_command_buffers(&info) }
             .map_err(failed("vkAllocateCommandBuffers"))?;
         Ok(buffers)

@@ -1,6 +1,6 @@
-//! Tiny kernels, compiled on the spot, and what to do without a device.
+//! Tiny kernels, compiled at run time, and what to do without a device.
 
-// No test uses all of it.
+// No test uses everything in it.
 #![allow(dead_code)]
 
 use naga::back::spv;
@@ -36,8 +36,8 @@ pub fn kernel(name: &'static str, wgsl: &str, bindings: &'static [Binding]) -> &
         ..Default::default()
     };
     let spirv = spv::write_vec(&module, &info, &options, None).expect(name);
-    // SAFETY: naga has validated the module; what it does beyond a buffer is what tests are about
-    // that run under the validation layer, which looks at every access.
+    // SAFETY: naga has validated the module; out-of-bounds accesses only occur in tests about them,
+    // which run under the validation layer that checks every access.
     let spirv = unsafe { Spirv::new(spirv.leak()) };
     Box::leak(Box::new(Kernel { name, spirv, workgroup: [64, 1, 1], bindings }))
 }
@@ -56,13 +56,13 @@ pub fn dispatch(kernel: &'static Kernel, buffers: &[usize], groups: u32) -> Op {
     }
 }
 
-/// None, with a remark, where there is no device; `RAYWAKE_VULKAN=required` makes that a failure.
+/// `None`, with a remark, if there is no device; `RAYWAKE_VULKAN=required` makes that a failure.
 pub fn executor(options: &Options, table: &[Buffer], ops: Vec<Op>) -> Option<Executor> {
     let program = Program { name: "test", ops };
     present(Executor::new(options, table, &[program])).map(|e| e.expect("set-up"))
 }
 
-/// The result, unless it says that there is nothing to run on.
+/// The result, or `None` if it says that there is nothing to run on.
 pub fn present<T>(result: Result<T, GpuError>) -> Option<Result<T, GpuError>> {
     let required = std::env::var("RAYWAKE_VULKAN").is_ok_and(|v| v == "required");
     match result {

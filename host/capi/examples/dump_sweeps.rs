@@ -1,9 +1,9 @@
-//! Sweeps of a recording, or of the demo's simulated drive, as one flat file that `replay.c` reads.
+//! Writes sweeps of a recording, or of the demo's simulated drive, to one flat file for `replay.c`.
 //!
 //! Little-endian, without padding. The rig: timing (u32), distorted (u32), from_s, span_s (f64),
-//! ground (f64), own vehicle (4 x f32), sensors (u64), each a pose. Then sweeps until the end:
-//! stamp (f64), pose, twist (6 x f64), returns (u64), of each x, y, z, time (f32) and sensor (u32).
-//! A pose is a translation and a quaternion x, y, z, w (7 x f64).
+//! ground (f64), own vehicle (4 x f32), number of sensors (u64), the pose of each. Then sweeps
+//! until the end: stamp (f64), pose, twist (6 x f64), number of returns (u64), and for each x, y,
+//! z, time (f32) and sensor (u32). A pose is a translation and a quaternion x, y, z, w (7 x f64).
 
 use std::error::Error;
 use std::fs::File;

@@ -1,4 +1,4 @@
-/* Replays a file of `dump_sweeps` and prints what moves, and the digest that the program
+/* Replays a file written by `dump_sweeps` and prints what moves, and the digest that the program
  * `raywake` prints for the same sweeps.
  *
  *     cc replay.c $(pkg-config --cflags --libs raywake) -o replay

@@ -1,10 +1,10 @@
-/* Files of dump_sweeps, which says what is in them. */
+/* Reads files written by dump_sweeps, which describes their format. */
 #include <raywake.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-/* A return as it lies in the file. */
+/* A return as stored in the file. */
 typedef struct {
     float xyz[3];
     float time_s;
@@ -20,7 +20,7 @@ static void need(FILE *file, void *to, size_t bytes) {
     }
 }
 
-/* The rig at the start of the file. */
+/* Reads the rig at the start of the file. */
 static raywake_options rig_of(FILE *file) {
     raywake_options options = {.abi_version = RAYWAKE_ABI_VERSION};
     uint64_t sensors = 0;

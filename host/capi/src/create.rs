@@ -1,4 +1,4 @@
-//! CreateOptions, and the estimator made by them.
+//! Options for an estimator, and its creation from them.
 
 use std::ffi::{CStr, c_char, c_void};
 
@@ -22,68 +22,68 @@ pub struct CPose {
     pub rotation: [f64; 4],
 }
 
-/// All returns are taken at the sweep's stamp.
+/// All returns are measured at the sweep's stamp.
 pub const RAYWAKE_TIMING_AT_STAMP: u32 = 0;
-/// Every return comes with its time after the stamp.
+/// Every return carries its time after the stamp.
 pub const RAYWAKE_TIMING_OFFSET: u32 = 1;
-/// The azimuth tells the time: the sensor spins clockwise seen from above, starts and ends at the
-/// rear, and is stamped when it looks forward (KITTI's HDL-64E).
+/// The azimuth gives the time: the sensor spins clockwise seen from above, starts and ends at the
+/// rear, and is stamped when it faces forward (KITTI's HDL-64E).
 pub const RAYWAKE_TIMING_AZIMUTH: u32 = 2;
-/// Sensors that a rig may have.
+/// Maximum number of sensors of a rig.
 pub const RAYWAKE_SENSORS_MAX: usize = 8;
 
 const _: () = assert!(RAYWAKE_SENSORS_MAX == SENSORS_MAX);
 
-/// What an estimator is to be made for. What is zero has its default.
+/// Options for creating an estimator. A value of zero means the default.
 #[repr(C)]
 pub struct CreateOptions {
     /// `RAYWAKE_ABI_VERSION`.
     pub abi_version: u32,
-    /// Threads that share the work; 0: as many as pay, 1: only that which calls.
+    /// Threads that share the work; 0: as many as pay off, 1: only the calling thread.
     pub threads: u32,
     /// Name of a profile: `hdl64` (the default), `wide`, `far` or `dissertation`.
     pub profile: *const c_char,
-    /// Parameters to be set, `NAME=VALUE` each, as PARAMETERS.md has them.
+    /// Parameters to set, each as `NAME=VALUE`; PARAMETERS.md lists them.
     pub settings: *const *const c_char,
-    /// How many.
+    /// Number of settings.
     pub settings_count: usize,
-    /// Returns that a sweep may have; 0: as many as the profile takes. Of a sweep that has more
-    /// than the profile takes, so many are taken, evenly.
+    /// Maximum number of returns of a sweep; 0: as many as the profile takes. Of a sweep with more
+    /// than the profile takes, that many are taken, evenly.
     pub points_max: usize,
-    /// Not 0: no poses are given, they are found by registration.
+    /// Not 0: poses are found by registration instead of being given.
     pub find_poses: u32,
     /// `RAYWAKE_TIMING_...`.
     pub timing: u32,
-    /// Not 0: objects are followed, too, in memory of their own.
+    /// Not 0: objects are tracked too, which needs more memory.
     pub objects: u32,
     /// `RAYWAKE_TIMING_OFFSET`: earliest time of a return after the stamp, s.
     pub from_s: f64,
-    /// Duration of a sweep, s; 0.1 where it is 0.
+    /// Duration of a sweep, s; 0 means 0.1.
     pub span_s: f64,
-    /// Not 0: returns are still distorted by the vehicle's motion. Each is moved to the stamp by
-    /// its time.
+    /// Not 0: returns are still distorted by the vehicle's motion. Each is moved to the stamp
+    /// according to its time.
     pub distorted: u32,
-    /// Sensors; 0: one at the vehicle's origin.
+    /// Number of sensors; 0: one at the vehicle's origin.
     pub sensor_count: u32,
     /// `vehicle_from_sensor` of each: rays begin there.
     pub sensors: [CPose; RAYWAKE_SENSORS_MAX],
-    /// Height of the ground under the vehicle in the vehicle frame, m. With the vehicle's origin
-    /// 1.73 m above the ground it is -1.73.
+    /// Height of the ground under the vehicle in the vehicle frame, m: -1.73 if the vehicle's
+    /// origin is 1.73 m above the ground.
     pub ground_m: f64,
-    /// Returns in this box of the vehicle frame are of the vehicle itself: least x and y, largest x
-    /// and y, m. All 0: there are none.
+    /// Returns in this box of the vehicle frame belong to the vehicle itself: minimum x and y,
+    /// maximum x and y, m. All 0: no box.
     pub own_vehicle_m: [f32; 4],
 }
 
-/// A text of the caller's; none where it is null.
+/// A string given by the caller; none if it is null.
 ///
 /// # Safety
-/// `text` is null or a string that ends in NUL and stays as it is.
+/// `text` is null or a NUL-terminated string that does not change.
 unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<Option<&'a str>, Refusal> {
     if text.is_null() {
         return Ok(None);
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let text = unsafe { CStr::from_ptr(text) };
     text.to_str().map(Some).map_err(|_| Refusal::invalid(format_args!("`{what}` is no UTF-8")))
 }
@@ -153,9 +153,9 @@ impl CreateOptions {
     }
 
     /// # Safety
-    /// As of [`raywake_create`].
+    /// As for [`raywake_create`].
     unsafe fn profile(&self) -> Result<Profile, Refusal> {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let name = unsafe { text(self.profile, "profile") }?.unwrap_or("hdl64");
         let mut profile = Profile::named(name)
             .ok_or_else(|| Refusal::invalid(format_args!("there is no profile `{name}`")))?;
@@ -163,7 +163,7 @@ impl CreateOptions {
             return Err(Refusal::null("settings"));
         }
         for n in 0..self.settings_count {
-            // SAFETY: the caller's promise.
+            // SAFETY: guaranteed by the caller.
             let setting = unsafe { text(self.settings.add(n).read_unaligned(), "settings") }?;
             assign(&mut profile, setting.ok_or_else(|| Refusal::null("settings"))?)?;
         }
@@ -171,21 +171,21 @@ impl CreateOptions {
     }
 
     /// # Safety
-    /// As of [`raywake_create`].
+    /// As for [`raywake_create`].
     unsafe fn read(options: *const CreateOptions) -> Result<(EstimatorOptions, usize), Refusal> {
         if options.is_null() {
             return Err(Refusal::null("options"));
         }
-        // Another version may have a shorter struct.
-        // SAFETY: the caller's promise.
+        // The struct of another version may be shorter.
+        // SAFETY: guaranteed by the caller.
         let abi = unsafe { options.cast::<u32>().read_unaligned() };
         if abi != RAYWAKE_ABI_VERSION {
             let why = format_args!("the program has ABI {abi}, the library {RAYWAKE_ABI_VERSION}");
             return Err(Refusal::new(CallStatus::OtherAbi, why));
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let options = unsafe { options.read_unaligned() };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let profile = unsafe { options.profile() }?;
         Ok((options.about(profile)?, options.threads as usize))
     }
@@ -201,10 +201,10 @@ fn needed(options: &EstimatorOptions) -> Result<usize, Refusal> {
     Ok(options.bytes()? + Handle::BYTES)
 }
 
-/// The caller's memory as the library's: as much of it as is needed.
+/// Takes over the caller's memory: as much of it as is needed.
 ///
 /// # Safety
-/// `memory` is null or has `bytes` bytes that nobody else uses.
+/// `memory` is null or points to `bytes` bytes that nobody else uses.
 unsafe fn own(memory: *mut c_void, bytes: usize, needed: usize) -> Result<Memory, Refusal> {
     if memory.is_null() {
         return Err(Refusal::null("memory"));
@@ -213,7 +213,7 @@ unsafe fn own(memory: *mut c_void, bytes: usize, needed: usize) -> Result<Memory
         let why = format_args!("{bytes} bytes were given, {needed} are needed");
         return Err(Refusal::new(CallStatus::MemoryTooSmall, why));
     }
-    // SAFETY: the caller's promise; `EstimatorOptions::bytes` is no more than an object may have.
+    // SAFETY: guaranteed by the caller; `EstimatorOptions::bytes` is at most the size of an object.
     Ok(unsafe { std::slice::from_raw_parts_mut(memory.cast(), needed) })
 }
 
@@ -227,30 +227,30 @@ fn make(
     Ok(Handle::put(team.map_err(|e| Refusal::new(CallStatus::NoThreads, e))?, handle))
 }
 
-/// Bytes of memory that `raywake_create` needs, wherever they begin.
+/// Writes how many bytes of memory `raywake_create` needs, at any alignment.
 ///
 /// # Safety
-/// Pointers are null or to what they are of; texts end in NUL.
+/// Pointers are null or valid; strings are NUL-terminated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_memory_needed(
     options: *const CreateOptions,
     bytes: *mut usize,
     error: *mut ErrorText,
 ) -> CallStatus {
-    // SAFETY, here and below: the caller's promise.
+    // SAFETY, here and below: guaranteed by the caller.
     let found = unsafe { CreateOptions::read(options) }.and_then(|(options, _)| needed(&options));
     let result = found.and_then(|found| unsafe { put(found, bytes, "bytes") });
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { told(result, error) }
 }
 
-/// Makes an estimator in the caller's memory, which is the library's until `raywake_destroy`.
+/// Creates an estimator in the caller's memory, which is the library's until `raywake_destroy`.
 ///
-/// Threads are started here, and what they need is taken from the heap; later nothing is.
+/// Threads are started here, and what they need is allocated on the heap; nothing is later.
 ///
 /// # Safety
-/// Pointers are null or to what they are of; texts end in NUL; `memory` has `bytes` bytes that
-/// nobody else uses until the estimator is destroyed.
+/// Pointers are null or valid; strings are NUL-terminated; `memory` has `bytes` bytes that nobody
+/// else uses until the estimator is destroyed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_create(
     options: *const CreateOptions,
@@ -259,17 +259,17 @@ pub unsafe extern "C" fn raywake_create(
     estimator: *mut *mut Handle,
     error: *mut ErrorText,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let made = unsafe { CreateOptions::read(options) }.and_then(|(options, threads)| {
         if estimator.is_null() {
             return Err(Refusal::null("estimator"));
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let memory = unsafe { own(memory, bytes, needed(&options)?) }?;
         make(&options, threads, memory)
     });
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let result = made.and_then(|handle| unsafe { put(handle, estimator, "estimator") });
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { told(result, error) }
 }

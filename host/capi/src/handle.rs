@@ -1,4 +1,4 @@
-//! What a pointer to an estimator points to.
+//! What an estimator pointer points to.
 
 use std::mem::MaybeUninit;
 use std::ptr::NonNull;
@@ -12,25 +12,25 @@ use crate::status::{CallStatus, Refusal};
 pub struct Handle {
     /// [`Handle::LIVE`] from creation to destruction.
     mark: AtomicU64,
-    /// A thread is in a call.
+    /// Set while a thread is in a call.
     busy: AtomicBool,
     team: TeamEstimator,
 }
 
-/// The right to use an estimator, until it is dropped.
+/// Exclusive use of an estimator, until this is dropped.
 pub(crate) struct Turn(NonNull<Handle>);
 
 impl Handle {
-    /// Bytes that it takes, wherever they begin.
+    /// Number of bytes it takes, at any alignment.
     pub(crate) const BYTES: usize = size_of::<Handle>() + align_of::<Handle>() - 1;
 
     const LIVE: u64 = u64::from_le_bytes(*b"raywake1");
 
-    /// Puts one into [`Handle::BYTES`] of memory.
+    /// Puts an estimator into [`Handle::BYTES`] bytes of memory.
     pub(crate) fn put(team: TeamEstimator, memory: &'static mut [MaybeUninit<u8>]) -> *mut Handle {
         let skip = memory.as_ptr().align_offset(align_of::<Handle>());
         let place = memory[skip..][..size_of::<Handle>()].as_mut_ptr().cast::<Handle>();
-        // SAFETY: so many bytes, aligned, that are this library's.
+        // SAFETY: enough bytes, aligned, that belong to this library.
         unsafe { place.write(Handle::new(team)) };
         place
     }
@@ -40,19 +40,19 @@ impl Handle {
     }
 
     /// # Safety
-    /// `handle` is null, or was an estimator's once, and its memory is still there.
+    /// `handle` is null, or was an estimator once and its memory still exists.
     pub(crate) unsafe fn enter(handle: *mut Handle) -> Result<Turn, Refusal> {
         let place = NonNull::new(handle).ok_or_else(|| Refusal::null("estimator"))?;
         let not_created = || Refusal::new(CallStatus::NotCreated, "there is no estimator here");
         if !place.is_aligned() {
             return Err(not_created());
         }
-        // SAFETY: the caller's promise; it may hold any bits.
+        // SAFETY: guaranteed by the caller; it may hold any bits.
         let mark = unsafe { &(*place.as_ptr()).mark };
         if mark.load(Ordering::Acquire) != Handle::LIVE {
             return Err(not_created());
         }
-        // SAFETY: it is live, so that this is a bool.
+        // SAFETY: the estimator is live, so this is a bool.
         let busy = unsafe { &(*place.as_ptr()).busy };
         if busy.swap(true, Ordering::Acquire) {
             return Err(Refusal::new(CallStatus::Busy, "another thread is in a call"));
@@ -75,18 +75,18 @@ impl Drop for Turn {
     }
 }
 
-/// Ends an estimator and its threads. Its memory is the caller's again.
+/// Destroys an estimator and ends its threads. Its memory is the caller's again.
 ///
 /// # Safety
-/// `estimator` is null, or was one once, and its memory is still there.
+/// `estimator` is null, or was an estimator once and its memory still exists.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_destroy(estimator: *mut Handle) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     match unsafe { Handle::enter(estimator) } {
         Ok(turn) => {
             let handle = turn.0.as_ptr();
             std::mem::forget(turn);
-            // SAFETY: nobody else is in a call, and nobody gets into another one.
+            // SAFETY: no other thread is in a call, and none can enter one.
             unsafe {
                 (*handle).mark.store(0, Ordering::Release);
                 std::ptr::drop_in_place(&raw mut (*handle).team);

@@ -1,7 +1,7 @@
 //! `libraywake`: temporal scene flow from LIDAR for C and C++, with the header `raywake.h`.
 //!
 //! Nothing unwinds into the caller, nothing is allocated after `raywake_create`, and every call
-//! checks what it can of its arguments. See `raywake.h`, which is made of this package.
+//! checks its arguments as far as it can. See `raywake.h`, which is generated from this crate.
 #![deny(missing_docs)]
 #![expect(clippy::result_large_err, reason = "a refusal carries its text: it allocates nothing")]
 
@@ -19,17 +19,17 @@ pub use read::*;
 pub use status::*;
 pub use step::*;
 
-/// Version of this interface: structs, functions and their meaning. Another number is another
-/// interface; the shared library is named after it.
+/// Version of this interface: structs, functions and their meaning. A different number is a
+/// different interface; the shared library is named after it.
 pub const RAYWAKE_ABI_VERSION: u32 = 2;
 
-/// `RAYWAKE_ABI_VERSION` of the library that is loaded.
+/// Returns `RAYWAKE_ABI_VERSION` of the library that is loaded.
 #[unsafe(no_mangle)]
 pub extern "C" fn raywake_abi_version() -> u32 {
     RAYWAKE_ABI_VERSION
 }
 
-/// Version of the library, a text.
+/// Returns the version of the library as a string.
 #[unsafe(no_mangle)]
 pub extern "C" fn raywake_version() -> *const c_char {
     VERSION.as_ptr()

@@ -1,4 +1,4 @@
-//! Results out.
+//! Reading results.
 
 use raywake_core::digest::Digest;
 use raywake_embed::{
@@ -8,13 +8,13 @@ use raywake_embed::{
 use crate::handle::Handle;
 use crate::status::{CallStatus, Refusal};
 
-/// Where a digest begins.
+/// Initial value of a digest.
 pub const RAYWAKE_DIGEST_START: u64 = 0xcbf2_9ce4_8422_2325;
 
 /// Writes records to the caller's array.
 ///
 /// # Safety
-/// `to` is null or has room for `room` elements; `count` is null or can be written.
+/// `to` is null or has room for `room` elements; `count` is null or writable.
 unsafe fn write<T>(
     records: impl ExactSizeIterator<Item = T>,
     to: *mut T,
@@ -25,11 +25,11 @@ unsafe fn write<T>(
         return Err(Refusal::null("records"));
     }
     if !count.is_null() {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { count.write_unaligned(records.len()) };
     }
     for (n, record) in records.take(room).enumerate() {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { to.add(n).write_unaligned(record) };
     }
     Ok(())
@@ -49,23 +49,24 @@ fn objects(found: &FlowEstimator) -> impl ExactSizeIterator<Item = ObjectRecord>
 }
 
 /// # Safety
-/// `estimator` as of every function.
+/// `estimator` as for every function.
 unsafe fn read(
     estimator: *mut Handle,
     read: impl FnOnce(&FlowEstimator) -> Result<(), Refusal>,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let result = unsafe { Handle::enter(estimator) }
         .and_then(|mut turn| turn.team().read(read).map_err(Refusal::from)?);
     CallStatus::of(result)
 }
 
-/// Flow of the solid columns of the sweep before the last: the first `room` of them to `records`,
-/// which may be null where that is 0; to `count`, which may be null, how many there are.
+/// Reads the flow of the solid columns of the sweep before the last: writes the first `room` of
+/// them to `records`, which may be null if `room` is 0, and their total to `count`, which may be
+/// null.
 ///
 /// # Safety
-/// Pointers are null or to what they are of; `estimator` is null, or was one once, and its memory
-/// is still there.
+/// Pointers are null or valid; `estimator` is null, or was an estimator once and its memory still
+/// exists.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_columns(
     estimator: *mut Handle,
@@ -73,14 +74,15 @@ pub unsafe extern "C" fn raywake_columns(
     room: usize,
     count: *mut usize,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { read(estimator, |found| write(columns(found), records, room, count)) }
 }
 
-/// Flow of the returns of the sweep before the last, in their order. As `raywake_columns`.
+/// Reads the flow of the returns of the sweep before the last, in their order. Like
+/// `raywake_columns`.
 ///
 /// # Safety
-/// As of `raywake_columns`.
+/// As for `raywake_columns`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_points(
     estimator: *mut Handle,
@@ -88,7 +90,7 @@ pub unsafe extern "C" fn raywake_points(
     room: usize,
     count: *mut usize,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         read(estimator, |found| match found.points() {
             Some(points) => write(points.iter().map(PointRecord::from), records, room, count),
@@ -97,10 +99,10 @@ pub unsafe extern "C" fn raywake_points(
     }
 }
 
-/// Tracklets at the time of the last sweep. As `raywake_columns`.
+/// Reads the tracklets at the time of the last sweep. Like `raywake_columns`.
 ///
 /// # Safety
-/// As of `raywake_columns`.
+/// As for `raywake_columns`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_tracklets(
     estimator: *mut Handle,
@@ -108,15 +110,15 @@ pub unsafe extern "C" fn raywake_tracklets(
     room: usize,
     count: *mut usize,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { read(estimator, |found| write(tracklets(found), records, room, count)) }
 }
 
-/// Objects in the sweep before the last, where the options ask for them: vehicles, people and
-/// two-wheelers, and whatever else moves. As `raywake_columns`.
+/// Reads the objects in the sweep before the last, if the options ask for them: vehicles, people,
+/// two-wheelers, and whatever else moves. Like `raywake_columns`.
 ///
 /// # Safety
-/// As of `raywake_columns`.
+/// As for `raywake_columns`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_objects(
     estimator: *mut Handle,
@@ -124,21 +126,22 @@ pub unsafe extern "C" fn raywake_objects(
     room: usize,
     count: *mut usize,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { read(estimator, |found| write(objects(found), records, room, count)) }
 }
 
-/// Adds all that can be read but objects to a digest, which begins as `RAYWAKE_DIGEST_START`. After
-/// every sweep of a recording it is the digest that the program `raywake` prints.
+/// Adds everything that can be read, except objects, to a digest that starts as
+/// `RAYWAKE_DIGEST_START`. Called after every sweep of a recording, it gives the digest that the
+/// program `raywake` prints.
 ///
 /// # Safety
-/// As of `raywake_columns`.
+/// As for `raywake_columns`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_add_to_digest(
     estimator: *mut Handle,
     digest: *mut u64,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         read(estimator, |found| {
             if digest.is_null() {
@@ -152,7 +155,7 @@ pub unsafe extern "C" fn raywake_add_to_digest(
     }
 }
 
-/// Objects that there are at most.
+/// Maximum number of objects.
 pub const RAYWAKE_OBJECTS_MAX: usize = 160;
 
 const _: () = assert!(RAYWAKE_OBJECTS_MAX == OBJECTS_MAX);

@@ -9,11 +9,11 @@ use raywake_embed::{CreateError, StepError};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallStatus {
-    /// Well.
+    /// The call succeeded.
     Ok = 0,
-    /// A pointer is null that must not be.
+    /// A pointer that must not be null is null.
     NullPointer = 1,
-    /// An argument is not what it must be.
+    /// An argument is invalid.
     InvalidArgument = 2,
     /// The program was compiled with a header of another ABI.
     OtherAbi = 3,
@@ -29,14 +29,14 @@ pub enum CallStatus {
     Failed = 8,
 }
 
-/// Room for a text that says what was wrong.
+/// Room for an error message.
 #[repr(C)]
 pub struct ErrorText {
-    /// UTF-8 with a NUL at its end; empty where nothing was wrong.
+    /// UTF-8, NUL-terminated; empty if there was no error.
     pub text: [c_char; 240],
 }
 
-/// What a status means, a text.
+/// Returns what a status means, as a string.
 #[unsafe(no_mangle)]
 pub extern "C" fn raywake_status_text(status: i32) -> *const c_char {
     let text: &CStr = match status {
@@ -64,11 +64,11 @@ impl ErrorText {
     const EMPTY: ErrorText = ErrorText { text: [0; 240] };
 }
 
-/// What has no more room is left out.
+/// Text that does not fit is dropped.
 impl fmt::Write for ErrorText {
     fn write_str(&mut self, more: &str) -> fmt::Result {
         let end = self.text.iter().position(|c| *c == 0).unwrap_or(0);
-        // The last one stays NUL.
+        // The last byte stays NUL.
         let room = &mut self.text[end..239];
         let fits = more.floor_char_boundary(room.len());
         let bytes = more.as_bytes()[..fits].iter();
@@ -77,7 +77,7 @@ impl fmt::Write for ErrorText {
     }
 }
 
-/// A status with what is to be said about it. Nothing is allocated for that.
+/// A status with its error message. Making it allocates nothing.
 pub(crate) struct Refusal {
     status: CallStatus,
     why: ErrorText,
@@ -124,30 +124,30 @@ impl From<StepError> for Refusal {
     }
 }
 
-/// Writes what a call yields.
+/// Writes the result of a call.
 ///
 /// # Safety
-/// `to` is null or can be written.
+/// `to` is null or writable.
 pub(crate) unsafe fn put<T>(value: T, to: *mut T, what: &str) -> Result<(), Refusal> {
     if to.is_null() {
         return Err(Refusal::null(what));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe { to.write_unaligned(value) };
     Ok(())
 }
 
-/// The status of a call, with its text where there is room for it.
+/// Returns the status of a call and writes its message, if there is room for it.
 ///
 /// # Safety
-/// `error` is null or can be written.
+/// `error` is null or writable.
 pub(crate) unsafe fn told(result: Result<(), Refusal>, error: *mut ErrorText) -> CallStatus {
     let (status, why) = match result {
         Ok(()) => (CallStatus::Ok, ErrorText::EMPTY),
         Err(refusal) => (refusal.status, refusal.why),
     };
     if !error.is_null() {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { error.write_unaligned(why) };
     }
     status

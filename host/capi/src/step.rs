@@ -1,4 +1,4 @@
-//! A sweep in.
+//! Passing in a sweep.
 
 use std::ffi::c_void;
 
@@ -23,19 +23,19 @@ pub struct CTwist {
     pub angular: [f64; 3],
 }
 
-/// One sweep. Numbers of returns may lie anywhere, `..._stride` bytes apart, as the fields of a
-/// `PointCloud2` do; the sweep is copied.
+/// One sweep. The values of its returns may lie anywhere, `..._stride` bytes apart, like the fields
+/// of a `PointCloud2`; the sweep is copied.
 #[repr(C)]
 pub struct SweepInput {
     /// Time of the stamp, s.
     pub stamp_s: f64,
-    /// Pose of the vehicle at the stamp; null where poses are found.
+    /// Pose of the vehicle at the stamp; null if poses are found.
     pub world_from_vehicle: *const CPose,
-    /// Its velocity at the stamp; null: what leads from the pose before to this one.
+    /// Its velocity at the stamp; null: that between the previous pose and this one.
     pub twist: *const CTwist,
-    /// Returns.
+    /// Number of returns.
     pub count: usize,
-    /// Three `float` each: x, y, z in the vehicle frame, m. (0, 0, 0) is no return.
+    /// Three `float` each: x, y, z in the vehicle frame, m. (0, 0, 0) means no return.
     pub xyz: *const c_void,
     /// Bytes from one to the next; 0: 12.
     pub xyz_stride: usize,
@@ -49,43 +49,43 @@ pub struct SweepInput {
     pub sensor_stride: usize,
 }
 
-/// It continues the one before.
+/// The sweep continues the previous one.
 pub const RAYWAKE_RESET_NONE: u32 = 0;
-/// It is the first one.
+/// It is the first sweep.
 pub const RAYWAKE_RESET_FIRST: u32 = 1;
 /// Time stood still or went backwards.
 pub const RAYWAKE_RESET_BACKWARDS: u32 = 2;
 /// Too much time has passed.
 pub const RAYWAKE_RESET_GAP: u32 = 3;
-/// The vehicle cannot have gone there so fast.
+/// The vehicle cannot have moved so fast.
 pub const RAYWAKE_RESET_JUMP: u32 = 4;
 /// The vehicle cannot have turned so fast.
 pub const RAYWAKE_RESET_SPIN: u32 = 5;
 
 /// The pose was given.
 pub const RAYWAKE_POSE_GIVEN: u32 = 0;
-/// Of the first sweep.
+/// The pose is that of the first sweep.
 pub const RAYWAKE_POSE_START: u32 = 1;
-/// By registration.
+/// The pose was found by registration.
 pub const RAYWAKE_POSE_REGISTERED: u32 = 2;
-/// The sweep shows too little: a part of the motion is that of the sweep before.
+/// The sweep shows too little: part of the motion is that of the previous sweep.
 pub const RAYWAKE_POSE_DEGENERATE: u32 = 3;
-/// The sweep fits nothing known: its motion is that of the sweep before.
+/// The sweep matches nothing known: its motion is that of the previous sweep.
 pub const RAYWAKE_POSE_LOST: u32 = 4;
 
-/// What a sweep came to.
+/// Summary of a sweep.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepResult {
-    /// Time from the sweep before to this one, s; 0 where they are no pair: then there is no flow.
+    /// Time from the previous sweep to this one, s; 0 if they are not a pair, and there is no flow.
     pub dt_s: f64,
-    /// Solid columns of the sweep before, whose flow can be read.
+    /// Solid columns of the previous sweep, whose flow can be read.
     pub columns: usize,
-    /// Returns of the sweep before, whose flow can be read.
+    /// Returns of the previous sweep, whose flow can be read.
     pub points: usize,
     /// Tracklets that can be read.
     pub tracklets: usize,
-    /// Objects in the sweep before that can be read.
+    /// Objects in the previous sweep that can be read.
     pub objects: usize,
     /// Columns with a valid match.
     pub matched: usize,
@@ -95,7 +95,7 @@ pub struct StepResult {
     pub foreground_dropped: usize,
     /// Distinct rays of the sweep.
     pub rays: usize,
-    /// Returns left out, as the sweep has more than the profile takes.
+    /// Returns left out because the sweep has more than the profile takes.
     pub over_capacity: u64,
     /// Returns left out that have a NaN or an infinity.
     pub not_finite: u64,
@@ -103,15 +103,15 @@ pub struct StepResult {
     pub no_return: u64,
     /// Returns left out that are too far away.
     pub too_far: u64,
-    /// Returns left out of a sensor that the rig does not have.
+    /// Returns left out because their sensor is not in the rig.
     pub unknown_sensor: u64,
     /// Returns of the own vehicle.
     pub own_vehicle: u64,
     /// Returns that the refinement had no room for.
     pub unrefined: u64,
-    /// `RAYWAKE_RESET_...`: why the sweep does not continue the one before.
+    /// `RAYWAKE_RESET_...`: why the sweep does not continue the previous one.
     pub reset: u32,
-    /// `RAYWAKE_POSE_...`: where its pose is from.
+    /// `RAYWAKE_POSE_...`: how its pose was obtained.
     pub pose_from: u32,
     /// Pose of the vehicle at the stamp.
     pub world_from_vehicle: CPose,
@@ -127,7 +127,7 @@ struct Column {
 static ZERO: f32 = 0.0;
 
 impl Column {
-    /// One zero again and again.
+    /// The same zero for every element.
     const ZEROS: Column = Column { start: (&raw const ZERO).cast(), stride: 0 };
 
     fn new(
@@ -154,18 +154,18 @@ impl Column {
     }
 
     /// # Safety
-    /// There is such an element.
+    /// The element exists.
     #[inline]
     unsafe fn get<T: Copy>(self, n: usize) -> T {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         unsafe { self.start.add(n * self.stride).cast::<T>().read_unaligned() }
     }
 }
 
 /// # Safety
-/// `from` is null or can be read.
+/// `from` is null or readable.
 unsafe fn get<T: Copy>(from: *const T) -> Option<T> {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     (!from.is_null()).then(|| unsafe { from.read_unaligned() })
 }
 
@@ -178,9 +178,9 @@ impl CTwist {
 
 impl SweepInput {
     /// # Safety
-    /// As of [`raywake_step`].
+    /// As for [`raywake_step`].
     unsafe fn place(&self) -> SweepPlace {
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let (pose, twist) = unsafe { (get(self.world_from_vehicle), get(self.twist)) };
         SweepPlace {
             stamp_s: self.stamp_s,
@@ -190,7 +190,7 @@ impl SweepInput {
     }
 
     /// # Safety
-    /// As of [`raywake_step`].
+    /// As for [`raywake_step`].
     unsafe fn points(&self) -> Result<impl ExactSizeIterator<Item = Point> + use<>, Refusal> {
         let count = self.count;
         let xyz = Column::new(self.xyz, self.xyz_stride, 12, count, "xyz")?;
@@ -200,7 +200,7 @@ impl SweepInput {
         };
         let time = optional(self.time_s, self.time_stride, 4, "time")?;
         let sensor = optional(self.sensor, self.sensor_stride, 1, "sensor")?;
-        // SAFETY, of the three: the caller's promise.
+        // SAFETY, of the three: guaranteed by the caller.
         Ok((0..count).map(move |n| Point {
             position: unsafe { xyz.get(n) },
             intensity: 0.0,
@@ -258,13 +258,14 @@ impl StepResult {
     }
 }
 
-/// One sweep. The flow of the one before can be read until the next call of this function.
+/// Processes one sweep. The flow of the previous one can be read until the next call of this
+/// function.
 ///
-/// A sweep that is refused is as if it had not been given.
+/// A sweep that is refused changes nothing.
 ///
 /// # Safety
-/// Pointers are null or to what they are of, with `count` elements; `estimator` is null, or was
-/// one once, and its memory is still there.
+/// Pointers are null or valid, with `count` elements; `estimator` is null, or was an estimator once
+/// and its memory still exists.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn raywake_step(
     estimator: *mut Handle,
@@ -272,20 +273,20 @@ pub unsafe extern "C" fn raywake_step(
     result: *mut StepResult,
     error: *mut ErrorText,
 ) -> CallStatus {
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     let stepped = unsafe { Handle::enter(estimator) }.and_then(|mut turn| {
         if sweep.is_null() {
             return Err(Refusal::null("sweep"));
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let sweep = unsafe { sweep.read_unaligned() };
-        // SAFETY: the caller's promise.
+        // SAFETY: guaranteed by the caller.
         let (place, points) = unsafe { (sweep.place(), sweep.points()?) };
         let team = turn.team();
         let summary = team.step(&place, points)?;
         Ok(StepResult::new(&summary, team.read(|e| e.tracklet_count())?))
     });
-    // SAFETY: the caller's promise.
+    // SAFETY: guaranteed by the caller.
     unsafe {
         let stepped = stepped.and_then(|found| match result.is_null() {
             true => Ok(()),

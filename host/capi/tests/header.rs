@@ -1,4 +1,4 @@
-//! `raywake.h` is what the code says.
+//! `raywake.h` matches the code.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-/* Calls that cannot be right: each must end with its status, and none with a crash. Then a drive,
- * in which nothing may be allocated. `misuse FILE` reads a file of `dump_sweeps`. */
+/* Invalid calls: each must return its status, and none may crash. Then drives, in which nothing may
+ * be allocated. `misuse FILE` reads a file written by `dump_sweeps`. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <pthread.h>
@@ -14,7 +14,7 @@
 #include "../examples/sweeps.h"
 
 #ifdef COUNT_ALLOCATIONS
-/* In the place of libc's: counts what the whole process asks for. */
+/* Replaces libc's allocator: counts what the whole process asks for. */
 extern void *__libc_malloc(size_t);
 extern void *__libc_calloc(size_t, size_t);
 extern void *__libc_realloc(void *, size_t);
@@ -81,7 +81,7 @@ static void options_that_are_none(void) {
     for (int n = 0; n < 6; n++) {
         o = options(), o.settings = settings + n, o.settings_count = 1;
         raywake_status status = raywake_memory_needed(&o, &bytes, &error);
-        /* Weights of other levels are noticed when they are read. */
+        /* Weights for other levels are noticed when they are read. */
         raywake_status wanted = n == 3   ? RAYWAKE_STATUS_OK
                                 : n == 5 ? RAYWAKE_STATUS_NULL_POINTER
                                          : RAYWAKE_STATUS_INVALID_ARGUMENT;
@@ -195,7 +195,7 @@ static void sweeps_that_are_none(void) {
     raywake_twist wild = {.angular = {NAN}};
     s = good, s.twist = &wild;
     EXPECT(raywake_step(e, &s, &result, &error), INVALID_ARGUMENT);
-    /* None of them was taken. */
+    /* None of them was accepted. */
     EXPECT(raywake_step(e, &good, &result, NULL), OK);
     CHECK(result.reset == RAYWAKE_RESET_FIRST && result.not_finite == 2 && result.no_return == 1);
     s = good, s.stamp_s = 1.1, s.count = 0, s.xyz = NULL;
@@ -219,8 +219,8 @@ static void *disturb(void *nothing) {
     return nothing;
 }
 
-/* A drive with two threads; with `disturbed`, a third calls all the while; with `all`, on one, with
-   poses found and objects followed, and all is read. Returns its digest. */
+/* A drive with two threads, whose results are read. With `disturbed`, a third thread reads all the
+   while instead; with `all`, one thread, poses found and objects tracked. Returns its digest. */
 static uint64_t drive(const char *path, int disturbed, int all) {
     FILE *file = fopen(path, "rb");
     if (!file) exit(3);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# libraywake from C and C++: the program's digest, and calls that cannot be right, counted, under
-# the address sanitizer and under Valgrind. `run.sh PROGRAM` compares with the program `raywake`.
+# libraywake from C and C++: the program's digest, and invalid calls, with allocations counted,
+# under the address sanitizer and under Valgrind. `run.sh PROGRAM` compares with the program
+# `raywake`.
 set -euo pipefail
 program=$(realpath "$1")
 cd "$(dirname "$0")/../../.."
@@ -20,7 +21,7 @@ dump demo "$out/demo.sweeps" 20
 dump demo "$out/short.sweeps" 3
 
 digest_of() { sed -n 's/^digest *//p'; }
-# Those of another build would be results of other settings.
+# Results of another build would count as results of other settings.
 rm -rf "$out/demo"
 expected=$("$program" demo --backend scalar --out "$out/demo" | digest_of)
 compare() {
@@ -36,7 +37,7 @@ compare "C, one thread, shared library" "$out/replay-shared" "$out/demo.sweeps" 
 small_stack() { (ulimit -s 512 && "$@"); }
 compare "C, one thread, 512 KiB of stack" small_stack "$out/replay" "$out/demo.sweeps" 1
 
-# For another architecture, under its emulator.
+# Another architecture, under its emulator.
 target=aarch64-unknown-linux-gnu
 if [ "$(uname -m)" = x86_64 ] && command -v aarch64-linux-gnu-gcc >/dev/null &&
     command -v qemu-aarch64-static >/dev/null && rustup target add $target >/dev/null 2>&1; then
@@ -50,7 +51,7 @@ else
     echo "skipped: no compiler, target or emulator for aarch64"
 fi
 
-# The header is one of C++, too; and the shared library is found by its ABI.
+# The header is also valid C++, and the shared library is found by its ABI.
 echo '#include <raywake.h>
 #include <cstdio>
 int main(int count, char **) {
@@ -60,7 +61,7 @@ int main(int count, char **) {
 g++ -std=c++11 -Wall -Wextra -Werror -pedantic "$out/abi.cc" -o "$out/abi" "${shared[@]}"
 "$out/abi"
 readelf -d "$out/abi" | grep -q "NEEDED.*libraywake.so.$("$out/abi" number)"
-# States are zeros at the start, which take no room in a file; one that is not shows here.
+# Initial states are zeros, which take no room in the file; one that is not shows up here.
 bytes=$(stat -L -c %s "$out/lib/libraywake.so")
 echo "shared library: $bytes bytes"
 [ "$bytes" -le 2000000 ] || { echo "larger than 2,000,000 bytes"; exit 1; }
@@ -73,7 +74,7 @@ echo "nothing allocated: $("$out/misuse" "$out/short.sweeps")"
 misuse -fsanitize=address,undefined -fno-sanitize-recover=all
 echo "address sanitizer: $("$out/misuse" "$out/short.sweeps")"
 misuse
-# Threads share one core there: fairly, or whoever disturbs keeps it.
+# Valgrind runs all threads on one core: without fairness, the disturbing thread would keep it.
 valgrind --quiet --error-exitcode=1 --fair-sched=yes \
     --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite \
     "$out/misuse" "$out/short.sweeps" | sed 's/^/valgrind: /'

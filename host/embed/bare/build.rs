@@ -1,4 +1,4 @@
-//! Where the program lies in the memory of QEMU's board `virt`.
+//! Links the program to its place in the memory of QEMU's `virt` board.
 
 fn main() {
     println!("cargo:rerun-if-changed=virt.ld");

@@ -1,4 +1,4 @@
-//! The pipeline with all it works in, in memory of the caller's.
+//! The pipeline and everything it works in, in the caller's memory.
 
 use raywake_core::digest::Digest;
 use raywake_core::encoder::{self, EncoderWeights};
@@ -33,15 +33,15 @@ impl AtRest for ObjectTracker {
     const REST: ObjectTracker = ObjectTracker::new();
 }
 
-/// A pair's flow, but for its slices.
+/// A pair's flow without its slices.
 #[derive(Clone, Copy)]
 struct KeptPair {
     columns: usize,
     points: KeptPoints,
 }
 
-/// Chapter 3, refined, a sweep at a time on the CPU: a pipeline, the storage of its results and the
-/// two sweeps that it looks at.
+/// The flow of chapter 3, refined, computed on the CPU a sweep at a time: a pipeline, storage for
+/// its results and the two sweeps it works on.
 pub struct FlowEstimator {
     setup: Setup,
     pipeline: &'static mut Pipeline,
@@ -50,7 +50,7 @@ pub struct FlowEstimator {
     backend: ScalarBackend<&'static mut [u32]>,
     columns: &'static mut [ColumnFlow],
     taken: &'static mut [ReturnFlow],
-    /// Returns of the last sweep, and of the one before.
+    /// Returns of the last sweep, and of the previous one.
     sweeps: [SweepRoom; 2],
     pair: Option<KeptPair>,
     before: Option<Before>,
@@ -70,18 +70,18 @@ struct SweepRoom {
     count: usize,
 }
 
-/// Room for columns that are put out.
+/// Number of output columns to make room for.
 fn solid(profile: &Profile) -> usize {
     profile.columns().min(SOLID_MAX)
 }
 
-/// Words that perception works in.
+/// Number of words that perception works in.
 fn words(profile: &Profile) -> usize {
     ScalarBackend::<&mut [u32]>::words(profile)
 }
 
 impl EstimatorOptions {
-    /// Bytes that an estimator needs, wherever they begin: what [`FlowEstimator::new`] cuts off.
+    /// Number of bytes an estimator needs, at any alignment: what [`FlowEstimator::new`] takes.
     pub fn bytes(&self) -> Result<usize, CreateError> {
         self.check()?;
         let EstimatorOptions { profile, points_max, registers, objects, .. } = self;
@@ -105,7 +105,7 @@ impl SweepRoom {
     }
 }
 
-/// Loads the encoder where something is refined, as nothing else asks it.
+/// Loads the encoder if there is refinement; nothing else uses it.
 fn load_encoder(pipeline: &mut Pipeline, profile: &Profile) -> Result<(), WeightsError> {
     if profile.refinement_sweeps == 0 {
         return Ok(());
@@ -115,7 +115,8 @@ fn load_encoder(pipeline: &mut Pipeline, profile: &Profile) -> Result<(), Weight
 }
 
 impl FlowEstimator {
-    /// In memory of at least [`EstimatorOptions::bytes`]. It allocates nothing, here or later.
+    /// Creates an estimator in memory of at least [`EstimatorOptions::bytes`]. It allocates
+    /// nothing, here or later.
     pub fn new(
         options: &EstimatorOptions,
         mut memory: Memory,
@@ -162,10 +163,10 @@ impl FlowEstimator {
         })
     }
 
-    /// One sweep. What was to be read of the pair before is gone.
+    /// Processes one sweep. Results of the previous pair can no longer be read.
     ///
     /// # Errors
-    /// The sweep cannot be one; it is as if it had not been given.
+    /// The sweep is invalid; the state is as if it had not been given.
     pub fn step(
         &mut self,
         team: &impl Team,
@@ -186,12 +187,12 @@ impl FlowEstimator {
         self.pair = None;
         self.sweeps.swap(0, 1);
         let SweepRoom { points: room, count } = &mut self.sweeps[0];
-        // An iterator that errs about its length gives what it has, within the room.
+        // An iterator with a wrong length yields what it has, as far as there is room.
         *count = room.iter_mut().zip(points).map(|(to, point)| *to = point).count();
         Ok(())
     }
 
-    /// Does the work of the sweep received.
+    /// Does the work for the sweep received.
     pub(crate) fn advance(&mut self, team: &impl Team, place: &SweepPlace) -> StepSummary {
         let (pose, twist, locating) = self.locate(place);
         let [now, before] = &self.sweeps;
@@ -227,7 +228,7 @@ impl FlowEstimator {
         if place.is_sound() { Ok(()) } else { Err(SweepError::NotFinite) }
     }
 
-    /// Pose and twist of the sweep that has just come.
+    /// Pose and twist of the sweep just received.
     fn locate(&mut self, place: &SweepPlace) -> (Pose, Twist, Option<Locating>) {
         let stamp_s = place.stamp_s;
         if let Some(odometry) = &mut self.odometry {
@@ -246,8 +247,7 @@ impl FlowEstimator {
         (pose, place.twist.unwrap_or(from_poses), None)
     }
 
-    /// Flow of the solid columns of the pair's first sweep; empty where the last sweep made no
-    /// pair.
+    /// Flow of the solid columns of the pair's first sweep; empty if the last sweep made no pair.
     pub fn columns(&self) -> &[ColumnFlow] {
         self.pair.map_or(&[], |pair| &self.columns[..pair.columns])
     }
@@ -258,7 +258,7 @@ impl FlowEstimator {
         Some(pair.points.over(self.columns, self.taken, self.sweeps[1].points()))
     }
 
-    /// How many tracklets there are.
+    /// Number of tracklets.
     pub fn tracklet_count(&self) -> usize {
         self.pipeline.tracklet_count()
     }
@@ -268,13 +268,13 @@ impl FlowEstimator {
         self.pipeline.tracklets(&self.setup.profile)
     }
 
-    /// Objects in the pair's first sweep, where they are followed.
+    /// Objects in the pair's first sweep, if they are tracked.
     pub fn objects(&self) -> &[TrackedObject] {
         self.objects.as_ref().map_or(&[], |tracker| tracker.objects())
     }
 
-    /// Adds all that can be read now, but objects, to a digest: after every sweep, that of the
-    /// program.
+    /// Adds everything that can be read now, except objects, to a digest. Called after every sweep,
+    /// it gives the program's digest.
     pub fn add_to(&self, digest: &mut Digest) {
         self.columns().iter().for_each(|c| digest.column(c));
         self.points().into_iter().flat_map(PointFlows::iter).for_each(|p| digest.point(&p));

@@ -1,12 +1,12 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![deny(missing_docs)]
 //! Temporal scene flow for other programs: a [`FlowEstimator`] lives in memory that it is given,
-//! keeps the two sweeps that it looks at, and hands out the flow from the one to the other.
+//! keeps the two sweeps it works on, and returns the flow from one to the other.
 //!
-//! The library for C, the module for Python and programs without an operating system are built on
-//! it. It runs on the CPU, with the shipped weights. With the feature `std` a [`TeamEstimator`]
-//! brings threads of its own and the widest instructions of the processor; without it the package
-//! is `no_std`. Neither allocates after it is made; the plain one not even then.
+//! The C library, the Python module and programs without an operating system are built on it. It
+//! runs on the CPU, with the shipped weights. With the feature `std`, a [`TeamEstimator`] adds its
+//! own threads and the processor's widest instructions; without it, the crate is `no_std`. Neither
+//! estimator allocates after its creation; the plain one not even then.
 
 mod estimator;
 mod memory;

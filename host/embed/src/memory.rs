@@ -1,16 +1,16 @@
-//! Memory that somebody else gave, cut into the parts that are needed. What this package does
-//! unsafely is here.
+//! Memory given by someone else, cut into the parts needed. This crate's unsafe code is here,
+//! except for one call in `team_estimator`.
 
 use core::mem::MaybeUninit;
 
 /// Memory for the rest of the program, or for as long as its owner says.
 pub type Memory = &'static mut [MaybeUninit<u8>];
 
-/// Memory of the heap, freed with this.
+/// Heap memory, freed when this is dropped.
 #[cfg(feature = "std")]
 pub(crate) struct HeapMemory(*mut [MaybeUninit<u8>]);
 
-// SAFETY: all that is done to it is that it is freed, once.
+// SAFETY: the only thing done with it is to free it, once.
 #[cfg(feature = "std")]
 unsafe impl Send for HeapMemory {}
 // SAFETY: as above.
@@ -19,16 +19,16 @@ unsafe impl Sync for HeapMemory {}
 
 #[cfg(feature = "std")]
 impl HeapMemory {
-    /// So many bytes, and the right to them; none where the system does not give them.
+    /// Allocates `bytes` bytes: returns their owner and the right to use them; none if that fails.
     ///
     /// # Safety
-    /// Whatever is made of the memory is dropped before this.
+    /// Whatever is made in the memory is dropped before this.
     pub(crate) unsafe fn new(bytes: usize) -> Option<(HeapMemory, Memory)> {
         let mut place = Vec::<MaybeUninit<u8>>::new();
         place.try_reserve_exact(bytes).ok()?;
         place.resize(bytes, MaybeUninit::uninit());
         let place = Box::into_raw(place.into_boxed_slice());
-        // SAFETY: it has just been allocated; the caller promises how long it is used.
+        // SAFETY: it has just been allocated; the caller guarantees how long it is used.
         Some((HeapMemory(place), unsafe { &mut *place }))
     }
 }
@@ -36,24 +36,24 @@ impl HeapMemory {
 #[cfg(feature = "std")]
 impl Drop for HeapMemory {
     fn drop(&mut self) {
-        // SAFETY: it was a box; nobody uses it any more, as `new` was promised.
+        // SAFETY: it was a box; nobody uses it any more, as guaranteed to `new`.
         drop(unsafe { Box::from_raw(self.0) });
     }
 }
 
-/// What a place is filled with at the start. A constant is written to its place: by way of the
-/// stack, states of tens of MiB would need as much of that.
+/// A type with an initial value. The value is a constant, written in place: going through the
+/// stack, states of tens of MiB would need as much of it.
 pub(crate) trait AtRest {
-    /// It.
+    /// The initial value.
     const REST: Self;
 }
 
-/// Bytes that hold so many values, wherever they begin.
+/// Number of bytes that hold this many values, at any alignment.
 pub(crate) const fn bytes_of<T>(count: usize) -> usize {
     count * size_of::<T>() + align_of::<T>() - 1
 }
 
-/// Cuts off the place of so many values; none where there is no room.
+/// Cuts off room for this many values; none if there is not enough.
 fn cut<T>(memory: &mut Memory, count: usize) -> Option<&'static mut [MaybeUninit<T>]> {
     let skip = memory.as_ptr().align_offset(align_of::<T>());
     let bytes = count.checked_mul(size_of::<T>())?;
@@ -63,7 +63,7 @@ fn cut<T>(memory: &mut Memory, count: usize) -> Option<&'static mut [MaybeUninit
     let (_, rest) = core::mem::take(memory).split_at_mut(skip);
     let (place, rest) = rest.split_at_mut(bytes);
     *memory = rest;
-    // SAFETY: bytes that may hold anything are values that may hold anything.
+    // SAFETY: bytes that may hold anything form values that may hold anything.
     let (before, place, after) = unsafe { place.align_to_mut::<MaybeUninit<T>>() };
     debug_assert!(before.is_empty() && after.is_empty() && place.len() == count);
     Some(place)
@@ -79,11 +79,11 @@ pub(crate) fn array<T: Copy>(
     for element in &mut *place {
         element.write(value);
     }
-    // SAFETY: each has just been written.
+    // SAFETY: each element has just been written.
     Some(unsafe { place.assume_init_mut() })
 }
 
-/// Cuts off a value at rest.
+/// Cuts off a state and sets it to its initial value.
 pub(crate) fn state<T: AtRest>(memory: &mut Memory) -> Option<&'static mut T> {
     let [place] = cut::<T>(memory, 1)? else { return None };
     *place = const { MaybeUninit::new(T::REST) };

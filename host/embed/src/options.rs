@@ -1,4 +1,4 @@
-//! What an estimator is told when it is made.
+//! Options for creating an estimator, and why creation fails.
 
 use core::fmt;
 
@@ -8,32 +8,32 @@ use raywake_core::weights::WeightsError;
 
 use crate::place::is_pose;
 
-/// What an estimator is to be made for.
+/// Options for creating an estimator.
 #[derive(Clone, Debug)]
 pub struct EstimatorOptions {
-    /// Every number of the flow.
+    /// All parameters of the flow.
     pub profile: Profile,
     /// Where the sensors sit, and what their returns' times mean.
     pub rig: Rig,
-    /// Returns that a sweep has at most. Of more than the profile's
-    /// [`returns_max`](Profile::returns_max), so many are taken, evenly.
+    /// Maximum number of returns of a sweep. Of more than the profile's
+    /// [`returns_max`](Profile::returns_max), that many are taken, evenly.
     pub points_max: usize,
-    /// Whether poses are found by registration, as none are given.
+    /// Whether poses are found by registration instead of being given.
     pub registers: bool,
-    /// Whether objects are followed, too.
+    /// Whether objects are tracked too.
     pub objects: bool,
 }
 
-/// Why there is no estimator.
+/// Why an estimator cannot be created.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CreateError {
-    /// A parameter of the profile is not what it must be.
+    /// A parameter of the profile is invalid.
     Profile(ProfileError),
-    /// The rig has no sensor, or a place, a height or a time of it is none.
+    /// The rig has no sensor, or one of its places, heights or times is invalid.
     Rig,
-    /// The shipped weights do not fit the profile: its `levels` are others.
+    /// The shipped weights do not fit the profile: its `levels` differ.
     Weights(WeightsError),
-    /// It needs so many bytes.
+    /// It needs this many bytes.
     Memory(usize),
 }
 
@@ -51,13 +51,13 @@ impl fmt::Display for CreateError {
 }
 
 impl EstimatorOptions {
-    /// Whether there can be such an estimator.
+    /// Checks that such an estimator is possible.
     pub(crate) fn check(&self) -> Result<(), CreateError> {
         self.profile.check().map_err(CreateError::Profile)?;
         if !is_sound(&self.rig) {
             return Err(CreateError::Rig);
         }
-        // What has so many returns is no sweep; and sums of bytes stay sums.
+        // No sweep has this many returns; and sums of bytes do not overflow.
         match self.points_max.checked_mul(4 * size_of::<Point>()) {
             Some(bytes) if bytes < isize::MAX as usize => Ok(()),
             _ => Err(CreateError::Memory(usize::MAX)),

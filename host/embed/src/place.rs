@@ -1,28 +1,28 @@
-//! When and where a sweep was made, and what cannot be.
+//! When and where a sweep was recorded, and what is refused.
 
 use core::fmt;
 
 use raywake_core::pose::{Pose, Twist};
 
-/// When and where a sweep was made.
+/// When and where a sweep was recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SweepPlace {
     /// Time of the stamp, s.
     pub stamp_s: f64,
-    /// `world_from_vehicle` at the stamp; none where it is to be found.
+    /// `world_from_vehicle` at the stamp; none if it is to be found.
     pub pose: Option<Pose>,
-    /// Velocity of the vehicle at the stamp; without it, what leads from the pose before to this.
+    /// Velocity of the vehicle at the stamp; if none, that between the previous pose and this one.
     pub twist: Option<Twist>,
 }
 
-/// Why a sweep was not taken. Nothing has changed: the next one may be given.
+/// Why a sweep was refused. Nothing has changed: the next one may be given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SweepError {
     /// It has more returns than [`points_max`](crate::EstimatorOptions::points_max).
     Points(usize),
-    /// Its stamp, pose or twist is not finite, or its rotation no unit quaternion.
+    /// Its stamp, pose or twist is not finite, or its rotation is not a unit quaternion.
     NotFinite,
-    /// There is no pose, and none is to be found; or there is one, and it was to be found.
+    /// A pose is missing although none is to be found, or given although it is to be found.
     Pose,
 }
 
@@ -41,7 +41,7 @@ impl fmt::Display for SweepError {
 }
 
 impl SweepPlace {
-    /// Whether its numbers can be those of a sweep.
+    /// Whether its numbers are valid.
     pub(crate) fn is_sound(&self) -> bool {
         let moves = self.twist.unwrap_or(Twist::ZERO);
         self.stamp_s.is_finite()
@@ -51,12 +51,12 @@ impl SweepPlace {
     }
 }
 
-/// Finite, and of a quaternion of unit length to within a thousandth.
+/// Whether a pose is finite, with a quaternion of unit length to within a thousandth.
 pub(crate) fn is_pose(pose: &Pose) -> bool {
     pose.translation.is_finite() && (pose.rotation.length() - 1.0).abs() < 1e-3
 }
 
-/// What is of unit length but for rounding keeps its bits.
+/// Normalises the rotation; one that is of unit length but for rounding keeps its bits.
 pub(crate) fn normalised(pose: Pose) -> Pose {
     let off = (pose.rotation.length_squared() - 1.0).abs();
     if off <= 4.0 * f64::EPSILON { pose } else { Pose::new(pose.rotation, pose.translation) }

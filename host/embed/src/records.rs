@@ -1,11 +1,11 @@
-//! What is read out of an estimator, as plain records: the same in C and in NumPy.
+//! The results of an estimator as plain records: the same in C and in NumPy.
 
 use bytemuck::{Pod, Zeroable};
 use raywake_core::encoder::ColumnClass;
 use raywake_core::output::{ColumnFlow, PointFlow, TrackletState};
 use raywake_objects::tracked::TrackedObject;
 
-/// Class of a column or return: there is none.
+/// Class of a column or return that has none.
 pub const NO_CLASS: u8 = 255;
 
 const _: () = assert!(NO_CLASS == ColumnClass::NONE);
@@ -16,7 +16,7 @@ const _: () = assert!(NO_CLASS == ColumnClass::NONE);
 pub struct ColumnRecord {
     /// Centre in the world (the frame of the poses), m.
     pub position_world_m: [f64; 2],
-    /// Index in the lattice, whose cell (0, 0) lies at the vehicle in the first sweep.
+    /// Lattice index; cell (0, 0) lies at the vehicle in the first sweep.
     pub cell: [i32; 2],
     /// Centre in the vehicle frame, m.
     pub position_vehicle_m: [f32; 2],
@@ -34,12 +34,12 @@ pub struct ColumnRecord {
     pub probability: f32,
     /// Observations of its tracklet after birth.
     pub age: u32,
-    /// Whence the flow: 0 background, 1 unmatched, 2 matched, 3 joined (with its cluster).
+    /// Source of the flow: 0 background, 1 unmatched, 2 matched, 3 joined (with its cluster).
     pub basis: u8,
     /// 0 ground, 1 structure, 2 vegetation, 3 pole, 4 car, 5 large vehicle, 6 person,
     /// 7 two-wheeler; 255: none.
     pub class_id: u8,
-    /// 0.
+    /// Always 0.
     pub reserved: [u8; 6],
 }
 
@@ -57,14 +57,14 @@ pub struct PointRecord {
     pub probability: f32,
     /// Observations of its column's tracklet after birth.
     pub age: u32,
-    /// What became of it: 0 static, 1 moving, 2 unmatched, 3 outside the window, 4 over capacity,
-    /// 5 own vehicle, 6 no echo, 7 invalid.
+    /// Outcome: 0 static, 1 moving, 2 unmatched, 3 outside the window, 4 over capacity, 5 own
+    /// vehicle, 6 no echo, 7 invalid.
     pub status: u8,
-    /// As of a column.
+    /// As for a column.
     pub basis: u8,
-    /// As of a column.
+    /// As for a column.
     pub class_id: u8,
-    /// 0.
+    /// Always 0.
     pub reserved: u8,
 }
 
@@ -100,19 +100,19 @@ pub struct TrackletRecord {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ObjectRecord {
-    /// When it was last seen, s: before the sweep's stamp where it was not seen in it.
+    /// When it was last seen, s: before the sweep's stamp if it was not seen in the sweep.
     pub time_s: f64,
-    /// Middle of its box in the world (the frame of the poses), m.
+    /// Centre of its box in the world (the frame of the poses), m.
     pub position_world_m: [f64; 3],
-    /// Direction of its length in the world, rad. Of what stands either end may be the front.
+    /// Direction of its length in the world, rad. If it is stationary, either end may be the front.
     pub heading_rad: f32,
-    /// Length, width and height of what was seen of it, m.
+    /// Length, width and height of the part that was seen, m.
     pub size_m: [f32; 3],
-    /// Velocity over ground along world axes, m/s; 0 where it stands.
+    /// Velocity over ground along world axes, m/s; 0 if it is stationary.
     pub velocity_world_mps: [f32; 2],
     /// Turning rate, rad/s.
     pub turn_rate_radps: f32,
-    /// Covariance of its place (xx, xy, yy) and variance of its height, m^2.
+    /// Covariance of its position (xx, xy, yy) and variance of its height, m^2.
     pub position_covariance: [f32; 4],
     /// Variance of the heading, rad^2.
     pub heading_variance: f32,
@@ -120,19 +120,19 @@ pub struct ObjectRecord {
     pub speed_variance: f32,
     /// Variance of the turning rate, (rad/s)^2.
     pub turn_rate_variance: f32,
-    /// P(moves), the mean of its returns; NaN where it is not known.
+    /// P(moves), the mean over its returns; NaN if unknown.
     pub probability: f32,
-    /// The share of its returns that are taken for what it is taken for, 0 to 1.
+    /// Share of its returns that have its class, 0 to 1.
     pub class_share: f32,
-    /// Number of its track, from 0 in the order of their births.
+    /// Number of its track, from 0 in order of birth.
     pub id: u32,
-    /// Times that it was seen.
+    /// Number of times it was seen.
     pub observations: u32,
-    /// 1: it moves; 0: it stands.
+    /// 1: moving; 0: stationary.
     pub moves: u8,
-    /// As of a column; what most of its returns are taken for.
+    /// As for a column: the class of most of its returns.
     pub class_id: u8,
-    /// 0.
+    /// Always 0.
     pub reserved: [u8; 6],
 }
 

@@ -1,4 +1,4 @@
-//! What a sweep came to, in numbers.
+//! Summaries of sweeps and pairs.
 
 use raywake_core::continuity::Reset;
 use raywake_core::dropped::DroppedReturns;
@@ -7,12 +7,12 @@ use raywake_core::pose::Pose;
 use raywake_core::tracklet::TrackletTurnover;
 use raywake_registration::odometry::Locating;
 
-/// What a sweep came to.
+/// Summary of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepSummary {
-    /// The pair of the sweep before and this one; none after a reset.
+    /// The pair of the previous sweep and this one; none after a reset.
     pub pair: Option<PairSummary>,
-    /// Set where the sweep has no usable predecessor.
+    /// Set if the sweep has no usable predecessor.
     pub reset: Option<Reset>,
     /// Returns left out.
     pub dropped: DroppedReturns,
@@ -24,13 +24,13 @@ pub struct StepSummary {
     pub rays: usize,
     /// `world_from_vehicle` at the stamp.
     pub pose: Pose,
-    /// How it was found, where it was.
+    /// How it was found, unless it was given.
     pub locating: Option<Locating>,
-    /// Objects in the sweep before.
+    /// Objects in the previous sweep.
     pub objects: usize,
 }
 
-/// What a pair of sweeps came to.
+/// Summary of a pair of sweeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairSummary {
     /// Time between them, s.

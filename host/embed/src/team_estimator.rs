@@ -1,7 +1,7 @@
-//! An estimator with threads of its own.
+//! An estimator with its own threads.
 //!
-//! Threads that share work allocate where others hand them some. So one of the team leads it: it
-//! waits for sweeps, and whoever gives one waits for it.
+//! Threads that share work allocate when an outside thread hands them some. So one of the team
+//! leads it: it waits for sweeps, and whoever gives one waits for it.
 
 use std::fmt;
 use std::io;
@@ -19,9 +19,9 @@ use crate::{CreateError, EstimatorOptions, FlowEstimator, StepSummary, SweepErro
 /// Why a step has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepError {
-    /// The sweep was not taken.
+    /// The sweep was refused.
     Sweep(SweepError),
-    /// A defect of this library: the step did not come to its end, nor will a later one.
+    /// A defect of this library: the step did not finish, and no later one will.
     Failed,
 }
 
@@ -36,25 +36,25 @@ impl fmt::Display for StepError {
 
 impl std::error::Error for StepError {}
 
-/// An estimator, and the threads that share its work. Any thread may give it sweeps.
+/// An estimator and the threads that share its work. Any thread may give it sweeps.
 pub struct TeamEstimator {
     desk: Arc<Desk>,
     threads: Vec<JoinHandle<()>>,
     pool: Option<ThreadPool>,
-    /// Of the estimator, where it is not the caller's. Dropped last.
+    /// The estimator's memory, unless it is the caller's. Dropped last.
     memory: Option<HeapMemory>,
 }
 
-/// Why there is no estimator with threads.
+/// Why an estimator with threads cannot be created.
 #[derive(Debug)]
 pub enum TeamError {
-    /// There is no estimator.
+    /// The estimator itself cannot be created.
     Create(CreateError),
     /// The system has no more threads.
     Threads(io::Error),
 }
 
-/// Where the caller and the leader of the team meet.
+/// Where the caller and the team's leader meet.
 struct Desk {
     work: Mutex<Work>,
     changed: Condvar,
@@ -63,13 +63,13 @@ struct Desk {
 struct Work {
     estimator: FlowEstimator,
     order: StepOrder,
-    /// A step did not come to its end.
+    /// A step did not finish.
     failed: bool,
 }
 
 enum StepOrder {
     None,
-    /// The returns have been put in.
+    /// The returns are in place.
     Step(SweepPlace),
     Done(Result<StepSummary, StepError>),
     Quit,
@@ -85,8 +85,8 @@ impl fmt::Display for TeamError {
 }
 
 impl TeamEstimator {
-    /// With so many threads, that which gives a sweep not counted while it waits; 0: as many as
-    /// pay. With one, the thread that gives a sweep does the work.
+    /// Gives an estimator this many threads, not counting the caller's, which waits meanwhile; 0:
+    /// as many as pay off. With one, the calling thread does the work.
     ///
     /// # Errors
     /// The system has no more threads.
@@ -101,13 +101,13 @@ impl TeamEstimator {
         Ok(made)
     }
 
-    /// The same in memory of its own.
+    /// The same, in its own heap memory.
     ///
     /// # Errors
-    /// As of [`FlowEstimator::new`] and [`TeamEstimator::new`].
+    /// As for [`FlowEstimator::new`] and [`TeamEstimator::new`].
     pub fn on_heap(options: &EstimatorOptions, threads: usize) -> Result<TeamEstimator, TeamError> {
         let bytes = options.bytes().map_err(TeamError::Create)?;
-        // SAFETY: it is kept until after the estimator.
+        // SAFETY: it is kept until after the estimator is dropped.
         let housed = unsafe { HeapMemory::new(bytes) };
         let (memory, place) = housed.ok_or(TeamError::Create(CreateError::Memory(bytes)))?;
         let estimator = FlowEstimator::new(options, place).map_err(TeamError::Create)?;
@@ -124,7 +124,7 @@ impl TeamEstimator {
             Ok(())
         });
         let pool = pool.build().map_err(io::Error::other)?;
-        // What a thread allocates when it first looks for work.
+        // Triggers what a thread allocates when it first looks for work.
         pool.broadcast(|_| ());
         let desk = self.desk.clone();
         pool.spawn(move || desk.lead());
@@ -132,15 +132,15 @@ impl TeamEstimator {
         Ok(())
     }
 
-    /// Threads that share the work.
+    /// Number of threads that share the work.
     pub fn threads(&self) -> usize {
         self.threads.len().max(1)
     }
 
-    /// One sweep. See [`FlowEstimator::step`].
+    /// Processes one sweep. See [`FlowEstimator::step`].
     ///
     /// # Errors
-    /// The sweep was not taken, or a step failed, this one or an earlier one.
+    /// The sweep was refused, or this step or an earlier one failed.
     pub fn step(
         &mut self,
         place: &SweepPlace,
@@ -157,7 +157,7 @@ impl TeamEstimator {
         }
     }
 
-    /// Reads what the last sweep came to.
+    /// Reads the results of the last sweep.
     ///
     /// # Errors
     /// A step failed.
@@ -170,7 +170,7 @@ impl TeamEstimator {
     }
 }
 
-/// As many as pay, or fewer.
+/// The number asked for, or as many as pay off; at most `THREADS_MAX`.
 fn paying(asked: usize) -> usize {
     match asked {
         0 => raywake_team::available(),
@@ -187,7 +187,7 @@ impl Desk {
         self.changed.wait(work).unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the leader do a step.
+    /// Has the leader do a step, and waits for it.
     fn order(
         &self,
         mut work: MutexGuard<Work>,
@@ -204,7 +204,7 @@ impl Desk {
         }
     }
 
-    /// The leader's life.
+    /// The leader's loop.
     fn lead(&self) {
         let mut work = self.work();
         loop {
@@ -232,12 +232,12 @@ impl Work {
 }
 
 impl Drop for TeamEstimator {
-    /// Waits for all threads: the code they run may be unloaded next.
+    /// Waits for all threads to end: the code they run may be unloaded next.
     fn drop(&mut self) {
         self.desk.work().order = StepOrder::Quit;
         self.desk.changed.notify_all();
         self.pool = None;
-        // One that panicked has ended, too.
+        // A thread that panicked has ended, too.
         self.threads.drain(..).for_each(|thread| drop(thread.join()));
     }
 }

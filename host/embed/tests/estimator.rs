@@ -1,4 +1,4 @@
-//! An estimator alone, with threads, and where it is given what it cannot take.
+//! An estimator alone, with threads, and with invalid input.
 #![cfg(feature = "std")]
 
 use std::mem::MaybeUninit;
@@ -79,7 +79,7 @@ fn threads_change_nothing() {
     }
 }
 
-/// They change nothing else, and threads change nothing of them.
+/// Tracking objects changes nothing else, and threads change nothing about the objects.
 #[test]
 fn objects_are_followed() {
     let following = EstimatorOptions { objects: true, ..options() };
@@ -163,7 +163,7 @@ fn what_is_no_set_of_options() {
     assert!(refused(&|o| o.points_max = usize::MAX / 8).contains("bytes of memory"));
 }
 
-/// Gives an estimator what is no sweep, again and again.
+/// Gives an estimator one invalid sweep after another.
 fn pester(estimator: &mut FlowEstimator, here: SweepPlace, points: &[Point]) {
     let far = Some(Pose { translation: glam::DVec3::NAN, ..Pose::IDENTITY });
     let odd = Some(Pose { rotation: glam::DQuat::IDENTITY * 2.0, ..Pose::IDENTITY });

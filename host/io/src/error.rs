@@ -1,41 +1,41 @@
-//! What can be wrong with an input, an output or a request for one.
+//! Errors in inputs, in outputs and in requests for them.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A failure the user can act on. Its text names the file and the place in it.
+/// A failure the user can act on. Its message names the file and the place in it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The command line asks for something that does not fit together.
+    /// The command line asks for something inconsistent.
     #[error("{0}")]
     Usage(String),
     /// This build lacks a feature the input or output needs.
     #[error("{0}")]
     Unsupported(String),
-    /// An input file or folder that can be read but makes no sense.
+    /// An input file or folder can be read but makes no sense.
     #[error("{}{}{place}: {what}", .path.display(), if .place.is_empty() { "" } else { ", " })]
     Input {
         /// File or folder.
         path: PathBuf,
-        /// Line, row or byte ("line 3"); empty where the whole file is meant.
+        /// Line, row or byte ("line 3"); empty if the whole file is meant.
         place: String,
         /// What is wrong there.
         what: String,
     },
-    /// The operating system refuses to read.
+    /// The operating system refused to read.
     #[error("cannot read {}: {source}", .path.display())]
     Read {
         /// File or folder.
         path: PathBuf,
-        /// Its reason.
+        /// The system's reason.
         source: io::Error,
     },
-    /// The operating system refuses to write (disk full, permission).
+    /// The operating system refused to write (disk full, permission).
     #[error("cannot write {}: {source}", .path.display())]
     Write {
         /// File or folder.
         path: PathBuf,
-        /// Its reason.
+        /// The system's reason.
         source: io::Error,
     },
 }
@@ -46,7 +46,7 @@ impl Error {
         Error::Input { path: path.to_path_buf(), place: place.into(), what: what.into() }
     }
 
-    /// [`Error::Unsupported`] for want of a feature.
+    /// [`Error::Unsupported`] because a feature is not compiled in.
     pub fn lacking(what: impl std::fmt::Display, feature: &str) -> Error {
         let text = format!(
             "{what} needs the feature `{feature}`, which is not compiled in: build raywake with \
@@ -55,18 +55,18 @@ impl Error {
         Error::Unsupported(text)
     }
 
-    /// For `map_err` on reading `path`.
+    /// Maps an I/O error in reading `path`, for `map_err`.
     pub fn reading(path: &Path) -> impl FnOnce(io::Error) -> Error + '_ {
         move |source| Error::Read { path: path.to_path_buf(), source }
     }
 
-    /// For `map_err` on writing `path`.
+    /// Maps an I/O error in writing `path`, for `map_err`.
     pub fn writing(path: &Path) -> impl FnOnce(io::Error) -> Error + '_ {
         move |source| Error::Write { path: path.to_path_buf(), source }
     }
 
-    /// Exit code of a program that ends with this error: 2 for usage (and what this build cannot
-    /// do), 3 for input, 4 for output.
+    /// Exit code of a program that ends with this error: 2 for usage (and features this build
+    /// lacks), 3 for input, 4 for output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) | Error::Unsupported(_) => 2,

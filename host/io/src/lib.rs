@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`source`] | sweeps and poses of KITTI, Argoverse 2, folders of clouds, simulated drives |
 //! | [`sink`] | feather tables, Argoverse 2 submissions, each file whole or absent |
-//! | [`error`] | what can be wrong with a file or an option, and the exit code for it |
+//! | [`error`] | errors in files and options, and their exit codes |
 
 pub mod error;
 pub mod sink;

@@ -1,4 +1,4 @@
-"""Flow of a recording in Rerun, as it is computed: returns in grey, an arrow per return that moves.
+"""Flow of a recording in Rerun, as it is computed: returns in grey, an arrow per moving return.
 
     pip install FOLDER/raywake-*.whl rerun-sdk
     python rerun_flow.py RECORDING [--save FILE.rrd]
@@ -20,13 +20,13 @@ before = None
 for sweep in recording:
     step = pipeline.step(sweep)
     if step.dt is not None:
-        # The flow is that of the sweep before.
+        # The flow is that of the previous sweep.
         at, flow = before.points, step.points
         moving = flow["status"] == raywake.MOVING
         colours = np.where(moving[:, None], [215, 38, 41], [150, 160, 170])
         rr.set_time("time", duration=before.stamp)
         rr.log("points", rr.Points3D(at, colors=colours))
-        # Relative to the vehicle, whose own motion is taken out again: where it will be in 0.5 s.
+        # Over ground, along the vehicle's axes: where it will be in 0.5 s.
         velocity = np.pad(flow["velocity_world_mps"][moving], ((0, 0), (0, 1)))
         in_vehicle = velocity @ pose[:3, :3]
         rr.log("motion", rr.Arrows3D(origins=at[moving], vectors=0.5 * in_vehicle))

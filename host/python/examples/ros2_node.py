@@ -1,11 +1,11 @@
-"""A ROS 2 node: PointCloud2 in; PointCloud2 with velocity, P(moves) and status of every point, and
-objects as a MarkerArray of boxes out.
+"""A ROS 2 node: takes PointCloud2; publishes PointCloud2 with velocity, P(moves) and status of
+every point, and objects as a MarkerArray of boxes.
 
     pip install FOLDER/raywake-*.whl
     python ros2_node.py --ros-args -r points:=/lidar/points -p ground:=-1.8
 
 Poses come from registration or, with `-p find_poses:=false`, from tf (`world_frame` to the cloud's
-frame). What is put out is of the cloud before the last.
+frame). What is published belongs to the cloud before the last.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 def as_array(cloud):
-    """The points of a PointCloud2 as a structured array; its memory is the message's."""
+    """Returns the points of a PointCloud2 as a structured array, copied only if rows are padded."""
     order = ">" if cloud.is_bigendian else "<"
     fields = [field for field in cloud.fields if field.count <= 1]
     row = np.dtype(
@@ -34,7 +34,7 @@ def as_array(cloud):
 
 
 def times_of(points, stamp):
-    """Time of every point after the stamp, s; none where the cloud does not tell."""
+    """Returns the time of every point after the stamp, s; None if the cloud has no times."""
     for name in ("t", "time", "timestamp", "time_offset", "offset_time"):
         if name in (points.dtype.names or ()):
             time = points[name].astype(np.float64)
@@ -45,11 +45,11 @@ def times_of(points, stamp):
 
 
 def positions_of(points):
-    """N x 3."""
+    """Returns the positions, N x 3."""
     return np.stack([points[axis] for axis in "xyz"], axis=1)
 
 
-#: What is put out for a point.
+#: What is published for a point.
 OUT = np.dtype(
     [
         ("x", "<f4"),
@@ -65,7 +65,7 @@ OUT = np.dtype(
 
 
 def with_velocity(positions, flow):
-    """Positions and, relative to the sensor, what was found, as an array of OUT."""
+    """Returns positions and results, relative to the sensor, as an array of OUT."""
     out = np.zeros(len(positions), OUT)
     for n, axis in enumerate("xyz"):
         out[axis] = positions[:, n]
@@ -75,8 +75,8 @@ def with_velocity(positions, flow):
 
 
 def as_boxes(objects, world_from_vehicle):
-    """Of every object number, class, whether it moves, place, heading, size and velocity over ground,
-    in the frame of the vehicle."""
+    """Yields number, class, whether it moves, position, heading, size and velocity over ground of
+    every object, in the vehicle frame."""
     vehicle_from_world = np.linalg.inv(world_from_vehicle)
     turn = vehicle_from_world[:3, :3]
     yaw = np.arctan2(turn[1, 0], turn[0, 0])
@@ -94,7 +94,7 @@ def as_boxes(objects, world_from_vehicle):
 
 
 class Flow:
-    """What the node does with a cloud, without ROS."""
+    """The node's processing of a cloud, without ROS."""
 
     def __init__(self, ground, find_poses, timed):
         timing = dict(timing="offset", distorted=True, start=-0.1, span=0.2) if timed else {}
@@ -103,7 +103,7 @@ class Flow:
         self.before = None
 
     def step(self, points, stamp, pose=None):
-        """Takes a cloud. Returns the cloud before as an array of OUT and its objects, or None."""
+        """Takes a cloud. Returns the previous cloud as an array of OUT and its objects, or None."""
         positions = positions_of(points)
         step = self.pipeline.step(positions, stamp, pose, time=times_of(points, stamp))
         before, self.before = self.before, (positions, step.pose)

@@ -1,4 +1,4 @@
-//! Arrays of records, and what is read of the caller's.
+//! Arrays of records, and reading the caller's arrays.
 
 use bytemuck::Pod;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -12,11 +12,11 @@ use crate::flow_record::FlowRecord;
 
 /// A record that NumPy can have arrays of.
 pub trait Record: Pod {
-    /// Of each field name, type in NumPy's words, numbers (none: one, without an axis) and place.
+    /// For each field: name, NumPy type code, count (none: a scalar, without an axis) and offset.
     const FIELDS: &'static [(&'static str, &'static str, Option<usize>, usize)];
 }
 
-/// A type of a field.
+/// The type of a field.
 trait RecordField {
     const CODE: &'static str;
     const COUNT: Option<usize> = None;
@@ -43,7 +43,7 @@ impl<T: RecordField, const N: usize> RecordField for [T; N] {
     const COUNT: Option<usize> = Some(N);
 }
 
-/// A field's type in NumPy's words, told by the way to it.
+/// A field's NumPy type code and count, inferred from its accessor.
 const fn code<R, T: RecordField>(_: fn(&R) -> &T) -> (&'static str, Option<usize>) {
     (T::CODE, T::COUNT)
 }
@@ -58,7 +58,7 @@ macro_rules! record {
         }
 
         const _: fn($record) = |record| {
-            // All fields but what is reserved.
+            // All fields except the reserved ones.
             #[allow(unused_variables, clippy::unneeded_field_pattern)]
             let $record { $($name,)* .. } = record;
         };
@@ -86,7 +86,7 @@ record! {
     FlowRecord { flow_m, motion_m, covariance, status, basis }
 }
 
-/// NumPy's type of a record.
+/// Returns NumPy's type of a record.
 pub fn dtype<'py, R: Record>(py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = py.import("numpy")?;
     let format = |(_, code, count, _): &(&str, &'static str, Option<usize>, usize)| match count {
@@ -111,7 +111,7 @@ pub fn add_types(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("FLOW_DTYPE", dtype::<FlowRecord>(py)?)
 }
 
-/// An array of its own, into which the records are written.
+/// Makes a new array and writes the records into it.
 pub fn array<'py, R: Record>(
     py: Python<'py>,
     count: usize,
@@ -128,7 +128,7 @@ pub fn array<'py, R: Record>(
     bytes.call_method1("view", (dtype::<R>(py)?,))
 }
 
-/// Whatever NumPy can make an array of, in single precision and the machine's order of bytes.
+/// Converts whatever NumPy can make an array of to single precision in native byte order.
 fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
@@ -140,7 +140,7 @@ fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyA
         return Err(pyo3::exceptions::PyTypeError::new_err(why));
     }
     let single = numpy.getattr("float32")?;
-    // A number beyond single precision becomes an infinity, which is counted.
+    // A number beyond single precision becomes an infinity, which is counted as not finite.
     let quiet = PyDict::new(py);
     quiet.set_item("all", "ignore")?;
     let state = numpy.call_method("errstate", (), Some(&quiet))?;
@@ -150,7 +150,7 @@ fn as_f32<'py>(value: &Bound<'py, PyAny>, what: &str) -> PyResult<Bound<'py, PyA
     made
 }
 
-/// Returns of the caller's, copied while no other thread of Python runs.
+/// Copies the caller's returns while no other Python thread runs.
 pub fn points(
     to: &mut Vec<Point>,
     points: &Bound<'_, PyAny>,
@@ -178,7 +178,7 @@ pub fn points(
     }
     if let Some(sensors) = sensors {
         let sensors = as_f32(sensors, "sensor")?;
-        // What is no index is that of no sensor; it is counted.
+        // An invalid index stands for no sensor; it is counted.
         let index = |v: f32| if (0.0..256.0).contains(&v) { v as u32 } else { u32::MAX };
         each(to, &sensors, "sensor", |point, sensor| point.sensor = index(sensor))?;
     }

@@ -39,13 +39,13 @@ impl CloudFlow {
 ///
 /// a, b: N x 3 or more numbers: x, y, z, m.
 /// dt: time from a to b, s.
-/// profile, settings: as of Pipeline.
-/// ground: height of the ground in a's frame, m; without: estimated from a.
-/// sensor: x, y, z of the sensor in the clouds' frame, m; without: their origin, unless the ground
-///     is too close to that.
-/// pose: pose of b's frame in a's, where it is known; without: by registration.
+/// profile, settings: as for Pipeline.
+/// ground: height of the ground in a's frame, m; default: estimated from a.
+/// sensor: x, y, z of the sensor in the clouds' frame, m; default: their origin, unless the ground
+///     is too close to it.
+/// pose: pose of b's frame in a's, if known; default: by registration.
 ///
-/// Raises ValueError where the clouds cannot be laid onto each other: that is not a guess.
+/// Raises ValueError if the clouds cannot be registered to each other: no motion is guessed.
 #[pyfunction]
 #[pyo3(signature = (a, b, *, dt=0.1, profile="hdl64", settings=None, ground=None, sensor=None,
     pose=None))]

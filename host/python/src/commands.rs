@@ -19,15 +19,15 @@ pub fn main(py: Python<'_>, args: Vec<String>) -> u8 {
     py.detach(|| {
         let line = Args::command().try_get_matches_from(args);
         line.and_then(|line| raywake::carry_out(&line)).unwrap_or_else(|e| {
-            // Where it cannot be printed, nothing can.
+            // If this cannot be printed, nothing can.
             let _ = e.print();
             e.exit_code() as u8
         })
     })
 }
 
-/// Poses of a recording from its sweeps alone: N x 4 x 4, world_from_vehicle, where the world is
-/// the vehicle's frame at the first sweep.
+/// Finds the poses of a recording from its sweeps alone: N x 4 x 4, world_from_vehicle, where the
+/// world is the vehicle's frame at the first sweep.
 #[pyfunction]
 pub fn odometry(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let options = OpenOptions { unlocated: Unlocated::Always, ..OpenOptions::default() };

@@ -1,6 +1,6 @@
 //! The Python module `raywake`: NumPy arrays in, arrays of records out.
 //!
-//! What is written in Python lies in `python/raywake`; this is `raywake._raywake`.
+//! The part written in Python is in `python/raywake`; this is `raywake._raywake`.
 #![deny(missing_docs)]
 
 mod arrays;

@@ -1,4 +1,4 @@
-//! A sweep at a time.
+//! The flow, a sweep at a time.
 
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -23,28 +23,28 @@ use crate::rig::PyRig;
 ///
 /// profile: "hdl64" (a window of +-25 m), "wide" (+-35 m), "far" (+-50 m) or "dissertation".
 /// rig: where the sensors sit; see Rig.
-/// settings: parameters of the profile, by the names of PARAMETERS.md.
-/// find_poses: no poses will be given; they are found by registration.
-/// objects: objects are followed, too; see Step.objects.
-/// points_max: returns that a sweep has at most; 0: as many as the profile takes.
-/// threads: 0: as many as pay.
+/// settings: parameters of the profile, by the names in PARAMETERS.md.
+/// find_poses: poses are found by registration instead of being given.
+/// objects: objects are tracked too; see Step.objects.
+/// points_max: maximum number of returns of a sweep; 0: as many as the profile takes.
+/// threads: 0: as many as pay off.
 ///
 /// All memory is allocated here.
 #[pyclass(module = "raywake", name = "Pipeline")]
 pub struct PyPipeline {
     team: TeamEstimator,
-    /// Returns of the sweep in hand.
+    /// Returns of the current sweep.
     points: Vec<Point>,
     /// Steps so far.
     steps: u64,
     digest: Digest,
     find_poses: bool,
-    /// Bytes that it works in.
+    /// Number of bytes it works in.
     #[pyo3(get)]
     memory: usize,
 }
 
-/// A profile with some of its parameters set.
+/// Returns a profile with some of its parameters set.
 pub fn profile(name: &str, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Profile> {
     let mut profile = Profile::named(name)
         .ok_or_else(|| PyValueError::new_err(format!("there is no profile {name:?}")))?;
@@ -70,7 +70,7 @@ fn set(profile: &mut Profile, path: &str, value: &Bound<'_, PyAny>) -> PyResult<
     })
 }
 
-/// An estimator in memory of its own.
+/// Creates an estimator in its own memory.
 pub fn estimator(options: &EstimatorOptions, threads: usize) -> PyResult<TeamEstimator> {
     TeamEstimator::on_heap(options, threads).map_err(|e| match e {
         TeamError::Create(CreateError::Memory(_)) => PyMemoryError::new_err(e.to_string()),
@@ -103,13 +103,13 @@ impl PyPipeline {
         Ok(PyPipeline { team, points, steps: 0, digest, find_poses, memory })
     }
 
-    /// One sweep; returns what is known of the pair of the sweep before and this one.
+    /// Processes one sweep; returns the results for the pair of the previous sweep and this one.
     ///
-    /// points: N x 3 or more numbers, x, y, z in the vehicle frame, m; (0, 0, 0) and NaN are no
-    ///     returns. Or a Sweep of a Recording, which comes with all that follows.
+    /// points: N x 3 or more numbers, x, y, z in the vehicle frame, m; (0, 0, 0) and NaN are not
+    ///     returns. Or a Sweep of a Recording, which includes everything below.
     /// stamp: time of the sweep, s.
     /// pose: world_from_vehicle; not with find_poses.
-    /// twist: vx, vy, vz, wx, wy, wz of the vehicle along its own axes; without: from the poses.
+    /// twist: vx, vy, vz, wx, wy, wz of the vehicle along its own axes; default: from the poses.
     /// time: time of every return after the stamp, s.
     /// sensor: index of every return's sensor.
     #[pyo3(signature = (points, stamp=None, pose=None, *, twist=None, time=None, sensor=None))]
@@ -156,15 +156,15 @@ impl PyPipeline {
         Ok(Step { pipeline: slf.clone().unbind(), number, summary, arrays: [const { None }; 4] })
     }
 
-    /// Adds all that the last step found to the digest and returns that: of a recording stepped
-    /// through it is the digest that `raywake run` prints.
+    /// Adds everything the last step found, except objects, to the digest and returns it: called
+    /// after every sweep of a recording, it gives the digest that `raywake run` prints.
     fn update_digest(&mut self) -> PyResult<String> {
         let digest = &mut self.digest;
         self.team.read(|found| found.add_to(digest)).map_err(refused)?;
         Ok(format!("{:016x}", self.digest.value()))
     }
 
-    /// Threads that share the work.
+    /// Number of threads that share the work.
     #[getter]
     fn threads(&self) -> usize {
         self.team.threads()
@@ -178,9 +178,9 @@ fn refused(e: StepError) -> PyErr {
     }
 }
 
-/// What a step found: the flow of the sweep before, and tracklets at the time of this one.
+/// Results of a step: the flow of the previous sweep, and tracklets at the time of this one.
 ///
-/// Arrays are made when they are first asked for, before the pipeline's next step.
+/// Arrays are made when they are first asked for, which must be before the pipeline's next step.
 #[pyclass(module = "raywake")]
 pub struct Step {
     pipeline: Py<PyPipeline>,
@@ -191,7 +191,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// An array that has been made, or is made now.
+    /// Returns an array, made now unless it was before.
     fn array(
         &mut self,
         py: Python<'_>,
@@ -214,7 +214,7 @@ impl Step {
 
 #[pymethods]
 impl Step {
-    /// Solid columns of the sweep before: an array of COLUMN_DTYPE.
+    /// Solid columns of the previous sweep: an array of COLUMN_DTYPE.
     #[getter]
     fn columns(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.array(py, 0, |found| {
@@ -223,7 +223,7 @@ impl Step {
         })
     }
 
-    /// Returns of the sweep before, in their order: an array of POINT_DTYPE.
+    /// Returns of the previous sweep, in their order: an array of POINT_DTYPE.
     #[getter]
     fn points(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.array(py, 1, |found| {
@@ -242,8 +242,8 @@ impl Step {
         })
     }
 
-    /// Objects in the sweep before: an array of OBJECT_DTYPE; empty unless the pipeline was made
-    /// with objects=True.
+    /// Objects in the previous sweep: an array of OBJECT_DTYPE; empty unless the pipeline was
+    /// created with objects=True.
     #[getter]
     fn objects(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.array(py, 3, |found| {
@@ -252,14 +252,14 @@ impl Step {
         })
     }
 
-    /// Time from the sweep before to this one, s; None where they are no pair.
+    /// Time from the previous sweep to this one, s; None if they are not a pair.
     #[getter]
     fn dt(&self) -> Option<f64> {
         self.summary.pair.map(|pair| pair.dt_s)
     }
 
-    /// Why this sweep does not continue the one before: "first", "backwards", "gap", "jump" or
-    /// "spin"; None where it does.
+    /// Why this sweep does not continue the previous one: "first", "backwards", "gap", "jump" or
+    /// "spin"; None if it does.
     #[getter]
     fn reset(&self) -> Option<&'static str> {
         self.summary.reset.map(|reset| in_words(reset).0)
@@ -271,8 +271,7 @@ impl Step {
         Ok(matrix(py, &self.summary.pose)?.into_any())
     }
 
-    /// How the pose was found: "start", "registered", "degenerate" or "lost"; None where it was
-    /// given.
+    /// How the pose was found: "start", "registered", "degenerate" or "lost"; None if it was given.
     #[getter]
     fn located(&self) -> Option<&'static str> {
         self.summary.locating.map(Locating::name)

@@ -1,4 +1,4 @@
-//! Poses and twists of the caller's.
+//! Poses and twists given by the caller.
 
 use glam::{DQuat, DVec3};
 use numpy::{PyArray2, PyArrayMethods};
@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use raywake_core::pose::{Pose, Twist};
 
-/// Numbers of an array of any shape, row by row.
+/// Returns the numbers of an array of any shape, row by row.
 fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
     let numpy = value.py().import("numpy")?;
     let double = numpy.getattr("float64")?;
@@ -19,7 +19,7 @@ fn numbers(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Vec<f64>> {
     }
 }
 
-/// From a 4x4 or 3x4 matrix, or x, y, z, qx, qy, qz, qw, whose bits are kept.
+/// Reads a pose from a 4x4 or 3x4 matrix, or from x, y, z, qx, qy, qz, qw, whose bits are kept.
 pub fn pose(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Pose> {
     const WHAT: &str = "a 4x4 or 3x4 matrix, or x, y, z, qx, qy, qz, qw, is needed";
     let wrong = |why: &str| PyValueError::new_err(format!("{what}: {why}"));
@@ -41,7 +41,7 @@ pub fn pose(value: &Bound<'_, PyAny>, what: &str) -> PyResult<Pose> {
     }
 }
 
-/// From a linear and an angular velocity.
+/// Reads a twist: a linear and an angular velocity.
 pub fn twist(value: &Bound<'_, PyAny>) -> PyResult<Twist> {
     match numbers(value, "twist")?[..] {
         [x, y, z, a, b, c] => {
@@ -51,14 +51,14 @@ pub fn twist(value: &Bound<'_, PyAny>) -> PyResult<Twist> {
     }
 }
 
-/// Rows of a 4x4 matrix.
+/// Returns the rows of a 4x4 matrix.
 pub fn rows(pose: &Pose) -> [[f64; 4]; 4] {
     let (r, t) = (pose.matrix(), pose.translation);
     let row = |n: usize| [r.row(n).x, r.row(n).y, r.row(n).z, t[n]];
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// As a 4x4 matrix.
+/// Returns a pose as a 4x4 matrix.
 pub fn matrix<'py>(py: Python<'py>, pose: &Pose) -> PyResult<Bound<'py, PyArray2<f64>>> {
     numpy::PyArray1::from_slice(py, rows(pose).as_flattened()).reshape([4, 4])
 }

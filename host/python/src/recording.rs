@@ -13,7 +13,7 @@ use raywake_io::source::{OpenOptions, Source, SweepData, Unlocated, open};
 use crate::poses::matrix;
 use crate::rig::PyRig;
 
-/// As Python has it: what cannot be read is an OSError, the rest a ValueError.
+/// Converts an error: what cannot be read is an OSError, the rest a ValueError.
 pub fn failed(e: Error) -> PyErr {
     match e {
         Error::Usage(_) => PyValueError::new_err(e.to_string()),
@@ -24,9 +24,9 @@ pub fn failed(e: Error) -> PyErr {
 /// Sweeps of a recording, in their order: an MCAP or pcap file, or a folder of KITTI, Argoverse 2,
 /// nuScenes, Waymo or clouds.
 ///
-/// poses: file of poses (12 numbers per line, or TUM's), in place of the recording's own.
-/// topics: point cloud topics of an MCAP file; without: all lidars that can be connected.
-/// ground: height of the ground in the vehicle frame, m; without: as the recording has it.
+/// poses: file of poses (12 numbers per line, or TUM's), instead of the recording's own.
+/// topics: point cloud topics of an MCAP file; default: all lidars that can be connected.
+/// ground: height of the ground in the vehicle frame, m; default: the recording's.
 #[pyclass(frozen, module = "raywake", name = "Recording")]
 pub struct PyRecording {
     source: Mutex<Box<dyn Source>>,
@@ -65,7 +65,7 @@ impl PyRecording {
         self.length
     }
 
-    /// A sweep; counted from the end where the index is negative.
+    /// Returns a sweep; a negative index counts from the end.
     fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<PySweep> {
         let from_end = if index < 0 { self.length as isize } else { 0 };
         let index = usize::try_from(index + from_end).ok().filter(|n| *n < self.length);
@@ -85,7 +85,7 @@ impl PyRecording {
         self.rig.clone()
     }
 
-    /// Whether it comes with poses; where not, Pipeline(find_poses=True) finds them.
+    /// Whether it comes with poses; if not, Pipeline(find_poses=True) finds them.
     #[getter]
     fn located(&self) -> bool {
         self.located
@@ -99,7 +99,7 @@ impl PyRecording {
 /// A sweep of a recording.
 #[pyclass(frozen, module = "raywake", name = "Sweep")]
 pub struct PySweep {
-    /// As it was read.
+    /// The sweep as read.
     pub data: SweepData,
     /// Whether it has a pose.
     pub located: bool,
@@ -117,14 +117,14 @@ impl PySweep {
 
 #[pymethods]
 impl PySweep {
-    /// Places of the returns in the vehicle frame, m: N x 3.
+    /// Positions of the returns in the vehicle frame, m: N x 3.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let flat = self.numbers(py, |p| p.position);
         Ok(flat.reshape([self.data.points.len(), 3])?.into_any())
     }
 
-    /// Intensity of every return, 0 to 1 where the recording has it.
+    /// Intensity of every return, 0 to 1 if the recording has it.
     #[getter]
     fn intensity<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         self.numbers(py, |p| [p.intensity]).into_any()
@@ -154,7 +154,7 @@ impl PySweep {
         self.data.frame
     }
 
-    /// world_from_vehicle, 4x4; None where the recording has no poses.
+    /// world_from_vehicle, 4x4; None if the recording has no poses.
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let pose = || matrix(py, &self.data.world_from_vehicle).map(Bound::into_any);

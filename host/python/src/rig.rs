@@ -10,13 +10,13 @@ use crate::poses::pose;
 
 /// Where the sensors sit, and what the times of their returns mean.
 ///
-/// sensors: poses vehicle_from_sensor, at most 8; without: one at the vehicle's origin.
-/// timing: "stamp" (every return is taken at the sweep's stamp), "offset" (returns come with their
+/// sensors: poses vehicle_from_sensor, at most 8; default: one at the vehicle's origin.
+/// timing: "stamp" (every return is measured at the sweep's stamp), "offset" (returns carry their
 ///     time after the stamp; a sweep spans `span` seconds from `start` on) or "azimuth" (a sensor
-///     that spins clockwise from the rear, stamped when it looks forward).
+///     that spins clockwise from the rear, stamped when it faces forward).
 /// distorted: returns are still distorted by the vehicle's motion; each is moved to the stamp.
 /// ground: height of the ground under the vehicle in the vehicle frame, m.
-/// own_vehicle: (x0, y0, x1, y1), m: returns in there are of the vehicle itself.
+/// own_vehicle: (x0, y0, x1, y1), m: returns in this box belong to the vehicle itself.
 #[pyclass(frozen, module = "raywake", name = "Rig")]
 #[derive(Clone)]
 pub struct PyRig(pub sweep::Rig);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The wheel, built and put into a fresh environment, against the program and against what it cannot
-# take. `run.sh PROGRAM` compares with the program `raywake`; exit code 77: no tools to be had.
+# Tests the wheel, built and installed into a fresh environment, against the program and with
+# invalid input. `run.sh PROGRAM` compares with the program `raywake`; exit code 77: tools
+# unavailable.
 set -euo pipefail
 program=$(realpath "$1")
 cd "$(dirname "$0")/../../.."
@@ -12,7 +13,7 @@ python3 -m venv "$out/tools" &&
     "$out/tools/bin/pip" install --quiet --disable-pip-version-check maturin==1.16.0 || exit 77
 
 rm -rf "$out/wheels" "$out/fresh"
-# As the program is built: to optimise across crates takes minutes, and changes no result.
+# Built like the program: optimising across crates takes minutes and changes no result.
 PATH=$out/tools/bin:$PATH host/python/wheel.sh "$(uname -m)" "$out/wheels" release
 
 python3 -m venv "$out/fresh"
@@ -26,14 +27,14 @@ cloud = numpy.concatenate([part.reshape(-1, 3) for part in (wall, ground, side)]
 print(raywake.flow(cloud, cloud))'
 echo "from pip install to the flow of two arrays: $((SECONDS - start)) s"
 
-# The example for Rerun, where that is installed: beside recordings of the program.
+# The example for Rerun, if Rerun is installed: alongside recordings of the program.
 viewers=$PWD/target/viewers/bin
 if [ -x "$viewers/rerun" ]; then
     "$viewers/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall \
         "$out"/wheels/raywake-*.whl
     recording=target/viewers/recordings/two.mcap
     "$viewers/python" host/python/examples/rerun_flow.py "$recording" --save "$out/flow.rrd"
-    # Not by a pipe: it takes one that is closed early for a defect.
+    # Not through a pipe: Rerun treats one that is closed early as a defect.
     "$viewers/rerun" rrd stats "$out/flow.rrd" >"$out/flow.txt" 2>&1
     grep -q motion "$out/flow.txt"
     echo "the example for Rerun: $recording"
@@ -41,7 +42,7 @@ fi
 
 dump() { cargo run --quiet --release -p raywake-capi --example dump_sweeps -- "$@"; }
 dump demo "$out/demo.sweeps" 20
-# Those of another build would be results of other settings.
+# Results of another build would count as results of other settings.
 rm -rf "$out/demo"
 RAYWAKE_SWEEPS=$out/demo.sweeps \
     RAYWAKE_DIGEST=$("$program" demo --backend scalar --out "$out/demo" | sed -n 's/^digest *//p') \

@@ -1,6 +1,6 @@
-"""The wheel against the program, and against what it cannot take.
+"""Tests the wheel against the program, and with invalid input.
 
-Run with RAYWAKE_SWEEPS=FILE, of dump_sweeps, and RAYWAKE_DIGEST=what the program prints for it.
+Run with RAYWAKE_SWEEPS=FILE, from dump_sweeps, and RAYWAKE_DIGEST=what the program prints for it.
 """
 
 import ast
@@ -21,7 +21,7 @@ import raywake
 
 
 class Flat:
-    """A file of dump_sweeps."""
+    """A file written by dump_sweeps."""
 
     RETURN = np.dtype([("xyz", "<f4", 3), ("time", "<f4"), ("sensor", "<u4")])
 
@@ -220,7 +220,7 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "one number", self.points, 0.0, eye, time=np.zeros(4))
         self.refuses(ValueError, "one number", self.points, 0.0, eye, sensor=np.zeros((5, 1)))
         self.refuses(TypeError, "real", self.points, 0.0, eye, time=["x"] * 5)
-        # None of them was taken.
+        # None of them was accepted.
         self.assertEqual(self.pipeline.step(self.points, 0.0, eye).reset, "first")
 
     def test_what_is_counted(self):
@@ -282,7 +282,7 @@ class Refused(unittest.TestCase):
         self.refuses(ValueError, "registered|ground", *noise, call=raywake.flow)
         self.refuses(ValueError, "dt", *noise, dt=0, call=raywake.flow)
         self.refuses(OSError, "No such file", "/nonexistent", call=raywake.Recording)
-        # The decoder panics over it.
+        # The decoder panics on it.
         corpus = Path(__file__).parents[2] / "io/fuzz/corpus/recording"
         bundle = (corpus / "mcap/record-longer-than-chunk").read_bytes()
         with tempfile.TemporaryDirectory() as folder:
@@ -320,7 +320,7 @@ class Package(unittest.TestCase):
 
 
 class Node(unittest.TestCase):
-    """What the example for ROS 2 does with messages."""
+    """How the example for ROS 2 handles messages."""
 
     def setUp(self):
         path = Path(__file__).parents[1] / "examples/ros2_node.py"
@@ -381,7 +381,7 @@ class Node(unittest.TestCase):
         self.assertGreater(sum(box["moves"] for box in boxes), 0)
         places = self.node.positions_of(points)
         for box in boxes:
-            # In the frame of the cloud: what it is of lies there.
+            # In the frame of the cloud: the object's own returns lie there.
             near = np.linalg.norm(places[:, :2] - box["place"][:2], axis=1) < 3
             self.assertTrue(near.any(), box)
 

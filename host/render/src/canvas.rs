@@ -1,4 +1,4 @@
-//! Shapes and text on a picture.
+//! Shapes and text drawn on a picture.
 
 use crate::colours::Colour;
 use crate::text;
@@ -7,21 +7,21 @@ use tiny_skia::{
     Transform,
 };
 
-/// Why there is no picture.
+/// Why a picture cannot be drawn.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PictureError {
-    /// This many pixels are none, or too many.
+    /// No pixels, or too many.
     #[error("a picture cannot have {} x {} pixels", .0[0], .0[1])]
     Size([f32; 2]),
-    /// So far a picture cannot reach, m.
+    /// An extent that a picture cannot have, m.
     #[error("a picture cannot reach {0} m")]
     Extent(f32),
 }
 
-/// The largest width and height of a picture, pixels.
+/// Maximum width and height of a picture, pixels.
 const PIXELS_MAX: f32 = 16_384.0;
 
-/// What is further from a picture's corner than this (units) is not drawn: the rasteriser works in
+/// Shapes further than this from a picture's corner, units, are not drawn: the rasteriser works in
 /// fixed point.
 const FAR: f32 = 30_000.0;
 
@@ -32,7 +32,7 @@ pub struct Pen {
     pub colour: Colour,
     /// Its width, units.
     pub width: f32,
-    /// Lengths of a dash and of the gap after it, units; both 0: none.
+    /// Lengths of a dash and of the gap after it, units; both 0 for a solid line.
     pub dashes: [f32; 2],
 }
 
@@ -43,7 +43,7 @@ impl Pen {
     }
 }
 
-/// Which end of a text its place means.
+/// Which point of a text its position refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
     /// The left end.
@@ -54,17 +54,18 @@ pub enum Align {
     End,
 }
 
-/// A picture under way. Places and sizes are in units, x to the right, y down from the upper left
-/// corner; what is not finite, or far outside, is not drawn.
+/// A picture being drawn. Positions and sizes are in units, x to the right, y down from the upper
+/// left corner; anything not finite, or far outside, is not drawn.
 pub struct Canvas {
     pixmap: Pixmap,
     scale: f32,
 }
 
 impl Canvas {
-    /// A picture of this width and height (units) in one colour, `scale` pixels to a unit.
+    /// Creates a picture of this width and height (units) in one colour, with `scale` pixels per
+    /// unit.
     ///
-    /// Fails where it would have no pixels, or more than 16,384 in a row or column.
+    /// Fails if it would have no pixels, or more than 16,384 in a row or column.
     pub fn new(size: [f32; 2], scale: f32, background: Colour) -> Result<Canvas, PictureError> {
         let pixels = size.map(|v| (v * scale).ceil());
         let error = PictureError::Size(pixels);
@@ -87,7 +88,7 @@ impl Canvas {
         self.pixmap.data()
     }
 
-    /// The picture as a PNG file; it has no transparent pixels.
+    /// Returns the picture as a PNG file; it has no transparent pixels.
     pub fn png(&self) -> Vec<u8> {
         let rgb = self.rgb();
         let mut file = Vec::new();
@@ -105,21 +106,21 @@ impl Canvas {
         self.rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
     }
 
-    /// A filled polygon.
+    /// Draws a filled polygon.
     pub fn polygon(&mut self, corners: &[[f32; 2]], colour: Colour, opacity: f32) {
         if let Some(path) = path(corners, true) {
             self.fill(&path, colour, opacity);
         }
     }
 
-    /// A line through places, closed or open.
+    /// Draws a line through some positions, closed or open.
     pub fn line(&mut self, places: &[[f32; 2]], closed: bool, pen: Pen) {
         if let Some(path) = path(places, closed) {
             self.stroke(&path, pen);
         }
     }
 
-    /// A circle's line.
+    /// Draws a circle.
     pub fn circle(&mut self, [x, y]: [f32; 2], radius: f32, pen: Pen) {
         if near([x, y])
             && radius < FAR
@@ -129,7 +130,7 @@ impl Canvas {
         }
     }
 
-    /// A disc.
+    /// Draws a disc.
     pub fn disc(&mut self, [x, y]: [f32; 2], radius: f32, colour: Colour, opacity: f32) {
         if near([x, y])
             && radius < FAR
@@ -139,7 +140,7 @@ impl Canvas {
         }
     }
 
-    /// A square of whole pixels, at least one, around a place: quick where there are many.
+    /// Draws a square of whole pixels, at least one, around a position: fast for large numbers.
     pub fn square(&mut self, at: [f32; 2], side: f32, colour: Colour, opacity: f32) {
         let [x, y] = at.map(|v| ((v - 0.5 * side) * self.scale).round());
         let side = (side * self.scale).round().max(1.0);
@@ -151,12 +152,12 @@ impl Canvas {
         }
     }
 
-    /// A rectangle from its upper left corner.
+    /// Draws a rectangle from its upper left corner.
     pub fn rect(&mut self, [x, y]: [f32; 2], [w, h]: [f32; 2], colour: Colour, opacity: f32) {
         self.polygon(&[[x, y], [x + w, y], [x + w, y + h], [x, y + h]], colour, opacity);
     }
 
-    /// What lies between two polygons, one inside the other.
+    /// Fills the area between two polygons, one inside the other.
     pub fn frame(&mut self, outer: &[[f32; 2]], inner: &[[f32; 2]], colour: Colour, opacity: f32) {
         let mut both = PathBuilder::new();
         for polygon in [outer, inner] {
@@ -169,7 +170,7 @@ impl Canvas {
         }
     }
 
-    /// A line of text on the baseline through `at`, `size` units high.
+    /// Draws a line of text on the baseline through `at`, `size` units high.
     pub fn text(&mut self, at: [f32; 2], text: &str, size: f32, align: Align, colour: Colour) {
         let width = text::width(text, size);
         let left = match align {
@@ -184,7 +185,7 @@ impl Canvas {
         }
     }
 
-    /// Another picture of the same scale upon this one, its upper left corner at `at`.
+    /// Draws another picture of the same scale onto this one, its upper left corner at `at`.
     pub fn place(&mut self, other: &Canvas, at: [f32; 2]) {
         let [x, y] = at.map(|v| (v * self.scale).round() as i32);
         let (paint, identity) = (PixmapPaint::default(), Transform::identity());
@@ -209,7 +210,7 @@ impl Canvas {
     }
 }
 
-/// Whether a place (units) can be drawn.
+/// Whether a position (units) can be drawn.
 fn near(at: [f32; 2]) -> bool {
     at.iter().all(|v| v.abs() < FAR)
 }

@@ -1,12 +1,12 @@
-//! Colours that colour-blind readers can tell apart: hues after Okabe and Ito ("Color universal
-//! design", 2008), ramps that change in lightness from end to end.
+//! Colours that colour-blind readers can distinguish: hues after Okabe and Ito ("Color universal
+//! design", 2008), and ramps whose lightness changes from end to end.
 
 /// Red, green and blue, 0 to 255, in sRGB.
 pub type Colour = [u8; 3];
 
 /// The page.
 pub const PAPER: Colour = [255, 255, 255];
-/// Ground of a panel.
+/// Background of a panel.
 pub const GROUND: Colour = [248, 249, 251];
 /// Text.
 pub const INK: Colour = [31, 36, 48];
@@ -16,9 +16,9 @@ pub const MUTED: Colour = [102, 112, 133];
 pub const RING: Colour = [208, 214, 223];
 /// Border of the window in which motion is estimated, and the shade outside it.
 pub const BORDER: Colour = [126, 136, 152];
-/// What is static.
+/// Static objects.
 pub const STATIC: Colour = [212, 221, 233];
-/// Observed and empty.
+/// Observed free space.
 pub const FREE: Colour = [226, 236, 240];
 /// The own vehicle.
 pub const VEHICLE: Colour = [58, 64, 76];
@@ -27,16 +27,16 @@ pub const VEHICLE: Colour = [58, 64, 76];
 pub const HEIGHTS: &[Colour] = &[[208, 216, 226], [156, 172, 192], [98, 116, 142]];
 /// Speeds, from slow to fast.
 pub const SPEEDS: &[Colour] = &[[240, 158, 30], [222, 84, 32], [176, 22, 74], [82, 12, 98]];
-/// Heights where they are the subject, as in a map: from low to high.
+/// Heights where they are the subject, as in a map, from low to high.
 pub const ELEVATIONS: &[Colour] =
     &[[154, 176, 196], [62, 148, 168], [38, 96, 142], [64, 26, 98], [30, 4, 36]];
 
-/// Within 0 to 1; NaN counts as 0.
+/// Clamps to 0 to 1; NaN counts as 0.
 pub fn clamped(t: f32) -> f32 {
     if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
 }
 
-/// The colour at `t` (0 to 1, clamped; NaN counts as 0) of a ramp with evenly spaced stops.
+/// Returns the colour at `t` (0 to 1, clamped; NaN counts as 0) of a ramp with evenly spaced stops.
 pub fn ramp(stops: &[Colour], t: f32) -> Colour {
     let Some(last) = stops.len().checked_sub(1) else { return INK };
     let place = clamped(t) * last as f32;

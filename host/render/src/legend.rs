@@ -1,4 +1,4 @@
-//! What colours and arrows mean, in rows below the panels.
+//! The legend: what colours and arrows mean, in rows below the panels.
 
 use crate::canvas::{Align, Canvas, Pen};
 use crate::colours::{Colour, INK, MUTED, ramp};
@@ -9,15 +9,15 @@ use crate::text;
 /// Height of a row and of its text, units.
 const ROW: f32 = 26.0;
 const SIZE: f32 = 13.0;
-/// Between entries, and between a sign and its text, units.
+/// Space between entries, and between a sign and its text, units.
 const GAP: f32 = 22.0;
 const SPACE: f32 = 7.0;
-/// Width of a ramp, and of a sign that has none of its own, units.
+/// Widths of a ramp, of a sign without its own width, and of a cell, units.
 const RAMP: f32 = 96.0;
 const SIGN: f32 = 20.0;
 const CELL: f32 = 10.0;
 
-/// Entries row by row, as many in each as its width allows.
+/// Arranges the entries in rows, as many in each as fit.
 pub(crate) fn rows(look: &Look, wide: f32) -> Vec<Vec<&LegendEntry>> {
     let mut rows: Vec<Vec<&LegendEntry>> = Vec::new();
     let mut x = wide;
@@ -35,7 +35,7 @@ pub(crate) fn rows(look: &Look, wide: f32) -> Vec<Vec<&LegendEntry>> {
     rows
 }
 
-/// Of all rows, units.
+/// Height of all rows, units.
 pub(crate) fn height(rows: &[Vec<&LegendEntry>]) -> f32 {
     if rows.is_empty() { 0.0 } else { 12.0 + ROW * rows.len() as f32 }
 }
@@ -70,7 +70,7 @@ fn sign_width(sign: &Sign, look: &Look) -> f32 {
     }
 }
 
-/// So many metres on a panel, units, within what a legend has room for.
+/// Length of some metres on a panel, units, limited to what fits a legend.
 fn pixels(look: &Look, metres: f32) -> f32 {
     (metres * look.per_m()).min(0.5 * look.side)
 }

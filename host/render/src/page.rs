@@ -6,21 +6,21 @@ use crate::panel::PanelView;
 use crate::scene::{Look, Panel};
 use crate::{legend, text};
 
-/// Around the page, units.
+/// Margin around the page, units.
 const MARGIN: f32 = 14.0;
-/// Between panels, units.
+/// Space between panels, units.
 const GAP: f32 = 28.0;
 /// Height of a panel's title, units.
 const TITLE: f32 = 30.0;
-/// Height of a title's and of a note's font, units.
+/// Font sizes of a title and of a note, units.
 const TITLE_SIZE: f32 = 16.0;
 const NOTE_SIZE: f32 = 13.0;
 
 /// Draws panels side by side above one legend.
 ///
 /// # Errors
-/// Where `half_extent_m` or `cell_m` is not positive and finite, or the picture has no pixels or
-/// more than 16,384 in a row or column.
+/// If `half_extent_m` or `cell_m` is not positive and finite, or the picture has no pixels or more
+/// than 16,384 in a row or column.
 pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Canvas, PictureError> {
     for metres in [look.half_extent_m, look.cell_m] {
         if !(metres > 0.0 && metres.is_finite()) {
@@ -42,7 +42,7 @@ pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Canvas, PictureError> 
     Ok(canvas)
 }
 
-/// Title and note on one baseline; the title ends before the note.
+/// Draws title and note on one baseline; the title is cut to end before the note.
 fn draw_title(canvas: &mut Canvas, panel: &Panel, [left, y]: [f32; 2], wide: f32) {
     let room = wide - text::width(&panel.note, NOTE_SIZE) - GAP;
     let fits = |title: &String| text::width(title, TITLE_SIZE) <= room;

@@ -12,7 +12,7 @@ const POINT: f32 = 1.6;
 const SIZE: f32 = 12.0;
 /// Distances between rings, m.
 const RINGS_M: [f32; 12] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0];
-/// More rings would hide what they are to measure.
+/// More rings would hide what they measure.
 const RINGS_MAX: usize = 10;
 const HALF_SQRT_2: f32 = core::f32::consts::FRAC_1_SQRT_2;
 
@@ -22,13 +22,13 @@ impl Look {
         0.5 * self.side / self.half_extent_m
     }
 
-    /// Width of a cell, never too small for its colour to be seen, units.
+    /// Width of a cell, units, never too small for its colour to be visible.
     pub(crate) fn cell_side(&self) -> f32 {
         (self.cell_m * self.per_m()).max(2.6) - 0.6
     }
 }
 
-/// Where metres lie on a panel.
+/// The mapping from metres to a panel.
 pub(crate) struct PanelView<'a> {
     look: &'a Look,
 }
@@ -38,7 +38,7 @@ impl PanelView<'_> {
         PanelView { look }
     }
 
-    /// Everything, from the ground up.
+    /// Draws everything, from bottom to top.
     pub fn draw(&self, panel: &Panel) -> Result<Canvas, PictureError> {
         let side = self.look.side;
         let mut canvas = Canvas::new([side; 2], self.look.scale, GROUND)?;
@@ -73,13 +73,13 @@ impl PanelView<'_> {
         Ok(canvas)
     }
 
-    /// Units from the panel's upper left corner.
+    /// Converts a position to units from the panel's upper left corner.
     fn at(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let (middle, per_m) = (0.5 * self.look.side, self.look.per_m());
         [middle - y * per_m, middle - x * per_m]
     }
 
-    /// The same, of what can be seen.
+    /// As [`PanelView::at`]; `None` if outside the panel.
     fn seen(&self, at: [f32; 2]) -> Option<[f32; 2]> {
         let at = self.at(at);
         at.iter().all(|v| (0.0..self.look.side).contains(v)).then_some(at)
@@ -89,9 +89,9 @@ impl PanelView<'_> {
         let seen = |p: &[f32; 3]| Some((p[2], self.seen([p[0], p[1]])?));
         let mut seen: Vec<(f32, [f32; 2])> =
             points.iter().filter(|p| p[2].is_finite()).filter_map(seen).collect();
-        // From the ground up, so that what stands there stays visible.
+        // From the ground up, so that objects on it stay visible.
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // A tenth of the returns lie lower than the ground: reflections.
+        // A tenth of the returns may lie below the ground: reflections.
         let Some(&(ground, _)) = seen.get(seen.len() / 10) else { return };
         for (z, at) in seen {
             let height = clamped((z - ground) / self.look.height_m);
@@ -107,7 +107,7 @@ impl PanelView<'_> {
         canvas.line(corners, true, WINDOW);
     }
 
-    /// Between rings: three or four of them reach the border.
+    /// Distance between rings, chosen so that three or four of them reach the border.
     fn ring_m(&self) -> f32 {
         let reach = 0.8 * self.look.half_extent_m;
         *RINGS_M.iter().find(|m| 4.0 * **m >= reach).unwrap_or(&1000.0)
@@ -127,9 +127,9 @@ impl PanelView<'_> {
 
     fn draw_ring_labels(&self, canvas: &mut Canvas) {
         for radius in self.rings() {
-            // Along a diagonal: roads leave to the front, back and sides.
+            // On a diagonal, as roads run to the front, back and sides.
             let [x, y] = self.at([-radius * HALF_SQRT_2, radius * HALF_SQRT_2]);
-            // Whole or not at all.
+            // Entirely or not at all.
             if x < 24.0 || y > self.look.side - 12.0 {
                 continue;
             }
@@ -137,7 +137,7 @@ impl PanelView<'_> {
         }
     }
 
-    /// Text on paper, its middle at `at`.
+    /// Text on a white tag, centred at `[x, y]`.
     fn draw_tag(&self, canvas: &mut Canvas, [x, y]: [f32; 2], text: &str, colour: Colour) {
         let wide = text::width(text, SIZE) + 5.0;
         canvas.rect([x - 0.5 * wide, y - 8.0], [wide, 16.0], PAPER, 0.8);
@@ -178,7 +178,7 @@ impl PanelView<'_> {
         self.draw_tag(canvas, [x, y + below.min(40.0)], &outline.label, outline.colour);
     }
 
-    /// A car around the origin with its windscreen to the front.
+    /// Draws a car around the origin with its windscreen to the front.
     fn draw_vehicle(&self, canvas: &mut Canvas) {
         let body = [[2.0, 0.9], [2.5, 0.6], [2.5, -0.6], [2.0, -0.9], [-2.0, -0.9], [-2.0, 0.9]];
         let screen = [[0.5, 0.65], [0.5, -0.65], [1.1, -0.75], [1.1, 0.75]];
@@ -207,13 +207,14 @@ impl PanelView<'_> {
 /// Border of the window in which motion is estimated.
 pub const WINDOW: Pen = Pen { colour: BORDER, width: 1.4, dashes: [6.0, 4.0] };
 
-/// A box.
+/// Draws a box.
 pub(crate) fn draw_box(canvas: &mut Canvas, corners: &[[f32; 2]; 4], colour: Colour) {
     canvas.polygon(corners, colour, 0.1);
     canvas.line(corners, true, Pen::new(colour, 1.6));
 }
 
-/// An arrow from `a` to `b`, units; short ones are all head, shorter than 1.5 units nothing.
+/// Draws an arrow from `a` to `b`, units; short ones are all head, ones below 1.5 units are not
+/// drawn.
 pub(crate) fn draw_arrow(
     canvas: &mut Canvas,
     a: [f32; 2],
@@ -222,7 +223,7 @@ pub(crate) fn draw_arrow(
     colour: Colour,
 ) {
     let way = [b[0] - a[0], b[1] - a[1]];
-    // Not `hypot`: that is another function on every platform.
+    // Not `hypot`, which differs between platforms.
     let long = (way[0] * way[0] + way[1] * way[1]).sqrt();
     if long.is_nan() || long < 1.5 {
         return;
@@ -237,10 +238,10 @@ pub(crate) fn draw_arrow(
     canvas.polygon(&[b, left, right], colour, 1.0);
 }
 
-/// The first cell with an arrow of every block of 2 x 2.
+/// Selects the first cell with an arrow in every block of 2 x 2.
 fn one_of_four(cells: &[Cell], cell_m: f32) -> Vec<&Cell> {
     let mut taken = BTreeSet::new();
-    // A cast saturates; what is not finite is not drawn anyway.
+    // The cast saturates; non-finite values are not drawn anyway.
     let block = |c: &Cell| c.at.map(|v| (v / (2.0 * cell_m)).floor() as i64);
     let arrows = cells.iter().filter(|c| c.arrows.iter().any(Option::is_some));
     arrows.filter(|c| taken.insert(block(c))).collect()

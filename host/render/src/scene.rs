@@ -1,17 +1,17 @@
-//! What a bird's-eye picture shows, as plain data.
+//! The contents of a bird's-eye picture, as plain data.
 
 use crate::canvas::Pen;
 use crate::colours::Colour;
 
-/// One view from above. Places are in metres, x up and y to the left on the picture; the origin is
-/// in the middle. What is not finite, or lies outside, is left out.
+/// One view from above. Positions are in metres, x up and y to the left on the picture, with the
+/// origin in the middle. Anything not finite, or outside, is not drawn.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Above the panel, left.
+    /// Text above the panel, left.
     pub title: String,
-    /// Above the panel, right: frame and time, for example.
+    /// Text above the panel, right: frame and time, for example.
     pub note: String,
-    /// Points, m: coloured by height, pale.
+    /// Points, m, in pale colours by height.
     pub points: Vec<[f32; 3]>,
     /// Squares below everything else, [`Look::cell_m`] wide.
     pub tiles: Vec<Cell>,
@@ -19,24 +19,23 @@ pub struct Panel {
     pub cells: Vec<Cell>,
     /// Boxes of objects.
     pub outlines: Vec<Outline>,
-    /// Ways of objects.
+    /// Paths of objects.
     pub trails: Vec<Trail>,
-    /// Corners of the window in which motion is estimated; what lies outside is shaded. None: no
-    /// window.
+    /// Corners of the window in which motion is estimated, if any; the area outside is shaded.
     pub window: Option<[[f32; 2]; 4]>,
-    /// Whether the own vehicle stands at the origin, its front up.
+    /// Whether to draw the own vehicle at the origin, its front up.
     pub vehicle: bool,
 }
 
-/// A square of one colour, perhaps with motion.
+/// A square of one colour, optionally with motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Its centre, m.
     pub at: [f32; 2],
     /// Its colour.
     pub colour: Colour,
-    /// Arrows from its centre, the second upon the first. Of every block of 2 x 2 cells, only the
-    /// first cell given has its arrows drawn: all of them would hide the cells.
+    /// Arrows from its centre, the second on top of the first. In every block of 2 x 2 cells, only
+    /// the first one with arrows has them drawn: all of them would hide the cells.
     pub arrows: [Option<Arrow>; 2],
 }
 
@@ -56,22 +55,22 @@ pub struct Arrow {
 pub struct Outline {
     /// Its centre, m.
     pub at: [f32; 2],
-    /// Direction of its front, of length 1.
+    /// Unit vector towards its front.
     pub forward: [f32; 2],
     /// Length and width, m.
     pub size: [f32; 2],
     /// Its colour.
     pub colour: Colour,
-    /// Beside it.
+    /// Text below it.
     pub label: String,
-    /// From its centre.
+    /// Arrow from its centre.
     pub arrow: Option<Arrow>,
 }
 
-/// The way of an object.
+/// The path of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trail {
-    /// Places in the order of time, m.
+    /// Positions in time order, m.
     pub places: Vec<[f32; 2]>,
     /// Its colour.
     pub colour: Colour,
@@ -82,11 +81,11 @@ pub struct Trail {
 /// What all panels of a picture share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// How far a panel reaches to every side, m.
+    /// How far a panel extends in each direction, m.
     pub half_extent_m: f32,
     /// Width of a cell, m.
     pub cell_m: f32,
-    /// Height above the ground from which on points have the darkest colour, m.
+    /// Height above the ground at which points reach the darkest colour, m.
     pub height_m: f32,
     /// Colours of points, from the ground up.
     pub heights: &'static [Colour],
@@ -110,7 +109,7 @@ pub struct LegendEntry {
 /// A sign of the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sign {
-    /// Colours of a range, with its ends in words.
+    /// A colour ramp, with labels for its ends.
     Ramp(&'static [Colour], [String; 2]),
     /// An arrow, `way` m long at the picture's scale.
     Arrow(Arrow),

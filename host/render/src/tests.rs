@@ -8,7 +8,7 @@ use crate::{
 
 const RED: Colour = [200, 0, 0];
 const BLUE: Colour = [0, 0, 200];
-/// Around the page and above a panel, pixels at a scale of 1.
+/// Margins left of and above a panel, pixels at a scale of 1.
 const LEFT: u32 = 14;
 const TOP: u32 = 44;
 
@@ -41,7 +41,7 @@ fn pixel(canvas: &Canvas, x: u32, y: u32) -> Colour {
     [rgba[0], rgba[1], rgba[2]]
 }
 
-/// Places of the pixels of a colour, edges included, m in the scene.
+/// Positions of the pixels of a colour, including edges, m in the scene.
 fn places(canvas: &Canvas, colour: Colour) -> Vec<[f32; 2]> {
     let [width, height] = canvas.size();
     let all = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -128,7 +128,7 @@ fn boxes_trails_and_the_vehicle_are_there() {
         Panel { outlines: vec![outline], trails: vec![trail], vehicle: true, ..Panel::default() };
     let picture = draw(panel);
     let red = places(&picture, RED);
-    // Its front points left: it is 4 m wide on the picture, and 2 m high but for the number.
+    // Its front points left: on the picture it is 4 m wide, and 2 m high except for the number.
     let [right, left] = bounds(&red, 1);
     assert!((left - 2.0).abs() < 0.2 && (right + 2.0).abs() < 0.2, "{left} {right}");
     assert_eq!(bounds(&places(&picture, BLUE), 1), [-4.95, 4.95]);

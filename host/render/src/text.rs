@@ -5,12 +5,13 @@ use std::sync::OnceLock;
 use tiny_skia::{Path, PathBuilder};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
-/// Width of a line of text, in the unit of `size`, the height of the font.
+/// Returns the width of a line of text, in the unit of `size`, the height of the font.
 pub fn width(text: &str, size: f32) -> f32 {
     glyphs(text).map(advance).sum::<f32>() * unit(size)
 }
 
-/// Outlines of a line of text that starts at `at` on the baseline; nothing where it has no marks.
+/// Returns the outlines of a line of text that starts at `[x, y]` on the baseline; `None` if it has
+/// none.
 pub(crate) fn outlines(text: &str, [x, y]: [f32; 2], size: f32) -> Option<Path> {
     let mut pen = GlyphPath { path: PathBuilder::new(), x, y, unit: unit(size) };
     for glyph in glyphs(text) {
@@ -29,7 +30,7 @@ fn unit(size: f32) -> f32 {
     size / f32::from(face().units_per_em())
 }
 
-/// Characters that the font lacks are its empty box.
+/// Characters missing from the font become its empty box.
 fn glyphs(text: &str) -> impl Iterator<Item = GlyphId> {
     text.chars().map(|c| face().glyph_index(c).unwrap_or_default())
 }
@@ -38,7 +39,7 @@ fn advance(glyph: GlyphId) -> f32 {
     f32::from(face().glyph_hor_advance(glyph).unwrap_or_default())
 }
 
-/// Places glyphs, given in font units with y up, on a picture with y down.
+/// Transforms glyphs, given in font units with y up, to a picture with y down.
 struct GlyphPath {
     path: PathBuilder,
     x: f32,

@@ -34,7 +34,7 @@ pub struct CleanArgs {
     /// Output folder: `labels`, `static`, `moving` and `map.ply`
     #[arg(short, long, value_name = "DIR", help_heading = "Results")]
     pub out: PathBuf,
-    /// Edge of the voxels of the map, m
+    /// Voxel size of the map, m
     #[arg(long, value_name = "M", default_value_t = 0.2, value_parser = edge)]
     #[arg(help_heading = "Results")]
     pub voxel: f64,
@@ -51,7 +51,7 @@ fn edge(text: &str) -> Result<f64, String> {
     if (0.02..=5.0).contains(&edge) { Ok(edge) } else { Err("must be from 0.02 to 5".into()) }
 }
 
-/// The end of `--help`.
+/// Text at the end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
     format!("{FILES}\n\n{exit_codes}")
 }

@@ -35,7 +35,7 @@ Only points that move have a motion. Of a cloud of more points than";
 #[derive(Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct FlowArgs {
-    /// First cloud; its points get the flow
+    /// First cloud; the flow is that of its points
     #[arg(value_name = "A")]
     pub first: PathBuf,
     /// Second cloud
@@ -47,14 +47,14 @@ pub struct FlowArgs {
     /// Output file: .feather or .bin
     #[arg(short, long, value_name = "FILE", help_heading = "Results")]
     pub out: PathBuf,
-    /// Also draw the flow from above; without a name, beside --out
+    /// Also draw the flow from above; without FILE, next to --out
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     #[arg(help_heading = "Results")]
     pub png: Option<Option<PathBuf>>,
     /// Also write an MCAP file for Foxglove, Rerun or rviz: A with velocities
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     pub mcap: Option<PathBuf>,
-    /// Numbers of a point in .bin and .npy files [default: x,y,z,intensity]
+    /// Fields of a point in .bin and .npy files [default: x,y,z,intensity]
     #[arg(long, value_name = "NAMES", value_parser = BinFields::parse)]
     pub bin_fields: Option<BinFields>,
     /// Time from A to B, s
@@ -67,19 +67,20 @@ pub struct FlowArgs {
     /// the origin is at ground level]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = place)]
     pub sensor: Option<[f64; 3]>,
-    /// Known motion instead of registration: a 3x4 matrix, the pose of B's frame in A's
+    /// Known sensor motion, used instead of registration: a 3x4 matrix, the pose of B's frame in
+    /// A's
     #[arg(long, value_name = "FILE")]
     pub pose: Option<PathBuf>,
     #[command(flatten)]
     pub flow: FlowChoice,
 }
 
-/// The end of `--help`.
+/// Text at the end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
     format!("{FILES} {POINTS_MAX} as many are taken, evenly spread.\n\n{exit_codes}")
 }
 
-/// Three finite numbers with commas between them.
+/// Parses three finite numbers separated by commas.
 fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|word| word.trim().parse()).collect();
     let place = numbers.ok().and_then(|n| <[f64; 3]>::try_from(n).ok());

@@ -1,4 +1,4 @@
-//! Outputs that would take the place of inputs.
+//! Protection of inputs from being overwritten by outputs.
 
 use std::any::TypeId;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use raywake_io::Error;
 use super::Args;
 use crate::settings_file;
 
-/// Arguments of files and folders that are written; all others of their type are read.
+/// Arguments for files and folders that are written; all other path arguments are read.
 const OUTPUTS: [&str; 6] = ["out", "summary", "film", "page", "mcap", "png"];
 
-/// Fails where an output of a command is one of its inputs, or would replace a file of a recording.
+/// Fails if an output of a command is one of its inputs, or would replace a file of a recording.
 pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let program = Args::command();
@@ -27,7 +27,7 @@ pub fn protect(matches: &ArgMatches) -> Result<(), Error> {
     Ok(())
 }
 
-/// Fails where the output of an option is an input, or would replace a file of it.
+/// Fails if the output of an option is the input, or would replace a file of it.
 pub fn spare(option: &str, output: &Path, input: &Path) -> Result<(), Error> {
     let input = input.canonicalize().ok();
     let harm = input.and_then(|input| harm(&resolved(output), &input));
@@ -43,7 +43,7 @@ fn paths(command: &Command) -> impl Iterator<Item = &str> {
     command.get_arguments().filter(is_path).map(|arg| arg.get_id().as_str())
 }
 
-/// An output as it would lie, links resolved.
+/// The path an output would have, with links resolved.
 fn resolved(output: &Path) -> PathBuf {
     let beside = || {
         let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -52,8 +52,8 @@ fn resolved(output: &Path) -> PathBuf {
     output.canonicalize().ok().or_else(beside).unwrap_or_else(|| output.to_path_buf())
 }
 
-/// What an output does to an input, if it does harm. In a recording there may be results: in a
-/// folder that is new, empty or has results already.
+/// What an output does to an input, if it does harm. Results may be written inside a recording, to
+/// a folder that is new, empty or already holds results.
 fn harm(output: &Path, input: &Path) -> Option<&'static str> {
     if output == input {
         return Some("is an input, which would be lost");

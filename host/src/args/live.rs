@@ -27,30 +27,30 @@ SIGINT or SIGTERM end it. Under systemd it says when it is ready, and that it is
 #[derive(Clone, Debug, clap::Args)]
 #[command(about = ABOUT.lines().next(), long_about = ABOUT)]
 pub struct LiveArgs {
-    /// Address and port that packets arrive at, or a port of this machine's loopback [default:
+    /// Address and port to receive packets on, or just a port, on the loopback address [default:
     /// 127.0.0.1:2368, or a free port for a replay]
     #[arg(long, value_name = "ADDRESS:PORT", value_parser = listen)]
     pub listen: Option<SocketAddr>,
-    /// Model of the sensor [default: that of the replay]
+    /// Sensor model [default: that of the replay]
     #[arg(long, required_unless_present = "replay", conflicts_with = "replay")]
     pub model: Option<SensorModel>,
-    /// What an Ouster says of itself: JSON, as from http://SENSOR/api/v1/sensor/metadata; of an
-    /// HDL-64E the db.xml that came with it
+    /// Metadata of an Ouster: JSON, as from http://SENSOR/api/v1/sensor/metadata; for an HDL-64E,
+    /// the db.xml that came with it
     #[arg(long, value_name = "FILE", conflicts_with = "replay")]
     pub metadata: Option<PathBuf>,
-    /// Where poses come from: `register`, by registration of the sweeps, or an address and port
-    /// that they arrive at as datagrams
+    /// Where poses come from: `register`, by registration of the sweeps, or an address and port to
+    /// receive them on as datagrams
     #[arg(long, value_name = "ADDRESS:PORT|register", default_value = "register")]
     #[arg(value_parser = poses_from)]
     pub poses_from: PosesFrom,
     /// Latency from a sweep's last packet to its flow beyond which it counts as late, ms [default:
-    /// a turn of the sensor]
+    /// one revolution of the sensor]
     #[arg(long, value_name = "MS", value_parser = milliseconds)]
     pub deadline: Option<Duration>,
-    /// Follow objects, too: a box with a number, a velocity and a class for each
+    /// Also track objects: a box with a number, a velocity and a class for each
     #[arg(long)]
     pub objects: bool,
-    /// End after so many sweeps
+    /// Stop after this many sweeps
     #[arg(short = 'n', value_name = "COUNT", value_parser = count)]
     pub count: Option<usize>,
     /// Print errors only
@@ -66,17 +66,17 @@ pub struct LiveArgs {
     pub replay: ReplayArgs,
 }
 
-/// Where the sensor sits.
+/// Where the sensor is mounted.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Sensor")]
 pub struct PlaceArgs {
-    /// Ground height in the sensor's frame, m [default: found in the first sweep]
+    /// Ground height in the sensor's frame, m [default: estimated from the first sweep]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub ground: Option<f64>,
-    /// Box around the own vehicle in the sensor's frame, m: returns in it are left out
+    /// Box around the own vehicle in the sensor's frame, m: returns in it are ignored
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true, value_parser = vehicle_box)]
     pub own_vehicle: Option<[[f32; 2]; 2]>,
-    /// Whether the vehicle moves while the sensor turns
+    /// Correct for the vehicle's motion during a revolution of the sensor
     #[arg(long, value_name = "on|off", hide_possible_values = true)]
     #[arg(value_parser = BoolishValueParser::new())]
     pub deskew: Option<bool>,
@@ -86,34 +86,34 @@ pub struct PlaceArgs {
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct LiveResults {
-    /// Send what moves to this address as datagrams (examples/live_receiver.py
-    /// reads them)
+    /// Send what moves to this address as datagrams (examples/live_receiver.py reads them)
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub send: Option<SocketAddr>,
     #[command(flatten)]
     pub streams: StreamArgs,
-    /// Write counts and latencies as JSON, at the end
+    /// At the end, write counts and latencies as JSON
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
 }
 
-/// A capture in place of a sensor.
+/// A capture instead of a sensor.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Replay")]
 pub struct ReplayArgs {
-    /// Send the packets of a capture (.pcap, .pcapng) here, as its sensor did
+    /// Replay the packets of a capture (.pcap, .pcapng), timed as its sensor sent them
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
-    /// How much faster than it did [default: 1]
+    /// How much faster than real time [default: 1]
     #[arg(long, value_name = "FACTOR", value_parser = factor)]
     pub speed: Option<f64>,
-    /// Sensor of the capture, where it has several
+    /// Sensor of the capture, if it has several
     #[arg(long, value_name = "ADDRESS:PORT")]
     pub topic: Option<String>,
 }
 
 impl ReplayArgs {
-    /// The parser asks for no replay where there is a model, which excludes one.
+    /// Fails if an option of a replay is given without one; clap cannot check it where --model
+    /// excludes one.
     pub fn check(&self) -> Result<(), Error> {
         let given = [("speed", self.speed.is_some()), ("topic", self.topic.is_some())];
         let alone = given.iter().find(|(_, given)| *given).filter(|_| self.replay.is_none());
@@ -136,7 +136,7 @@ fn poses_from(text: &str) -> Result<PosesFrom, String> {
 }
 
 impl PlaceArgs {
-    /// What the user says of a sensor.
+    /// Options for reading the sensor.
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             ground_m: self.ground,

@@ -1,4 +1,4 @@
-//! One recording, or many, shared among machines.
+//! One recording, or many distributed over machines.
 
 use std::path::{Path, PathBuf};
 
@@ -9,25 +9,25 @@ pub struct Recordings {
     /// Recording: an MCAP or pcap file, or a folder: KITTI, Argoverse 2, nuScenes, Waymo or clouds
     #[arg(required_unless_present = "list")]
     pub data: Option<PathBuf>,
-    /// Do so with every recording of a list, a path a line: results of PATH go to DIR/PATH. What
-    /// was done before with the same settings, weights and files is left as it is
+    /// Process every recording of a list, one path per line; results of PATH go to DIR/PATH.
+    /// Results already finished with the same settings, weights and files are kept
     #[arg(long, value_name = "FILE", conflicts_with = "data", requires = "out")]
     #[arg(help_heading = "Many recordings")]
     pub list: Option<PathBuf>,
-    /// Only every N-th recording of the list, from the I-th on (0 to N-1) [default: by the array or
-    /// the step of Slurm, or by JOB_COMPLETION_INDEX of Kubernetes and RAYWAKE_SHARDS]
+    /// Process only every N-th recording of the list, from the I-th on (0 to N-1) [default: taken
+    /// from Slurm's array or step, or from JOB_COMPLETION_INDEX of Kubernetes and RAYWAKE_SHARDS]
     #[arg(long, value_name = "I/N", requires = "list", value_parser = Shard::parse)]
     #[arg(help_heading = "Many recordings")]
     pub shard: Option<Shard>,
 }
 
 impl Recordings {
-    /// A single one.
+    /// A single recording.
     pub fn one(data: PathBuf) -> Recordings {
         Recordings { data: Some(data), ..Recordings::default() }
     }
 
-    /// The only one: there is one unless there is a list.
+    /// The single recording; empty if there is a list instead.
     pub fn path(&self) -> &Path {
         self.data.as_deref().unwrap_or(Path::new(""))
     }
@@ -38,25 +38,25 @@ impl Recordings {
 pub struct Shard {
     /// From 0.
     pub index: usize,
-    /// Parts in all, at least one.
+    /// Number of parts, at least one.
     pub of: usize,
 }
 
-/// Names of the variables in which a scheduler tells a process its part.
+/// Names of the environment variables by which a scheduler assigns a process its part.
 struct Scheduler {
-    /// Set where there are parts.
+    /// Set if there are parts.
     shared: &'static str,
-    /// Its number.
+    /// Number of this part.
     index: &'static str,
-    /// Number of the first part; 0 without.
+    /// Number of the first part; 0 if none.
     first: Option<&'static str>,
-    /// From one number to the next; 1 without.
+    /// Step from one number to the next; 1 if none.
     step: Option<&'static str>,
-    /// How many parts there are.
+    /// Number of parts.
     count: &'static str,
 }
 
-/// In order of preference: tasks of an array are more than processes of a task.
+/// In order of preference: array tasks come before the processes of a task.
 const SCHEDULERS: [Scheduler; 3] = [
     Scheduler {
         shared: "SLURM_ARRAY_TASK_ID",
@@ -65,7 +65,7 @@ const SCHEDULERS: [Scheduler; 3] = [
         step: Some("SLURM_ARRAY_TASK_STEP"),
         count: "SLURM_ARRAY_TASK_COUNT",
     },
-    // Not `SLURM_NTASKS`: a batch script has that, too, which runs once.
+    // Not `SLURM_NTASKS`: a batch script has that too, but runs once.
     Scheduler {
         shared: "SLURM_STEP_NUM_TASKS",
         index: "SLURM_PROCID",
@@ -83,7 +83,7 @@ const SCHEDULERS: [Scheduler; 3] = [
 ];
 
 impl Shard {
-    /// From `I/N`.
+    /// Parses `I/N`.
     pub fn parse(text: &str) -> Result<Shard, String> {
         let numbers =
             text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
@@ -95,10 +95,10 @@ impl Shard {
         (index < of).then_some(Shard { index, of })
     }
 
-    /// What a scheduler says in the variables of the environment; all where none does.
+    /// The part assigned by a scheduler through environment variables; the whole if there is none.
     ///
     /// # Errors
-    /// They say what cannot be.
+    /// The variables are missing or inconsistent.
     pub fn of_environment() -> Result<Shard, Error> {
         Shard::of_scheduler(|name| std::env::var(name).ok()).map_err(Error::Usage)
     }
@@ -167,7 +167,7 @@ mod tests {
         let process = ("SLURM_PROCID", "2");
         assert_eq!(shard(&[process, ("SLURM_STEP_NUM_TASKS", "4")]), Ok((2, 4)));
         assert!(shard(&[("SLURM_STEP_NUM_TASKS", "4")]).unwrap_err().contains("PROCID is not set"));
-        // A batch script for four tasks, which starts them by itself.
+        // A batch script for four tasks, which it starts itself.
         assert_eq!(shard(&[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "4")]), Ok((0, 1)));
         let index = ("JOB_COMPLETION_INDEX", "5");
         assert_eq!(shard(&[index, ("RAYWAKE_SHARDS", "6")]), Ok((5, 6)));

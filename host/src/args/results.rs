@@ -10,10 +10,10 @@ use raywake_io::sink::streams::{Pace, StreamTargets};
 #[command(next_help_heading = "Results")]
 pub struct Results {
     /// Output folder: `columns`, `points`, `tracklets` (feather), `png` and `summary.json`. Tables
-    /// that an interrupted run left there are kept
+    /// left there by an interrupted run are kept
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Also write bird's-eye pictures, with velocities over ground or relative to the vehicle
+    /// Also draw bird's-eye pictures, with velocities over ground or relative to the vehicle
     #[arg(long, requires = "out", value_name = "FRAME", value_enum)]
     #[arg(num_args = 0..=1, require_equals = true, default_missing_value = "world")]
     pub png: Option<PictureFrame>,
@@ -21,8 +21,8 @@ pub struct Results {
     pub views: Views,
     #[command(flatten)]
     pub streams: StreamArgs,
-    /// Write columns.parquet, points.parquet and tracklets.parquet, a row group each sweep, in
-    /// place of a feather file each (feature `parquet`)
+    /// Write columns.parquet, points.parquet and tracklets.parquet, with a row group per sweep,
+    /// instead of feather files per sweep (feature `parquet`)
     #[arg(long, requires = "out")]
     pub parquet: bool,
     /// Do not write per-point files
@@ -36,34 +36,33 @@ pub struct Results {
     pub summary: Option<PathBuf>,
 }
 
-/// What there is to look at besides pictures of single sweeps.
+/// Views of a whole run, besides pictures of single sweeps.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct Views {
-    /// Also write a film at the recording's pace: an animated PNG, which browsers play
+    /// Also write a film at the recording's pace: an animated PNG, which browsers can play
     #[arg(long, value_name = "FILE")]
     pub film: Option<PathBuf>,
-    /// Also write a page for the browser: a slider over the sweeps, charts, the busiest moments
+    /// Also write an HTML page: a slider over the sweeps, charts, the busiest moments
     #[arg(long, value_name = "FILE.html")]
     pub page: Option<PathBuf>,
 }
 
-/// Messages of ROS 2.
+/// ROS 2 messages.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub struct StreamArgs {
     /// Also write an MCAP file for Foxglove, Rerun, rviz or Autoware: points, what moves, poses
     #[arg(long, value_name = "FILE")]
     pub mcap: Option<PathBuf>,
-    /// Also send the same to Foxglove, once it has connected, at the recording's pace (feature
-    /// `live`)
+    /// Also send the same to Foxglove, once it connects, at the recording's pace (feature `live`)
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true)]
     #[arg(default_missing_value = "127.0.0.1:8765")]
     pub live: Option<SocketAddr>,
 }
 
 impl StreamArgs {
-    /// For [`raywake_io::sink::bag`].
+    /// Targets for [`raywake_io::sink::bag`].
     pub fn sinks(&self, pace: Pace) -> StreamTargets {
         StreamTargets { mcap: self.mcap.clone(), live: self.live, pace }
     }
@@ -79,7 +78,7 @@ pub enum PictureFrame {
     Ego,
 }
 
-/// Formats of other tools.
+/// Export formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Export {
     /// Argoverse 2 scene flow
@@ -87,7 +86,7 @@ pub enum Export {
 }
 
 impl Views {
-    /// A file of all sweeps that was asked for.
+    /// The option given, if any, for a single file of all sweeps.
     pub fn single_file(&self) -> Option<&'static str> {
         let page = self.page.is_some().then_some("page");
         self.film.is_some().then_some("film").or(page)
@@ -95,7 +94,7 @@ impl Views {
 }
 
 impl StreamArgs {
-    /// A file, or viewers, of all sweeps that was asked for.
+    /// The option given, if any, for a single file, or viewers, of all sweeps.
     pub fn single_file(&self) -> Option<&'static str> {
         let live = self.live.is_some().then_some("live");
         self.mcap.is_some().then_some("mcap").or(live)
@@ -103,7 +102,7 @@ impl StreamArgs {
 }
 
 impl Results {
-    /// A file of all sweeps that was asked for.
+    /// The option given, if any, for a single file of all sweeps.
     pub fn single_file(&self) -> Option<&'static str> {
         let summary = self.summary.is_some().then_some("summary");
         self.streams.single_file().or(self.views.single_file()).or(summary)

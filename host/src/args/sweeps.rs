@@ -13,7 +13,7 @@ pub struct SweepRange {
 }
 
 impl SweepRange {
-    /// From `A..B`, `A..`, `..B` or `..`.
+    /// Parses `A..B`, `A..`, `..B` or `..`.
     pub(super) fn parse(text: &str) -> Result<SweepRange, String> {
         let (from, to) = text.split_once("..").ok_or("expected A..B, for example 10..20")?;
         let index = |s: &str| s.parse::<usize>().map_err(|_| format!("`{s}` is not a sweep index"));
@@ -25,7 +25,7 @@ impl SweepRange {
         Ok(SweepRange { from, to })
     }
 
-    /// The range in a recording of `len` sweeps; fails where it reaches beyond.
+    /// Returns the range within a recording of `len` sweeps; fails if it reaches beyond.
     pub fn within(&self, len: usize) -> Result<Range<usize>, Error> {
         let to = self.to.unwrap_or(len);
         if self.from < len && to <= len {

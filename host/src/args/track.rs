@@ -46,11 +46,11 @@ pub struct TrackArgs {
     /// How trajectory and shape are estimated
     #[arg(long, value_enum, value_name = "KIND", default_value = "refined")]
     pub estimate: EstimateKind,
-    /// Ground heights in the frame of the poses, an ESRI ASCII grid; where it has no data they are
-    /// estimated from the returns
+    /// Ground heights in the world frame of the poses, an ESRI ASCII grid; where it has no data
+    /// they are estimated from the returns
     #[arg(long, value_name = "FILE")]
     pub ground_map: Option<PathBuf>,
-    /// Also estimate with every sweep, from a sliding window
+    /// Also estimate at every sweep, from a sliding window
     #[arg(long)]
     pub fixed_lag: bool,
     /// Output folder: `tracks.feather`, `clouds` and `summary.json`
@@ -63,7 +63,7 @@ pub struct TrackArgs {
     pub views: Views,
     #[command(flatten)]
     pub streams: StreamArgs,
-    /// Show all tracks, those of what stands and is no vehicle, person or two-wheeler, too
+    /// Show all tracks, including stationary ones that are not vehicles, people or two-wheelers
     #[arg(long)]
     pub all: bool,
     /// Write run statistics as JSON [default with --out: DIR/summary.json]
@@ -81,22 +81,22 @@ pub struct TrackArgs {
 pub enum FrontEndKind {
     /// Height variance in cells of a ground grid; association by position
     Variance,
-    /// Scene flow as well: moving points are objects; association by position and velocity. What
-    /// stands and is no vehicle, person or two-wheeler is left out, as is all outside the window
-    /// of the profile (±25 m; `far`: ±50 m)
+    /// Scene flow as well: moving points are objects; association by position and velocity.
+    /// Stationary objects other than vehicles, people and two-wheelers are left out, as is
+    /// everything outside the window of the profile (±25 m; `far`: ±50 m)
     Flow,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EstimateKind {
-    /// Chapter 2, refined: surfaces, ends, what rays pass and carve, several starts
+    /// Chapter 2, refined: surfaces, ends, free space along rays, several starts
     Refined,
     /// Chapter 2 as printed, with its parameters (2.6.2)
     Printed,
 }
 
 impl EstimateKind {
-    /// Parameters that it starts from; `--set` and files change them.
+    /// Initial parameters; `--set` and files change them.
     pub fn params(self) -> EstimateParams {
         match self {
             EstimateKind::Refined => EstimateParams::DEFAULT,
@@ -105,7 +105,7 @@ impl EstimateKind {
     }
 }
 
-/// The end of `--help`.
+/// Text at the end of `--help`.
 pub(super) fn after_help(exit_codes: &str) -> String {
     format!("{FILES}\n\n{exit_codes}")
 }

@@ -1,4 +1,4 @@
-//! Values of options.
+//! Parsers of option values.
 
 #[cfg(feature = "pcap")]
 use std::net::{Ipv4Addr, SocketAddr};
@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use raywake_simd::Simd;
 
-/// A number of at least one.
+/// Parses a number of at least one.
 pub(super) fn count(text: &str) -> Result<usize, String> {
     let count = text.parse().map_err(|_| "not a number")?;
     if count > 0 { Ok(count) } else { Err("must be at least 1".into()) }
 }
 
-/// Corners of a rectangle.
+/// Parses the corners of a rectangle.
 pub(super) fn vehicle_box(text: &str) -> Result<[[f32; 2]; 2], String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     let numbers = numbers.map_err(|_| "expected four numbers: X0,Y0,X1,Y1")?;
@@ -24,7 +24,7 @@ pub(super) fn vehicle_box(text: &str) -> Result<[[f32; 2]; 2], String> {
     }
 }
 
-/// Bytes: a number with or without a unit.
+/// Parses a size in bytes: a number with or without a unit.
 pub(super) fn size(text: &str) -> Result<u64, String> {
     let digits = text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
     let (number, unit) = text.split_at(digits);
@@ -42,7 +42,7 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     bytes.ok_or_else(|| "not a number of bytes".into())
 }
 
-/// An instruction set that this processor has.
+/// Parses the name of an instruction set that this processor has.
 pub(super) fn simd(text: &str) -> Result<Simd, String> {
     let found = Simd::available().find(|simd| simd.name() == text);
     found.ok_or_else(|| {
@@ -51,21 +51,21 @@ pub(super) fn simd(text: &str) -> Result<Simd, String> {
     })
 }
 
-/// A duration.
+/// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number")?;
     let duration = Duration::try_from_secs_f64(seconds).map_err(|e| e.to_string())?;
     if duration.is_zero() { Err("must be more than 0".into()) } else { Ok(duration) }
 }
 
-/// An address to listen at; of a port alone, that of this machine's loopback.
+/// Parses an address to listen on; a port alone means the loopback address.
 #[cfg(feature = "pcap")]
 pub(super) fn listen(text: &str) -> Result<SocketAddr, String> {
     let port = text.parse().map(|port: u16| (Ipv4Addr::LOCALHOST, port).into());
     port.or_else(|_| text.parse()).map_err(|_| "expected ADDRESS:PORT, or a PORT".into())
 }
 
-/// A duration in ms, at most a minute.
+/// Parses a duration in ms, at most a minute.
 #[cfg(feature = "pcap")]
 pub(super) fn milliseconds(text: &str) -> Result<Duration, String> {
     let ms: f64 = text.parse().map_err(|_| "not a number")?;
@@ -73,7 +73,7 @@ pub(super) fn milliseconds(text: &str) -> Result<Duration, String> {
     believed.then(|| Duration::from_secs_f64(ms * 1e-3)).ok_or("must be 0.1 to 60000".into())
 }
 
-/// A factor of a pace.
+/// Parses a speed factor.
 #[cfg(feature = "pcap")]
 pub(super) fn factor(text: &str) -> Result<f64, String> {
     let factor: f64 = text.parse().map_err(|_| "not a number")?;
@@ -81,7 +81,7 @@ pub(super) fn factor(text: &str) -> Result<f64, String> {
     believed.then_some(factor).ok_or("must be 0.01 to 1000".into())
 }
 
-/// Log-odds that probabilities are cut off at. Beyond 20 a probability is 1 in single precision.
+/// Parses the log-odds to clip at. Beyond 20 a probability is 1 in single precision.
 pub(super) fn nats(text: &str) -> Result<f32, String> {
     let nats: f32 = text.parse().map_err(|_| "not a number")?;
     if (0.001..=20.0).contains(&nats) { Ok(nats) } else { Err("must be 0.001 to 20".into()) }

@@ -1,4 +1,4 @@
-//! The kernels on a Vulkan device as a backend: one recorded command buffer a sweep.
+//! The kernels on a Vulkan device as a backend: one recorded command buffer per sweep.
 
 use raywake_core::params::Profile;
 use raywake_core::perceive::{
@@ -13,11 +13,11 @@ use raywake_kernels::schedule::Schedule;
 
 use super::Tables;
 
-/// Index of the program run once, and of the one run every sweep.
+/// Indices of the program run once and of the one run every sweep.
 const LOAD: usize = 0;
 const FLOW: usize = 1;
 
-/// A device with everything recorded.
+/// A device with all its programs recorded.
 pub struct Device {
     executor: Executor,
     schedule: Schedule,
@@ -25,7 +25,7 @@ pub struct Device {
 
 impl Device {
     /// Allocates and records for a profile, uploads the learned tables and runs the pipeline once
-    /// without rays: software devices compile kernels in their first run.
+    /// without rays: software devices compile kernels on their first run.
     pub fn new(profile: &Profile, tables: &Tables, options: &Options) -> Result<Device, GpuError> {
         let schedule = Schedule::new(FLOW_PROGRAMS, profile);
         let buffers = schedule.buffers(profile);
@@ -35,13 +35,13 @@ impl Device {
         device.upload(Buffer::constancy_weights, bytemuck::cast_slice(&tables.constancy))?;
         device.upload(Buffer::constancy_costs, &tables.costs)?;
         device.executor.run(LOAD)?;
-        // Nothing of what the device held before comes into view.
+        // Shifted out of view: nothing the device held before remains.
         let empty = SweepUniform { shift_x: profile.side as i32, ..uniform_of(profile, 0) };
         device.perceive(&empty, &Alone, &mut (), || ())?;
         Ok(device)
     }
 
-    /// What was allocated and created.
+    /// Counts of what was allocated and created.
     pub fn census(&self) -> Census {
         self.executor.census()
     }
@@ -61,7 +61,7 @@ impl Device {
         Ok(())
     }
 
-    /// What the last sweep left.
+    /// The results of the last sweep.
     fn left(&self) -> PerceptionBuffers<'_> {
         PerceptionBuffers {
             counters: self.readback(Buffer::counters),

@@ -12,7 +12,7 @@ use raywake_core::team::Team;
 use raywake_core::weights::WeightsError;
 use raywake_gpu::{Census, GpuError};
 
-/// What is learned.
+/// A learned part of the pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LearnedPart {
     /// The background filter.
@@ -23,7 +23,7 @@ pub enum LearnedPart {
     Encoder,
 }
 
-/// Why a weights file does not serve a profile.
+/// Why a weights file does not fit a profile.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {why}", match .of {
     LearnedPart::Filter => "background filter",
@@ -37,28 +37,28 @@ pub struct TablesError {
     pub why: WeightsError,
 }
 
-/// The learned numbers in the form the kernels and their twins use.
+/// The learned weights in the form the kernels and their twins use.
 #[derive(Clone)]
 pub struct Tables {
-    /// See [`background_filter::load`]; empty of weight where every solid column passes.
+    /// See [`background_filter::load`]; all zero if every solid column passes.
     pub filter: Vec<i32>,
     /// See [`occupancy_constancy::load`].
     pub constancy: Vec<i32>,
-    /// Its costs.
+    /// Costs of the constancy scores.
     pub costs: Vec<u32>,
-    /// Its range of scores.
+    /// The range of the scores.
     pub scores: Scores,
-    /// Where the filter comes from, or that there is none.
+    /// Where the filter comes from, or a note that there is none.
     pub provenance: String,
-    /// Every solid column is foreground.
+    /// Whether every solid column is foreground.
     pub unfiltered: bool,
-    /// See [`EncoderWeights::load`]; none where nothing is encoded.
+    /// See [`EncoderWeights::load`]; `None` if nothing is encoded.
     pub encoder: Option<Box<EncoderWeights>>,
 }
 
 impl Tables {
     /// Reads the weights files for a profile; without a filter every solid column is foreground.
-    /// Nothing is encoded where nothing is refined.
+    /// Nothing is encoded unless the profile refines.
     pub fn load(
         profile: &Profile,
         filter: Option<&str>,
@@ -100,7 +100,7 @@ fn encoder_weights(text: &str, levels: usize) -> Result<Box<EncoderWeights>, Tab
     Ok(weights)
 }
 
-/// The twins over memory of the heap.
+/// The twins, with their buffers on the heap.
 pub type Scalar = perceive::ScalarBackend<Vec<u32>>;
 
 /// Either backend.
@@ -165,7 +165,7 @@ impl Backend {
         }
     }
 
-    /// What a device allocated and created.
+    /// Counts of what a device allocated and created.
     pub fn census(&self) -> Option<Census> {
         match self {
             Backend::Scalar(_) => None,
@@ -173,7 +173,7 @@ impl Backend {
         }
     }
 
-    /// Messages of the validation layer, the first few.
+    /// The first few messages of the validation layer.
     pub fn messages(&self) -> Vec<String> {
         match self {
             Backend::Scalar(_) => Vec::new(),

@@ -1,4 +1,4 @@
-//! The layout as a document.
+//! The memory layout as a Markdown document.
 
 use std::fmt::Write;
 
@@ -36,12 +36,12 @@ const MAP_HEAD: &str = "
 count` and `map band` for every band of keys.
 ";
 
-/// Below the host's table of the sparse map.
+/// Text below the host table of the sparse map.
 const MAP_HOST: &str = "
 The voxels of a sweep, and the file made of them, grow with what is seen and are not counted.
 ";
 
-/// Below the host's table of either.
+/// Text below either host table.
 const CAPACITY: &str = "
 A sweep of more returns than the capacity is read whole; what the pipeline leaves out of it is
 counted.
@@ -58,7 +58,7 @@ holds besides. The last one is in place of all others where objects are followed
 |---|---|--:|
 ";
 
-/// Below the table of the tracks.
+/// Text below the table of the tracks.
 const TRACKS_HOST: &str = "
 The states of tracks that have ended wait for their file, and are not counted.
 ";
@@ -73,24 +73,25 @@ band.
 |--:|--:|---|---|
 ";
 
-/// Profiles that take the same bytes share a column.
+/// Profiles with identical buffer sizes, which share a column.
 struct Sizes<'a> {
     names: String,
     profile: &'a Profile,
 }
 
-/// Buffers that are allocated together, with their headings.
+/// The layout of buffers that are allocated together.
 struct Layout<'a> {
-    /// What precedes the title of a section.
+    /// Markdown heading prefix of a section.
     level: &'static str,
     schedule: Schedule,
     sizes: Vec<Sizes<'a>>,
     traffic: Vec<Traffic>,
-    /// Below the host's table.
+    /// Text below the host table.
     host: &'static str,
 }
 
-/// `memory-layout.md` for some profiles. Of the flow's, the first one's schedule names the steps.
+/// Returns `memory-layout.md` for some profiles. The steps of the flow are named by the schedule of
+/// its first profile.
 pub fn memory_layout(profiles: &[Profile]) -> String {
     let (maps, flows): (Vec<&Profile>, Vec<&Profile>) = profiles.iter().partition(|p| is_map(p));
     let mut out = String::from(HEAD);
@@ -221,7 +222,7 @@ fn totals(out: &mut String, layout: &Layout) -> std::fmt::Result {
     row("scalar | host", &|p| host_bytes(p, true))
 }
 
-/// The words of records, and how elements are packed.
+/// Writes the words of records, and how elements are packed.
 fn records(out: &mut String) -> std::fmt::Result {
     out.push_str(RECORDS_HEAD);
     for (word, field) in SweepUniform::FIELDS.iter().enumerate() {
@@ -234,7 +235,7 @@ fn records(out: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// Thousands apart.
+/// Formats a number with commas between thousands.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let groups: Vec<&str> = digits

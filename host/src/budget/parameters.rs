@@ -1,4 +1,4 @@
-//! `PARAMETERS.md`: every parameter as it is declared.
+//! `PARAMETERS.md`: every parameter as declared.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,7 @@ const COLUMNS: &str = "\
 |---|---|---|---|---|---|
 ";
 
-/// The text of `PARAMETERS.md`.
+/// Returns the text of `PARAMETERS.md`.
 pub fn parameters() -> String {
     let mut text = HEAD.to_string();
     let profiles = shipped();
@@ -51,7 +51,7 @@ pub fn parameters() -> String {
     text
 }
 
-/// The values a parameter of the group `n` has in the profiles.
+/// The values of a parameter of group `n` in the profiles.
 fn default_of(name: &str, n: usize, profiles: &[Profile]) -> String {
     let value = |p: &Profile| p.groups()[n].1.get(name).map_or(String::new(), |v| v.to_string());
     let default = value(&profiles[0]);

@@ -1,16 +1,16 @@
-//! Who writes and who reads each buffer, as the schedules say.
+//! Which steps write and read each buffer, according to the schedules.
 
 use raywake_gpu::{Heap, Op, accesses};
 use raywake_kernels::schedule::Schedule;
 
-/// Names of the steps that touch a buffer, each once, from first to last.
+/// Names of the steps that touch a buffer, each once, in the order of first use.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Traffic {
     pub writers: Vec<&'static str>,
     pub readers: Vec<&'static str>,
 }
 
-/// The traffic of every buffer over the programs, in the order they run.
+/// The traffic of every buffer over the programs, in execution order.
 pub(super) fn of(schedule: &Schedule) -> Vec<Traffic> {
     let mut all: Vec<Traffic> = vec![Traffic::default(); schedule.rows.len()];
     for (buffer, traffic) in schedule.rows.iter().zip(&mut all) {

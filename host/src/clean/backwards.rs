@@ -1,24 +1,24 @@
-//! A drive seen backwards in time: what has just come into view, and is missed forwards, has been
-//! seen for long when it leaves.
+//! A drive processed backwards in time: an object that is missed forwards, having only just come
+//! into view, has been in view for a long time backwards.
 
 use raywake_core::pose::Twist;
 use raywake_core::return_clock::ReturnClock;
 use raywake_core::sweep::{Rig, Timing};
 use raywake_io::source::SweepData;
 
-/// Turns sweeps of a rig around.
+/// Reverses the sweeps of a rig in time.
 pub struct Backwards {
     forwards: Rig,
     clock: ReturnClock,
 }
 
 impl Backwards {
-    /// For sweeps of a rig.
+    /// For the sweeps of a rig.
     pub fn new(rig: &Rig) -> Backwards {
         Backwards { forwards: rig.clone(), clock: ReturnClock::new() }
     }
 
-    /// The rig of sweeps that were turned around.
+    /// Returns the rig of the reversed sweeps.
     pub fn rig(&self) -> Rig {
         let timing = match self.forwards.timing {
             Timing::AtStamp => Timing::AtStamp,
@@ -31,7 +31,7 @@ impl Backwards {
         Rig { timing, ..self.forwards.clone() }
     }
 
-    /// Turns a sweep around: what is after the stamp comes before it, and all moves the other way.
+    /// Reverses a sweep: what was after the stamp comes before it, and all motion is reversed.
     pub fn turn(&self, sweep: &mut SweepData) {
         sweep.stamp_s = -sweep.stamp_s;
         let Twist { linear, angular } = sweep.twist;
@@ -72,7 +72,7 @@ mod tests {
         let (timing, times) = turned(offset);
         assert_eq!(timing, Timing::Offset { from_s: -0.075, span_s: 0.125 });
         assert!((times[0] + 0.03).abs() < 1e-6 && (times[1] - 0.05).abs() < 1e-6, "{times:?}");
-        // Clockwise from the rear: left comes a quarter of a turn before the stamp.
+        // Clockwise from the rear: left comes a quarter of a revolution before the stamp.
         let (timing, times) = turned(Timing::Azimuth { span_s: 0.1 });
         assert_eq!(timing, Timing::Offset { from_s: -0.05, span_s: 0.1 });
         assert!(times[0].abs() < 1e-4 && (times[1] - 0.025).abs() < 1e-4, "{times:?}");

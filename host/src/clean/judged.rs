@@ -1,4 +1,4 @@
-//! What became of every return, by either way through the drive.
+//! The verdict on every return from both passes through the drive.
 
 use raywake_core::output::{PointFlow, Status};
 
@@ -7,20 +7,20 @@ const UNLABELLED: u32 = 0;
 const STATIC: u32 = 9;
 const MOVING: u32 = 251;
 
-/// What is known of a return by both ways.
+/// The verdict on a return from both passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Judged {
     /// No surface: no echo, the own vehicle, not finite.
     None,
-    /// Outside the window both times.
+    /// Outside the window or over capacity in both passes.
     Unknown,
     Static,
     Moving,
 }
 
 impl Judged {
-    /// All of them, in their order.
+    /// All verdicts, in order of discriminant.
     const ALL: [Judged; 4] = [Judged::None, Judged::Unknown, Judged::Static, Judged::Moving];
 
     pub fn label(self) -> u32 {
@@ -32,11 +32,12 @@ impl Judged {
     }
 }
 
-/// What one way tells of a return, in four bits: P(moves) from 0 to [`SURE`], or one of the others.
+/// The result of one pass for a return, in four bits: P(moves) scaled to 0 to [`SURE`], or
+/// [`UNKNOWN`] or [`NONE`].
 type Nibble = u8;
 
 const SURE: Nibble = 13;
-/// Not looked at.
+/// Not examined.
 const UNKNOWN: Nibble = 14;
 /// No surface.
 const NONE: Nibble = 15;
@@ -51,7 +52,7 @@ fn nibble(flow: &PointFlow) -> Nibble {
     }
 }
 
-/// Four bits for each return of a sweep.
+/// Four bits per return of a sweep.
 #[derive(Clone, Debug, Default)]
 struct Nibbles(Vec<u8>);
 
@@ -69,7 +70,7 @@ impl Nibbles {
     }
 }
 
-/// What one way tells of the returns of a sweep.
+/// The results of one pass for the returns of a sweep.
 #[derive(Clone, Debug, Default)]
 pub struct OneWay(Nibbles);
 
@@ -83,25 +84,25 @@ impl OneWay {
     }
 }
 
-/// What became of the returns of a sweep.
+/// The verdicts on the returns of a sweep.
 #[derive(Clone, Debug, Default)]
 pub struct Verdicts(Nibbles);
 
 impl Verdicts {
-    /// Of so many returns, by both ways.
+    /// The verdicts on the given number of returns from both passes.
     pub fn of(ways: [&OneWay; 2], returns: usize, moving: f32) -> Verdicts {
         Verdicts(Nibbles::of((0..returns).map(|n| judge(ways, n, moving) as Nibble)))
     }
 
-    /// Of so many returns.
+    /// The verdicts, for the given number of returns.
     pub fn all(&self, returns: usize) -> Vec<Judged> {
         let judged = |n| self.0.get(n).and_then(|nibble| Judged::ALL.get(usize::from(nibble)));
         (0..returns).map(|n| judged(n).copied().unwrap_or(Judged::Unknown)).collect()
     }
 }
 
-/// What is known of a return by both ways: it moves where the mean of P(moves) of those that looked
-/// at it reaches `moving`.
+/// The verdict on a return from both passes: it moves if the mean P(moves) of the passes that
+/// examined it reaches `moving`.
 fn judge(ways: [&OneWay; 2], n: usize, moving: f32) -> Judged {
     let told = ways.map(|way| way.get(n));
     if told.contains(&NONE) {
@@ -137,7 +138,7 @@ mod tests {
             (out, out, Judged::Unknown),
             (own, still, Judged::None),
         ] {
-            // At either place of a byte.
+            // In either half of a byte.
             for n in 0..3 {
                 let way = |flow| OneWay::of((0..3).map(|k| if k == n { flow } else { still }));
                 let ways = [way(forwards), way(backwards)];

@@ -1,4 +1,4 @@
-//! The clouds of what stands and of what moves, stored as the recording's are.
+//! The clouds of static and of moving returns, stored in the recording's format.
 
 use std::path::{Path, PathBuf};
 
@@ -11,19 +11,19 @@ use raywake_io::source::{Overview, SweepData};
 
 use super::judged::Judged;
 
-/// Names of folders and files.
+/// Names of the folders or files.
 const NAMES: [&str; 2] = ["static", "moving"];
 
 /// Where clouds go.
 pub enum KeptClouds {
-    /// A file each in a folder of what stands and one of what moves.
+    /// A file per sweep in each of two folders, for static and for moving returns.
     Files { root: PathBuf, extension: String },
-    /// Two recordings of messages.
+    /// Two MCAP recordings.
     Bags(Box<[BagSink; 2]>),
 }
 
 impl KeptClouds {
-    /// Creates folders for files with this extension, or, without, files of messages.
+    /// Creates folders for files with this extension or, without one, MCAP files.
     pub fn create(
         root: &Path,
         extension: Option<&str>,
@@ -44,7 +44,7 @@ impl KeptClouds {
         Ok(KeptClouds::Files { root: root.to_path_buf(), extension: extension.into() })
     }
 
-    /// Writes the returns of a sweep by what became of them.
+    /// Writes the returns of a sweep by verdict.
     pub fn sweep(&mut self, sweep: &SweepData, judged: &[Judged]) -> Result<(), Error> {
         let of = |moves: bool| -> Vec<Point> {
             let all = sweep.points.iter().zip(judged);

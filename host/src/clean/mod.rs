@@ -1,8 +1,8 @@
-//! `raywake clean`: a recording without what moves.
+//! `raywake clean`: a recording without moving objects.
 //!
-//! The flow of every sweep is found twice, forwards and backwards in time: forwards a mover that
-//! has just come into view is known too little, backwards it has been seen for long; and what only
-//! seems to move seldom does so both ways.
+//! The flow of every sweep is computed twice, forwards and backwards in time: a mover that has just
+//! come into view is too little known forwards, but backwards it has been in view for a long time;
+//! and what only appears to move seldom does so both ways.
 
 mod backwards;
 mod judged;
@@ -35,15 +35,15 @@ use raywake_io::sink::{atomic, clouds};
 use raywake_io::source::{self, Source, SweepData};
 use still_map::StillMap;
 
-/// Mean of P(moves) of both ways from which on a return moves. Share of static returns kept and of
-/// moving ones removed, % (IoU of these): on cluttered streets 99.93, 97.6 (97.1) at 0.3, 99.95,
-/// 97.3 (97.0) here, 99.96, 96.1 (95.9) at 0.5; what is put out forwards alone 99.93, 96.9 (96.5),
-/// by either way 99.90, 97.9 (97.2). On `kitti_raw_0005`, whose boxes hold ground, too, the IoU is
-/// 75.8, 76.8, 74.9; 75.4, 75.4.
+/// Minimum mean P(moves) of both passes for a return to count as moving. Static returns kept and
+/// moving ones removed, % (IoU of the latter): on cluttered streets 99.93, 97.6 (97.1) at 0.3,
+/// 99.95, 97.3 (97.0) at 0.4, 99.96, 96.1 (95.9) at 0.5; with what the forward pass alone reports
+/// as moving 99.93, 96.9 (96.5), with what either pass does 99.90, 97.9 (97.2). On
+/// `kitti_raw_0005`, whose boxes also contain ground, the IoU is 75.8, 76.8, 74.9; 75.4, 75.4.
 const MOVING_MIN: f32 = 0.4;
 
-/// Reads a recording three times and writes it without what moves. Returns whether it got to the
-/// end.
+/// Reads a recording three times and writes it without moving objects. Returns whether it ran to
+/// completion.
 fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     let mut source = source::open(args.recordings.path(), &args.recording.options())?;
     let profile = config::profile(&args.flow.profile)?;
@@ -82,7 +82,7 @@ fn clean(args: &args::CleanArgs) -> Result<bool, RunError> {
     Ok(done)
 }
 
-/// A sweep that was seen forwards.
+/// A sweep processed forwards.
 struct SeenSweep {
     world_from_vehicle: Pose,
     twist: Twist,
@@ -97,12 +97,12 @@ struct Cleaning<'a> {
     seen: Vec<SeenSweep>,
     map: StillMap,
     clock: ReturnClock,
-    /// Returns by what is known of them.
+    /// Numbers of returns by verdict.
     counts: [u64; 4],
 }
 
 impl Cleaning<'_> {
-    /// Finds poses and flow in the order of time.
+    /// Finds poses and flow in time order.
     fn forwards(
         &mut self,
         source: &mut dyn Source,
@@ -128,7 +128,7 @@ impl Cleaning<'_> {
         Ok(!end.interrupted)
     }
 
-    /// Finds the flow against the order of time, and what comes of both.
+    /// Finds the flow in reverse time order, and the verdicts from both passes.
     fn backwards(
         &mut self,
         source: &mut dyn Source,
@@ -160,7 +160,7 @@ impl Cleaning<'_> {
         Ok(true)
     }
 
-    /// Decides what became of the returns of a sweep.
+    /// Decides the verdicts on the returns of a sweep.
     fn judge(&mut self, number: usize, returns: usize, backwards: &OneWay) {
         let moving = self.args.flow.profile.moving.unwrap_or(MOVING_MIN);
         let seen = &mut self.seen[number];
@@ -168,7 +168,7 @@ impl Cleaning<'_> {
         seen.verdicts = Verdicts::of([&forwards, backwards], returns, moving);
     }
 
-    /// Reads a sweep, with the pose that was found for it.
+    /// Reads a sweep, with the pose found for it.
     fn read(
         &self,
         source: &mut dyn Source,
@@ -182,7 +182,7 @@ impl Cleaning<'_> {
         Ok(())
     }
 
-    /// Writes what comes of all sweeps, in the order of time.
+    /// Writes the results of all sweeps, in time order.
     fn write(
         &mut self,
         source: &mut dyn Source,
@@ -226,7 +226,7 @@ impl Cleaning<'_> {
     }
 }
 
-/// Where a return was in the world, m.
+/// The position of a return in the world, m.
 fn place(clock: &ReturnClock, rig: &Rig, sweep: &SweepData, point: &Point) -> glam::DVec3 {
     let at = glam::DVec3::from_array(point.position.map(f64::from));
     let offset_s = if rig.distorted { clock.offset_s(rig, point) } else { 0.0 };

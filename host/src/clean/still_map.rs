@@ -1,5 +1,5 @@
-//! The map of what stands: the mean of the static returns of every voxel in which more of them were
-//! static than moving.
+//! The static map: the mean of the static returns of every voxel in which more returns were static
+//! than moving.
 
 use std::collections::HashMap;
 
@@ -7,16 +7,17 @@ use glam::DVec3;
 
 use super::judged::Judged;
 
-/// Returns in a voxel.
+/// The returns in a voxel.
 #[derive(Clone, Copy, Default)]
 struct VoxelReturns {
-    /// Sum of places of static ones, from the voxel's corner, m, and of their intensities.
+    /// Sums of the static returns' positions relative to the voxel's corner, m, and of their
+    /// intensities.
     sum: [f32; 4],
     still: u32,
     moving: u32,
 }
 
-/// A map that grows with the drive.
+/// The static map, growing with the drive.
 pub struct StillMap {
     voxel_m: f64,
     voxels: HashMap<[i32; 3], VoxelReturns>,
@@ -27,7 +28,7 @@ impl StillMap {
         StillMap { voxel_m, voxels: HashMap::new() }
     }
 
-    /// Adds a return at a place of the world.
+    /// Adds a return at a world position.
     pub fn add(&mut self, at: DVec3, intensity: f32, judged: Judged) {
         let index = (at / self.voxel_m).floor();
         let key = index.to_array().map(|c| c as i32);
@@ -43,7 +44,7 @@ impl StillMap {
         }
     }
 
-    /// Its points: x, y, z (m, world) and intensity, in the order of their voxels.
+    /// The points: x, y, z (m, world) and intensity, in voxel order.
     pub fn points(&self) -> Vec<[f32; 4]> {
         let still = self.voxels.iter().filter(|(_, seen)| seen.still > seen.moving);
         let mut still: Vec<_> = still.collect();

@@ -1,7 +1,7 @@
 //! `raywake flow`: scene flow between two clouds, without poses.
 //!
-//! The second cloud is registered with the first, then both go through the pipeline as the two
-//! sweeps of a drive whose world is the first cloud's frame.
+//! The second cloud is registered to the first, then both go through the pipeline as the two sweeps
+//! of a drive whose world is the first cloud's frame.
 
 pub mod motion;
 pub mod place;
@@ -31,10 +31,10 @@ use raywake_io::source::{BinFields, SweepData, pose_row, read_cloud, read_pose};
 use place::Unplaced;
 use rows::{Form, PointRow};
 
-/// From this speed over ground on a point counts as moving, m/s.
+/// Minimum speed over ground of a moving point, m/s.
 const MOVING_MPS: f64 = 0.5;
 
-/// Reads, registers, finds the flow and writes it.
+/// Reads and registers the clouds, computes the flow and writes it.
 pub fn flow(args: &args::FlowArgs) -> Result<(), RunError> {
     let form = Form::of(&args.out)?;
     let profile = config::profile(&args.flow.profile)?;
@@ -88,7 +88,7 @@ fn title(args: &args::FlowArgs) -> String {
     format!("from {} to {}", name(&args.first), name(&args.second))
 }
 
-/// A cloud as a sweep. Fails where it has no return with a place, as nothing can be done with it.
+/// Reads a cloud as a sweep. Fails if no return has finite coordinates.
 fn cloud(path: &Path, fields: Option<&BinFields>, stamp_s: f64) -> Result<SweepData, Error> {
     let mut sweep = SweepData { stamp_s, ..SweepData::default() };
     read_cloud(path, fields, &mut sweep.points)?;
@@ -111,8 +111,8 @@ fn rig(args: &args::FlowArgs, first: &SweepData) -> Result<(Rig, String), Error>
     })
 }
 
-/// Flow of every point of the first sweep, those over the pipeline's capacity included, and what
-/// the pipeline left out of both.
+/// Flow of every point of the first sweep, including those over the pipeline's capacity, and what
+/// the pipeline dropped from both.
 fn points(
     args: &args::FlowArgs,
     profile: &Profile,
@@ -139,14 +139,14 @@ fn points(
     }
     let flows = stepped.output.flows.as_ref();
     let flows: Vec<PointFlow> = flows.map_or_else(Vec::new, |f| f.points.iter().collect());
-    // A device that fails between the two leaves nothing to put out.
+    // A device that fails between the two sweeps leaves nothing to output.
     if let Some(failure) = drive.failure().filter(|_| flows.len() < first.points.len()) {
         return Err(RunError::Device(failure.clone()));
     }
     Ok((flows, Dropped { returns, ..Dropped::default() }))
 }
 
-/// Writes what is to be looked at.
+/// Writes the picture and the messages asked for.
 fn show(
     args: &args::FlowArgs,
     png: Option<&Path>,
@@ -164,7 +164,7 @@ fn show(
     bag.finish()
 }
 
-/// A line on what was found.
+/// Lines on what was found.
 fn census(rows: &[PointRow], dt_s: f64, dropped: &Dropped) -> String {
     let count = |of: &dyn Fn(&PointRow) -> bool| rows.iter().filter(|row| of(row)).count();
     let moving =

@@ -1,4 +1,4 @@
-//! The motion of the sensor from one cloud to the next, and lines about it.
+//! The motion of the sensor from one cloud to the next, and its report.
 
 use glam::{DVec3, EulerRot};
 use raywake_core::pose::{Pose, Twist};
@@ -10,8 +10,8 @@ use raywake_registration::{
     register_multi_start,
 };
 
-/// The pose of the second cloud's frame in the first one's, and lines about it; or why there is
-/// none.
+/// Estimates the pose of the second cloud's frame in the first one's, and describes it; or returns
+/// why there is none.
 pub fn find([first, second]: [&[Point]; 2], rig: &Rig) -> Result<(Pose, String), String> {
     let (mut target, mut source) = (surface(first, rig), surface(second, rig));
     let (target, source) = std::thread::scope(|scope| {
@@ -24,7 +24,7 @@ pub fn find([first, second]: [&[Point]; 2], rig: &Rig) -> Result<(Pose, String),
     if best.is_accepted() { Ok((best.pose, report(&best))) } else { Err(refusal(&best)) }
 }
 
-/// A pose that is known beforehand, and a line about it.
+/// Returns a known pose, and a line about it.
 pub fn given(pose: Pose) -> (Pose, String) {
     (pose, format!("motion     {} (given)\n", describe(&pose)))
 }
@@ -74,7 +74,7 @@ fn report(r: &Registration) -> String {
     text
 }
 
-/// Metres and degrees.
+/// Formats a motion in metres and degrees.
 fn describe(motion: &Pose) -> String {
     let DVec3 { x, y, z } = motion.translation;
     let (yaw, pitch, roll) = motion.rotation.to_euler(EulerRot::ZYX);

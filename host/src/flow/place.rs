@@ -1,4 +1,4 @@
-//! Where the sensor and the ground of two clouds are.
+//! The positions of the sensor and the ground of two clouds.
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
@@ -6,19 +6,19 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use raywake_io::source::{mounting, plausible};
 use raywake_registration::ground::ground_height;
 
-/// Why clouds have no place.
+/// Why sensor and ground could not be placed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unplaced {
-    /// None was given, and the first cloud shows none.
+    /// No ground height was given, and the first cloud shows no ground.
     #[error("no ground found in this cloud")]
     NoGround,
-    /// What was given cannot be.
+    /// An implausible value was given.
     #[error("{0}")]
     Implausible(String),
 }
 
-/// Sensor and ground as the user says, or as the first cloud tells; and a line about them. Returns
-/// are taken at once, and as they are.
+/// Sensor and ground as given by the user or estimated from the first cloud, and lines about them.
+/// Returns are treated as simultaneous and undistorted.
 pub fn rig(
     first: &[Point],
     ground_m: Option<f64>,

@@ -1,4 +1,4 @@
-//! Flow of single points as rows, and their files.
+//! Per-point flow as rows, and their files.
 
 use std::io::Write;
 use std::path::Path;
@@ -14,26 +14,26 @@ use raywake_io::sink::feather::status_names;
 use raywake_io::sink::table::TableWriter;
 use raywake_io::sink::{Meta, atomic};
 
-/// What is put out for a point of the first cloud.
+/// The output for a point of the first cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointRow {
-    /// Where it is, m, in the first cloud's frame.
+    /// Position in the first cloud's frame, m.
     pub position: [f32; 3],
-    /// Where it is in the second cloud's frame less `position`, m.
+    /// Position in the second cloud's frame minus `position`, m.
     pub flow: [f32; 3],
     /// Motion over ground along the axes of the first cloud, m.
     pub motion: [f32; 3],
-    /// Covariance of the motion (xx, xy, yy), m^2; zero where neither matched nor joined.
+    /// Covariance of the motion (xx, xy, yy), m^2; zero if neither matched nor joined.
     pub covariance: [f32; 3],
-    /// Whence the flow.
+    /// Where the flow comes from.
     pub basis: FlowBasis,
-    /// What became of it.
+    /// What became of the point.
     pub status: Status,
 }
 
 impl PointRow {
-    /// Of a point and the flow found for it in `dt_s`; `second_from_first` is the inverse of the
-    /// sensor's motion.
+    /// Creates the row of a point and its flow over `dt_s`; `second_from_first` is the inverse of
+    /// the sensor's motion.
     pub fn new(point: &Point, flow: &PointFlow, second_from_first: &Pose, dt_s: f64) -> PointRow {
         let at = Vec3::from_array(point.position);
         let measured = if at.is_finite() { 1.0 } else { f32::NAN };
@@ -49,13 +49,13 @@ impl PointRow {
         }
     }
 
-    /// Matched, or part of a moving cluster.
+    /// Whether the point was matched or is part of a moving cluster.
     pub fn valid(&self) -> bool {
         self.basis >= FlowBasis::Matched
     }
 }
 
-/// How rows are written.
+/// File format of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// A table.
@@ -65,7 +65,8 @@ pub enum Form {
 }
 
 impl Form {
-    /// By a file's extension. Fails where it is another one, or this build cannot write it.
+    /// The format of a file by its extension. Fails if the extension is unknown, or this build
+    /// cannot write it.
     pub fn of(path: &Path) -> Result<Form, Error> {
         let unable = |what: &str| format!("--out {}: {what}", path.display());
         match path.extension().and_then(|e| e.to_str()) {
@@ -76,7 +77,7 @@ impl Form {
         }
     }
 
-    /// Writes the rows, whole or not at all; `meta` goes to a table's metadata.
+    /// Writes the rows, whole or not at all; `meta` goes into a table's metadata.
     pub fn write(self, path: &Path, rows: &[PointRow], meta: Meta<'_>) -> Result<(), Error> {
         match self {
             Form::Feather => table(rows).write(path, &[meta, &[status_names()]].concat()),
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn flow_has_the_sensors_motion_and_motion_has_not() {
-        // The sensor goes a metre forward and turns left.
+        // The sensor moves a metre forward and turns left.
         let second_from_first = Pose::planar(1.0, 0.0, 0.0, FRAC_PI_2).inverse();
         let row = |position, velocity_world_mps| {
             let flow = PointFlow {

@@ -1,5 +1,5 @@
-//! What one thread hands to another: a queue of one. Whoever puts something in never waits: it
-//! takes the place of what has not been fetched. Values change places, so nothing is allocated.
+//! Handover between threads: a queue of one. The producer never waits: a new value replaces one
+//! that has not been fetched. Values are swapped, so nothing is allocated.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -17,30 +17,30 @@ struct HandoverSlot<T> {
     replaced: u64,
 }
 
-/// What came of waiting for a value.
+/// The outcome of waiting for a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fetched {
-    /// There is one.
+    /// A value was fetched.
     Value,
-    /// None came in time.
+    /// No value came in time.
     Nothing,
-    /// None will come any more.
+    /// No more values will come.
     Closed,
 }
 
 impl<T> Handover<T> {
-    /// An empty queue, with a value for whoever puts in the first one.
+    /// An empty queue, with a spare value to exchange for the first one put in.
     pub fn new(spare: T) -> Handover<T> {
         let slot = HandoverSlot { value: spare, full: false, closed: false, replaced: 0 };
         Handover { slot: Mutex::new(slot), changed: Condvar::new() }
     }
 
     fn slot(&self) -> MutexGuard<'_, HandoverSlot<T>> {
-        // Values change places whole.
+        // Values are swapped whole, so a poisoned lock does no harm.
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts in a value and takes another for it, of no meaning.
+    /// Puts in a value, in exchange for a spare of arbitrary content.
     pub fn put(&self, value: &mut T) {
         let mut slot = self.slot();
         std::mem::swap(&mut slot.value, value);
@@ -50,7 +50,7 @@ impl<T> Handover<T> {
         self.changed.notify_one();
     }
 
-    /// Fetches the value, for one of no meaning.
+    /// Fetches the value, in exchange for a spare.
     pub fn fetch(&self, value: &mut T, within: Duration) -> Fetched {
         let waits = |slot: &mut HandoverSlot<T>| !slot.full && !slot.closed;
         let waited = self.changed.wait_timeout_while(self.slot(), within, waits);
@@ -63,12 +63,12 @@ impl<T> Handover<T> {
         if slot.closed { Fetched::Closed } else { Fetched::Nothing }
     }
 
-    /// Values that were replaced before anybody fetched them.
+    /// Number of values replaced before they were fetched.
     pub fn replaced(&self) -> u64 {
         self.slot().replaced
     }
 
-    /// No value will come any more.
+    /// Closes the queue: no more values will come.
     pub fn close(&self) {
         self.slot().closed = true;
         self.changed.notify_all();
@@ -93,7 +93,7 @@ mod tests {
         assert_eq!((queue.fetch(&mut mine, SOON), queue.replaced()), (Fetched::Nothing, 2));
         queue.put(&mut 4);
         queue.close();
-        // What is in it is still fetched.
+        // A value still in the queue is fetched.
         assert_eq!((queue.fetch(&mut mine, SOON), mine), (Fetched::Value, 4));
         assert_eq!(queue.fetch(&mut mine, SOON), Fetched::Closed);
     }

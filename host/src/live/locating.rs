@@ -1,4 +1,4 @@
-//! Where the vehicle is: by registration, or by poses that come.
+//! Locating the vehicle: by registration, or by received poses.
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::pose::Pose;
@@ -15,19 +15,19 @@ use crate::locate::registration;
 /// How sweeps were located.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LocatedCounts {
-    /// By poses that came.
+    /// By received poses.
     pub by_poses: u64,
-    /// Left out for want of a pose.
+    /// Dropped for lack of a pose.
     pub without_pose: u64,
-    /// By registration, the first one among them.
+    /// By registration, including the first one.
     pub registered: u64,
-    /// Sweeps that show too little: a part of their motion is that of the sweep before.
+    /// Sweeps that show too little: part of their motion is taken from the sweep before.
     pub degenerate: u64,
-    /// Sweeps that fit nothing known: their motion is that of the sweep before.
+    /// Sweeps that match nothing known: their motion is taken from the sweep before.
     pub lost: u64,
 }
 
-/// Locates one sweep after the other.
+/// Locates one sweep after another.
 pub struct LiveLocator<'a> {
     by: By<'a>,
     counts: LocatedCounts,
@@ -39,7 +39,7 @@ enum By<'a> {
 }
 
 impl<'a> LiveLocator<'a> {
-    /// By poses, or by registration where none come.
+    /// Locates by poses, or by registration if there is no receiver.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
@@ -51,13 +51,13 @@ impl<'a> LiveLocator<'a> {
         Ok(LiveLocator { by, counts: LocatedCounts::default() })
     }
 
-    /// How it went so far.
+    /// Counts so far.
     pub fn counts(&self) -> LocatedCounts {
         self.counts
     }
 
-    /// Gives a sweep its pose and twist; `sweep_ns` is the time that one takes. Returns whether it
-    /// has one.
+    /// Sets the pose and twist of a sweep; `sweep_ns` is the duration of one. Returns whether a
+    /// pose was found.
     ///
     /// # Errors
     /// [`RunError::Allocation`].

@@ -1,16 +1,16 @@
-//! `raywake live`: a sensor's packets as they come, flow at the pace of its turns.
+//! `raywake live`: flow from a sensor's packets as they arrive, at sensor rate.
 //!
-//! | thread | does | hands on |
+//! | thread | does | passes on |
 //! |---|---|---|
 //! | receiver | packets to returns, returns to sweeps ([`receiver`]) | the newest sweep |
-//! | poses | keeps the last ones ([`poses`]) | the pose at a stamp |
-//! | worker, with its team | locates, computes flow, follows objects, sends ([`worker`]) | a pair |
+//! | poses | keeps the latest poses ([`poses`]) | the pose at a stamp |
+//! | worker, with its team | locates, computes flow, tracks objects, sends ([`worker`]) | a pair |
 //! | recorder | writes messages to a file and to viewers ([`recorder`]) | |
-//! | replay | sends a capture's packets, where there is no sensor | |
+//! | replay | sends a capture's packets in place of a sensor | |
 //!
-//! What is handed on waits in a queue of one ([`handover`]), where the newest takes the place of
-//! what nobody has fetched: nothing grows, and nobody waits for whoever is slower. After the start
-//! receiver, poses and worker allocate nothing; messages and replay do.
+//! Values are passed on through a queue of one ([`handover`]), where the newest replaces one not
+//! yet fetched: nothing grows, and no thread waits for a slower one. After the start, receiver,
+//! poses and worker allocate nothing; recorder and replay do.
 
 mod handover;
 mod locating;
@@ -54,17 +54,17 @@ use stream::FlowStream;
 use summary::LiveSummary;
 use worker::{LiveEnd, Worker};
 
-/// Where packets arrive unless something else is said: the port that Velodyne's sensors send to.
+/// Default port: the one Velodyne sensors send to.
 const PORT: u16 = 2368;
-/// After the last packet of a replay: what is on its way arrives.
+/// Wait after the last packet of a replay, for packets still on their way.
 const REPLAY_TAIL: Duration = Duration::from_millis(300);
-/// How often is asked whether the first sweep is there, and how long until that is told.
+/// How often to check for the first sweep, and how long until the user is told that there is none.
 const POLL: Duration = Duration::from_millis(100);
 const PATIENCE: Duration = Duration::from_secs(5);
 /// A device has this many deadlines to answer.
 const DEVICE_DEADLINES: u32 = 10;
 
-/// What a run needs, checked before anything is opened.
+/// What a run needs, checked before any socket or file is opened.
 struct Plan<'a> {
     args: &'a LiveArgs,
     profile: Profile,
@@ -121,7 +121,7 @@ pub fn live(args: &LiveArgs) -> Result<(), RunError> {
 }
 
 impl Plan<'_> {
-    /// From the first sweep to the end.
+    /// Processes everything from the first sweep to the end.
     fn work(
         &self,
         receiver: &Receiver,
@@ -182,7 +182,7 @@ impl Plan<'_> {
         })
     }
 
-    /// Room to follow objects in, where that is asked for.
+    /// The object tracker, if asked for.
     fn objects(&self) -> Result<Option<LiveObjects<'_>>, RunError> {
         if !self.args.objects {
             return Ok(None);
@@ -192,7 +192,7 @@ impl Plan<'_> {
         LiveObjects::new(self.tracking, &self.profile).map(Some)
     }
 
-    /// Waits for the first sweep. Returns whether there is one: a signal may come first.
+    /// Waits for the first sweep. Returns whether one arrived: a signal may come first.
     fn first_sweep(
         &self,
         receiver: &Receiver,
@@ -223,7 +223,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Tells how it went. Fails where recording did.
+    /// Prints and writes the summary. Fails if recording did.
     fn finish(
         &self,
         figures: &FiguresFile,

@@ -1,5 +1,5 @@
-//! Objects in the sweeps that come: the front end of `raywake track`, without the estimates at the
-//! ends of tracks.
+//! Objects in live sweeps: the front end of `raywake track`, without the estimates at the ends of
+//! tracks.
 
 use raywake_alloc_guard::Sealed;
 use raywake_core::output::PointFlows;
@@ -12,7 +12,7 @@ use raywake_objects::tracked::{ObjectTracker, TrackedObject};
 use crate::error::RunError;
 use crate::memory;
 
-/// Objects, and how they are followed. Nothing is allocated once it is made.
+/// The object tracker. Once created, it allocates nothing.
 pub struct LiveObjects<'a> {
     params: TrackingParams,
     profile: &'a Profile,
@@ -21,10 +21,10 @@ pub struct LiveObjects<'a> {
 }
 
 impl LiveObjects<'_> {
-    /// Bytes that it holds.
+    /// Bytes held.
     pub const BYTES: usize = size_of::<LiveObjects>() + size_of::<ObjectTracker>();
 
-    /// No tracks yet.
+    /// Creates a tracker without tracks.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
@@ -39,13 +39,12 @@ impl LiveObjects<'_> {
         })
     }
 
-    /// What was done so far.
+    /// Counts so far.
     pub fn counts(&self) -> TrackingCounts {
         self.counts
     }
 
-    /// Follows the objects through a sweep whose flow is known, or is not to be had. Returns those
-    /// in it.
+    /// Tracks the objects through a sweep, with its flow if there is any. Returns those in it.
     ///
     /// # Errors
     /// Memory was allocated.

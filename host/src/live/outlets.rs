@@ -1,4 +1,4 @@
-//! Where what is found goes: datagrams, a recording, a digest.
+//! Where results go: datagrams, a recording, a digest.
 
 use std::time::{Duration, Instant};
 
@@ -11,26 +11,26 @@ use super::handover::Handover;
 use super::recorder::RecordedPair;
 use super::stream::{FlowStream, SentSweep};
 
-/// Where what is found goes.
+/// Where results go.
 pub struct Outlets<'a> {
     pub stream: Option<FlowStream>,
-    /// Where pairs go that are recorded, and the next one.
+    /// The queue of pairs to record, and the next one.
     pub recording: Option<(&'a Handover<RecordedPair>, RecordedPair)>,
-    /// Of all results but objects, where it is wanted.
+    /// Digest of all results except objects, if wanted.
     pub digest: Option<Digest>,
 }
 
-/// What became of a pair's flow.
+/// Facts about a pair's flow that was passed on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlowGone {
     /// Columns that move.
     pub moving: usize,
-    /// How long was spent on what nobody waits for.
+    /// Time spent on output that nobody waits for.
     pub aside: Duration,
 }
 
 impl Outlets<'_> {
-    /// The flow of a pair with its first sweep.
+    /// Passes on the flow of a pair with its first sweep.
     pub fn flow(&mut self, first: &LiveSweep, flows: &PairFlows) -> FlowGone {
         let moves = |column: &&ColumnFlow| column.velocity_world_mps != [0.0; 2];
         let columns = flows.columns.iter().filter(moves);
@@ -38,7 +38,7 @@ impl Outlets<'_> {
         if let Some(stream) = &mut self.stream {
             stream.columns(&sent_sweep(first), columns);
         }
-        // Now, as the next borrow of the drive ends the flow.
+        // Now, as the next borrow of the drive ends the flow's.
         let clock = Instant::now();
         if let Some((_, kept)) = &mut self.recording {
             kept.keep(flows);
@@ -50,7 +50,7 @@ impl Outlets<'_> {
         FlowGone { moving, aside: clock.elapsed() }
     }
 
-    /// The objects in a pair's first sweep.
+    /// Passes on the objects in a pair's first sweep.
     pub fn objects(&mut self, first: &LiveSweep, seen: &[TrackedObject]) {
         if let Some(stream) = &mut self.stream {
             stream.objects(&sent_sweep(first), first.data.stamp_s, seen.iter());
@@ -60,19 +60,19 @@ impl Outlets<'_> {
         }
     }
 
-    /// Hands on a pair whose flow is kept, for another sweep of no meaning in place of its first.
+    /// Passes on a pair whose flow is kept; its first sweep is exchanged for a spare.
     pub fn record(&mut self, first: &mut LiveSweep) {
         let Some((pairs, kept)) = &mut self.recording else { return };
         kept.take_first(first);
         pairs.put(kept);
     }
 
-    /// Datagrams that the system did not take.
+    /// Number of datagrams that the system did not accept.
     pub fn unsent(&self) -> u64 {
         self.stream.as_ref().map_or(0, FlowStream::unsent)
     }
 
-    /// Pairs that were replaced before they were recorded.
+    /// Number of pairs replaced before they were recorded.
     pub fn unrecorded(&self) -> u64 {
         self.recording.as_ref().map_or(0, |(pairs, _)| pairs.replaced())
     }

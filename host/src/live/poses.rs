@@ -1,8 +1,8 @@
-//! Poses that come as datagrams.
+//! Poses received as datagrams.
 //!
 //! A datagram has 72 bytes, little-endian: `RWP1`, four bytes of zero, a u64, the time since 1970
 //! in ns, and seven f64: x, y, z (m) and the quaternion x, y, z, w of the vehicle in the world,
-//! that is of the sensor, whose frame the vehicle's is.
+//! that is, of the sensor, whose frame is the vehicle's.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::atomic::AtomicBool;
@@ -19,42 +19,42 @@ use super::receiver::{bind, each_datagram};
 /// First bytes of a datagram, and its length.
 const MAGIC: &[u8] = b"RWP1\0\0\0\0";
 const DATAGRAM: usize = 72;
-/// Poses that are kept: 2.5 s of 200 a second.
+/// Number of poses kept: 2.5 s at 200 Hz.
 const KEPT: usize = 512;
-/// How far a pose reaches beyond the last one that came, ns: two sweeps of most sensors.
+/// How far to extrapolate beyond the last pose, ns: two sweeps of most sensors.
 const BEYOND_MAX_NS: u64 = 200_000_000;
-/// A pose this far from the last one, ns, is of a clock that was set.
+/// A pose further than this from the last one, ns, means that the clock was set.
 const SET_NS: u64 = 10_000_000_000;
 const S_OF_NS: f64 = 1e-9;
 
-/// What became of datagrams.
+/// Counts of received datagrams.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PoseCounts {
     /// Poses.
     pub poses: u64,
-    /// Datagrams that are no poses.
+    /// Datagrams that are not poses.
     pub foreign: u64,
-    /// Poses that are not later than those before: left out.
+    /// Poses not later than the one before: dropped.
     pub late: u64,
 }
 
 /// A pose and its time since 1970, ns.
 type Timed = (u64, Pose);
 
-/// The last poses, rising in time.
+/// The latest poses, in time order.
 struct RecentPoses {
     poses: heapless::Deque<Timed, KEPT>,
     counts: PoseCounts,
 }
 
-/// A socket that poses arrive at.
+/// A socket that receives poses.
 pub struct PoseReceiver {
     socket: UdpSocket,
     track: Mutex<RecentPoses>,
 }
 
 impl PoseReceiver {
-    /// Opens a socket. Fails where the address is not to be had.
+    /// Opens a socket. Fails if the address is unavailable.
     pub fn bind(address: SocketAddr) -> Result<PoseReceiver, Error> {
         let socket = bind(address, "poses-from")?;
         let track = RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() };
@@ -65,7 +65,7 @@ impl PoseReceiver {
         self.track.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What became of datagrams so far.
+    /// Counts of datagrams so far.
     pub fn counts(&self) -> PoseCounts {
         self.track().counts
     }
@@ -77,14 +77,14 @@ impl PoseReceiver {
         });
     }
 
-    /// Where the vehicle was at a time since 1970, ns, and how it moved in the time that a sweep
-    /// takes from there on. `None` where poses before and after are missing.
+    /// Returns the vehicle's pose at a time since 1970, ns, and its twist over the duration of a
+    /// sweep from then on. `None` if the poses around that time are missing.
     pub fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
         self.track().at(stamp_ns, sweep_ns)
     }
 }
 
-/// The pose of a datagram.
+/// Parses the pose in a datagram.
 fn parse(datagram: &[u8]) -> Option<Timed> {
     let numbers = datagram.strip_prefix(MAGIC).filter(|_| datagram.len() == DATAGRAM)?;
     let (stamp, numbers) = numbers.split_first_chunk()?;
@@ -103,7 +103,7 @@ impl RecentPoses {
         };
         let last_ns = self.poses.back().map_or(timed.0 - 1, |(last_ns, _)| *last_ns);
         if timed.0.abs_diff(last_ns) > SET_NS {
-            // The clock was set; of what was before nothing can be told.
+            // The clock was set: earlier poses are of no use.
             self.poses.clear();
         } else if timed.0 <= last_ns {
             self.counts.late += 1;
@@ -120,7 +120,7 @@ impl RecentPoses {
     fn at(&self, stamp_ns: u64, sweep_ns: u64) -> Option<(Pose, Twist)> {
         let pose = self.pose(stamp_ns)?;
         let newest_ns = self.poses.back()?.0;
-        // How it moves is told by what has come, where that is later than the stamp.
+        // If poses later than the stamp have arrived, the twist is taken from them alone.
         let until_ns = match newest_ns > stamp_ns {
             true => newest_ns.min(stamp_ns.saturating_add(sweep_ns)),
             false => stamp_ns.saturating_add(sweep_ns),
@@ -145,7 +145,7 @@ impl RecentPoses {
         }
     }
 
-    /// After the last pose, where the last two lead.
+    /// Extrapolates the last two poses beyond the last one.
     fn beyond(&self, at_ns: u64) -> Option<Pose> {
         let mut newest = self.poses.iter().rev();
         let ((to_ns, to), (from_ns, from)) = (newest.next()?, newest.next()?);
@@ -155,7 +155,7 @@ impl RecentPoses {
     }
 }
 
-/// A share of the way from one pose to another.
+/// Interpolates between two poses.
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let place = |a: DVec3, b: DVec3| a + share * (b - a);
     let turned: DQuat = from.rotation.slerp(to.rotation, share);
@@ -177,7 +177,7 @@ mod tests {
         RecentPoses { poses: heapless::Deque::new(), counts: PoseCounts::default() }
     }
 
-    /// Ten metres a second ahead, turning by 0.2 rad/s.
+    /// Forwards at 10 m/s, turning at 0.2 rad/s.
     fn moving(seconds: std::ops::Range<u64>) -> RecentPoses {
         let mut track = track();
         for tenth in seconds.start * 10..seconds.end * 10 {
@@ -217,7 +217,7 @@ mod tests {
         let mut jump = moving(1..2);
         jump.take(&datagram(u64::MAX, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
         assert!(jump.at(u64::MAX, SECOND).is_none() && jump.poses.len() == 1);
-        // And back: one wrong stamp does not end it.
+        // And back: one wrong stamp does no lasting harm.
         jump.take(&datagram(2 * SECOND, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
         assert_eq!((jump.poses.len(), jump.counts.late), (1, 0));
     }

@@ -1,4 +1,4 @@
-//! The thread that receives a sensor's packets. Nothing is allocated there.
+//! The thread that receives a sensor's packets. It allocates nothing.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -14,25 +14,25 @@ use socket2::SockRef;
 
 use super::handover::Handover;
 
-/// More than any datagram has, bytes.
+/// More than the largest datagram, bytes.
 const DATAGRAM: usize = 1 << 16;
-/// Bytes of packets that the system is asked to hold: two sweeps of the largest sensor (OS1-128,
-/// 2048 columns).
+/// Size of the receive buffer requested from the system, bytes: two sweeps of the largest sensor
+/// (OS1-128, 2048 columns).
 const HELD: usize = 8 << 20;
-/// How often is asked whether it is over.
+/// How often to check whether to stop.
 const POLL: Duration = Duration::from_millis(50);
 
-/// What others see of a receiver.
+/// A receiver's state as seen by other threads.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReceiverState {
     pub counts: PacketCounts,
-    /// The sensor.
+    /// Address of the sensor.
     pub sender: Option<IpAddr>,
     /// Time of the first stamp since 1970, ns.
     pub epoch_ns: u64,
 }
 
-/// A socket that packets arrive at.
+/// A socket that receives packets.
 pub struct Receiver {
     socket: UdpSocket,
     address: SocketAddr,
@@ -40,7 +40,7 @@ pub struct Receiver {
     state: Mutex<ReceiverState>,
 }
 
-/// Opens a socket. Fails where the address is not to be had.
+/// Opens a socket. Fails if the address is unavailable.
 pub fn bind(address: SocketAddr, option: &str) -> Result<UdpSocket, Error> {
     let open = || {
         let socket = UdpSocket::bind(address)?;
@@ -56,15 +56,16 @@ fn now_ns() -> u64 {
     since.map_or(0, |since| since.as_nanos() as u64)
 }
 
-/// Whether nothing came, as it may; other errors are those of single datagrams, which are lost.
+/// Pauses after an error, except a timeout or interruption; errors concern single datagrams, which
+/// are lost.
 fn pause(e: &std::io::Error) {
     if !matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) {
-        // A network that is down says so at once.
+        // If the network is down, the error comes at once, again and again.
         std::thread::sleep(POLL);
     }
 }
 
-/// Hands every datagram to `take` until `stop`.
+/// Passes every datagram to `take` until `stop`.
 pub fn each_datagram(
     socket: &UdpSocket,
     stop: &AtomicBool,
@@ -80,16 +81,16 @@ pub fn each_datagram(
 }
 
 impl Receiver {
-    /// Opens a socket for a sensor. Fails where the address is not to be had.
+    /// Opens a socket for a sensor. Fails if the address is unavailable.
     pub fn bind(address: SocketAddr, sensor: LiveSensor) -> Result<Receiver, Error> {
         let socket = bind(address, "listen")?;
-        // The system gives what it allows.
+        // The system grants as much as it allows.
         let _ = SockRef::from(&socket).set_recv_buffer_size(HELD);
         let address = socket.local_addr().unwrap_or(address);
         Ok(Receiver { socket, address, sensor, state: Mutex::default() })
     }
 
-    /// Where it listens.
+    /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -99,17 +100,17 @@ impl Receiver {
         &self.sensor
     }
 
-    /// How it goes.
+    /// The current state.
     pub fn state(&self) -> ReceiverState {
         *self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Bytes of packets that the system holds.
+    /// Size of the receive buffer, bytes.
     pub fn held(&self) -> usize {
         SockRef::from(&self.socket).recv_buffer_size().unwrap_or(0)
     }
 
-    /// A note for the user where the system holds little.
+    /// A note for the user if the receive buffer is small.
     pub fn note(&self) -> Option<String> {
         let held = self.held();
         (held < HELD).then(|| {
@@ -120,8 +121,8 @@ impl Receiver {
         })
     }
 
-    /// Receives packets and hands on the sweeps until `stop`. Whoever sends the first packet of the
-    /// sensor is the sensor; what others send is foreign.
+    /// Receives packets and passes on the sweeps until `stop`. The sender of the first valid packet
+    /// is taken as the sensor; datagrams from others are foreign.
     pub fn run(&self, sweeps: &Handover<LiveSweep>, stop: &AtomicBool) {
         let (mut assembler, mut sender) = (Assembler::new(self.sensor.clone()), None);
         raywake_alloc_guard::watch("receiver", || {
@@ -133,7 +134,7 @@ impl Receiver {
                     false => assembler.foreign(),
                 }
                 let counts = assembler.counts();
-                // Whoever sent something else first is not the sensor.
+                // A sender whose first datagram was not a valid packet is not the sensor.
                 sender = sender.filter(|_| counts.packets > 0);
                 let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
                 *state = ReceiverState { counts, sender, epoch_ns: assembler.epoch_ns() };
@@ -142,8 +143,8 @@ impl Receiver {
         sweeps.close();
     }
 
-    /// Datagrams that the system threw away because they were not fetched in time; `None` where it
-    /// does not tell.
+    /// Number of datagrams that the system dropped because they were not fetched in time; `None` if
+    /// unknown.
     pub fn overflowed(&self) -> Option<u64> {
         let table = match self.address.is_ipv4() {
             true => "/proc/net/udp",
@@ -153,7 +154,7 @@ impl Receiver {
     }
 }
 
-/// The last column of the row of a local port in Linux's table of sockets.
+/// The last column of a local port's row in Linux's socket table.
 fn overflowed(table: &str, port: u16) -> Option<u64> {
     let end = format!(":{port:04X}");
     let is_mine = |row: &&str| row.split_whitespace().nth(1).is_some_and(|at| at.ends_with(&end));

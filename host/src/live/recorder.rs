@@ -1,4 +1,4 @@
-//! The thread that writes messages: a disk or a viewer that is slow holds up nothing but itself.
+//! The thread that writes messages: a slow disk or viewer holds up nothing else.
 
 use std::time::Duration;
 
@@ -15,17 +15,17 @@ use raywake_objects::tracked::TrackedObject;
 use super::handover::{Fetched, Handover};
 use crate::console::warn;
 
-/// How often is asked whether there is something to write.
+/// Maximum time to wait for something to write.
 const POLL: Duration = Duration::from_secs(1);
 
-/// A pair of sweeps, kept to be written.
+/// A pair of sweeps, kept for writing.
 pub struct RecordedPair {
     first: LiveSweep,
     columns: Vec<ColumnFlow>,
     returns: Vec<ReturnFlow>,
-    /// None where they are not followed.
+    /// `None` if objects are not tracked.
     objects: Option<heapless::Vec<TrackedObject, TRACKS_MAX>>,
-    /// What else is known; none before the first pair.
+    /// The remaining fields; `None` before the first pair.
     rest: Option<Rest>,
 }
 
@@ -39,7 +39,7 @@ struct Rest {
 }
 
 impl RecordedPair {
-    /// Room for a pair.
+    /// Allocates room for a pair.
     pub fn of(sensor: &LiveSensor, profile: &Profile) -> RecordedPair {
         RecordedPair {
             first: LiveSweep::of(sensor),
@@ -66,16 +66,16 @@ impl RecordedPair {
     pub fn keep_objects(&mut self, seen: &[TrackedObject]) {
         let kept = self.objects.get_or_insert_default();
         kept.clear();
-        // There is room for as many as there are tracks.
+        // The capacity is the maximum number of tracks.
         let _ = kept.extend_from_slice(seen);
     }
 
-    /// Takes the pair's first sweep, for another of no meaning.
+    /// Takes the pair's first sweep, in exchange for a spare.
     pub fn take_first(&mut self, sweep: &mut LiveSweep) {
         std::mem::swap(&mut self.first, sweep);
     }
 
-    /// Writes the pair, where there is one.
+    /// Writes the pair, if there is one.
     fn write(&self, to: &mut BagSink) -> Option<Result<(), Error>> {
         let Rest { points, solid, dt_s, turnover, valid, foreground_dropped } =
             *self.rest.as_ref()?;
@@ -96,16 +96,16 @@ impl RecordedPair {
     }
 }
 
-/// What came of recording.
+/// The outcome of recording.
 #[derive(Debug, Default)]
 pub struct RecordingOutcome {
-    /// Pairs that were written.
+    /// Number of pairs written.
     pub pairs: u64,
-    /// Why no more were.
+    /// Why recording ended early.
     pub failure: Option<Error>,
 }
 
-/// Writes pairs until no more come. A failure, as of a full disk, ends the recording alone.
+/// Writes pairs until no more come. A failure, such as a full disk, ends only the recording.
 pub fn record(
     sink: BagSink,
     pairs: &Handover<RecordedPair>,

@@ -1,37 +1,37 @@
-//! What comes out as datagrams: a small format for whoever acts on what moves.
+//! Output as datagrams: a small format for programs that react to moving objects.
 //!
-//! Little-endian. A datagram has a head of 24 bytes and records of one kind:
+//! Little-endian. A datagram has a header of 24 bytes and records of one kind:
 //!
-//! | byte | type | what |
+//! | byte | type | content |
 //! |--:|---|---|
 //! | 0 | 4 bytes | `RWF2` |
 //! | 4 | u16 | kind of the records: 0 sweep, 1 column, 2 tracklet, 3 object |
-//! | 6 | u16 | records in this datagram |
+//! | 6 | u16 | number of records in this datagram |
 //! | 8 | u16 | number of this datagram among those of its kind and sweep |
-//! | 10 | u16 | how many there are |
-//! | 12 | u32 | number of the sweep, whose frame positions and axes are of |
-//! | 16 | u64 | its stamp since 1970, ns |
+//! | 10 | u16 | number of such datagrams |
+//! | 12 | u32 | number of the sweep, in whose frame positions and axes are given |
+//! | 16 | u64 | stamp of the sweep since 1970, ns |
 //!
 //! | kind | bytes | record |
 //! |---|--:|---|
 //! | sweep | 96 | f64 x, y, z and quaternion x, y, z, w of the vehicle in the world; then 1. |
 //! | column | 32 | f32 x, y, velocity x, y over ground, its covariance xx, xy, yy, P(moves) |
 //! | tracklet | 32 | f32 x, y, velocity x, y over ground, turn rate; then 2. |
-//! | object | 84 | u32 number, observations, class; f32 its share of the returns; then 3. |
+//! | object | 84 | u32 number, observations, class; f32 the class's share of the returns; then 3. |
 //!
 //! 1. f32 time since the sweep before, s (0: no flow), latency from the last packet, ms; u64 sweeps
-//!    left out so far; u32 columns, tracklets, objects that were sent, and 0; u64 stamp of the
-//!    sweep before, ns
+//!    dropped so far; u32 columns, tracklets, objects sent, and 0; u64 stamp of the sweep before,
+//!    ns
 //! 2. u32 observations; f32 standard deviation of the speed, P(moves)
-//! 3. f32 P(moves) (NaN: not known), time since the stamp at which it was last seen (s, below 0
-//!    where it was not seen in the sweep), x, y, z of the middle of its box, heading (rad), length,
-//!    width, height, velocity x, y over ground (0 where it stands), turn rate, covariance xx, xy,
-//!    yy of its place, variances of its heading and speed
+//! 3. f32 P(moves) (NaN: unknown), time when last seen relative to the stamp (s, below 0 if not
+//!    seen in the sweep), x, y, z of the centre of its box, heading (rad), length, width, height,
+//!    velocity x, y over ground (0 if stationary), turn rate, covariance xx, xy, yy of its
+//!    position, variances of its heading and speed
 //!
-//! Columns are those that move in the sweep before, objects all in it (`--objects`), tracklets
-//! those that move in the sweep; m, m/s, rad/s along the vehicle's axes. Classes: 0 ground,
-//! 1 structure, 2 vegetation, 3 pole, 4 car, 5 large vehicle, 6 person, 7 two-wheeler, 255 none.
-//! For every sweep there is a datagram of kind 0, after the others.
+//! Columns are the moving ones of the sweep before, objects all of that sweep (`--objects`),
+//! tracklets the moving ones of the sweep; m, m/s, rad/s along the vehicle's axes. Classes:
+//! 0 ground, 1 structure, 2 vegetation, 3 pole, 4 car, 5 large vehicle, 6 person, 7 two-wheeler,
+//! 255 none. Every sweep ends with a datagram of kind 0.
 
 use std::net::{SocketAddr, UdpSocket};
 
@@ -46,9 +46,9 @@ use raywake_objects::wrap_angle;
 
 const MAGIC: &[u8; 4] = b"RWF2";
 const HEAD: usize = 24;
-/// Bytes of records in a datagram at most: it fits an Ethernet frame.
+/// Maximum bytes of records in a datagram, which then fits an Ethernet frame.
 const ROOM: usize = 1280;
-/// Bytes of a column and of a tracklet, and of an object.
+/// Bytes of a column or tracklet, and of an object.
 const RECORD: usize = 32;
 const OBJECT: usize = 84;
 
@@ -61,7 +61,7 @@ enum RecordKind {
     Object = 3,
 }
 
-/// A sweep that is sent.
+/// A sweep to send.
 #[derive(Clone, Copy, Debug)]
 pub struct SentSweep {
     pub number: u64,
@@ -69,21 +69,21 @@ pub struct SentSweep {
     pub pose: Pose,
 }
 
-/// What else is told of a sweep.
+/// Other facts sent about a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepFacts {
-    /// Since the sweep before, s; 0 where there is no flow.
+    /// Time since the sweep before, s; 0 if there is no flow.
     pub dt_s: f64,
     pub latency_ms: f64,
-    /// Sweeps left out so far.
+    /// Sweeps dropped so far.
     pub left_out: u64,
-    /// Columns, tracklets and objects that were sent.
+    /// Numbers of columns, tracklets and objects sent.
     pub sent: [usize; 3],
     /// Stamp of the sweep before, ns.
     pub before_ns: u64,
 }
 
-/// A socket that datagrams leave by, and the one in hand.
+/// A socket to send datagrams from, and the current datagram.
 pub struct FlowStream {
     socket: UdpSocket,
     to: SocketAddr,
@@ -92,7 +92,7 @@ pub struct FlowStream {
 }
 
 impl FlowStream {
-    /// Opens a socket. Fails where the system has none.
+    /// Opens a socket. Fails if the system has none.
     pub fn to(to: SocketAddr) -> Result<FlowStream, Error> {
         let any: SocketAddr = match to {
             SocketAddr::V4(_) => ([0; 4], 0).into(),
@@ -107,7 +107,7 @@ impl FlowStream {
         Ok(FlowStream { socket, to, datagram: heapless::Vec::new(), unsent: 0 })
     }
 
-    /// Datagrams that the system did not take.
+    /// Number of datagrams that the system did not accept.
     pub fn unsent(&self) -> u64 {
         self.unsent
     }
@@ -141,7 +141,7 @@ impl FlowStream {
         })
     }
 
-    /// Sends objects of a sweep, whose stamp is also given as it stands in them, s. Returns how
+    /// Sends objects of a sweep; `stamp_s` is its stamp on the objects' time scale, s. Returns how
     /// many.
     pub fn objects<'a>(
         &mut self,
@@ -171,7 +171,7 @@ impl FlowStream {
         })
     }
 
-    /// Sends a sweep, after all else of it.
+    /// Sends the record of a sweep, after all its others.
     pub fn sweep(&mut self, sweep: &SentSweep, facts: &SweepFacts) {
         self.begin(RecordKind::Sweep, sweep, [0, 1, 1]);
         let (place, turned) = (sweep.pose.translation, sweep.pose.rotation);
@@ -186,7 +186,7 @@ impl FlowStream {
         self.finish();
     }
 
-    /// Sends records of one kind and size, as many a datagram as fit. Returns how many.
+    /// Sends records of one kind and size, as many per datagram as fit. Returns how many.
     fn all<R>(
         &mut self,
         (kind, bytes): (RecordKind, usize),
@@ -224,7 +224,7 @@ impl FlowStream {
     }
 
     fn bytes(&mut self, bytes: &[u8]) {
-        // The records were counted.
+        // The number of records was chosen to fit.
         let _ = self.datagram.extend_from_slice(bytes);
     }
 
@@ -233,7 +233,7 @@ impl FlowStream {
     }
 }
 
-/// A covariance (xx, xy, yy) of the world along the vehicle's axes, in the plane.
+/// Rotates a planar covariance (xx, xy, yy) from the world's to the vehicle's axes.
 fn turned_covariance(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
     let (sin, cos) = libm::sincosf(pose.yaw_rad() as f32);
     let (cc, ss, cs) = (cos * cos, sin * sin, cos * sin);
@@ -253,7 +253,7 @@ mod tests {
         u16::from_le_bytes(bytes[at..][..2].try_into().unwrap())
     }
 
-    /// By the table above.
+    /// Checked against the table above.
     #[test]
     fn what_is_sent() {
         let here = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -267,7 +267,7 @@ mod tests {
         };
         let mut tracklet = TrackletState { age: 7, probability: 0.5, ..TrackletState::default() };
         tracklet.covariance[3][3] = 0.25;
-        // It looks along y.
+        // It faces along y.
         let pose = Pose::planar(1.0, 2.0, 0.0, std::f64::consts::FRAC_PI_2);
         let sweeps = [8, 9].map(|number| SentSweep { number, stamp_ns: 100 + number, pose });
         let columns = vec![column; 41];
@@ -329,7 +329,7 @@ mod tests {
         }
     }
 
-    /// That object, of a vehicle at (1, 2) that looks along y.
+    /// Checks that object, seen from a vehicle at (1, 2) that faces along y.
     fn check_object(bytes: &[u8]) {
         let numbers = [0, 4, 8].map(|at| u32::from_le_bytes(bytes[at..][..4].try_into().unwrap()));
         assert_eq!(numbers, [5, 9, 4]);

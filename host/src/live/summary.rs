@@ -1,4 +1,4 @@
-//! What is counted while sweeps come, and what is told of it.
+//! The statistics of a live run, and their summary.
 
 use raywake_core::continuity::Reset;
 use raywake_core::dropped::DroppedReturns;
@@ -12,50 +12,50 @@ use super::locating::LocatedCounts;
 use super::poses::PoseCounts;
 use crate::latency::{Latencies, LatencyFigures};
 
-/// Counted sweep by sweep. Nothing is allocated for it.
+/// Statistics updated sweep by sweep, without allocation.
 pub struct LiveStatistics {
     pub counts: SweepCounts,
     pub dropped: DroppedReturns,
     pub latencies: Latencies,
 }
 
-/// What became of sweeps.
+/// Counts of sweeps by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SweepCounts {
     /// Sweeps whose flow was computed, or that had no usable predecessor.
     pub done: u64,
     /// Of these, sweeps that completed a pair.
     pub pairs: u64,
-    /// Left out, as a newer one came before they were begun.
+    /// Sweeps dropped, as a newer one arrived before they were begun.
     pub left_out: u64,
-    /// Whose flow came later than the deadline, after the first pair.
+    /// Sweeps whose flow was later than the deadline, after the first pair.
     pub late: u64,
-    /// Left out before all was allocated.
+    /// Sweeps dropped before everything was allocated.
     pub before_start: u64,
-    /// That lack packets.
+    /// Sweeps that lack packets.
     pub incomplete: u64,
-    /// Turns that are missing between others.
+    /// Revolutions missing between others.
     pub missing: u64,
-    /// Without a usable predecessor, the first apart.
+    /// Sweeps without a usable predecessor, except the first.
     pub resets: u64,
-    /// Columns that were put out as moving.
+    /// Columns reported as moving.
     pub moving_columns: u64,
-    /// Objects that were put out as moving.
+    /// Objects reported as moving.
     pub moving_objects: u64,
-    /// Times that no sweep came for a second.
+    /// Number of times that no sweep arrived for a second.
     pub pauses: u64,
-    /// Sweeps in which memory was allocated: a defect of this program.
+    /// Sweeps in which memory was allocated, which is a bug.
     pub allocating: u64,
-    /// Pairs that were recorded.
+    /// Pairs recorded.
     pub recorded: u64,
-    /// Pairs that were not, as the disk or a viewer was slower.
+    /// Pairs not recorded, as the disk or a viewer was too slow.
     pub unrecorded: u64,
     /// Datagrams that the system did not send.
     pub unsent_datagrams: u64,
 }
 
 impl LiveStatistics {
-    /// Nothing so far.
+    /// Creates empty statistics.
     pub fn new() -> LiveStatistics {
         LiveStatistics {
             counts: SweepCounts::default(),
@@ -64,7 +64,7 @@ impl LiveStatistics {
         }
     }
 
-    /// Counts a sweep that was done.
+    /// Counts a processed sweep.
     pub fn sweep(&mut self, output: &SweepOutput) {
         let counts = &mut self.counts;
         self.dropped += output.dropped;
@@ -80,19 +80,19 @@ impl LiveStatistics {
         self.counts.moving_objects += moving.count() as u64;
     }
 
-    /// Counts the latency of a sweep that may take so long.
+    /// Counts the latency of a sweep, given its deadline.
     pub fn latency(&mut self, ms: f64, deadline_ms: f64) {
         self.latencies.add(ms);
         self.counts.late += u64::from(ms > deadline_ms);
     }
 }
 
-/// What a run was and what came of it.
+/// The facts and results of a live run.
 #[derive(Debug, Serialize)]
 pub struct LiveSummary {
     /// Version of this program.
     pub version: &'static str,
-    /// Model of the sensor, and its address, where one sent.
+    /// Model of the sensor, and its address if it sent anything.
     pub sensor: String,
     pub sender: Option<String>,
     pub profile: String,
@@ -100,37 +100,36 @@ pub struct LiveSummary {
     pub device: String,
     pub threads: usize,
     pub simd: &'static str,
-    /// Time that a sweep takes, and may take until its flow is there, ms.
+    /// Duration of a revolution, and maximum latency of a sweep's flow, ms.
     pub turn_ms: f64,
     pub deadline_ms: f64,
-    /// How long it ran, s.
+    /// Duration of the run, s.
     pub seconds: f64,
     pub packets: PacketCounts,
-    /// Datagrams that the system threw away as they were not fetched in time; null where it does
-    /// not tell.
+    /// Datagrams that the system dropped because they were not fetched in time; null if unknown.
     pub overflowed: Option<u64>,
-    /// Bytes of packets that it holds.
+    /// Size of the system's receive buffer, bytes.
     pub held_bytes: usize,
     pub sweeps: SweepCounts,
-    /// Number of the first sweep done, and of the last.
+    /// Numbers of the first and the last sweep processed.
     pub frames: Option<[u64; 2]>,
-    /// Returns left out.
+    /// Returns dropped.
     #[serde(serialize_with = "by_name")]
     pub dropped_returns: DroppedReturns,
-    /// What following objects did, where it was asked for.
+    /// Counts of object tracking, if asked for.
     #[serde(serialize_with = "tracking_by_name")]
     pub tracking: Option<TrackingCounts>,
     pub located: LocatedCounts,
-    /// Where poses come.
+    /// Counts of received poses, if poses are received.
     pub poses: Option<PoseCounts>,
-    /// From the arrival of a sweep's last packet until its flow is there and sent, ms; after the
-    /// first pair.
+    /// Time from the arrival of a sweep's last packet until its flow is computed and sent, ms;
+    /// after the first pair.
     pub latency_ms: Option<LatencyFigures>,
-    /// How the device failed, where it did, and the scalar backend took its place.
+    /// How the device failed, if it did and the scalar backend took over.
     pub device_failure: Option<String>,
     /// Why recording ended early.
     pub recording_failure: Option<String>,
-    /// Digest of all results, of a replay.
+    /// Digest of all results of a replay.
     pub digest: Option<String>,
 }
 
@@ -146,7 +145,7 @@ fn tracking_by_name<S: Serializer>(
 }
 
 impl LiveSummary {
-    /// For people.
+    /// Formats the summary for the user.
     pub fn text(&self) -> String {
         let SweepCounts { done, pairs, left_out, late, incomplete, resets, .. } = self.sweeps;
         let PacketCounts { packets, missing, duplicates, reordered, foreign, .. } = self.packets;

@@ -23,15 +23,15 @@ use crate::drive::Drive;
 use crate::error::RunError;
 use crate::team;
 
-/// How often is asked whether it is over, where no sweep comes.
+/// How often to check for the end when no sweep arrives.
 const POLL: Duration = Duration::from_millis(100);
-/// Without a sweep for so long the user is told.
+/// The user is warned after this time without a sweep.
 const PAUSE: Duration = Duration::from_secs(1);
-/// How often the user is told how it goes, and whoever watches the process that it is alive.
+/// Intervals of status lines to the user and of watchdog notifications to systemd.
 const STATUS: Duration = Duration::from_secs(5);
 const ALIVE: Duration = Duration::from_secs(1);
 
-/// All that a run needs, allocated.
+/// Everything a run needs, allocated.
 pub struct Worker<'a> {
     pub profile: &'a Profile,
     pub rig: &'a Rig,
@@ -42,7 +42,7 @@ pub struct Worker<'a> {
     pub locator: LiveLocator<'a>,
     pub outlets: Outlets<'a>,
     pub quiet: bool,
-    /// Sweeps after which it ends.
+    /// Number of sweeps after which the run ends.
     pub most: u64,
 }
 
@@ -58,19 +58,19 @@ pub struct LiveEnd {
     times: [Duration; 2],
 }
 
-/// A run under way.
+/// A run in progress.
 struct LiveRun<'a> {
     worker: Worker<'a>,
     statistics: LiveStatistics,
     now: LiveSweep,
-    /// The sweep done before, and whether there is one.
+    /// The sweep processed before, and whether there is one.
     last: LiveSweep,
     paired: bool,
     frames: Option<[u64; 2]>,
 }
 
 impl Worker<'_> {
-    /// Sends what moves in a sweep, and the sweep.
+    /// Sends the moving tracklets of a sweep, then the sweep's record.
     fn send(&mut self, sweep: &LiveSweep, mut facts: SweepFacts) {
         let Some(stream) = &mut self.outlets.stream else { return };
         let moves_min = self.profile.moves.moves_min;
@@ -80,7 +80,8 @@ impl Worker<'_> {
         stream.sweep(&sweep, &facts);
     }
 
-    /// Works on sweeps until a signal, the last one, or so many. `spare` is of no meaning.
+    /// Processes sweeps until a signal, the last one, or the maximum number. The content of `spare`
+    /// is irrelevant.
     ///
     /// # Errors
     /// [`RunError::Device`] without a spare backend.
@@ -100,7 +101,7 @@ impl Worker<'_> {
             worker: self,
         };
         running.statistics.counts.before_start = sweeps.replaced();
-        // Nobody may watch.
+        // Ignored: there may be no service manager.
         let _ = sd_notify::notify(&[NotifyState::Ready]);
         let began = Instant::now();
         let (mut status, mut alive, mut came) = (began, began, began);
@@ -124,7 +125,7 @@ impl Worker<'_> {
             }
             if status.elapsed() > STATUS {
                 status = Instant::now();
-                // A log that cannot be written is no reason to stop.
+                // Failure to write the log is no reason to stop.
                 let _ = say(running.worker.quiet, &running.status(receiver, began));
             }
         }
@@ -147,8 +148,8 @@ impl Worker<'_> {
 }
 
 impl LiveRun<'_> {
-    /// One sweep. Memory allocated in it is a defect that is counted, and told once: a vehicle goes
-    /// on.
+    /// Processes one sweep. Memory allocated in it is a bug, counted and reported once: the vehicle
+    /// keeps moving.
     fn take(&mut self, sweeps: &Handover<LiveSweep>) -> Result<(), RunError> {
         let counts = &mut self.statistics.counts;
         counts.left_out = sweeps.replaced() - counts.before_start;
@@ -165,7 +166,7 @@ impl LiveRun<'_> {
         }
     }
 
-    /// One sweep, from its returns to what is sent.
+    /// Processes one sweep, from its returns to the datagrams.
     fn sweep(&mut self) -> Result<(), RunError> {
         let LiveRun { worker, statistics, now, last, paired, frames, .. } = self;
         let turn_ns = worker.turn.as_nanos() as u64;
@@ -199,7 +200,7 @@ impl LiveRun<'_> {
             before_ns: last.stamp_ns,
         };
         worker.send(now, facts);
-        // With the first pair the run has started: registration tries several motions there.
+        // Without the first pair, on which registration tries several motions.
         if statistics.counts.pairs > 1 {
             let deadline_ms = worker.deadline.as_secs_f64() * 1e3;
             statistics.latency(latency_ms(now, aside), deadline_ms);
@@ -217,7 +218,7 @@ impl LiveRun<'_> {
         Ok(())
     }
 
-    /// No sweep has come for a while.
+    /// Warns that no sweep has arrived for a while.
     fn pause(&mut self, receiver: &Receiver) {
         let counts = &mut self.statistics.counts;
         counts.pauses += 1;
@@ -225,7 +226,7 @@ impl LiveRun<'_> {
         warn(&format!("no sweep for {} s; {packets} packets so far", PAUSE.as_secs()));
     }
 
-    /// How it goes, for people.
+    /// The status line for the user.
     fn status(&self, receiver: &Receiver, began: Instant) -> String {
         let (counts, latencies) = (&self.statistics.counts, &self.statistics.latencies);
         let latency = latencies.figures().map_or(String::new(), |l| format!(", {}", l.line()));
@@ -240,13 +241,13 @@ impl LiveRun<'_> {
     }
 }
 
-/// Since a sweep's last packet came, ms, but for what was done aside.
+/// Time since a sweep's last packet arrived, excluding the time spent on other output, ms.
 fn latency_ms(sweep: &LiveSweep, aside: Duration) -> f64 {
     sweep.arrived.elapsed().saturating_sub(aside).as_secs_f64() * 1e3
 }
 
 impl LiveEnd {
-    /// What it was and what came of it; poses and recording apart.
+    /// The summary of the run, without poses and recording.
     pub fn summary(&self, profile: &Profile, receiver: &Receiver) -> LiveSummary {
         let (drive, state) = (&self.drive, receiver.state());
         let [turn_ms, deadline_ms] = self.times.map(|time| time.as_secs_f64() * 1e3);

@@ -1,4 +1,4 @@
-//! The command: sources in, feather files out.
+//! The `map` command: sources in, feather files out.
 
 use std::time::Instant;
 
@@ -20,8 +20,8 @@ use crate::statistics::Dropped;
 use raywake_io::sink::feather::{self, Voxel};
 use raywake_io::source::{self, SweepData};
 
-/// Maps every sweep of a recording. Returns whether it got to the end: a signal ends it after the
-/// sweep in hand.
+/// Maps every sweep of a recording. Returns whether it ran to completion: a signal ends it after
+/// the current sweep.
 pub fn map(args: &args::MapArgs) -> Result<bool, RunError> {
     let profile = Profile::map();
     let mut source = source::open(&args.data, &args.recording.options())?;
@@ -77,7 +77,7 @@ struct MapTally {
 }
 
 impl MapTally {
-    /// Maps a sweep: its voxels, and the corner of the voxel (0, 0, 0) in the world, m.
+    /// Maps a sweep. Returns its voxels, and the corner of the voxel (0, 0, 0) in the world, m.
     fn sweep(
         &mut self,
         mapper: &mut Mapper,
@@ -102,7 +102,7 @@ impl MapTally {
         Ok((found.iter().map(voxel).collect(), origin_m))
     }
 
-    /// Of the sweep mapped last.
+    /// Figures of the sweep mapped last.
     fn last(&self, voxels: &[Voxel]) -> SweepFigures {
         let ms = self.milliseconds.last().copied().unwrap_or_default();
         [("voxels", voxels.len() as f64), ("ms a sweep", ms)]

@@ -11,12 +11,12 @@ use raywake_kernels::schedule::Schedule;
 
 use super::Mapper;
 
-/// Programs in the order the executor has them.
+/// Indices of the executor's programs.
 const RAYS: usize = 0;
 const COUNT: usize = 1;
 const BAND: usize = 2;
 
-/// A device with everything recorded.
+/// A device with all its programs recorded.
 pub struct DeviceMap {
     executor: Executor,
     schedule: Schedule,
@@ -37,7 +37,7 @@ impl DeviceMap {
         &self.executor.info().name
     }
 
-    /// Where the next sweep goes: mapped memory.
+    /// Where the next sweep goes, in mapped memory.
     pub fn input(&mut self) -> Result<RayInput<'_>, GpuError> {
         let rows = [Buffer::rays, Buffer::origins].map(|b| self.schedule.index(Heap::Upload, b));
         let [rays, origins] = self.executor.uploads(rows)?;

@@ -1,4 +1,4 @@
-//! `raywake map`: the sparse map of appendix B, one per sweep, over the sensor's whole range.
+//! `raywake map`: the sparse map of appendix B, one per sweep, over the sensor's full range.
 
 pub mod command;
 pub mod device;
@@ -65,19 +65,19 @@ pub struct Mapper {
     backend: MapBackend,
 }
 
-/// Where a map lies and what it left out.
+/// Where a map lies and what was dropped.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapped {
-    /// The window: keys count from its corner.
+    /// The window; keys count from its corner.
     pub window: Window,
-    /// Returns left out.
+    /// Returns dropped.
     pub dropped: DroppedReturns,
-    /// Rays.
+    /// Number of rays.
     pub rays: usize,
 }
 
 impl Mapper {
-    /// A mapper for a profile that passed [`Profile::check`].
+    /// Creates a mapper for a profile that passed [`Profile::check`].
     pub fn new(profile: Profile, rig: Rig, backend: MapBackend) -> Mapper {
         Mapper {
             columns: vec![NONE; profile.returns()],

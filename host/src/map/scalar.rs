@@ -1,4 +1,4 @@
-//! The scalar map: memory allocated once for the buffers it needs.
+//! The scalar map: allocates its buffers once.
 
 use raywake_core::map::{Bands, map};
 use raywake_core::params::Profile;
@@ -9,7 +9,7 @@ use raywake_core::stages::{MAP_PROGRAMS, Storage};
 
 use super::Mapper;
 
-/// Memory and bands.
+/// Buffer memory and bands.
 pub struct ScalarMap {
     words: Vec<u32>,
     profile: Profile,

@@ -1,4 +1,4 @@
-//! In the place of pictures, in a build without them.
+//! Stand-in for pictures in a build without them.
 
 use std::path::Path;
 
@@ -13,12 +13,12 @@ pub struct NoPictures;
 pub use NoPictures as Pictures;
 
 impl NoPictures {
-    /// Fails where one is asked for.
+    /// Fails if any picture is asked for.
     pub fn create(files: &PictureFiles, _: &str, _: usize) -> Result<NoPictures, Error> {
         if files.is_empty() { Ok(NoPictures) } else { Err(lacking()) }
     }
 
-    /// No.
+    /// Returns `false`.
     pub fn are_wanted(&self) -> bool {
         false
     }
@@ -28,13 +28,13 @@ impl NoPictures {
         Ok(())
     }
 
-    /// Nothing is left to do.
+    /// Does nothing.
     pub fn finish(self, _: &str) -> Result<(), Error> {
         Ok(())
     }
 }
 
-/// Fails.
+/// Always fails.
 pub fn write_one(_: &Path, _: &SweepData, _: &Subject, _: &str) -> Result<(), Error> {
     Err(lacking())
 }

@@ -13,11 +13,11 @@ use crate::args::PictureFrame;
 
 /// Columns slower than this are drawn as static, m/s.
 const MOVING_MPS: f32 = 0.5;
-/// Width of the arrow of a tracklet observed less than [`AGE`] times, pixels.
+/// Width of the arrow of a tracklet observed fewer than [`AGE`] times, pixels.
 const THIN: f32 = 0.8;
-/// As in the author's viewer: most false matches end before.
+/// As in the author's viewer: most false matches end sooner.
 const AGE: u32 = 3;
-/// How much further than the window a picture reaches, so that its border can be seen.
+/// How far a picture extends relative to the window, so that the window's border is visible.
 pub(super) const BEYOND: f64 = 1.16;
 
 pub(super) fn view(
@@ -58,7 +58,7 @@ fn cell(column: &ColumnFlow, pose: &Pose, frame: PictureFrame) -> Cell {
     Cell { at: column.position_vehicle_m, colour, arrows: [arrow, None] }
 }
 
-/// Corners of the window around the vehicle, within half a voxel.
+/// Corners of the window around the vehicle, accurate to half a voxel.
 fn window(half_m: f64, frame: Frame, pose: &Pose) -> [[f32; 2]; 4] {
     let corners = [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]];
     corners.map(|corner: [f64; 2]| match frame {

@@ -7,12 +7,12 @@ use raywake_render::{Cell, Look, Panel, Sign, colours};
 
 use super::drawing::{entry, heights, look};
 
-/// How far a picture reaches, m: as far as a map does.
+/// How far a picture extends, m: as far as a map.
 const REACH_M: f64 = 100.0;
 /// Height above the ground of the darkest columns, m: that of a tram.
 const HEIGHT_M: f32 = 4.0;
 
-/// Columns by the height of their highest occupied voxel, free ones apart.
+/// Draws columns by the height of their highest occupied voxel, and free ones separately.
 pub(super) fn view(
     world_from_vehicle: &Pose,
     voxels: &[Voxel],

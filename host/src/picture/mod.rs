@@ -1,4 +1,4 @@
-//! Pictures of what the program finds, seen from above.
+//! Pictures of the results, seen from above.
 
 #[cfg(feature = "png")]
 mod drawing;
@@ -31,27 +31,27 @@ pub use pictures::{Pictures, write_one};
 pub enum Subject<'a> {
     /// The flow of the sweep's columns.
     Flow {
-        /// Its columns.
+        /// The sweep's columns.
         columns: &'a [ColumnFlow],
-        /// Gives the window.
+        /// Determines the window.
         profile: &'a Profile,
         /// Which velocity is drawn.
         frame: PictureFrame,
     },
-    /// The sweep's sparse map, in place of its returns.
+    /// The sweep's sparse map, instead of its returns.
     Map {
-        /// Its voxels, those of a column one after the other.
+        /// The map's voxels, those of a column next to each other.
         voxels: &'a [Voxel],
         /// Corner of the voxel (0, 0, 0) in the world, m.
         origin_m: [f64; 3],
-        /// Edge of a voxel, m.
+        /// Size of a voxel, m.
         voxel_m: f64,
     },
     /// The objects in the sweep.
     Objects {
-        /// What they are.
+        /// The objects.
         objects: &'a [TrackedObject],
-        /// The way of each so far, in the world, m.
+        /// The path of each so far, in the world, m.
         ways: &'a [Vec<[f64; 3]>],
     },
 }
@@ -59,7 +59,7 @@ pub enum Subject<'a> {
 /// Where the pictures of a recording go.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PictureFiles {
-    /// Folder for one of each sweep, FRAME.png.
+    /// Folder for one picture per sweep, FRAME.png.
     pub folder: Option<PathBuf>,
     /// File of an animated PNG.
     pub film: Option<PathBuf>,
@@ -68,7 +68,7 @@ pub struct PictureFiles {
 }
 
 impl PictureFiles {
-    /// What the command line asks for, and a folder for single pictures where there is one.
+    /// The files the command line asks for, with a folder for single pictures, if any.
     pub fn of(views: &Views, folder: Option<PathBuf>) -> PictureFiles {
         PictureFiles { folder, film: views.film.clone(), page: views.page.clone() }
     }
@@ -79,5 +79,5 @@ impl PictureFiles {
     }
 }
 
-/// What the charts of a page show of every sweep: a name and the sweep's number.
+/// What the charts of a page show for every sweep: names and values.
 pub type SweepFigures = [(&'static str, f64); 2];

@@ -1,5 +1,5 @@
-//! One HTML page of a run that needs nothing else: a slider over the sweeps, figures of each, the
-//! busiest moments, and the summary. `page.html` is what it is made of.
+//! A self-contained HTML page of a run: a slider over the sweeps, figures of each, the busiest
+//! moments, and the summary. `page.html` is its template.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -14,28 +14,28 @@ use serde::Serialize;
 
 use super::SweepFigures;
 
-/// Pictures on a page at most; of more sweeps every second is shown, or every third, and so on. At
-/// 100 kB each a page of as many has 40 MB, which browsers open within a second.
+/// Maximum number of pictures on a page; of more sweeps every second is shown, or every third, and
+/// so on. At 100 kB each, a page with this many has 40 MB, which browsers open within a second.
 const SHOWN_MAX: usize = 300;
 
 const TEMPLATE: &str = include_str!("page.html");
 /// Where the sweeps go in the template.
 const MOMENTS: &str = "<!-- moments -->\n";
 
-/// A page while it is written.
+/// A page being written.
 pub(super) struct Page {
     partial: Partial,
     out: BufWriter<File>,
     name: String,
-    /// One of so many sweeps is shown.
+    /// One in this many sweeps is shown.
     every: usize,
     moments: usize,
 }
 
-/// A sweep as the page's script takes it.
+/// A sweep in the form the page's script takes.
 #[derive(Serialize)]
 struct Moment {
-    /// In words: a timestamp has more digits than a script's numbers.
+    /// A string: a timestamp has more digits than JavaScript numbers.
     frame: String,
     time_s: f64,
     figures: [f64; 2],
@@ -56,7 +56,7 @@ impl Page {
         self.moments.is_multiple_of(self.every)
     }
 
-    /// A sweep, its time after the first one (s), and its picture if it is shown.
+    /// Adds a sweep with its time since the first one (s), and its picture if it is shown.
     pub(super) fn moment(
         &mut self,
         frame: u64,
@@ -86,7 +86,7 @@ impl Page {
         writeln!(self.out, "<script>add({})</script>", serde_json::to_string(moment)?)
     }
 
-    /// Ends the page with a text. Without a sweep there is no page, and no file.
+    /// Ends the page with a summary. Without any sweep there is no page, and no file.
     pub(super) fn finish(mut self, summary: &str) -> Result<(), Error> {
         if self.moments == 0 {
             return Ok(());
@@ -98,7 +98,7 @@ impl Page {
     }
 }
 
-/// What comes before the sweeps, and what after.
+/// The template before and after the sweeps.
 fn parts() -> (&'static str, &'static str) {
     TEMPLATE.split_once(MOMENTS).unwrap_or((TEMPLATE, ""))
 }

@@ -1,4 +1,4 @@
-//! Where pictures go: a file each, a film, a page.
+//! Where pictures go: single files, a film, a page.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -12,10 +12,10 @@ use raywake_render::{Canvas, Film, Look, Panel};
 use super::page::Page;
 use super::{PictureFiles, Subject, SweepFigures, drawing, flow, map, tracks};
 
-/// How long the first picture of a film is shown, s: a sweep of most sensors.
+/// How long the first picture of a film is shown, s: the duration of a sweep of most sensors.
 const FIRST_SHOWN_S: f64 = 0.1;
 
-/// The pictures of a recording, under way.
+/// The pictures of a recording in progress.
 pub struct Pictures {
     name: String,
     folder: Option<PathBuf>,
@@ -26,11 +26,11 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Those of a recording with this name and number of sweeps. Folders are made where they are
-    /// missing.
+    /// Starts the pictures of a recording with this name and number of sweeps. Creates missing
+    /// folders.
     ///
     /// # Errors
-    /// Where a file or folder cannot be made.
+    /// If a file or folder cannot be created.
     pub fn create(files: &PictureFiles, name: &str, sweeps: usize) -> Result<Pictures, Error> {
         files.folder.as_deref().map_or(Ok(()), atomic::create_folder)?;
         Ok(Pictures {
@@ -47,10 +47,10 @@ impl Pictures {
         self.folder.is_some() || self.film.is_some() || self.page.is_some()
     }
 
-    /// Draws a sweep. The time is counted from the first sweep drawn.
+    /// Draws a sweep. Time counts from the first sweep drawn.
     ///
     /// # Errors
-    /// Where a file cannot be written.
+    /// If a file cannot be written.
     pub fn write(
         &mut self,
         sweep: &SweepData,
@@ -81,20 +81,20 @@ impl Pictures {
         self.page.iter_mut().try_for_each(moment)
     }
 
-    /// Completes the files that all sweeps go to; the page ends with this text.
+    /// Completes the files that span all sweeps; the page ends with the summary.
     ///
     /// # Errors
-    /// Where they cannot be written.
+    /// If they cannot be written.
     pub fn finish(self, summary: &str) -> Result<(), Error> {
         self.film.map_or(Ok(()), FilmFile::finish)?;
         self.page.map_or(Ok(()), |page| page.finish(summary))
     }
 }
 
-/// Draws a single picture, named so.
+/// Draws a single picture, titled with `name`.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_one(
     path: &Path,
     sweep: &SweepData,
@@ -135,10 +135,10 @@ pub(super) fn draw(sweep: &SweepData, subject: &Subject) -> Canvas {
     drawn(&titled(panel, "drive"), &look).unwrap()
 }
 
-/// A film while it is made.
+/// A film being written.
 struct FilmFile {
     partial: Partial,
-    /// Until the first picture says how large all are.
+    /// Present until the first picture determines the size of all.
     empty: Option<BufWriter<File>>,
     film: Option<Film>,
 }
@@ -157,7 +157,7 @@ impl FilmFile {
         film.iter_mut().try_for_each(|f| f.frame(picture, shown_s)).map_err(|e| partial.error(e))
     }
 
-    /// Without a picture there is no film, and no file.
+    /// Completes the film. Without any picture there is no film, and no file.
     fn finish(self) -> Result<(), Error> {
         let FilmFile { partial, film, .. } = self;
         let Some(film) = film else { return Ok(()) };

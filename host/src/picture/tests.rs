@@ -24,10 +24,10 @@ fn draw(columns: &[ColumnFlow], yaw_rad: f64, frame: PictureFrame) -> Canvas {
     super::pictures::draw(&sweep, &subject)
 }
 
-/// Middle of the strong colours of the panel, m forward and left, and how many pixels have such.
+/// Centroid of the strong colours of the panel, m forward and left, and their number of pixels.
 fn motion(canvas: &Canvas) -> ([f64; 2], usize) {
     let width = canvas.size()[0] as usize;
-    // The panel is 900 pixels wide and high and stands 14 from the left and 44 from the top.
+    // The panel is 900 pixels wide and high, 14 from the left and 44 from the top.
     let rows = canvas.rgba().chunks(4 * width).skip(44).take(900);
     let pixels = rows.enumerate().flat_map(|(y, row)| {
         let strong = |p: &[u8]| p[0].saturating_sub(p[2]) > 60 || p[0].saturating_sub(p[1]) > 60;
@@ -91,7 +91,7 @@ fn what_is_static_or_unknown_has_no_arrow() {
 
 #[test]
 fn a_map_shows_what_stands_and_what_is_free() {
-    // A wall 3 m high and 20 m ahead, a free lane up to it, ground to its right; voxels of 0.4 m.
+    // A wall 3 m high 20 m ahead, a free lane up to it, ground to its right; voxels of 0.4 m.
     let voxel = |i, j, k, log_odds_tenths| Voxel { index: [i, j, k], log_odds_tenths };
     let ground = (0..100).map(|i| voxel(i, -60, 0, 20));
     let lane = (0..50).map(|i| voxel(i, 0, 0, -20));
@@ -116,7 +116,7 @@ fn a_map_shows_what_stands_and_what_is_free() {
     assert!(at(20.2, 2.2)[1] < 200, "{:?}", at(20.2, 2.2));
 }
 
-/// Texts of a page between these.
+/// The parts of a page between these strings.
 fn between<'a>(page: &'a str, from: &str, to: &str) -> Vec<&'a str> {
     let parts = page.split(from).skip(1);
     parts.map(|part| part.split_once(to).unwrap().0).collect()
@@ -160,7 +160,7 @@ fn a_page_holds_every_sweep_and_pictures_of_some() {
     assert_eq!(between(&text, "<pre>", "</pre>"), ["all &amp; done"]);
     assert_eq!(between(&text, "names = ", ";"), ["[\"moving\",\"ms\"]"]);
 
-    // Of nothing there is no page.
+    // Without sweeps there is no page.
     Pictures::create(&files(none.clone(), None), "", 0).unwrap().finish("").unwrap();
     assert!(!none.exists());
 }

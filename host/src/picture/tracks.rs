@@ -8,11 +8,11 @@ use raywake_render::{Look, Outline, Panel, Sign, Trail, colours};
 
 use super::drawing::{WIDE, along_vehicle, arrow, entry, look, places, return_heights, speeds};
 
-/// How far a picture reaches, m.
+/// How far a picture extends, m.
 const REACH_M: f64 = 50.0;
-/// Width of the cells whose arrows are thinned: there are none, m.
+/// Width of the cells whose arrows are thinned, m; there are none here.
 const CELL_M: f64 = 0.4;
-/// The smallest side of a box, m.
+/// Minimum side of a box, m.
 const SIDE_MIN_M: f32 = 0.4;
 
 pub(super) fn view(
@@ -30,7 +30,7 @@ pub(super) fn view(
         }
         panel.outlines.push(outline);
     }
-    // What moves lies upon what does not.
+    // Moving objects are drawn on top of static ones.
     panel.outlines.sort_by_key(|o| o.arrow.is_some());
     let still = entry(Sign::Outline(colours::BORDER), "static");
     let way = Sign::Line(raywake_render::Pen::new(colours::SPEEDS[2], WIDE));
@@ -39,7 +39,7 @@ pub(super) fn view(
     (panel, look(REACH_M, CELL_M, legend))
 }
 
-/// With number and class where it moves.
+/// The outline of an object, with number and class if it moves.
 fn outline(object: &TrackedObject, pose: &Pose) -> Outline {
     let (sin, cos) = libm::sincos(object.heading);
     let arrow = object.velocity.map(|velocity| arrow(along_vehicle(pose, velocity), WIDE));
@@ -54,7 +54,7 @@ fn outline(object: &TrackedObject, pose: &Pose) -> Outline {
     }
 }
 
-/// A place in the world, in the frame of the vehicle.
+/// Transforms a world position to the vehicle's frame.
 fn seen_from(world_from_vehicle: &Pose, at: [f64; 3]) -> [f32; 2] {
     let at = world_from_vehicle.inverse().transform(DVec3::from_array(at));
     [at.x as f32, at.y as f32]

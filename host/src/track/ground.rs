@@ -1,8 +1,8 @@
 //! A map of the ground from a file: an ESRI ASCII grid in the frame of the poses.
 //!
-//! Lines of a key and a number (`ncols`, `nrows`, `xllcorner`, `yllcorner`, `cellsize` and, if
-//! there is such, `NODATA_value`; m), then `nrows` lines of `ncols` heights (m), that of the
-//! largest y first.
+//! Lines of a key and a number (`ncols`, `nrows`, `xllcorner`, `yllcorner`, `cellsize` and,
+//! optionally, `NODATA_value`; m), then `nrows` lines of `ncols` heights (m), starting with the
+//! largest y.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use raywake_objects::front_end::GroundMap;
 use raywake_io::Error;
 use raywake_io::source::{text, whole};
 
-/// Heights of the ground, with their memory.
+/// Heights of the ground; owns its memory.
 #[derive(Debug)]
 pub struct Ground {
     corner: [f64; 2],
@@ -21,12 +21,12 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Reads a file; fails where it is no such grid.
+    /// Reads a file; fails if it is not such a grid.
     pub fn read(path: &Path) -> Result<Ground, Error> {
         parse(path, &whole::read_text(path)?)
     }
 
-    /// As the front end takes it.
+    /// The map in the form the front end takes.
     pub fn map(&self) -> GroundMap<'_> {
         GroundMap {
             corner: self.corner,
@@ -112,7 +112,7 @@ NODATA_value -9999
             Ok(ground) => {
                 let map = ground.map();
                 assert_eq!(map.heights.len() % map.columns, 0);
-                // Anywhere, whatever the numbers are.
+                // Anywhere, whatever the numbers.
                 [-1e300, -1.0, 0.0, 4.5, 1e300].iter().for_each(|x| _ = map.height(*x, 5.0));
                 true
             }

@@ -30,8 +30,8 @@ pub use ground::Ground;
 pub use report::TrackSummary;
 pub use tracker::{Ended, Tracker};
 
-/// Follows the objects of a recording. Returns whether it got to the end: a signal ends it after
-/// the sweep in hand: tracks that have not ended by then have no estimate and are left out.
+/// Tracks the objects of a recording. Returns whether it ran to completion: a signal ends it after
+/// the current sweep; tracks without an estimate by then are left out.
 fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     let settings = settings(args)?;
     let mut source = source::open(args.recordings.path(), &args.recording.options())?;
@@ -63,7 +63,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
         let clock = Instant::now();
         if let Some(counts) = tracker.sweep(visit.now, visit.before)? {
             report.step(&counts, clock);
-            // Flow of a sweep is known with the next one.
+            // The flow of a sweep is known with the next one.
             let stepped = visit.before.filter(|_| tracker.lags()).unwrap_or(visit.now);
             files.sweep(stepped, &tracker, report.last_ms())?;
             report.ended(&mut tracker, &mut files, || ())?;
@@ -91,7 +91,7 @@ fn track(args: &args::TrackArgs) -> Result<bool, RunError> {
     Ok(!summary.interrupted)
 }
 
-/// Parameters of the flow and of tracking.
+/// Parameters of flow and tracking.
 fn settings(args: &args::TrackArgs) -> Result<Settings, RunError> {
     let objects = TrackingParams { estimate: args.estimate.params(), ..TrackingParams::DEFAULT };
     let mut settings = config::settings_over(&args.flow.profile, objects)?;
@@ -107,7 +107,7 @@ fn flow(args: &args::TrackArgs, profile: &Profile, rig: &Rig) -> Result<Drive, R
     Ok(chosen.drive)
 }
 
-/// What the run holds, and what bounds its work.
+/// The memory of the run, and the bounds of its work.
 fn budget(fixed_lag: bool) -> String {
     let parts = Tracker::parts().map(|(name, _, size)| format!("{name} {}", bytes(size as u64)));
     let mut text = format!("memory budget: {}\n", parts.join(", "));

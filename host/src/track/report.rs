@@ -1,4 +1,4 @@
-//! The figures of a run of tracks.
+//! The figures of a tracking run.
 
 use std::fmt::Write;
 use std::time::Instant;
@@ -30,18 +30,18 @@ pub struct Line {
     pub track: u32,
     /// Time of its first centroid, s.
     pub from_s: f64,
-    /// Time to its last one, s.
+    /// Time from the first to the last one, s.
     pub for_s: f64,
     /// Centroids observed.
     pub updates: u32,
     pub returns: u64,
-    /// What the encoder takes most of its returns for; null where nobody tells.
+    /// The class the encoder assigns to most of its returns; null if unknown.
     pub class: Option<&'static str>,
     /// Length, width and height of its box, m.
     pub size_m: [f32; 3],
     /// Mean P(moves) of its returns over its life; null without the flow.
     pub p_moves: Option<f32>,
-    /// From the first place of the estimate to the last, m.
+    /// Distance from the first position of the estimate to the last, m.
     pub moved_m: f64,
     /// Speed of the estimate at the end, m/s.
     pub speed_mps: f64,
@@ -50,7 +50,7 @@ pub struct Line {
     pub iterations: usize,
 }
 
-/// What is counted as a run goes on.
+/// Counts of a run in progress.
 #[derive(Default)]
 pub struct Report {
     pub counts: TrackingCounts,
@@ -65,7 +65,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// A step of the front end that began at `clock`.
+    /// Counts a step of the front end that began at `clock`.
     pub fn step(&mut self, counts: &TrackingCounts, clock: Instant) {
         self.steps.push(clock.elapsed().as_secs_f64() * 1e3);
         self.counts += *counts;
@@ -77,7 +77,7 @@ impl Report {
         self.steps.last().copied().unwrap_or_default()
     }
 
-    /// A sweep as it was read.
+    /// Counts a sweep that was read.
     pub fn read(&mut self, sweep: &SweepData) {
         self.dropped.null_rows += u64::from(sweep.dropped.null_rows);
         if self.sweeps > 0 {
@@ -86,7 +86,8 @@ impl Report {
         self.sweeps += 1;
     }
 
-    /// The tracks that ended in the last step, with their files; `tell` hears of each.
+    /// Counts the tracks that ended in the last step, and writes their files; `tell` is called for
+    /// each.
     pub fn ended(
         &mut self,
         tracker: &mut Tracker,
@@ -101,8 +102,9 @@ impl Report {
         Ok(())
     }
 
-    /// A track at its end, with its files. The digest is over its number, anchor and start, and at
-    /// each state of its history this and the estimate; then the estimates of every sweep.
+    /// Counts an ended track, and writes its files. The digest covers its number, anchor and start,
+    /// then each state of its history with the estimate at that time, then the estimates of every
+    /// sweep.
     fn track(&mut self, ended: &Ended, files: &mut Files) -> Result<(), Error> {
         let Ended { track, estimator, shape, report, lag, milliseconds } = *ended;
         self.estimates.push(milliseconds);
@@ -138,7 +140,7 @@ impl Report {
         numbers.into_iter().for_each(|v| self.digest.double(v));
     }
 
-    /// Puts the figures together.
+    /// Assembles the figures.
     pub fn summary(self, source: &str, kind: FrontEndKind, stopped: bool) -> TrackSummary {
         TrackSummary {
             version: env!("CARGO_PKG_VERSION"),
@@ -160,14 +162,14 @@ impl Report {
     }
 }
 
-/// Mean of those that are told.
+/// Mean of the known values.
 fn mean_told(p_moves: &[f32]) -> Option<f32> {
     let told = || p_moves.iter().filter(|p| !p.is_nan());
     let count = told().count();
     (count > 0).then(|| told().sum::<f32>() / count as f32)
 }
 
-/// What a run was and what came of it.
+/// The facts and results of a tracking run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackSummary {
     /// Version of this program.
@@ -176,30 +178,30 @@ pub struct TrackSummary {
     pub source: String,
     /// `variance` or `flow`.
     pub front_end: &'static str,
-    /// Whether the run was ended by a signal.
+    /// Whether a signal ended the run.
     pub interrupted: bool,
-    /// Sweeps done.
+    /// Sweeps processed.
     pub sweeps: u64,
     /// Digest of all tracks and their estimates, 16 hexadecimal digits.
     pub digest: String,
-    /// Time of a sweep, ms: that of its flow, of the front end and of the fixed lag, as far as they
-    /// are asked for. Null without a sweep.
+    /// Time per sweep, ms: flow, front end and fixed lag, as far as they are asked for. Null
+    /// without a sweep.
     pub step_ms: Option<Spread>,
-    /// Time of the estimate of a track at its end, ms; null without a track.
+    /// Time to estimate a track at its end, ms; null without a track.
     pub estimate_ms: Option<Spread>,
-    /// Counts over all sweeps, but those of dropped returns.
+    /// Counts over all sweeps, except those of dropped returns.
     #[serde(serialize_with = "by_name")]
     pub tally: TrackingCounts,
-    /// Tracks left out, as a signal came before their estimate.
+    /// Tracks left out because a signal came before their estimate.
     pub unestimated: u64,
-    /// Left out.
+    /// What was dropped.
     pub dropped: Dropped,
-    /// Every track that was seen often enough, in the order of their ends.
+    /// Every track that was seen often enough, in the order in which they ended.
     pub tracks: Vec<Line>,
 }
 
 impl TrackSummary {
-    /// For people.
+    /// Formats the summary for the user.
     pub fn text(&self) -> String {
         let mut out = String::new();
         // Writing to a string cannot fail.
@@ -246,7 +248,7 @@ impl TrackSummary {
         writeln!(out, "digest     {}", self.digest)
     }
 
-    /// The tracks observed most.
+    /// Lists the tracks observed most often.
     fn longest(&self, out: &mut String) -> std::fmt::Result {
         let mut lines: Vec<&Line> = self.tracks.iter().collect();
         lines.sort_by_key(|l| (u32::MAX - l.updates, l.track));

@@ -1,5 +1,5 @@
-//! A sweep through the front end, and through the flow before it where that is wanted; a track
-//! through the estimate at its end. Nothing in here allocates once made.
+//! A sweep through the front end, preceded by the flow if wanted; a track through the estimate at
+//! its end. Once created, nothing in here allocates.
 
 use std::time::Instant;
 
@@ -25,10 +25,10 @@ use crate::memory;
 use crate::team::ThreadTeam;
 use raywake_io::source::SweepData;
 
-/// Tracks that have ended and are estimated at the same time, each on a thread; 3.9 MB a track.
+/// Number of ended tracks estimated at the same time, each on a thread; 3.9 MB per track.
 const SOLVERS: usize = 4;
 
-/// The front end with its tracks, and the estimate. Nothing is allocated once it is made.
+/// The front end with its tracks, and the estimate. Once created, it allocates nothing.
 pub struct Tracker {
     rig: Rig,
     params: TrackingParams,
@@ -36,22 +36,23 @@ pub struct Tracker {
     reach_m: f64,
     ground: Option<Ground>,
     parts: Sealed<TrackerParts>,
-    /// Rooms of the tracks that ended.
+    /// Slots of the tracks that ended.
     ended: Vec<usize>,
-    /// Tracks of what is no object are shown, too; without flow and encoder nobody tells.
+    /// Whether tracks other than those of objects are shown too; without flow and encoder they
+    /// cannot be distinguished.
     pub all: bool,
 }
 
 struct TrackerParts {
     front_end: Box<FrontEnd>,
     tracks: Vec<Track>,
-    /// Fixed lags use the first.
+    /// Fixed lags use the first one.
     solvers: Vec<Solver>,
-    /// One for each track, or none.
+    /// One per track, or none.
     lags: Vec<Lag>,
 }
 
-/// Room for the estimate of a track, and how it went.
+/// Memory for the estimate of a track, and its report.
 struct Solver {
     estimator: Box<Estimator>,
     report: EstimateReport,
@@ -74,7 +75,7 @@ impl Solver {
     }
 }
 
-/// Solves some of the tracks, each in a room of its own.
+/// Estimates some of the tracks, each with its own solver.
 fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slots: &[usize]) {
     match (solvers, slots) {
         ([], _) | (_, []) => {}
@@ -88,10 +89,10 @@ fn solve(params: &EstimateParams, solvers: &mut [Solver], tracks: &[Track], slot
     }
 }
 
-/// The estimate of a track over its last seconds, sweep by sweep.
+/// The sliding-window estimate of a track, sweep by sweep.
 struct Lag {
     filter: Box<FixedLag>,
-    /// One for each update of the track, thinned as its history is.
+    /// One per update of the track, thinned like its history.
     states: Thinned<ObjectState, HISTORY_MAX>,
 }
 
@@ -103,7 +104,7 @@ impl Lag {
         }
     }
 
-    /// Takes in what the last step saw of a track.
+    /// Adds the observation of a track in the last step.
     fn update(&mut self, params: &EstimateParams, track: &Track, estimator: &mut Estimator) {
         let Some(state) = track.state().filter(|_| track.life == Life::Live) else { return };
         if track.observations == 1 {
@@ -117,9 +118,9 @@ impl Lag {
 }
 
 impl Tracker {
-    /// Tracks of a rig's sweeps, with the flow of a profile where there is a drive to find it, with
-    /// a map of the ground where there is one, and with the estimate of every sweep where
-    /// `fixed_lag` says so. Call it on a thread with 64 MiB of stack, as [`Drive::new`].
+    /// Creates a tracker for a rig's sweeps: with flow if there is a drive to compute it, with a
+    /// map of the ground if there is one, and with an estimate at every sweep if `fixed_lag` is
+    /// set.
     ///
     /// # Errors
     /// [`RunError::NoMemory`].
@@ -150,7 +151,7 @@ impl Tracker {
         })
     }
 
-    /// The parts of the host's memory held: name, type and bytes, those of the flow apart.
+    /// The parts of the host's memory held, without the flow's: name, type and bytes.
     pub fn parts() -> [(&'static str, &'static str, usize); 4] {
         let solver = size_of::<Solver>() + size_of::<Estimator>();
         let lag = size_of::<Lag>() + size_of::<FixedLag>();
@@ -162,14 +163,14 @@ impl Tracker {
         ]
     }
 
-    /// Bytes of all parts, of those of every sweep's estimate only where they are wanted.
+    /// Bytes of all parts; those of the estimates at every sweep only if wanted.
     fn bytes(fixed_lag: bool) -> u64 {
         let [front_end, tracks, solvers, lags] = Tracker::parts().map(|part| part.2 as u64);
         front_end + tracks + solvers + if fixed_lag { lags } else { 0 }
     }
 
-    /// A sweep, and the one before it if there is one. With the flow it is that one whose tracks
-    /// come next, as its flow is then known; nothing comes back where there is none.
+    /// Processes a sweep, given the one before it, if any. With flow, it is the sweep before whose
+    /// tracks are updated, as its flow is then known; returns `None` if there is none.
     pub fn sweep(
         &mut self,
         now: &SweepData,
@@ -195,7 +196,7 @@ impl Tracker {
         before.map(|before| step(before, flows)).transpose()
     }
 
-    /// The last sweep, where it still waits for its flow, which will not come.
+    /// Processes the last sweep if it is still waiting for its flow, which will not come.
     pub fn last(&mut self, sweep: &SweepData) -> Result<Option<TrackingCounts>, RunError> {
         match self.drive.take() {
             Some(_) => self.sweep(sweep, None),
@@ -208,38 +209,38 @@ impl Tracker {
         self.parts.step(|parts| Ok(parts.front_end.finish(&mut parts.tracks)))
     }
 
-    /// Room for tracks, with those that live.
+    /// All track slots, including the live ones.
     pub fn tracks(&self) -> &[Track] {
         &self.parts.tracks
     }
 
-    /// Whether the tracks are those of the sweep before the last.
+    /// Whether the tracks are those of the second to last sweep.
     pub fn lags(&self) -> bool {
         self.drive.is_some()
     }
 
-    /// The tracks that ended in the last step, in the order of their room.
+    /// The tracks that ended in the last step, in slot order.
     pub fn ended_tracks(&self) -> impl Iterator<Item = &Track> {
         self.parts.tracks.iter().filter(|t| t.life == Life::Ended)
     }
 
-    /// Of the returns of the last step's sweep those of a track: which one, and the track's number.
+    /// The returns of the last step's sweep that belong to a track: index and track number.
     pub fn members(&self) -> impl Iterator<Item = (usize, u32)> {
         self.parts.front_end.members().map(|(n, slot)| (n, self.parts.tracks[slot].id))
     }
 
-    /// The objects of the last step's sweep, with their tracks: those that are put out.
+    /// The output objects of the last step's sweep, with their tracks.
     pub fn objects(&self) -> impl Iterator<Item = (TrackedObject, &Track)> {
         let shown = self.parts.tracks.iter().filter(|t| self.shows(t));
         shown.filter_map(|track| Some((track.object(&self.params)?, track)))
     }
 
-    /// Whether a track is put out: that of an object, or any.
+    /// Whether a track is output: that of an object, or any.
     fn shows(&self, track: &Track) -> bool {
         self.all || track.is_object(&self.params.front_end)
     }
 
-    /// How many of the tracks that ended in the last step are to be shown.
+    /// Number of tracks that ended in the last step and are to be shown.
     pub fn ended_objects(&self) -> usize {
         self.parts.tracks.iter().filter(|t| self.is_shown_at_its_end(t)).count()
     }
@@ -249,10 +250,10 @@ impl Tracker {
         track.life == Life::Ended && sure && self.shows(track)
     }
 
-    /// Shows the tracks that ended in the last step, in the order of their room, each with the
-    /// estimate of its trajectory and shape: those of objects, unless all are asked for. Those that
-    /// ended before they were sure are left out: there is little to estimate. After a signal no
-    /// further track is estimated, as that may take seconds each; returns how many are left.
+    /// Shows the tracks that ended in the last step, in slot order, each with the estimate of its
+    /// trajectory and shape: those of objects, unless all are asked for. Tracks that ended before
+    /// they were confirmed are left out: there is little to estimate. After a signal no further
+    /// track is estimated, as each may take seconds; returns how many are left.
     pub fn ended(
         &mut self,
         mut show: impl FnMut(&Ended) -> Result<(), raywake_io::Error>,
@@ -286,7 +287,7 @@ impl Tracker {
     }
 }
 
-/// The box around all returns of a track, each where its time puts it.
+/// The box around all returns of a track, each placed according to its time.
 fn shape(params: &TrackingParams, track: &Track, estimator: &Estimator) -> ObjectBox {
     let place = |seen: &ObjectReturn| estimator.state(f64::from(seen.time_s)).local(seen.position);
     let moved_m = moved_m(track, estimator);
@@ -294,7 +295,7 @@ fn shape(params: &TrackingParams, track: &Track, estimator: &Estimator) -> Objec
     ObjectBox::around(&params.boxes, places, moved_m).unwrap_or_default()
 }
 
-/// From the first place of the estimate of a track to its last one, along the ground, m.
+/// Distance from the first to the last position of the estimate of a track, along the ground, m.
 pub fn moved_m(track: &Track, estimator: &Estimator) -> f64 {
     let [first, last] = [0.0, track.last_s() - track.start_s].map(|t| estimator.state(t).position);
     libm::hypot(last[0] - first[0], last[1] - first[1])
@@ -304,14 +305,14 @@ pub fn moved_m(track: &Track, estimator: &Estimator) -> f64 {
 pub struct Ended<'a> {
     /// The track.
     pub track: &'a Track,
-    /// With its trajectory and shape.
+    /// The estimator with its trajectory and shape.
     pub estimator: &'a Estimator,
-    /// The box around its returns in its frame; without one it has no size.
+    /// The box around its returns in its frame; size 0 if there is none.
     pub shape: ObjectBox,
-    /// How these were found.
+    /// Report of the estimate.
     pub report: &'a EstimateReport,
-    /// The estimates of every sweep where there are any, one for each state of its history.
+    /// The estimates at every sweep, if any, one for each state of its history.
     pub lag: Option<&'a [ObjectState]>,
-    /// How long the estimate at its end took, ms.
+    /// Duration of the estimate at its end, ms.
     pub milliseconds: f64,
 }

@@ -1,4 +1,4 @@
-//! The files of tracks.
+//! The files written by tracking.
 
 use std::path::PathBuf;
 
@@ -25,17 +25,16 @@ pub struct Files {
     pictures: Pictures,
     bag: Option<BagSink>,
     rows: Vec<TrackRow>,
-    /// Number of the track of every return of a sweep, -1 without one.
+    /// Track number of every return of a sweep, -1 without one.
     of_returns: Vec<i32>,
 }
 
-/// A track at the time of one of its updates: times of the recording, s, and positions in the
-/// world, m.
+/// A track at one of its updates: times of the recording, s, and positions in the world, m.
 struct TrackRow {
     track: u32,
     filter: ObjectState,
     estimate: ObjectState,
-    /// NaN where there is none.
+    /// NaN if there is none.
     lag: ObjectState,
     /// The box in the frame of the estimate.
     shape: ObjectBox,
@@ -54,8 +53,8 @@ const NONE: ObjectState = ObjectState {
 };
 
 impl Files {
-    /// Creates folders and files for some sweeps of a recording, and waits for a viewer, where one
-    /// is to look; where nothing is named nothing will be written.
+    /// Creates folders and files for some sweeps of a recording, and waits for a viewer, if one is
+    /// expected; what is not named is not written.
     pub fn create(args: &TrackArgs, of: &Overview, sweeps: usize) -> Result<Files, Error> {
         let folder = args.out.clone();
         if let Some(root) = &folder {
@@ -72,7 +71,7 @@ impl Files {
         Ok(Files { folder, pictures, bag, rows: Vec::new(), of_returns: Vec::new() })
     }
 
-    /// The sweep of the last step, which took `ms` milliseconds.
+    /// Writes the sweep of the last step, which took `ms` milliseconds.
     pub fn sweep(&mut self, sweep: &SweepData, tracker: &Tracker, ms: f64) -> Result<(), Error> {
         if self.folder.is_none() && self.bag.is_none() && !self.pictures.are_wanted() {
             return Ok(());
@@ -98,7 +97,7 @@ impl Files {
         t.write(&folder.join(format!("returns/{:010}.feather", sweep.frame)), &[])
     }
 
-    /// A track at its end: its cloud, and its rows for later.
+    /// Writes the cloud of an ended track, and keeps its rows for later.
     pub fn track(&mut self, ended: &Ended) -> Result<(), Error> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let Ended { track, estimator, shape, .. } = ended;
@@ -127,7 +126,7 @@ impl Files {
         clouds::write_ply(&path, ["x", "y", "z", "time"], &rows)
     }
 
-    /// All tracks have been seen; the page ends with this text.
+    /// Completes the files after all tracks; the page ends with the summary.
     pub fn finish(self, summary: &str) -> Result<(), Error> {
         self.pictures.finish(summary)?;
         self.bag.map_or(Ok(()), BagSink::finish)?;
@@ -156,12 +155,12 @@ impl Files {
     }
 }
 
-/// Where a track was, in the world, m.
+/// The path of a track in the world, m.
 fn way(track: &Track) -> Vec<[f64; 3]> {
     track.history().iter().map(|state| track.in_world(state.position)).collect()
 }
 
-/// What a track is beside its states.
+/// Adds the columns that describe a track besides its states.
 fn objects(t: &mut TableWriter, rows: &[TrackRow]) {
     t.array(["cov_xx", "cov_xy", "cov_yy", "cov_zz"], rows, |r| r.variances.position);
     t.column("cov_speed", rows, |r| r.variances.speed);

@@ -13,18 +13,19 @@ use raywake_alloc_guard::watch;
 use raywake_core::team::Team;
 use raywake_simd::Simd;
 
-/// Threads at most. A sweep of `kitti_raw_0005` beside a GPU takes 39, 28, 19 and 16 ms on 1, 2, 4
-/// and 8 cores of a machine of 16, and 13 to 17 on all of them: the rest is left to others.
+/// Maximum number of threads. A sweep of `kitti_raw_0005` alongside a GPU takes 39, 28, 19 and 16
+/// ms on 1, 2, 4 and 8 cores of a 16-core machine, and 13 to 17 on all of them: the rest is left to
+/// other programs.
 pub const THREADS_MAX: usize = 8;
 
-/// Whoever belongs to the thread that asks.
+/// The team of the calling thread.
 #[derive(Clone, Copy)]
 pub struct ThreadTeam {
     simd: Simd,
 }
 
 impl ThreadTeam {
-    /// With these instructions, the widest that there are if none are given.
+    /// A team that uses these instructions, or the widest available if none are given.
     pub fn new(simd: Option<Simd>) -> ThreadTeam {
         ThreadTeam { simd: simd.unwrap_or_else(Simd::widest) }
     }
@@ -44,20 +45,20 @@ impl Team for ThreadTeam {
     }
 }
 
-/// How many threads share the work of this one, itself among them.
+/// Number of threads that share the work of the calling one, itself included.
 pub fn threads() -> usize {
-    // A pool takes in the work of other threads too, but allocates for that.
+    // A pool accepts work from other threads too, but allocates for that.
     rayon_core::current_thread_index().map_or(1, |_| rayon_core::current_num_threads())
 }
 
-/// As many threads as pay on this machine.
+/// Number of threads that pay off on this machine.
 pub fn available() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(THREADS_MAX)
 }
 
-/// Does `work` on this thread, with so many less one others that share it: they are watched for
-/// allocations all their life, and sleep where there is nothing to do. Once a thread: there is no
-/// other team for it.
+/// Does `work` on this thread, with `threads - 1` others that share it: they are watched for
+/// allocations all their life, and sleep while there is nothing to do. Once per thread: it cannot
+/// lead another team.
 pub fn lead<R>(threads: usize, work: impl FnOnce() -> R) -> R {
     if threads < 2 {
         return work();
@@ -68,7 +69,7 @@ pub fn lead<R>(threads: usize, work: impl FnOnce() -> R) -> R {
         Ok(())
     });
     let pool = pool.build().expect("the system has threads");
-    // What a thread allocates when it first looks for work.
+    // Triggers what a thread allocates when it first looks for work.
     pool.broadcast(|_| ());
     work()
 }

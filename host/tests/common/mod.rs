@@ -1,4 +1,4 @@
-//! The program and made-up recordings for it.
+//! The program and synthetic recordings for it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use raywake_core::digest::Digest;
 
-/// A folder that goes away with the value.
+/// A folder that is removed when dropped.
 pub struct Temp(PathBuf);
 
 impl Temp {
@@ -23,7 +23,7 @@ impl Temp {
         &self.0
     }
 
-    /// Writes a file and the folders above it.
+    /// Writes a file and its parent folders.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -31,8 +31,8 @@ impl Temp {
         path
     }
 
-    /// A drive `drive` of some sweeps in KITTI's layout: half a metre forward every 0.1 s, between
-    /// walls, something ahead driving along.
+    /// Writes `drive`, a drive of some sweeps in KITTI's layout: half a metre forward every 0.1 s,
+    /// between walls, with an object driving ahead.
     pub fn drive(&self, sweeps: usize) {
         for n in 0..sweeps {
             self.write(&format!("drive/velodyne_points/data/{n:010}.bin"), cloud(n % 100));
@@ -49,7 +49,7 @@ impl Drop for Temp {
     }
 }
 
-/// A row of a pose `x` metres along its axis.
+/// The row of a pose `x` metres along the x axis.
 pub fn row(x: f64) -> String {
     format!("1 0 0 {x} 0 1 0 0 0 0 1 0\n")
 }
@@ -67,7 +67,7 @@ fn cloud(n: usize) -> Vec<u8> {
     points.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-/// A weights file of zeros and others, its checksum right.
+/// A weights file of the given values, with a correct checksum.
 pub fn weights(kind: &str, shape: &[usize], value: impl Fn(usize) -> &'static str) -> String {
     let sizes: Vec<_> = shape.iter().map(usize::to_string).collect();
     let values: Vec<_> = (0..shape.iter().product::<usize>() + 1).map(value).collect();
@@ -76,7 +76,7 @@ pub fn weights(kind: &str, shape: &[usize], value: impl Fn(usize) -> &'static st
     format!("raywake-weights 1\nchecksum {:016x}\n{body}", Digest::of(body.as_bytes()))
 }
 
-/// The layer that lets calls of Vulkan fail, where cargo has put it: beside the test.
+/// The layer that makes Vulkan calls fail, where cargo puts it: next to the test.
 #[allow(dead_code)]
 pub fn faulty_layer() -> PathBuf {
     let folder = std::env::current_exe().unwrap().parent().unwrap().to_path_buf();
@@ -110,7 +110,7 @@ impl Outcome {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
     }
 
-    /// Ended with this code, and a message with these words.
+    /// Asserts that it ended with this code, and a message with these words.
     #[track_caller]
     pub fn failed(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, Some(code), "{}", self.stderr);

@@ -1,21 +1,21 @@
-// The feasible displacement of least energy for every foreground column, one workgroup a column.
-// Twin: core/src/stages/flow/expectation.rs; expectation_by_rings.rs beside it says why few
+// The feasible displacement of least energy for every foreground column, one workgroup per column.
+// Twin: core/src/stages/flow/expectation.rs; expectation_by_rings.rs next to it explains why few
 // candidates are enough.
 
 const ROW_QUADS = ROW_WORDS / 4u;
 const QUADS_PER_LANE = ROW_QUADS / ROW_WORKGROUP + 1u;
-// Displacements around the mean of the neighbours that are looked at before any others: as far
-// as there is a lane for each.
+// Reach of the displacements around the mean of the neighbours that are tried before any others: as
+// far as there is a lane for each.
 const NEAR = 3;
 const NEAR_SIDE = 2 * NEAR + 1;
 const_assert u32(NEAR_SIDE * NEAR_SIDE) <= ROW_WORKGROUP;
 
-// Rows of the column and its neighbours in `pair_cost`, NONE where there is none, one less outside
-// the window.
+// Rows of the column and its neighbours in `pair_cost`; NONE if there is none, one less than that
+// outside the window.
 var<workgroup> rows: array<u32, 9>;
-// Of the valid flows around: how many, their sum, and that of their squares.
+// Number, sum (x, y) and sum of squares of the valid flows around the column.
 var<workgroup> around: array<atomic<i32>, 4>;
-// Least energy of those near and of all, and where the latter is.
+// Least energy of the displacements near the mean and of all, and the place of the latter.
 var<workgroup> least: array<atomic<u32>, 2>;
 var<workgroup> place: atomic<u32>;
 
@@ -24,7 +24,7 @@ struct Search {
     i: i32,
     j: i32,
     own: u32,
-    // Of neighbours that have no row.
+    // Cost of the neighbours that have no row.
     beside: i32,
     n: i32,
     sum: vec2<i32>,
@@ -35,7 +35,7 @@ fn index_of(d: vec2<i32>) -> u32 {
     return u32(d.x + REACH) * LINE + u32(d.y + REACH);
 }
 
-// Eight costs of the window, two a word: nine of at most COST_MAX never carry.
+// Eight costs of the window, two per word: sums of nine of at most COST_MAX never carry.
 fn costs_of(quad: u32) -> vec4<u32> {
     var sum = vec4<u32>(0u);
     for (var n = 0; n < 9; n += 1) {
@@ -46,14 +46,14 @@ fn costs_of(quad: u32) -> vec4<u32> {
     return sum;
 }
 
-// Energy of a displacement within reach and its place in the row, NONE where it is not feasible or
-// `energy_max` or more.
+// Energy of a displacement within reach and its place in the row, NONE if it is not feasible or the
+// energy is at least `energy_max`.
 fn energy_at(s: Search, d: vec2<i32>, costs: vec4<u32>, energy_max: u32) -> vec2<u32> {
     let index = index_of(d);
     let cost = i32((costs[(index % 8u) / 2u] >> (16u * (index & 1u))) & 0xffffu);
     let square = d.x * d.x + d.y * d.y;
     let smoothness = s.squares + s.n * square - 2 * (d.x * s.sum.x + d.y * s.sum.y);
-    // Never negative: its order is that of unsigned numbers, and NONE is above all.
+    // Never negative: it can be compared as unsigned, and NONE is above all energies.
     let energy = u32(cost + s.beside + sweep.displacement_cost * square
         + sweep.smoothing * smoothness);
     if energy >= energy_max || !inside_square(s.i + d.x, s.j + d.y, sweep.side) {
@@ -66,7 +66,7 @@ fn energy_at(s: Search, d: vec2<i32>, costs: vec4<u32>, energy_max: u32) -> vec2
     return vec2<u32>(NONE);
 }
 
-// Of the column's displacements those that fall to a lane, without any in the padding.
+// The best of a lane's share of the column's displacements, skipping the padding.
 fn everywhere(s: Search, lane: u32) -> vec2<u32> {
     var best = vec2<u32>(NONE);
     for (var quad = lane; quad < ROW_QUADS; quad += ROW_WORKGROUP) { // <= QUADS_PER_LANE
@@ -83,7 +83,7 @@ fn everywhere(s: Search, lane: u32) -> vec2<u32> {
     return best;
 }
 
-// The displacement near the mean that falls to a lane.
+// The displacement near the mean that is assigned to a lane.
 fn near_mean(s: Search, lane: i32) -> vec2<u32> {
     let mean = vec2<i32>(round_div(s.sum.x, s.n), round_div(s.sum.y, s.n));
     let d = mean + vec2<i32>(lane / NEAR_SIDE, lane % NEAR_SIDE) - vec2<i32>(NEAR);
@@ -94,10 +94,10 @@ fn near_mean(s: Search, lane: i32) -> vec2<u32> {
     return energy_at(s, d, costs_of(index / 8u), NONE);
 }
 
-// Whether nothing farther from the mean than those near can have this energy or less.
+// Whether no displacement farther from the mean than the near ones can have this energy or less.
 fn excludes(s: Search, floor_energy: u32, energy: u32) -> bool {
     let spread = (s.n * s.squares - s.sum.x * s.sum.x - s.sum.y * s.sum.y) / s.n;
-    // Twice the least distance of those of the next ring from the mean, which was rounded.
+    // Twice the least distance of the next ring from the unrounded mean.
     let near = 2 * (NEAR + 1) - 1;
     let smoothness = s.n * near * near / 4 + spread;
     return floor_energy + u32(sweep.smoothing * smoothness) > energy;
@@ -156,7 +156,7 @@ fn expectation(
     if n > 0 {
         mine = near_mean(s, i32(lane));
     } else if lane == 0u {
-        // Where it pays least, if it may.
+        // The displacement of least cost, if it is feasible.
         mine = energy_at(s, displacement_at(known.y), costs_of(known.y / 8u), NONE);
     }
     atomicMin(&least[0], mine.x);

@@ -1,12 +1,12 @@
-// The feasible displacement of least energy for every foreground column, one invocation a column:
+// The feasible displacement of least energy for every foreground column, one invocation per column:
 // for devices that are CPUs. Twin: core/src/stages/flow/expectation_by_rings.rs, which explains the
 // search.
 
 struct Best { energy: i32, index: i32 }
 
-// Rows of the column and its neighbours in `pair_cost`, NONE where there is none.
+// Rows of the column and its neighbours in `pair_cost`, NONE if there is none.
 var<private> rows: array<u32, 9>;
-// Cost of those without one: inside the window unknown, outside it a number of the profile.
+// Cost of those without one: the unknown cost inside the window, one given by the profile outside.
 var<private> beside: i32;
 
 fn look_around(i: i32, j: i32) {
@@ -25,7 +25,7 @@ fn look_around(i: i32, j: i32) {
     }
 }
 
-// Eight costs of the window, two a word.
+// Eight costs of the window, two per word.
 fn costs_of(quad: u32) -> vec4<u32> {
     var sum = vec4<u32>(0u);
     for (var n = 0; n < 9; n += 1) {
@@ -72,7 +72,8 @@ fn everywhere(column: i32, i: i32, j: i32, own: u32) -> Best {
     return best;
 }
 
-// Rings of growing distance around the mean of `n` neighbours with sum `s` and squares `squares`.
+// Rings of growing distance around the mean of `n` neighbours with sum `s` and sum of squares
+// `squares`.
 fn rings(
     rank: u32,
     column: i32,
@@ -92,7 +93,7 @@ fn rings(
         if floor_energy + sweep.smoothing * (n * near * near / 4 + spread) > best.energy {
             break;
         }
-        // The ring's cells in order, 8 of them per unit of its radius, one in its middle.
+        // The ring's cells in order: 8 per unit of its radius, 1 for ring 0.
         let cells = max(8 * ring, 1);
         for (var cell = 0; cell < cells; cell += 1) { // <= 8 * 2 * REACH
             let d = mean + on_ring(ring, cell);
@@ -152,7 +153,7 @@ fn expectation_by_rings(@builtin(global_invocation_id) id: vec3<u32>) {
     look_around(i, j);
     var best = Best(I32_MAX, I32_MAX);
     if count == 0 {
-        // Where it pays least, if it may.
+        // The displacement of least cost, if it is feasible.
         let known = min_cost.d[rank];
         best = consider(best, column, i32(known.y), i32(known.x), own);
         if best.index == I32_MAX {

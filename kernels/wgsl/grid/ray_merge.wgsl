@@ -14,10 +14,10 @@ fn ray_merge(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let ray = rays.d[index];
     var slot = first_slot(ray);
-    // Finding no place is no error: the ray is then traced alone.
+    // Finding no slot is not an error: the ray is then traced alone.
     var entry = MERGE_SLOTS + index;
     for (var probe = 0u; probe < MERGE_PROBES; probe += 1u) {
-        // A look before the exchange: most rays find their like already there.
+        // A load before the exchange: most rays find an equal one already there.
         var holder = atomicLoad(&slots.d[2u * slot]);
         if holder == 0u {
             holder = atomicCompareExchangeWeak(&slots.d[2u * slot], 0u, index + 1u).old_value;

@@ -27,7 +27,7 @@ fn ray_trace(@builtin(global_invocation_id) id: vec3<u32>) {
             entered = true;
             atomicAdd(&log_odds.d[index_of(w.voxel)], LOG_ODDS_FREE * weight);
         } else if entered {
-            // The window is convex: once left, it is never met again.
+            // The window is convex: once left, it is never entered again.
             break;
         }
     }

@@ -1,4 +1,4 @@
-// The columns of the sweep before, seen from the new window. Twin: core/src/stages/grid/shift.rs
+// The columns of the previous sweep in the new window. Twin: core/src/stages/grid/shift.rs
 
 fn moved(mask: u32) -> u32 {
     let all_levels = (1u << u32(sweep.levels)) - 1u;

@@ -1,4 +1,4 @@
-// Counts, then writes, the updates of every distinct ray in a band. Twin:
+// Counts, then writes, the updates in a band by every distinct ray. Twin:
 // core/src/stages/map/emit.rs
 
 struct Merged { ray: vec2<u32>, weight: i32 }
@@ -20,7 +20,7 @@ fn key_in_band(v: vec3<i32>) -> u32 {
     return select(0u, u32(key) + 1u, key >= sweep.band_from && key < sweep.band_to);
 }
 
-// Keys ascend with x: a ray beside the band's slabs has nothing in it.
+// Keys ascend with x: a ray that misses the band's slabs has nothing in the band.
 fn beside_band(start: vec3<i32>, end: vec3<i32>) -> bool {
     let slab = sweep.side * sweep.levels;
     return max(start.x, end.x) < sweep.band_from / slab

@@ -1,9 +1,9 @@
-// Stable radix sort of updates by key, 4 bits a pass. Twin: core/src/stages/map/radix_sort.rs
+// Stable radix sort of updates by key, 4 bits per pass. Twin: core/src/stages/map/radix_sort.rs
 //
-// A pass: `histogram` counts the digits of every tile, a prefix sum over (digit, tile) says where
-// each tile's share of a digit goes, `scatter` ranks the keys within the tile and writes them,
-// `next_digit` moves on. Ranks come from counts per invocation scanned across the workgroup: no
-// subgroup size assumed. Counts of two digits share a word, so that all fit 8 KiB.
+// A pass: `histogram` counts the digits of every tile, a prefix sum over (digit, tile) determines
+// where each tile's share of a digit goes, `scatter` ranks the keys within the tile and writes
+// them, `next_digit` moves on. Ranks come from per-invocation counts scanned across the workgroup:
+// no subgroup size is assumed. Counts of two digits share a word, so that all fit in 8 KiB.
 
 const EACH = TILE / WORKGROUP;
 const HALF = RADIX / 2u;

@@ -1,7 +1,7 @@
 // Sums the updates of each key of a sorted list. Twin: core/src/stages/map/reduce_by_key.rs
 //
-// `heads` marks where a key is new; the prefix sum of the marks numbers the keys; `fold` adds every
-// update to its key's voxel. `voxels` must start as zeros.
+// `mark_heads` marks where a new key starts; the prefix sum of the marks numbers the keys; `fold`
+// adds every update to its key's voxel. `voxels` must start as zeros.
 
 fn is_head(index: u32) -> bool {
     if index == 0u {

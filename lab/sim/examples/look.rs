@@ -1,4 +1,4 @@
-//! Writes two pictures of a sweep, from above and as the sensor sees it:
+//! Writes two pictures of a sweep, one from above and one as the sensor sees it:
 //! `look SEED SWEEP FOLDER [RIG] [SCENERY] [CLUTTER]`.
 
 use raywake_sim::{Class, Drive, Options, SensorRig, SimSweep};
@@ -6,7 +6,7 @@ use std::io::Write;
 
 const SIDE: usize = 1000;
 const PIXELS_PER_M: f32 = 8.0;
-/// Columns of the sensor's view, and rows of 0.2 degrees from `TOP` down.
+/// Columns of the sensor's view, and its rows of 0.2 degrees from `TOP` downwards.
 const WIDE: usize = 1800;
 const HIGH: usize = 240;
 const TOP: f32 = 20.0;
@@ -39,7 +39,7 @@ fn from_above(sweep: &SimSweep) -> Vec<u8> {
     image
 }
 
-/// From the point `eye` metres above the vehicle frame's origin, forward in the middle.
+/// View from `eye` metres above the vehicle frame's origin, with forward in the middle.
 fn as_seen(sweep: &SimSweep, eye: f32) -> Vec<u8> {
     let mut image = vec![0u8; WIDE * HIGH * 3];
     for (p, t) in sweep.points.iter().zip(&sweep.truth) {

@@ -1,4 +1,4 @@
-//! Sweeps per second through drawn streets, of every rig or of one: `rate [SEEDS] [RIG]`.
+//! Sweeps per second through random streets, for every rig or for one: `rate [SEEDS] [RIG]`.
 
 use raywake_sim::{Drive, Options, SensorRig};
 use std::time::Instant;

@@ -1,13 +1,13 @@
-//! Lines of constant curvature: the axis of a road that bends evenly.
+//! Lines of constant curvature: the axis of a road that curves evenly.
 
 use crate::path::{Path, State};
 
-/// Curvature below which a line is taken as straight, 1/m: a kilometre of it leaves the straight
-/// line by half a millimetre.
+/// Curvature below which a line is treated as straight, 1/m: after a kilometre it deviates from the
+/// straight line by half a millimetre.
 const STRAIGHT: f64 = 1e-9;
 
 /// A line through the origin of the street frame, where it runs along +x. Places beside it are
-/// told by station (m along it) and offset (m to the left).
+/// given by station (m along it) and offset (m to the left).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bend {
     /// 1/m, left positive.
@@ -15,7 +15,7 @@ pub(crate) struct Bend {
 }
 
 impl Bend {
-    /// Offset of a place.
+    /// Offset of a place from the line.
     pub(crate) fn offset(&self, x: f64, y: f64) -> f64 {
         if self.curvature.abs() < STRAIGHT {
             return y;
@@ -25,7 +25,7 @@ impl Bend {
         radius - radius.signum() * (x * x + down * down).sqrt()
     }
 
-    /// Place and heading (rad) at a station and offset.
+    /// Place and heading (rad) at this station and offset.
     pub(crate) fn at(&self, station: f64, offset: f64) -> [f64; 3] {
         if self.curvature.abs() < STRAIGHT {
             return [station, offset, 0.0];
@@ -35,19 +35,19 @@ impl Bend {
         [(radius - offset) * s, radius - (radius - offset) * c, yaw]
     }
 
-    /// State of somebody at a station and offset who goes along the line (`way` 1) or back (-1).
+    /// State of someone at this station and offset who moves along the line (`way` 1) or back (-1).
     pub(crate) fn state(&self, [station, offset]: [f64; 2], way: f64, speed: f64) -> State {
         let [x, y, yaw] = self.at(station, offset);
         let turned = if way < 0.0 { std::f64::consts::PI } else { 0.0 };
         State { x, y, yaw: yaw + turned, speed }
     }
 
-    /// Curvature of the way of somebody at this offset.
+    /// Curvature of the path of someone at this offset.
     pub(crate) fn turn(&self, offset: f64, way: f64) -> f64 {
         way * self.curvature / (1.0 - self.curvature * offset)
     }
 
-    /// Along the line at a constant offset for this long, s; at station `place[0]` at time 0.
+    /// Path along the line at a constant offset for this long, s; at station `place[0]` at time 0.
     pub(crate) fn follow(&self, place: [f64; 2], way: f64, speed: f64, long_s: f64) -> Path {
         Path::from(self.state(place, way, speed)).then(long_s, 0.0, self.turn(place[1], way))
     }

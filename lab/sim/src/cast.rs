@@ -1,5 +1,5 @@
-//! Casting one sweep: every column of every sensor at its own time, from the moving vehicle, at
-//! the scene as it is at that time.
+//! Casting of one sweep: every column of every sensor at its own time, from the moving vehicle,
+//! into the scene as it is at that time.
 
 use crate::clutter::{Air, Clutter};
 use crate::object::Surface;
@@ -17,13 +17,13 @@ use raywake_core::sweep::Point;
 /// Returns with their truth.
 pub(crate) type Returns = (Vec<Point>, Vec<Truth>);
 
-/// A scene and a rig, prepared.
+/// A scene and a rig, prepared for casting.
 pub(crate) struct Caster<'a> {
     scene: &'a Scene,
     still: &'a Still,
     rig: &'a SensorRig,
     clutter: Clutter,
-    /// Objects that move: index and radius.
+    /// Moving objects: index and radius.
     movers: Vec<(usize, f64)>,
     /// Directions of every sensor's beams at azimuth 0, and its [`Sensor::spread`].
     beams: Vec<(Vec<DVec3>, f64)>,
@@ -51,8 +51,8 @@ impl<'a> Caster<'a> {
         Caster { scene, still, rig, clutter, movers, beams }
     }
 
-    /// Sweep `index`, `ego` being `street_from_vehicle` over time; cast by `threads` threads, the
-    /// number of which does not show in the result.
+    /// Casts sweep `index` on `threads` threads, whose number does not affect the result; `ego` is
+    /// `street_from_vehicle` over time.
     pub(crate) fn sweep(
         &self,
         ego: &(dyn Fn(f64) -> Pose + Sync),
@@ -85,7 +85,7 @@ impl<'a> Caster<'a> {
         })
     }
 
-    /// All beams of one column, fired at time `t` from a vehicle at `ego`.
+    /// Casts all beams of one column, fired at time `t` from a vehicle at `ego`.
     fn column(&self, firing: &Firing, t: f64, ego: Pose, mut rng: Rng, returns: &mut Returns) {
         let mount = &self.rig.mounts[firing.mount];
         let sensor = &mount.sensor;
@@ -141,13 +141,13 @@ impl<'a> Caster<'a> {
         }
     }
 
-    /// The parts of moving objects that a column can meet.
+    /// The parts of moving objects that a column can hit.
     fn moving_targets(&self, fan: &Fan, t: f64) -> Vec<Target> {
         let mut targets = Vec::new();
         for &(index, reach) in &self.movers {
             let object = &self.scene.objects[index];
             let place = object.path.at(t);
-            // A cheap look first: the centre is at most its height off the road below it.
+            // A cheap test first: the centre is at most its height from the road below it.
             let foot = DVec3::new(place.x, place.y, self.scene.ground.height(place.x, place.y));
             if !fan.meets(foot, 2.0 * reach + 0.5) {
                 continue;
@@ -177,7 +177,7 @@ impl<'a> Caster<'a> {
     }
 }
 
-/// The direction a ray really takes: off its nominal one by the angular noise.
+/// The true direction of a ray: the nominal one plus the angular noise.
 fn disturbed(sensor: &Sensor, u: DVec3, rng: &mut Rng) -> DVec3 {
     let noise = sensor.angle_noise;
     if noise == 0.0 {
@@ -188,13 +188,13 @@ fn disturbed(sensor: &Sensor, u: DVec3, rng: &mut Rng) -> DVec3 {
     v / v.dot(v).sqrt()
 }
 
-/// Range and intensity as measured of what is too fine to be a surface.
+/// Measured range and intensity of a return from something too fine to be a surface.
 fn diffuse(sensor: &Sensor, range: f64, rng: &mut Rng) -> (f64, f64) {
     (range + sensor.range_noise * rng.bell(), 0.08 * rng.unit())
 }
 
-/// Range and intensity as measured, where there is a return; `clearness` is the share of the light
-/// that the air lets through.
+/// Measured range and intensity, if there is a return; `clearness` is the share of the light that
+/// the air lets through.
 fn measured(sensor: &Sensor, hit: &Hit, clearness: f64, rng: &mut Rng) -> Option<(f64, f64)> {
     let asphalt = Surface::matt(0.2);
     let surface = hit.target.map_or(asphalt, |t| t.surface);

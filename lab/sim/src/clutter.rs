@@ -1,5 +1,5 @@
-//! What hangs in the air and sends a laser's light back: rain, fog, dust behind vehicles. Such
-//! returns belong to no object.
+//! Matter in the air that sends a laser's light back: rain, fog, dust behind vehicles. Such returns
+//! belong to no object.
 
 use crate::ground::Ground;
 use crate::object::{Class, Object};
@@ -17,15 +17,16 @@ pub enum Clutter {
     /// Nothing.
     #[default]
     None,
-    /// Heavy rain: single returns within some metres of the sensor.
+    /// Heavy rain: isolated returns within several metres of the sensor.
     Rain,
-    /// Fog of some 60 m of sight, in drifting patches: many returns near the sensor, few far away.
+    /// Fog with about 60 m of visibility, in drifting patches: many returns near the sensor, few
+    /// far away.
     Fog,
     /// Dust behind every second moving vehicle.
     Dust,
 }
 
-/// A name that no clutter has.
+/// A name that is not a clutter's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownClutter(String);
 
@@ -38,40 +39,40 @@ impl fmt::Display for UnknownClutter {
 
 impl std::error::Error for UnknownClutter {}
 
-/// Fine drops, evenly spread.
+/// Fine drops, uniformly distributed.
 struct Drops {
-    /// Share of rays that a drop sends back, where nothing solid is nearer.
+    /// Share of rays that a drop sends back unless something solid is nearer.
     share: f64,
-    /// Mean range of these returns, m; they grow rarer as an exponential.
+    /// Mean range of these returns, m; their distribution is exponential.
     mean_m: f64,
-    /// Share of the light that is lost on each metre, there and back.
+    /// Share of the light that is lost per metre, there and back.
     loss: f64,
     /// Whether they drift in patches.
     patchy: bool,
 }
 
-/// Beyond this range no drop is strong enough to be seen, m.
+/// Beyond this range no drop reflects strongly enough to be seen, m.
 const DROPS_M: f64 = 18.0;
-/// A patch of fog is so many times as wide as the widest bump of [`roughness`] (2.3 m), and drifts
-/// with the wind, m/s.
+/// A patch of fog is this many times as wide as the widest bump of [`roughness`] (2.3 m), and
+/// drifts with the wind, m/s.
 const PATCH: f64 = 3.0;
 const WIND: f64 = 1.5;
 
-/// Heavy rain: a percent and a half of all rays.
+/// Heavy rain: one and a half per cent of all rays.
 const RAIN: Drops = Drops { share: 0.015, mean_m: 5.0, loss: 0.004, patchy: false };
-/// Fog: by Koschmieder's rule light is down to a twentieth after the 60 m one sees.
+/// Fog: by Koschmieder's rule, light is down to a twentieth at the visibility of 60 m.
 const FOG: Drops = Drops { share: 0.15, mean_m: 4.0, loss: 0.1, patchy: true };
 
-/// A cloud of dust is made of puffs, one in so many seconds, which last for so long.
+/// A cloud of dust consists of puffs, one every `PUFF_S` seconds, each lasting `DUST_S` seconds.
 const PUFF_S: f64 = 0.1;
 const DUST_S: f64 = 3.0;
 /// Speed from which a vehicle raises dust, m/s.
 const DUSTY: f64 = 3.0;
 /// Radius of a fresh puff (m) and its growth (m/s).
 const PUFF: [f64; 2] = [0.7, 0.45];
-/// Returns per metre of a ray in a fresh puff, and the time in which they fall to a third, s.
+/// Returns per metre of a ray in a fresh puff, and the time in which they fall to about a third, s.
 const THICK: [f64; 2] = [0.15, 1.2];
-/// Splits what chance decides in puffs from what it decides elsewhere along a ray.
+/// Separate the random numbers of puffs from those of drops along the same ray.
 const OF_PUFFS: u64 = 0xD057;
 const OF_DROPS: u64 = 0xF06;
 
@@ -116,7 +117,7 @@ struct Puff {
 }
 
 impl Puff {
-    /// Behind the object where it was at `then`, seen at `t`.
+    /// A puff raised behind the object at time `then`, as seen at `t`.
     fn behind(object: &Object, ground: &Ground, then: f64, t: f64) -> Puff {
         let (at, age) = (object.path.at(then), t - then);
         let back = 0.5 * object.size[0];
@@ -126,7 +127,7 @@ impl Puff {
         Puff { centre, radius, thick: THICK[0] * (-age / THICK[1]).exp() }
     }
 
-    /// Stretch of a ray within it, m.
+    /// Section of a ray within it, m.
     fn stretch(&self, ray: &Ray) -> Option<[f64; 2]> {
         let to = self.centre - ray.origin;
         let along = to.dot(ray.direction);
@@ -136,7 +137,7 @@ impl Puff {
     }
 }
 
-/// What is in the air about one column at one time.
+/// What is in the air around one column at one time.
 pub(crate) struct Air {
     drops: Option<&'static Drops>,
     puffs: Vec<Puff>,
@@ -149,7 +150,7 @@ impl Air {
         if clutter != Clutter::Dust {
             return air;
         }
-        // The first puff of every object that is not older than they last.
+        // The oldest puff that still exists, the same for every object.
         let first = ((t - DUST_S) / PUFF_S).ceil() as i64;
         for object in scene.objects.iter().filter(|o| raises_dust(o) && is_near(o, fan, t)) {
             let times = (first..).map(|n| n as f64 * PUFF_S).take_while(|&then| then <= t);
@@ -160,7 +161,7 @@ impl Air {
         air
     }
 
-    /// Range at which the air sends a ray back that would otherwise go as far as `free`, m.
+    /// Range at which the air sends back a ray that would otherwise go as far as `free`, m.
     pub(crate) fn echo(&self, ray: &Ray, free: f64) -> Option<f64> {
         let drop = self.drops.and_then(|drops| drops.echo(ray, self.t));
         let puffs = self.puffs.iter().zip(0..).filter_map(|(puff, n)| {
@@ -196,11 +197,11 @@ impl Drops {
 fn is_near(object: &Object, fan: &Fan, t: f64) -> bool {
     let [now, then] = [t, t - DUST_S].map(|t| object.path.at(t));
     let middle = DVec3::new(0.5 * (now.x + then.x), 0.5 * (now.y + then.y), fan.origin.z);
-    // Half as long again, for bends; and what is as long as a truck, high up or down a hill.
+    // Half as much again, for curved paths; plus the length of a truck and the height of a hill.
     fan.meets(middle, 0.75 * (now.x - then.x).hypot(now.y - then.y) + 20.0)
 }
 
-/// Every second vehicle on wheels that moves.
+/// True for every second moving vehicle on wheels.
 fn raises_dust(object: &Object) -> bool {
     (Class::Car..=Class::Bus).contains(&object.class)
         && object.id % 2 == 1

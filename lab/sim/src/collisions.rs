@@ -1,4 +1,4 @@
-//! For tests: that nobody of a scene is where something else is.
+//! For tests: checks that nothing in a scene overlaps anything else.
 
 use crate::object::Fixture;
 use crate::path::Path;
@@ -6,8 +6,8 @@ use crate::scene::Scene;
 use glam::DVec3;
 use raywake_core::pose::Pose;
 
-/// Points of a box that stands at a pose, low, at half its height and high, 0.3 m apart at most
-/// and well within it.
+/// Points of a box standing at a pose, low, at half its height and high, at most 0.3 m apart and
+/// well inside it.
 fn points(pose: &Pose, size: [f64; 3]) -> Vec<DVec3> {
     let [count_x, count_y] = [size[0], size[1]].map(|length| (length / 0.3).ceil() as u32);
     let along =
@@ -29,8 +29,8 @@ fn holds(fixture: &Fixture, point: DVec3) -> bool {
     (fixture.shape.half() - at).min_element() > 0.0
 }
 
-/// Panics where an object, or the vehicle of this size on its path, is within one of the fixtures
-/// or within another within six seconds.
+/// Panics if an object, or the vehicle of this size on its path, overlaps a fixture or another of
+/// them within six seconds.
 pub(crate) fn check_clear(
     name: &str,
     scene: &Scene,

@@ -14,14 +14,14 @@ use glam::DQuat;
 use raywake_core::pose::{Pose, Twist};
 use raywake_core::sweep::{Point, Rig};
 
-/// What a drive is to be like.
+/// Options of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Sweeps, 10 a second.
     pub sweeps: usize,
-    /// What is driven through.
+    /// Scene that is driven through.
     pub scenery: Scenery,
-    /// What the vehicle does in a street; elsewhere the scene knows.
+    /// What the vehicle does in a street; elsewhere the scene determines it.
     pub ego: Ego,
     /// Amount of traffic; 1 is a busy street, 0 an empty one.
     pub density: f64,
@@ -29,8 +29,8 @@ pub struct Options {
     pub clutter: Clutter,
     /// The sensors.
     pub rig: SensorRig,
-    /// Threads that cast rays; 0: as many as the machine runs at once. The sweeps are the same
-    /// whatever the number.
+    /// Threads that cast rays; 0: as many as the machine can run at once. The number does not
+    /// affect the sweeps.
     pub threads: usize,
 }
 
@@ -51,20 +51,20 @@ impl Default for Options {
 /// One simulated sweep with its truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimSweep {
-    /// Time of the stamp, the middle of the sweep, s from 0.
+    /// Time of the stamp, at the middle of the sweep, s; starts from 0.
     pub stamp_s: f64,
-    /// Returns in the order of their times, each in the vehicle frame at its own time (distorted
-    /// by the vehicle's motion), `offset_s` after the stamp.
+    /// Returns in chronological order, each in the vehicle frame at its own time (distorted by the
+    /// vehicle's motion), `offset_s` after the stamp.
     pub points: Vec<Point>,
     /// What every return really comes from.
     pub truth: Vec<Truth>,
     /// Pose of the vehicle at the stamp.
     pub world_from_vehicle: Pose,
-    /// Velocity of the vehicle at the stamp, in its frame.
+    /// Velocity of the vehicle at the stamp, in its own frame.
     pub twist: Twist,
 }
 
-/// A drive: iterate it for its sweeps, or ask for one of them.
+/// A drive: iterate over its sweeps, or request a particular one.
 #[derive(Clone, Debug)]
 pub struct Drive {
     scene: Scene,
@@ -76,7 +76,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// A drive through a scene that the seed draws.
+    /// Draws a scene from the seed and drives through it.
     pub fn new(seed: u64, options: Options) -> Drive {
         let duration_s = options.sweeps as f64 * PERIOD_S;
         let Options { scenery, ego, density, .. } = options;
@@ -84,23 +84,23 @@ impl Drive {
         Drive::through(scene, path, seed, options)
     }
 
-    /// A drive along a path (street frame) through a given scene; the seed draws the noise, and
-    /// the options' ego and density do not count.
+    /// Drives along a path (street frame) through a given scene; the seed draws the noise, and the
+    /// options' ego and density are ignored.
     pub fn through(scene: Scene, path: Path, seed: u64, options: Options) -> Drive {
         Drive { still: Still::new(&scene), scene, path, options, seed, next: 0 }
     }
 
-    /// What is driven through.
+    /// Scene that is driven through.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Sweeps of the drive.
+    /// Number of sweeps of the drive.
     pub fn sweeps(&self) -> usize {
         self.options.sweeps
     }
 
-    /// What is fixed about the sensors.
+    /// The fixed description of the sensors.
     pub fn rig(&self) -> Rig {
         self.options.rig.declared()
     }
@@ -118,14 +118,14 @@ impl Drive {
     fn street_from_vehicle(&self, t: f64) -> Pose {
         let state = self.path.at(t);
         let foot = self.scene.ground.stand(state.x, state.y, state.yaw, [2.7, 1.5]);
-        // The body nods and rolls a little on its springs once it moves.
+        // The body pitches and rolls a little on its springs once it moves.
         let swing = 0.003 * (state.speed.abs() / 8.0).min(1.0);
         let nod = DQuat::from_rotation_y(swing * (7.3 * t + 0.4).sin());
         let roll = DQuat::from_rotation_x(0.6 * swing * (9.1 * t).sin());
         foot * Pose::new(nod * roll, self.options.rig.origin)
     }
 
-    /// Velocity of the vehicle at a time, s, in its frame.
+    /// Velocity of the vehicle at a time, s, in its own frame.
     pub fn twist(&self, t: f64) -> Twist {
         const STEP_S: f64 = 1e-3;
         let here = self.street_from_vehicle(t).inverse();
@@ -144,7 +144,7 @@ impl Drive {
         }
     }
 
-    /// Sweep `index`, whichever sweeps were cast before.
+    /// Casts sweep `index`, independently of the sweeps cast before.
     pub fn sweep(&self, index: usize) -> SimSweep {
         let stamp_s = stamp_s(index);
         let Options { rig, clutter, .. } = &self.options;

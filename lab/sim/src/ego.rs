@@ -1,10 +1,10 @@
-//! How the vehicle that carries the sensor drives.
+//! Driving behaviour of the vehicle that carries the sensor.
 
 use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::FRAC_PI_2;
 
-/// Distance of a lane's middle from the road's centre line, m.
+/// Distance of a lane's centre from the road's centre line, m.
 pub(crate) const LANE: f64 = 1.75;
 
 /// What the vehicle does during a drive.
@@ -13,14 +13,14 @@ pub enum Ego {
     /// One of the others, chosen by the seed.
     #[default]
     Any,
-    /// Stands in the right lane.
+    /// Stands still in the right lane.
     Standing,
-    /// Goes straight on at constant speed.
+    /// Drives straight on at constant speed.
     Straight {
         /// m/s, up to 14.
         speed: f64,
     },
-    /// Goes straight on, brakes to a stop, waits a second and starts again.
+    /// Drives straight on, brakes to a stop, waits a second and starts again.
     StopAndGo {
         /// m/s before and after the stop, > 0.
         speed: f64,
@@ -29,19 +29,19 @@ pub enum Ego {
     Turn {
         /// To the left, across the oncoming lane.
         left: bool,
-        /// m/s, > 0; 5 is what drivers do.
+        /// m/s, > 0; drivers typically do 5.
         speed: f64,
     },
 }
 
-/// How fast others are.
+/// How fast the other traffic is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
     /// As in town.
     Town,
     /// As on a road out of town: vehicles at 15 to 36 m/s.
     Fast,
-    /// Vehicles that creep, at up to 4 m/s unless they overtake, and many people, who stroll, alone
+    /// Vehicles that creep, at up to 4 m/s unless they overtake, and many people strolling, alone
     /// or in pairs.
     Slow,
 }
@@ -49,16 +49,16 @@ pub(crate) enum Pace {
 /// A planned drive.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Plan {
-    /// Of the vehicle, street frame.
+    /// Path of the vehicle, street frame.
     pub(crate) path: Path,
     /// x of the crossing road's centre line, m.
     pub(crate) crossing: f64,
-    /// How traffic moves.
+    /// Pace of the other traffic.
     pub(crate) pace: Pace,
 }
 
 impl Ego {
-    /// Lays the path, from the street frame's x = 0 at time 0, and the crossing road where the
+    /// Plans the path, from the street frame's x = 0 at time 0, with the crossing road where the
     /// path needs it.
     pub(crate) fn plan(self, seed: u64, duration_s: f64) -> Plan {
         let mut rng = Rng::split(seed, 0);
@@ -86,7 +86,7 @@ impl Ego {
         }
     }
 
-    /// What is drawn of a road out of town goes straight on, or stands in every sixth case.
+    /// On a road out of town a random ego drives straight on, or stands still in one case in six.
     pub(crate) fn out_of_town(self, seed: u64) -> Ego {
         let mut rng = Rng::split(seed, 10);
         let (stands, speed) = (rng.chance(1.0 / 6.0), rng.range(15.0, 30.0));
@@ -103,17 +103,17 @@ impl Ego {
         }
     }
 
-    /// Straight on at a speed of city traffic.
+    /// Drives straight on at a city speed.
     pub fn straight(rng: &mut Rng) -> Ego {
         Ego::Straight { speed: rng.range(2.0, 14.0) }
     }
 
-    /// A stop from a speed of city traffic.
+    /// Stops from a city speed.
     pub fn stop_and_go(rng: &mut Rng) -> Ego {
         Ego::StopAndGo { speed: rng.range(4.0, 10.0) }
     }
 
-    /// A turn to either side.
+    /// Turns to either side.
     pub fn turn(rng: &mut Rng) -> Ego {
         Ego::Turn { left: rng.chance(0.5), speed: rng.range(3.5, 6.0) }
     }

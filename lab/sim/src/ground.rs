@@ -1,5 +1,5 @@
-//! The ground: two gently sloped planes that meet in a valley or a crest, and sidewalks raised by
-//! a kerb beside two roads that cross. Or any other relief.
+//! The ground: two gently sloped planes that meet in a valley or a crest, with sidewalks raised by
+//! a kerb along two crossing roads. Alternatively, any other relief.
 //!
 //! Street frame: x along the main road, y left, z up.
 
@@ -9,7 +9,7 @@ use crate::roughness::roughness;
 use glam::{DMat3, DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// Width over which a walker's feet climb the kerb, m.
+/// Width over which feet and wheels climb the kerb, m.
 const RAMP: f64 = 0.3;
 
 /// The surface everything stands on.
@@ -17,15 +17,15 @@ const RAMP: f64 = 0.3;
 pub struct Ground {
     /// z = p.x x + p.y y + p.z of both planes.
     planes: [DVec3; 2],
-    /// The higher plane counts (a valley) rather than the lower (a crest).
+    /// The higher plane applies (a valley) rather than the lower (a crest).
     valley: bool,
-    /// x of the crossing road's centre line, m; none: no roads, no kerbs.
+    /// x of the crossing road's centre line, m; `None`: no roads, no kerbs.
     crossing: Option<f64>,
     /// Height of the sidewalks above the road, m.
     kerb: f64,
     /// Largest unevenness of the road, m.
     bumps: f64,
-    /// What lies there instead of the planes and the roads.
+    /// Relief that replaces the planes and the roads.
     relief: Option<Relief>,
 }
 
@@ -51,13 +51,13 @@ impl Ground {
         }
     }
 
-    /// Ground of another relief, without kerbs.
+    /// Ground with another relief, without kerbs.
     pub(crate) fn of(relief: Relief) -> Ground {
         Ground { relief: Some(relief), ..Ground::flat() }
     }
 
     /// A street whose slope changes at `bend_m` from `slopes[0]` to `slopes[1]` (rise over run
-    /// along x) with the slope `across` to the left; the roads cross at `crossing_m`.
+    /// along x), with the slope `across` to the left; the roads cross at `crossing_m`.
     pub fn street(
         slopes: [f64; 2],
         across: f64,
@@ -75,8 +75,9 @@ impl Ground {
         }
     }
 
-    /// The same with bumps of this height on the road (m), half as much again on the sidewalks and
-    /// several times as much beyond, for the laser alone: who stands on it does not notice.
+    /// The same ground with bumps of this height on the road (m), half as much again on the
+    /// sidewalks and several times as much beyond. Only the laser sees them; whatever stands on the
+    /// ground ignores them.
     pub fn uneven(self, bumps: f64) -> Ground {
         Ground { bumps, ..self }
     }
@@ -89,8 +90,8 @@ impl Ground {
         }
     }
 
-    /// Height as a foot or wheel finds it, m: the road, or the sidewalk with its kerb smoothed to
-    /// a ramp so that whoever climbs it has a velocity.
+    /// Height for a foot or wheel, m: the road, or the sidewalk with its kerb smoothed to a ramp,
+    /// so that whoever climbs it has a finite velocity.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         if let Some(relief) = &self.relief {
             return relief.height(x, y);
@@ -101,14 +102,14 @@ impl Ground {
         road + self.kerb * u * u * (3.0 - 2.0 * u)
     }
 
-    /// Where a ray reaches the surface raised by `lift`; infinity where it never does.
+    /// Where a ray reaches the surface raised by `lift`; infinity if it never does.
     fn reach(&self, o: DVec3, d: DVec3, lift: f64) -> f64 {
         let [a, b] = self.planes.map(|p| {
             let above = o.z - (p.x * o.x + p.y * o.y + p.z + lift);
             let sink = d.z - (p.x * d.x + p.y * d.y);
             if sink < -1e-9 { (-above / sink).max(0.0) } else { f64::INFINITY }
         });
-        // Above a valley is above both planes, above a crest is above either.
+        // Being above a valley means above both planes; above a crest, above either.
         if self.valley { a.min(b) } else { a.max(b) }
     }
 
@@ -142,8 +143,8 @@ impl Ground {
         if !low.is_finite() || !raised(low) {
             return level(low);
         }
-        // Over the road at the sidewalk's height, beneath the sidewalk at the road's: between the
-        // two lies the kerb's face.
+        // Above the road at the sidewalk's height, below the sidewalk at the road's: the kerb's
+        // face lies between the two.
         let (mut before, mut after) = (high, low);
         for _ in 0..24 {
             let middle = 0.5 * (before + after);
@@ -155,26 +156,26 @@ impl Ground {
         Some(Contact { range: after, cosine: if along_x { d.y.abs() } else { d.x.abs() } })
     }
 
-    /// The contact moved along the ray to where the bump at its place is met; bumps are `scale`
+    /// The contact moved along the ray to where it meets the bump at its place; bumps are `scale`
     /// times as high as on the road.
     fn bumped(&self, contact: Contact, at: DVec3, scale: f64) -> Contact {
         if self.bumps == 0.0 {
             return contact;
         }
         let height = self.bumps * scale * roughness(at.x, at.y);
-        // A grazing ray meets a bump long before it or flies over: no farther than its width.
+        // A grazing ray meets a bump long before it or passes over it: limited to the bump's width.
         let shift = (height / contact.cosine.max(1e-3)).clamp(-1.0, 1.0);
         Contact { range: (contact.range - shift).max(0.5 * contact.range), ..contact }
     }
 
-    /// Cosine of incidence; the planes differ too little for it to matter which one is met.
+    /// Cosine of incidence; the planes differ too little for it to matter which of them is met.
     fn cosine(&self, d: DVec3) -> f64 {
         let normal = DVec3::new(-self.planes[0].x, -self.planes[0].y, 1.0);
         d.dot(normal).abs() / normal.dot(normal).sqrt()
     }
 
-    /// Pose of something that stands at (x, y) facing `yaw` on four feet `base` apart (length,
-    /// width, m); upright where `base` is nothing.
+    /// Pose of something standing at (x, y) facing `yaw` on four feet `base` apart (length, width,
+    /// m); upright if `base` is zero.
     pub fn stand(&self, x: f64, y: f64, yaw: f64, base: [f64; 2]) -> Pose {
         if base[0] == 0.0 {
             return Pose::planar(x, y, self.height(x, y), yaw);

@@ -4,14 +4,14 @@
 //! traffic, or another [`Scenery`], seen by spinning sensors on a moving vehicle, with the exact
 //! truth of every return.
 //!
-//! [`Drive::new`] draws a scene and iterates its sweeps; [`Drive::through`] takes a [`Scene`] put
-//! together by hand. The same seed gives the same bytes on the same machine, whatever the number
-//! of threads.
+//! [`Drive::new`] draws a scene and iterates over its sweeps; [`Drive::through`] takes a [`Scene`]
+//! built by hand. The same seed gives the same bytes on the same machine, whatever the number of
+//! threads.
 //!
-//! Frames are right-handed, x forward, y left, z up; metres, seconds, radians. The street frame
-//! (x along the main road) lies anywhere and at any heading in the world frame; what leaves the
-//! crate is in the world or vehicle frame unless it says otherwise. Where the vehicle frame lies on
-//! the vehicle is the rig's choice ([`SensorRig::origin`]).
+//! Frames are right-handed, x forward, y left, z up; metres, seconds, radians. The street frame (x
+//! along the main road) has an arbitrary position and heading in the world frame; everything that
+//! leaves the crate is in the world or vehicle frame unless stated otherwise. The rig chooses where
+//! the vehicle frame lies on the vehicle ([`SensorRig::origin`]).
 
 mod bend;
 mod cast;

@@ -1,4 +1,4 @@
-//! What stands and moves in a scene: fixtures of the background, and objects of several parts.
+//! Contents of a scene: fixtures of the background, and objects of several parts.
 
 use crate::ground::Ground;
 use crate::path::Path;
@@ -19,7 +19,7 @@ pub enum Class {
     Pole = 2,
     /// Crowns, hedges and bushes.
     Vegetation = 3,
-    /// Fences, bins, boxes and other things put up to stay.
+    /// Fences, bins, boxes and other permanent installations.
     Fixture = 4,
     /// A car, parked or moving.
     Car = 5,
@@ -31,31 +31,31 @@ pub enum Class {
     Bus = 8,
     /// A tram.
     Tram = 9,
-    /// A motorcycle with its rider; nothing of it moves against the rest.
+    /// A motorcycle with its rider; no part moves relative to the rest.
     Motorcycle = 10,
     /// A cyclist, pedalling.
     Cyclist = 11,
-    /// Somebody on foot.
+    /// A person on foot.
     Pedestrian = 12,
-    /// Rain, fog or dust: no object at all.
+    /// Rain, fog or dust: not an object at all.
     Clutter = 13,
 }
 
 impl Class {
-    /// Whether a background filter should keep it: whatever could move, even if it does not.
+    /// Whether a background filter should keep it: anything that could move, even if it does not.
     pub fn is_foreground(self) -> bool {
         (Class::Car..=Class::Pedestrian).contains(&self)
     }
 }
 
-/// How a surface answers the laser.
+/// How a surface responds to the laser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Share of the light that comes back at normal incidence, 0..1.
     pub reflectivity: f64,
-    /// Probability that a ray that hits it gives no return (glass).
+    /// Probability that a ray hitting it gives no return (glass).
     pub loss: f64,
-    /// Probability that a ray goes through as though nothing were there (leaves, wire).
+    /// Probability that a ray passes through as if nothing were there (leaves, wire).
     pub porosity: f64,
 }
 
@@ -65,7 +65,7 @@ impl Surface {
         Surface { reflectivity, loss: 0.0, porosity: 0.0 }
     }
 
-    /// Windows: most rays go through or glance off and never come back.
+    /// Windows: most rays pass through or are deflected and never return.
     pub fn glass(reflectivity: f64) -> Surface {
         Surface { reflectivity, loss: 0.55, porosity: 0.0 }
     }
@@ -76,10 +76,10 @@ impl Surface {
     }
 }
 
-/// Something of the background, in the street frame.
+/// An element of the background, in the street frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fixture {
-    /// What it is.
+    /// Its class.
     pub class: Class,
     /// Its solid.
     pub shape: Shape,
@@ -128,16 +128,17 @@ impl Part {
     }
 }
 
-/// A traffic participant. Its frame: origin at the centre of its box, x forward, y left, z up.
+/// A traffic participant. Its frame has its origin at the centre of its box: x forward, y left, z
+/// up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// Positive, unlike any other's in the scene.
+    /// Positive, unique in the scene.
     pub id: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
     /// Length, width and height of its box, m.
     pub size: [f64; 3],
-    /// Distance between its wheels along and across, m; zeros for something upright.
+    /// Distance between its wheels along and across, m; zeros for an upright object.
     pub base: [f64; 2],
     /// How it moves on the ground, street frame.
     pub path: Path,
@@ -164,7 +165,7 @@ impl Object {
         self.path.is_still() && self.parts.iter().all(|part| part.swing.is_none())
     }
 
-    /// Radius of the sphere about its centre that holds all of it, m.
+    /// Radius of the sphere around its centre that contains all of it, m.
     pub fn reach(&self) -> f64 {
         let part = |p: &Part| {
             let arm = p.rest.translation.length() + p.shape.reach();

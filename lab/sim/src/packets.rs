@@ -1,7 +1,7 @@
-//! A simulated Ouster's packets, as a capture of network traffic has them: for what takes packets.
+//! A simulated Ouster's packets, as in a capture of network traffic: input for packet readers.
 //!
 //! Profile `RNG19_RFL8_SIG16_NIR16` (Ouster firmware user manual, "LIDAR data packet format"),
-//! without check sums; ranges in whole millimetres.
+//! without checksums; ranges in whole millimetres.
 
 use std::f64::consts::{PI, TAU};
 use std::io::{self, Write};
@@ -12,38 +12,38 @@ use crate::{Sensor, SimSweep};
 
 /// Columns of a packet.
 const PACKET_COLUMNS: usize = 16;
-/// Bytes of a packet's head and foot, of a column's head and of a measurement.
+/// Bytes of a packet's header (and of its footer), of a column's header and of a measurement.
 const HEAD: usize = 32;
 const COLUMN_HEAD: usize = 12;
 const MEASUREMENT: usize = 12;
-/// Time of the first turn's first column, ns since 1970.
+/// Time of the first revolution's first column, ns since 1970.
 const START_NS: u64 = 1_700_000_000_000_000_000;
-/// Ranges are of 19 bits.
+/// Ranges have 19 bits.
 const RANGE_MAX_MM: f64 = 524_287.0;
-/// The port that it sends to, and its address.
+/// The port it sends to, and its address.
 const PORT: u16 = 7502;
 const ADDRESS: [u8; 4] = [192, 168, 1, 11];
 
-/// The packets of a sensor whose beams leave its origin, and whose frame is the vehicle's.
+/// The packets of a sensor whose beams originate at its origin and whose frame is the vehicle's.
 pub struct OusterPackets {
     sensor: Sensor,
 }
 
 impl OusterPackets {
-    /// Of a sensor with a multiple of 16 columns.
+    /// Creates them for a sensor with a multiple of 16 columns.
     pub fn of(sensor: &Sensor) -> OusterPackets {
         OusterPackets { sensor: sensor.clone() }
     }
 
-    /// Time of a column after the turn's first one, ns.
+    /// Time of a column after the revolution's first one, ns.
     fn column_ns(&self, column: usize) -> u64 {
         (self.sensor.turn_s * 1e9 * column as f64 / self.sensor.columns as f64) as u64
     }
 
-    /// What the sensor tells of itself.
+    /// The sensor's metadata.
     pub fn metadata(&self) -> String {
         let Sensor { beams, columns, turn_s, .. } = &self.sensor;
-        // A column's azimuth is that of its middle.
+        // A column's azimuth is that of its centre.
         let half = 180.0 / *columns as f64;
         let list = |numbers: Vec<f64>| format!("{numbers:?}");
         let elevations = list(beams.iter().map(|b| b.elevation.to_degrees()).collect());
@@ -58,8 +58,8 @@ impl OusterPackets {
         )
     }
 
-    /// The packets of a turn, each with its time, ns. Returns are those of a sweep of the sensor
-    /// alone, in its frame, each measured at its own time.
+    /// The packets of a revolution, each with its time, ns. `returns` are those of a sweep of this
+    /// sensor alone, in its frame, each measured at its own time.
     fn turn(&self, number: usize, returns: &[Point]) -> Vec<(u64, Vec<u8>)> {
         let columns = self.sensor.columns;
         let begins_ns = START_NS + number as u64 * self.column_ns(columns);
@@ -97,8 +97,8 @@ impl OusterPackets {
         packets
     }
 
-    /// Writes a capture of some turns, a sweep each. It begins within the first one, as that of a
-    /// sensor that runs does.
+    /// Writes a capture of revolutions, one per sweep. It begins within the first one, like a
+    /// capture of a running sensor.
     pub fn capture(
         &self,
         out: &mut impl Write,
@@ -113,7 +113,7 @@ impl OusterPackets {
         Ok(())
     }
 
-    /// The beam that is nearest to an elevation, rad.
+    /// The beam nearest to an elevation, rad.
     fn beam(&self, elevation: f64) -> usize {
         let off = |n: &usize| (self.sensor.beams[*n].elevation - elevation).abs();
         let beams = 0..self.sensor.beams.len();
@@ -121,19 +121,19 @@ impl OusterPackets {
     }
 }
 
-/// The head of a capture (libpcap, times in ns, frames of IPv4).
+/// Writes the header of a capture (libpcap, times in ns, frames of IPv4).
 fn head(out: &mut impl Write) -> io::Result<()> {
     let head: [u32; 6] = [0xa1b2_3c4d, 0x0004_0002, 0, 0, 1 << 17, 101];
     head.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))
 }
 
-/// Adds a datagram of the sensor.
+/// Appends a datagram of the sensor.
 fn datagram(out: &mut impl Write, time_ns: u64, payload: &[u8]) -> io::Result<()> {
     let (udp, all) = (8 + payload.len() as u16, 28 + payload.len() as u32);
     let time = [(time_ns / 1_000_000_000) as u32, (time_ns % 1_000_000_000) as u32];
     let head = [time[0], time[1], all, all];
     head.iter().try_for_each(|word| out.write_all(&word.to_le_bytes()))?;
-    // IPv4 without options, UDP; no check sums.
+    // IPv4 without options, UDP; no checksums.
     out.write_all(&[0x45, 0])?;
     out.write_all(&(all as u16).to_be_bytes())?;
     out.write_all(&[0, 0, 0, 0, 64, 17, 0, 0])?;

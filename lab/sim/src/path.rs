@@ -1,14 +1,14 @@
-//! Planar motion, leg by leg: acceleration and curvature are constant or change evenly, the one
-//! with time, the other along the way (clothoids, by which real vehicles enter a bend).
+//! Planar motion, leg by leg: acceleration and curvature are constant or change linearly, the
+//! former with time, the latter with distance (clothoids, on which real vehicles enter a curve).
 
-/// Time in which a vehicle's turn or braking begins and ends, s: its yaw rate and acceleration do
-/// not jump, and within a sweep the twist at its stamp stands for all of it.
+/// Time over which a vehicle's turn or braking builds up and fades, s: its yaw rate and
+/// acceleration do not jump, and the twist at a sweep's stamp represents the whole sweep.
 pub(crate) const EASE_S: f64 = 1.0;
 
-/// Steps in which the angle of a change of lane is found.
+/// Iterations for finding the angle of a lane change.
 const SHIFT_STEPS: u32 = 8;
 
-/// Where something is and how it moves.
+/// Place and motion at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
     /// m, street frame.
@@ -21,16 +21,16 @@ pub struct State {
     pub speed: f64,
 }
 
-/// What a leg does.
+/// Motion of a leg.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Course {
-    /// At its start, m/s^2.
+    /// m/s^2, at its start.
     acceleration: f64,
     /// m/s^3.
     jerk: f64,
-    /// At its start, 1/m, left positive.
+    /// 1/m, left positive, at its start.
     curvature: f64,
-    /// Change of curvature along the way, 1/m^2.
+    /// Change of curvature per distance, 1/m^2.
     sharpness: f64,
 }
 
@@ -41,8 +41,8 @@ struct Leg {
     course: Course,
 }
 
-/// Places and weights of Gauss and Legendre's quadrature over 0 to 1: better than a micrometre
-/// where a clothoid turns by less than a right angle.
+/// Abscissae and weights of Gauss-Legendre quadrature over 0 to 1: more accurate than a micrometre
+/// if a clothoid turns by less than a right angle.
 const QUADRATURE: [[f64; 2]; 5] = [
     [0.046_910_077_030_668, 0.118_463_442_528_095],
     [0.230_765_344_947_158, 0.239_314_335_249_683],
@@ -51,8 +51,8 @@ const QUADRATURE: [[f64; 2]; 5] = [
     [0.953_089_922_969_332, 0.118_463_442_528_095],
 ];
 
-/// A motion for all times: the first leg reaches back without end, and after the last leg it goes
-/// straight on at constant speed.
+/// A motion for all times: the first leg extends back indefinitely, and after the last leg the
+/// motion continues straight on at constant speed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     legs: Vec<Leg>,
@@ -65,7 +65,7 @@ impl Leg {
         let along = self.from.speed * dt + 0.5 * acceleration * dt * dt + jerk * dt * dt * dt / 6.0;
         let heading = |along: f64| curvature * along + 0.5 * sharpness * along * along;
         let (dx, dy) = if sharpness == 0.0 {
-            // Chord of the arc: sin(a/2)/(a/2) long, half way between the headings.
+            // Chord of the arc: sin(a/2)/(a/2) times its length, halfway between the headings.
             let half = 0.5 * heading(along);
             let chord = if half.abs() < 1e-9 { along } else { along * half.sin() / half };
             let (s, c) = (self.from.yaw + half).sin_cos();
@@ -86,12 +86,12 @@ impl Leg {
 }
 
 impl Path {
-    /// Straight on for ever, from this state at time 0.
+    /// Straight on for ever, with this state at time 0.
     pub fn from(state: State) -> Path {
         Path::starting(0.0, state)
     }
 
-    /// Straight on for ever, from this state at a time, s.
+    /// Straight on for ever, with this state at time `start_s`, s.
     pub fn starting(start_s: f64, state: State) -> Path {
         Path { legs: vec![Leg { start_s, from: state, course: Course::default() }] }
     }
@@ -118,8 +118,8 @@ impl Path {
         self
     }
 
-    /// Appends legs along which the speed changes to `speed` (m/s), which must be another than
-    /// before: the acceleration grows to `rate` (m/s^2 > 0) and fades again over `ease_s` each
+    /// Appends legs along which the speed changes to `speed` (m/s), which must differ from the one
+    /// before: the acceleration builds up to `rate` (m/s^2 > 0) and fades again over `ease_s` each
     /// (> 0).
     pub fn then_to_speed(self, speed: f64, rate: f64, ease_s: f64) -> Path {
         let change = speed - self.end().speed;
@@ -132,7 +132,7 @@ impl Path {
             .at_speed(speed)
     }
 
-    /// Rids the speed at the end of rounding, so that a stop is a stop.
+    /// Removes rounding errors from the speed at the end, so that a stop is really a stop.
     fn at_speed(mut self, speed: f64) -> Path {
         if let Some(leg) = self.legs.last_mut() {
             leg.from.speed = speed;
@@ -141,7 +141,7 @@ impl Path {
     }
 
     /// Appends a turn by `angle` (rad, left positive) at constant speed, which must not be zero:
-    /// the curvature grows to that of the radius (m) and fades again over `ease_s` each, > 0.
+    /// the curvature builds up to that of the radius (m) and fades again over `ease_s` each, > 0.
     pub fn then_turn(self, angle: f64, radius: f64, ease_s: f64) -> Path {
         let speed = self.end().speed;
         let whole_m = angle.abs() * radius;
@@ -156,9 +156,9 @@ impl Path {
             )
     }
 
-    /// Appends a change of lane by `aside` (m, left positive, not zero) in this time (s) at
-    /// constant speed, which must not be zero: two turns whose curvature grows and fades all the
-    /// way, after which the heading is as before.
+    /// Appends a lane change by `aside` (m, left positive, not zero) in this time (s) at constant
+    /// speed, which must not be zero: two turns whose curvature builds up and fades all the way,
+    /// after which the heading is the same as before.
     pub fn then_shift(self, aside: f64, duration: f64) -> Path {
         let start = self.end();
         let length = start.speed * duration;
@@ -175,7 +175,7 @@ impl Path {
         turns(self, angle)
     }
 
-    /// State when the last leg begins.
+    /// State at the start of the last leg.
     pub fn end(&self) -> State {
         self.legs.last().map_or(State::default(), |leg| leg.from)
     }
@@ -186,7 +186,7 @@ impl Path {
         later.or(self.legs.first()).map_or(State::default(), |leg| leg.at(t))
     }
 
-    /// The same path moved by (x, y), m.
+    /// The same path translated by (x, y), m.
     pub fn moved(mut self, x: f64, y: f64) -> Path {
         for leg in &mut self.legs {
             leg.from.x += x;
@@ -195,7 +195,7 @@ impl Path {
         self
     }
 
-    /// Whether it never moves.
+    /// Returns whether it never moves.
     pub fn is_still(&self) -> bool {
         let rests = |c: &Course| c.acceleration == 0.0 && c.jerk == 0.0;
         self.legs.iter().all(|leg| leg.from.speed == 0.0 && rests(&leg.course))
@@ -228,11 +228,11 @@ mod tests {
         assert_eq!(path.at(-2.0), start);
         let end = path.end();
         assert!((end.y - 1.75).abs() < 1e-9 && end.yaw.abs() < 1e-12 && end.speed == 12.0);
-        // Half way after half of the 36 m along it, which are a little longer than the road.
+        // Halfway after half of the 36 m along it, which is a little longer than the road.
         assert!(path.at(0.5).y.abs() < 1e-9 && (50.4..51.0).contains(&end.x), "{end:?}");
     }
 
-    /// That heading and speed are the derivative of the place at a time.
+    /// Checks that heading and speed are the derivative of the position at a time.
     fn check_derivative(path: &Path, t: f64) {
         let h = 1e-5;
         let (a, b, m) = (path.at(t - h), path.at(t + h), path.at(t));
@@ -272,7 +272,7 @@ mod tests {
         for &t in &times {
             check_derivative(&path, t);
             let now = rates(&path, t);
-            // 3 m/s^2 grow in half a second, 6 m/s on 8 m in one second.
+            // 3 m/s^2 build up in half a second, the yaw rate of 6 m/s on 8 m in one second.
             for (n, limit) in [6.0, 0.75].into_iter().enumerate() {
                 assert!((now[n] - before[n]).abs() < 1.01 * limit * 0.01, "{t}: {now:?}");
                 most[n] = most[n].max(now[n].abs());
@@ -282,7 +282,7 @@ mod tests {
         assert!((most[0] - 3.0).abs() < 1e-6 && (most[1] - 0.75).abs() < 1e-6, "{most:?}");
         let end = path.end();
         assert!((end.yaw + FRAC_PI_2).abs() < 1e-12 && end.speed == 6.0);
-        // Braking at 3 m/s^2 takes 2 s and half a second more, the turn 1 s more than its arc.
+        // Braking at 3 m/s^2 takes 2 s plus half a second, the turn 1 s more than its arc.
         let stopped = 0.5 + (8.0 * FRAC_PI_2) / 6.0 + 1.0 + 2.5;
         assert_eq!((path.at(stopped).speed, path.at(stopped + 0.9).speed), (0.0, 0.0));
         assert!(path.at(stopped - 0.1).speed > 0.0 && path.at(stopped + 1.1).speed > 0.0);
@@ -294,7 +294,7 @@ mod tests {
         let start = State { speed: 10.0, ..State::default() };
         let turned = Path::from(start).then_turn(0.2, 20.0, 1.0).end();
         assert!((turned.yaw - 0.2).abs() < 1e-12);
-        // Curvature grows and fades over 4 m each: half of the turn lies to either side.
+        // Curvature builds up and fades over 4 m each: half of the turn lies on either side.
         let half = Path::from(start).then_turn(0.2, 20.0, 1.0).at(0.4);
         assert!((half.yaw - 0.1).abs() < 1e-12);
         let slower = Path::from(start).then_to_speed(9.5, 2.0, 1.0);

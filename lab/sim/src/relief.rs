@@ -1,37 +1,37 @@
 //! Uneven ground: banks and ditches beside a road, waves along it, mounds.
 //!
-//! Each term of the sum knows how steep it is at most, here and around: so a ray is followed to
-//! the ground in few steps, and nothing wider than [`STEP_M`] is overlooked.
+//! Each term of the sum knows its maximum steepness, here and in a neighbourhood, so a ray is
+//! followed to the ground in few steps, and nothing wider than [`STEP_M`] is missed.
 
 use crate::bend::Bend;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Shortest step along a ray, m: nothing of a relief is narrower.
+/// Shortest step along a ray, m: no feature of a relief is narrower.
 const STEP_M: f64 = 0.2;
 /// Rays are followed this far, m: farther than any sensor reports.
 const FAR_M: f64 = 250.0;
-/// Times that the place where a ray meets the ground is put where a straight slope would: on one
-/// slope the first is exact, over an edge the error shrinks by half or more each time.
+/// Number of secant steps for where a ray meets the ground: on a single slope the first is exact,
+/// over an edge the error shrinks by half or more each time.
 const SECANTS: u32 = 8;
-/// Nearer than this to the ground is on it, m.
+/// Points closer to the ground than this count as on it, m.
 const EXACT_M: f64 = 1e-6;
-/// Step of the differences that give the normal, m.
+/// Step of the differences that yield the normal, m.
 const NORMAL_M: f64 = 0.05;
 
-/// A summand of the height.
+/// A term of the height.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Term {
-    /// Height by the offset from a line: `[offset, height]` by rising offset, m, with straight
-    /// lines between and level beyond.
+    /// Height by the offset from a line: `[offset, height]` by rising offset, m, linear in between
+    /// and level beyond.
     Banks(Bend, Vec<[f64; 2]>),
     /// A sine along x: height (m), length (m) and phase (rad).
     Wave([f64; 3]),
-    /// A round hill, a whole wave of the cosine: centre, radius and height, m.
+    /// A round hill, one full period of a cosine: centre, radius and height, m.
     Mound([f64; 2], f64, f64),
 }
 
-/// Height at a place, and how steep it is at most within a distance.
+/// Height at a place, and its maximum steepness within a distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Local {
     height: f64,
@@ -43,7 +43,7 @@ struct Local {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Relief {
     pub(crate) terms: Vec<Term>,
-    /// Axis and half width (m) of what is paved; beyond, bumps are higher.
+    /// Axis and half width (m) of the paved part; beyond it, bumps are higher.
     pub(crate) paved: (Bend, f64),
 }
 
@@ -67,7 +67,7 @@ impl Term {
         }
     }
 
-    /// How steep it is anywhere, at most.
+    /// Maximum steepness anywhere.
     fn slope(&self) -> f64 {
         match self {
             Term::Banks(_, points) => {
@@ -106,7 +106,7 @@ impl Relief {
         self.terms.iter().map(|term| term.local(x, y).height).sum()
     }
 
-    /// How much higher bumps are than on a road.
+    /// How much higher bumps are here than on a road.
     pub(crate) fn roughening(&self, x: f64, y: f64) -> f64 {
         let (axis, half) = self.paved;
         1.0 + 2.0 * (axis.offset(x, y).abs() - half).clamp(0.0, 1.0)
@@ -125,7 +125,7 @@ impl Relief {
     pub(crate) fn reach(&self, o: DVec3, d: DVec3) -> Option<f64> {
         let flat = d.x.hypot(d.y);
         let steepest: f64 = self.terms.iter().map(Term::slope).sum();
-        // How fast a ray can near ground that is this steep, per metre.
+        // How fast a ray can approach ground this steep, per metre.
         let closing = |slope: f64| slope * flat - d.z;
         if closing(steepest) <= 0.0 {
             return None;
@@ -147,15 +147,15 @@ impl Relief {
         None
     }
 
-    /// Where a ray meets the ground between two places of it: range and height above the ground of
-    /// one that lies over it and one that does not.
+    /// Where a ray meets the ground between two places on it, each given by range and height above
+    /// the ground: one above the ground and one not.
     fn between(&self, o: DVec3, d: DVec3, mut over: [f64; 2], mut under: [f64; 2]) -> f64 {
         for _ in 0..SECANTS {
             let share = over[1] / (over[1] - under[1]).max(f64::MIN_POSITIVE);
             let range = over[0] + share.min(1.0) * (under[0] - over[0]);
             let at = o + d * range;
             let above = at.z - self.height(at.x, at.y);
-            // The end that stays counts half, or one end would stay for ever.
+            // The end that stays counts half; otherwise one end could stay for ever.
             let (moved, stays) =
                 if above > 0.0 { (&mut over, &mut under) } else { (&mut under, &mut over) };
             (*moved, stays[1]) = ([range, above], 0.5 * stays[1]);
@@ -209,7 +209,7 @@ mod tests {
             let slow = (0..12_000).map(|n| 0.01 * f64::from(n)).find(|&range| under(range));
             let fast = relief.reach(o, d).filter(|&range| range < 119.0);
             let Some(slow) = slow.filter(|_| fast.is_some()) else {
-                // What only grazes the ground may be met by one and missed by the other.
+                // A ray that only grazes the ground may hit by one method and miss by the other.
                 assert!(slow.is_none_or(|s| s > 118.0 || !under(s + STEP_M)), "{o} {d} {slow:?}");
                 continue;
             };

@@ -1,4 +1,4 @@
-//! Sensors on a vehicle: where they sit, when they fire, and how the vehicle frame lies.
+//! Sensors on a vehicle: where they are mounted, when they fire, and where the vehicle frame lies.
 
 use crate::sensor::Sensor;
 use glam::{DQuat, DVec3};
@@ -8,12 +8,11 @@ use raywake_core::sweep::{Point, Rig, Timing};
 use std::fmt;
 use std::str::FromStr;
 
-/// Duration of a sweep, s: what all sensors fire from half of it before the stamp to half of it
-/// after.
+/// Duration of a sweep, s: everything that the sensors fire from half of it before the stamp to
+/// half of it after.
 pub const PERIOD_S: f64 = 0.1;
 
-/// Time from one firing of all beams of an HDL-32E to the next, s (Velodyne, HDL-32E user manual
-/// 63-9113).
+/// Interval between firings of all beams of an HDL-32E, s (Velodyne, HDL-32E user manual 63-9113).
 const HDL32_FIRING_S: f64 = 46.08e-6;
 
 /// Stamp of sweep `index`, s.
@@ -21,20 +20,20 @@ pub fn stamp_s(index: usize) -> f64 {
     index as f64 / 10.0
 }
 
-/// A sensor where it is mounted.
+/// A sensor in its mounting position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mount {
     /// The sensor.
     pub sensor: Sensor,
-    /// Where it sits.
+    /// Its pose on the vehicle.
     pub vehicle_from_sensor: Pose,
-    /// Time at which it first looks along its x axis, s: two sensors of one turn and different
-    /// phases look apart for ever, and sensors of different turns drift apart.
+    /// Time at which it first looks along its x axis, s: two sensors with equal periods and
+    /// different phases look apart for ever, and sensors with different periods drift apart.
     pub phase_s: f64,
 }
 
 impl Mount {
-    /// A return of a firing at this place of the sensor's frame.
+    /// A return of a firing at this place in the sensor's frame.
     pub(crate) fn point(&self, firing: &Firing, at: DVec3, intensity: f64) -> Point {
         Point {
             position: self.vehicle_from_sensor.transform(at).as_vec3().to_array(),
@@ -48,14 +47,14 @@ impl Mount {
 /// One to [`SENSORS_MAX`] sensors on a vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorRig {
-    /// Sensors in the order of [`raywake_core::sweep::Point::sensor`].
+    /// Sensors, indexed by [`raywake_core::sweep::Point::sensor`].
     pub mounts: Vec<Mount>,
-    /// Origin of the vehicle frame seen from the point of the ground beneath the vehicle's middle
-    /// (x forward, y left, z up), m.
+    /// Origin of the vehicle frame relative to the ground point beneath the vehicle's centre (x
+    /// forward, y left, z up), m.
     pub origin: DVec3,
 }
 
-/// A name that no rig has.
+/// A name that is not a rig's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownRig(String);
 
@@ -67,18 +66,18 @@ impl fmt::Display for UnknownRig {
 
 impl std::error::Error for UnknownRig {}
 
-/// All that one sensor does at one time.
+/// Everything that one sensor fires at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Firing {
-    /// Of the mount.
+    /// Index of the mount.
     pub(crate) mount: usize,
-    /// After the sweep's stamp, s.
+    /// Time after the sweep's stamp, s.
     pub(crate) offset_s: f64,
-    /// Of the column in the sensor's frame, rad.
+    /// Azimuth of the column in the sensor's frame, rad.
     pub(crate) azimuth: f64,
 }
 
-/// Middle of the rear axle of a middling car.
+/// Centre of the rear axle of an average car.
 const REAR_AXLE: DVec3 = DVec3::new(-1.4, 0.0, 0.33);
 
 /// Upright at (x, y, z), m.
@@ -87,10 +86,10 @@ fn upright(x: f64, y: f64, z: f64) -> Pose {
 }
 
 impl SensorRig {
-    /// What [`SensorRig::from_str`] understands.
+    /// The names that [`SensorRig::from_str`] accepts.
     pub const NAMES: [&str; 5] = ["hdl64", "hdl32x4", "hdl32x4-full", "vlp32x2", "beam128"];
 
-    /// One sensor, upright, `height` above the ground (m) over the vehicle's middle; the vehicle
+    /// One sensor, upright, `height` above the ground (m) over the vehicle's centre; the vehicle
     /// frame is the sensor's.
     pub fn single(sensor: Sensor, height: f64) -> SensorRig {
         SensorRig {
@@ -99,7 +98,8 @@ impl SensorRig {
         }
     }
 
-    /// KITTI's: an HDL-64E 1.73 m above the ground, its frame the vehicle's. 131,072 rays a sweep.
+    /// KITTI's rig: an HDL-64E 1.73 m above the ground, its frame the vehicle's. 131,072 rays a
+    /// sweep.
     pub fn hdl64() -> SensorRig {
         SensorRig::single(Sensor::hdl64(), 1.73)
     }
@@ -109,10 +109,10 @@ impl SensorRig {
         SensorRig::single(Sensor::ideal(), 1.73)
     }
 
-    /// The dissertation's vehicle: four HDL-32E on the roof "spinning at roughly 10 Hz"
-    /// (section 1.2), here at 9.90 to 10.06, unsynchronised. Nothing is published of where they
-    /// sit: two upright ahead, two behind that lean outwards by 12 degrees, 1.9 m above the ground.
-    /// The vehicle frame lies in the rear axle. At most 127,872 rays a sweep.
+    /// The dissertation's vehicle: four HDL-32E on the roof "spinning at roughly 10 Hz" (section
+    /// 1.2), here at 9.90 to 10.06 Hz, unsynchronised. Their positions are not published; assumed
+    /// here: two upright in front, two behind leaning outwards by 12 degrees, 1.9 m above the
+    /// ground. The vehicle frame lies in the rear axle. At most 127,872 rays a sweep.
     pub fn hdl32x4() -> SensorRig {
         let places = [[1.5, 0.3, 0.0], [1.5, -0.3, 0.0], [0.9, 0.55, -12.0], [0.9, -0.55, 12.0]];
         let rates = [10.0, 10.06, 9.95, 9.9];
@@ -129,9 +129,9 @@ impl SensorRig {
         SensorRig { mounts: (0..4).map(mount).collect(), origin: REAR_AXLE }
     }
 
-    /// The same four at the device's full rate, however fast it spins: 32 beams every 46.08 us are
-    /// 694,444 rays a second each. 277,778 rays a sweep, of which those into the sky do not return:
-    /// some 243,000 returns in a street.
+    /// The same four at the device's full rate, which is independent of the spin rate: 32 beams
+    /// every 46.08 us are 694,444 rays a second each. 277,778 rays a sweep, of which those into the
+    /// sky do not return: about 243,000 returns in a street.
     pub fn hdl32x4_full() -> SensorRig {
         let mut rig = SensorRig::hdl32x4();
         for Mount { sensor, .. } in &mut rig.mounts {
@@ -140,9 +140,10 @@ impl SensorRig {
         rig
     }
 
-    /// Argoverse 2's: two VLP-32C stacked on the roof, 1.64 and 1.56 m above the rear axle, where
-    /// the vehicle frame lies; the lower one hangs upside down (poses as in the calibrations
-    /// published with the logs, rounded) and fires half a turn apart. 115,712 rays a sweep.
+    /// Argoverse 2's rig: two VLP-32C stacked on the roof, 1.64 and 1.56 m above the rear axle,
+    /// where the vehicle frame lies; the lower one is mounted upside down (poses as in the
+    /// calibrations published with the logs, rounded) and fires half a revolution apart. 115,712
+    /// rays a sweep.
     pub fn vlp32x2() -> SensorRig {
         let mount = |vehicle_from_sensor, phase_s| Mount {
             sensor: Sensor::vlp32c(),
@@ -165,10 +166,10 @@ impl SensorRig {
         SensorRig { mounts: vec![mount], origin: REAR_AXLE }
     }
 
-    /// What a source declares of it: every return has its time, and is distorted.
+    /// The rig as a source declares it: every return has its own time, and sweeps are distorted.
     ///
     /// # Panics
-    /// Where there are more than [`SENSORS_MAX`] sensors.
+    /// If there are more than [`SENSORS_MAX`] sensors.
     pub(crate) fn declared(&self) -> Rig {
         assert!(self.mounts.len() <= SENSORS_MAX, "a rig has at most {SENSORS_MAX} sensors");
         Rig {
@@ -180,7 +181,7 @@ impl SensorRig {
         }
     }
 
-    /// What is fired in sweep `index`, by time and then by sensor. Every firing belongs to exactly
+    /// All firings of sweep `index`, by time and then by sensor. Every firing belongs to exactly
     /// one sweep.
     pub(crate) fn firings(&self, index: usize) -> Vec<Firing> {
         let mut all = Vec::new();
@@ -188,7 +189,7 @@ impl SensorRig {
             let Sensor { columns, turn_s, .. } = mount.sensor;
             let first = mount.phase_s - 0.5 * turn_s;
             let per_s = columns as f64 / turn_s;
-            // The first firing not before the border of two sweeps.
+            // The first firing not before the boundary of two sweeps.
             let from = |sweeps: f64| ((sweeps / 10.0 - first) * per_s - 0.5).ceil() as i64;
             for k in from(index as f64 - 0.5)..from(index as f64 + 0.5) {
                 let t = first + (k as f64 + 0.5) / per_s;

@@ -1,5 +1,5 @@
-//! A tiny random generator (splitmix64): the simulator's only source of chance, so that one seed
-//! gives one drive.
+//! A tiny random generator (splitmix64): the simulator's only source of randomness, so that one
+//! seed gives one drive.
 
 /// Splitmix64 (Steele, Lea and Flood 2014): 64 bits of state, enough for scenery and noise.
 #[derive(Clone, Debug)]
@@ -20,8 +20,8 @@ impl Rng {
         Rng { state: scatter(seed ^ 0x9E37_79B9_7F4A_7C15) }
     }
 
-    /// A stream of its own for part `index` of a seed, so that what one part draws does not move
-    /// what another draws (columns cast by different threads, say).
+    /// A separate stream for part `index` of a seed, so that what one part draws does not affect
+    /// what another draws (columns cast by different threads, for example).
     pub fn split(seed: u64, index: u64) -> Rng {
         Rng::new(scatter(seed).wrapping_add(scatter(index ^ 0xD1B5_4A32_D192_ED03)))
     }
@@ -42,7 +42,7 @@ impl Rng {
         from + (to - from) * self.unit()
     }
 
-    /// True with this probability.
+    /// Returns true with this probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }
@@ -52,8 +52,8 @@ impl Rng {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }
 
-    /// Bell-shaped with mean 0 and deviation 1: the sum of four uniforms, which costs no
-    /// transcendental function and never strays beyond 3.5.
+    /// Bell-shaped with mean 0 and standard deviation 1: the sum of four uniforms, which needs no
+    /// transcendental function and never exceeds 3.5 in magnitude.
     pub fn bell(&mut self) -> f64 {
         let (a, b) = (self.bits(), self.bits());
         let parts = [a >> 32, a & 0xFFFF_FFFF, b >> 32, b & 0xFFFF_FFFF];

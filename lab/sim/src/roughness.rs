@@ -1,4 +1,4 @@
-//! The unevenness of the ground, too small for whoever stands on it and seen by the laser.
+//! The unevenness of the ground: too small to affect whoever stands on it, but seen by the laser.
 
 use crate::rng::Rng;
 
@@ -11,7 +11,7 @@ fn at_lattice(x: i64, y: i64, wave: usize) -> f64 {
     2.0 * Rng::new(key).unit() - 1.0
 }
 
-/// Bilinear between the points of a lattice of chance.
+/// Bilinear interpolation between the points of a random lattice.
 fn bumps(x: f64, y: f64, wave: usize) -> f64 {
     let (fx, fy) = (x.floor(), y.floor());
     let (u, v) = (x - fx, y - fy);
@@ -20,7 +20,7 @@ fn bumps(x: f64, y: f64, wave: usize) -> f64 {
     (1.0 - v) * row(j) + v * row(j + 1)
 }
 
-/// Height of the bumps at a place of the street frame, in -1 to 1.
+/// Height of the bumps at a place in the street frame, from -1 to 1.
 pub(crate) fn roughness(x: f64, y: f64) -> f64 {
     let wave = |(n, (width, share)): (usize, &(f64, f64))| share * bumps(x / width, y / width, n);
     WAVES.iter().enumerate().map(wave).sum()

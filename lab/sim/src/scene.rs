@@ -1,4 +1,4 @@
-//! A scene: ground, fixtures and traffic, in a street frame that lies anywhere in the world.
+//! A scene: ground, fixtures and traffic, in a street frame placed anywhere in the world.
 
 use crate::ego::Ego;
 use crate::ground::Ground;
@@ -11,8 +11,8 @@ use crate::{street, traffic};
 use glam::DVec3;
 use raywake_core::pose::Pose;
 
-/// Everything a sensor can see. Positions and paths are in the street frame: x along the main
-/// road, y left, z up.
+/// Everything a sensor can see. Positions and paths are in the street frame: x along the main road,
+/// y left, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// What everything stands on.
@@ -30,7 +30,7 @@ pub struct Scene {
 pub struct ObjectState {
     /// As in [`crate::Truth::object`].
     pub id: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
     /// Pose of its box's centre in the world; x forward, y left, z up.
     pub world_from_object: Pose,
@@ -41,8 +41,7 @@ pub struct ObjectState {
 }
 
 impl Scene {
-    /// Nothing but the plane z = 0; street and world frame are the same. For tests that place
-    /// what they need.
+    /// Only the plane z = 0; street and world frame coincide. For tests that place what they need.
     pub fn empty() -> Scene {
         Scene {
             ground: Ground::flat(),
@@ -52,14 +51,14 @@ impl Scene {
         }
     }
 
-    /// A street with buildings, parked cars and twenty seconds of traffic around a vehicle that
-    /// stands in the right lane at the street frame's origin.
+    /// A street with buildings, parked cars and twenty seconds of traffic around a vehicle standing
+    /// in the right lane at the street frame's origin.
     pub fn street(seed: u64) -> Scene {
         Scene::around(seed, &Ego::Standing.plan(seed, 20.0), 20.0, 1.0, false)
     }
 
-    /// A street made for this motion of the vehicle over `duration_s`: no path of traffic crosses
-    /// it. `density` scales the amount of traffic; a `cluttered` street has more standing about.
+    /// A street built for this motion of the vehicle over `duration_s`: no path of traffic crosses
+    /// it. `density` scales the amount of traffic; a `cluttered` street has more fixtures.
     pub(crate) fn around(
         seed: u64,
         plan: &crate::ego::Plan,
@@ -86,13 +85,13 @@ impl Scene {
         Scene { ground, fixtures, objects, world_from_street }
     }
 
-    /// Puts up something of the background; `pose` is `street_from_shape`.
+    /// Adds a fixture to the background; `pose` is `street_from_shape`.
     pub fn put(&mut self, class: Class, shape: Shape, pose: Pose, surface: Surface) {
         self.fixtures.push(Fixture { class, shape, pose, surface });
     }
 
-    /// Adds an object and returns its id. `model` is one of [`crate::models`]; `seed` chooses its
-    /// size and paint.
+    /// Adds an object and returns its id. `model` is one of [`crate::models`]; `seed` determines
+    /// its size and paint.
     pub fn add(&mut self, model: fn(u32, Path, &mut Rng) -> Object, path: Path, seed: u64) -> u32 {
         let id = self.objects.len() as u32 + 1;
         self.objects.push(model(id, path, &mut Rng::new(seed)));
@@ -104,7 +103,7 @@ impl Scene {
         self.add(models::car, path, seed)
     }
 
-    /// The objects at a time, s, in the order of their ids.
+    /// The objects at a time, s, by id.
     pub fn states(&self, t: f64) -> Vec<ObjectState> {
         self.objects.iter().map(|object| self.state(object, t)).collect()
     }

@@ -7,25 +7,25 @@ use crate::scene::Scene;
 use std::fmt;
 use std::str::FromStr;
 
-/// What is driven through.
+/// The scene to drive through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scenery {
-    /// A street with houses, trees and parked cars: what training draws from.
+    /// A street with houses, trees and parked cars: the one used for training.
     #[default]
     Street,
-    /// The same with more that makes still things seem to move, to choose numbers on.
+    /// The same with more of what makes static structure appear to move, for tuning.
     StreetCluttered,
-    /// The same with the traffic of a road out of town, 15 to 36 m/s, to choose numbers on.
+    /// The same with the traffic of a road out of town, 15 to 36 m/s, for tuning.
     StreetFast,
-    /// The same with vehicles that creep and many people who stroll, to choose numbers on.
+    /// The same with creeping vehicles and many strolling people, for tuning.
     StreetSlow,
-    /// One of [`Place::ALL`], drawn by the seed: never trained or tuned on.
+    /// One of [`Place::ALL`], drawn by the seed: never used for training or tuning.
     Outskirts,
-    /// This one of them.
+    /// This particular one.
     Only(Place),
 }
 
-/// A name that no scenery has.
+/// A name that is not a scenery's.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownScenery(String);
 
@@ -39,7 +39,7 @@ impl fmt::Display for UnknownScenery {
 impl std::error::Error for UnknownScenery {}
 
 impl Scenery {
-    /// The street and its kinds.
+    /// The street and its variants.
     const STREETS: [Scenery; 4] =
         [Scenery::Street, Scenery::StreetCluttered, Scenery::StreetFast, Scenery::StreetSlow];
 
@@ -49,7 +49,7 @@ impl Scenery {
         Scenery::STREETS.into_iter().chain([Scenery::Outskirts]).chain(places)
     }
 
-    /// What [`Scenery::from_str`] understands.
+    /// The name that [`Scenery::from_str`] accepts.
     pub fn name(self) -> &'static str {
         match self {
             Scenery::Street => "street",
@@ -61,7 +61,7 @@ impl Scenery {
         }
     }
 
-    /// The place of the outskirts that a drive of this seed goes through.
+    /// The place in the outskirts that a drive with this seed goes through.
     pub fn place(self, seed: u64) -> Option<Place> {
         match self {
             Scenery::Outskirts => Some(Place::drawn(seed)),
@@ -70,7 +70,7 @@ impl Scenery {
         }
     }
 
-    /// A scene and the path of the vehicle through it. `ego` counts in the street only.
+    /// A scene and the vehicle's path through it. `ego` applies to the street only.
     pub(crate) fn draw(self, seed: u64, ego: Ego, duration_s: f64, density: f64) -> (Scene, Path) {
         if let Some(place) = self.place(seed) {
             return outskirts::draw(place, seed, duration_s, density);

@@ -1,4 +1,4 @@
-//! Spinning sensors: beams, turn, range and noise of some devices.
+//! Spinning sensors: beams, revolution, range and noise of several devices.
 
 use crate::rng::Rng;
 use std::f64::consts::PI;
@@ -6,31 +6,31 @@ use std::f64::consts::PI;
 /// One laser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// Above the sensor's horizontal plane, rad.
+    /// Angle above the sensor's horizontal plane, rad.
     pub elevation: f64,
-    /// Ahead of the column's azimuth (counter-clockwise), rad.
+    /// Angle ahead of the column's azimuth (counter-clockwise), rad.
     pub azimuth: f64,
 }
 
-/// A sensor that spins clockwise seen from its own top and starts and ends its turn at the rear.
+/// A sensor that spins clockwise as seen from its own top, with revolutions from rear to rear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensor {
-    /// Lasers; all of a column fire at once.
+    /// Lasers; all those of a column fire at once.
     pub beams: Vec<Beam>,
-    /// Firings a turn.
+    /// Firings per revolution.
     pub columns: usize,
-    /// Duration of a turn, s.
+    /// Duration of a revolution, s.
     pub turn_s: f64,
-    /// Nearest and farthest range that is reported, m.
+    /// Minimum and maximum reported range, m.
     pub range: [f64; 2],
-    /// Deviation of the range, m.
+    /// Standard deviation of the range, m.
     pub range_noise: f64,
-    /// Deviation of a ray's true direction from the reported one, rad.
+    /// Standard deviation of a ray's true direction from the reported one, rad.
     pub angle_noise: f64,
-    /// Probability that a ray gives no return for no reason of the scene.
+    /// Probability that a ray gives no return for reasons unrelated to the scene.
     pub dropout: f64,
-    /// Signal at 1 m, normal incidence and reflectivity 1 in units of the detection threshold:
-    /// what makes returns fade with range and grazing incidence. Infinite: none fade.
+    /// Signal at 1 m, normal incidence and reflectivity 1, in units of the detection threshold: it
+    /// makes returns fade with range and grazing incidence. Infinite: none fade.
     pub signal: f64,
 }
 
@@ -78,10 +78,10 @@ impl Beam {
 }
 
 impl Sensor {
-    /// The HDL-64E: 32 beams from +2 to -8.33 degrees, 32 from -8.83 to -24.33 degrees, 10 turns a
-    /// second, 120 m. Each laser sits a little off its place, as in any copy of the device; the
-    /// offsets are known to the calibration and the same in every simulation. 2048 firings a turn:
-    /// 131,072 rays.
+    /// The HDL-64E: 32 beams from +2 to -8.33 degrees, 32 from -8.83 to -24.33 degrees, 10
+    /// revolutions a second, 120 m. Each laser is a little off its nominal direction, as in any
+    /// individual device; the offsets are known to the calibration and the same in every
+    /// simulation. 2048 firings per revolution: 131,072 rays.
     pub fn hdl64() -> Sensor {
         let mut rng = Rng::new(0x64);
         let degrees = |i: usize| match i {
@@ -102,17 +102,18 @@ impl Sensor {
         }
     }
 
-    /// The HDL-32E: 32 beams from +10.67 to -30.67 degrees in steps of 1.33, 100 m. 1000 firings a
-    /// turn, fewer than half of the device's 2170 at 10 turns a second, so that four of them stay
-    /// within a sweep; [`crate::SensorRig::hdl32x4_full`] has them all.
+    /// The HDL-32E: 32 beams from +10.67 to -30.67 degrees in steps of 1.33, 100 m. 1000 firings
+    /// per revolution, fewer than half of the device's 2170 at 10 revolutions a second, so that
+    /// four of them fit into a sweep; [`crate::SensorRig::hdl32x4_full`] has them all.
     pub fn hdl32() -> Sensor {
         let beam = |i| Beam::degrees((32.0 - 4.0 * f64::from(i)) / 3.0, 0.0);
         let beams = (0..32).map(beam).collect();
         Sensor { beams, columns: 1000, range: [1.0, 100.0], ..Sensor::hdl64() }
     }
 
-    /// The VLP-32C: 32 beams, dense around the horizon and sparse below, with their own azimuths,
-    /// 200 m; 1808 firings a turn as in the device at 10 turns a second (one in 55.296 us).
+    /// The VLP-32C: 32 beams, dense around the horizon and sparse below, with individual azimuths,
+    /// 200 m; 1808 firings per revolution as in the device at 10 revolutions a second (one per
+    /// 55.296 us).
     pub fn vlp32c() -> Sensor {
         let beams = VLP32C.iter().map(|&[elevation, azimuth]| Beam::degrees(elevation, azimuth));
         Sensor {
@@ -124,8 +125,8 @@ impl Sensor {
         }
     }
 
-    /// The Ouster OS1-128 in its mode 1024x10: 128 beams evenly from +22.5 to -22.5 degrees, four
-    /// azimuths in turn, 120 m; 131,072 rays.
+    /// The Ouster OS1-128 in its mode 1024x10: 128 beams evenly spaced from +22.5 to -22.5 degrees,
+    /// four alternating azimuths, 120 m; 131,072 rays.
     pub fn os1_128() -> Sensor {
         let beam =
             |i: usize| Beam::degrees(22.5 - 45.0 * i as f64 / 127.0, [4.2, 1.4, -1.4, -4.2][i % 4]);
@@ -145,8 +146,8 @@ impl Sensor {
         PI * (1.0 - 2.0 * turned)
     }
 
-    /// How far a ray may lie beside its column's half plane, per metre ahead: the beams' own
-    /// azimuths and the most that [`Rng::bell`] strays.
+    /// Maximum distance of a ray from its column's half plane, per metre ahead: the beams' own
+    /// azimuths plus the largest deviation of [`Rng::bell`].
     pub(crate) fn spread(&self) -> f64 {
         let widest = self.beams.iter().map(|b| b.azimuth.abs()).fold(0.0, f64::max);
         1e-4 + 1.01 * (widest + 3.5 * self.angle_noise).tan()
@@ -169,7 +170,7 @@ mod tests {
         assert!((s.beams[31].elevation.to_degrees() + 8.33).abs() < 0.05);
         assert!((s.beams[63].elevation.to_degrees() + 24.33).abs() < 0.05);
         assert!(s.beams.windows(2).all(|b| b[0].elevation > b[1].elevation));
-        // A quarter into the turn it looks left, at three quarters right.
+        // A quarter into the revolution it looks left, at three quarters right.
         assert!((s.azimuth(511) - 1.5723).abs() < 1e-3 && (s.azimuth(1536) + 1.5723).abs() < 1e-3);
     }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// A solid about the origin of its own frame.
+/// A solid centred on the origin of its own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A box.
@@ -17,17 +17,17 @@ pub enum Shape {
         /// Half height, m.
         half: f64,
     },
-    /// An ellipsoid along the axes.
+    /// An ellipsoid aligned with the axes.
     Ellipsoid {
         /// Half axes, m.
         radii: DVec3,
     },
 }
 
-/// A ray that starts outside a solid and goes through it.
+/// A ray that starts outside a solid and passes through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// Distance along the ray at which it enters, in lengths of its direction.
+    /// Distance along the ray at which it enters, in multiples of its direction's length.
     pub near: f64,
     /// Distance at which it leaves.
     pub far: f64,
@@ -51,7 +51,7 @@ impl Shape {
         Shape::Ellipsoid { radii: DVec3::new(x, y, z) }
     }
 
-    /// Radius of the sphere about the origin that holds the solid, m.
+    /// Radius of the sphere around the origin that contains the solid, m.
     pub fn reach(&self) -> f64 {
         match *self {
             Shape::Cuboid { half } => half.length(),
@@ -60,7 +60,7 @@ impl Shape {
         }
     }
 
-    /// Half extents of the box along the axes that holds the solid, m.
+    /// Half extents of the axis-aligned box that contains the solid, m.
     pub fn half(&self) -> DVec3 {
         match *self {
             Shape::Cuboid { half } => half,
@@ -70,7 +70,7 @@ impl Shape {
     }
 
     /// Where the ray from `origin` along the unit vector `direction` crosses the solid, if it
-    /// starts outside and meets it.
+    /// starts outside and hits it.
     pub fn cross(&self, origin: DVec3, direction: DVec3) -> Option<Crossing> {
         let crossing = match *self {
             Shape::Cuboid { half } => cross_cuboid(half, origin, direction),
@@ -81,7 +81,7 @@ impl Shape {
     }
 }
 
-/// Interval of the ray within |x| <= half along one axis; everything or nothing where the ray runs
+/// Interval of the ray within |x| <= half along one axis; everything or nothing if the ray is
 /// parallel to the slab.
 fn slab(half: f64, origin: f64, direction: f64) -> (f64, f64) {
     if direction.abs() < 1e-12 {
@@ -160,7 +160,8 @@ mod tests {
         let s = Shape::cuboid(4.0, 2.0, 1.0);
         let c = s.cross(DVec3::new(-10.0, 0.5, 0.0), DVec3::X).unwrap();
         assert!(close(c.near, 8.0) && close(c.far, 12.0) && close(c.cosine, 1.0));
-        // At 45 degrees from (0, -5): enters y = -1 at 4 sqrt 2, leaves through x = 2 after that.
+        // At 45 degrees from (-3.5, -5): enters y = -1 at 4 sqrt 2, leaves through x = 2 after
+        // that.
         let d = DVec3::new(1.0, 1.0, 0.0) / 2f64.sqrt();
         let c = s.cross(DVec3::new(-3.5, -5.0, 0.0), d).unwrap();
         assert!(close(c.near, 4.0 * 2f64.sqrt()) && close(c.far, 5.5 * 2f64.sqrt()));

@@ -1,4 +1,4 @@
-//! All that never moves, in a bounding volume hierarchy.
+//! Everything that never moves, in a bounding volume hierarchy.
 
 use crate::scene::Scene;
 use crate::target::{Hit, Ray, Target};
@@ -11,8 +11,8 @@ use obvhs::{Boundable, BvhBuildParams};
 use std::fmt;
 use std::time::Duration;
 
-/// How much larger than its solid every box is, m. The hierarchy is in single precision, which is
-/// good to 0.001 m within 8 km of the street's origin: boxes this much larger never lose a hit.
+/// How much every box exceeds its solid, m. The hierarchy is in single precision, which is accurate
+/// to 0.001 m within 8 km of the street's origin: with this margin boxes never lose a hit.
 const MARGIN: f64 = 0.02;
 
 /// Fixtures and parked objects.
@@ -53,9 +53,10 @@ impl Still {
         Still { targets, boxes }
     }
 
-    /// Replaces the hit where the ray meets one of these nearer.
+    /// Replaces the hit if the ray meets one of these targets nearer.
     pub(crate) fn nearest<'t>(&'t self, ray: &Ray, best: &mut Hit<'t>) {
-        // Rounded away from the origin, so that no box behind the hit's own is cut off.
+        // Rounded away from the origin, so that the hit's own box and those just behind it are not
+        // cut off.
         let beyond = |range: f64| (range + MARGIN) as f32;
         let [origin, direction] = [ray.origin, ray.direction].map(|v| Vec3A::from(v.as_vec3()));
         let through = BoxRay::new(origin, direction, 0.0, beyond(best.range));
@@ -66,7 +67,7 @@ impl Still {
         });
     }
 
-    /// The same by asking every target.
+    /// The same by testing every target.
     #[cfg(test)]
     pub(crate) fn nearest_of_all<'t>(&'t self, ray: &Ray, best: &mut Hit<'t>) {
         for target in &self.targets {
@@ -91,7 +92,7 @@ mod tests {
                 let mut any = || DVec3::new(rng.bell(), rng.bell(), 0.2 * rng.bell());
                 let mut direction = any().normalize();
                 if n % 8 == 0 {
-                    // Along an axis, where the boxes' test divides by nothing.
+                    // Along an axis, where the box test divides by zero.
                     direction = [DVec3::X, DVec3::Y, -DVec3::X, DVec3::Z][n / 8 % 4];
                 }
                 let origin = 10.0 * any() + DVec3::new(0.0, 0.0, 3.0);

@@ -1,5 +1,5 @@
 //! Solids placed at one moment, the nearest of them on a ray, and the half plane in which a column
-//! of rays meets them.
+//! of rays hits them.
 
 use crate::object::{Class, Object, Surface};
 use crate::rng::Rng;
@@ -7,7 +7,7 @@ use crate::shape::Shape;
 use glam::{DMat3, DVec3};
 use raywake_core::pose::Pose;
 
-/// A solid at one moment, ready to be met by rays of the street frame.
+/// A solid at one moment, ready to be hit by rays in the street frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Target {
     pub(crate) shape: Shape,
@@ -18,10 +18,10 @@ pub(crate) struct Target {
     pub(crate) surface: Surface,
     pub(crate) class: Class,
     pub(crate) object: u32,
-    /// Object and part it is of, where that moves.
+    /// Indices of the object and part it belongs to, if that moves.
     pub(crate) mover: Option<(usize, usize)>,
-    /// From 1, unlike any other's in the scene: draws the chance of a ray to go through, and
-    /// decides between two at the same range, so that the order they are met in does not matter.
+    /// Unique in the scene, from 1: seeds whether a ray passes through, and decides between two at
+    /// the same range, so that the order in which they are tested does not matter.
     pub(crate) number: u64,
 }
 
@@ -55,7 +55,7 @@ impl Target {
         Target { shape, turn, centre, reach, surface, class, object: 0, mover: None, number }
     }
 
-    /// Half extents along the street's axes of a box that holds the solid.
+    /// Half extents along the street's axes of a box containing the solid.
     pub(crate) fn half(&self) -> DVec3 {
         let half = self.shape.half();
         // Rows of `street_from_part` are columns of its transpose.
@@ -63,13 +63,13 @@ impl Target {
     }
 }
 
-/// A ray of the street frame.
+/// A ray in the street frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     pub(crate) origin: DVec3,
     /// A unit vector.
     pub(crate) direction: DVec3,
-    /// Seed of what chance decides along it.
+    /// Seed of all random decisions along it.
     pub(crate) seed: u64,
 }
 
@@ -78,12 +78,12 @@ pub(crate) struct Ray {
 pub(crate) struct Hit<'t> {
     pub(crate) range: f64,
     pub(crate) cosine: f64,
-    /// None: the ground.
+    /// `None`: the ground.
     pub(crate) target: Option<&'t Target>,
 }
 
 impl<'t> Hit<'t> {
-    /// Takes the target instead if the ray meets it nearer; says whether it did.
+    /// Takes the target instead if the ray hits it nearer; returns whether it did.
     pub(crate) fn consider(&mut self, ray: &Ray, target: &'t Target) -> bool {
         let (turn, surface) = (&target.turn, &target.surface);
         let origin = *turn * (ray.origin - target.centre);
@@ -96,7 +96,7 @@ impl<'t> Hit<'t> {
             if rng.chance(surface.porosity) {
                 return false;
             }
-            // Leaves return from within, mostly from the outer ones.
+            // Foliage returns rays from within, mostly from its outer part.
             let u = rng.unit();
             range += 0.6 * u * u * (c.far - c.near);
         }
@@ -116,14 +116,14 @@ pub(crate) struct Fan {
     pub(crate) forward: DVec3,
     /// Normal of the half plane.
     pub(crate) across: DVec3,
-    /// How far a ray may lie beside the half plane, per metre ahead.
+    /// Maximum distance of a ray from the half plane, per metre ahead.
     pub(crate) spread: f64,
     /// Farthest range, m.
     pub(crate) range: f64,
 }
 
 impl Fan {
-    /// Whether a ray of the column can meet the sphere.
+    /// Whether a ray of the column can hit the sphere.
     pub(crate) fn meets(&self, centre: DVec3, reach: f64) -> bool {
         let to = centre - self.origin;
         let ahead = to.dot(self.forward);

@@ -1,4 +1,4 @@
-//! What a return really comes from, and how that moves.
+//! Where a return really comes from, and how that moves.
 
 use crate::object::Class;
 use crate::rig::PERIOD_S;
@@ -7,31 +7,31 @@ use crate::target::Hit;
 use glam::DVec3;
 use raywake_core::pose::Pose;
 
-/// What a return really comes from.
+/// Where a return really comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Id of the object, 0 for the static background.
     pub object: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// Velocity over ground of the very point that was hit, at the ray's time, along world axes,
-    /// m/s: a turning car's corners differ, a walker's leg is faster than the walker.
+    /// Velocity over ground of the exact point hit, at the ray's time, along world axes, m/s: a
+    /// turning car's corners differ, a walker's leg is faster than the walker.
     pub velocity_world: [f32; 3],
-    /// How far over ground, along world axes, that very point of the material moves within the
-    /// 0.1 s (one sweep) after the ray's time, m; exact.
+    /// Motion over ground, along world axes, of that same material point within the 0.1 s (one
+    /// sweep) after the ray's time, m; exact.
     pub flow_world: [f32; 3],
 }
 
 impl Truth {
-    /// Of what hangs in the air: no object, at rest.
+    /// Truth of clutter in the air: no object, at rest.
     pub(crate) const CLUTTER: Truth =
         Truth { object: 0, class: Class::Clutter, velocity_world: [0.0; 3], flow_world: [0.0; 3] };
 }
 
-/// Half the step of the central difference that gives velocities, s.
+/// Half the step of the central difference that yields velocities, s.
 const STEP_S: f64 = 5e-4;
 
-/// How one part of an object moves about one time.
+/// Motion of one part of an object around one time.
 #[derive(Clone, Copy)]
 struct Motion {
     part_from_street: Pose,

@@ -1,4 +1,4 @@
-//! Whole sweeps against what is known exactly.
+//! Whole sweeps against exact expectations.
 
 use glam::DVec3;
 use raywake_core::sweep::Timing;
@@ -22,7 +22,7 @@ fn vector(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// Returns in the world, each from the pose at its own time.
+/// Returns in the world frame, each by the pose at its own time.
 fn in_world<'a>(drive: &'a Drive, sweep: &'a SimSweep) -> impl Iterator<Item = (DVec3, f64)> + 'a {
     sweep.points.iter().map(|p| {
         let t = sweep.stamp_s + f64::from(p.offset_s);
@@ -87,7 +87,7 @@ fn rig_and_time() {
     for p in &sweep.points {
         assert!(p.offset_s >= before && p.offset_s < 0.05);
         before = p.offset_s;
-        // Clockwise, forward at the stamp: the azimuth tells the time.
+        // Clockwise, forward at the stamp: the azimuth gives the time.
         let azimuth = f64::from(p.position[1]).atan2(f64::from(p.position[0]));
         let off = (azimuth + f64::from(p.offset_s) / 0.1 * std::f64::consts::TAU).abs();
         let off = off.min((std::f64::consts::TAU - off).abs());
@@ -106,7 +106,7 @@ fn the_twist_at_the_stamp_stands_for_the_sweep() {
             let at = |s: f64| drive.world_from_vehicle(stamp_s + s);
             let twist = drive.twist(stamp_s);
             for s in [-0.05, 0.05] {
-                // Where the two take what lies 20 m ahead, and beside.
+                // Points 20 m ahead and to the side, as moved by the twist and by the path.
                 for p in [DVec3::X, DVec3::Y].map(|axis| 20.0 * axis) {
                     let off = (at(0.0) * twist.over(s)).transform(p) - at(s).transform(p);
                     assert!(off.length() < 0.03, "{ego:?}, sweep {n}: {} m", off.length());
@@ -187,12 +187,12 @@ fn every_sensor_of_every_rig_sees_the_same_planes() {
         for (((p, t), point), truth) in
             in_world(&drive, &sweep).zip(&sweep.points).zip(&sweep.truth)
         {
-            // Of 0.1 s, in the order of time, above the ground as the rig says.
+            // Within 0.1 s, in chronological order, above the ground as the rig states.
             assert!((-0.05..0.05).contains(&point.offset_s));
             let wall = usize::from(truth.class == Class::Building);
             let here = drive.world_from_vehicle(t).inverse().transform(p);
             if wall == 0 {
-                // The vehicle nods by 0.003 rad at most.
+                // The vehicle pitches by at most 0.003 rad.
                 let up = (here.z - declared.ground_m).abs();
                 assert!(p.z.abs() < 1e-4 && up < 0.01 + 0.005 * here.length(), "{name}: {here}");
             } else if p.z < 5.9999 {
@@ -207,7 +207,7 @@ fn every_sensor_of_every_rig_sees_the_same_planes() {
     }
 }
 
-/// Scene with one of each in motion, one of them turning.
+/// Scene with one moving object of each kind, one of them turning.
 fn movers() -> Scene {
     let mut scene = Scene::empty();
     let at = |x: f64, y: f64, yaw: f64, speed: f64| State { x, y, yaw, speed };
@@ -272,7 +272,7 @@ fn velocity_is_the_pose_s_derivative() {
         let at = |t: f64| state(t).world_from_object.transform(fixed);
         let expected = (at(t + h) - at(t - h)) / (2.0 * h);
         let off = (vector(truth.velocity_world) - expected).length();
-        // Limbs swing besides: up to their length times amplitude times rate.
+        // Limbs also swing, at up to their length times amplitude times rate.
         let limit = if state(t).class.max(Class::Van) > Class::Van { 2.5 } else { 1e-3 };
         assert!(off < limit, "{:?}: {off} m/s", state(t).class);
         let [l, w, height] = state(t).size.map(|v| 0.5 * v);
@@ -311,8 +311,8 @@ fn flow_is_the_material_s_displacement() {
         }
         seen.insert(truth.object);
         let object = &drive.scene().objects[truth.object as usize - 1];
-        // Street and world are the same here. Which part was hit is not said: one of them must
-        // have the point on its surface, and carry it to where the flow says.
+        // Street and world frame coincide here. The part that was hit is not recorded: one of them
+        // must have the point on its surface, and carry it to where the flow says.
         let ground = &drive.scene().ground;
         let off = (0..object.parts.len()).map(|part| {
             let pose = |t: f64| object.part_pose(part, ground, t);
@@ -321,7 +321,7 @@ fn flow_is_the_material_s_displacement() {
             out + (pose(t + 0.1).transform(fixed) - p - flow).length()
         });
         assert!(off.fold(f64::INFINITY, f64::min) < 1e-3, "{truth:?} at {p}");
-        // Over 0.1 s speed times time is near, but misses what turns and brakes.
+        // Over 0.1 s, speed times time is close, but ignores turning and braking.
         let straight = 0.1 * vector(truth.velocity_world);
         if object.class <= Class::Tram {
             assert!((flow - straight).length() < 0.08, "{flow} {straight}");

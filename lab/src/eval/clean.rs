@@ -1,8 +1,8 @@
-//! `raywake-lab eval clean`: what `raywake clean` made of a recording, against its truth.
+//! `raywake-lab eval clean`: the output of `raywake clean` for a recording, against its truth.
 //!
-//! Counted are returns, as the benchmark of dynamic maps does (Zhang et al. 2023): the share of
-//! static ones that is kept (SA), that of moving ones that is removed (DA), the geometric mean of
-//! both, and the IoU of moving object segmentation.
+//! Returns are counted as in the dynamic map benchmark (Zhang et al. 2023): the share of static
+//! ones kept (SA), that of moving ones removed (DA), the geometric mean of both, and the IoU of
+//! moving object segmentation.
 
 use super::exact::Exact;
 use super::moving::Semantic;
@@ -10,8 +10,8 @@ use raywake_io::Error;
 use raywake_io::source::{OpenOptions, Source, SweepData, Unlocated, open};
 use std::path::{Path, PathBuf};
 
-/// Returns whose material moves less in a tenth of a second are neither static nor moving, unless
-/// they do not move at all, m.
+/// Returns whose surface moves less than this in a tenth of a second are neither static nor moving,
+/// unless they do not move at all, m.
 const MOVING_M: f32 = 0.05;
 /// Labels that `raywake clean` writes.
 const MOVING: u32 = 251;
@@ -20,9 +20,9 @@ const UNLABELLED: u32 = 0;
 /// Options of `eval clean`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Recording: a simulated drive, or one with SemanticKITTI's labels of what moves.
+    /// Recording: a simulated drive, or one with SemanticKITTI's labels of moving classes.
     drive: PathBuf,
-    /// What `raywake clean --out` wrote of it.
+    /// What `raywake clean --out` wrote for it.
     cleaned: PathBuf,
 }
 
@@ -34,7 +34,7 @@ struct Counted {
     removed: u64,
 }
 
-/// Returns that do not move and those that do.
+/// Static and moving returns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Tally([Counted; 2]);
 
@@ -46,7 +46,7 @@ impl Tally {
         counted.removed += u64::from(label == MOVING);
     }
 
-    /// Of returns that were looked at: static kept, dynamic removed, IoU.
+    /// Shares of inspected returns: static kept, dynamic removed, IoU.
     fn shares(&self) -> [f64; 3] {
         let [still, moving] = self.0;
         let share = |part: u64, of: u64| part as f64 / of.max(1) as f64;
@@ -104,7 +104,7 @@ fn tally(drive: &Path, cleaned: &Path) -> Result<Tally, Error> {
     Ok(tally)
 }
 
-/// What tells whether returns move.
+/// Source of whether returns move.
 enum Truth {
     Exact(Exact),
     Semantic(Semantic),
@@ -118,7 +118,7 @@ impl Truth {
         exact.or_else(labelled).ok_or_else(|| Error::input(drive, "", what))
     }
 
-    /// Whether each return moves; `None` where that cannot be told.
+    /// Whether each return moves; `None` if unknown.
     fn moves(&self, sweep: &SweepData) -> Result<Vec<Option<bool>>, Error> {
         Ok(match self {
             Truth::Exact(exact) => {
@@ -173,7 +173,7 @@ mod tests {
         let [kept, removed, _] = tally.shares();
         eprintln!("{tally:?}");
         assert!(kept > 0.99 && removed > 0.9, "{}", tally.text());
-        // The clouds hold all that is a surface, and the map stands where the drive was.
+        // The clouds hold every surface, and the map is where the drive was.
         let size = |name: &str| -> u64 {
             let files = std::fs::read_dir(cleaned.join(name)).unwrap();
             files.map(|f| f.unwrap().metadata().unwrap().len()).sum()

@@ -1,4 +1,4 @@
-//! From a pair of sweeps to rows: every solid column beside its truth.
+//! From a pair of sweeps to rows: every solid column with its truth.
 
 use super::exact::owners;
 use super::objects::{Objects, Present};
@@ -26,18 +26,18 @@ pub struct PairData {
     pub index: usize,
     /// The first sweep.
     pub first: SweepData,
-    /// Pose of the vehicle in the second.
+    /// Pose of the vehicle in the second sweep.
     pub then: Pose,
     /// Time between them, s.
     pub dt_s: f64,
     /// Flow of the first sweep's columns.
     pub columns: Vec<ColumnFlow>,
-    /// Flow of its returns.
+    /// Flow of the first sweep's returns.
     pub points: Vec<PointFlow>,
 }
 
 impl PairData {
-    /// Copies.
+    /// Copies a pair.
     pub fn of(pair: &Pair) -> PairData {
         PairData {
             index: pair.index,
@@ -55,15 +55,15 @@ impl PairData {
     }
 }
 
-/// Displacements over ground of a column between the sweeps, m, world axes.
+/// Displacements over ground of a column between the sweeps, m, in world axes.
 struct Displacements {
-    /// By the labels as they are.
+    /// By the labels as given.
     truth: DVec3,
     /// By the smoothed labels.
     smooth: DVec3,
-    /// At rest relative to the vehicle.
+    /// When at rest relative to the vehicle.
     carried: DVec3,
-    /// The truth in whole cells of the grid.
+    /// The truth rounded to whole cells of the grid.
     rounded: DVec3,
     /// Whether labels are complete at both ends.
     in_view: bool,
@@ -76,13 +76,13 @@ pub struct Collector<'a> {
     /// Table of the background filter.
     filter: Vec<i32>,
     view: View,
-    /// By how much a box reaches beyond its sides, m.
+    /// How far boxes are extended beyond their sides, m.
     margin_m: f64,
     objects: &'a Objects,
     grid: Grid,
     /// Columns of the first sweep in the second's window, where the filter sees them.
     before: Vec<Column>,
-    /// Whether the window of the first sweep has a column with flow that is not put out as moving.
+    /// Whether each column of the first sweep's window has flow and is not reported as moving.
     stands: Vec<bool>,
 }
 
@@ -112,9 +112,9 @@ impl<'a> Collector<'a> {
         self.objects.at(seen.first.frame)
     }
 
-    /// Rows of the first sweep's solid columns. Where there is exact truth of returns, they belong
-    /// to what those above the ground hit; without such, and without such truth, to the box that
-    /// their centre lies in: exact truth then says that they are of the road below
+    /// Rows of the first sweep's solid columns. With exact truth, a column belongs to whatever its
+    /// returns above the ground hit. Columns without such returns, or without exact truth, belong
+    /// to the box that contains their centre; with exact truth they are then of the road below it
     /// ([`Row::below`]).
     pub fn rows(&mut self, seen: &PairData, exact: Option<&[PointTruth]>) -> Vec<Row> {
         let window = self.grid.sweep(&self.rig, &seen.first.sweep());
@@ -148,8 +148,9 @@ impl<'a> Collector<'a> {
         rows
     }
 
-    /// Whether each return of the first sweep is put out as moving: with a velocity, and with its
-    /// column where that is solid. Of the sweep whose rows were made last.
+    /// Whether each return of the first sweep is reported as moving: with a velocity of
+    /// [`MOVING_MPS`] or more, and together with its column if that is solid. Applies to the sweep
+    /// whose rows were made last.
     pub fn returns_put_out_moving(&self, seen: &PairData) -> Vec<bool> {
         let moving = |(flow, &column): (&PointFlow, &u32)| {
             let [x, y] = flow.velocity_world_mps.map(f64::from);
@@ -211,9 +212,9 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// What is true of a column with its centre `at`, and the references.
+    /// The true displacements of a column with its centre `at`, and the references.
     fn displacements(&self, seen: &PairData, at: DVec3, object: Option<&Present>) -> Displacements {
-        // Flow is planar; the height matters where the vehicle nods, a little.
+        // Flow is planar; the height matters a little when the vehicle pitches.
         let height = object.map_or(self.rig.ground_m, |p| p.vehicle_from_box.translation.z);
         let at = DVec3::new(at.x, at.y, height);
         let world = seen.now().transform(at);
@@ -233,7 +234,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// A displacement in the frame of the grid as a displacement over ground.
+    /// Converts a displacement in the frame of the grid to one over ground.
     fn over_ground(&self, seen: &PairData, at: DVec3, by: DVec3) -> DVec3 {
         match self.profile.frame {
             Frame::Lattice => by,
@@ -241,7 +242,7 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// A displacement over ground in the frame of the grid.
+    /// Converts a displacement over ground to one in the frame of the grid.
     fn in_grid(&self, seen: &PairData, at: DVec3, by: DVec3) -> DVec3 {
         match self.profile.frame {
             Frame::Lattice => by,
@@ -256,7 +257,7 @@ fn flat(flow: &ColumnFlow) -> DVec3 {
     DVec3::new(x, y, 0.0)
 }
 
-/// As [`Row::motion`] has it.
+/// Encoded as in [`Row::motion`].
 fn motion(motion: Motion) -> u8 {
     match motion {
         Motion::Parked => 0,
@@ -277,7 +278,7 @@ mod tests {
     use raywake_io::source::simulated::Simulated;
     use raywake_sim::Class;
 
-    /// A truck of 8 m that goes 0.6 m on, and returns within its footprint and beside it.
+    /// A truck of 8 m that moves 0.6 m, with returns within its footprint and beside it.
     #[test]
     fn what_stands_beneath_a_truck_is_not_the_truck() {
         let source = Simulated::new(1, 2);
@@ -341,7 +342,7 @@ mod tests {
             assert!(*class == 2 && (by - 0.6).abs() < 1e-3, "{motion:?}");
         }
         assert!(motion[2..] == [(0, 0.0); 2], "{motion:?}");
-        // By the boxes alone.
+        // With the boxes alone.
         let rows = collector.rows(&seen, None);
         assert_eq!(classes(&rows), ["Truck", "Truck", "Truck", "Background"]);
         assert!(rows.iter().all(|r| !r.below));

@@ -15,10 +15,10 @@ use crate::report::{Picture, Report, Results};
 use raywake_io::Error;
 use std::path::Path;
 
-/// What the rows of all drives come to.
+/// Results accumulated from the rows of all drives.
 struct Evidence {
     tally: Tally,
-    /// The same pair by pair.
+    /// The same, pair by pair.
     alone: Option<Tally>,
     calibration: Calibration,
     verdicts: ColumnVerdicts,
@@ -48,7 +48,7 @@ impl Evidence {
 }
 
 /// Reads the rows of all drives, writes the report and returns its tables. `pairs`: the drives that
-/// were run pair by pair, too.
+/// were also run pair by pair.
 pub fn conclude(
     drives: &[Facts],
     pairs: &[Facts],
@@ -144,7 +144,7 @@ const UNCERTAINTY: &str = "Every displacement and every velocity has a covarianc
     simulator's, or the smoothed labels, whose own errors count as ours; what is parked, and what \
     no label holds, is at rest.";
 
-/// What the scores of returns are.
+/// Text explaining the scores of returns.
 fn about_returns() -> String {
     format!(
         "Every return has the velocity of its column over the time between the sweeps. \
@@ -166,7 +166,7 @@ fn subtitle(drives: &[Facts]) -> String {
     format!("{drives}, {pairs} pairs of sweeps")
 }
 
-/// A number with its unit; a dash where there is none.
+/// A number with its unit; a dash if there is none.
 fn number(value: f64, unit: &str, digits: usize) -> String {
     if value.is_finite() { format!("{value:.digits$} {unit}") } else { "–".into() }
 }
@@ -221,7 +221,7 @@ fn facts(report: &mut Report, drives: &[Facts], settings: &Settings) {
     report.fact("Evaluated", &format!("{sweeps} sweeps in {times:.1} s of work"));
 }
 
-/// Best and worst sweeps, of the first drives.
+/// Best and worst sweeps of the first drives.
 fn pictures(report: &mut Report, drives: &[Facts], out: &Path) -> Result<(), Error> {
     const SHOWN: usize = 8;
     let panels: Vec<_> = drives.iter().flat_map(|d| &d.panels).take(SHOWN).collect();
@@ -238,7 +238,7 @@ fn pictures(report: &mut Report, drives: &[Facts], out: &Path) -> Result<(), Err
     Ok(())
 }
 
-/// Every choice that decides what is counted.
+/// Every convention that decides what is counted.
 fn choices(report: &mut Report, drives: &[Facts], settings: &Settings, tally: &Tally) {
     let boxes: usize = drives.iter().map(|d| d.boxes).sum();
     let tracks: usize = drives.iter().map(|d| d.tracks).sum();

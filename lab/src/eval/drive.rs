@@ -27,33 +27,33 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Instant;
 
-/// Pairs that may wait for their rows: the pipeline waits where rows take longer.
+/// Pairs that may wait for their rows: the pipeline waits if rows take longer.
 const WAITING: usize = 2;
 
-/// Counts changes of what rows and facts mean: those of another number are made anew. Raise it with
+/// Version of the meaning of rows and facts: those of another version are redone. Raise it with
 /// every such change.
 const ROWS: u32 = 4;
 
-/// What all drives of an evaluation have in common.
+/// Settings shared by all drives of an evaluation.
 #[derive(Clone)]
 pub struct Settings {
     /// Checked.
     pub profile: Profile,
     /// Read and checked.
     pub weights: WeightFiles,
-    /// Digest of the weights' texts.
+    /// Digest of the weights' text.
     pub weights_digest: String,
     /// Where the heavy half runs.
     pub backend: BackendChoice,
     /// How recordings are opened.
     pub open: OpenOptions,
-    /// By how much a box reaches beyond its sides, m.
+    /// How far boxes are extended beyond their sides, m.
     pub margin_m: f64,
-    /// Sweeps of a drive at most.
+    /// Maximum number of sweeps per drive.
     pub sweeps: usize,
-    /// Time the pipeline without its filter too.
+    /// Whether to also time the pipeline without its filter.
     pub all_columns: bool,
-    /// Whether the pipeline keeps what it knows from one pair to the next.
+    /// Whether the pipeline keeps its history from one pair to the next.
     pub history: bool,
 }
 
@@ -71,8 +71,8 @@ impl Settings {
         }
     }
 
-    /// What decides the rows of a drive. Of the drive itself: its poses, stamps and rig, which
-    /// depend on how it is opened too, and its labels.
+    /// Everything that decides the rows of a drive. Of the drive itself: its poses, stamps and rig,
+    /// which also depend on how it is opened, and its labels.
     fn key(&self, source: &dyn Source, labels: &Labels) -> serde_json::Value {
         let moments =
             (0..source.len()).map(|i| (source.frame(i), source.stamp_s(i), source.pose(i)));
@@ -92,7 +92,7 @@ impl Settings {
     }
 }
 
-/// Total time of every pair where every solid column is foreground, ms.
+/// Total time of every pair with every solid column as foreground, ms.
 fn unfiltered(source: &mut dyn Source, settings: &Settings) -> Result<Vec<f64>, RunError> {
     let mut totals = Vec::new();
     let sweeps = settings.sweeps.min(source.len());
@@ -118,7 +118,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Of a drive in a folder of results.
+    /// Files of a drive in a folder of results.
     pub fn of(out: &Path, drive: &str) -> Files {
         Files {
             rows: out.join("rows").join(format!("{drive}.parquet")),
@@ -139,8 +139,8 @@ impl Files {
     }
 }
 
-/// Evaluates the drive at `path` unless that has been done with the same settings. Returns its
-/// facts and whether they were there already.
+/// Evaluates the drive at `path` unless that was done with the same settings. Returns its facts and
+/// whether they existed already.
 pub fn evaluate(
     path: &Path,
     name: &str,
@@ -164,7 +164,7 @@ pub fn evaluate(
     {
         return Ok((facts, true));
     }
-    // Rows of other settings must not pass for those of the facts that are there.
+    // Rows of other settings must not pass for those of the existing facts.
     files.forget()?;
     let objects = Objects::new(&labels, source.as_ref());
     let mut facts = known(name, key, source.as_ref(), &labels);
@@ -185,7 +185,7 @@ pub fn evaluate(
     Ok((facts, false))
 }
 
-/// What is known of a drive before it is run.
+/// What is known about a drive before it is run.
 fn known(name: &str, key: serde_json::Value, source: &dyn Source, labels: &Labels) -> Facts {
     Facts {
         drive: name.to_string(),
@@ -199,7 +199,7 @@ fn known(name: &str, key: serde_json::Value, source: &dyn Source, labels: &Label
     }
 }
 
-/// Boxes of the drive; none will do where its returns are labelled.
+/// Boxes of the drive; there may be none if its returns are labelled.
 fn labels(path: &Path, source: &dyn Source, semantic: bool) -> Result<Labels, Error> {
     match labels::find(path, source)? {
         None if semantic => Ok(Labels::none()),
@@ -216,7 +216,7 @@ fn view(view: View) -> &'static str {
     }
 }
 
-/// What judges the pairs of one drive.
+/// Everything that judges the pairs of one drive.
 struct Judges<'a> {
     collector: Collector<'a>,
     points: Points,
@@ -259,7 +259,7 @@ impl<'a> Judges<'a> {
     }
 }
 
-/// The pipeline here, rows on a thread of their own.
+/// Runs the pipeline here and makes rows on a thread of their own.
 fn run(
     source: &mut dyn Source,
     sweeps: usize,
@@ -275,7 +275,7 @@ fn run(
         let rows = scope.spawn(move || collect(&drive, judges, &receive, files));
         let summary = engine::execute(&plan, source, &mut |_, pair| {
             facts.pair(pair.first.points.len(), pair.laps);
-            // Fails where the other thread has; it will say why.
+            // Fails if the other thread has failed; that thread reports why.
             let index = if history { pair.index } else { PairByPair::sweep(pair.index) };
             let _ = send.send(Some(PairData { index, ..PairData::of(pair) }));
         });
@@ -304,8 +304,8 @@ fn run(
     Ok(())
 }
 
-/// Rows and scores of all pairs as they come; `None` says that these were all. Without it there
-/// is no file of rows.
+/// Collects rows and scores of all pairs as they arrive; `None` marks the end. Without it no file
+/// of rows is written.
 fn collect(
     drive: &str,
     mut judges: Judges,
@@ -321,7 +321,7 @@ fn collect(
     Ok(Collected { scores: judges.points.scores, returns: judges.returns.counts, panels })
 }
 
-/// What the thread that makes rows has besides.
+/// What the thread that makes rows returns.
 struct Collected {
     scores: [PointScores; 3],
     returns: ReturnCounts,

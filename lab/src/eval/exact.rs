@@ -1,4 +1,4 @@
-//! What every return of a simulated drive really is, and with it every column.
+//! The exact truth of every return of a simulated drive, and so of every column.
 
 use crate::simulate::truth::{self, PointTruth};
 use raywake_core::record::NONE;
@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 pub struct Exact(PathBuf);
 
 impl Exact {
-    /// Of the drive in a folder; none where it is not a simulated one.
+    /// The truth of the drive in a folder; `None` if it is not a simulated one.
     pub fn of(drive: &Path) -> Option<Exact> {
-        // As the labels: in the only recording below the folder.
+        // As for the labels: in the only recording below the folder.
         let drive = recognise(drive).map_or_else(|_| drive.to_path_buf(), |found| found.1);
         truth::objects_path(&drive).is_file().then_some(Exact(drive))
     }
 
-    /// Of the returns of a sweep, in their order. Fails where the file does not fit.
+    /// The truth of a sweep's returns, in their order. Fails if the file does not fit.
     pub fn returns(&self, sweep: &SweepData) -> Result<Vec<PointTruth>, Error> {
         let path = truth::points_path(&self.0, sweep.frame);
         let rows = truth::read_points(&path)?;
@@ -30,9 +30,9 @@ impl Exact {
     }
 }
 
-/// What every column belongs to: the object that most of its returns above the ground hit, the
-/// first id where some have as many; 0 where more hit the background, nothing where it has none.
-/// `of_point` has the column of every return.
+/// What every column belongs to: the object hit by most of its returns above the ground (on a tie
+/// the first id); 0 if more hit the background, `None` if there are no such returns. `of_point` has
+/// the column of every return.
 pub fn owners(of_point: &[u32], returns: &[PointTruth], columns: usize) -> Vec<Option<u32>> {
     let hits =
         of_point.iter().zip(returns).filter(|(c, t)| **c != NONE && t.class != Class::Ground);
@@ -41,7 +41,7 @@ pub fn owners(of_point: &[u32], returns: &[PointTruth], columns: usize) -> Vec<O
     let (mut owners, mut most) = (vec![None; columns], vec![0; columns]);
     for same in hits.chunk_by(|a, b| a == b) {
         let (column, object) = (same[0].0 as usize, same[0].1);
-        // The background comes first, and gives way to an object with as many.
+        // The background comes first, and yields to an object with equally many.
         if same.len() > most[column] || same.len() == most[column] && owners[column] == Some(0) {
             (owners[column], most[column]) = (Some(object), same.len());
         }
@@ -75,7 +75,7 @@ mod tests {
         ];
         let returns = columns.iter().enumerate();
         let returns = returns.flat_map(|(n, (_, all))| all.iter().map(move |t| (n as u32, *t)));
-        // As they come, with some outside the window.
+        // Reversed, with some outside the window.
         let (of_point, truth): (Vec<u32>, Vec<PointTruth>) =
             returns.rev().chain([(NONE, car), (NONE, wall)]).unzip();
         let expected: Vec<Option<u32>> = columns.iter().map(|c| c.0).collect();

@@ -1,4 +1,4 @@
-//! What is kept of a drive beside its rows: settings, times, notes.
+//! Facts kept of a drive beside its rows: settings, times, notes.
 
 use super::moving::ReturnCounts;
 use super::points::PointScores;
@@ -33,11 +33,11 @@ pub struct Panel {
 pub struct Facts {
     /// Name of the drive.
     pub drive: String,
-    /// Everything that decides what its rows are; another run with the same need not be done.
+    /// Everything that decides its rows; a run with equal settings need not be repeated.
     pub settings: serde_json::Value,
-    /// Where objects are labelled; empty where none are.
+    /// Where objects are labelled; empty if none are.
     pub view: String,
-    /// Whether labels are a simulator's, without noise.
+    /// Whether labels come from a simulator, without noise.
     pub exact: bool,
     /// Labelled objects.
     pub tracks: usize,
@@ -53,15 +53,15 @@ pub struct Facts {
     pub stages: Vec<Stage>,
     /// Sum of the stages per pair, ms.
     pub totals: Vec<f64>,
-    /// The same without the background filter, where that was asked for.
+    /// The same without the background filter, if requested.
     pub unfiltered: Vec<f64>,
     /// Returns of the first sweep of each pair.
     pub points: Vec<usize>,
-    /// What was left out, of data and labels.
+    /// What was left out of data and labels.
     pub notes: Vec<String>,
     /// Scores of single returns, in the order of [`super::points::ESTIMATES`].
     pub scores: [PointScores; 3],
-    /// Returns put out as moving, by what they are.
+    /// Returns reported as moving, by what they are.
     pub returns: ReturnCounts,
     /// Pictures of its best and worst sweeps.
     pub panels: Vec<Panel>,
@@ -70,7 +70,7 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// Books the times of a pair.
+    /// Records the times of a pair.
     pub fn pair(&mut self, points: usize, laps: &Laps) {
         let mut total = 0.0;
         for (name, ms) in laps.stages() {
@@ -100,7 +100,7 @@ impl Facts {
         Ok(facts)
     }
 
-    /// Writes them, whole or not at all.
+    /// Writes the facts, whole or not at all.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let text = serde_json::to_string_pretty(self).expect("plain numbers and text");
         atomic::write(path, |out| out.write_all(text.as_bytes()))

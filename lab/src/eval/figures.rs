@@ -21,7 +21,7 @@ const CDF_MPS: f64 = 3.0;
 /// Points of a curve.
 const POINTS: usize = 200;
 
-/// Classes with a figure of their own in the dissertation, and all that are there.
+/// Classes with a figure of their own in the dissertation, and all others present.
 fn groups(tally: &Tally) -> Vec<ClassGroup> {
     let some = |g: &ClassGroup| tally.coverage(*g, MotionGroup::Any)[0] > 0;
     ClassGroup::labelled().chain([ClassGroup::Class(0)]).filter(some).collect()
@@ -73,7 +73,7 @@ fn histogram(errors: &Sorted, cell_m: f64) -> Plot {
     Plot::Histogram(histogram)
 }
 
-/// Figures 3.7 and 3.8: errors of the raw flow by class, and of all, what moves and what is parked.
+/// Figures 3.7 and 3.8: errors of the raw flow by class, and of all, moving and parked columns.
 pub fn histograms(tally: &Tally, cell_m: f64) -> [Chart; 2] {
     let of = |group, motion| {
         histogram(&tally.flow(Estimate::Ours, Truth::Raw, group, motion, Weight::Column), cell_m)
@@ -107,7 +107,7 @@ fn cdf(name: &str, errors: &Sorted, limit: f64, style: Style) -> Series {
     Series { name, points: errors.cdf(limit, POINTS), style, marks: Vec::new() }
 }
 
-/// Raw flow of what moves and what is parked beside the estimates that need no LIDAR.
+/// Raw flow of moving and of parked columns beside estimates that need no LIDAR.
 pub fn references(tally: &Tally) -> Chart {
     let part = |motion: MotionGroup| {
         let mut lines = Lines::new(
@@ -129,7 +129,7 @@ pub fn references(tally: &Tally) -> Chart {
     Chart::small_multiples("figure-references", caption, parts.into())
 }
 
-/// Figure 3.9: errors of tracklets by age, by class: what moves, and all that is parked.
+/// Figure 3.9: errors of tracklets by age and class: moving ones, and all parked ones.
 pub fn tracklets(tally: &Tally) -> Chart {
     let part = |(group, motion): (ClassGroup, MotionGroup)| {
         let mut lines = Lines::new(
@@ -158,7 +158,7 @@ pub fn tracklets(tally: &Tally) -> Chart {
     Chart::small_multiples("figure-3-9", caption, parts.map(part).collect())
 }
 
-/// Settled tracklets, moving and parked apart.
+/// Settled tracklets, moving and parked separately.
 pub fn settled(tally: &Tally) -> Chart {
     let mut lines = Lines::new(
         Axis::new("error, m/s").range(0.0, CDF_MPS),
@@ -173,7 +173,7 @@ pub fn settled(tally: &Tally) -> Chart {
     Chart::new("figure-settled", caption, Plot::Lines(lines))
 }
 
-/// Table 3.3 as bars: median and 99 % of every stage.
+/// Table 3.3 as bars: median and 99 % quantile of every stage.
 pub fn times(drives: &[Facts]) -> Chart {
     let stages = stages(drives);
     let bar = |ms: &[f64]| {
@@ -191,7 +191,7 @@ pub fn times(drives: &[Facts]) -> Chart {
     Chart::new("figure-stages", caption, Plot::Bars(bars))
 }
 
-/// Section B.4: time of the occupancy grid, and of everything, against number of points.
+/// Section B.4: time of the occupancy grid, and of a whole pair, against the number of returns.
 pub fn time_by_points(drives: &[Facts]) -> Chart {
     let series = |name: &str, ms: &dyn Fn(&Facts) -> Vec<f64>| {
         let points = drives.iter().flat_map(|d| d.points.iter().zip(ms(d)));

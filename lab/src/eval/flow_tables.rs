@@ -1,4 +1,4 @@
-//! Table 3.1 and what belongs beside it: errors of the raw flow.
+//! Table 3.1 and related tables: errors of the raw flow.
 
 use super::groups::{ClassGroup, Estimate, MotionGroup, Truth};
 use super::statistics::{Sorted, Weight};
@@ -8,7 +8,7 @@ use crate::report::{Cell, Table, TableRow};
 /// Errors below this count as "within 30 cm" (table 3.1).
 pub const WITHIN_M: f64 = 0.3;
 
-/// Columns of displacements.
+/// Columns for displacements.
 const FLOW: [&str; 3] = ["Median, cm", "Mean, cm", "Within 30 cm, %"];
 
 /// Median, mean and share within 30 cm of displacements.
@@ -20,16 +20,16 @@ fn flow_cells(errors: &Sorted) -> [Cell; 3] {
     ]
 }
 
-/// The tallies of the pipeline as it runs and, where they were asked for, of pairs on their own.
+/// The tallies of the pipeline in normal operation and, if requested, of single pairs.
 #[derive(Clone, Copy)]
 pub struct Tallies<'a> {
-    /// As it runs.
+    /// In normal operation.
     pub run: &'a Tally,
     /// Without history.
     pub pairs: Option<&'a Tally>,
 }
 
-/// What a figure of table 3.1 is of.
+/// What a figure of table 3.1 is about.
 struct Counted<'a> {
     tally: &'a Tally,
     weight: Weight,
@@ -37,7 +37,7 @@ struct Counted<'a> {
 }
 
 impl<'a> Tallies<'a> {
-    /// As they stand beside each other.
+    /// In the order in which they are listed side by side.
     fn counted(self) -> impl Iterator<Item = Counted<'a>> {
         let of = |tally, names: [&'static str; 2]| {
             let weights = [Weight::Column, Weight::Voxel].into_iter();
@@ -63,7 +63,7 @@ fn published(group: ClassGroup) -> Option<(u64, [f64; 3])> {
 /// Columns of table 3.1 before its figures.
 const HEAD: [&str; 4] = ["Class", "Motion", "Columns", "Voxels"];
 
-/// The row of the dissertation, under the columns of voxels.
+/// The dissertation's row, under the columns for voxels.
 fn published_row(group: ClassGroup, columns: usize) -> Option<TableRow> {
     let (count, figures) = published(group)?;
     let head = [group.label().into(), "dissertation".into(), Cell::Empty, Cell::Count(count)];
@@ -72,8 +72,8 @@ fn published_row(group: ClassGroup, columns: usize) -> Option<TableRow> {
     Some(TableRow::reference(cells.chain(std::iter::repeat(Cell::Empty)).take(columns)))
 }
 
-/// Table 3.1: raw flow by class, moving and parked apart; by columns and by voxels, with history
-/// and without.
+/// Table 3.1: raw flow by class, moving and parked separately; by columns and by voxels, with and
+/// without history.
 pub fn raw_flow(tallies: Tallies) -> Table {
     let figures = |counted: Counted| {
         let named = move |figure: &str| match counted.name {
@@ -120,7 +120,7 @@ fn raw_flow_row(tallies: Tallies, group: ClassGroup, motion: MotionGroup) -> Opt
     (counts[0] > 0).then(|| TableRow::new(cells.chain(tallies.counted().flat_map(figures))))
 }
 
-/// Every estimate beside every other, all labelled columns.
+/// Every estimate beside every other, for all labelled columns.
 pub fn references(tallies: Tallies, truth: Truth) -> Table {
     let mut rows = Vec::new();
     for motion in MotionGroup::ALL {
@@ -150,7 +150,7 @@ pub fn references(tallies: Tallies, truth: Truth) -> Table {
     Table::new(id, caption, &[&["Motion", "Estimate", "Count"], &FLOW[..]].concat(), rows)
 }
 
-/// The cells of an estimate; none where nothing is estimated.
+/// The cells of an estimate; `None` if there is nothing to estimate.
 fn estimate_cells(motion: MotionGroup, name: &str, errors: &Sorted) -> Option<Vec<Cell>> {
     let head = [motion.label().into(), name.into(), Cell::Count(errors.count())];
     (errors.count() > 0).then(|| head.into_iter().chain(flow_cells(errors)).collect())

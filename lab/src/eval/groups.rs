@@ -1,14 +1,14 @@
-//! What the tables tell apart: estimates, truths, classes and motions.
+//! What the tables distinguish: estimates, truths, classes and motions.
 
 use super::row::{CLASSES, Row, class_of};
 use crate::labels::Kind;
 
-/// What is compared with the truth.
+/// An estimate compared with the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Estimate {
     /// The pipeline's.
     Ours,
-    /// The pipeline's, where it found a match; the other columns are left out.
+    /// The pipeline's, where it found a match; other columns are left out.
     Matched,
     /// Nothing moves relative to the vehicle.
     Zero,
@@ -19,11 +19,11 @@ pub enum Estimate {
 }
 
 impl Estimate {
-    /// All of them, as they are listed.
+    /// All of them, in the order listed.
     pub const ALL: [Estimate; 5] =
         [Estimate::Ours, Estimate::Matched, Estimate::Zero, Estimate::EgoOnly, Estimate::Rounded];
 
-    /// For people.
+    /// Name for display.
     pub fn label(self) -> &'static str {
         match self {
             Estimate::Ours => "raywake",
@@ -39,7 +39,7 @@ impl Estimate {
         !matches!(self, Estimate::Ours | Estimate::Matched)
     }
 
-    /// Displacement over ground, m; none where the column does not count.
+    /// Displacement over ground, m; `None` if the column does not count.
     pub fn of(self, row: &Row) -> Option<[f32; 2]> {
         match self {
             Estimate::Ours => Some([row.flow_x, row.flow_y]),
@@ -51,19 +51,19 @@ impl Estimate {
     }
 }
 
-/// Which truth.
+/// A truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Truth {
-    /// Labels as they are: they jitter.
+    /// Labels as given: they jitter.
     Raw,
-    /// Labels smoothed over time, zero for what is parked.
+    /// Labels smoothed over time, zero for parked objects.
     Smooth,
 }
 
-/// What labelled objects do over ground; see [`crate::labels::Motion`].
+/// Motion of labelled objects over ground; see [`crate::labels::Motion`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MotionGroup {
-    /// Whatever.
+    /// Any motion.
     Any,
     /// Moving.
     Moving,
@@ -78,12 +78,12 @@ impl MotionGroup {
     pub const ALL: [MotionGroup; 4] =
         [MotionGroup::Any, MotionGroup::Moving, MotionGroup::Slow, MotionGroup::Parked];
 
-    /// Those told apart for a group: only what is labelled has any.
+    /// The motions distinguished for a group: only labelled ones have any.
     pub fn of(group: ClassGroup) -> &'static [MotionGroup] {
         if group == ClassGroup::Class(0) { &[MotionGroup::Any] } else { &MotionGroup::ALL[1..] }
     }
 
-    /// For people.
+    /// Name for display.
     pub fn label(self) -> &'static str {
         match self {
             MotionGroup::Any => "all",
@@ -116,7 +116,7 @@ impl ClassGroup {
     /// People on foot.
     pub const PEOPLE: ClassGroup = ClassGroup::Class(class_of(Kind::Pedestrian));
 
-    /// For people.
+    /// Name for display.
     pub fn label(self) -> &'static str {
         match self {
             ClassGroup::Class(class) => CLASSES[class as usize],
@@ -124,12 +124,12 @@ impl ClassGroup {
         }
     }
 
-    /// Classes of labelled objects and all of them together.
+    /// Classes of labelled objects, and all of them together.
     pub fn labelled() -> impl Iterator<Item = ClassGroup> {
         (1..CLASSES.len() as u8).map(ClassGroup::Class).chain([ClassGroup::Labelled])
     }
 
-    /// Whether a class of [`CLASSES`] is one of it.
+    /// Whether a class of [`CLASSES`] belongs to this group.
     pub fn holds(self, class: usize) -> bool {
         match self {
             ClassGroup::Class(c) => usize::from(c) == class,
@@ -138,9 +138,9 @@ impl ClassGroup {
     }
 }
 
-/// Classes, what is in no box among them.
+/// Number of classes, including what is in no box.
 pub const COUNT: usize = CLASSES.len();
-/// Indices of the cells that a group and a motion name.
+/// Indices of the cells selected by a group and a motion.
 pub fn cells(group: ClassGroup, motion: MotionGroup) -> impl Iterator<Item = (usize, usize)> {
     let classes = (0..COUNT).filter(move |c| group.holds(*c));
     classes.flat_map(move |c| (0..3).filter(move |m| motion.holds(*m)).map(move |m| (c, m)))

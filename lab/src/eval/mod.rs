@@ -1,10 +1,10 @@
-//! `raywake-lab eval`: chapter 3's tables and figures, and today's metrics, on labelled drives.
+//! `raywake-lab eval`: chapter 3's tables and figures, and current metrics, on labelled drives.
 //!
 //! Two steps. Every drive goes through the pipeline once and leaves its rows (Parquet, one per
-//! solid column of every pair) and facts (JSON) in the folder of results: on several drives at a
-//! time, and only on those not there yet, so that an interrupted evaluation resumes. Then all rows
-//! are read again for tables, figures and the report; any engine that reads Parquet can do the same
-//! over more drives than one machine holds.
+//! solid column of every pair) and facts (JSON) in the folder of results: several drives at a time,
+//! and only those not there yet, so that an interrupted evaluation resumes. Then all rows are read
+//! again for tables, figures and the report; any engine that reads Parquet can do the same over
+//! more drives than one machine holds.
 
 pub mod ablate;
 mod calibration;
@@ -59,8 +59,8 @@ struct Inputs {
     backend: BackendChoice,
     #[command(flatten)]
     recording: Recording,
-    /// By how much a box reaches beyond its sides, m, where no exact truth tells what is in it: the
-    /// dissertation's programs have 0 (chapter 3) and 0.3 (chapter 4)
+    /// How far boxes are extended beyond their sides, m, where no exact truth says what is in them:
+    /// the dissertation's programs use 0 (chapter 3) and 0.3 (chapter 4)
     #[arg(long, value_name = "M", default_value_t = 0.0)]
     margin: f64,
     /// Stop after this many sweeps of every drive
@@ -69,7 +69,7 @@ struct Inputs {
 }
 
 impl Inputs {
-    /// Reads profile and learned numbers.
+    /// Reads the profile and learned parameters.
     fn settings(&self) -> Result<Settings, Error> {
         if !(0.0..=2.0).contains(&self.margin) {
             return Err(Error::Usage("--margin must be 0 to 2 m".into()));
@@ -90,7 +90,7 @@ impl Inputs {
     }
 }
 
-/// Folder in that of the results with those of pairs on their own: a folder of results, too.
+/// Subfolder of the results for pairs on their own: a folder of results, too.
 const PAIRS: &str = "pairs";
 
 /// `raywake-lab eval`: report.html, rows/DRIVE.parquet, drives/DRIVE.json and charts.
@@ -99,12 +99,12 @@ pub struct Args {
     /// Labelled drives: simulated, KITTI or Argoverse 2
     #[arg(required_unless_present = "list", value_name = "DRIVE")]
     drives: Vec<PathBuf>,
-    /// Drives of a list, a path a line, whose results are named after their whole paths. Of a part
-    /// of the list rows and facts only: the report comes of the list without --shard, once all
-    /// parts are done
+    /// Drives from a list, one path per line; results are named after the full paths. With --shard
+    /// only rows and facts are written: run the list without --shard for the report, once all parts
+    /// are done
     #[arg(long, value_name = "FILE", conflicts_with = "drives")]
     list: Option<PathBuf>,
-    /// Only every N-th drive of the list, as of `raywake run`
+    /// Only every N-th drive of the list, as in `raywake run`
     #[arg(long, value_name = "I/N", requires = "list", value_parser = Shard::parse)]
     shard: Option<Shard>,
     /// Folder of results
@@ -115,14 +115,15 @@ pub struct Args {
     /// Drives at a time; each keeps two cores busy
     #[arg(long, value_name = "N", default_value_t = 1)]
     jobs: usize,
-    /// Run every drive once more without the filter, for the time that all columns take
+    /// Run every drive once more without the filter, to time all columns
     #[arg(long)]
     all_columns: bool,
-    /// Run every drive once more, pair by pair: everything known from earlier sweeps is dropped
-    /// before each pair. Its raw flow stands beside the other
+    /// Run every drive once more, pair by pair: all history is discarded before each pair. Its raw
+    /// flow is listed beside the other
     #[arg(long)]
     pairs: bool,
-    /// Leave rows and facts only: for many processes that share a folder, the report coming last
+    /// Write rows and facts only: for many processes that share a folder, with the report written
+    /// last
     #[arg(long)]
     rows_only: bool,
 }
@@ -149,7 +150,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     failures("drives", &failed)
 }
 
-/// What failed, where anything did.
+/// An error that lists what failed, if anything did.
 fn failures(what: &str, failed: &[(String, impl std::fmt::Display)]) -> Result<(), Error> {
     if failed.is_empty() {
         return Ok(());
@@ -159,7 +160,7 @@ fn failures(what: &str, failed: &[(String, impl std::fmt::Display)]) -> Result<(
     Err(Error::Usage(format!("{} {what} failed:\n  {list}", failed.len())))
 }
 
-/// Hands the rows of all drives in a folder of results to `each`.
+/// Passes the rows of all drives in a folder of results to `each`.
 fn read_rows(
     drives: &[Facts],
     out: &Path,
@@ -172,8 +173,8 @@ fn read_rows(
     Ok(())
 }
 
-/// Hands the rows of a folder of results to `each`, with the number of their drive. Returns how
-/// many drives there are.
+/// Passes the rows of a folder of results to `each`, with the number of their drive. Returns the
+/// number of drives.
 pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<usize, Error> {
     let folder = out.join("rows");
     let entries = std::fs::read_dir(&folder).map_err(Error::reading(&folder))?;
@@ -185,7 +186,7 @@ pub fn rows_of(out: &Path, mut each: impl FnMut(usize, &Row)) -> Result<usize, E
     Ok(files.len())
 }
 
-/// A name for every drive: its folder's.
+/// A name for every drive: that of its folder.
 fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, Error> {
     let mut names = BTreeMap::new();
     for path in drives {
@@ -199,7 +200,8 @@ fn names(drives: &[PathBuf]) -> Result<BTreeMap<String, PathBuf>, Error> {
     Ok(names)
 }
 
-/// A name for every drive of a part of a list: its path, in one piece. And whether that is all.
+/// A name for every drive of a part of a list: its path, in one piece. Also returns whether the
+/// part is the whole list.
 fn names_of_list(
     list: &Path,
     shard: Option<Shard>,
@@ -212,7 +214,7 @@ fn names_of_list(
     Ok((names, shard.of == 1))
 }
 
-/// A path in one piece. No two have the same, in whichever part of a list they are.
+/// A path in one piece, unique across all parts of a list.
 fn name_of(place: &Path) -> String {
     let parts = place.iter().map(|part| part.to_string_lossy());
     let parts = parts.map(|part| part.replace('%', "%25").replace('+', "%2B"));
@@ -222,8 +224,8 @@ fn name_of(place: &Path) -> String {
 /// Drives that were evaluated, and those that failed.
 type Outcome = (Vec<Facts>, Vec<(String, RunError)>);
 
-/// Evaluates all drives into the folder `out`, `jobs` at a time. Fails where the folder cannot be
-/// made, and after a signal: the drives that were finished stay.
+/// Evaluates all drives into the folder `out`, `jobs` at a time. Fails if the folder cannot be
+/// created, and after a signal: finished drives are kept.
 fn all(
     names: &BTreeMap<String, PathBuf>,
     settings: &Settings,

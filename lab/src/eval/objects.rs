@@ -13,23 +13,23 @@ pub struct Present {
     pub track: u32,
     /// Id in the truth of a simulated drive's returns.
     pub id: Option<u32>,
-    /// What it is.
+    /// Kind of the object.
     pub kind: Kind,
-    /// From above, vehicle frame.
+    /// Seen from above, vehicle frame.
     pub footprint: Footprint,
-    /// The box's frame lies in its centre.
+    /// The box's frame is centred in it.
     pub vehicle_from_box: Pose,
     /// Length, width and height, m.
     pub size: [f64; 3],
-    /// What it does.
+    /// Its motion over the track.
     pub motion: Motion,
-    /// Motion to the next sweep; none where the object has no box there.
+    /// Motion to the next sweep; `None` if the object has no box there.
     pub step: Option<Step>,
 }
 
 impl Present {
-    /// From a point of the vehicle frame to the nearest box of those that move, seen from above,
-    /// m; infinite where nothing moves.
+    /// Distance from a point of the vehicle frame to the nearest box of a moving object, seen from
+    /// above, m; infinite if nothing moves.
     pub fn mover_m(all: &[Present], at: DVec3) -> f32 {
         let movers = all.iter().filter(|p| p.motion == Motion::Moving);
         movers.map(|p| p.footprint.distance_m(at)).fold(f64::INFINITY, f64::min) as f32
@@ -45,9 +45,9 @@ impl Present {
 /// Motion of an object from a sweep to the next, as transforms of points of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// By the labels as they are.
+    /// By the labels as given.
     pub raw: Pose,
-    /// By the smoothed labels; none for what is parked.
+    /// By the smoothed labels; the identity for parked objects.
     pub smooth: Pose,
 }
 
@@ -55,7 +55,7 @@ pub struct Step {
 pub struct Objects(HashMap<u64, Vec<Present>>);
 
 impl Objects {
-    /// Of labels, with the poses of the drive.
+    /// From labels, with the poses of the drive.
     pub fn new(labels: &Labels, source: &dyn Source) -> Objects {
         let mut frames: HashMap<u64, Vec<Present>> = HashMap::new();
         let all = trajectories(labels, source);

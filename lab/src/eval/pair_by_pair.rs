@@ -3,15 +3,15 @@
 use raywake_io::Error;
 use raywake_io::source::{Overview, PoseTrack, Source, SweepData};
 
-/// The sweeps of a recording in the order 0, 1, 1, 2, 2, 3: where one comes again no time passes,
-/// at which the pipeline drops all that it knows.
+/// The sweeps of a recording in the order 0, 1, 1, 2, 2, 3: no time passes at a repeat, so the
+/// pipeline discards all its history there.
 pub struct PairByPair<'a> {
     source: &'a mut dyn Source,
     overview: Overview,
 }
 
 impl<'a> PairByPair<'a> {
-    /// Of the first `sweeps` sweeps at most.
+    /// Pairs of at most the first `sweeps` sweeps.
     pub fn of(source: &'a mut dyn Source, sweeps: usize) -> PairByPair<'a> {
         let pairs = sweeps.min(source.len()).saturating_sub(1);
         let indices = || (0..(2 * pairs).max(1)).map(Self::sweep);
@@ -24,14 +24,14 @@ impl<'a> PairByPair<'a> {
                 poses: indices().map(|n| source.pose(n)).collect(),
             },
             epoch_ns: source.overview().epoch_ns,
-            // Every other step is none.
+            // Every other step has zero length.
             trusted: true,
             notes: source.notes().to_vec(),
         };
         PairByPair { source, overview }
     }
 
-    /// Index in the recording of the sweep that comes as number `index`.
+    /// Index in the recording of the sweep delivered as number `index`.
     pub fn sweep(index: usize) -> usize {
         index.div_ceil(2)
     }

@@ -1,5 +1,5 @@
-//! Pictures of a drive: its best and worst sweeps, and motion over ground beside motion as the
-//! vehicle sees it (figures 3.10 to 3.12).
+//! Pictures of a drive: its best and worst sweeps, and motion over ground beside motion as seen
+//! from the vehicle (figures 3.10 to 3.12).
 
 use super::collect::PairData;
 use super::facts;
@@ -13,22 +13,22 @@ use raywake_io::sink::atomic;
 use std::io::Write;
 use std::path::Path;
 
-/// A sweep with fewer labelled columns in view is no candidate.
+/// A sweep with fewer labelled columns in view is not a candidate.
 const LABELLED: usize = 30;
-/// Errors beyond this do not make a sweep any worse, m.
+/// Errors beyond this make a sweep no worse, m.
 const CLIP_M: f32 = 1.0;
-/// Arrows are as long as the way in this time, s.
+/// Arrows show the path covered in this time, s.
 const ARROW_S: f64 = 0.5;
-/// How far a picture reaches, m.
+/// How far a picture reaches from the vehicle, m.
 const EXTENT_M: f64 = 40.0;
-/// Error from which on columns have the colour of the worst, m.
+/// Error from which on columns get the colour of the worst, m.
 const WORST_M: f64 = 0.6;
 /// Observations below which a tracklet is not drawn, as in the author's viewer.
 const AGE: u32 = 3;
 
 /// A sweep worth a picture.
 struct Candidate {
-    /// Of all candidates for the same picture the one with the greatest is drawn.
+    /// Of all candidates for a picture the one with the highest merit is drawn.
     merit: f32,
     /// Mean error of the raw flow of labelled columns, m.
     mean_m: f32,
@@ -37,14 +37,14 @@ struct Candidate {
     outlines: Vec<Outline>,
 }
 
-/// Which sweeps are drawn: by the error of their raw flow, then those with most tracklets that move
-/// while the vehicle stands (figure 3.10) and while it drives (figures 3.11 and 3.12).
+/// The sweeps drawn: by the error of their raw flow, then those with most moving tracklets while
+/// the vehicle is stationary (figure 3.10) and while it drives (figures 3.11 and 3.12).
 const PICTURES: [&str; 4] = ["worst", "best", "busiest standing", "busiest driving"];
-/// A vehicle slower than this stands, m/s: twice what poses that are 1 cm off on every sweep make
-/// of one that does.
+/// A vehicle slower than this is stationary, m/s: twice the speed that poses with an error of 1 cm
+/// on every sweep give a stationary one.
 const STANDING_MPS: f64 = 0.3;
 
-/// The sweeps to be drawn so far.
+/// The sweeps to be drawn, so far.
 #[derive(Default)]
 pub struct Panels([Option<Candidate>; PICTURES.len()]);
 
@@ -71,7 +71,7 @@ impl Panels {
         }
     }
 
-    /// Draws them into `folder`.
+    /// Draws the sweeps into `folder`.
     pub fn write(
         self,
         folder: &Path,
@@ -174,7 +174,7 @@ impl Candidate {
         self.panel(title, columns.collect())
     }
 
-    /// An arrow along the vehicle's axes of a velocity over ground, m/s.
+    /// A velocity over ground, m/s, as an arrow along the vehicle's axes.
     fn arrow(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let along = self.seen.now().rotation.conjugate() * DVec3::new(x, y, 0.0);
         [along.x * ARROW_S, along.y * ARROW_S]

@@ -1,4 +1,4 @@
-//! Today's metrics on the flow of every return, for drives with labelled boxes or exact truth.
+//! Current metrics for the flow of every return, on drives with labelled boxes or exact truth.
 
 use super::collect::PairData;
 use super::objects::Present;
@@ -14,17 +14,17 @@ use raywake_io::sink::argoverse::displacement;
 use raywake_sim::{Class, PERIOD_S};
 use serde::{Deserialize, Serialize};
 
-/// Returns without a label up to this height above the plane the vehicle stands on count as
-/// ground, m, where no truth tells; the graders leave ground out.
+/// Without exact truth, returns without a label up to this height above the plane the vehicle
+/// stands on count as ground, m; the graders leave ground out.
 pub const GROUND_M: f64 = 0.3;
 
-/// Returns so close outside a box are not scored, m: to whom they belong cannot be told.
+/// Returns this close outside a box are not scored, m: they may or may not belong to it.
 pub const DOUBT_M: f64 = 0.3;
 
-/// The estimates that are scored.
+/// The estimates scored.
 pub const ESTIMATES: [&str; 3] = ["raywake", "ego motion only", "truth rounded to cells"];
 
-/// What one estimate scores over some pairs.
+/// Scores of one estimate over some pairs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointScores {
     /// EPE3D, AccS, AccR, outliers.
@@ -36,7 +36,7 @@ pub struct PointScores {
 }
 
 impl PointScores {
-    /// Whether they are whole; those read from a file need not be.
+    /// Whether the scores are complete; those read from a file need not be.
     pub fn are_whole(&self) -> bool {
         self.accuracy.is_whole() && self.bucketed.is_whole() && self.three_way.is_whole()
     }
@@ -65,7 +65,7 @@ impl Points {
         Points { view, ground_m, margin_m, cell_m, scores: Default::default() }
     }
 
-    /// Scores the first sweep of a pair, by the exact truth of its returns where there is any.
+    /// Scores the first sweep of a pair, against the exact truth of its returns if there is any.
     /// Fails where the graders would.
     pub fn pair(
         &mut self,
@@ -80,7 +80,7 @@ impl Points {
                 seen.first.points.iter().map(|p| self.boxed(p.position, seen, present)).collect()
             }
         };
-        // The pipeline has left out what is beyond its capacity.
+        // The pipeline has dropped what is beyond its capacity.
         points.truncate(seen.points.len());
         let pair = Pair { points, second_from_first: seen.then.inverse() * now };
         let ours = seen.points.iter().map(|f| displacement(f, &now, seen.dt_s)).collect();
@@ -97,7 +97,7 @@ impl Points {
         Ok(())
     }
 
-    /// By the box around it: what is in none stands.
+    /// Truth by the box around a return: without one it is static.
     fn boxed(&self, position_m: [f32; 3], seen: &PairData, present: &[Present]) -> TruePoint {
         let at = DVec3::from_array(position_m.map(f64::from));
         let mut point = TruePoint {
@@ -112,7 +112,8 @@ impl Points {
         }
         let Some(object) = present.iter().find(|p| p.holds(at, self.margin_m)) else {
             point.ground = at.z < self.ground_m + GROUND_M;
-            // Noise and swinging limbs leave boxes; what is so close to one may belong to it.
+            // Noise and swinging limbs stick out of boxes; returns this close to one may belong to
+            // it.
             point.valid = !present.iter().any(|p| p.holds(at, self.margin_m + DOUBT_M));
             return point;
         };
@@ -128,9 +129,9 @@ impl Points {
     }
 }
 
-/// By the simulator.
+/// Truth by the simulator.
 fn simulated(seen: &PairData, returns: &[PointTruth]) -> Vec<TruePoint> {
-    // Flow over one period; pairs may lie a little closer or farther apart.
+    // Flow over one period; the time between a pair may be a little shorter or longer.
     let span = (seen.dt_s / PERIOD_S) as f32;
     let point = |(p, t): (&Point, &PointTruth)| TruePoint {
         position_m: p.position,
@@ -142,7 +143,7 @@ fn simulated(seen: &PairData, returns: &[PointTruth]) -> Vec<TruePoint> {
     seen.first.points.iter().zip(returns).map(point).collect()
 }
 
-/// The category of what the simulator shows.
+/// The category of a simulated class.
 fn category(class: Class) -> Category {
     let kind = kind(truth::class_name(class)).filter(|_| class.is_foreground());
     kind.and_then(Category::of_kind).unwrap_or(Category::BACKGROUND)

@@ -1,5 +1,5 @@
-//! One row per (drive, sweep, solid column): what was estimated, what is true, and what is needed
-//! to choose between them. Written as Parquet, so that any engine can aggregate many drives.
+//! One row per (drive, sweep, solid column): the estimates, the truth, and whatever is needed to
+//! filter them. Written as Parquet, so that any engine can aggregate many drives.
 
 use crate::labels::Kind;
 use crate::labels::trajectory::MOVING_MPS;
@@ -15,7 +15,8 @@ use raywake_core::output::FlowBasis;
 use raywake_core::refinement::cues::Cues;
 use std::sync::Arc;
 
-/// Names of [`Row::class`]: what belongs to no labelled object, then the kinds of [`Kind`].
+/// Names of [`Row::class`]: the background, which belongs to no labelled object, then the kinds of
+/// [`Kind`].
 pub const CLASSES: [&str; 10] = [
     "Background",
     "Car",
@@ -34,7 +35,7 @@ pub const fn class_of(kind: Kind) -> u8 {
     kind as u8 + 1
 }
 
-/// How a Rust type lies in a Parquet column.
+/// How a Rust type is stored in a Parquet column.
 trait Cell: Copy {
     fn data_type() -> DataType;
     fn write(values: impl Iterator<Item = Self>) -> ArrayRef;
@@ -95,7 +96,8 @@ macro_rules! row {
             vec![$(<$type as Cell>::write(rows.iter().map(|r| r.$field))),*]
         }
 
-        /// The rows of a batch; the name of the column that is missing or of another type.
+        /// The rows of a batch; on failure the name of the column that is missing or of another
+        /// type.
         pub fn rows(batch: &RecordBatch) -> Result<Vec<Row>, &'static str> {
             let mut rows = vec![Row::default(); batch.num_rows()];
             $({
@@ -112,7 +114,7 @@ macro_rules! row {
 row! {
     /// Index of the sweep in the drive.
     sweep: u32,
-    /// Frame as the source counts.
+    /// Frame number, as counted by the source.
     frame: u64,
     /// Stamp of the sweep, s.
     stamp_s: f64,
@@ -128,14 +130,14 @@ row! {
     class: u8,
     /// 1 + index of the labelled track; 0: none.
     track: u32,
-    /// Where labels are complete, at both ends of the true motion.
+    /// Whether labels are complete, at both ends of the true motion.
     in_view: bool,
     /// 0: parked, or of no object; 1: slow; 2: moving ([`crate::labels::Motion`]).
     motion: u8,
-    /// Whether exact truth says that nothing but the ground below the box of its object was hit.
+    /// Whether by exact truth only the ground below its object's box was hit.
     below: bool,
-    /// From the column's centre to the nearest box of an object that moves, seen from above, m: 0
-    /// within it, infinite where nothing moves.
+    /// Distance from the column's centre to the nearest box of a moving object, seen from above, m:
+    /// 0 within it, infinite if nothing moves.
     mover_m: f32,
     /// Occupied voxels of the column: its weight in the dissertation's tables.
     voxels: u8,
@@ -147,26 +149,26 @@ row! {
     flow_x: f32,
     /// See `flow_x`.
     flow_y: f32,
-    /// Covariance of that displacement, m^2; zero where there is no match.
+    /// Covariance of that displacement, m^2; zero if there is no match.
     flow_cov_xx: f32,
     /// See `flow_cov_xx`.
     flow_cov_xy: f32,
     /// See `flow_cov_xx`.
     flow_cov_yy: f32,
-    /// True displacement by the labels as they are, m.
+    /// True displacement by the labels as given, m.
     true_x: f32,
     /// See `true_x`.
     true_y: f32,
-    /// Displacement by the labels' smoothed motion, zero for what is parked, m. Over `dt` it is the
-    /// true velocity.
+    /// Displacement by the labels' smoothed motion, zero for parked objects, m. Divided by `dt` it
+    /// is the true velocity.
     smooth_x: f32,
     /// See `smooth_x`.
     smooth_y: f32,
-    /// What "no motion relative to the vehicle" would be over ground, m.
+    /// Displacement over ground of "no motion relative to the vehicle", m.
     carried_x: f32,
     /// See `carried_x`.
     carried_y: f32,
-    /// The true displacement (labels as they are) rounded to whole cells, m.
+    /// The true displacement (labels as given) rounded to whole cells, m.
     rounded_x: f32,
     /// See `rounded_x`.
     rounded_y: f32,
@@ -174,7 +176,7 @@ row! {
     velocity_x: f32,
     /// See `velocity_x`.
     velocity_y: f32,
-    /// Covariance of the velocity, (m/s)^2; zero where there is no tracklet.
+    /// Covariance of the velocity, (m/s)^2; zero if there is no tracklet.
     covariance_xx: f32,
     /// See `covariance_xx`.
     covariance_xy: f32,
@@ -186,7 +188,7 @@ row! {
     dt: f32,
     /// P(moves).
     probability: f32,
-    /// See [`raywake_core::refinement::cues::Cues`], which these are.
+    /// A cue of P(moves), as the following fields; see [`raywake_core::refinement::cues::Cues`].
     margin: f32,
     /// See `margin`.
     share: f32,
@@ -208,16 +210,16 @@ row! {
     stands: f32,
 }
 
-/// Declares which columns are cues; the compiler knows whether all are.
+/// Declares which columns are cues; the compiler checks that none is missing.
 macro_rules! told {
     ($($cue:ident),*) => {
         impl Row {
-            /// Nothing but what P(moves) was told by.
+            /// A row with nothing but the cues of P(moves).
             pub fn told_by(cues: Cues) -> Row {
                 Row { $($cue: cues.$cue,)* ..Row::default() }
             }
 
-            /// What its P(moves) was told by.
+            /// The cues of its P(moves).
             pub fn cues(&self) -> Cues {
                 Cues { $($cue: self.$cue),* }
             }
@@ -233,39 +235,40 @@ impl Row {
         self.motion == 2
     }
 
-    /// Whether it moves or stands; `None` where that cannot be told: out of view, of what is slow,
-    /// and of the ground below an object.
+    /// Whether it moves; `None` if unknown: out of view, slow objects, and the ground below an
+    /// object.
     pub fn moves(&self) -> Option<bool> {
         self.moves_by_boxes().filter(|_| !self.below)
     }
 
-    /// The same where what lies in a box moves with it, as labels of recorded drives have it.
+    /// The same with everything in a box moving with it, as in labels of recorded drives.
     pub fn moves_by_boxes(&self) -> Option<bool> {
         (self.in_view && self.motion != 1).then_some(self.is_moving())
     }
 
-    /// Whether the flow is that of a match, the column's own or its thing's.
+    /// Whether the flow comes from a match, the column's own or its object's.
     pub fn is_matched(&self) -> bool {
         self.basis >= FlowBasis::Matched as u8
     }
 
-    /// Whether a displacement over ground was put out.
+    /// Whether a displacement over ground was output.
     pub fn is_displaced(&self) -> bool {
         self.flow_x != 0.0 || self.flow_y != 0.0
     }
 
-    /// Whether it was put out as moving: with a displacement and a velocity of [`MOVING_MPS`].
+    /// Whether it was reported as moving: with a displacement and a velocity of [`MOVING_MPS`] or
+    /// more.
     pub fn is_put_out_moving(&self) -> bool {
         let by_velocity = f64::from(self.velocity_x.hypot(self.velocity_y)) >= MOVING_MPS;
         by_velocity && self.is_moving_by_flow()
     }
 
-    /// Whether its displacement alone is one of [`MOVING_MPS`] over the time between the sweeps.
+    /// Whether its displacement alone amounts to [`MOVING_MPS`] over the time between the sweeps.
     pub fn is_moving_by_flow(&self) -> bool {
         f64::from(self.flow_x.hypot(self.flow_y)) >= MOVING_MPS * f64::from(self.dt)
     }
 
-    /// Whether class and motion are among those there are; those read from a file need not be.
+    /// Whether class and motion are in range; those read from a file need not be.
     pub fn is_sound(&self) -> bool {
         usize::from(self.class) < CLASSES.len() && self.motion <= 2
     }

@@ -11,8 +11,8 @@ use std::fs::File;
 use std::io;
 use std::path::Path;
 
-/// Writes the rows that `next` hands out, pair by pair, until it has no more; the file is there
-/// when all are in it, or not at all.
+/// Writes the rows that `next` returns, pair by pair, until there are no more; the file exists only
+/// once all rows are in it.
 pub fn write(
     path: &Path,
     drive: &str,
@@ -38,8 +38,7 @@ pub fn write(
     failed.map_or(written, Err)
 }
 
-/// Hands the rows of a file to `each`, in batches. Fails where the file is damaged or lacks a
-/// column.
+/// Passes the rows of a file to `each`, in batches. Fails if the file is damaged or lacks a column.
 pub fn read(path: &Path, mut each: impl FnMut(&[Row])) -> Result<(), Error> {
     let broken = |e: &dyn std::fmt::Display| Error::input(path, "", e.to_string());
     let file = File::open(path).map_err(|e| broken(&e))?;

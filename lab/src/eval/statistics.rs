@@ -1,11 +1,11 @@
 //! Errors of columns: counts, quantiles, shares.
 
-/// What an error counts for.
+/// How much an error counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// Every column once.
+    /// Every column counts once.
     Column,
-    /// Every column as often as it has occupied voxels: the dissertation's tables.
+    /// Every column counts as often as it has occupied voxels: the dissertation's tables.
     Voxel,
 }
 
@@ -16,17 +16,17 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Adds one. A NaN counts as infinite: nothing gets better by failing.
+    /// Adds one. NaN counts as infinite: failing must not improve the result.
     pub fn push(&mut self, error: f32, voxels: u8) {
         self.values.push((if error.is_nan() { f32::INFINITY } else { error }, voxels));
     }
 
-    /// Adds others.
+    /// Adds all errors of `others`.
     pub fn extend(&mut self, others: &Errors) {
         self.values.extend_from_slice(&others.values);
     }
 
-    /// In ascending order.
+    /// The errors in ascending order.
     pub fn sorted(mut self, weight: Weight) -> Sorted {
         self.values.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut sum = 0;
@@ -50,8 +50,8 @@ impl Sorted {
         self.values.last().map_or(0, |v| v.1)
     }
 
-    /// The smallest error that at least the share `q` of the weight does not exceed; for an even
-    /// number of equal weights the median is the mean of the middle two, as is usual.
+    /// The smallest error that at least a share `q` of the weight does not exceed; for an even
+    /// number of equal weights the median is the mean of the middle two, as usual.
     pub fn quantile(&self, q: f64) -> f64 {
         let Some(&(last, count)) = self.values.last() else {
             return f64::NAN;
@@ -99,7 +99,8 @@ impl Sorted {
         counts
     }
 
-    /// Points (error, share) of the cumulative distribution at `count` places up to `limit`.
+    /// Points (error, share) of the cumulative distribution at `count` + 1 places from 0 to
+    /// `limit`.
     pub fn cdf(&self, limit: f64, count: usize) -> Vec<[f64; 2]> {
         let place = |n: usize| limit * n as f64 / count as f64;
         (0..=count).map(|n| [place(n), self.share_below(place(n))]).collect()
@@ -122,7 +123,7 @@ mod tests {
         let s = sorted(&[(3.0, 1), (1.0, 1), (2.0, 1), (0.5, 1)]);
         assert_eq!((s.quantile(0.5), s.mean(), s.count()), (1.5, 1.625, 4));
         assert_eq!((s.share_below(1.0), s.share_below(1.1)), (0.25, 0.5));
-        // As though 2.0 stood there three times: 1 2 2 2 4.
+        // As if 2.0 occurred three times: 1 2 2 2 4.
         let s = sorted(&[(4.0, 1), (2.0, 3), (1.0, 1), (9.0, 0)]);
         assert_eq!((s.quantile(0.5), s.mean(), s.count()), (2.0, 2.2, 5));
         assert_eq!(s.histogram(1.0, 3), [0, 1, 4]);

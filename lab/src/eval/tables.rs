@@ -1,4 +1,4 @@
-//! Tables 3.2 and 3.3 and what belongs beside them.
+//! Tables 3.2 and 3.3 and related ones.
 
 use super::facts::Facts;
 use super::groups::{ClassGroup, MotionGroup};
@@ -9,7 +9,7 @@ use crate::report::{Cell, Table, TableRow};
 use raywake::order_statistics::Spread;
 use raywake::statistics::BUDGET_MS;
 
-/// The dissertation's share of the foreground that the filter keeps (section 3.4.2).
+/// The dissertation's share of the foreground kept by the filter (section 3.4.2).
 pub const RECALL: f64 = 0.95;
 
 /// Columns of table 3.2.
@@ -73,7 +73,7 @@ fn published_tracklets(group: ClassGroup) -> Option<TableRow> {
     Some(published(group, count, &[(median, 2), (mean, 2)]))
 }
 
-/// Figures of the dissertation: a count, then numbers with as many decimals as it has.
+/// Figures of the dissertation: a count, then numbers with as many decimals as printed.
 fn published(group: ClassGroup, count: u64, numbers: &[(f64, usize)]) -> TableRow {
     let head = [group.label(), "dissertation"].map(Cell::from).into_iter();
     let numbers = numbers.iter().map(|&(v, digits)| Cell::Number(v, digits));
@@ -102,12 +102,12 @@ pub fn filter(curve: Option<&Curve>) -> Table {
     Table::new("filter", caption, &columns, rows)
 }
 
-/// Name of the time of all stages among the stages.
+/// Name, among the stages, of the total time.
 const TOTAL: &str = "total";
-/// Name of the time without the filter among the stages.
+/// Name, among the stages, of the total time without the filter.
 const ALL_COLUMNS: &str = "total, all columns (no filter)";
 
-/// Times of all pairs of all drives by stage, ms; then their sums, with and without the filter.
+/// Times of all pairs of all drives by stage, ms; then their totals, with and without the filter.
 pub fn stages(drives: &[Facts]) -> Vec<(String, Vec<f64>)> {
     let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
     for stage in drives.iter().flat_map(|d| &d.stages) {
@@ -128,9 +128,9 @@ pub fn stages(drives: &[Facts]) -> Vec<(String, Vec<f64>)> {
 /// A step of table 3.3.
 pub struct PrintedStep {
     pub name: &'static str,
-    /// Our stages that make it up.
+    /// Our stages that make up the step.
     pub stages: &'static [&'static str],
-    /// Mean and standard deviation on his GTX 1080, ms.
+    /// Mean and standard deviation on the author's GTX 1080, ms.
     printed_ms: [f64; 2],
 }
 
@@ -141,8 +141,7 @@ pub const GRID: PrintedStep = PrintedStep {
     printed_ms: [12.5, 0.87],
 };
 
-/// The steps in their order. What refines the flow, encodes columns and hands results over is in
-/// none.
+/// The steps in order. Refining the flow, encoding columns and passing on results belong to none.
 const STEPS: [PrintedStep; 5] = [
     GRID,
     PrintedStep {
@@ -163,7 +162,7 @@ const STEPS: [PrintedStep; 5] = [
     PrintedStep { name: "filtered temporal flow", stages: &["track"], printed_ms: [0.4, 0.43] },
 ];
 
-/// His total.
+/// The author's total.
 const PRINTED_TOTAL_MS: [f64; 2] = [85.7, 6.38];
 
 impl PrintedStep {

@@ -1,4 +1,4 @@
-//! Rows to errors by class and motion: what tables 3.1 and 3.2 and figures 3.6 to 3.9 are made of.
+//! From rows to errors by class and motion, the basis of tables 3.1 and 3.2 and figures 3.6 to 3.9.
 
 use super::groups::{COUNT, ClassGroup, Estimate, MotionGroup, Truth, cells};
 use super::row::Row;
@@ -11,23 +11,23 @@ pub const SETTLED: u32 = 10;
 /// Errors by class, then by [`Row::motion`].
 type Cells = [[Errors; 3]; COUNT];
 
-/// Of one age and more, or of one age.
+/// Errors of settled tracklets.
 #[derive(Clone, Debug, Default)]
 struct Velocities {
     smooth: Cells,
     raw: Cells,
-    /// Distance between the two truths: the floor of the raw one.
+    /// Distance between the two truths: the lower bound for errors against the raw one.
     floor: Cells,
 }
 
-/// Everything the tables need.
+/// All data for the tables.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
-    /// By estimate as in [`Estimate::ALL`], against the labels as they are.
+    /// By estimate as in [`Estimate::ALL`], against the labels as given.
     raw: [Cells; 5],
     /// The same against smoothed labels.
     smooth: [Cells; 5],
-    /// Of what moves: errors against the labels as they are, over the true displacement.
+    /// For moving columns: errors against the labels as given, divided by the true displacement.
     relative: Cells,
     /// Settled tracklets.
     settled: Velocities,
@@ -36,9 +36,9 @@ pub struct Tally {
     /// Solid columns in view, and those with a settled tracklet.
     columns: [[u64; 3]; COUNT],
     covered: [[u64; 3]; COUNT],
-    /// Score of the filter of every solid column in view, and whether it is labelled.
+    /// Filter score of every solid column in view, and whether it is labelled.
     scores: Vec<(i32, bool)>,
-    /// Rows that do not count because labels are not complete there.
+    /// Rows that do not count because labels are incomplete there.
     pub out_of_view: u64,
     /// Rows that do not count because they are of the ground below an object.
     pub below: u64,
@@ -49,10 +49,10 @@ fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
 }
 
 impl Tally {
-    /// Ages shown apart.
+    /// Ages shown separately.
     pub const AGES: [u32; 5] = [0, 2, 5, 10, 20];
 
-    /// An empty one.
+    /// An empty tally.
     pub fn new() -> Tally {
         Tally { by_age: Tally::AGES.map(|a| (a, Cells::default())).to_vec(), ..Tally::default() }
     }
@@ -71,7 +71,7 @@ impl Tally {
         self.scores.push((row.score, row.class > 0));
         let (raw, smooth) = ([row.true_x, row.true_y], [row.smooth_x, row.smooth_y]);
         for (n, estimate) in Estimate::ALL.iter().enumerate() {
-            // Of the background, by far the most, only what is shown is kept.
+            // Of the background, by far the largest part, only what is shown is kept.
             if class == 0 && *estimate != Estimate::Ours {
                 continue;
             }
@@ -106,8 +106,8 @@ impl Tally {
         self.settled.floor[class][motion].push(distance(truth, raw), row.voxels);
     }
 
-    /// What the filter does at every threshold (figure 3.6); none where nothing is labelled, or
-    /// everything.
+    /// The filter's operating points at every threshold (figure 3.6); `None` if nothing is
+    /// labelled, or everything is.
     pub fn filter(&self) -> Option<Curve> {
         Curve::of(self.scores.iter().map(|s| (f64::from(s.0), s.1, 1.0)))
     }
@@ -126,7 +126,7 @@ impl Tally {
         gather(&by[n], group, motion).sorted(weight)
     }
 
-    /// Errors of displacement as shares of the true one; only what moves has any.
+    /// Errors of displacement as shares of the true one; only moving columns have any.
     pub fn relative(&self, group: ClassGroup, motion: MotionGroup, weight: Weight) -> Sorted {
         gather(&self.relative, group, motion).sorted(weight)
     }
@@ -136,13 +136,13 @@ impl Tally {
         gather(&self.settled.smooth, group, motion).sorted(weight)
     }
 
-    /// The same against labels as they are, and their own distance from the smoothed ones.
+    /// The same against labels as given, and the distance of those from the smoothed ones.
     pub fn settled_raw(&self, group: ClassGroup, motion: MotionGroup) -> [Sorted; 2] {
         [&self.settled.raw, &self.settled.floor]
             .map(|cells| gather(cells, group, motion).sorted(Weight::Column))
     }
 
-    /// Errors of the velocity of tracklets of one age of [`Self::AGES`], m/s.
+    /// Errors of the velocity of tracklets of one age, an index into [`Self::AGES`], m/s.
     pub fn at_age(&self, age: usize, group: ClassGroup, motion: MotionGroup) -> Sorted {
         gather(&self.by_age[age].1, group, motion).sorted(Weight::Column)
     }

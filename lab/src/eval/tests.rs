@@ -1,4 +1,4 @@
-//! Drives evaluated from end to end.
+//! Drives evaluated end to end.
 
 mod recorded;
 
@@ -18,7 +18,7 @@ enum Command {
     Ablate(ablate::Args),
 }
 
-/// `raywake-lab COMMAND` with these words.
+/// Runs `raywake-lab COMMAND` with these arguments.
 fn command(name: &str, words: &[&Path], options: &[&str]) -> Result<(), String> {
     let words = words.iter().map(|w| w.as_os_str());
     let options = ["--backend", "scalar"].iter().chain(options).map(OsStr::new);
@@ -34,7 +34,7 @@ fn eval(words: &[&Path], options: &[&str]) -> Result<(), String> {
     command("eval", words, options)
 }
 
-/// A busy street in six sweeps, seen from a standing vehicle.
+/// Six sweeps of a busy street, seen from a stationary vehicle.
 fn drive(folder: &Path) -> PathBuf {
     drive_of(folder, Motion::Standing, 6)
 }
@@ -56,7 +56,7 @@ fn facts(out: &Path) -> serde_json::Value {
     serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap()
 }
 
-/// The figure in a table's column, of the first row that begins so.
+/// The figure in a table's column, from the first row that begins with `head`.
 fn figure(out: &Path, table: &str, head: &[&str], column: &str) -> f64 {
     let file = out.join(format!("tables/{table}.csv"));
     let mut reader = csv::Reader::from_path(file).unwrap();
@@ -67,12 +67,12 @@ fn figure(out: &Path, table: &str, head: &[&str], column: &str) -> f64 {
     row.unwrap_or_else(|| panic!("{table}: {head:?}"))[at].parse().unwrap()
 }
 
-/// Rounded to what f32 keeps of some metres.
+/// Equal up to what f32 keeps of a few metres.
 fn same(a: f32, b: f32) -> bool {
     (a - b).abs() < 1e-4
 }
 
-/// Whether a column moves with its thing, whatever the filter and the match said.
+/// Whether a column moves with its object, regardless of the filter and the match.
 fn joined(row: &Row) -> bool {
     row.basis == FlowBasis::Joined as u8
 }
@@ -87,10 +87,10 @@ fn a_simulated_drive() {
 
     let rows_of = out.join("rows/2000_01_01_drive_0000_sync.parquet");
     let rows = rows(&rows_of);
-    // Pairs, and columns of each.
+    // The pairs, and the columns of each.
     assert_eq!(rows.iter().map(|r| r.sweep).max(), Some(4));
     assert!(rows.len() > 5 * 3000, "{} rows", rows.len());
-    // Seen all around by a vehicle at rest: nothing is carried along, and rounding is within half
+    // Seen all round by a stationary vehicle: nothing is carried along, and rounding is within half
     // a cell along each axis.
     let labelled: Vec<&Row> = rows.iter().filter(|r| r.class > 0 && r.in_view).collect();
     assert!(labelled.len() > 200, "{} labelled", labelled.len());
@@ -98,7 +98,7 @@ fn a_simulated_drive() {
         assert!(r.carried_x.hypot(r.carried_y) < 2e-3 && r.voxels > 0 && r.track > 0);
         let off = [r.rounded_x - r.true_x, r.rounded_y - r.true_y];
         assert!(off.iter().all(|v| v.abs() <= 0.15 + 1e-4), "{off:?}");
-        // Exact labels are their own smoothed motion.
+        // Exact labels equal their own smoothed motion.
         assert!(same(r.smooth_x, r.true_x) && same(r.smooth_y, r.true_y), "{r:?}");
         let moved = r.true_x.hypot(r.true_y) / r.dt;
         assert_eq!(
@@ -112,7 +112,7 @@ fn a_simulated_drive() {
     for r in rows.iter().filter(|r| !r.is_matched()) {
         assert_eq!((r.flow_x, r.flow_y), (0.0, 0.0));
     }
-    // Whatever the filter rejects scored no more than 0.
+    // Whatever the filter rejects scored at most 0.
     assert!(rows.iter().filter(|r| !joined(r)).all(|r| (r.basis > 0) == (r.score > 0)));
 
     let first = facts(&out);
@@ -125,13 +125,13 @@ fn a_simulated_drive() {
     let line = table.lines().find(|l| l.starts_with("parked,ego motion only")).unwrap();
     assert!(line.split(',').nth(4).unwrap().parse::<f64>().unwrap() < 1e-3, "{line}");
 
-    // The vehicle stands, and what moves is seen well.
+    // The vehicle is stationary, and movers are seen well.
     for of in ["columns", "returns"] {
         let share = |column: &str| figure(&out, "moving-or-not", &[of, "exact"], column);
         assert!(share("Recall, %") > 70.0 && share("Precision, %") > 50.0, "{of}");
     }
 
-    // Again: nothing is done over; with another margin it is, which columns of ground go by.
+    // Again: nothing is redone; with another margin it is, since that decides on columns of ground.
     eval(&[&drive, flag, &out], &["--all-columns"]).unwrap();
     assert_eq!(facts(&out), first);
     eval(&[&drive, flag, &out], &["--margin", "0.3"]).unwrap();
@@ -153,7 +153,7 @@ fn boxes_where_no_truth_tells() {
     let folder = Scratch::new();
     let out = folder.path().join("out");
     let drive = drive(folder.path());
-    // What is left is a recording, labelled in the camera's view.
+    // The rest is a recording, labelled in the camera's view.
     fs::remove_file(drive.join("truth/objects.feather")).unwrap();
     let labelled = |margin: &str| {
         let options = ["-n", "3", "--margin", margin];
@@ -163,7 +163,7 @@ fn boxes_where_no_truth_tells() {
     };
     let (boxes, wider) = (labelled("0"), labelled("0.3"));
     assert!(boxes > 20 && wider > boxes, "{boxes} and {wider}");
-    // Without boxes, but with a class for every return: buildings.
+    // Without boxes, but with a class for every return: building.
     fs::remove_file(drive.join("tracklet_labels.xml")).unwrap();
     fs::create_dir(drive.join("labels")).unwrap();
     let building = 50u32.to_le_bytes();
@@ -192,7 +192,7 @@ fn pairs_on_their_own() {
     for (a, b) in run.iter().zip(&pairs) {
         let truth = |r: &Row| (r.sweep, [r.cell_i, r.cell_j], [r.true_x, r.true_y], r.voxels);
         assert_eq!(truth(a), truth(b));
-        // The first pair has no history anyhow.
+        // The first pair has no history in either case.
         assert!(b.age == 0 && (a.sweep > 0 || a == b));
     }
     assert!(run.iter().any(|r| r.age > 0));
@@ -206,7 +206,7 @@ fn drives_that_fail_are_named() {
     let out = folder.path().join("out");
     let good = drive(folder.path());
     let flag: &Path = Path::new("--out");
-    // Another without its labels.
+    // Another drive without its labels.
     let bad = folder.path().join("unlabelled");
     let copy = std::process::Command::new("cp").arg("-r").arg(&good).arg(&bad).status().unwrap();
     assert!(copy.success());
@@ -221,7 +221,7 @@ fn drives_that_fail_are_named() {
     truth::write_points(&first, &rows[1..]).unwrap();
     let failed = eval(&[&good, flag, &out], &["-n", "3"]).unwrap_err();
     assert!(failed.contains("0000000000.feather"), "{failed}");
-    // One name for two drives, no drive, a margin that is none.
+    // One name for two drives, no drive, an invalid margin.
     let twin = folder.path().join("twin").join(good.file_name().unwrap());
     fs::create_dir_all(&twin).unwrap();
     assert!(eval(&[&good, &twin, flag, &out], &[]).unwrap_err().contains("same name"));
@@ -234,7 +234,7 @@ fn parts_of_a_list() {
     let folder = Scratch::new();
     let good = drive(folder.path());
     let name = good.file_name().unwrap();
-    // Another of the same name.
+    // Another drive of the same name.
     let twin = folder.path().join("twin").join(name);
     fs::create_dir_all(twin.parent().unwrap()).unwrap();
     let copy = std::process::Command::new("cp").arg("-r").arg(&good).arg(&twin).status().unwrap();
@@ -264,13 +264,13 @@ fn a_moving_vehicle() {
     let other = all.iter().filter(|r| !joined(r) && (r.basis > 0) != (r.score > 0)).count();
     assert_eq!(other, 0, "of {}", all.len());
 
-    // Named by a folder above it, it has the same truth.
+    // Named by a folder above it, the drive has the same truth.
     eval(&[folder.path(), flag, &above], &[]).unwrap();
     let table = |out: &Path| fs::read_to_string(out.join("tables/three-way.csv")).unwrap();
     assert_eq!(table(&above), table(&out));
 
-    // Opened in another way it is evaluated anew; where that fails, nothing old is left that could
-    // pass for it.
+    // Opened differently, it is evaluated anew; if that fails, nothing old is left that could pass
+    // for it.
     let settings = || facts(&out)["settings"].clone();
     let before = settings();
     eval(&[&drive, flag, &out], &["--ground", "-1.6"]).unwrap();
@@ -301,17 +301,17 @@ fn variants_in_one_table() {
     let table = lines(&out);
     let names: Vec<&String> = table.iter().map(|row| &row[0]).collect();
     assert_eq!(names, ["base", "refine-0", "rounds-6", "filter-off"]);
-    // Of the same rows: the base has as many rounds.
+    // From the same rows: the base has as many rounds.
     assert_eq!(table[0][2..], table[2][2..]);
     assert!(out.join("filter-off/rows").is_dir() && !out.join("rounds-6").exists());
     let number = |row: usize, column: usize| table[row][column].parse::<f64>().unwrap();
-    // Whole cells are farther off what moves, and the filter changes what is found.
+    // Whole cells have larger errors on movers, and the filter changes what is found.
     assert!(number(1, 3) > 2.0 * number(0, 3), "{table:?}");
     assert_ne!(table[3][3..10], table[0][3..10]);
     // Precision and recall.
     assert!([18, 19].iter().all(|&n| (30.0..=100.0).contains(&number(0, n))), "{table:?}");
     assert!(number(0, 13) > number(0, 14) && number(0, 14) > 0.0, "{table:?}");
-    // A variant's folder is one of `eval`, which finds it done and has the same figures.
+    // A variant's folder is an `eval` folder: `eval` finds it done, with the same figures.
     let base = out.join("base");
     let before = facts(&base);
     eval(&[&drive, flag, &base], &[]).unwrap();
@@ -320,7 +320,7 @@ fn variants_in_one_table() {
     let moving = flows.lines().find(|l| l.starts_with("moving,raywake,")).unwrap();
     assert_eq!(moving.split(',').skip(2).collect::<Vec<_>>(), table[0][2..6]);
 
-    // One that cannot run is named, and the others are there.
+    // One that cannot run is named, and the others are present.
     let only = ["--profile", "dissertation", "--only", "base,refine-2", "-n", "2"];
     let failed = command("ablate", &[&drive, flag, &author], &only).unwrap_err();
     assert!(failed.contains("refine-2: refinement_sweeps"), "{failed}");

@@ -11,8 +11,8 @@ use crate::report::{
 use raywake_io::Error;
 use std::path::Path;
 
-/// Table 4.2 as published: mean error in cm and share within 30 cm in per cent, occupancy constancy
-/// and features.
+/// Table 4.2 as published: mean error in cm and share within 30 cm in per cent, for occupancy
+/// constancy and for features.
 const PUBLISHED: [(&str, [f64; 4]); 4] = [
     ("car", [19.3, 83.8, 15.6, 89.2]),
     ("cyclist", [24.5, 78.8, 15.9, 93.1]),
@@ -130,7 +130,7 @@ fn curves(compared: &[Compared]) -> Vec<Option<Curve>> {
     (0..METRICS.len()).map(of).collect()
 }
 
-/// Mean of the precision over the recall.
+/// The precision averaged over recall.
 fn average_precision(curve: &Curve) -> f64 {
     let mut before = 0.0;
     let mut sum = 0.0;

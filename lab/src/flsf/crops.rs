@@ -1,8 +1,8 @@
 //! Lessons: squares around a cell of an object, with pairs drawn from them.
 //!
-//! The text draws a pair of cells at a time. Every encoding of a square costs little more than one,
-//! so that a lesson takes all pairs of a square as wide as the search: each solid cell of an object
-//! with the cell it went to and with one other, and one in a hundred of the background's.
+//! The text draws one pair of cells at a time. All encodings of a square cost little more than one,
+//! so a lesson takes all pairs of a square as wide as the search: each solid cell of an object with
+//! the cell it went to and with one other, and one in a hundred of the background's cells likewise.
 
 use super::network::{CellPair, Lesson, SEEN};
 use super::occupancy::{BORDER, SIDE, Symmetry};
@@ -10,7 +10,7 @@ use super::pairs::{CellOwner, FlowPair};
 use raywake_core::params::SIDE as SEARCH;
 use raywake_sim::Rng;
 
-/// Share of the background's cells that pairs are drawn of (4.4.3.1).
+/// Share of the background's cells from which pairs are drawn (4.4.3.1).
 const OF_BACKGROUND: f64 = 0.01;
 
 impl FlowPair {
@@ -22,7 +22,7 @@ impl FlowPair {
         let from = first.map(|n| n + (BORDER - SEEN) as i32);
         let wide = SEARCH + 2 * SEEN;
         let maps = self.maps.each_ref().map(|map| map.square(from, wide, symmetry));
-        // Cells of the window by their place in the square, and back.
+        // Cells of the window by their place in the square, and the inverse.
         let mut cells = vec![None; SEARCH * SEARCH];
         let mut places = vec![0; SEARCH * SEARCH];
         for (n, cell) in cells.iter_mut().enumerate() {
@@ -48,7 +48,7 @@ impl FlowPair {
         Lesson { maps, pairs, classes: self.classes(&cells) }
     }
 
-    /// Whether pairs are drawn of a cell.
+    /// Whether pairs are drawn from a cell.
     fn taken(&self, cell: usize, rng: &mut Rng) -> bool {
         match self.cells[cell].owner {
             CellOwner::Object(_) => self.cells[cell].solid,
@@ -57,7 +57,7 @@ impl FlowPair {
         }
     }
 
-    /// Classes of the square's inner cells, which the classifier's kernel leaves.
+    /// Classes of the square's inner cells, which remain after the classifier's kernel.
     fn classes(&self, cells: &[Option<usize>]) -> Vec<Option<bool>> {
         let class = |n: usize| match self.cells[cells[n]?].owner {
             CellOwner::Object(_) => Some(true),
@@ -69,7 +69,7 @@ impl FlowPair {
     }
 }
 
-/// Index of a place in a square of `side` cells whose rows have `row`.
+/// Index of a place in a square of `side` cells whose rows are `row` long; `None` outside it.
 fn within([i, j]: [i32; 2], side: usize, row: usize) -> Option<usize> {
     let inside = |n: &usize| *n < side;
     let i = usize::try_from(i).ok().filter(inside)?;

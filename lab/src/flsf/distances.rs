@@ -1,5 +1,5 @@
-//! Pictures of how far the features of a cell are from those around it a sweep later (figures 4.6
-//! and 4.7).
+//! Pictures of the distance between a cell's features and those around it one sweep later (figures
+//! 4.6 and 4.7).
 
 use super::matching::{Encoded, Features, place};
 use super::occupancy::SIDE;
@@ -10,24 +10,24 @@ use raywake_io::Error;
 use raywake_render::canvas::{Align, Canvas, Pen};
 use raywake_render::{Colour, colours};
 
-/// Cells that are looked at in a picture.
+/// Cells shown in a picture.
 const CELLS: usize = 3;
 /// Side of a cell, and space around and between squares, units.
 const CELL: f32 = 7.0;
 const GAP: f32 = 16.0;
-/// Above the squares, units.
+/// Space above the squares, units.
 const TITLE: f32 = 24.0;
-/// Distances are drawn up to here, as the dissertation's figure 4.6; beyond, in [`FAR`].
+/// Distances are drawn up to this, as in the dissertation's figure 4.6; beyond it in [`FAR`].
 const SHOWN: f32 = 2.0;
 /// From near to far.
 const NEAR_TO_FAR: &[Colour] = &[[53, 42, 135], [15, 118, 200], [55, 184, 157], [250, 220, 30]];
 const FAR: Colour = [192, 24, 43];
 
-/// One cell and what is around it.
+/// One cell and its surroundings.
 struct Around {
     /// Whether there is a return in each cell of the second sweep.
     solid: Vec<bool>,
-    /// Distance of the features of each, by row and column; none beyond the window.
+    /// Feature distance of each, by row and column; `None` beyond the window.
     distances: Vec<Option<f32>>,
     /// Where the cell went.
     step: [i32; 2],
@@ -35,7 +35,7 @@ struct Around {
 
 /// Some cells of a kind in one pair.
 pub struct Distances {
-    /// Solid cells of the kind that move: the pair that has most is drawn.
+    /// Number of moving solid cells of the kind: the pair with the most is drawn.
     pub cells: usize,
     around: Vec<Around>,
 }
@@ -53,7 +53,7 @@ pub fn moving(pair: &FlowPair, kind: Kind) -> Vec<usize> {
 }
 
 impl Distances {
-    /// Of the first, middle and last of some cells.
+    /// For the first, middle and last of some cells.
     pub fn of(
         pair: &FlowPair,
         cells: &[usize],
@@ -65,7 +65,7 @@ impl Distances {
         Distances { cells: cells.len(), around }
     }
 
-    /// Draws them side by side; returns a PNG file.
+    /// Draws them side by side and returns a PNG file.
     pub fn png(&self) -> Result<Vec<u8>, Error> {
         let wide = SEARCH as f32 * CELL + GAP;
         let page = [GAP + self.around.len() as f32 * wide, TITLE + GAP + wide];

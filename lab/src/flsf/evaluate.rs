@@ -1,5 +1,5 @@
-//! `raywake-lab eval flsf`: table 4.2 and figure 4.8, occupancy constancy and learned features by
-//! one protocol on the same drives.
+//! `raywake-lab eval flsf`: table 4.2 and figure 4.8, comparing occupancy constancy and learned
+//! features by one protocol on the same drives.
 
 use super::conclude::conclude;
 use super::matching::{Constancy, Features};
@@ -17,13 +17,13 @@ use std::path::PathBuf;
 /// Options of `eval flsf`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Labelled drives, recorded or simulated, that the weights have not seen
+    /// Labelled drives, recorded or simulated, that were not used to train the weights
     #[arg(value_name = "DRIVE", required = true)]
     drives: Vec<PathBuf>,
-    /// What `train flsf` wrote
+    /// Weights file written by `train flsf`
     #[arg(long, value_name = "FILE")]
     weights: PathBuf,
-    /// Occupancy constancy to compare with [default: as section 3.5.1 trains it]
+    /// Occupancy constancy to compare with [default: as trained by section 3.5.1]
     #[arg(long, value_name = "FILE")]
     constancy: Option<PathBuf>,
     /// Folder of results
@@ -34,7 +34,7 @@ pub struct Args {
     count: Option<usize>,
 }
 
-/// Pairs of cells, one of each source, that figure 4.8 is drawn of (section 4.5.2).
+/// Pairs of cells, one per source, behind figure 4.8 (section 4.5.2).
 const SOURCES: usize = 5000;
 
 /// Evaluates, writes and prints.
@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Leaves so many of them, drawn evenly.
+/// Keeps a uniform random sample of at most [`SOURCES`].
 fn thin(compared: &mut Vec<Compared>, rng: &mut Rng) {
     for n in 0..SOURCES.min(compared.len()) {
         let other = n + rng.bits() as usize % (compared.len() - n);

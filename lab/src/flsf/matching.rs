@@ -1,5 +1,5 @@
-//! Flow of a pair of sweeps by either metric, by the same energy minimisation: occupancy constancy
-//! (chapter 3) and distance of features (4.9)-(4.14).
+//! Flow of a pair of sweeps by either metric, occupancy constancy (chapter 3) or distance of
+//! features (4.9)-(4.14), with the same energy minimisation.
 
 use super::network::{FEATURES, Flsf, SCORES};
 use super::occupancy::{OccupancyMap, SIDE, WIDE};
@@ -18,19 +18,19 @@ use raywake_core::stages::window::{Costs, WindowCosts, least};
 const ROUNDS: usize = 20;
 /// Weight of the smoothing term, thousandths per cell² (w_p = 0.07, section 4.5).
 const SMOOTHING: i32 = 70;
-/// Thousandths of a distance.
+/// Thousandths per unit of distance.
 const THOUSAND: f32 = 1000.0;
 
 /// The flow of least energy.
 pub struct Matched {
     /// Cells that take part, ascending.
     foreground: Vec<u32>,
-    /// Of every cell of the window; 0 where it has none.
+    /// Flow of every cell of the window; 0 if it has none.
     flow: Vec<Flow>,
 }
 
 impl Matched {
-    /// Displacement of a cell, cells.
+    /// Displacement of a cell, in cells.
     pub fn displacement(&self, cell: usize) -> Option<[i32; 2]> {
         let flow = self.flow[cell];
         (flow & VALID != 0).then(|| flow_displacement(flow))
@@ -41,7 +41,7 @@ impl Matched {
         self.foreground.binary_search(&(cell as u32)).is_ok()
     }
 
-    /// Of some cells with a row of costs each.
+    /// Minimises the energy of some cells with a row of costs each.
     fn minimised(foreground: Vec<u32>, costs: &[[u16; ROW]], step: &SweepUniform) -> Matched {
         let mut flow = vec![0; SIDE * SIDE];
         let mut energies = vec![NONE; SIDE * SIDE];
@@ -61,7 +61,7 @@ impl Matched {
     }
 }
 
-/// Place of a displacement in a row.
+/// Index of a displacement in a row.
 pub fn place([u, v]: [i32; 2]) -> usize {
     (u + REACH) as usize * LINE + (v + REACH) as usize
 }
@@ -73,7 +73,7 @@ pub struct Constancy {
 }
 
 impl Constancy {
-    /// By these tables, with the numbers of the dissertation's profile.
+    /// With these tables and the parameters of the dissertation's profile.
     pub fn new(tables: Tables) -> Constancy {
         let profile = Profile::dissertation();
         assert_eq!(profile.side as usize, SIDE, "one window for both");
@@ -87,7 +87,7 @@ impl Constancy {
         Constancy { tables, step }
     }
 
-    /// Flow of the columns that the background filter leaves.
+    /// Flow of the columns that the background filter keeps.
     pub fn flow(&self, pair: &FlowPair) -> Matched {
         let mut marks = vec![0; SIDE * SIDE];
         background_filter_by_bytes(&self.step, &self.tables.filter, &pair.columns[0], &mut marks);
@@ -120,10 +120,10 @@ pub struct Features {
     numbers: Vec<f32>,
 }
 
-/// What the network makes of a sweep.
+/// The network's output for a sweep.
 #[derive(Clone)]
 pub struct Encoded {
-    /// Encodings, a cell to each side more than the window has.
+    /// Encodings, one cell more on each side than the window.
     features: FeatureMap,
     /// Scores of the window's cells.
     scores: FeatureMap,
@@ -135,7 +135,7 @@ impl Encoded {
         self.features.cell(cell / SIDE + 1, cell % SIDE + 1)
     }
 
-    /// Whether a cell takes part: it is not the background, with a probability of a half.
+    /// Whether a cell takes part: it is foreground with a probability of at least a half.
     fn takes(&self, cell: usize) -> bool {
         let scores = self.scores.cell(cell / SIDE, cell % SIDE);
         scores[1] >= scores[0]
@@ -143,12 +143,12 @@ impl Encoded {
 }
 
 impl Features {
-    /// By trained numbers.
+    /// With trained parameters.
     pub fn new(numbers: Vec<f32>) -> Features {
         Features { network: Flsf::new(false), numbers }
     }
 
-    /// Encodes a sweep, half of it a thread.
+    /// Encodes a sweep, half of it on each of two threads.
     pub fn encode(&self, map: &OccupancyMap) -> Encoded {
         let (of_encoder, of_classifier) = self.numbers.split_at(self.network.encoder.numbers());
         let whole = map.whole();
@@ -186,7 +186,7 @@ impl Features {
                     let other = second.of(i as usize * SIDE + j as usize);
                     let squares = own.iter().zip(other).map(|(a, b)| (a - b) * (a - b));
                     let distance = THOUSAND * squares.sum::<f32>().sqrt();
-                    // Rounded towards zero; what is too far is as far as can be told.
+                    // Rounded towards zero; saturates at the largest value.
                     row[place(step)] = distance as u16;
                 }
             }

@@ -1,5 +1,5 @@
-//! Feature learning for scene flow as the dissertation prints it (chapter 4): a network of six
-//! convolutions on the occupancy of a sweep in the vehicle's frame, trained by pairs of cells.
+//! Feature learning for scene flow as printed in the dissertation (chapter 4): a network of six
+//! convolutions on the occupancy of a sweep in the vehicle's frame, trained on pairs of cells.
 //!
 //! For the record, off-board: 41.9 billion products a sweep. What ships is
 //! [`raywake_core::encoder`].

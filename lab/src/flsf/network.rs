@@ -1,24 +1,24 @@
-//! The network (Fig. 4.4, sizes by the author's program) and its losses (4.6)-(4.8).
+//! The network (Fig. 4.4, sizes from the author's program) and its losses (4.6)-(4.8).
 
 use crate::learning::{
     Activation, Convolution, FeatureMap, FeatureNetwork, cross_entropy, pair_loss,
 };
 use raywake_sim::Rng;
 
-/// Levels of the occupancy that enters: [`raywake_core`]'s; the author's program has 13.
+/// Levels of the input occupancy: those of [`raywake_core`]; the author's program has 13.
 pub const LEVELS: usize = 14;
-/// Numbers of an encoding (N_f).
+/// Dimension of an encoding (N_f).
 pub const FEATURES: usize = 10;
 /// Scores of a cell: background and foreground.
 pub const SCORES: usize = 2;
-/// Kernels and outputs of the encoder's layers, then of the classifier, which reads the encoding
-/// alone.
+/// Kernels and outputs of the encoder's layers, then of the classifier, which reads only the
+/// encoding.
 const LAYERS: [[usize; 2]; 6] = [[9, 200], [7, 100], [5, 50], [3, 25], [3, FEATURES], [3, SCORES]];
-/// Cells that an encoding sees to each side of its own.
+/// Cells seen by an encoding on each side of its own.
 pub const SEEN: usize = 11;
-/// Below zero a fifth is let through, in every layer.
+/// Slope below zero, in every layer.
 const LEAK: f32 = 0.2;
-/// Share of what enters and of every layer's outputs that training takes for zero (4.4.3.2).
+/// Share of the input and of every layer's outputs that training sets to zero (4.4.3.2).
 const DROPOUT: f64 = 0.2;
 /// Distance from which on encodings are far enough apart (4.4.2).
 pub const D_MAX: f32 = 10.0;
@@ -32,30 +32,30 @@ pub struct Flsf {
     pub classifier: FeatureNetwork,
 }
 
-/// A pair of cells of two maps of encodings, and whether the one went to the other.
+/// A pair of cells from two maps of encodings, and whether the first went to the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellPair {
     /// Index in the first map.
     pub first: usize,
     /// Index in the second.
     pub second: usize,
-    /// Whether it is where the first went.
+    /// Whether it is the cell the first went to.
     pub matching: bool,
 }
 
-/// What the network is to learn of a place.
+/// A training sample: a place and what the network is to learn there.
 #[derive(Clone, Debug)]
 pub struct Lesson {
     /// Occupancy of the same square of both sweeps.
     pub maps: [FeatureMap; 2],
     /// Pairs of their encodings.
     pub pairs: Vec<CellPair>,
-    /// Of every score of the first map: foreground, background, or not known.
+    /// Class for every score of the first map: foreground, background, or unknown.
     pub classes: Vec<Option<bool>>,
 }
 
 impl Flsf {
-    /// The network, with dropout or a test's without.
+    /// The network, with dropout or, for evaluation, without.
     pub fn new(dropout: bool) -> Flsf {
         let mut inputs = LEVELS;
         let mut layers: Vec<Convolution> = Vec::new();
@@ -72,20 +72,20 @@ impl Flsf {
         }
     }
 
-    /// How many numbers it has, the encoder's first.
+    /// Number of parameters, those of the encoder first.
     pub fn numbers(&self) -> usize {
         self.encoder.numbers() + self.classifier.numbers()
     }
 
-    /// Numbers to begin with.
+    /// Random initial parameters.
     pub fn drawn(&self, rng: &mut Rng) -> Vec<f32> {
         let mut numbers = self.encoder.drawn(rng);
         numbers.extend(self.classifier.drawn(rng));
         numbers
     }
 
-    /// Mean losses of a lesson, of the pairs (4.6) and of the classes (4.7); adds the gradient of
-    /// their sum (4.8). `weights` are those of background and foreground.
+    /// Mean losses of a lesson, for the pairs (4.6) and for the classes (4.7); adds the gradient of
+    /// their sum (4.8) to `into`. `weights` are those of background and foreground.
     pub fn learn(
         &self,
         numbers: &[f32],
@@ -111,7 +111,7 @@ impl Flsf {
     }
 }
 
-/// Mean loss of the pairs, and its gradient by both maps.
+/// Mean loss of the pairs, and its gradient with respect to both maps.
 fn of_pairs(maps: [&FeatureMap; 2], pairs: &[CellPair]) -> (f32, [Vec<f32>; 2]) {
     let mut slopes = maps.map(|map| vec![0.0; map.values.len()]);
     let share = 1.0 / pairs.len().max(1) as f32;
@@ -130,7 +130,7 @@ fn of_pairs(maps: [&FeatureMap; 2], pairs: &[CellPair]) -> (f32, [Vec<f32>; 2]) 
     (sum, slopes)
 }
 
-/// Mean loss of the cells whose class is known, and its gradient by the scores.
+/// Mean loss of the cells whose class is known, and its gradient with respect to the scores.
 fn of_classes(
     scores: &FeatureMap,
     classes: &[Option<bool>],

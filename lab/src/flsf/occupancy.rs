@@ -1,4 +1,4 @@
-//! What the network sees: probabilities of occupancy (4.3)-(4.5) in the vehicle's frame.
+//! Input of the network: probabilities of occupancy (4.3)-(4.5) in the vehicle's frame.
 
 use super::network::LEVELS;
 use crate::grid::Grid;
@@ -9,10 +9,10 @@ use raywake_core::sweep::{Rig, Sweep};
 
 /// Cells of the flow's window along one axis: 50 m.
 pub const SIDE: usize = 167;
-/// Cells around it that the network sees, too: the encoding of a cell at the rim, and its class,
-/// ask for 12 to each side.
+/// Cells around it that the network also sees: the encoding of a cell at the rim, and its class,
+/// need 12 on each side.
 pub const BORDER: usize = 12;
-/// Cells that are kept along one axis.
+/// Cells kept along one axis.
 pub const WIDE: usize = SIDE + 2 * BORDER;
 /// Log-odds are clipped here, tenths (table B.1).
 const CLIP: i32 = 30;
@@ -21,7 +21,7 @@ const CLIP: i32 = 30;
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyMap(Vec<i8>);
 
-/// A grid in the vehicle's frame that is as wide as the network asks for.
+/// A grid in the vehicle's frame as wide as the network needs.
 pub fn wide_grid() -> Grid {
     let profile = Profile { side: WIDE as u32, ..Profile::dissertation() };
     assert_eq!(profile.levels as usize, LEVELS, "the network is for so many levels");
@@ -29,7 +29,8 @@ pub fn wide_grid() -> Grid {
 }
 
 impl OccupancyMap {
-    /// Traces a sweep; the grid then has its columns, too. With it where the window lies.
+    /// Traces a sweep, after which the grid also has its columns. Also returns the position of the
+    /// window.
     pub fn of(grid: &mut Grid, rig: &Rig, sweep: &Sweep) -> (OccupancyMap, Window) {
         let window = grid.sweep(rig, sweep);
         let clipped = |l: &i32| (*l).clamp(-CLIP, CLIP) as i8;
@@ -43,8 +44,8 @@ impl OccupancyMap {
         OccupancyMap(tenths)
     }
 
-    /// The square of `side` cells whose first cell is `from`, turned or mirrored; what lies beyond
-    /// the map is unknown.
+    /// The square of `side` cells whose first cell is `from`, rotated or mirrored; whatever lies
+    /// beyond the map is unknown.
     pub fn square(&self, from: [i32; 2], side: usize, symmetry: Symmetry) -> FeatureMap {
         let values: [f32; 2 * CLIP as usize + 1] =
             std::array::from_fn(|n| centred((n as i32 - CLIP) as f32 / 10.0));
@@ -62,13 +63,13 @@ impl OccupancyMap {
         map
     }
 
-    /// All of it.
+    /// The whole map.
     pub fn whole(&self) -> FeatureMap {
         self.square([0, 0], WIDE, Symmetry(0))
     }
 }
 
-/// A probability less a half, by log-odds.
+/// The probability of a log-odds value, minus a half.
 fn centred(log_odds: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-log_odds)) - 0.5
 }
@@ -78,7 +79,7 @@ fn centred(log_odds: f32) -> f32 {
 pub struct Symmetry(pub u8);
 
 impl Symmetry {
-    /// The cell that comes to lie at a place of a square.
+    /// The cell that is mapped to a place of a square.
     pub fn of(self, [i, j]: [usize; 2], side: usize) -> [usize; 2] {
         let i = if self.0 & 1 == 0 { i } else { side - 1 - i };
         let j = if self.0 & 2 == 0 { j } else { side - 1 - j };

@@ -1,4 +1,4 @@
-//! What both methods put out for the pairs of drives, against the labels.
+//! Results of both methods for the pairs of the drives, against the labels.
 
 use super::distances::{Distances, moving};
 use super::matching::{Constancy, Encoded, Features, Matched, place};
@@ -13,46 +13,46 @@ use raywake_sim::Rng;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Seconds that a method took for all pairs.
+/// Total time of each method over all pairs, s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seconds {
     /// Occupancy constancy: costs and minimisation.
     pub constancy: f64,
-    /// The network, a sweep.
+    /// The network, one sweep per pair.
     pub encoder: f64,
     /// Distances and minimisation.
     pub features: f64,
 }
 
-/// A pair of cells, whether the one went to the other, and what each metric says: constancy of the
-/// column alone, of its window, and distance of features, the lower the likelier.
+/// A pair of cells, whether the first went to the second, and the costs by each metric: constancy
+/// of the column alone, of its window, and distance of features; the lower the more likely.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
-    /// Whether it did.
+    /// Whether it went there.
     pub matching: bool,
-    /// What they say.
+    /// Cost by each metric.
     pub costs: [f64; 3],
 }
 
-/// Kinds that figures 4.6 and 4.7 show.
+/// Kinds shown in figures 4.6 and 4.7.
 pub const PICTURED: [Kind; 2] = [Kind::Car, Kind::Pedestrian];
 
-/// What came of all drives.
+/// Results over all drives.
 #[derive(Default)]
 pub struct Outcome {
     /// Pairs of sweeps.
     pub pairs: usize,
-    /// As chapter 3 counts, and as chapter 4's program does.
+    /// Counted as in chapter 3, and as in chapter 4's program.
     pub tallies: [Tally; 2],
     /// For figure 4.8.
     pub compared: Vec<Compared>,
-    /// Of all pairs.
+    /// Over all pairs.
     pub seconds: Seconds,
-    /// For figures 4.6 and 4.7: the pair with most moving cells of a kind.
+    /// For figures 4.6 and 4.7: from the pair with most moving cells of a kind.
     pub distances: BTreeMap<Kind, Distances>,
 }
 
-/// All pairs of a drive.
+/// Processes all pairs of a drive.
 pub fn walk(
     drive: &mut dyn Labelled,
     count: Option<usize>,
@@ -75,8 +75,8 @@ pub fn walk(
 }
 
 impl Outcome {
-    /// Adds a pair of sweeps; `first` is what the network made of its first, if that is known.
-    /// Returns what it made of the second.
+    /// Adds a pair of sweeps; `first` is the network's output for its first sweep, if known.
+    /// Returns that for the second.
     fn add(
         &mut self,
         pair: &FlowPair,
@@ -108,7 +108,7 @@ impl Outcome {
         second
     }
 
-    /// Keeps the distances around cells that move, if there are more of them than before.
+    /// Keeps the distances around moving cells, if there are more of them than before.
     fn look(&mut self, pair: &FlowPair, features: &Features, both: [&Encoded; 2]) {
         for kind in PICTURED {
             let cells = moving(pair, kind);
@@ -118,7 +118,7 @@ impl Outcome {
         }
     }
 
-    /// Errors of every solid cell of an object.
+    /// Counts the errors of every solid cell of an object.
     fn count(&mut self, pair: &FlowPair, methods: [&Matched; 2]) {
         for (n, cell) in pair.cells.iter().enumerate().filter(|(_, c)| c.solid) {
             let (CellOwner::Object(object), Some(truth)) = (cell.owner, cell.displacement) else {
@@ -146,7 +146,7 @@ impl Outcome {
     }
 }
 
-/// A displacement of a source: half the time where it went, else any other within the window.
+/// A displacement of a source: half the time the true one, otherwise any other within the window.
 fn drawn(pair: &FlowPair, source: usize, rng: &mut Rng) -> Option<([i32; 2], bool)> {
     let inside = |step: [i32; 2]| {
         let at = [source / SIDE, source % SIDE];

@@ -1,4 +1,4 @@
-//! Two sweeps, each in the frame of its vehicle, and where every cell of the first went.
+//! Two sweeps, each in the frame of its vehicle pose, and where every cell of the first went.
 
 use super::occupancy::{BORDER, OccupancyMap, SIDE, WIDE};
 use crate::grid::Grid;
@@ -12,36 +12,36 @@ use raywake_core::record::Column;
 use raywake_io::Error;
 use std::collections::HashMap;
 
-/// What a cell of the first sweep is.
+/// What a cell of the first sweep belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellOwner {
     /// In an object's footprint: an index of [`FlowPair::objects`].
     Object(u16),
-    /// Nothing that is labelled.
+    /// Nothing labelled.
     Background,
-    /// Of an object of no kind, or where nothing is labelled.
+    /// An object of no known kind, or a place where nothing is labelled.
     Unknown,
 }
 
 /// A cell of the first sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// What it is.
+    /// What it belongs to.
     pub owner: CellOwner,
     /// Whether there is a return in it.
     pub solid: bool,
-    /// Where it went, cells along both axes; nothing where that is not known.
+    /// Where it went, cells along both axes; `None` if unknown.
     pub displacement: Option<[f32; 2]>,
-    /// Where it would have gone, did it stand.
+    /// Where it would have gone if static.
     pub odometry: [f32; 2],
 }
 
 /// A labelled object of the first sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LabelledObject {
-    /// What it is.
+    /// Kind of the object.
     pub kind: Kind,
-    /// Speed over ground, m/s; nothing where the second sweep does not have it.
+    /// Speed over ground, m/s; `None` if it is missing from the second sweep.
     pub speed_mps: Option<f64>,
 }
 
@@ -57,12 +57,12 @@ pub struct FlowPair {
     pub objects: Vec<LabelledObject>,
 }
 
-/// What is worked with, kept so that its memory is reused.
+/// Working memory, kept for reuse.
 #[derive(Default)]
 pub struct TwoSweeps([LabelledSweep; 2]);
 
 impl FlowPair {
-    /// The pair that begins at a sweep of a drive; none where the next does not continue it.
+    /// The pair that begins at a sweep of a drive; `None` if the next sweep does not continue it.
     pub fn read(
         grid: &mut Grid,
         drive: &mut dyn Labelled,
@@ -91,7 +91,7 @@ impl FlowPair {
         Ok(Some(FlowPair { maps: [map, later], cells, columns, objects: objects.collect() }))
     }
 
-    /// Rounded displacement of a cell, where it is known and ends within the search.
+    /// Rounded displacement of a cell, if it is known and within the search.
     pub fn step(&self, cell: usize) -> Option<[i32; 2]> {
         let step = self.cells[cell].displacement?.map(|d| d.round() as i32);
         let near = step.iter().all(|d| d.abs() <= raywake_core::params::REACH);

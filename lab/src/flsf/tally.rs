@@ -3,16 +3,16 @@
 use crate::labels::Kind;
 use std::collections::BTreeMap;
 
-/// What is compared.
+/// The methods compared.
 pub const METHODS: [&str; 5] =
     ["zero flow", "ego motion only", "rounded truth", "occupancy constancy", "learned features"];
 
-/// Errors of a cell by each method, m; nothing where a method has no flow there.
+/// Errors of a cell by each method, m; `None` if a method has no flow there.
 pub type Errors = [Option<f64>; METHODS.len()];
 
-/// Speed over ground from which on an object moves, m/s.
+/// Speed over ground from which on an object counts as moving, m/s.
 const MOVING_MPS: f64 = 0.5;
-/// What counts as right, m: a cell (section 3.8.1).
+/// Largest error that counts as correct, m: one cell (section 3.8.1).
 const RIGHT_M: f64 = 0.3;
 
 /// Sums of one method over some cells.
@@ -20,9 +20,9 @@ const RIGHT_M: f64 = 0.3;
 pub struct ErrorSums {
     /// Cells.
     pub count: usize,
-    /// Of errors, m.
+    /// Sum of errors, m.
     pub sum_m: f64,
-    /// Cells with an error of at most a cell.
+    /// Cells with an error of at most one cell.
     pub right: usize,
 }
 
@@ -38,7 +38,7 @@ impl ErrorSums {
         100.0 * self.sum_m / self.count as f64
     }
 
-    /// Share within a cell, per cent.
+    /// Share of errors within one cell, per cent.
     pub fn within(&self) -> f64 {
         100.0 * self.right as f64 / self.count as f64
     }
@@ -63,14 +63,14 @@ impl Tally {
         }
     }
 
-    /// Kinds that were seen.
+    /// Kinds seen.
     pub fn kinds(&self) -> Vec<Kind> {
         let mut kinds: Vec<Kind> = self.0.keys().map(|(kind, _)| *kind).collect();
         kinds.dedup();
         kinds
     }
 
-    /// Sums over some of them.
+    /// Sums over the wanted kinds and motions.
     pub fn of(&self, wanted: impl Fn(Kind, bool) -> bool) -> [ErrorSums; METHODS.len()] {
         let mut all = [ErrorSums::default(); METHODS.len()];
         for (_, sums) in self.0.iter().filter(|((kind, moves), _)| wanted(*kind, *moves)) {

@@ -14,7 +14,7 @@ use raywake_core::params::{Profile, REACH, SIDE as SEARCH};
 use raywake_sim::{Drive, Options, Path, Rng, Scene, SensorRig, State};
 use std::collections::BTreeSet;
 
-/// A car ahead at 9 m/s to the left and one parked; the vehicle drives at 6 m/s.
+/// A car ahead moving left at 9 m/s, and one parked; the vehicle drives at 6 m/s.
 fn scene() -> Simulated {
     let mut scene = Scene::empty();
     let way = |x, y, yaw, speed| Path::from(State { x, y, yaw, speed });
@@ -29,7 +29,7 @@ fn pair() -> FlowPair {
     FlowPair::read(&mut wide_grid(), &mut scene(), 1, &mut sweeps).unwrap().unwrap()
 }
 
-/// The parked car comes 0.6 m nearer, the other goes 0.9 m to the left besides.
+/// The parked car comes 0.6 m nearer; the other also moves 0.9 m to the left.
 #[test]
 fn cells_of_a_scene_made_by_hand() {
     let pair = pair();
@@ -48,8 +48,8 @@ fn cells_of_a_scene_made_by_hand() {
     assert!(background.into_iter().all(|c| c.displacement == Some(c.odometry)));
 }
 
-/// The eight images of a square are the group: all different, every cell once, and two of them one
-/// after the other another of them.
+/// The eight images of a square form the group: all differ, each contains every cell once, and the
+/// product of any two is again one of them.
 #[test]
 fn symmetries() {
     let side = 5;
@@ -77,12 +77,12 @@ fn occupancy_of_a_square() {
     assert!((square.cell(2, 1)[3] - 0.452_574).abs() < 1e-5);
     assert!((square.cell(2, 2)[0] + 0.231_059).abs() < 1e-5);
     assert_eq!(square.values.iter().filter(|v| **v != 0.0).count(), 2);
-    // Mirrored along the first axis; and beyond the map nothing is known.
+    // Mirrored along the first axis; and beyond the map everything is unknown.
     assert_eq!(map.square([38, 49], 4, Symmetry(1)).cell(1, 1), square.cell(2, 1));
     assert!(map.square([-50, 180], 60, Symmetry(0)).values.iter().all(|v| *v == 0.0));
 }
 
-/// Pairs of a lesson say the same of the two maps, however the square is turned.
+/// The pairs of a lesson agree with the two maps, however the square is rotated.
 #[test]
 fn lessons_match_where_cells_went() {
     let pair = pair();
@@ -117,9 +117,9 @@ fn lessons_match_where_cells_went() {
     assert!(seen[0] == seen[1] && seen[0] > 50, "{seen:?}");
 }
 
-/// "Intentionally only a single layer between encoding and filter": the classifier reads the
-/// encoding alone. And the sizes are those of the text and of the author's program, but for one
-/// level more.
+/// "Intentionally only a single layer between encoding and filter": the classifier reads only the
+/// encoding. The sizes are those of the text and of the author's program, except for one extra
+/// level.
 #[test]
 fn sizes_of_the_network() {
     let network = Flsf::new(true);
@@ -131,8 +131,8 @@ fn sizes_of_the_network() {
     assert_eq!(BORDER, super::network::SEEN + 1);
 }
 
-/// Numbers that take no time to learn from: one pair of sweeps, few steps. Interrupted, training
-/// comes to the same end; another one's checkpoint is refused.
+/// Training that takes little time: one pair of sweeps, few steps. Interrupted, it ends with the
+/// same result; the checkpoint of another training is refused.
 #[test]
 fn training_goes_on_where_it_was() {
     let material = || vec![Material::of(pair()).unwrap()];
@@ -141,7 +141,7 @@ fn training_goes_on_where_it_was() {
     let whole = Fit::of(&material(), 1, 2, None).unwrap();
     let network = Flsf::new(true);
     assert_eq!(whole.numbers.len(), network.numbers());
-    // As it stands after both steps: nothing is left to do.
+    // The state after both steps: nothing is left to do.
     let state = Adam { step: 2, ..Adam::new(whole.numbers.len()) };
     let of = Fit::identity(&material(), 1, 2);
     weights::write_state(&file, of, &whole.numbers, &state).unwrap();
@@ -169,8 +169,8 @@ fn training_goes_on_where_it_was() {
     assert!(damaged.contains("damaged"), "{damaged}");
 }
 
-/// Both methods over a scene by hand: what stands has the odometry's flow by constancy, features
-/// are told apart by whatever numbers, and all that is counted adds up.
+/// Both methods over a synthetic scene: everything in a labelled box is counted once per method,
+/// whatever the parameters of the network, and all counts add up.
 #[test]
 fn both_methods_are_counted_on_the_same_cells() {
     let profile = Profile::dissertation();
@@ -184,7 +184,8 @@ fn both_methods_are_counted_on_the_same_cells() {
     let [filled, valid] = outcome.tallies.each_ref().map(|t| t.of(|_, _| true));
     assert!(filled.iter().all(|s| s.count == filled[0].count) && filled[0].count > 15);
     assert!(valid[3].count <= filled[3].count && valid[0].count == filled[0].count);
-    // Rounding errs by less than a cell's diagonal, and standing still by the car's way.
+    // Rounding errs by less than a cell's diagonal, and assuming no motion by the car's
+    // displacement.
     assert!(filled[2].mean_cm() < 22.0 && filled[1].mean_cm() > 20.0);
     assert_eq!(outcome.compared.len(), filled[0].count);
     assert!(outcome.compared.iter().any(|c| c.matching));

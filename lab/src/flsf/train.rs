@@ -16,14 +16,14 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Lessons of a step: two a thread.
+/// Lessons per step: two per thread.
 const BATCH: usize = 4;
-/// Rate of Adam at the first step; it falls evenly to nothing. The text's 1e-6 with a pair and a
-/// map a step took two days on a GPU.
+/// Adam's rate at the first step; it falls linearly to zero. The text's 1e-6 with one pair and one
+/// map per step took two days on a GPU.
 const RATE: f32 = 3e-4;
-/// Steps from one checkpoint, and one line of progress, to the next.
+/// Steps between checkpoints and between lines of progress.
 const CHECKPOINT: u32 = 50;
-/// Lessons that the network is judged by.
+/// Lessons used to judge the network.
 const JUDGED: usize = 200;
 
 /// Options of `train flsf`.
@@ -34,13 +34,13 @@ pub struct Args {
     /// Weights file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// File of results to write.
+    /// Results file to write.
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
-    /// Steps of four lessons.
+    /// Number of steps of four lessons.
     #[arg(long, default_value_t = 1500, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
-    /// File to go on from where training was interrupted.
+    /// Checkpoint file to write, and to resume from if training was interrupted.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
 }
@@ -54,7 +54,7 @@ struct Report {
     held_out: [usize; 2],
     /// Mean losses of pairs (4.6) and of classes (4.7), every fifty steps.
     losses: Vec<[f32; 2]>,
-    /// How well distances tell matching pairs from others, on held-out drives.
+    /// How well distances separate matching pairs from others, on held-out drives.
     matching_auc: f64,
     matching: Vec<Operating>,
 }
@@ -100,14 +100,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
 }
 
-/// A pair of sweeps and the cells that lessons are around.
+/// A pair of sweeps and the cells around which lessons are centred.
 pub struct Material {
     pair: FlowPair,
     sources: Vec<usize>,
 }
 
 impl Material {
-    /// None where there is nothing to learn from.
+    /// `None` if there is nothing to learn from.
     pub fn of(pair: FlowPair) -> Option<Material> {
         let sources = pair.sources();
         (!sources.is_empty()).then_some(Material { pair, sources })
@@ -131,7 +131,8 @@ fn of_drive(visit: Visit) -> Result<Vec<Material>, Error> {
     Ok(pairs)
 }
 
-/// Weights of background and foreground: the inverse of how often they are (4.7), their mean 1.
+/// Weights of background and foreground: inverse frequencies (4.7), with a frequency-weighted mean
+/// of 1.
 fn class_weights(pairs: &[Material]) -> [f32; SCORES] {
     let mut counts = [0.0f64; SCORES];
     for cell in pairs.iter().flat_map(|m| &m.pair.cells) {
@@ -145,22 +146,22 @@ fn class_weights(pairs: &[Material]) -> [f32; SCORES] {
     counts.map(|n| (all / (SCORES as f64 * n.max(1.0))) as f32)
 }
 
-/// Where training ended.
+/// Result of training.
 pub struct Fit {
-    /// Of the network.
+    /// Parameters of the network.
     pub numbers: Vec<f32>,
     /// Mean losses of pairs and of classes, every [`CHECKPOINT`] steps.
     pub losses: Vec<[f32; 2]>,
 }
 
 impl Fit {
-    /// What a checkpoint is of.
+    /// Identifies the training that a checkpoint belongs to.
     pub fn identity(pairs: &[Material], seed: u64, steps: u32) -> u64 {
         let weights = class_weights(pairs);
         Digest::of(format!("{seed} {steps} {} {weights:?}", pairs.len()).as_bytes())
     }
 
-    /// Learns from pairs of sweeps, or goes on from a checkpoint.
+    /// Learns from pairs of sweeps, or resumes from a checkpoint.
     pub fn of(
         pairs: &[Material],
         seed: u64,
@@ -200,7 +201,7 @@ impl Fit {
     }
 }
 
-/// Mean gradient and mean losses of a batch, half of it a thread.
+/// Mean gradient and mean losses of a batch, half of it on each of two threads.
 fn gradient(
     network: &Flsf,
     numbers: &[f32],
@@ -228,7 +229,8 @@ fn gradient(
     (slope, [0, 1].map(|n| share * (losses[n] + more[n])))
 }
 
-/// How well distances tell matching pairs of held-out drives from others: the nearer, the more.
+/// How well distances separate matching pairs of held-out drives from others: the smaller, the more
+/// likely a match.
 fn judge(pairs: &[Material], numbers: &[f32]) -> Curve {
     let network = Flsf::new(false);
     let of_encoder = &numbers[..network.encoder.numbers()];

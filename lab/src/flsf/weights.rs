@@ -1,21 +1,21 @@
-//! Numbers of the network, and training under way, as files.
+//! Parameters of the network, and the state of training, as files.
 
 use crate::learning::{Adam, checkpoint};
 use raywake_io::Error;
 use raywake_io::sink::atomic;
 use std::path::Path;
 
-/// What files of weights begin with.
+/// Header of weights files.
 const WEIGHTS: &[u8] = b"raywake-flsf-weights 1\n";
-/// What checkpoints begin with.
+/// Header of checkpoints.
 const TRAINING: &[u8] = b"raywake-flsf-training 1\n";
 
-/// Bytes of a text of where weights come from, at most.
+/// Maximum bytes of the provenance text.
 const PROVENANCE_MAX: usize = 10_000;
 
-/// Trained numbers, and where they come from.
+/// Trained parameters, and their provenance.
 pub struct TrainedNumbers {
-    /// Of the network.
+    /// Parameters of the network.
     pub numbers: Vec<f32>,
     /// Command, inputs, steps.
     pub provenance: String,
@@ -29,7 +29,7 @@ impl TrainedNumbers {
         atomic::write(path, |to| checkpoint::write(to, WEIGHTS, 0, &body))
     }
 
-    /// Reads `count` numbers. Fails where the file is damaged or of another network.
+    /// Reads `count` parameters. Fails if the file is damaged or from another network.
     pub fn read(path: &Path, count: usize) -> Result<TrainedNumbers, Error> {
         let lengths = 4 * count..=4 * count + PROVENANCE_MAX;
         let body = checkpoint::read(path, WEIGHTS, 0, lengths)?;
@@ -39,7 +39,7 @@ impl TrainedNumbers {
     }
 }
 
-/// Writes training of the kind `of` as it stands.
+/// Writes the state of the training identified by `of`.
 pub fn write_state(path: &Path, of: u64, numbers: &[f32], state: &Adam) -> Result<(), Error> {
     let mut body: Vec<u8> = state.step.to_le_bytes().to_vec();
     let all = numbers.iter().chain(&state.means).chain(&state.squares);
@@ -47,7 +47,7 @@ pub fn write_state(path: &Path, of: u64, numbers: &[f32], state: &Adam) -> Resul
     atomic::write(path, |to| checkpoint::write(to, TRAINING, of, &body))
 }
 
-/// Reads it again; fails where it is damaged, or of another training.
+/// Reads it back; fails if it is damaged or from another training.
 pub fn read_state(path: &Path, of: u64, count: usize) -> Result<(Vec<f32>, Adam), Error> {
     let length = 4 + 12 * count;
     let body = checkpoint::read(path, TRAINING, of, length..=length)?;

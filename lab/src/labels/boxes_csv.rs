@@ -10,11 +10,11 @@ use std::path::Path;
 /// First columns, in this order; others may follow.
 const COLUMNS: [&str; 10] = ["frame", "track_id", "class", "x", "y", "z", "l", "w", "h", "yaw"];
 
-/// Reads a file. Its labels are taken to lie all around where one of its boxes lies wholly behind
-/// the vehicle frame's origin, which no camera that looks forward sees; otherwise in the camera's
-/// view.
+/// Reads a file. Its labels are taken to be complete all round if one of its boxes lies wholly
+/// behind the vehicle frame's origin, where no forward-looking camera sees; otherwise in the
+/// camera's view.
 ///
-/// Fails where it cannot be read, lacks a column, or a line is no box.
+/// Fails if it cannot be read or lacks a column, or a line is not a box.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
     let text = whole::read_text(path)?;
     let mut lines = text::lines(&text);

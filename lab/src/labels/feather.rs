@@ -32,11 +32,11 @@ const OBJECTS: Names = Names {
     size: ["length", "width", "height"],
 };
 
-/// Both have it.
+/// Shared by both.
 const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];
 
-/// Annotations of an Argoverse 2 log: frames are timestamps, ns; labelled all around, on what no
-/// return comes from too.
+/// Annotations of an Argoverse 2 log: frames are timestamps, ns; labelled all round, including
+/// objects without returns.
 pub(super) fn annotations(path: &Path) -> Result<Labels, Error> {
     read(path, &ANNOTATIONS, |table| table.strings(ANNOTATIONS.id))
 }
@@ -108,7 +108,7 @@ mod tests {
         Arc::new(Float64Array::from(values.to_vec()))
     }
 
-    /// Columns of boxes after their keys; the second box is 1.5 m on.
+    /// Columns of boxes except their keys; the second box is 1.5 m further on.
     fn columns<'a>(centre: [&'a str; 3], size: [&'a str; 3], x: f64) -> Vec<(&'a str, ArrayRef)> {
         let [qw, q] = [[1.0; 2], [0.0; 2]].map(floats);
         let mut columns = vec![("qw", qw), ("qx", q.clone()), ("qy", q.clone()), ("qz", q)];

@@ -11,7 +11,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Of a box of this length and width.
+    /// The footprint of a box of this length and width.
     pub fn new(vehicle_from_box: Pose, length: f64, width: f64) -> Footprint {
         Footprint {
             box_from_vehicle: vehicle_from_box.inverse(),
@@ -25,7 +25,7 @@ impl Footprint {
         p.x.abs() <= self.half[0] + margin && p.y.abs() <= self.half[1] + margin
     }
 
-    /// How far outside of it a point (vehicle frame) lies, seen from above, m; 0 within it.
+    /// Distance of a point (vehicle frame) from it, seen from above, m; 0 within it.
     pub fn distance_m(&self, at: DVec3) -> f64 {
         let p = self.box_from_vehicle.transform(at);
         let [x, y] = [p.x.abs() - self.half[0], p.y.abs() - self.half[1]].map(|v| v.max(0.0));

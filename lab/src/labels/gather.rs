@@ -1,4 +1,4 @@
-//! Rows of boxes, of whatever file, become tracks.
+//! Gathers rows of boxes, from any file, into tracks.
 
 use super::{Kind, Labels, Track, View, kind::kind};
 use glam::DQuat;
@@ -6,7 +6,7 @@ use raywake_core::pose::Pose;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
-/// One box as a file has it, not yet looked at.
+/// One box as given in a file, not yet checked.
 pub(super) struct LabelRow<'a> {
     pub id: &'a str,
     pub class: &'a str,
@@ -28,17 +28,17 @@ pub(super) fn heading(yaw_rad: f64) -> DQuat {
 pub(super) struct Gather {
     tracks: Vec<Track>,
     by_id: HashMap<String, usize>,
-    /// Reason and number of what was left out.
+    /// Reason and number of everything left out or noted.
     left_out: BTreeMap<&'static str, u64>,
-    /// Classes of no known name.
+    /// Unknown classes.
     unknown: BTreeMap<String, u64>,
 }
 
-/// Largest difference between a track's first size and another that is rounding, m.
+/// Largest difference from a track's first size that counts as rounding, m.
 const SIZE_TOLERANCE: f64 = 0.01;
 
 impl Gather {
-    /// Takes a box, or counts why it cannot be one.
+    /// Takes a box, or counts why it cannot be used.
     pub fn add(&mut self, row: &LabelRow) {
         match usable(row) {
             Ok(pose) => self.place(row, pose),
@@ -46,7 +46,7 @@ impl Gather {
         }
     }
 
-    /// Counts something that is left out.
+    /// Counts something under its reason.
     pub fn leave_out(&mut self, why: &'static str) {
         *self.left_out.entry(why).or_default() += 1;
     }
@@ -87,7 +87,7 @@ impl Gather {
         self.tracks.len() - 1
     }
 
-    /// What was collected, with a note for every reason.
+    /// The collected labels, with a note for every reason.
     pub fn finish(self, view: View) -> Labels {
         let mut notes: Vec<String> =
             self.left_out.iter().map(|(why, count)| format!("{count} {why}")).collect();
@@ -99,7 +99,7 @@ impl Gather {
     }
 }
 
-/// The pose of a row that makes sense.
+/// The pose of a valid row.
 fn usable(row: &LabelRow) -> Result<Pose, &'static str> {
     let whole = |v: &[f64]| v.iter().all(|v| v.is_finite());
     if !whole(&row.centre) || !whole(&row.size) || !row.rotation.is_finite() {

@@ -2,11 +2,11 @@
 
 use super::Kind;
 
-/// The kind that a class of KITTI, Argoverse 2, SemanticKITTI or the simulator is of, whatever its
-/// case; `None` for a name that none of them has.
+/// The kind of a class of KITTI, Argoverse 2, SemanticKITTI or the simulator, ignoring case; `None`
+/// for a name that none of them has.
 ///
-/// Bicycles, wheelchairs, animals and signs are [`Kind::Other`]: known, but nothing that the kinds
-/// tell apart.
+/// Bicycles, wheelchairs, animals and signs are [`Kind::Other`]: known, but without a kind of their
+/// own.
 pub fn kind(class: &str) -> Option<Kind> {
     let name = class.to_ascii_lowercase();
     Some(match name.strip_prefix("moving-").unwrap_or(&name) {
@@ -25,7 +25,7 @@ pub fn kind(class: &str) -> Option<Kind> {
     })
 }
 
-/// Known classes of no kind of their own.
+/// Known classes without a kind of their own.
 const OTHER: [&str; 20] = [
     "animal",
     "bicycle",

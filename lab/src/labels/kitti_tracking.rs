@@ -1,8 +1,8 @@
 //! Labels of KITTI's tracking benchmark: `label_02/NNNN.txt` with `calib/NNNN.txt`.
 //!
 //! A line is a box: frame, id, type, truncation, occlusion, alpha, 4 numbers of the box in the
-//! image, height, width, length, x, y, z of the middle of its bottom and `rotation_y`, both in the
-//! rectified camera (x right, y down, z forward).
+//! image, height, width, length, x, y, z of the centre of its bottom and `rotation_y`, both in the
+//! rectified camera frame (x right, y down, z forward).
 
 use super::gather::{Gather, LabelRow};
 use super::{Error, Labels, View};
@@ -11,13 +11,13 @@ use raywake_core::pose::Pose;
 use raywake_io::source::{text, whole};
 use std::path::Path;
 
-/// Fields of a line; results of trackers have a score after them.
+/// Fields of a line; tracker results append a score.
 const FIELDS: usize = 17;
 
-/// Reads the labels at `path` with the calibration at `calib`; boxes are moved to the Velodyne's
-/// frame, regions named `DontCare` left out.
+/// Reads the labels at `path` with the calibration at `calib`; boxes are transformed to the
+/// Velodyne's frame, regions named `DontCare` left out.
 ///
-/// Fails where a file cannot be read, a line is no box, or the calibration lacks a transform.
+/// Fails if a file cannot be read, a line is not a box, or the calibration lacks a transform.
 pub(super) fn read(path: &Path, calib: &Path) -> Result<Labels, Error> {
     let velodyne_from_camera = read_calib(calib)?;
     let text = whole::read_text(path)?;
@@ -55,7 +55,8 @@ pub(super) fn read(path: &Path, calib: &Path) -> Result<Labels, Error> {
     Ok(gather.finish(View::Camera))
 }
 
-/// The box's frame, x forward and z up in its centre, in the rectified camera's. NaN stays.
+/// The box's frame, centred in it with x forward and z up, in the rectified camera's. NaN stays
+/// NaN.
 fn camera_from_box(&[height, _, _, x, y, z, rotation_y]: &[f64; 7]) -> Pose {
     let forward = DVec3::new(rotation_y.cos(), 0.0, -rotation_y.sin());
     let up = DVec3::NEG_Y;
@@ -63,8 +64,8 @@ fn camera_from_box(&[height, _, _, x, y, z, rotation_y]: &[f64; 7]) -> Pose {
     Pose { rotation: DQuat::from_mat3(&axes), translation: DVec3::new(x, y - 0.5 * height, z) }
 }
 
-/// `velodyne_from_camera` of the rectified camera. Keys are with and without a colon, and of the
-/// tracking or the object benchmark.
+/// `velodyne_from_camera` for the rectified camera. Keys are accepted with and without a colon,
+/// from the tracking and the object benchmark.
 fn read_calib(path: &Path) -> Result<Pose, Error> {
     let text = whole::read_text(path)?;
     let [a, b, c, d, e, f, g, h, i] = keyed::<9>(path, &text, ["R_rect", "R0_rect"])?.1;
@@ -119,7 +120,7 @@ mod tests {
         // 13 m ahead and 5 m to the left; the box's bottom is 1.5 m below the Velodyne.
         let ahead = track.boxes[&0];
         assert!((ahead.translation - DVec3::new(13.0, 5.0, -0.5)).length() < 1e-9, "{ahead:?}");
-        // Along the camera's z axis is straight ahead, along its x axis to the right.
+        // The camera's z axis points straight ahead, its x axis to the right.
         assert!(ahead.yaw_rad().abs() < 1e-9);
         assert!((track.boxes[&2].yaw_rad() + 0.5 * std::f64::consts::PI).abs() < 1e-9);
         assert!((ahead.rotation * DVec3::Z - DVec3::Z).length() < 1e-9);

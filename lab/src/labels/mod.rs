@@ -1,4 +1,5 @@
-//! Labelled objects of a recorded or simulated drive: boxes over time, whatever file they are from.
+//! Labelled objects of a recorded or simulated drive: boxes over time, from any of the file
+//! formats.
 
 mod boxes_csv;
 mod feather;
@@ -27,7 +28,7 @@ use glam::DVec3;
 use raywake_core::pose::Pose;
 use std::collections::BTreeMap;
 
-/// Kinds of objects that the data sets share; their own names stay in [`Track::class`].
+/// Kinds of objects shared by the data sets; their own names are kept in [`Track::class`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Passenger cars.
@@ -51,7 +52,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, in their order.
+    /// All of them, in order.
     pub const ALL: [Kind; 9] = [
         Kind::Car,
         Kind::Van,
@@ -68,32 +69,32 @@ impl Kind {
 /// One labelled object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Unlike any other's in the drive, as the file has it.
+    /// Unique in the drive, as given in the file.
     pub id: String,
-    /// Class as the file names it.
+    /// Class as named in the file.
     pub class: String,
-    /// The same in common terms.
+    /// The class in common terms.
     pub kind: Kind,
     /// Length, width and height of the box, m.
     pub size: [f64; 3],
-    /// Where it is, by frame (as [`raywake_io::source::Source::frame`] counts): `vehicle_from_box`,
-    /// the box's frame lying in its centre, x forward, y left, z up.
+    /// Where it is, by frame (as counted by [`raywake_io::source::Source::frame`]):
+    /// `vehicle_from_box`, the box's frame centred in it, x forward, y left, z up.
     pub boxes: BTreeMap<u64, Pose>,
 }
 
-/// Where objects are labelled; outside nothing is known of what is there.
+/// Where objects are labelled; outside nothing is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
-    /// All around.
+    /// All round.
     All,
-    /// In the view of a camera that looks forward (KITTI).
+    /// In the view of a forward-looking camera (KITTI).
     Camera,
     /// Nowhere: the drive has no boxes.
     Nowhere,
 }
 
-/// Half of the camera's view in which KITTI has labels for certain, degrees; at its border boxes
-/// are cut off.
+/// Half of the camera's view in which KITTI's labels are reliably complete, degrees; at its border
+/// boxes are cut off.
 pub const CAMERA_DEG: f64 = 40.0;
 
 impl View {
@@ -114,14 +115,14 @@ pub struct Labels {
     pub tracks: Vec<Track>,
     /// Where they are complete.
     pub view: View,
-    /// Whether they are a simulator's, without noise: nothing is gained by smoothing them.
+    /// Whether they come from a simulator, without noise: smoothing gains nothing.
     pub exact: bool,
-    /// What was left out, and why: one line each for people.
+    /// What was left out, and why: one readable line each.
     pub notes: Vec<String>,
 }
 
 impl Labels {
-    /// Of a drive without boxes.
+    /// The labels of a drive without boxes.
     pub fn none() -> Labels {
         Labels { tracks: Vec::new(), view: View::Nowhere, exact: false, notes: Vec::new() }
     }

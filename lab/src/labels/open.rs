@@ -1,4 +1,4 @@
-//! Which labels a drive's folder holds.
+//! Finds and reads the labels in a drive's folder.
 
 use super::sweeps::{Sweeps, fit};
 use super::{Error, Labels, boxes_csv, feather, kitti_tracking, tracklets};
@@ -7,24 +7,24 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Reads the labels of the drive at `path` (or of the only one in a folder below it), whose sweeps
-/// `source` has: the first that is there of
+/// are in `source`: the first found of
 ///
-/// | file | of | view |
+/// | file | source | view |
 /// |---|---|---|
-/// | `truth/objects.feather` | simulated drives, exact | all around |
+/// | `truth/objects.feather` | simulated drives, exact | all round |
 /// | `tracklet_labels.xml` | KITTI raw | the camera's |
-/// | `boxes.csv` | converted boxes | as its boxes show |
-/// | `annotations.feather` | Argoverse 2 | all around |
+/// | `boxes.csv` | converted boxes | inferred from its boxes |
+/// | `annotations.feather` | Argoverse 2 | all round |
 /// | `label_02/NNNN.txt`, `calib/NNNN.txt` | KITTI tracking | the camera's |
 ///
-/// The last are looked for in the drive (one file alone), and as distributed, the drive being
+/// The last are searched for in the drive (a single file), and as distributed: if the drive is
 /// `velodyne/NNNN`, in `../../label_02` and `../../calib`.
 ///
-/// Boxes that make no sense are left out, those of frames without a sweep too; tracks are cut where
-/// they jump: where something is faster over ground than 15 m/s (people), 30 m/s (cyclists) or
-/// 70 m/s, or turns by more than a right angle from one box to the next. The notes count all that.
+/// Invalid boxes are left out, and so are those of frames without a sweep; tracks are cut where
+/// they jump: if something moves faster over ground than 15 m/s (people), 30 m/s (cyclists) or 70
+/// m/s, or turns by more than a right angle from one box to the next. The notes count all of these.
 ///
-/// Fails where there are no labels, and where they cannot be read.
+/// Fails if there are no labels or they cannot be read.
 pub fn open(path: &Path, source: &dyn Source) -> Result<Labels, Error> {
     let names = "`truth/objects.feather`, `tracklet_labels.xml`, `boxes.csv`, \
                  `annotations.feather`, `label_02/NNNN.txt`";
@@ -32,16 +32,16 @@ pub fn open(path: &Path, source: &dyn Source) -> Result<Labels, Error> {
     find(path, source)?.ok_or_else(missing)
 }
 
-/// The same; none where there are none.
+/// The same; `None` if there are no labels.
 pub fn find(path: &Path, source: &dyn Source) -> Result<Option<Labels>, Error> {
-    // Labels lie in the folder that has the clouds, the one named where that is not to be told.
+    // Labels lie in the folder that has the clouds, or in the one named if that is not recognised.
     let root = recognise(path).map_or_else(|_| path.to_path_buf(), |found| found.1);
     let mut labels = read(&root).transpose()?;
     labels.iter_mut().for_each(|labels| fit(labels, &Sweeps::of(source)));
     Ok(labels)
 }
 
-/// The labels in a folder; none where there are none.
+/// The labels in a folder; `None` if there are none.
 fn read(root: &Path) -> Option<Result<Labels, Error>> {
     let there = |name: &str| Some(root.join(name)).filter(|file| file.is_file());
     if let Some(file) = there("truth/objects.feather") {

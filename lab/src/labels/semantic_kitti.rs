@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub struct PointLabel {
     /// Number of the class, the lower half of the word.
     pub class: u16,
-    /// Number of the object within its class, over the sequence; 0 for stuff that is not counted.
+    /// Number of the object within its class, over the sequence; 0 for classes without instances.
     pub instance: u16,
 }
 
@@ -54,23 +54,23 @@ const CLASSES: [(u16, &str); 34] = [
 ];
 
 impl PointLabel {
-    /// Name of the class; `None` where the data set has none of this number.
+    /// Name of the class; `None` if the data set has no such number.
     pub fn name(self) -> Option<&'static str> {
         CLASSES.iter().find(|c| c.0 == self.class).map(|c| c.1)
     }
 
-    /// Whether it has no class, or is no thing at all (0 and 1).
+    /// Whether it has no class or is an outlier (0 and 1).
     pub fn is_unlabelled(self) -> bool {
         self.class <= 1
     }
 
-    /// Whether it is something that moved somewhere in the sequence (252 to 259).
+    /// Whether it belongs to an object that moved at some time in the sequence (252 to 259).
     pub fn moving(self) -> bool {
         (252..=259).contains(&self.class)
     }
 
-    /// Kind of the object; `None` for what is no object that could move, and for what is
-    /// unlabelled.
+    /// Kind of the object; `None` for classes of no object that could move, and for unlabelled
+    /// returns.
     pub fn kind(self) -> Option<Kind> {
         let object = self.moving() || (10..=32).contains(&self.class);
         self.name().filter(|_| object).and_then(kind)
@@ -82,9 +82,9 @@ pub fn file(sequence: &Path, frame: u64) -> PathBuf {
     sequence.join(format!("labels/{frame:06}.label"))
 }
 
-/// Labels of the `points` returns of a sweep, in the order of its `.bin`.
+/// Reads the labels of the `points` returns of a sweep, in the order of its `.bin`.
 ///
-/// Fails where the file cannot be read or has labels for another number of returns.
+/// Fails if the file cannot be read or has labels for a different number of returns.
 pub fn read(path: &Path, points: usize) -> Result<Vec<PointLabel>, Error> {
     let size = fs::metadata(path).map_err(Error::reading(path))?.len();
     if size != 4 * points as u64 {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-/// Sweeps before and after a sweep whose boxes make its smoothed box: 11 in all, a second at 10 Hz.
+/// Sweeps on either side whose boxes contribute to a smoothed box: 11 in all, a second at 10 Hz.
 const HALF_WINDOW: usize = 5;
 
 /// A box in the world, as labelled.
@@ -21,7 +21,7 @@ pub(super) struct Fit {
     pub yaw: f64,
 }
 
-/// The motion at sample `n` from its window; of exact ones, from its neighbours alone.
+/// The motion at sample `n` from its window; for exact samples from the adjacent ones only.
 pub(super) fn fit(samples: &[Sample], n: usize, exact: bool) -> Fit {
     let half = if exact { 1 } else { HALF_WINDOW };
     let near = |s: &&Sample| s.index.abs_diff(samples[n].index) <= half;
@@ -34,7 +34,7 @@ pub(super) fn fit(samples: &[Sample], n: usize, exact: bool) -> Fit {
     polynomial(&window, samples[n].stamp_s, degree)
 }
 
-/// The polynomial of a degree up to 2 through the samples by least squares, at a stamp.
+/// The least-squares polynomial of a degree up to 2 through the samples, evaluated at a stamp.
 pub(super) fn polynomial(samples: &[Sample], stamp_s: f64, degree: usize) -> Fit {
     let mut gram = DMat3::ZERO;
     // Sums of powers of time by x, y, z, heading.

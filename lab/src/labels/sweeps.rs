@@ -1,4 +1,4 @@
-//! Labels against the sweeps they belong to.
+//! Matches labels to their sweeps.
 
 use super::{Kind, Labels, Track};
 use raywake_core::pose::Pose;
@@ -32,8 +32,8 @@ impl Sweeps {
     }
 }
 
-/// Fastest that something of a kind is taken to move over ground, m/s: beyond it a track jumps from
-/// one object to another, or a box was placed wrongly.
+/// Highest plausible speed of a kind over ground, m/s: beyond it a track jumps from one object to
+/// another, or a box was misplaced.
 fn speed_max(kind: Kind) -> f64 {
     match kind {
         Kind::Pedestrian => 15.0,
@@ -42,10 +42,10 @@ fn speed_max(kind: Kind) -> f64 {
     }
 }
 
-/// Leaves out boxes of frames without a sweep; cuts tracks where they jump: where a kind's greatest
-/// speed over ground does not lead from one box to the next, or the heading turns by more than a
-/// right angle. The parts become tracks of their own, the later ones named `ID/2`, `ID/3` and so
-/// on. All that is counted in the notes, as are sweeps without a box.
+/// Drops boxes of frames without a sweep; cuts tracks where they jump: where getting from one box
+/// to the next would exceed the kind's highest speed over ground, or the heading turns by more than
+/// a right angle. The parts become separate tracks, the later ones named `ID/2`, `ID/3` and so on.
+/// The notes count all of these, and sweeps without a box.
 pub(super) fn fit(labels: &mut Labels, sweeps: &Sweeps) {
     let mut without_sweep = 0;
     for track in &mut labels.tracks {
@@ -96,13 +96,13 @@ fn cut(track: Track, sweeps: &Sweeps) -> Vec<Track> {
     parts
 }
 
-/// Whether two moments, s and `world_from_box`, are not of one motion.
+/// Whether two moments, s and `world_from_box`, cannot belong to one motion.
 fn jumps(kind: Kind, a: (f64, Pose), b: (f64, Pose)) -> bool {
     let far = (b.1.translation - a.1.translation).length() > speed_max(kind) * (b.0 - a.0);
     far || turn(a.1.yaw_rad(), b.1.yaw_rad()).abs() > FRAC_PI_2
 }
 
-/// The turn from one heading to another, -pi to pi, rad.
+/// The signed angle from one heading to another, -pi to pi, rad.
 pub fn turn(from_rad: f64, to_rad: f64) -> f64 {
     (to_rad - from_rad + PI).rem_euclid(TAU) - PI
 }
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn tracks_are_cut_where_they_jump_over_ground() {
         let at = |x: f64, yaw: f64| Pose::planar(x, 0.0, 0.0, yaw);
-        // 5 m in 0.1 s is no jump for a car, 8 m is one.
+        // 5 m in 0.1 s is not a jump for a car, 8 m is.
         let steady = fitted((0..6).map(|f| (f, at(5.0 * f as f64, 0.0))), 0.0);
         assert_eq!((steady.tracks.len(), steady.notes.len()), (1, 0));
         let jumping = fitted((0..6).map(|f| (f, at(if f < 2 { 0.0 } else { 8.0 }, 0.0))), 0.0);
@@ -133,11 +133,11 @@ mod tests {
         let parts: Vec<_> = jumping.tracks.iter().map(|t| (t.id.as_str(), t.boxes.len())).collect();
         assert_eq!(parts, [("a", 2), ("a/2", 4)]);
         assert_eq!(jumping.tracks[1].class, "Car");
-        // What stays beside a vehicle that drives 80 m/s drives as fast.
+        // Whatever stays beside a vehicle at 80 m/s is as fast.
         assert_eq!(fitted((0..6).map(|f| (f, at(3.0, 0.0))), 80.0).tracks.len(), 6);
         let turned = fitted((0..6).map(|f| (f, at(3.0, if f < 5 { 1.5 } else { -1.6 }))), 0.0);
         assert_eq!(turned.tracks.len(), 2);
-        // Across the seam of the angles there is no turn.
+        // Wrapping around pi is not a turn.
         let seam = fitted((0..6).map(|f| (f, at(3.0, if f < 3 { 3.1 } else { -3.1 }))), 0.0);
         assert_eq!(seam.tracks.len(), 1);
     }

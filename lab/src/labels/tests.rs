@@ -91,7 +91,7 @@ fn recorded_drives() {
     let (source, log) = data("av2_log");
     let (_, pair) = data("av2_7fab2350");
     assert_eq!((pair.view, log.view), (View::All, View::All));
-    // The log has boxes of 156 sweeps, two of which are there.
+    // The log has boxes of 156 sweeps, two of which are present.
     assert!(log.notes[0].ends_with("boxes left out: their frame has no sweep"), "{:?}", log.notes);
     assert_eq!(boxes(&pair), 162);
     for index in 0..2u64 {

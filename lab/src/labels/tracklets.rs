@@ -1,7 +1,7 @@
-//! `tracklet_labels.xml` of a KITTI raw drive, as boost serialises it.
+//! `tracklet_labels.xml` of a KITTI raw drive, as serialised by Boost.
 //!
 //! An item of `tracklets` is a track: `objectType`, `h`, `w`, `l`, `first_frame`, and in `poses` an
-//! item for every frame from that one on. A pose is that of the middle of the box's bottom in the
+//! item for every frame from that one on. A pose is that of the centre of the box's bottom in the
 //! Velodyne's frame (Geiger et al. 2013).
 
 use super::gather::{Gather, LabelRow};
@@ -11,13 +11,13 @@ use raywake_io::source::boost;
 use roxmltree::{Document, Node};
 use std::path::Path;
 
-/// Value of `state` of a pose that nobody set.
+/// Value of `state` for a pose that was never set.
 const UNSET: u64 = 0;
 
-/// Reads a file. Poses that nobody set are left out.
+/// Reads a file. Poses that were never set are left out.
 ///
-/// Fails where the file cannot be read, is no whole XML, lacks an element, or has another number of
-/// items than it says.
+/// Fails if the file cannot be read, is not well-formed XML, lacks an element, or has a different
+/// number of items than it states.
 pub(super) fn read(path: &Path) -> Result<Labels, Error> {
     boost::read(path, |document| labels(path, document))
 }
@@ -80,7 +80,7 @@ impl<'a> File<'a> {
         text.parse().map_err(|_| self.error(node, format!("<{name}>: `{text}` is not a number")))
     }
 
-    /// The items of a list, as many as its `count` says.
+    /// The items of a list, checked against its `count`.
     fn items(&self, list: Node<'a, 'a>) -> Result<Vec<Node<'a, 'a>>, Error> {
         let items: Vec<_> = list.children().filter(|c| c.has_tag_name("item")).collect();
         let count: usize = self.number(list, "count")?;

@@ -7,27 +7,27 @@ use glam::DVec3;
 use raywake_core::pose::Pose;
 use raywake_io::source::Source;
 
-/// An object is parked where the boxes of its track lie no farther than this from their mean (root
-/// of the mean square, on the ground), m. A voxel's side: boxes of parked vehicles wander by up to
-/// two thirds of it as the vehicle passes, its own poses drifting. What creeps goes 1 m until it
-/// shows.
+/// An object is parked if the boxes of its track lie within this of their mean (root mean square,
+/// on the ground), m. A voxel's side: boxes of parked vehicles wander by up to two thirds of it as
+/// the vehicle passes, because its own poses drift. A creeping object moves 1 m before it exceeds
+/// this.
 pub const PARKED_M: f64 = 0.3;
 
-/// The same where labels are exact, m: what a body sways on its springs.
+/// The same for exact labels, m: the sway of a body on its springs.
 const EXACT_M: f64 = 0.01;
 
-/// Speed over ground from which an object moves, and below which one is parked, m/s.
+/// Speed over ground from which on an object moves, and below which one is parked, m/s.
 pub const MOVING_MPS: f64 = 0.5;
 
-/// What an object does at a sweep.
+/// Motion of an object at a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// Stands for as long as it is labelled: its true velocity is 0.
+    /// Static for as long as it is labelled: its true velocity is 0.
     Parked,
-    /// Moves by [`MOVING_MPS`] or more.
+    /// Moves at [`MOVING_MPS`] or more.
     Moving,
-    /// Slower than that, though not parked: at a traffic light, or standing about. Its labels do
-    /// not tell noise from motion.
+    /// Slower than that, though not parked: at a traffic light, or standing around. Its labels do
+    /// not distinguish noise from motion.
     Slow,
 }
 
@@ -36,9 +36,9 @@ pub enum Motion {
 pub struct State {
     /// Frame of the sweep.
     pub frame: u64,
-    /// Its number in the source.
+    /// Index of the sweep in the source.
     pub index: usize,
-    /// Its stamp, s.
+    /// Stamp of the sweep, s.
     pub stamp_s: f64,
     /// Pose of the vehicle.
     pub world_from_vehicle: Pose,
@@ -46,23 +46,23 @@ pub struct State {
     pub world_from_box: Pose,
     /// Velocity of the box's centre over ground, along the axes of the world, m/s.
     pub velocity: DVec3,
-    /// What it does.
+    /// Its motion.
     pub motion: Motion,
 }
 
 /// A track in the world.
 ///
 /// Poses of parked objects are their mean, so that they do not move at all. Those of others are
-/// smoothed: a quadratic is laid through position and heading of the boxes within five
-/// sweeps by least squares, and taken at the sweep; a line through fewer than five boxes. At the
-/// ends of a track the window has one side only. Exact labels stay as they are.
+/// smoothed: a quadratic is fitted by least squares to position and heading of the boxes within
+/// five sweeps and evaluated at the sweep; a line if there are fewer than five boxes. At the ends
+/// of a track the window is one-sided. Exact labels are kept as they are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     states: Vec<State>,
 }
 
-/// The trajectories of all tracks, in their order; boxes of frames that the source lacks do not
-/// count.
+/// The trajectories of all tracks, in their order; boxes of frames missing from the source are
+/// ignored.
 pub fn trajectories(labels: &Labels, source: &dyn Source) -> Vec<Trajectory> {
     let sweeps = Sweeps::of(source);
     labels.tracks.iter().map(|t| Trajectory::new(t, labels.exact, &sweeps)).collect()
@@ -110,12 +110,12 @@ impl Trajectory {
         }
     }
 
-    /// Where it is labelled, in order of time.
+    /// States at all labelled sweeps, in order of time.
     pub fn states(&self) -> &[State] {
         &self.states
     }
 
-    /// What it is at a frame; `None` where it is not labelled.
+    /// State at a frame; `None` if it is not labelled.
     pub fn at(&self, frame: u64) -> Option<&State> {
         self.place(frame).map(|n| &self.states[n])
     }
@@ -125,7 +125,7 @@ impl Trajectory {
     }
 
     /// Motion of its body from the sweep of a frame to the next sweep of the source, as a transform
-    /// of points of the world; `None` where one of them has no box.
+    /// of points of the world; `None` if either has no box.
     pub fn step(&self, frame: u64) -> Option<Pose> {
         let n = self.place(frame)?;
         let (here, next) = (&self.states[n], self.states.get(n + 1)?);
@@ -145,7 +145,7 @@ impl Trajectory {
     }
 }
 
-/// The boxes of a track in the world as they are labelled, and their headings without leaps, rad.
+/// The boxes of a track in the world as labelled, and their unwrapped headings, rad.
 fn placed(track: &Track, sweeps: &Sweeps) -> (Vec<State>, Vec<f64>) {
     let (mut states, mut headings): (Vec<State>, Vec<f64>) = Default::default();
     for (&frame, &vehicle_from_box) in &track.boxes {
@@ -168,9 +168,8 @@ fn placed(track: &Track, sweeps: &Sweeps) -> (Vec<State>, Vec<f64>) {
     (states, headings)
 }
 
-/// The mean pose of an object that is parked: boxes within a tolerance of it, and no steady motion
-/// of [`MOVING_MPS`] hidden in them, as there may be in a short track. A track of one box
-/// tells nothing.
+/// The mean pose of an object that is parked: its boxes lie within a tolerance of it and hide no
+/// steady motion of [`MOVING_MPS`], as a short track might. A track of one box is inconclusive.
 fn parked(samples: &[Sample], tolerance_m: f64) -> Option<Pose> {
     if samples.len() < 2 {
         return None;
@@ -188,7 +187,7 @@ mod tests {
     use super::super::tests::{Road, labels_of, track};
     use super::*;
 
-    /// A vehicle that turns and drives on, and boxes given in the world.
+    /// A vehicle that turns as it drives, and boxes given in the world.
     fn trajectory(exact: bool, world_from_box: impl Fn(f64) -> Pose, count: usize) -> Trajectory {
         let road = Road::of(
             (0..count)
@@ -203,7 +202,7 @@ mod tests {
         trajectories(&labels, &road).remove(0)
     }
 
-    /// Noise of a fixed pattern, up to one.
+    /// Noise of a fixed pattern, of amplitude 1.
     fn noise(t: f64) -> f64 {
         (1e4 * t).sin()
     }
@@ -236,7 +235,7 @@ mod tests {
 
     #[test]
     fn a_point_of_a_turning_body() {
-        // Turning on the spot around (20, 5) by 1 rad/s; its centre 3 m ahead of that.
+        // Rotating about (20, 5) at 1 rad/s, with its centre 3 m ahead of that point.
         let truth = |t: f64| Pose::planar(20.0, 5.0, 0.0, t) * Pose::planar(3.0, 0.0, 0.0, 0.0);
         let exact = trajectory(true, truth, 5);
         let at = exact.at(2).unwrap().world_from_vehicle.inverse();
@@ -261,16 +260,16 @@ mod tests {
         assert_eq!(parked.step(11), None);
         let mean = parked.at(0).unwrap().world_from_box;
         assert!((mean.translation.x - 9.0).abs() < 0.05 && turn(mean.yaw_rad(), 3.1).abs() < 0.1);
-        // Stays for a second, then leaves.
+        // Static for a second, then leaves.
         let leaves = |t: f64| Pose::planar(9.0 + 2.0 * (t - 1.0).max(0.0).powi(2), 0.0, 0.0, 0.0);
         let leaving = trajectory(false, leaves, 30);
         let motion = |frame: u64| leaving.at(frame).unwrap().motion;
         assert_eq!((motion(2), motion(20)), (Motion::Slow, Motion::Moving));
-        // What creeps exactly so is not parked.
+        // An object that creeps is not parked if labels are exact.
         let creeps = |t: f64| Pose::planar(0.3 * t, 0.0, 0.0, 0.0);
         assert_eq!(trajectory(true, creeps, 20).at(9).unwrap().motion, Motion::Slow);
         assert_eq!(trajectory(false, creeps, 20).at(9).unwrap().motion, Motion::Parked);
-        // In two sweeps nobody gets far.
+        // Nothing gets far in two sweeps.
         let walks = |t: f64| Pose::planar(1.5 * t, 0.0, 0.0, 0.0);
         assert_eq!(trajectory(false, walks, 2).at(0).unwrap().motion, Motion::Moving);
         assert_eq!(trajectory(false, walks, 1).at(0).unwrap().motion, Motion::Slow);

@@ -1,12 +1,12 @@
 //! Adam (Kingma and Ba, 2015).
 
-/// Decay of the mean gradient, and of its square: the paper's.
+/// Decay of the mean gradient, and of its square, as in the paper.
 const DECAY: [f32; 2] = [0.9, 0.999];
 
 /// Moments of the gradient so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
-    /// Decayed mean of every number's gradient.
+    /// Decayed mean of the gradient of every number.
     pub means: Vec<f32>,
     /// Decayed mean of its square.
     pub squares: Vec<f32>,
@@ -15,12 +15,12 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Before the first step of so many numbers.
+    /// State before the first step, for the given count of numbers.
     pub fn new(numbers: usize) -> Adam {
         Adam { means: vec![0.0; numbers], squares: vec![0.0; numbers], step: 0 }
     }
 
-    /// A step of `numbers` down their gradient.
+    /// Moves `numbers` one step down their gradient.
     pub fn advance(&mut self, numbers: &mut [f32], slope: &[f32], rate: f32) {
         self.step += 1;
         let unbiased = DECAY.map(|d| 1.0 - f64::from(d).powi(self.step as i32) as f32);

@@ -1,4 +1,4 @@
-//! Files of numbers that say what they are of and tell whether they are damaged.
+//! Files of numbers that record what they belong to and whose damage can be detected.
 
 use raywake_core::digest::Digest;
 use raywake_io::Error;
@@ -14,8 +14,8 @@ pub fn write(to: &mut impl Write, magic: &[u8], of: u64, body: &[u8]) -> io::Res
     to.write_all(&bytes)
 }
 
-/// The body of a file, `lengths` bytes long. Fails where it is of another kind or length, damaged,
-/// or of something else than `of`.
+/// Returns the body of a file, which must be `lengths` bytes long. Fails if the file is of another
+/// kind or length, is damaged, or does not belong to `of`.
 pub fn read(
     file: &Path,
     magic: &[u8],

@@ -1,4 +1,4 @@
-//! A convolution without padding and what follows it, by products of matrices.
+//! Convolution without padding, with its activation, by matrix products.
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2, ShapeBuilder};
@@ -10,19 +10,19 @@ pub struct FeatureMap {
     pub rows: usize,
     /// Cells along the second.
     pub columns: usize,
-    /// Numbers a cell.
+    /// Numbers per cell.
     pub channels: usize,
-    /// All of them.
+    /// The numbers of all cells.
     pub values: Vec<f32>,
 }
 
 impl FeatureMap {
-    /// Nothing but zeros.
+    /// A map of zeros.
     pub fn zeros(rows: usize, columns: usize, channels: usize) -> FeatureMap {
         FeatureMap { rows, columns, channels, values: vec![0.0; rows * columns * channels] }
     }
 
-    /// Vectors side by side: what a dense layer works on.
+    /// Vectors side by side, as a dense layer processes them.
     pub fn row(channels: usize, values: Vec<f32>) -> FeatureMap {
         FeatureMap { rows: 1, columns: values.len() / channels, channels, values }
     }
@@ -37,8 +37,8 @@ impl FeatureMap {
         self.values.chunks_exact(self.channels)
     }
 
-    /// From every of the first `count` cells of a row, the numbers of `width` cells on: lines that
-    /// overlap, and need no copy.
+    /// For each of the first `count` cells of a row, the numbers of `width` cells from there:
+    /// overlapping lines that need no copy.
     fn windows(&self, row: usize, count: usize, width: usize) -> ArrayView2<'_, f32> {
         let from = row * self.columns * self.channels;
         let shape = (count, width * self.channels).strides((self.channels, 1));
@@ -46,7 +46,7 @@ impl FeatureMap {
     }
 }
 
-/// What becomes of a sum.
+/// Function applied to a sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Activation {
     /// The sum itself.
@@ -55,7 +55,7 @@ pub enum Activation {
     Tanh,
     /// 1 / (1 + exp(-sum)).
     Sigmoid,
-    /// Below zero a part of it.
+    /// The given fraction of it if below zero.
     LeakyRelu(f32),
 }
 
@@ -69,7 +69,7 @@ impl Activation {
         }
     }
 
-    /// Its derivative, where it is `value`.
+    /// Its derivative where the output is `value`.
     fn slope(self, value: f32) -> f32 {
         match self {
             Activation::Linear => 1.0,
@@ -86,18 +86,18 @@ impl Activation {
     }
 }
 
-/// A layer: `kernel` x `kernel` cells with their channels, weighted, with a bias. Its numbers are
-/// the weights by row, column and channel of the kernel, the outputs innermost, then the biases. A
-/// dense layer has a kernel of 1.
+/// A layer: a weighted sum over `kernel` x `kernel` cells with their channels, plus a bias. Its
+/// numbers are the weights by row, column and channel of the kernel, outputs innermost, then the
+/// biases. A dense layer has a kernel of 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convolution {
     /// Side of the kernel, cells.
     pub kernel: usize,
-    /// Channels that enter.
+    /// Input channels.
     pub inputs: usize,
-    /// Channels that come out.
+    /// Output channels.
     pub outputs: usize,
-    /// What becomes of the sums.
+    /// Function applied to the sums.
     pub activation: Activation,
 }
 
@@ -107,18 +107,18 @@ impl Convolution {
         (self.fan_in() + 1) * self.outputs
     }
 
-    /// Numbers that a sum is made of.
+    /// Count of numbers that enter a sum.
     pub fn fan_in(&self) -> usize {
         self.kernel * self.kernel * self.inputs
     }
 
-    /// Numbers of one row of the kernel, from one on.
+    /// Range of the numbers of row `n` of the kernel.
     fn of_row(&self, n: usize) -> std::ops::Range<usize> {
         let row = self.kernel * self.inputs * self.outputs;
         n * row..(n + 1) * row
     }
 
-    /// The layer's map; as many cells less as the kernel is wider than one.
+    /// The layer's output map, smaller by `kernel` - 1 cells along each axis.
     pub fn forward(&self, numbers: &[f32], x: &FeatureMap) -> FeatureMap {
         let [rows, columns] = [x.rows, x.columns].map(|n| n + 1 - self.kernel);
         let (weights, biases) = numbers.split_at(self.fan_in() * self.outputs);
@@ -138,8 +138,8 @@ impl Convolution {
         FeatureMap { rows, columns, channels: self.outputs, values }
     }
 
-    /// Adds the gradient of its numbers to `into`, and of what entered it to `below` where that is
-    /// asked for, given that of what came out.
+    /// Given the gradient of the output, adds that of its numbers to `into` and, if `below` is
+    /// given, that of the input to `below`.
     pub fn backward(
         &self,
         numbers: &[f32],
@@ -170,7 +170,7 @@ impl Convolution {
         }
     }
 
-    /// Adds to a row of the map below what a row of the kernel passes back of a row of slopes.
+    /// Adds to a row of the map below what a row of the kernel passes back from a row of slopes.
     fn descend(
         &self,
         weights: &[f32],

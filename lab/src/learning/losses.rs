@@ -1,11 +1,11 @@
 //! Losses of chapter 4, with their gradients.
 
-/// Added to a squared distance: its root has a gradient at zero, too.
+/// Added to a squared distance so that its root has a gradient at zero, too.
 const NEAR: f32 = 1e-12;
 
-/// Loss of a pair of features (4.2), (4.6): their distance where they match, what it lacks of
-/// `d_max` where they do not. With it the factor that makes their difference the gradient by the
-/// first; that by the second is the opposite.
+/// Loss of a pair of features (4.2), (4.6): their distance if they match, otherwise what it falls
+/// short of `d_max`. Also returns the factor that turns their difference into the gradient with
+/// respect to the first; that with respect to the second is its negative.
 pub fn pair_loss(first: &[f32], second: &[f32], matching: bool, d_max: f32) -> (f32, f32) {
     let squares = first.iter().zip(second).map(|(a, b)| (a - b) * (a - b));
     let distance = (squares.sum::<f32>() + NEAR).sqrt();
@@ -16,7 +16,8 @@ pub fn pair_loss(first: &[f32], second: &[f32], matching: bool, d_max: f32) -> (
     }
 }
 
-/// Softmax cross-entropy of a row of scores whose class is `class`, weighted; adds its gradient.
+/// Weighted softmax cross-entropy of a row of scores for class `class`; adds its gradient to
+/// `slope`.
 pub fn cross_entropy(scores: &[f32], class: usize, weight: f32, slope: &mut [f32]) -> f32 {
     let top = scores.iter().fold(f32::MIN, |a, b| a.max(*b));
     let sum: f32 = scores.iter().map(|s| libm::expf(s - top)).sum();

@@ -1,9 +1,9 @@
 //! Networks in floating point, for chapter 4 as printed: convolutions without padding, the losses
 //! of pairs and of classes, dropout and Adam.
 //!
-//! Products of matrices are `ndarray`'s, which asks the processor for its widest vectors: a seed
-//! gives the same numbers again on the same kind of processor, and nearly the same on another. What
-//! ships is trained elsewhere ([`crate::train`]), the same everywhere.
+//! Matrix products are `ndarray`'s, which uses the processor's widest vectors: a seed gives the
+//! same numbers again on the same kind of processor, and nearly the same on another. Shipped
+//! numbers are trained elsewhere ([`crate::train`]) and are the same everywhere.
 
 mod adam;
 pub mod checkpoint;

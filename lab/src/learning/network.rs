@@ -1,29 +1,29 @@
-//! Layers one after another.
+//! A sequence of layers.
 
 use super::convolution::{Convolution, FeatureMap};
 use raywake_sim::Rng;
 
-/// Layers, each on what the one before it puts out.
+/// Layers, each applied to the output of the one before it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureNetwork {
-    /// In their order.
+    /// In order.
     pub layers: Vec<Convolution>,
-    /// Share of the numbers that training takes for zero: of what enters the first layer and of
-    /// what every layer puts out. In steps of 1/256.
+    /// Share of the numbers that training sets to zero, in the input of the first layer and the
+    /// output of every layer. In steps of 1/256.
     pub dropout: f64,
 }
 
-/// What went through a network.
+/// Record of a pass through a network.
 #[derive(Clone, Debug, Default)]
 pub struct FeatureTape {
-    /// What entered each layer and, last, what came out, all after dropout.
+    /// The input of each layer and, last, the output, all after dropout.
     maps: Vec<FeatureMap>,
-    /// Factors of dropout of each of them; nothing where nothing was dropped.
+    /// Dropout factors of each map; empty if nothing was dropped.
     kept: Vec<Vec<f32>>,
 }
 
 impl FeatureTape {
-    /// What came out.
+    /// The output.
     pub fn output(&self) -> &FeatureMap {
         self.maps.last().expect("an input at least")
     }
@@ -35,7 +35,7 @@ impl FeatureNetwork {
         self.layers.iter().map(Convolution::numbers).sum()
     }
 
-    /// Numbers to begin with: weights as Glorot and Bengio (2010), biases of zero.
+    /// Initial numbers: weights as in Glorot and Bengio (2010), biases of zero.
     pub fn drawn(&self, rng: &mut Rng) -> Vec<f32> {
         let mut numbers = Vec::with_capacity(self.numbers());
         for layer in &self.layers {
@@ -48,7 +48,7 @@ impl FeatureNetwork {
         numbers
     }
 
-    /// What comes out, with nothing dropped.
+    /// The output, with nothing dropped.
     pub fn apply(&self, numbers: &[f32], input: &FeatureMap) -> FeatureMap {
         let mut at = 0;
         let mut map = None;
@@ -74,7 +74,8 @@ impl FeatureNetwork {
         tape
     }
 
-    /// Puts a map on the tape, less what is dropped; the rest grows, so that sums stay.
+    /// Puts a map on the tape with dropout applied; the rest is scaled up so that sums stay the
+    /// same.
     fn keep(&self, tape: &mut FeatureTape, mut map: FeatureMap, rng: &mut Rng) {
         let limit = (256.0 * self.dropout) as u8;
         let mut kept = Vec::new();
@@ -91,8 +92,8 @@ impl FeatureNetwork {
         tape.kept.push(kept);
     }
 
-    /// Adds the gradient of the network's numbers to `into`, given that of what came out, and
-    /// returns that of what entered where `below` asks for it.
+    /// Adds the gradient of the network's numbers to `into`, given that of the output, and returns
+    /// that of the input if `below` is set.
     pub fn backward(
         &self,
         numbers: &[f32],
@@ -116,7 +117,7 @@ impl FeatureNetwork {
         Some(slope)
     }
 
-    /// A map of the tape as its layer put it out; what was dropped stays zero, as its slope is.
+    /// A map of the tape as its layer output it; dropped numbers stay zero, as do their slopes.
     fn undropped<'a>(&self, tape: &'a FeatureTape, n: usize) -> std::borrow::Cow<'a, FeatureMap> {
         let map = &tape.maps[n];
         let Some(factor) = tape.kept[n].iter().copied().find(|k| *k > 0.0) else {
@@ -127,7 +128,7 @@ impl FeatureNetwork {
     }
 }
 
-/// A slope behind dropout from that before it.
+/// The slope before dropout, from the one after it.
 fn dropped(mut slope: Vec<f32>, kept: &[f32]) -> Vec<f32> {
     slope.iter_mut().zip(kept).for_each(|(s, k)| *s *= k);
     slope

@@ -13,12 +13,12 @@ fn drawn(rng: &mut Rng, count: usize) -> Vec<f32> {
     (0..count).map(|_| rng.range(-1.0, 1.0) as f32).collect()
 }
 
-/// Sum of what comes out, weighted.
+/// Weighted sum of the output.
 fn of_output(tape: &FeatureTape, weights: &[f32]) -> f64 {
     tape.output().values.iter().zip(weights).map(|(v, w)| f64::from(v * w)).sum()
 }
 
-/// Every gradient is the central difference, of the numbers and of what enters.
+/// Every gradient, of the numbers and of the input, matches its central difference.
 #[test]
 fn gradients_are_central_differences() {
     use Activation::*;
@@ -152,6 +152,6 @@ fn one_pair_is_learned() {
 fn first_steps_of_adam() {
     let (mut state, mut numbers) = (Adam::new(2), [1.0, 2.0]);
     state.advance(&mut numbers, &[0.5, -3.0], 0.1);
-    // Whatever its size, a first gradient makes a step of the rate.
+    // Whatever its size, the first gradient makes a step of length `rate`.
     assert!((numbers[0] - 0.9).abs() < 1e-6 && (numbers[1] - 2.1).abs() < 1e-6, "{numbers:?}");
 }

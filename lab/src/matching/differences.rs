@@ -1,4 +1,4 @@
-//! How far motions are from those they are compared with, as a table.
+//! Differences between motions and reference motions, as a table.
 
 use raywake::order_statistics::quantiles;
 use raywake_core::pose::Pose;
@@ -7,7 +7,7 @@ use std::fmt::{self, Write};
 const ROWS: [&str; 8] =
     ["x m", "y m", "z m", "translation m", "roll deg", "pitch deg", "yaw deg", "rotation deg"];
 
-/// Differences of steps, and of what they chain to.
+/// Differences of steps, and of the path they chain to.
 #[derive(Default)]
 pub struct Differences {
     rows: [Vec<f64>; 8],
@@ -15,7 +15,7 @@ pub struct Differences {
 }
 
 impl Differences {
-    /// Adds a step: what was found against what is given, both `before_from_now`.
+    /// Adds a step, found and given, both `before_from_now`.
     pub fn add(&mut self, found: &Pose, given: &Pose) {
         let apart = (given.inverse() * *found).twist(1.0);
         let (t, r) = (apart.linear, apart.angular * 1f64.to_degrees());
@@ -26,7 +26,7 @@ impl Differences {
         self.path_m += given.translation.length();
     }
 
-    /// Length of the way by the given steps, m.
+    /// Length of the path of the given steps, m.
     #[cfg(test)]
     pub fn path_m(&self) -> f64 {
         self.path_m
@@ -38,7 +38,7 @@ impl Differences {
         self.rows[3].iter().copied().fold(0.0, f64::max)
     }
 
-    /// The table, and how far apart the drives end.
+    /// The table, and how far apart the two paths end.
     pub fn table(&self, found: &Pose, given: &Pose) -> Result<String, fmt::Error> {
         let mut text = String::new();
         writeln!(text, "{:<16}{:>10}{:>10}{:>10}", "per step", "median", "95 %", "max")?;

@@ -1,4 +1,4 @@
-//! `raywake-lab match`: the poses that `raywake odometry` finds, against the drive's own.
+//! `raywake-lab match`: compares the poses that `raywake odometry` finds with the drive's own.
 
 mod differences;
 
@@ -20,15 +20,15 @@ pub struct Args {
     /// A simulated drive with this seed instead, whose poses are exact.
     #[arg(long, value_name = "SEED", conflicts_with = "drive")]
     simulated: Option<u64>,
-    /// Whether sweeps still contain motion distortion; as the format has it unless given.
+    /// Whether sweeps still contain motion distortion; as the format defines it unless given.
     #[arg(long, value_name = "true|false")]
     deskew: Option<bool>,
-    /// The first sweeps only.
+    /// Use only the first sweeps.
     #[arg(short = 'n', value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..))]
     count: Option<u32>,
 }
 
-/// Sweeps of a simulated drive unless the count says otherwise.
+/// Sweeps of a simulated drive unless a count is given.
 const SIMULATED_SWEEPS: u32 = 30;
 
 /// Locates and compares.
@@ -49,10 +49,10 @@ pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What came of a drive.
+/// Results of a drive.
 struct Found {
     differences: Differences,
-    /// The last pose as found and as given, since the first sweep.
+    /// The last pose, found and given, relative to the first sweep.
     last: [Pose; 2],
     located: LocatedSweeps,
 }
@@ -91,7 +91,7 @@ mod tests {
         assert!(off(&found) < 0.003, "{}", off(&found));
     }
 
-    /// Their own poses are off by about as much.
+    /// The drives' own poses are off by about as much.
     #[test]
     #[ignore = "needs RAYWAKE_DATA"]
     fn recorded_drives() {

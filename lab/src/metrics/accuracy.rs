@@ -1,38 +1,38 @@
-//! The metrics that scene flow on KITTI is reported in (Liu et al., "FlowNet3D", CVPR 2019), and
-//! the angle in space and time of Argoverse 2's own tools (av2-api), whose strict and relaxed
-//! accuracies are the same two.
+//! The usual scene flow metrics on KITTI (Liu et al., "FlowNet3D", CVPR 2019), and the space-time
+//! angle of Argoverse 2's own tools (av2-api), whose strict and relaxed accuracies are the same
+//! two.
 //!
-//! An error is accepted below a length or below a share of the true motion, and an outlier above
-//! either. Where the vehicle's motion is removed, what stands has no motion at all, so that every
-//! error there, however small, is an outlier: give them flow with the vehicle's motion in it
-//! ([`Scored::with_ego_motion`]), or look at what moves only.
+//! An error is accepted below a length or below a share of the true motion, and is an outlier above
+//! either. With the vehicle's motion removed, static structure has no motion at all, so that every
+//! error there, however small, is an outlier: use flow that includes the vehicle's motion
+//! ([`Scored::with_ego_motion`]), or consider only what moves.
 
 use super::{Category, Scored};
 use glam::{DVec3, DVec4};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Error below which an estimate is accurate, in metres and as a share of the true motion.
+/// Error below which an estimate is accurate, both in metres and as a share of the true motion.
 const STRICT: f64 = 0.05;
 
 /// The same, relaxed.
 const RELAXED: f64 = 0.1;
 
-/// Error above which it is an outlier, m, and as a share of the true motion.
+/// Error above which it is an outlier: in m, and as a share of the true motion.
 const OUTLIER: [f64; 2] = [0.3, 0.1];
 
-/// Kept away from division by zero, m.
+/// Prevents division by zero, m.
 const EPSILON_M: f64 = 1e-10;
 
-/// Fourth component of flow in space and time: time between sweeps, s.
+/// Fourth component of flow in space-time: time between sweeps, s.
 const PAIR_S: f64 = 0.1;
 
-/// Whether things truly move over ground ([`Scored::moving`]).
+/// Whether returns truly move over ground ([`Scored::moving`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointMotion {
     /// At least [`super::MOVING_M`].
     Moving,
-    /// Less: parked where they are objects.
+    /// Less: parked, in the case of objects.
     Standing,
     /// Either.
     Any,
@@ -62,11 +62,11 @@ impl AddAssign for Sums {
 /// Sums over pairs, by category and motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AccuracyTable {
-    /// Standing and moving.
+    /// Static and moving.
     cells: Vec<[Sums; 2]>,
 }
 
-/// The figures; all but the count are NaN where there is nothing.
+/// The figures; all but the count are NaN if there are no returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
     /// Number of returns.
@@ -79,7 +79,7 @@ pub struct Accuracy {
     pub relaxed: f64,
     /// Share with an error above 0.3 m or 10 % (Outliers3D).
     pub outliers: f64,
-    /// Mean angle between (flow, 0.1 s) as estimated and as it is, rad.
+    /// Mean angle between the estimated and the true (flow, 0.1 s), rad.
     pub angle_rad: f64,
 }
 
@@ -97,7 +97,7 @@ impl AccuracyTable {
         }
     }
 
-    /// Whether it is whole; one read from a file need not be.
+    /// Whether the table is complete; one read from a file need not be.
     pub fn is_whole(&self) -> bool {
         self.cells.len() == Category::COUNT
     }
@@ -110,7 +110,7 @@ impl AccuracyTable {
         }
     }
 
-    /// Over the categories that `of` names.
+    /// The figures over the categories selected by `of`.
     pub fn accuracy(&self, of: impl Fn(Category) -> bool, motion: PointMotion) -> Accuracy {
         let mut sums = Sums::default();
         for category in Category::all().filter(|&c| of(c)) {
@@ -150,7 +150,7 @@ fn measure(point: &Scored) -> Sums {
     }
 }
 
-/// Angle between two motions in space and time, rad.
+/// Angle between two motions in space-time, rad.
 fn angle(a: DVec3, b: DVec3) -> f64 {
     let unit = |v: DVec3| {
         let v: DVec4 = v.extend(PAIR_S);

@@ -1,7 +1,7 @@
-//! An Argoverse 2 log with its true scene flow, and estimates of it, in the files that the
-//! official grader reads: `FOLDER/LOG/NUMBER.feather`, one per pair of sweeps, one row per return
-//! of its first sweep: `flow_tx_m flow_ty_m flow_tz_m` (m per pair, first sweep's vehicle frame,
-//! the vehicle's motion removed), `is_valid`, and for the truth `classes_0` (-1 background).
+//! An Argoverse 2 log with its true scene flow, and estimates of it, in the files read by the
+//! official grader: `FOLDER/LOG/NUMBER.feather`, one per pair of sweeps, one row per return of its
+//! first sweep: `flow_tx_m flow_ty_m flow_tz_m` (m per pair, first sweep's vehicle frame, the
+//! vehicle's motion removed), `is_valid`, and for the truth `classes_0` (-1 background).
 
 use super::ground::Ground;
 use super::{Category, Pair, Rules, TruePoint};
@@ -22,27 +22,27 @@ pub struct Log {
     name: String,
     /// By the index of a pair's first sweep.
     truth: BTreeMap<usize, PathBuf>,
-    /// Not read where returns from the ground are not told apart.
+    /// `None` if returns from the ground are not to be distinguished.
     ground: Option<Ground>,
-    /// Sweeps at hand and their indices: pairs share them.
+    /// Cached sweeps and their indices: consecutive pairs share one.
     sweeps: [(usize, SweepData); 2],
 }
 
 /// An estimate's flow, one row per return.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Motion over the pair, m, in the terms of [`TruePoint::flow_m`].
+    /// Motion over the pair, m, as in [`TruePoint::flow_m`].
     pub flow_m: Vec<[f32; 3]>,
-    /// Whether the estimator vouches for it; the grader takes the flow either way.
+    /// Whether the estimator vouches for it; the grader uses the flow either way.
     pub valid: Vec<bool>,
 }
 
 impl Log {
-    /// Opens the log at `path` with the truth in `truth/LOG`, or without a `truth` where the
-    /// grader looks for it: in `SPLIT_sceneflow_feather` beside the folder `SPLIT` of the log.
-    /// With `find_ground` the map is read, and returns from the ground are marked.
+    /// Opens the log at `path` with the truth in `truth/LOG`, or if `truth` is `None` where the
+    /// grader looks for it: in `SPLIT_sceneflow_feather` beside the folder `SPLIT` of the log. With
+    /// `find_ground` the map is read, and returns from the ground are marked.
     ///
-    /// Fails where `path` is no Argoverse 2 log, and where truth or map are missing or damaged.
+    /// Fails if `path` is not an Argoverse 2 log, or if truth or map are missing or damaged.
     pub fn open(path: &Path, truth: Option<&Path>, find_ground: bool) -> Result<Log, Error> {
         let (format, root) = source::recognise(path)?;
         if format != Format::Argoverse2 {
@@ -67,13 +67,13 @@ impl Log {
         &self.name
     }
 
-    /// The first sweeps of all pairs with truth, rising, and the files that hold it.
+    /// The first sweeps of all pairs with truth, ascending, and the files that hold it.
     pub fn pairs(&self) -> impl Iterator<Item = (usize, &Path)> {
         self.truth.iter().map(|(&sweep, path)| (sweep, path.as_path()))
     }
 
     /// The files of an estimate of this log in `folder/LOG`, one for each of [`Log::pairs`]; files
-    /// of other pairs are passed over. Fails where one is missing.
+    /// of other pairs are ignored. Fails if one is missing.
     pub fn estimates(&self, folder: &Path) -> Result<BTreeMap<usize, PathBuf>, Error> {
         let folder = folder.join(&self.name);
         let mut files = by_sweep(&folder, self.source.as_ref())?;
@@ -115,14 +115,14 @@ impl Log {
         Ok(Pair { points, second_from_first })
     }
 
-    /// Brings sweeps `first` and the next to hand; a sweep of the pair before is not read again.
+    /// Loads sweeps `first` and the next; one shared with the previous pair is not read again.
     fn load(&mut self, first: usize) -> Result<(), Error> {
         if self.sweeps[1].0 == first {
             self.sweeps.swap(0, 1);
         }
         for (offset, (at, sweep)) in self.sweeps.iter_mut().enumerate() {
             if *at != first + offset {
-                // Nothing half-read stays at hand.
+                // Never keep a half-read sweep.
                 *at = usize::MAX;
                 self.source.read(first + offset, sweep)?;
                 *at = first + offset;
@@ -133,14 +133,14 @@ impl Log {
 }
 
 impl Estimate {
-    /// Returns of the pair that count, but that the estimator does not vouch for.
+    /// Number of returns of the pair that count but that the estimator does not vouch for.
     pub fn unvouched(&self, pair: &Pair, rules: &Rules) -> u64 {
         let counts = |&(row, _): &(usize, &bool)| pair.counts(&pair.points[row], rules).is_some();
         self.valid.iter().enumerate().filter(|(_, valid)| !**valid).filter(counts).count() as u64
     }
 }
 
-/// Reads an estimate of a pair with so many returns.
+/// Reads an estimate of a pair, one row per return.
 pub fn read_estimate(path: &Path, pair: &Pair) -> Result<Estimate, Error> {
     let table = FeatherTable::read(path, &[&FLOW[..], &["is_valid"]].concat())?;
     let (flow_m, valid) = (read_flow(&table)?, table.booleans("is_valid")?);
@@ -152,7 +152,7 @@ fn position(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// The flow of every row in f32, which is what files hold.
+/// The flow of every row in f32, the precision of the files.
 fn read_flow(table: &FeatherTable) -> Result<Vec<[f32; 3]>, Error> {
     table.vectors(FLOW)
 }
@@ -165,7 +165,7 @@ fn same_rows(path: &Path, found: usize, points: usize) -> Result<(), Error> {
     Err(Error::input(path, "", what))
 }
 
-/// Where the grader looks for truth by itself.
+/// Where the grader looks for truth by default.
 fn usual_truth(root: &Path) -> Result<PathBuf, Error> {
     let place = || {
         let (split, log) = (root.parent()?, root.file_name()?);
@@ -175,9 +175,9 @@ fn usual_truth(root: &Path) -> Result<PathBuf, Error> {
     place().ok_or_else(|| Error::Usage("name the folder of the truth".into()))
 }
 
-/// Files of flow in a folder by the index of their first sweep: by name where all names are
-/// stamps of the log's sweeps, which allows for gaps, and otherwise in the order of the names, as
-/// the grader has it.
+/// Files of flow in a folder by the index of their first sweep: by name if all names are stamps of
+/// the log's sweeps, which allows for gaps, and otherwise in the order of the names, as in the
+/// grader.
 fn by_sweep(folder: &Path, source: &dyn Source) -> Result<BTreeMap<usize, PathBuf>, Error> {
     let files = numbered(folder)?;
     let index: BTreeMap<u64, usize> = (0..source.len()).map(|i| (source.frame(i), i)).collect();
@@ -198,7 +198,7 @@ fn by_sweep(folder: &Path, source: &dyn Source) -> Result<BTreeMap<usize, PathBu
     }
 }
 
-/// Feather files whose names are digits and nothing else, in the order of the names.
+/// Feather files whose names consist of digits, in the order of the names.
 fn numbered(folder: &Path) -> Result<Vec<(u64, PathBuf)>, Error> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(Error::reading(folder))? {

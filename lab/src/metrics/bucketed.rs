@@ -1,15 +1,15 @@
 //! Bucket-normalised endpoint error: Khatri et al., "I Can't Believe It's Not Scene Flow!", ECCV
 //! 2024, the ranking of the Argoverse 2 scene flow challenge since 2024.
 //!
-//! Returns are gathered by class and true speed. The first bucket, below 0.04 m per pair (0.4 m/s
-//! at 10 Hz), is the class's static error, in metres. In every other the mean error is divided by
-//! the mean speed, and the mean over the buckets that hold anything is the class's dynamic error:
-//! 1 for an estimate of no motion. Every class weighs the same, however few its returns.
+//! Returns are grouped by class and true speed. The first bucket, below 0.04 m per pair (0.4 m/s at
+//! 10 Hz), is the class's static error, in metres. In every other the mean error is divided by the
+//! mean speed, and the mean over the non-empty buckets is the class's dynamic error: 1 for an
+//! estimate of no motion. Every class has equal weight, however few its returns.
 
 use super::{Bucket, Category, Class, Range, Scored, SpeedTable};
 use serde::{Deserialize, Serialize};
 
-/// Speed from which there is a single bucket, m per pair: 20 m/s at 10 Hz.
+/// Speed from which on there is a single bucket, m per pair: 20 m/s at 10 Hz.
 const MAX_SPEED_M: f64 = 2.0;
 
 /// Buckets below [`MAX_SPEED_M`].
@@ -24,11 +24,11 @@ pub struct BucketedEpe {
 /// A class's figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassError {
-    /// Which.
+    /// The class.
     pub class: Class,
-    /// Mean error of what moves less than 0.04 m, m; NaN where there is none.
+    /// Mean error of what moves less than 0.04 m, m; NaN if there is none.
     pub static_epe_m: f64,
-    /// Mean of the other buckets' normalised errors; NaN where all are empty.
+    /// Mean of the other buckets' normalised errors; NaN if all are empty.
     pub dynamic: f64,
     /// All 51 buckets, the static one first.
     pub buckets: Vec<Bucket>,
@@ -41,7 +41,7 @@ pub struct BucketedErrors {
     pub classes: Vec<ClassError>,
     /// Mean over the classes that have one, m.
     pub mean_static_epe_m: f64,
-    /// Mean over the classes that have one: the figure that ranks.
+    /// Mean over the classes that have one: the ranking figure.
     pub mean_dynamic: f64,
 }
 
@@ -60,7 +60,7 @@ impl BucketedEpe {
         self.table.add(points);
     }
 
-    /// Whether it is whole; one read from a file need not be.
+    /// Whether the sums are complete; those read from a file need not be.
     pub fn is_whole(&self) -> bool {
         self.table.fits(&BucketedEpe::default().table)
     }
@@ -70,7 +70,7 @@ impl BucketedEpe {
         self.table.merge(&other.table);
     }
 
-    /// The buckets of one category, also of those that no class holds.
+    /// The buckets of one category, including categories that belong to no class.
     pub fn category(&self, category: Category, range: Range) -> Vec<Bucket> {
         self.buckets(|c| c == category, range)
     }
@@ -94,7 +94,7 @@ impl BucketedEpe {
     }
 }
 
-/// Mean of what is not NaN; NaN where nothing is left.
+/// Mean of the values that are not NaN; NaN if there are none.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (count, sum) =
         values.filter(|v| !v.is_nan()).fold((0, 0.0), |(n, sum), v| (n + 1, sum + v));

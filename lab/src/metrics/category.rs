@@ -1,8 +1,8 @@
-//! Argoverse 2's categories, and the classes that the scene-flow metrics gather them in.
+//! Argoverse 2's categories, and the classes into which the scene-flow metrics group them.
 
 use crate::labels::Kind;
 
-/// Names of the labelled categories; their numbers in files of flow count from 0.
+/// Names of the labelled categories; their numbers in flow files count from 0.
 const NAMES: [&str; 30] = [
     "ANIMAL",
     "ARTICULATED_BUS",
@@ -44,7 +44,7 @@ impl Category {
     /// Outside all labelled boxes.
     pub const BACKGROUND: Category = Category(0);
 
-    /// How many there are, the background with them.
+    /// Number of categories, including the background.
     pub const COUNT: usize = NAMES.len() + 1;
 
     /// All of them, the background first.
@@ -62,8 +62,8 @@ impl Category {
         Category::all().find(|c| c.name() == name)
     }
 
-    /// The category next to a kind of object of any data set; none for [`Kind::Other`], which the
-    /// metrics would have to ignore.
+    /// The category closest to a kind of object of any data set; `None` for [`Kind::Other`], which
+    /// the metrics would have to ignore.
     pub fn of_kind(kind: Kind) -> Option<Category> {
         Category::from_name(match kind {
             Kind::Car | Kind::Van => "REGULAR_VEHICLE",
@@ -90,7 +90,7 @@ impl Category {
         self.0.into()
     }
 
-    /// The class it is graded in; none for animals and road furniture, which are ignored.
+    /// The class it is graded in; `None` for animals and road furniture, which are ignored.
     pub fn class(self) -> Option<Class> {
         Some(match self.name() {
             "BACKGROUND" => Class::Background,
@@ -112,7 +112,7 @@ impl Category {
 pub enum Class {
     /// Everything without a label.
     Background,
-    /// Cars and what is of their size.
+    /// Cars and objects of their size.
     Car,
     /// Lorries, buses, trailers, trams.
     OtherVehicles,

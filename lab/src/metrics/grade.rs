@@ -1,4 +1,4 @@
-//! `raywake-lab grade`: the official figures of estimates on an Argoverse 2 log.
+//! `raywake-lab grade`: the official figures for estimates on an Argoverse 2 log.
 
 use super::argoverse::{Log, read_estimate};
 use super::grades::Grades;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// Cell that the truth is rounded to for comparison, m: the profiles' voxels.
+/// Cell size to which the truth is rounded for comparison, m: the profiles' voxels.
 const CELL_M: f32 = 0.30;
 
 /// Options of `grade`.
@@ -16,32 +16,32 @@ const CELL_M: f32 = 0.30;
 pub struct Args {
     /// Argoverse 2 log, with its map.
     log: PathBuf,
-    /// Folder with an estimate, LOG/NUMBER.feather, as `raywake run --export argoverse` writes to
-    /// OUT/argoverse; several are graded side by side.
+    /// Folder with an estimate, LOG/NUMBER.feather, as `raywake run --export argoverse` writes it
+    /// to OUT/argoverse; several are graded side by side.
     #[arg(long, value_name = "FOLDER")]
     estimate: Vec<PathBuf>,
-    /// Folder with the truth, LOG/NUMBER.feather; else SPLIT_sceneflow_feather beside the folder
-    /// SPLIT of the log.
+    /// Folder with the truth, LOG/NUMBER.feather; default: SPLIT_sceneflow_feather beside the
+    /// folder SPLIT of the log.
     #[arg(long, value_name = "FOLDER")]
     truth: Option<PathBuf>,
-    /// Count returns from the ground too; the challenge does not.
+    /// Also count returns from the ground; the challenge does not.
     #[arg(long)]
     with_ground: bool,
-    /// Grade every Nth pair of the log only; the challenge's own script takes every fifth.
+    /// Grade only every Nth pair of the log; the challenge's own script takes every fifth.
     #[arg(long, value_name = "N", default_value = "1")]
     every: NonZeroUsize,
 }
 
-/// An estimate under way, or what there is to compare it with.
+/// An estimate being graded, or a reference to compare it with.
 struct Graded {
     name: String,
     from: From,
     grades: Grades,
-    /// Returns that count, but that the estimate does not vouch for.
+    /// Returns that count but that the estimate does not vouch for.
     unvouched: u64,
 }
 
-/// Where a row's flow is from.
+/// Source of a row's flow.
 enum From {
     /// Files by the index of the pair's first sweep.
     Files(BTreeMap<usize, PathBuf>),
@@ -49,7 +49,7 @@ enum From {
     Reference(Reference),
 }
 
-/// Makes an estimate of a pair out of its truth.
+/// Makes an estimate of a pair from its truth.
 type Reference = fn(&Pair) -> Vec<[f32; 3]>;
 
 /// Grades and prints.

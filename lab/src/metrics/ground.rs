@@ -1,8 +1,8 @@
-//! The height of the ground in an Argoverse 2 map, and which returns are its.
+//! The height of the ground in an Argoverse 2 map, and which returns belong to it.
 //!
 //! `map/*_ground_height_surface____*.npy` holds heights (m, city frame; NaN where unknown) on a
 //! lattice; `map/*img_Sim2_city.json` maps a place in the city to (column, row) as `s (R p + t)`,
-//! rounded, halves to the even number.
+//! rounded, halves to even.
 
 use glam::{DMat2, DVec2, DVec3};
 use raywake_io::Error;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Height over the map's ground up to which a return is the ground's, m. Everything below is, too.
+/// Height above the map's ground up to which a return belongs to it, m. Everything below does, too.
 const WITHIN_M: f64 = 0.4;
 
 /// Heights of the ground.
@@ -22,7 +22,7 @@ pub(super) struct Ground {
     scale: f64,
 }
 
-/// The similarity as the file has it.
+/// The similarity as stored in the file.
 #[derive(Deserialize)]
 struct Sim2 {
     #[serde(rename = "R")]
@@ -53,12 +53,13 @@ impl Ground {
         Ok(Ground { heights, rotation, translation, scale: sim.scale })
     }
 
-    /// Whether a return at `p` (city frame, m) is the ground's; never where the map knows nothing.
+    /// Whether a return at `p` (city frame, m) belongs to the ground; never where the map has no
+    /// height.
     pub fn holds(&self, p: DVec3) -> bool {
         self.height_m(p).is_some_and(|height| p.z - height <= WITHIN_M)
     }
 
-    /// Height of the ground at a place; `None` beyond the map, and a NaN where it has a hole.
+    /// Height of the ground at a place; `None` beyond the map, NaN in its holes.
     fn height_m(&self, p: DVec3) -> Option<f64> {
         let place = (self.rotation * p.truncate() + self.translation) * self.scale;
         let cell = |v: f64, count: usize| {
@@ -71,7 +72,7 @@ impl Ground {
     }
 }
 
-/// The only file of a folder with such a name.
+/// The only file of a folder whose name satisfies `named`.
 fn only(folder: &Path, what: &str, named: impl Fn(&str) -> bool) -> Result<PathBuf, Error> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(Error::reading(folder))? {

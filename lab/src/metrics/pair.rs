@@ -1,4 +1,4 @@
-//! The returns of a pair of sweeps, which of them count, and how wrong an estimate is there.
+//! The returns of a pair of sweeps, which of them count, and the errors of an estimate there.
 
 use super::Category;
 use glam::DVec3;
@@ -7,7 +7,7 @@ use raywake_core::pose::Pose;
 /// Chebyshev distance (larger of |x| and |y|) below which a return is near, m.
 pub const NEAR_M: f64 = 35.0;
 
-/// Motion over a pair from which something moves, m: 0.5 m/s at 10 Hz.
+/// Motion over a pair from which on a return moves, m: 0.5 m/s at 10 Hz.
 pub const MOVING_M: f64 = 0.05;
 
 /// A return of a pair's first sweep and its true motion to the second.
@@ -15,8 +15,8 @@ pub const MOVING_M: f64 = 0.05;
 pub struct TruePoint {
     /// Position in the first sweep's vehicle frame, m.
     pub position_m: [f32; 3],
-    /// Motion to the second sweep along the axes of the same frame, m, the vehicle's own
-    /// removed: what stands has none.
+    /// Motion to the second sweep along the axes of the same frame, m, the vehicle's own removed:
+    /// zero for static structure.
     pub flow_m: [f32; 3],
     /// What it belongs to.
     pub category: Category,
@@ -35,10 +35,10 @@ pub struct Pair {
     pub second_from_first: Pose,
 }
 
-/// Which returns count, besides those without truth, which never do.
+/// Which returns count; those without truth never do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
-    /// Bounds of the box in which they count, both excluded, in the second sweep's vehicle frame
+    /// Corner of the box in which they count, bounds excluded, in the second sweep's vehicle frame
     /// (positions as at the first sweep), m.
     pub low_m: [f64; 3],
     /// The opposite corner, m.
@@ -58,7 +58,8 @@ impl Rules {
 pub struct Scored {
     /// What it belongs to.
     pub category: Category,
-    /// Within [`NEAR_M`] of the vehicle at the second sweep (itself as at the first).
+    /// Whether it is within [`NEAR_M`] of the vehicle at the second sweep (positions as at the
+    /// first).
     pub near: bool,
     /// Length of the true motion over ground, m per pair, rounded to f32 as the grader does.
     pub speed_m: f32,
@@ -75,7 +76,7 @@ pub struct Scored {
 /// Why an estimate cannot be scored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScoreError {
-    /// There is not one estimate per return.
+    /// The number of estimates differs from that of returns.
     #[error("{estimates} rows, but the sweep has {points} returns")]
     Rows {
         /// Returns of the sweep.
@@ -83,13 +84,13 @@ pub enum ScoreError {
         /// Rows of the estimate.
         estimates: usize,
     },
-    /// The truth is NaN or infinite (or its square is) where it counts, in this row from 0.
+    /// The truth is NaN or infinite (or its square is) for a return that counts.
     #[error("row {row}: the true flow is not finite")]
     Truth {
         /// Row, from 0.
         row: usize,
     },
-    /// The estimate is, where it counts.
+    /// The same of the estimate.
     #[error("row {row}: the estimated flow is not finite")]
     Estimate {
         /// Row, from 0.
@@ -98,7 +99,7 @@ pub enum ScoreError {
 }
 
 impl Pair {
-    /// The returns that count, in the order of the sweep, with `estimates` (m, in the terms of
+    /// The returns that count, in the order of the sweep, with `estimates` (m, as in
     /// [`TruePoint::flow_m`], one per return of the sweep).
     pub fn score(&self, estimates: &[[f32; 3]], rules: &Rules) -> Result<Vec<Scored>, ScoreError> {
         if estimates.len() != self.points.len() {
@@ -146,7 +147,7 @@ fn compare(
     Ok(Scored { category, near, speed_m, error_m, position_m, truth_m, estimate_m })
 }
 
-/// In f32 throughout, as the grader computes it: a speed on the edge of two buckets must fall into
+/// Computed in f32 throughout, as in the grader: a speed on the edge of two buckets must fall into
 /// the same one.
 fn length([x, y, z]: [f32; 3]) -> f32 {
     (x * x + y * y + z * z).sqrt()
@@ -159,8 +160,8 @@ impl Scored {
     }
 
     /// The same with the vehicle's motion in the flow, as in KITTI's scene flow: a point at `p`
-    /// that moves by `f` over ground is found at `second_from_first * (p + f)`. The speed stays
-    /// the one over ground, and so does the error, up to rounding.
+    /// that moves by `f` over ground is found at `second_from_first * (p + f)`. The speed remains
+    /// that over ground, and so does the error, up to rounding.
     pub fn with_ego_motion(self, second_from_first: &Pose) -> Scored {
         let p = DVec3::from_array(self.position_m.map(f64::from));
         let seen = |flow: [f32; 3]| {

@@ -27,7 +27,7 @@ fn bucketed(errors: &BucketedErrors) {
     println!("    {:<34}{a}{b}", "mean");
 }
 
-/// Writes the buckets that hold anything to standard output.
+/// Writes the non-empty buckets to standard output.
 pub(super) fn buckets(errors: &BucketedErrors) {
     println!("  buckets, m per pair            returns     EPE (m)   speed (m)  normalised");
     for class in &errors.classes {
@@ -35,7 +35,7 @@ pub(super) fn buckets(errors: &BucketedErrors) {
             let range = format!("{:.2} to {:.2}", bucket.from_m, bucket.to_m);
             print!("    {:<15}{range:<14}{:>5}", class.class.name(), bucket.count);
             print!("{}{}", number(bucket.epe_m), number(bucket.mean_speed_m));
-            // The first bucket stands: its error is not divided by next to nothing.
+            // The first bucket is static: its error is not divided by next to nothing.
             println!(
                 "{}",
                 number(if bucket.from_m > 0.0 { bucket.normalised() } else { f64::NAN })
@@ -59,7 +59,7 @@ fn accuracy(what: &str, table: &AccuracyTable) {
     }
 }
 
-/// Twelve characters wide; nothing to tell is a dash.
+/// Twelve characters wide; a dash for NaN.
 fn number(value: f64) -> String {
     if value.is_nan() { format!("{:>12}", "-") } else { format!("{value:>12.6}") }
 }

@@ -1,18 +1,18 @@
-//! Estimates that need no estimator, to compare with: what nothing, or the truth on a lattice,
-//! would score.
+//! Reference estimates that need no estimator: the scores of no motion, and of the truth on a
+//! lattice.
 
 use super::Pair;
 use glam::DVec3;
 
-/// No motion over ground: every figure is that of the vehicle's motion alone, which the metrics
-/// with the vehicle's motion removed grant for nothing.
+/// No motion over ground: the figures of the vehicle's motion alone, which metrics with the
+/// vehicle's motion removed give away for free.
 pub fn standing(pair: &Pair) -> Vec<[f32; 3]> {
     vec![[0.0; 3]; pair.points.len()]
 }
 
-/// No motion relative to the vehicle, not even the one that its own motion causes: all-zero flow
-/// where the vehicle's motion is part of it, as in KITTI's scene flow. Returned over ground, as
-/// all estimates here: everything moves as the vehicle does.
+/// No motion relative to the vehicle, not even that caused by its own motion: all-zero flow if the
+/// vehicle's motion is part of it, as in KITTI's scene flow. Returned over ground, like all
+/// estimates here: everything moves with the vehicle.
 pub fn carried(pair: &Pair) -> Vec<[f32; 3]> {
     let first_from_second = pair.second_from_first.inverse();
     let carried = |position: [f32; 3]| {
@@ -22,8 +22,8 @@ pub fn carried(pair: &Pair) -> Vec<[f32; 3]> {
     pair.points.iter().map(|p| carried(p.position_m)).collect()
 }
 
-/// The truth rounded to whole cells of `cell_m` along the first sweep's axes: a matching without
-/// error on a grid without refinement (halves go to the even cell).
+/// The truth rounded to whole cells of `cell_m` along the first sweep's axes: perfect matching on a
+/// grid without refinement (halves go to the even cell).
 pub fn rounded(pair: &Pair, cell_m: f32) -> Vec<[f32; 3]> {
     let round = |v: f32| (v / cell_m).round_ties_even() * cell_m;
     pair.points.iter().map(|p| p.flow_m.map(round)).collect()

@@ -1,19 +1,19 @@
-//! Errors gathered by category, distance and true speed, over any number of pairs.
+//! Errors grouped by category, distance and true speed, over any number of pairs.
 
 use super::{Category, Scored};
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Which returns by distance, as the grader has it for both of its tables.
+/// A selection of returns by distance, as in both of the grader's tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
-    /// Chebyshev distance below [`super::NEAR_M`]: the figures that are ranked.
+    /// Chebyshev distance below [`super::NEAR_M`]: the ranked figures.
     Near,
     /// Everything that counts.
     All,
 }
 
-/// What came together in one cell.
+/// The sums of one cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sums {
     count: u64,
@@ -29,12 +29,12 @@ impl AddAssign for Sums {
     }
 }
 
-/// A speed bucket and what fell into it; means over nothing are NaN.
+/// A speed bucket and its returns; means over nothing are NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bucket {
     /// Smallest speed, m per pair.
     pub from_m: f64,
-    /// Speed it ends below, m per pair; infinite for the last.
+    /// Upper bound of its speeds, excluded, m per pair; infinite for the last.
     pub to_m: f64,
     /// Number of returns.
     pub count: u64,
@@ -53,18 +53,18 @@ impl Bucket {
 
 /// Sums by category, speed bucket and distance.
 ///
-/// The grader averages every pair by itself and the pairs weighted by their counts, which is the
-/// mean over all returns, as here.
+/// The grader averages every pair separately, then the pairs weighted by their counts, which equals
+/// the mean over all returns, computed here.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpeedTable {
-    /// Lower borders of the buckets, rising from 0; the last bucket is open.
+    /// Lower edges of the buckets, ascending from 0; the last bucket is open.
     edges_m: Vec<f64>,
-    /// By category, then bucket; near returns and the others apart.
+    /// By category, then bucket; near returns and the others separately.
     cells: Vec<[Sums; 2]>,
 }
 
 impl SpeedTable {
-    /// An empty table with buckets from each of `edges_m`, which rise from 0, to the next.
+    /// An empty table with buckets from each of `edges_m`, which ascend from 0, to the next.
     pub fn new(edges_m: Vec<f64>) -> SpeedTable {
         let cells = vec![[Sums::default(); 2]; Category::COUNT * edges_m.len()];
         SpeedTable { edges_m, cells }
@@ -79,7 +79,7 @@ impl SpeedTable {
     pub fn add(&mut self, points: &[Scored]) {
         for p in points {
             let speed = f64::from(p.speed_m);
-            // The first edge is 0 and the last bucket open, so that every speed has one.
+            // The first edge is 0 and the last bucket open, so that every speed falls into one.
             let bucket = self.edges_m[1..].partition_point(|&edge| edge <= speed);
             let cell = p.category.index() * self.buckets() + bucket;
             self.cells[cell][usize::from(!p.near)] +=
@@ -92,7 +92,7 @@ impl SpeedTable {
         self.edges_m == other.edges_m && self.cells.len() == other.cells.len()
     }
 
-    /// Adds what another table with the same buckets has counted.
+    /// Adds the counts of another table with the same buckets.
     pub fn merge(&mut self, other: &SpeedTable) {
         assert!(self.fits(other), "tables of different metrics");
         for (mine, theirs) in self.cells.iter_mut().zip(&other.cells) {
@@ -101,7 +101,7 @@ impl SpeedTable {
         }
     }
 
-    /// Bucket number `bucket` over the categories that `of` names.
+    /// Bucket number `bucket` over the categories selected by `of`.
     pub fn bucket(&self, of: impl Fn(Category) -> bool, range: Range, bucket: usize) -> Bucket {
         let mut sums = Sums::default();
         for category in Category::all().filter(|&c| of(c)) {

@@ -1,8 +1,8 @@
 //! Three-way endpoint error: the Argoverse 2 scene flow challenge of 2023 (Chodosh et al.,
 //! "Re-Evaluating LiDAR Scene Flow", WACV 2024).
 //!
-//! Mean errors, in metres, of what moves at least 0.05 m per pair (0.5 m/s at 10 Hz) among the
-//! labelled objects, of the rest of them, and of the background.
+//! Mean errors, in metres, of labelled objects that move at least 0.05 m per pair (0.5 m/s at 10
+//! Hz), of labelled objects that do not, and of the background.
 
 use super::{Bucket, Category, Class, MOVING_M, Range, Scored, SpeedTable};
 use serde::{Deserialize, Serialize};
@@ -13,16 +13,16 @@ pub struct ThreeWayEpe {
     table: SpeedTable,
 }
 
-/// The figures: a bucket each, of which the mean error counts.
+/// The figures: one bucket each, whose mean error counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThreeWayErrors {
     /// Objects of all graded classes that move.
     pub foreground_dynamic: Bucket,
-    /// The same objects where they stand.
+    /// The same objects while static.
     pub foreground_static: Bucket,
-    /// What moves without a label, of which truth made from boxes has none.
+    /// Unlabelled returns that move; there are none if the truth is made from boxes.
     pub background_dynamic: Bucket,
-    /// Everything else without a label.
+    /// All other unlabelled returns.
     pub background_static: Bucket,
 }
 
@@ -38,7 +38,7 @@ impl ThreeWayEpe {
         self.table.add(points);
     }
 
-    /// Whether it is whole; one read from a file need not be.
+    /// Whether the sums are complete; those read from a file need not be.
     pub fn is_whole(&self) -> bool {
         self.table.fits(&ThreeWayEpe::default().table)
     }
@@ -48,7 +48,7 @@ impl ThreeWayEpe {
         self.table.merge(&other.table);
     }
 
-    /// One category, standing and moving, also of those that no class holds.
+    /// One category, static and moving, including categories that belong to no class.
     pub fn category(&self, category: Category, range: Range) -> [Bucket; 2] {
         [0, 1].map(|i| self.table.bucket(|c| c == category, range, i))
     }
@@ -67,8 +67,8 @@ impl ThreeWayEpe {
 }
 
 impl ThreeWayErrors {
-    /// The mean that ranks, m: of objects that move, objects that stand and the background that
-    /// stands. NaN where one of them is empty.
+    /// The ranking mean, m: of moving objects, static objects and static background. NaN if one of
+    /// them is empty.
     pub fn mean_epe_m(&self) -> f64 {
         let three = [self.foreground_dynamic, self.foreground_static, self.background_static];
         three.iter().map(|b| b.epe_m).sum::<f64>() / 3.0

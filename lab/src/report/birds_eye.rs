@@ -9,18 +9,18 @@ use std::collections::BTreeSet;
 
 /// Height above the ground of the darkest returns, m.
 const HEIGHT_M: f32 = 2.5;
-/// Colours of arrows and of columns whose error is not known.
+/// Colours of arrows and of columns whose error is unknown.
 const TRUTH: Colour = [42, 157, 244];
 const ESTIMATE: Colour = [176, 0, 32];
 const UNKNOWN: Colour = [154, 164, 178];
-/// From no error to the worst: green, yellow, orange, dark red; the lightness of the ends differs.
+/// From no error to the worst: green, yellow, orange, dark red; the ends differ in lightness.
 const ERRORS: &[Colour] = &[[0, 158, 115], [240, 214, 60], [226, 106, 20], [140, 16, 40]];
 
-/// One view; everything lies in the vehicle frame (x forward, y left, z up, metres), drawn with the
-/// vehicle in the middle and forward up.
+/// One view; all coordinates are in the vehicle frame (x forward, y left, z up, metres), drawn with
+/// the vehicle in the centre and forward up.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Above it.
+    /// Shown above the view.
     pub title: String,
     /// Returns.
     pub points: Vec<[f32; 3]>,
@@ -33,11 +33,11 @@ pub struct Panel {
 /// A labelled box.
 #[derive(Clone, Copy, Debug)]
 pub struct Outline {
-    /// `vehicle_from_box`, the box's frame in its centre, x forward.
+    /// `vehicle_from_box`; the box's frame is centred in it, x forward.
     pub pose: Pose,
     /// Length and width, m.
     pub size: [f64; 2],
-    /// Gives the colour.
+    /// Determines the colour.
     pub kind: Kind,
 }
 
@@ -46,36 +46,36 @@ pub struct Outline {
 pub struct Column {
     /// Its centre, m.
     pub at: [f64; 2],
-    /// Gives the colour; grey where nothing is known.
+    /// Determines the colour; grey if unknown.
     pub error: Option<f64>,
-    /// Arrow of the true motion, m on the picture.
+    /// Arrow of the true motion, m in the picture.
     pub truth: Option<[f64; 2]>,
-    /// Arrow of the estimated motion, m on the picture.
+    /// Arrow of the estimated motion, m in the picture.
     pub estimate: Option<[f64; 2]>,
 }
 
-/// What all panels of a picture share.
+/// Settings shared by all panels of a picture.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// How far a panel reaches to every side, m.
+    /// How far a panel reaches in every direction, m.
     pub half_extent_m: f64,
     /// Width of a column, m.
     pub cell_m: f64,
     /// Name and unit of the error, as in "error, m".
     pub error: String,
-    /// Error from which on columns have the colour of the worst.
+    /// Error from which on columns get the colour of the worst.
     pub worst: f64,
-    /// What the length of an arrow means, as in "way in 0.5 s".
+    /// Meaning of an arrow's length, as in "way in 0.5 s".
     pub arrows: String,
 }
 
 /// Draws panels side by side above one legend: returns by height, range rings, boxes by class,
-/// columns by error, the motion of columns as arrows, one for each block of 2 x 2 columns. What
-/// lies outside or is not finite is left out.
+/// columns by error, and the motion of columns as arrows, one for each block of 2 x 2 columns.
+/// Whatever lies outside or is not finite is left out.
 ///
-/// Returns a PNG file. Fails where `half_extent_m` or `cell_m` is not positive.
+/// Returns a PNG file. Fails if `half_extent_m` or `cell_m` is not positive.
 pub fn birds_eye(panels: &[Panel], look: &Look) -> Result<Vec<u8>, Error> {
-    // Where panels stand side by side on a page, they are smaller beside the same text.
+    // Panels side by side appear smaller on a page, next to text of the same size.
     let (side, scale) = if panels.len() > 1 { (460.0, 1.8) } else { (700.0, 1.5) };
     let drawn: Vec<render::Panel> = panels.iter().map(|panel| look.panel(panel, side)).collect();
     let shared = render::Look {
@@ -110,12 +110,12 @@ impl Look {
         let arrow = |like: Arrow, way: Option<[f64; 2]>| {
             way.map(|way| Arrow { way: way.map(|v| v as f32), ..like })
         };
-        // The truth below, so that an estimate that hits it lies in it.
+        // The truth goes below, so that a matching estimate lies on top of it.
         let arrows = [arrow(truth, column.truth), arrow(estimate, column.estimate)];
         Cell { at: column.at.map(|v| v as f32), colour, arrows }
     }
 
-    /// The arrows of truth and estimate, thinner where columns are small.
+    /// The arrows of truth and estimate, thinner if columns are small.
     fn arrows(&self, side: f64) -> [Arrow; 2] {
         let width = (0.11 * self.cell_m * side / self.half_extent_m).clamp(0.8, 1.6) as f32;
         [(TRUTH, 2.4 * width), (ESTIMATE, width)].map(|(colour, width)| Arrow {
@@ -125,7 +125,7 @@ impl Look {
         })
     }
 
-    /// What is drawn only.
+    /// Entries only for what is drawn.
     fn legend(&self, panels: &[Panel], side: f64) -> Vec<LegendEntry> {
         let any = |of: fn(&Column) -> bool| panels.iter().any(|p| p.columns.iter().any(of));
         let [truth, estimate] = self.arrows(side);

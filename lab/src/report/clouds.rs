@@ -6,9 +6,9 @@ use raywake_render::{Colour, colours};
 
 /// Width of a panel, units.
 const WIDE: f64 = 340.0;
-/// Between panels, and around everything, units.
+/// Space between panels and around everything, units.
 const GAP: f64 = 14.0;
-/// Above the panels, for their titles; below, for the scale; units.
+/// Space above the panels, for their titles; below, for the scale; units.
 const TITLE: f64 = 26.0;
 const FOOT: f64 = 30.0;
 /// Pixels per unit.
@@ -17,25 +17,25 @@ const SCALE: f32 = 2.0;
 const POINT: f32 = 1.0;
 /// Free space around the object, m.
 const MARGIN_M: f64 = 0.3;
-/// From first to last: blue over green to yellow, ever lighter.
+/// From first to last: blue through green to yellow, ever lighter.
 const TIMES: &[Colour] = &[[53, 42, 135], [15, 118, 200], [55, 184, 157], [250, 220, 30]];
 
 /// A cloud with a title.
 #[derive(Clone, Debug)]
 pub struct Cloud {
-    /// Above it.
+    /// Shown above it.
     pub title: String,
-    /// x to the right, y up and z towards whoever looks from above, m.
+    /// x to the right, y up and z towards the viewer of the view from above, m.
     pub points: Vec<[f32; 3]>,
     /// When each was seen: 0 at the beginning, 1 at the end.
     pub times: Vec<f32>,
 }
 
-/// Draws clouds side by side at one scale, from above and beneath it from the right, from blue
-/// (first) to yellow (last). The scale is chosen to show `reach` m (length, width, height) about
-/// the origin; what lies beyond is left out.
+/// Draws clouds side by side at one scale, from above and, underneath, from the right, coloured
+/// from blue (first) to yellow (last). The scale is chosen to show `reach` m (length, width,
+/// height) around the origin; whatever lies beyond is left out.
 ///
-/// Returns a PNG file. Fails where the picture has no pixels or too many.
+/// Returns a PNG file. Fails if the picture has no pixels or too many.
 pub fn clouds(clouds: &[Cloud], reach: [f64; 3]) -> Result<Vec<u8>, Error> {
     let [length, width, height] = reach.map(|v| v + 2.0 * MARGIN_M);
     let per_m = WIDE / length;
@@ -75,7 +75,7 @@ struct Area {
 }
 
 impl Area {
-    /// A point so far right of and above the middle, units, if it lies within.
+    /// Draws a point this far right of and above the middle, units, if it lies within.
     fn dot(&self, canvas: &mut Canvas, [x, y]: [f64; 2], colour: Colour) {
         let ([left, top], [width, height]) = (self.corner, self.size);
         if x.abs() < 0.5 * width && y.abs() < 0.5 * height {

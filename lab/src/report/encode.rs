@@ -1,4 +1,4 @@
-//! Bytes and texts as they may stand in the files of a report.
+//! Bytes and text, encoded for the files of a report.
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 
@@ -33,7 +33,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     BASE64_STANDARD.encode(bytes)
 }
 
-/// A number with this many decimals and a comma between thousands.
+/// A number with this many decimals and commas between thousands.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "–".into() } else { format!("{value}") };
@@ -44,7 +44,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     format!("{}{}{rest}", if negative { "\u{2212}" } else { "" }, grouped(whole))
 }
 
-/// Digits with a comma between thousands.
+/// Digits with commas between thousands.
 pub(super) fn grouped(digits: &str) -> String {
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -56,7 +56,7 @@ pub(super) fn grouped(digits: &str) -> String {
     out
 }
 
-/// A number with three significant digits or, above a thousand, all of its whole part.
+/// A number with three significant digits or, above a thousand, its whole part.
 pub(super) fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return fixed(value, 0);

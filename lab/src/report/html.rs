@@ -1,4 +1,4 @@
-//! The page: XHTML in a file that needs no other.
+//! The page: XHTML in a single self-contained file.
 
 use super::encode::{base64, xml};
 use super::{Element, Picture, Report, Section};
@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");
 
-/// Numbers given to what has a caption.
+/// Running numbers of captions.
 #[derive(Default)]
 struct Numbers {
     figures: usize,
@@ -116,7 +116,7 @@ fn image(picture: &Picture) -> String {
     format!("<img{size} alt=\"{what}\" src=\"data:image/png;base64,{data}\"/>\n")
 }
 
-/// An open caption.
+/// A caption, not yet closed.
 fn caption(class: &str, kind: &str, number: usize, text: &str) -> String {
     format!("<figcaption class=\"{class}\"><b>{kind} {number}.</b> {}", prose(text))
 }

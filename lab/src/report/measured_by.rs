@@ -1,10 +1,10 @@
-//! What measured: a command on a machine.
+//! Provenance of measurements: a command on a machine.
 
-/// Name of the fact that tells the command line.
+/// Name of the fact that holds the command line.
 pub const COMMAND: &str = "Command";
 
-/// The command line of this process; of many arguments in a row, drives that is, the first and
-/// last.
+/// The command line of this process; of many consecutive arguments (drives, that is) only the first
+/// two and the last.
 pub(super) fn command() -> String {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let mut out = String::from("raywake-lab");
@@ -19,7 +19,7 @@ pub(super) fn command() -> String {
     out
 }
 
-/// Cores and model of this machine's processor, where Linux tells.
+/// Cores and model of this machine's processor, if Linux reports it.
 pub(super) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

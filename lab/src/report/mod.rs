@@ -1,8 +1,8 @@
-//! Reports of evaluations: one page to look at, and every chart, table and picture as a file.
+//! Reports of evaluations: one page to read, and every chart, table and picture as a file.
 //!
 //! The page needs neither network nor scripts. Every chart is described once and drawn once, as
-//! SVG: the page holds it, the PNG is made of it. No text given here needs to be escaped; pairs of
-//! backticks enclose code.
+//! SVG: the page contains it, the PNG is rendered from it. No text given here needs escaping; pairs
+//! of backticks enclose code.
 
 mod birds_eye;
 mod chart;
@@ -31,13 +31,13 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
-/// Pixels per unit of a chart as PNG.
+/// Pixels per unit of a chart's PNG.
 const SCALE: f32 = 2.0;
 
 /// First bytes of every PNG file.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
 
-/// A report under way.
+/// A report under construction.
 #[derive(Clone, Debug)]
 pub struct Report {
     title: String,
@@ -51,7 +51,7 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Results {
-    /// Of the report.
+    /// Title of the report.
     pub title: String,
     /// Names and values: command, machine, drives.
     pub facts: Vec<[String; 2]>,
@@ -60,21 +60,21 @@ pub struct Results {
 }
 
 impl Results {
-    /// Prints the tables, and where the report is.
+    /// Prints the tables and the path of the report.
     pub fn print(&self, folder: &Path) {
         self.tables.iter().for_each(|table| println!("{}", table.text()));
         println!("report: {}", folder.join("report.html").display());
     }
 }
 
-/// A section of a report under way.
+/// A section of a report under construction.
 #[derive(Clone, Debug)]
 pub struct Section {
     title: String,
     elements: Vec<Element>,
 }
 
-/// What a section holds, in order.
+/// What a section contains, in order.
 #[derive(Clone, Debug)]
 enum Element {
     Text(String),
@@ -88,14 +88,14 @@ enum Element {
 pub struct Picture {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
-    /// What one sees.
+    /// What the picture shows.
     pub caption: String,
     /// A PNG file.
     pub png: Vec<u8>,
 }
 
 impl Picture {
-    /// Width and height, pixels; nothing where the bytes are no PNG.
+    /// Width and height, pixels; `None` if the bytes are not a PNG.
     fn size(&self) -> Option<[u32; 2]> {
         let sizes = self.png.strip_prefix(PNG)?.first_chunk::<8>()?;
         let [w, h] = [0, 4].map(|i| [sizes[i], sizes[i + 1], sizes[i + 2], sizes[i + 3]]);
@@ -104,7 +104,7 @@ impl Picture {
 }
 
 impl Report {
-    /// A report that tells no more than this command and machine.
+    /// A report that contains only this command and machine.
     pub fn new(title: &str, subtitle: &str) -> Report {
         Report {
             title: title.into(),
@@ -118,14 +118,14 @@ impl Report {
         }
     }
 
-    /// A result in large type at the top: a number with its unit, what it is, what to compare it
-    /// with.
+    /// Adds a result in large type at the top: a number with its unit, what it is, what to compare
+    /// it with.
     pub fn headline(&mut self, value: &str, label: &str, note: &str) -> &mut Report {
         self.headlines.push([value, label, note].map(String::from));
         self
     }
 
-    /// A line at the top on what was measured: drives, profile, digest.
+    /// Adds a line at the top on what was measured: drives, profile, digest.
     pub fn fact(&mut self, name: &str, value: &str) -> &mut Report {
         self.facts.push([name, value].map(String::from));
         self
@@ -139,12 +139,12 @@ impl Report {
     }
 
     /// Writes `report.html`, `results.json`, `charts/ID.svg`, `.png` and `.csv`, `tables/ID.csv`
-    /// and `pictures/ID.png` in a folder, which is made where it is missing; each file whole or not
-    /// at all, the page last.
+    /// and `pictures/ID.png` to a folder, which is created if missing; each file whole or not at
+    /// all, the page last.
     ///
-    /// Fails before anything is written with [`Error::Usage`] on an id that is not a file name or
-    /// that is given twice, a table whose rows do not fit its columns, or a picture that is no PNG;
-    /// later where a file cannot be written.
+    /// Fails with [`Error::Usage`] before anything is written on an id that is not a file name or
+    /// is given twice, a table whose rows do not fit its columns, or a picture that is not a PNG;
+    /// later if a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Results, Error> {
         self.check()?;
         atomic::create_folder(folder)?;
@@ -202,25 +202,25 @@ impl Report {
 }
 
 impl Section {
-    /// Paragraphs, with an empty line between two.
+    /// Adds paragraphs, separated by empty lines.
     pub fn text(&mut self, text: &str) -> &mut Section {
         self.elements.push(Element::Text(text.into()));
         self
     }
 
-    /// A table.
+    /// Adds a table.
     pub fn table(&mut self, table: Table) -> &mut Section {
         self.elements.push(Element::Table(table));
         self
     }
 
-    /// A chart.
+    /// Adds a chart.
     pub fn chart(&mut self, chart: Chart) -> &mut Section {
         self.elements.push(Element::Chart(chart));
         self
     }
 
-    /// A picture.
+    /// Adds a picture.
     pub fn picture(&mut self, picture: Picture) -> &mut Section {
         self.elements.push(Element::Picture(picture));
         self

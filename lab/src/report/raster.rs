@@ -6,9 +6,9 @@ use resvg::usvg::fontdb::Database;
 use resvg::usvg::{Options, Tree};
 use std::sync::{Arc, OnceLock};
 
-/// An SVG of this size (units) on white as a PNG file, `scale` pixels per unit.
+/// Renders an SVG of this size (units) on white as a PNG file, `scale` pixels per unit.
 ///
-/// Fails where the document is no SVG or the picture is empty or larger than memory.
+/// Fails if the document is not an SVG or the picture is empty or larger than memory.
 pub(super) fn png(svg: &str, size: [f64; 2], scale: f32) -> Result<Vec<u8>, Error> {
     let options =
         Options { fontdb: fonts(), font_family: "sans-serif".into(), ..Options::default() };

@@ -4,7 +4,7 @@ use super::encode::{self, fixed, xml};
 use raywake_io::Error;
 use serde::{Deserialize, Serialize};
 
-/// What is shown where there is nothing to tell.
+/// Shown if there is no value.
 const NOTHING: &str = "–";
 
 /// A table with a name for its file.
@@ -13,38 +13,38 @@ const NOTHING: &str = "–";
 pub struct Table<C = Cell> {
     /// Name of its file, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
-    /// What it tells.
+    /// What it shows.
     pub caption: String,
     /// Names of the columns with their units.
     pub columns: Vec<String>,
-    /// As many cells each as there are columns.
+    /// Each with as many cells as there are columns.
     pub rows: Vec<TableRow<C>>,
-    /// Below the table.
+    /// Shown below the table.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
 }
 
-/// A table whose cells are text, as it stands on a page and in `results.json`.
+/// A table whose cells are text, as shown on a page and in `results.json`.
 pub type Shown = Table<String>;
 
-/// Figures of ours.
+/// A row of a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableRow<C = Cell> {
     /// One for each column.
     pub cells: Vec<C>,
-    /// Whether these are somebody else's figures, to compare with; they step back.
+    /// Whether these are someone else's figures, for comparison; they are de-emphasised.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub reference: bool,
 }
 
 impl TableRow {
-    /// Figures of ours.
+    /// A row of our figures.
     pub fn new(cells: impl IntoIterator<Item = Cell>) -> TableRow {
         TableRow { cells: cells.into_iter().collect(), reference: false }
     }
 
-    /// Figures of somebody else's.
+    /// A row of someone else's figures.
     pub fn reference(cells: impl IntoIterator<Item = Cell>) -> TableRow {
         TableRow { reference: true, ..TableRow::new(cells) }
     }
@@ -53,13 +53,13 @@ impl TableRow {
 /// A cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// Words.
+    /// Text.
     Text(String),
-    /// How many.
+    /// A count.
     Count(u64),
-    /// A number and the decimals that are shown of it; the CSV has all. NaN is shown as a dash.
+    /// A number and the decimals shown of it; the CSV has all. NaN is shown as a dash.
     Number(f64, usize),
-    /// Nothing to tell.
+    /// No value.
     Empty,
 }
 
@@ -91,7 +91,7 @@ impl Cell {
     fn shown(&self) -> String {
         match self {
             Cell::Text(text) => text.clone(),
-            // Not by way of a float: counts are exact.
+            // Not via a float: counts are exact.
             Cell::Count(count) => encode::grouped(&count.to_string()),
             Cell::Number(value, decimals) => fixed(*value, *decimals),
             Cell::Empty => NOTHING.into(),
@@ -121,13 +121,13 @@ impl Table {
         Table { id: id.into(), caption: caption.into(), columns, rows, notes: Vec::new() }
     }
 
-    /// The same with a note below.
+    /// The same table with a note below.
     pub fn note(mut self, note: &str) -> Table {
         self.notes.push(note.into());
         self
     }
 
-    /// Fails where a row has another number of cells than there are columns.
+    /// Fails if a row's number of cells differs from the number of columns.
     pub(super) fn check(&self) -> Result<(), Error> {
         let wrong = self.rows.iter().position(|r| r.cells.len() != self.columns.len());
         let Some(row) = wrong else { return Ok(()) };
@@ -143,12 +143,12 @@ impl Table {
         encode::csv(&rows)
     }
 
-    /// For a screen.
+    /// The table as text for a terminal.
     pub fn text(&self) -> String {
         self.shown().text()
     }
 
-    /// With every cell as the text that is shown of it.
+    /// The table with every cell as the text shown for it.
     pub fn shown(&self) -> Shown {
         let row = |r: &TableRow| TableRow {
             cells: r.cells.iter().map(Cell::shown).collect(),
@@ -165,7 +165,7 @@ impl Table {
 }
 
 impl Shown {
-    /// Whether a column, never the first, holds numbers: those are set flush right.
+    /// Whether a column, never the first, holds numbers: those are right-aligned.
     fn is_number(&self, column: usize) -> bool {
         let number = |line: &TableRow<String>| {
             let text = line.cells[column].trim_start_matches('\u{2212}');
@@ -174,7 +174,8 @@ impl Shown {
         column > 0 && !self.rows.is_empty() && self.rows.iter().all(number)
     }
 
-    /// For a screen: the caption, then columns of equal width.
+    /// The table as text for a terminal: the caption, then the columns, each padded to its widest
+    /// cell.
     pub fn text(&self) -> String {
         let lines = || [&self.columns].into_iter().chain(self.rows.iter().map(|r| &r.cells));
         let width = |c: usize| lines().map(|r| r[c].chars().count()).max().unwrap_or(0);
@@ -191,7 +192,7 @@ impl Shown {
         out
     }
 
-    /// As a table of GitHub's Markdown.
+    /// The table in GitHub's Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
         let rule = |c| if self.is_number(c) { "--:" } else { "---" };
@@ -207,7 +208,7 @@ impl Shown {
         out
     }
 
-    /// As `<table>`.
+    /// The table as `<table>`.
     pub(super) fn html(&self) -> String {
         let class: Vec<&str> = (0..self.columns.len())
             .map(|c| if self.is_number(c) { " class=\"n\"" } else { "" })

@@ -1,5 +1,5 @@
-//! The calibration of a day: a camera that looks forward and an inertial unit, placed about as on
-//! KITTI's vehicle, and the files that say so.
+//! The calibration of a day: a forward-looking camera and an inertial unit, placed roughly as on
+//! KITTI's vehicle, and the files that describe them.
 
 use super::layout::{rotation_rows, spaced};
 use glam::{DMat3, DQuat, DVec3};
@@ -11,17 +11,17 @@ use std::path::Path;
 
 /// Size of the camera's image, pixels.
 pub const IMAGE: [f64; 2] = [1242.0, 375.0];
-/// Focal length, pixels: 81.6 degrees wide.
+/// Focal length, pixels, for a horizontal field of view of 81.6 degrees.
 const FOCAL: f64 = 720.0;
 /// Where the optical axis meets the image, pixels.
 const CENTRE: [f64; 2] = [620.5, 187.0];
 /// How far cameras 00 to 03 sit to the left of camera 00, m.
 const LEFT_M: [f64; 4] = [0.0, -0.54, 0.06, -0.48];
-/// The camera whose view has labels.
+/// The camera with labels in its view.
 const LABELLED: usize = 2;
-/// Camera 00, seen from the point of the ground beneath the first sensor, m.
+/// Camera 00, relative to the ground point beneath the first sensor, m.
 const CAMERA: DVec3 = DVec3::new(0.27, 0.0, 1.65);
-/// The inertial unit, seen from there, m.
+/// The inertial unit, relative to the same point, m.
 const IMU: DVec3 = DVec3::new(-0.81, 0.32, 0.93);
 
 /// Camera 02, in whose view objects are labelled.
@@ -30,7 +30,7 @@ pub struct Camera {
     camera_from_vehicle: Pose,
 }
 
-/// Something at this place of the rig's vehicle, axes parallel.
+/// Pose of something mounted at this place on the rig's vehicle, with parallel axes.
 fn mounted(rig: &Rig, place: DVec3) -> Pose {
     let below = DVec3::new(rig.sensors[0].translation.x, 0.0, rig.ground_m);
     Pose { rotation: DQuat::IDENTITY, translation: below + place }
@@ -41,7 +41,7 @@ pub fn imu(rig: &Rig) -> Pose {
     mounted(rig, IMU)
 }
 
-/// Camera 00 (x right, y down, z forward) seen from the vehicle.
+/// `camera_from_vehicle` of camera 00 (x right, y down, z forward).
 fn camera_from_vehicle(rig: &Rig) -> Pose {
     // Rows are the camera's axes.
     let axes = DMat3::from_cols(-DVec3::Y, -DVec3::Z, DVec3::X);
@@ -71,9 +71,9 @@ impl Camera {
     }
 }
 
-/// Writes the calibration of a rig to the folder of a day, unless it is there.
+/// Writes the calibration of a rig to the folder of a day, unless it is already there.
 ///
-/// Fails where the folder holds another.
+/// Fails if the folder holds a different one.
 pub fn write(day: &Path, rig: &Rig) -> Result<(), Error> {
     for (name, text) in [
         ("calib_cam_to_cam.txt", cameras()),

@@ -1,4 +1,4 @@
-//! One drive: what it is made of, and its folder.
+//! One drive: its recipe, and its folder.
 
 use super::calibration::{Camera, imu};
 use super::gnss::Errors;
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Height of KITTI's Velodyne, which readers of its layout assume, m.
 const KITTI_HEIGHT_M: f64 = 1.73;
 
-/// Last file of a drive: what it was made of.
+/// The last file of a drive to be written: what it was made from.
 const MANIFEST: &str = "manifest.json";
 
 /// What the vehicle does.
@@ -26,9 +26,9 @@ const MANIFEST: &str = "manifest.json";
 pub enum Motion {
     /// One of the others, drawn for every drive.
     Any,
-    /// Stands.
+    /// Stands still.
     Standing,
-    /// Goes straight on.
+    /// Drives straight on.
     Straight,
     /// Turns left or right at a crossing.
     Turn,
@@ -36,26 +36,26 @@ pub enum Motion {
     StopAndGo,
 }
 
-/// Poses that a drive's `oxts/` tells; `truth/` always tells the exact ones.
+/// Poses in a drive's `oxts/`; `truth/` always has the exact ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Poses {
     /// The exact ones.
     Exact,
-    /// With the errors of an inertial unit aided by satellites: reports on a clock of 10 ms, some
-    /// 4 cm of position and 0.2 degrees of heading that change slowly, 1 cm on every sweep.
+    /// With the errors of a satellite-aided inertial unit: reports on a clock of 10 ms, about 4 cm
+    /// of position and 0.2 degrees of heading that change slowly, and 1 cm on every sweep.
     Gnss,
 }
 
 /// What the drives of a run have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
-    /// Every drive's own seed is drawn from it.
+    /// Seed that every drive's own seed is drawn from.
     pub seed: u64,
     /// Sweeps of a drive.
     pub sweeps: usize,
     /// One of [`SensorRig::NAMES`].
     pub sensor: String,
-    /// What is driven through.
+    /// Scene that is driven through.
     pub scenery: Scenery,
     /// What the vehicle does in a street.
     pub motion: Motion,
@@ -105,13 +105,13 @@ impl Recipe {
         Ok(Drive::new(seed, options))
     }
 
-    /// The seed of drive `number`, and what its motion is drawn from.
+    /// The seed of drive `number`, and the generator its motion is drawn from.
     fn chance(&self, number: usize) -> (u64, Rng) {
         let mut rng = Rng::split(self.seed, number as u64);
         (rng.bits(), rng)
     }
 
-    /// Fails where what is asked for does not fit together.
+    /// Fails if the options do not fit together.
     pub fn check(&self) -> Result<(), Error> {
         if self.motion != Motion::Any && self.scenery.place(self.seed).is_some() {
             let name = self.scenery.name();
@@ -126,14 +126,14 @@ impl Recipe {
         self.sensor.parse().map_err(|e: raywake_sim::UnknownRig| Error::Usage(e.to_string()))
     }
 
-    /// What the sensors are to a reader.
+    /// The rig as a reader of the drive sees it.
     pub fn rig(&self) -> Result<Rig, Error> {
         let nowhere =
             Options { sweeps: 0, density: 0.0, rig: self.sensors()?, ..Default::default() };
         Ok(Drive::new(0, nowhere).rig())
     }
 
-    /// What tells a drive from any other.
+    /// What distinguishes a drive from any other.
     fn manifest(&self, number: usize) -> String {
         let motion = clap::ValueEnum::to_possible_value(&self.motion);
         let mut manifest = json!({
@@ -145,7 +145,8 @@ impl Recipe {
             "ego": motion.map_or_else(String::new, |m| m.get_name().to_owned()),
             "density": self.density,
         });
-        // What was there before anything else could be chosen says no more than it did.
+        // Defaults older than the other choices are left out, so that existing manifests still
+        // match.
         if self.scenery != Scenery::Street {
             manifest["scenery"] = self.scenery.name().into();
         }
@@ -162,16 +163,16 @@ impl Recipe {
     }
 }
 
-/// What there is of a drive.
+/// What exists of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Nothing that is whole.
+    /// Nothing, or only part of it.
     Missing,
     /// All of it.
     Finished,
 }
 
-/// Whether drive `number` is there. Fails where its name is taken by something else.
+/// Returns whether drive `number` is there. Fails if its name is taken by something else.
 pub fn state(day: &Path, recipe: &Recipe, number: usize) -> Result<State, Error> {
     let folder = day.join(drive_name(number));
     match fs::symlink_metadata(&folder) {
@@ -199,10 +200,10 @@ pub fn state(day: &Path, recipe: &Recipe, number: usize) -> Result<State, Error>
     }
 }
 
-/// Writes drive `number` under a temporary name, which becomes its own when all is there.
+/// Writes drive `number` under a temporary name and renames it when it is complete.
 ///
-/// `tell` is called after each sweep and returns whether to go on; where it says no, the drive
-/// stays unfinished. Fails where a file cannot be written.
+/// `tell` is called after each sweep and returns whether to go on; if it returns false, the drive
+/// stays unfinished. Fails if a file cannot be written.
 pub fn write(
     day: &Path,
     recipe: &Recipe,
@@ -229,7 +230,7 @@ pub fn write(
     fs::rename(&partial, &folder).map_err(Error::writing(&folder))
 }
 
-/// A file of a folder.
+/// Writes a file in a folder.
 fn save(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> Result<(), Error> {
     let path = folder.join(name);
     fs::write(&path, content).map_err(Error::writing(&path))
@@ -241,7 +242,7 @@ struct Writer<'a> {
     drive: &'a Drive,
     vehicle_from_imu: Pose,
     unit: oxts::Unit,
-    /// Of the poses; none where they are exact.
+    /// Errors of the poses; `None` if they are exact.
     errors: Option<Errors>,
     sidecars: bool,
     tracklets: Tracklets,
@@ -290,7 +291,7 @@ impl<'a> Writer<'a> {
         })
     }
 
-    /// Casts a sweep and writes what is of it alone.
+    /// Casts a sweep and writes everything that concerns it alone.
     fn sweep(&mut self, frame: usize) -> Result<(), Error> {
         let sweep = self.drive.sweep(frame);
         let bin = frame_name(frame, "bin");
@@ -322,7 +323,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Times and sensors of the returns.
+    /// Writes times and sensors of the returns.
     fn beside(&self, bin: &str, sweep: &SimSweep) -> Result<(), Error> {
         let times: Vec<u8> = sweep.points.iter().flat_map(|p| p.offset_s.to_le_bytes()).collect();
         let sensors: Vec<u8> = sweep.points.iter().map(|p| p.sensor as u8).collect();
@@ -330,7 +331,7 @@ impl<'a> Writer<'a> {
         save(&self.root, &format!("velodyne_points/sensor/{bin}"), sensors)
     }
 
-    /// Writes what is of the whole drive.
+    /// Writes everything that concerns the whole drive.
     fn finish(self) -> Result<(), Error> {
         let [from_s, span_s] = span(&self.drive.rig());
         let times =

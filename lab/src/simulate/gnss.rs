@@ -1,12 +1,12 @@
-//! Errors of an inertial unit aided by satellites, as real poses have them.
+//! Errors of a satellite-aided inertial unit, as real poses have them.
 //!
 //! - Clock: the unit reports every 10 ms, and a sweep gets the report nearest to its stamp. The
-//!   scanner's period is no multiple of 10 ms (KITTI's is 103.6 ms): the report is up to 5 ms off
-//!   and walks by 3.6 ms a sweep; the drive's own times do not tell.
-//! - Position: a first-order Gauss-Markov process of 4 cm along each axis that forgets within 20 s
-//!   (a random walk over a few seconds, 0.4 cm a sweep), and 1 cm anew on every sweep.
-//! - Attitude: the same process of 0.2 degrees of heading and 0.05 degrees of roll and pitch, and a
-//!   tenth of that anew on every sweep.
+//!   scanner's period is not a multiple of 10 ms (KITTI's is 103.6 ms), so the report is up to 5 ms
+//!   off and drifts by 3.6 ms a sweep; the drive's own timestamps do not show this.
+//! - Position: a first-order Gauss-Markov process of 4 cm along each axis with a time constant of
+//!   20 s (a random walk over a few seconds, 0.4 cm a sweep), plus 1 cm drawn anew for every sweep.
+//! - Attitude: the same process with 0.2 degrees of heading and 0.05 degrees of roll and pitch,
+//!   plus a tenth of that drawn anew for every sweep.
 //!
 //! For comparison: on KITTI's raw drive 0005 (4.6 m/s) the unit's steps from sweep to sweep differ
 //! from those of scan matching by 2.5 cm along, 1.8 cm across and 0.047 degrees; here, at that
@@ -16,39 +16,40 @@ use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use raywake_sim::{PERIOD_S, Rng};
 
-/// Time between two reports of the unit, and how much the scanner's period exceeds a multiple of
+/// Time between two reports of the unit, and by how much the scanner's period exceeds a multiple of
 /// it, s.
 const REPORT_S: f64 = 0.01;
 const WALK_S: f64 = 0.0036;
-/// Time in which the slow errors are forgotten to a third, s.
+/// Time in which the slow errors decay to about a third, s.
 const MEMORY_S: f64 = 20.0;
-/// Deviations: slow and anew on every sweep. Position in m; roll, pitch and heading in degrees.
+/// Standard deviations: of the slow error, and of the error of every sweep. Position in m; roll,
+/// pitch and heading in degrees.
 const POSITION_M: [f64; 2] = [0.04, 0.01];
 const TILT_DEG: f64 = 0.05;
 const HEADING_DEG: f64 = 0.2;
 /// Share of the attitude's slow deviation that is drawn anew on every sweep.
 const QUICK: f64 = 0.1;
 
-/// The errors of one drive, sweep by sweep.
+/// The errors of a drive, sweep by sweep.
 pub struct Errors {
     rng: Rng,
     clock_s: f64,
-    /// Slow errors in units of their deviations: position, then roll, pitch and heading.
+    /// Slow errors in units of their standard deviations: position, then roll, pitch and heading.
     slow: [f64; 6],
 }
 
-/// The errors on one sweep.
+/// The errors of one sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Error {
-    /// How much later than it says a pose was taken, s.
+    /// How much later than stated a pose was taken, s.
     pub late_s: f64,
     position: DVec3,
-    /// About the world's axes, rad.
+    /// Rotation about the world's axes, rad.
     turn: DVec3,
 }
 
 impl Errors {
-    /// Of the drive of a seed, in the middle of their course.
+    /// Errors of the drive with this seed, in their steady state.
     pub fn new(seed: u64) -> Errors {
         let mut rng = Rng::split(seed, 8);
         let clock_s = rng.range(0.0, REPORT_S);
@@ -56,7 +57,7 @@ impl Errors {
         Errors { rng, clock_s, slow }
     }
 
-    /// Those of the next sweep.
+    /// The errors of the next sweep.
     pub fn next(&mut self) -> Error {
         let kept = (-PERIOD_S / MEMORY_S).exp();
         self.clock_s = (self.clock_s + WALK_S).rem_euclid(REPORT_S);
@@ -76,7 +77,7 @@ impl Errors {
 }
 
 impl Error {
-    /// The pose that the unit reports for the one it has.
+    /// The pose that the unit reports for its true pose.
     pub fn of(&self, world_from_unit: Pose) -> Pose {
         let rotation = DQuat::from_scaled_axis(self.turn) * world_from_unit.rotation;
         Pose::new(rotation, world_from_unit.translation + self.position)
@@ -106,7 +107,7 @@ mod tests {
         let [position, step] = [position, step].map(f64::sqrt);
         let heading = heading.sqrt().to_degrees();
         assert!((0.037..0.045).contains(&position), "{position} m");
-        // 0.4 cm of the slow error, and the difference of two of 1 cm.
+        // 0.4 cm from the slow error, plus the difference of two errors of 1 cm.
         assert!((0.0135..0.016).contains(&step), "{step} m");
         assert!((0.18..0.22).contains(&heading), "{heading} degrees");
         assert!((0.004..=0.005).contains(&late), "{late} s");

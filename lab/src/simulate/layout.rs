@@ -1,20 +1,20 @@
-//! Names and formats of files of a KITTI raw recording.
+//! File names and formats of a KITTI raw recording.
 
 use raywake_core::pose::Pose;
 use std::fmt::Display;
 
-/// The day of all simulated drives: none on which KITTI recorded.
+/// The day of all simulated drives: one on which KITTI did not record.
 pub const DATE: &str = "2000_01_01";
 
-/// Begin of every drive, ns since midnight.
+/// Start of every drive, ns since midnight.
 const NOON_NS: i64 = 43_200_000_000_000;
 
-/// Folder of a drive within that of its day.
+/// Name of a drive's folder within that of its day.
 pub fn drive_name(number: usize) -> String {
     format!("{DATE}_drive_{number:04}_sync")
 }
 
-/// File of a frame.
+/// Name of a frame's file.
 pub fn frame_name(frame: usize, extension: &str) -> String {
     format!("{frame:010}.{extension}")
 }
@@ -27,7 +27,7 @@ pub fn timestamp(frame: usize, offset_s: f64) -> String {
     format!("{} {hour:02}:{minute:02}:{second:02}.{ns:09}\n", DATE.replace('_', "-"))
 }
 
-/// Numbers with a space between them.
+/// Joins numbers with single spaces.
 pub fn spaced<T: Display>(values: impl IntoIterator<Item = T>) -> String {
     values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }

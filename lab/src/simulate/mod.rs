@@ -1,9 +1,9 @@
 //! `raywake-lab sim`: simulated drives in the layout of KITTI's raw recordings, with exact truth.
-//! Evaluation, training and the program read them as they read any other recording.
+//! Evaluation, training and the program read them like any other recording.
 //!
-//! A drive is `OUT/DATE/DATE_drive_NNNN_sync/`, its calibration `OUT/DATE/calib_*.txt`. Beside what
-//! a recording has, it has `truth/`: see [`truth`]. Its vehicle frame ("Velodyne" in KITTI's files)
-//! is that of [`raywake_sim::Drive::rig`].
+//! A drive is `OUT/DATE/DATE_drive_NNNN_sync/`, its calibration `OUT/DATE/calib_*.txt`. In addition
+//! to what a recording has, it has `truth/`: see [`truth`]. Its vehicle frame ("Velodyne" in
+//! KITTI's files) is that of [`raywake_sim::Drive::rig`].
 
 mod calibration;
 mod drive;
@@ -30,10 +30,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Most sweeps of a drive: a quarter of an hour.
+/// Maximum number of sweeps of a drive: about a quarter of an hour.
 const SWEEPS_MAX: u64 = 10_000;
 
-/// Largest density of traffic: beyond, there is no room in the street.
+/// Largest density of traffic: beyond it there is no room in the street.
 const DENSITY_MAX: f64 = 10.0;
 
 /// Options of `sim`.
@@ -48,47 +48,47 @@ pub struct Args {
     #[arg(long, default_value_t = 100)]
     #[arg(value_parser = clap::value_parser!(u64).range(1..=SWEEPS_MAX))]
     sweeps: u64,
-    /// Drive k of a seed is the same whatever the number of drives.
+    /// Seed; drive k of a seed is the same whatever the number of drives.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Sensors on the vehicle.
     #[arg(long, default_value = "hdl64")]
     #[arg(value_parser = PossibleValuesParser::new(SensorRig::NAMES))]
     sensor: String,
-    /// What is driven through: a street; or `outskirts`, which nothing is trained or tuned on, one
-    /// of the places after it, drawn for every drive.
+    /// Scene that is driven through: a street; or `outskirts`, which nothing is trained or tuned
+    /// on: one of the places listed after it, drawn for every drive.
     #[arg(long, default_value = "street", value_parser = sceneries())]
     scenery: Scenery,
-    /// What the vehicle does in a street; elsewhere the place tells.
+    /// What the vehicle does in a street; elsewhere the place determines it.
     #[arg(long, value_enum, default_value = "any")]
     ego: Motion,
     /// Amount of traffic: 1 is a busy street, 0 an empty one.
     #[arg(long, default_value_t = 1.0, value_parser = density)]
     density: f64,
-    /// What hangs in the air and sends rays back, without being an object.
+    /// What hangs in the air and returns rays without being an object.
     #[arg(long, default_value = "none", value_parser = clutters())]
     clutter: Clutter,
-    /// Poses that the drives tell; their truth always has the exact ones.
+    /// Poses that the drives report; their truth always has the exact ones.
     #[arg(long, value_enum, default_value = "exact")]
     poses: Poses,
-    /// Threads; as many as the machine runs at once unless given.
+    /// Threads; unless given, as many as the machine can run at once.
     #[arg(long)]
     jobs: Option<usize>,
 }
 
-/// Reads the name of a scenery.
+/// Parses the name of a scenery.
 fn sceneries() -> impl TypedValueParser<Value = Scenery> {
     PossibleValuesParser::new(Scenery::all().map(Scenery::name))
         .try_map(|name| name.parse::<Scenery>())
 }
 
-/// Reads the name of a clutter.
+/// Parses the name of a clutter.
 fn clutters() -> impl TypedValueParser<Value = Clutter> {
     PossibleValuesParser::new(Clutter::ALL.map(Clutter::name))
         .try_map(|name| name.parse::<Clutter>())
 }
 
-/// Reads a density.
+/// Parses a density.
 fn density(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     let fits = (0.0..=DENSITY_MAX).contains(&value);
@@ -100,11 +100,11 @@ fn density(text: &str) -> Result<f64, String> {
 pub struct Written {
     /// Drives written.
     pub drives: usize,
-    /// Drives that were there already.
+    /// Drives that were already there.
     pub skipped: usize,
 }
 
-/// Writes what the command line asks for, and says how fast.
+/// Writes what the command line asks for, and prints how fast that was.
 pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     let recipe = Recipe {
         seed: args.seed,
@@ -130,12 +130,13 @@ pub fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Writes drives 0 to `drives` of a recipe by `jobs` threads, the number of which does not show.
+/// Writes drives 0 to `drives` of a recipe on `jobs` threads, whose number does not affect the
+/// output.
 ///
-/// Drives that are there are kept; a drive that a run left unfinished is begun anew. Two runs must
-/// not write to one folder at once. Fails where a folder holds something else than the drive meant
-/// to be there or where the recipe does not fit together, before anything is written, and where a
-/// file cannot be written.
+/// Existing drives are kept; a drive that an earlier run left unfinished is started again. Two runs
+/// must not write to one folder at once. Fails before anything is written if a folder holds
+/// something other than the drive meant to be there or if the recipe is inconsistent; also fails if
+/// a file cannot be written.
 pub fn write(
     out: &Path,
     recipe: &Recipe,
@@ -154,7 +155,7 @@ pub fn write(
     }
     atomic::create_folder(&day)?;
     calibration::write(&day, &rig)?;
-    // Threads that find no drive of their own help casting.
+    // Threads left without a drive of their own help with casting.
     let workers = jobs.clamp(1, missing.len().max(1));
     let threads = (jobs / workers).max(1);
     let progress = Mutex::new(Progress::new("sweep", missing.len() * recipe.sweeps, quiet));
@@ -167,7 +168,7 @@ pub fn write(
     let work = || {
         while let Some(&number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
             let result = drive::write(&day, recipe, number, threads, &tell);
-            // The others need not go on.
+            // The others can stop.
             result.inspect_err(|_| stop.store(true, Ordering::Relaxed))?;
             if stop.load(Ordering::Relaxed) {
                 break;

@@ -1,15 +1,16 @@
-//! Packets of the GPS and inertial unit, in the format and by the convention of KITTI's development
-//! kit: Mercator position scaled by the first latitude, `Rz(yaw) Ry(pitch) Rx(roll)`.
+//! Packets of the GPS and inertial unit, in the format and by the conventions of KITTI's
+//! development kit: Mercator position scaled by the first latitude, `Rz(yaw) Ry(pitch) Rx(roll)`.
 
 use super::layout::spaced;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::{Pose, Twist};
 
-/// Radius of the sphere of the projection, m.
+/// Radius of the projection's sphere, m.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;
-/// Latitude and longitude (degrees) of the unit on the first frame, and the height of the world, m.
+/// Latitude and longitude (degrees) of the unit on the first frame, and the altitude of the world's
+/// origin, m.
 const FIRST: [f64; 3] = [45.0, 7.0, 100.0];
-/// Step of the differences that give velocities and accelerations, s.
+/// Step of the differences that yield velocities and accelerations, s.
 const STEP_S: f64 = 1e-3;
 /// m/s^2; an accelerometer at rest measures it upwards.
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, 9.81);
@@ -50,17 +51,17 @@ orimode: orientation mode
 
 /// Makes the packets of one drive.
 pub struct Unit {
-    /// Where the unit is on the first frame, in the simulation's world.
+    /// Position of the unit on the first frame, in the simulation's world.
     origin: DVec3,
 }
 
 impl Unit {
-    /// `first` is `world_from_imu` on the first frame.
+    /// Creates the unit; `first` is `world_from_imu` on the first frame.
     pub fn new(first: Pose) -> Unit {
         Unit { origin: DVec3::new(first.translation.x, first.translation.y, 0.0) }
     }
 
-    /// The packet at a time (s) of a unit that moves as `world_from_imu`.
+    /// Returns the packet at a time (s) of a unit that moves as `world_from_imu`.
     pub fn packet(&self, world_from_imu: &dyn Fn(f64) -> Pose, t: f64) -> String {
         let [before, here, after] = [t - STEP_S, t, t + STEP_S].map(world_from_imu);
         let velocity = (after.translation - before.translation) / (2.0 * STEP_S);
@@ -75,7 +76,7 @@ impl Unit {
         let pushed = level * acceleration;
         let turned = level * (here.rotation * rates);
         let place = self.place(here.translation);
-        // Fourteen decimals of a degree are a nanometre.
+        // Fourteen decimals of a degree resolve a nanometre.
         let exact = place.into_iter().chain(angles).map(|v| format!("{v:.14}"));
         let motion = [velocity.y, velocity.x]
             .into_iter()
@@ -135,7 +136,7 @@ mod tests {
         for (n, (a, b)) in packet.iter().zip(expected.iter().chain(&rest)).enumerate() {
             assert!((a - b).abs() < 1e-5, "field {n}: {a}, not {b}");
         }
-        // Half a turn on, it heads west.
+        // Half a revolution later, it heads west.
         let t = 2.0 * std::f64::consts::PI;
         let packet = fields(&Unit::new(on_circle(0.0)).packet(&on_circle, t));
         assert!((packet[7] + 10.0).abs() < 1e-4 && (packet[8] - 10.0).abs() < 1e-4);

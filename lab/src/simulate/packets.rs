@@ -15,18 +15,18 @@ const HEIGHT_M: f64 = 1.9;
 /// Options of `packets`.
 #[derive(clap::Args)]
 pub struct PacketsArgs {
-    /// Capture to write, `.pcap`; what the sensor says of itself goes beside it, as `.json`.
+    /// Capture to write, `.pcap`; the sensor's metadata goes next to it, as `.json`.
     out: PathBuf,
-    /// Turns, 10 a second.
+    /// Revolutions, 10 a second.
     #[arg(long, default_value_t = 100)]
     sweeps: usize,
-    /// Columns of a turn, of 128 beams each.
+    /// Columns of a revolution, of 128 beams each.
     #[arg(long, default_value_t = 1024, value_parser = columns)]
     columns: usize,
     /// Seed of the drive.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// What is driven through.
+    /// Scene that is driven through.
     #[arg(long, default_value = "street", value_parser = sceneries())]
     scenery: Scenery,
 }
@@ -36,7 +36,7 @@ fn columns(text: &str) -> Result<usize, String> {
     of_sensors.then(|| text.parse().ok()).flatten().ok_or("512, 1024 or 2048".into())
 }
 
-/// Writes capture and metadata.
+/// Writes the capture and the metadata.
 pub fn packets(args: &PacketsArgs) -> Result<(), Error> {
     let sensor = Sensor { columns: args.columns, ..Sensor::os1_128() };
     let rig = SensorRig::single(sensor.clone(), HEIGHT_M);

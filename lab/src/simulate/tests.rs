@@ -1,4 +1,4 @@
-//! Drives written, and read back by those who read recordings.
+//! Drives written, and read back by the readers of recordings.
 
 use super::calibration::Camera;
 use super::drive::{Motion, Poses, Recipe};
@@ -87,13 +87,13 @@ fn round_trip(sensor: &str, motion: Motion, sweeps: usize) {
                 let then = drive.objects(cast.stamp_s + s)[o.id as usize - 1].world_from_object;
                 (then.yaw_rad() - state.world_from_object.yaw_rad()).sin() / s
             });
-            // A turn may begin or end within these times.
+            // A turn may begin or end within this interval.
             let within = before.min(after) - 0.05..before.max(after) + 0.05;
             assert!(within.contains(&o.yaw_rate), "{before} to {after}: {o:?}");
         }
     }
     assert_eq!(objects.len(), sweeps * drive.objects(0.0).len());
-    // The exact poses serve as well.
+    // The exact poses can be used, too.
     let poses = Some(folder.join("truth/poses.txt"));
     let mut source = open(&folder, &OpenOptions { poses, ..OpenOptions::default() }).unwrap();
     source.read(sweeps - 1, &mut read).unwrap();
@@ -146,7 +146,7 @@ fn the_azimuth_tells_an_hdl64_s_time() {
         (-0.1 * azimuth / std::f64::consts::TAU - f64::from(p.offset_s)).abs()
     };
     let worst = sweep.points.iter().map(off).fold(0.0, f64::max);
-    // The lasers' own azimuths, 0.08 degrees at most.
+    // The lasers' own azimuth offsets, at most 0.08 degrees.
     assert!(worst < 23e-6 && worst > 15e-6, "{worst} s");
 }
 
@@ -240,7 +240,7 @@ fn the_same_seed_writes_the_same_bytes() {
     let recipe = recipe("vlp32x2", Motion::Any, 1);
     assert_eq!(write(a.path(), &recipe, 2, 2, true).unwrap(), Written { drives: 2, skipped: 0 });
     assert_eq!(write(b.path(), &recipe, 1, 1, true).unwrap(), Written { drives: 1, skipped: 0 });
-    // What a run that was stopped leaves behind.
+    // Left behind by a run that was stopped.
     let partial = b.path().join("2000_01_01/.2000_01_01_drive_0001_sync.partial");
     fs::create_dir_all(&partial).unwrap();
     fs::write(partial.join("rubbish"), "x").unwrap();

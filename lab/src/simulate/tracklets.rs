@@ -1,8 +1,8 @@
-//! `tracklet_labels.xml`: the boxes a labeller would see, as KITTI's development kit stores them
-//! (boost serialisation).
+//! `tracklet_labels.xml`: the boxes that a labeller would see, as KITTI's development kit stores
+//! them (boost serialisation).
 //!
-//! An object has poses from the first frame on which the camera sees a return of it to the last;
-//! on frames between where it sees none, its pose is marked as unset and fully occluded. Boxes are
+//! An object has poses from the first to the last frame on which the camera sees a return of it; on
+//! frames in between without one, its pose is marked as unset and fully occluded. Boxes are
 //! upright, as KITTI's are: (tx, ty, tz) lies half the height below the centre, and rz is the
 //! heading.
 
@@ -18,9 +18,9 @@ struct ObjectRow {
     /// Bottom centre (m) and heading (rad) in the vehicle frame.
     at: DVec3,
     yaw: f64,
-    /// Whether the camera sees a return of it.
+    /// Whether the camera sees a return of the object.
     seen: bool,
-    /// Corners in the image.
+    /// Number of corners in the image.
     corners: usize,
 }
 
@@ -44,7 +44,8 @@ impl Tracklets {
         Tracklets { camera, by_id: BTreeMap::new() }
     }
 
-    /// Adds a frame; frames come in order, none left out. `objects` are those at its stamp.
+    /// Adds a frame; frames must come in order with none left out. `objects` are those at its
+    /// stamp.
     pub fn add(&mut self, frame: usize, sweep: &SimSweep, objects: &[ObjectState]) {
         let in_view =
             |position: [f32; 3]| self.camera.sees(DVec3::from_array(position.map(f64::from)));
@@ -80,7 +81,7 @@ impl Tracklets {
         }
     }
 
-    /// The file.
+    /// The content of the file.
     pub fn xml(mut self) -> String {
         for tracklet in self.by_id.values_mut() {
             let last = tracklet.rows.iter().rposition(|row| row.seen).unwrap_or(0);
@@ -102,7 +103,7 @@ impl Tracklets {
     }
 }
 
-/// The attributes that boost gives to the first element of a class alone.
+/// The attributes that boost gives only to the first element of a class.
 fn attributes(first: &mut bool, class_id: usize, version: usize) -> String {
     match std::mem::replace(first, false) {
         true => format!(" class_id=\"{class_id}\" tracking_level=\"0\" version=\"{version}\""),
@@ -139,7 +140,7 @@ impl Tracklet {
 
 impl ObjectRow {
     /// Elements of a pose. State 0: unset, 2: labelled; occlusion 0: visible (or partly, which is
-    /// not told apart), 2: fully; truncation 0: in the image, 1: truncated, 2: outside.
+    /// not distinguished), 2: fully; truncation 0: in the image, 1: truncated, 2: outside.
     fn fields(&self) -> [(&'static str, f64); 15] {
         let truncation = match self.corners {
             8 => 0.0,
@@ -166,7 +167,7 @@ impl ObjectRow {
     }
 }
 
-/// KITTI's name of a class; what it has no name for is "Misc".
+/// KITTI's name of a class; "Misc" if it has none.
 fn object_type(class: Class) -> &'static str {
     match class {
         Class::Car => "Car",
@@ -197,7 +198,7 @@ mod tests {
             size: [12.0, 2.5, 3.0],
             velocity_world: DVec3::ZERO,
         };
-        // Seen in front, behind the camera, of something else, and not at all.
+        // Seen in front, behind the camera, of another object, and not at all.
         for (frame, (x, id)) in
             [(9.0, 0), (9.0, 7), (-9.0, 7), (9.0, 7), (9.0, 3)].iter().enumerate()
         {

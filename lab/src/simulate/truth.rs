@@ -1,4 +1,4 @@
-//! What a simulated drive really was: files of its folder `truth/`, written and read.
+//! Ground truth of a simulated drive: the files of its folder `truth/`, written and read.
 //!
 //! | file | content |
 //! |---|---|
@@ -16,7 +16,7 @@ use raywake_io::source::feather;
 use raywake_sim::{Class, Clutter, Drive, ObjectState, SimSweep};
 use std::path::{Path, PathBuf};
 
-/// Step of the difference that gives turn rates, s.
+/// Step of the difference that yields turn rates, s.
 const STEP_S: f64 = 5e-4;
 
 /// All classes, by number.
@@ -37,32 +37,32 @@ const CLASSES: [Class; 14] = [
     Class::Clutter,
 ];
 
-/// What a return really comes from.
+/// Where a return really comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointTruth {
-    /// Time after the sweep's stamp, s; exact where the azimuth tells it only nearly.
+    /// Time after the sweep's stamp, s; exact even where the azimuth gives it only approximately.
     pub offset_s: f32,
-    /// The sensor, as the rig counts them.
+    /// Index of the sensor in the rig.
     pub sensor: u8,
     /// Id of the object, 0 for the static background.
     pub object: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// How far over ground the point of the material moves within [`raywake_sim::PERIOD_S`] after
-    /// the return, along the axes the vehicle has at the sweep's stamp, m.
+    /// Motion over ground of the reflecting material point within [`raywake_sim::PERIOD_S`] after
+    /// the return, along the axes of the vehicle at the sweep's stamp, m.
     pub flow: [f32; 3],
 }
 
-/// An object at the stamp of a frame, in the frame of the vehicle.
+/// An object at the stamp of a frame, in the vehicle frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectTruth {
     /// The frame.
     pub frame: u64,
     /// As in [`PointTruth::object`].
     pub id: u32,
-    /// What it is.
+    /// Its class.
     pub class: Class,
-    /// The frame of the box lies in its centre: x forward, y left, z up.
+    /// Pose of the box, whose frame has its origin at the centre: x forward, y left, z up.
     pub vehicle_from_box: Pose,
     /// Length, width and height, m.
     pub size: [f64; 3],
@@ -92,18 +92,18 @@ pub fn class_name(class: Class) -> &'static str {
     }
 }
 
-/// The lines of `classes.txt`; what hangs in the air is told only where there is any.
+/// The lines of `classes.txt`; clutter is listed only if there is any.
 pub(super) fn classes(clutter: Clutter) -> String {
     let told = |c: &&Class| **c != Class::Clutter || clutter != Clutter::None;
     CLASSES.iter().filter(told).map(|&c| format!("{} {}\n", c as u8, class_name(c))).collect()
 }
 
-/// The truth of a frame's returns, in the folder of a drive.
+/// Path of the truth of a frame's returns in the folder of a drive.
 pub fn points_path(drive: &Path, frame: u64) -> PathBuf {
     drive.join("truth/points").join(frame_name(frame as usize, "feather"))
 }
 
-/// The truth of objects, in the folder of a drive.
+/// Path of the truth of objects in the folder of a drive.
 pub fn objects_path(drive: &Path) -> PathBuf {
     drive.join("truth/objects.feather")
 }
@@ -112,7 +112,7 @@ pub fn objects_path(drive: &Path) -> PathBuf {
 pub(super) fn of_points(sweep: &SimSweep) -> Vec<PointTruth> {
     let vehicle_from_world = sweep.world_from_vehicle.rotation.conjugate();
     let along = |flow: [f32; 3]| match flow {
-        // Most of the world stands still, and is to be so exactly.
+        // Most of the world is static, and must be exactly so.
         [0.0, 0.0, 0.0] => flow,
         _ => (vehicle_from_world * DVec3::from_array(flow.map(f64::from))).as_vec3().to_array(),
     };
@@ -163,7 +163,7 @@ pub fn write_points(path: &Path, rows: &[PointTruth]) -> Result<(), Error> {
 
 /// Reads the truth of a sweep's returns, in their order.
 ///
-/// Fails where the file is unreadable or damaged, lacks a column, or has a value that cannot be.
+/// Fails if the file is unreadable or damaged, lacks a column, or has an impossible value.
 pub fn read_points(path: &Path) -> Result<Vec<PointTruth>, Error> {
     let names = ["offset_s", "sensor", "object", "class", "flow_x", "flow_y", "flow_z"];
     let t = feather::FeatherTable::read(path, &names)?;
@@ -187,7 +187,7 @@ pub fn read_points(path: &Path) -> Result<Vec<PointTruth>, Error> {
     (0..t.rows()).map(row).collect()
 }
 
-/// Columns of numbers of `objects.feather`, in the order of [`numbers`].
+/// Numeric columns of `objects.feather`, in the order of [`numbers`].
 const NUMBERS: [&str; 14] = [
     "x", "y", "z", "qw", "qx", "qy", "qz", "length", "width", "height", "vx", "vy", "vz",
     "yaw_rate",
@@ -212,7 +212,7 @@ pub fn write_objects(path: &Path, rows: &[ObjectTruth]) -> Result<(), Error> {
 
 /// Reads the truth of objects, by frame and then by id.
 ///
-/// Fails where the file is unreadable or damaged, lacks a column, or has a value that cannot be.
+/// Fails if the file is unreadable or damaged, lacks a column, or has an impossible value.
 pub fn read_objects(path: &Path) -> Result<Vec<ObjectTruth>, Error> {
     let names: Vec<&str> = ["frame", "id", "class"].into_iter().chain(NUMBERS).collect();
     let t = feather::FeatherTable::read(path, &names)?;

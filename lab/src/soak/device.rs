@@ -14,23 +14,23 @@ use std::error::Error;
 use std::path::Path;
 use std::process::Command;
 
-/// Every thousandth submission finds the device lost.
+/// Every thousandth submission reports the device as lost.
 const LOST: &str = "vkQueueSubmit 1000 -4 each";
 
-/// What pipelines are made of.
+/// What pipelines are made from.
 pub struct Makes<'a> {
-    /// Where the heavy half runs.
+    /// Where the expensive half runs.
     pub backend: &'a BackendChoice,
-    /// Read and checked.
+    /// Weights, read and checked.
     pub weights: WeightFiles,
-    /// Checked.
+    /// The profile, checked.
     pub profile: Profile,
-    /// Of the recording.
+    /// The rig of the recording.
     pub rig: Rig,
 }
 
 impl Makes<'_> {
-    /// A pipeline on the backend asked for.
+    /// A pipeline on the requested backend.
     pub fn drive(&self) -> Result<Drive, RunError> {
         let Makes { backend, weights, profile, rig } = self;
         Ok(choose::drive(backend, weights, profile, rig)?.drive)
@@ -49,11 +49,11 @@ pub fn is_under_layer() -> bool {
     std::env::var_os(FAULT).is_some()
 }
 
-/// Has this program do the same again under such a layer: its variables are read as a process
-/// starts. `folder` takes the layer's manifest.
+/// Runs this program again under such a layer, since its variables are read when a process starts.
+/// `folder` receives the layer's manifest.
 ///
 /// # Errors
-/// The other process failed, or could not be begun.
+/// If the other process failed or could not be started.
 pub fn under_layer(library: &Path, folder: &Path) -> Result<(), Box<dyn Error>> {
     let library = library.canonicalize()?;
     atomic::create_folder(folder)?;

@@ -8,27 +8,27 @@ use raywake_core::sweep::Point;
 use raywake_io::source::SweepData;
 use raywake_sim::Rng;
 
-/// Every so many returns one is spoilt.
+/// One in this many returns is corrupted.
 const SPOILT_EVERY: usize = 7;
-/// How far noise reaches, m.
+/// Extent of noise, m.
 const NOISE_M: f64 = 100.0;
-/// Sweeps of a gap: a second.
+/// Sweeps in a gap: one second.
 pub const GAP: usize = 10;
-/// A sweep over capacity has so many times as many returns as the profile takes.
+/// A sweep over capacity has this many times the returns that the profile takes.
 pub const OVER: usize = 2;
 
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Fault {
-    /// One sweep is lost, and tracking goes on.
+    /// One sweep is lost; tracking goes on.
     LostSweep,
-    /// More are lost than tracking bears.
+    /// More sweeps are lost than tracking can bridge.
     Gap,
-    /// Coordinates, times and intensities that are no numbers; sensors that there are none of.
+    /// Coordinates, times and intensities that are not finite; sensors that do not exist.
     NotFinite,
-    /// Poses go on a kilometre away.
+    /// Poses continue a kilometre away.
     Jump,
-    /// Poses go on the other way round.
+    /// Poses continue facing the other way.
     Spin,
     /// The clock is set back by an hour.
     ClockBack,
@@ -36,13 +36,13 @@ pub enum Fault {
     ClockForward,
     /// A sweep without returns.
     Empty,
-    /// Twice as many returns as are taken.
+    /// Twice as many returns as the profile takes.
     OverCapacity,
-    /// All returns at one place.
+    /// All returns at the same place.
     OnePlace,
     /// Returns anywhere.
     Noise,
-    /// The disk is full that results go to.
+    /// The disk that results go to is full.
     FullDisk,
 }
 
@@ -52,8 +52,8 @@ impl Fault {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Spoils the sweep that is `after` the one in the middle of its stretch, where that is not
-    /// negative. Returns whether there is a sweep at all.
+    /// Spoils the sweep that comes `after` sweeps after the middle one of its stretch. Returns
+    /// whether there is a sweep at all.
     pub fn spoil(
         self,
         after: usize,
@@ -100,7 +100,7 @@ impl Fault {
     }
 }
 
-/// Some of the returns hold what is none.
+/// Fills some of the returns with invalid values.
 fn spoilt(points: &mut [Point], rng: &mut Rng) {
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, -0.0];
     for point in points.iter_mut().step_by(SPOILT_EVERY) {

@@ -1,4 +1,4 @@
-//! What was found over time, in a memory that does not grow.
+//! Findings over time, in memory that does not grow.
 
 use super::fault::Fault;
 use super::memory::resident_bytes;
@@ -9,13 +9,13 @@ use raywake::latency::Latencies;
 use raywake_io::Error;
 use std::path::Path;
 
-/// Parts of the time that are told apart.
+/// Number of parts that the time is divided into.
 pub const PERIODS: usize = 10;
-/// Rounds after which most memory has been in use. Seen to grow by 2.4 MiB in the second round, by
-/// 0.06 in the next nine.
+/// Rounds after which most memory has been in use. Measured growth: 2.4 MiB in the second round,
+/// 0.06 MiB in the next nine.
 const IN_USE: u32 = 3;
-/// By how much memory may grow after these, bytes. Seen: 1.5 to 1.7 MiB over six rounds of
-/// stretches of 30 sweeps, which is not explained; 0.02 over 26,279 sweeps in stretches of 100.
+/// Allowed growth of memory after these, bytes. Measured: 1.5 to 1.7 MiB over six rounds with
+/// stretches of 30 sweeps, unexplained; 0.02 MiB over 26,279 sweeps in stretches of 100.
 const GROWTH_MAX: i64 = 4 << 20;
 
 /// A part of the time.
@@ -28,24 +28,25 @@ pub struct Period {
     pub resident: u64,
 }
 
-/// What was found.
+/// The findings of a soak.
 pub struct Findings {
-    /// What the digest of a stretch without a fault must be.
+    /// Required digest of a stretch without a fault.
     pub expected: u64,
-    /// In the order of time.
+    /// In chronological order.
     pub periods: [Period; PERIODS],
-    /// Stretches with each fault, and how many clean ones after them had the expected digest.
+    /// Stretches with each fault, and how many of the clean ones after them had the expected
+    /// digest.
     pub of_fault: Vec<[u64; 2]>,
-    /// Memory once all of it had been in use, bytes; 0 before.
+    /// Memory once all of it had been in use, bytes; 0 before that.
     pub start: u64,
-    /// Devices that failed, after which there was a new one.
+    /// Devices that failed and were replaced by new ones.
     pub devices_failed: u64,
-    /// Stretches in which a device failed, which have no digest to expect.
+    /// Stretches in which a device failed, so that there is no digest to expect.
     pub not_compared: u64,
 }
 
 impl Findings {
-    /// Nothing so far.
+    /// No findings yet.
     pub fn new(expected: u64) -> Findings {
         let period = || Period { sweeps: 0, times: Latencies::default(), resident: 0 };
         Findings {
@@ -58,7 +59,7 @@ impl Findings {
         }
     }
 
-    /// A stretch with a fault and the clean one after it have been done.
+    /// Counts a stretch with a fault and the clean one after it.
     pub fn count(&mut self, fault: Fault, clean: &StretchEnd) {
         let [stretches, as_expected] = &mut self.of_fault[fault as usize];
         *stretches += 1;
@@ -66,13 +67,13 @@ impl Findings {
         *as_expected += u64::from(!clean.failed_over && clean.digest == self.expected);
     }
 
-    /// Clean stretches of another digest.
+    /// Number of clean stretches with a different digest.
     fn wrong(&self) -> u64 {
         let others = self.of_fault.iter().map(|[stretches, as_expected]| stretches - as_expected);
         others.sum::<u64>() - self.not_compared
     }
 
-    /// Takes down how much memory there is now, at the end of a round of all faults.
+    /// Records how much memory is in use, at the end of a round of all faults.
     pub fn weigh(&mut self, period: usize, rounds: u32) {
         let resident = resident_bytes().unwrap_or(0);
         self.periods[period].resident = resident;
@@ -86,16 +87,17 @@ impl Findings {
         self.periods.iter().map(|period| period.sweeps).sum()
     }
 
-    /// Memory at the end less that at the start, bytes.
+    /// Memory at the end minus that at the start, bytes.
     fn growth(&self) -> i64 {
         let last = self.periods.iter().rev().find(|period| period.resident > 0);
         let grown = |period: &Period| period.resident as i64 - self.start as i64;
         last.filter(|_| self.start > 0).map_or(0, grown)
     }
 
-    /// What is not as it must be; none where all is.
+    /// What is wrong; `None` if nothing is.
     pub fn verdict(&self) -> Option<String> {
-        // What a driver makes of a new device is its own: seen to go up by 6 MiB and down again.
+        // What a driver allocates for a new device is its own business: observed to grow by 6 MiB
+        // and to shrink again.
         let grown = self.devices_failed == 0 && self.growth() > GROWTH_MAX;
         let wrong = self.wrong();
         let wrong = (wrong > 0).then(|| format!("{wrong} stretches differ"));
@@ -104,7 +106,7 @@ impl Findings {
         (!all.is_empty()).then(|| all.join("; "))
     }
 
-    /// A line for people on what a period came to.
+    /// A human-readable line on a period.
     pub fn line(&self, period: usize) -> String {
         let Period { sweeps, times, resident } = &self.periods[period];
         let times = times.figures().map_or(String::new(), |f| f.line());

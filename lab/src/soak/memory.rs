@@ -1,11 +1,11 @@
 //! Memory of this process.
 
-/// Bytes that it occupies (RSS); none where the system does not say.
+/// Resident bytes of this process (RSS); `None` if the system does not report them.
 pub fn resident_bytes() -> Option<u64> {
     resident_of(&std::fs::read_to_string("/proc/self/status").ok()?)
 }
 
-/// What Linux says of it.
+/// Parses what Linux reports.
 fn resident_of(status: &str) -> Option<u64> {
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     Some(1024 * kibibytes.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)

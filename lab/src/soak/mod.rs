@@ -1,8 +1,8 @@
 //! `raywake-lab soak`: sweeps in a loop for hours, with faults between clean stretches.
 //!
-//! Every round has a stretch for each fault, which meets it in its middle, and a clean stretch
-//! after each, which begins with the clock set back. The digest of a clean stretch must be that of
-//! a pipeline that has seen nothing else; memory must not grow once all of it has been in use.
+//! Every round has a stretch for each fault, which strikes in its middle, each followed by a clean
+//! stretch, which begins with the clock set back. The digest of a clean stretch must be that of a
+//! pipeline that has seen nothing else; memory must not grow once all of it has been in use.
 
 mod device;
 mod fault;
@@ -38,20 +38,21 @@ pub struct Args {
     /// Recording with poses, in any format that `raywake run` reads [default: a simulated street]
     #[arg(value_name = "DATA")]
     data: Option<PathBuf>,
-    /// How long
+    /// Duration
     #[arg(long, value_name = "HOURS", required_unless_present = "sweeps")]
     hours: Option<f64>,
-    /// How many sweeps, if fewer
+    /// Number of sweeps, if reached earlier
     #[arg(long, value_name = "COUNT")]
     sweeps: Option<u64>,
     /// Sweeps of a stretch
     #[arg(short = 'n', value_name = "COUNT", default_value = "40")]
     #[arg(value_parser = clap::value_parser!(u16).range(3 * GAP as i64..))]
     stretch: u16,
-    /// A folder on a disk that is full, or nearly so: results are written there, too
+    /// A folder on a full or nearly full disk: results are written there, too
     #[arg(long, value_name = "DIR")]
     full_disk: Option<PathBuf>,
-    /// The layer that lets calls fail, as cargo built it: the device is lost every thousandth sweep
+    /// The layer that makes calls fail, as built by cargo: the device is lost every thousandth
+    /// sweep
     #[arg(long, value_name = "LIBRARY")]
     faulty_layer: Option<PathBuf>,
     /// Folder of results
@@ -61,10 +62,10 @@ pub struct Args {
     flow: FlowChoice,
 }
 
-/// Runs, reports, and fails where something was not as it must be.
+/// Runs, reports, and fails if anything was not as it must be.
 ///
 /// # Errors
-/// What a step returns, at once; at the end where digests differ or memory grew.
+/// Any error of a step, at once; at the end if digests differ or memory grew.
 pub fn run(args: &Args) -> Result<(), Box<dyn Error>> {
     if let Some(layer) = args.faulty_layer.as_ref().filter(|_| !device::is_under_layer()) {
         return device::under_layer(layer, &args.out);
@@ -99,7 +100,7 @@ struct Soak<'a> {
     drive: Drive,
     findings: Findings,
     began: Instant,
-    /// The part of the time that it is in.
+    /// The part of the time it is in.
     period: usize,
 }
 
@@ -117,14 +118,14 @@ impl<'a> Soak<'a> {
         };
         let rig = source.rig().clone();
         let makes = Makes { backend: &args.flow.backend, weights, profile, rig };
-        // Of a pipeline of its own, on the CPU.
+        // From a separate pipeline, on the CPU.
         let expected = stretches.run(&mut makes.scalar()?, None, &mut Latencies::default())?;
         let (drive, began) = (makes.drive()?, Instant::now());
         let findings = Findings::new(expected.digest);
         Ok(Soak { args, stretches, makes, drive, findings, began, period: 0 })
     }
 
-    /// Rounds of all faults, until the time is over or a signal comes.
+    /// Runs rounds of all faults until the time is over or a signal arrives.
     fn run(&mut self) -> Result<(), RunError> {
         let met = |fault: &Fault| *fault != Fault::FullDisk || self.args.full_disk.is_some();
         let faults: Vec<Fault> = Fault::value_variants().iter().copied().filter(met).collect();
@@ -146,7 +147,7 @@ impl<'a> Soak<'a> {
         Ok(())
     }
 
-    /// One stretch; where the device fails in it, there is another one afterwards.
+    /// Runs one stretch; if the device fails in it, replaces it afterwards.
     fn stretch(&mut self, fault: Option<Fault>) -> Result<stretch::StretchEnd, RunError> {
         let period = &mut self.findings.periods[self.period];
         let end = self.stretches.run(&mut self.drive, fault, &mut period.times)?;
@@ -162,7 +163,7 @@ impl<'a> Soak<'a> {
         self.began.elapsed().as_secs_f64() / 3600.0
     }
 
-    /// How much of it is done, 0 to 1.
+    /// The completed part of it, 0 to 1.
     fn part(&self) -> f64 {
         let of_time = self.args.hours.map_or(0.0, |hours| self.hours() / hours);
         let done = self.findings.sweeps() as f64;

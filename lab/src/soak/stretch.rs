@@ -16,45 +16,45 @@ use raywake_sim::Rng;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// What all stretches have in common.
+/// What all stretches share.
 pub struct Stretches {
-    /// Checked.
+    /// The profile, checked.
     pub profile: Profile,
-    /// Of the recording.
+    /// The recording's overview.
     pub overview: Overview,
     /// The sweeps of a stretch.
     pub sweeps: Vec<SweepData>,
-    /// A folder on a disk without room.
+    /// A folder on a full disk.
     pub full_disk: Option<PathBuf>,
-    /// What chance there is.
+    /// Source of all randomness.
     pub rng: Rng,
-    /// The sweep in hand and the one before, whose memory is used again.
+    /// The current sweep and the one before; their memory is reused.
     pub sides: [SweepData; 2],
 }
 
-/// What a stretch came to.
+/// Outcome of a stretch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StretchEnd {
-    /// Of all that was put out.
+    /// Digest of all output.
     pub digest: u64,
-    /// Sweeps that were given.
+    /// Sweeps processed.
     pub sweeps: u64,
-    /// Whether the device failed in it.
+    /// Whether the device failed during it.
     pub failed_over: bool,
 }
 
-/// Both sweeps' memory, as large as any fault needs it, and touched.
+/// Memory of both sweeps, as large as any fault needs it, and already touched.
 pub fn sides(profile: &Profile) -> [SweepData; 2] {
     let points = vec![Point { sensor: u32::MAX, ..Point::default() }; OVER * profile.returns()];
     [points.clone(), points].map(|points| SweepData { points, ..SweepData::default() })
 }
 
 impl Stretches {
-    /// One stretch, with a fault in its middle or without one.
+    /// Runs one stretch, with a fault in its middle or without one.
     ///
     /// # Errors
-    /// What a step returns; [`Error`] where a disk that is to be full takes all results, or fails
-    /// otherwise than for want of room.
+    /// Any error of a step; [`Error`] if a disk that should be full accepts all results, or fails
+    /// for a reason other than lack of space.
     pub fn run(
         &mut self,
         drive: &mut Drive,
@@ -93,7 +93,7 @@ impl Stretches {
         Ok(end)
     }
 
-    /// Where results go that there is no room for.
+    /// Where the results go that will not fit.
     fn results(&self, fault: Option<Fault>) -> Result<Option<FullDisk>, Error> {
         let Some(folder) = self.full_disk.as_ref().filter(|_| fault == Some(Fault::FullDisk))
         else {
@@ -107,14 +107,14 @@ impl Stretches {
     }
 }
 
-/// Results on a disk without room.
+/// Results on a full disk.
 struct FullDisk {
     outputs: Outputs,
     root: PathBuf,
 }
 
 impl FullDisk {
-    /// Writes those of a pair. Once there is no room they are removed, and none is left.
+    /// Writes those of a pair. Once the disk is full they are removed, and `None` is returned.
     fn take(mut self, first: &SweepData, flows: &PairFlows) -> Result<Option<FullDisk>, Error> {
         match self.outputs.pair(first, flows, 0.0) {
             Ok(()) => Ok(Some(self)),

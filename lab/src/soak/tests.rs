@@ -19,6 +19,6 @@ fn faults_leave_nothing_behind() {
     let met = soak.findings.of_fault.iter().filter(|counts| **counts != [0, 0]);
     assert!(met.clone().count() == 11 && met.clone().all(|counts| *counts == [1, 1]));
     assert_eq!(soak.findings.verdict(), None);
-    // Eleven stretches lose one sweep and a second of them.
+    // One of these stretches loses one sweep, and another ten.
     assert_eq!(soak.findings.sweeps(), 22 * 30 - 11);
 }

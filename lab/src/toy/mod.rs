@@ -1,8 +1,8 @@
 //! `raywake-lab toy`: the dissertation's example of feature learning (section 4.3) on digits.
 //!
-//! An encoder takes a digit's picture to two numbers. It is trained twice: as half of an
-//! autoencoder, which is to restore the picture (4.1), and by pairs of digits, equal ones close and
-//! different ones apart (4.2). One linear layer then tells the digits by those two numbers alone:
+//! An encoder maps a digit's picture to two numbers. It is trained twice: as half of an autoencoder
+//! that should restore the picture (4.1), and with pairs of digits, equal ones close and different
+//! ones apart (4.2). One linear layer then classifies the digits from those two numbers alone:
 //! table 4.1, figures 4.2 and 4.3.
 
 mod digits;
@@ -21,7 +21,7 @@ use train::{Lesson, Training};
 /// `raywake-lab toy`: report.html, table 4.1 and figures 4.2 and 4.3.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder of MNIST's IDX files, packed or not; folder of 0.json to 9.json; or a .csv file of
+    /// Folder of MNIST's IDX files, gzipped or not; folder of 0.json to 9.json; or a .csv file of
     /// pixels from 0 to 16 and the digit
     #[arg(value_name = "DIGITS")]
     digits: PathBuf,
@@ -32,7 +32,7 @@ pub struct Args {
     training: Training,
 }
 
-/// Learns both ways, writes and prints.
+/// Trains both ways, writes the report and prints it.
 pub fn run(args: &Args) -> Result<(), Error> {
     let sets = digits::open(&args.digits, args.training.seed)?;
     let (both, seconds) = both(&sets, &args.training);
@@ -41,16 +41,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// What came of a lesson.
+/// Outcome of a lesson.
 struct Learned {
     lesson: Lesson,
-    /// Encodings of the test's digits.
+    /// Encodings of the test digits.
     encodings: Vec<[f32; 2]>,
-    /// Share of each digit of the test that was told right, and of all.
+    /// Share of test digits classified correctly, for each digit and for all.
     right: [f64; CLASSES + 1],
 }
 
-/// Both lessons, side by side, and how long they took, s.
+/// Runs both lessons in parallel; also returns how long they took, s.
 fn both(sets: &DigitSets, training: &Training) -> ([Learned; 2], f64) {
     let begin = std::time::Instant::now();
     let learned = |lesson: Lesson| {
@@ -67,7 +67,7 @@ fn both(sets: &DigitSets, training: &Training) -> ([Learned; 2], f64) {
     (both, begin.elapsed().as_secs_f64())
 }
 
-/// Shares told right.
+/// Shares classified correctly.
 fn shares(digits: &Digits, told: &[u8]) -> [f64; CLASSES + 1] {
     let right = |n: &usize| told[*n] == digits.labels[*n];
     let share = |all: &[usize]| all.iter().filter(|n| right(n)).count() as f64 / all.len() as f64;
@@ -76,7 +76,7 @@ fn shares(digits: &Digits, told: &[u8]) -> [f64; CLASSES + 1] {
     std::array::from_fn(|n| share(by_class.get(n).unwrap_or(&all)))
 }
 
-/// Table 4.1 as published, per cent: autoencoder and features, by digit and of all.
+/// Table 4.1 as published, per cent: autoencoder and features, by digit and for all.
 const PUBLISHED: [[f64; 2]; CLASSES + 1] = [
     [87.7, 98.2],
     [97.7, 98.6],

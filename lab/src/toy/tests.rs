@@ -9,10 +9,10 @@ struct Toy {
     args: Args,
 }
 
-/// Strokes of a display of seven of them, by digit.
+/// Strokes of a seven-segment display, by digit.
 const STROKES: [u8; CLASSES] = [0x77, 0x24, 0x5d, 0x6d, 0x2e, 0x6b, 0x7b, 0x25, 0x7f, 0x6f];
 
-/// Digits drawn on 8 x 8 pixels, each stroke a little brighter or darker, with some noise.
+/// Digits drawn on 8 x 8 pixels, with each stroke a little brighter or darker, and some noise.
 fn drawn(count: usize) -> String {
     let mut rng = Rng::new(7);
     let line = |n: usize| {
@@ -31,7 +31,7 @@ fn drawn(count: usize) -> String {
     (0..count).map(line).collect()
 }
 
-/// Of three digits, all pairs can be as they are wanted: no loss is left (4.2).
+/// With three digits, all pairs can be at their desired distances: no loss is left (4.2).
 #[test]
 fn three_digits_reach_the_optimum() {
     let mut rng = Rng::new(4);
@@ -58,8 +58,8 @@ fn three_digits_reach_the_optimum() {
     assert_eq!(told, digits.labels);
 }
 
-/// Every digit of its own; which are taken for another depends on the seed, as two classes that
-/// fell upon each other stay there.
+/// Every digit gets a place of its own; which ones are confused depends on the seed, since two
+/// classes that have collapsed onto each other stay there.
 #[test]
 fn drawn_digits_end_to_end() {
     let scratch = Scratch::new();

@@ -1,4 +1,4 @@
-//! The encoder, learned either way, and the classifier on top.
+//! The encoder, trained either way, and the classifier on top.
 
 use super::digits::{CLASSES, Digits};
 use crate::learning::{
@@ -7,32 +7,33 @@ use crate::learning::{
 use raywake_sim::Rng;
 use std::fmt;
 
-/// Pictures, or pairs of them, of a step.
+/// Pictures, or pairs of them, per step.
 const BATCH: usize = 100;
-/// Distance from which on different digits are far enough apart (4.2).
+/// Distance beyond which different digits are far enough apart (4.2).
 const D_MAX: f32 = 5.0;
-/// Steps of the classifier, each over all digits: more change no digit in a thousand.
+/// Steps of the classifier, each over all digits: more steps change less than one digit in a
+/// thousand.
 const CLASSIFIER_STEPS: usize = 1000;
-/// Its rate: encodings reach from -10 to 10.
+/// Its learning rate: encodings range from -10 to 10.
 const CLASSIFIER_RATE: f32 = 0.05;
 
 /// How to train.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Training {
-    /// Widths of the hidden layers, tanh each.
+    /// Widths of the hidden layers, each with tanh.
     #[arg(long, value_name = "N,N", value_delimiter = ',', default_value = "150,50")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1000))]
     hidden: Vec<u16>,
     /// Steps of Adam, of 100 pictures or 100 pairs.
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
-    /// Rate at the first step; it falls evenly to nothing.
+    /// Learning rate at the first step; it falls linearly to zero.
     #[arg(long, default_value_t = 1e-3)]
     rate: f32,
     /// Weight of the L2 regularisation.
     #[arg(long, default_value_t = 1e-5)]
     l2: f32,
-    /// Of whatever is drawn.
+    /// Seed of everything random.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
@@ -62,7 +63,7 @@ pub struct DigitEncoder {
 }
 
 impl DigitEncoder {
-    /// Two numbers for every digit.
+    /// Returns two numbers for every digit.
     pub fn of(&self, digits: &Digits) -> Vec<[f32; 2]> {
         let input = FeatureMap::row(digits.pixels, digits.values.clone());
         self.network.apply(&self.numbers, &input).values.as_chunks().0.to_vec()
@@ -76,7 +77,7 @@ pub struct DigitClassifier {
 }
 
 impl DigitClassifier {
-    /// The digit of each encoding.
+    /// Returns the digit of each encoding.
     pub fn tell(&self, encodings: &[[f32; 2]]) -> Vec<u8> {
         let input = FeatureMap::row(2, encodings.as_flattened().to_vec());
         let scores = self.layer.forward(&self.numbers, &input);
@@ -86,7 +87,7 @@ impl DigitClassifier {
 }
 
 impl Training {
-    /// In words, for a report.
+    /// Description for a report.
     pub fn text(&self) -> String {
         let widths = self.hidden.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
         format!(
@@ -95,7 +96,7 @@ impl Training {
         )
     }
 
-    /// Learns an encoder.
+    /// Trains an encoder.
     pub fn encoder(&self, lesson: Lesson, digits: &Digits) -> DigitEncoder {
         let widths: Vec<usize> = [digits.pixels]
             .into_iter()
@@ -128,7 +129,7 @@ impl Training {
         DigitEncoder { network: encoder, numbers }
     }
 
-    /// Learns to tell digits by their encodings.
+    /// Trains a classifier of digits by their encodings.
     pub fn classifier(&self, encodings: &[[f32; 2]], labels: &[u8]) -> DigitClassifier {
         let layer =
             Convolution { kernel: 1, inputs: 2, outputs: CLASSES, activation: Activation::Linear };
@@ -153,7 +154,7 @@ impl Training {
     }
 }
 
-/// Dense layers of these widths, tanh but for the last.
+/// Dense layers of these widths, with tanh except for the last.
 fn dense(widths: &[usize], last: Activation) -> FeatureNetwork {
     let hidden = widths.len() - 2;
     let layer = |(n, ends): (usize, &[usize])| Convolution {
@@ -165,7 +166,7 @@ fn dense(widths: &[usize], last: Activation) -> FeatureNetwork {
     FeatureNetwork { layers: widths.windows(2).enumerate().map(layer).collect(), dropout: 0.0 }
 }
 
-/// Gradient of (4.1) over a batch: mean square of what the restored pictures lack.
+/// Gradient of (4.1) over a batch: mean squared error of the restored pictures.
 fn restored(network: &FeatureNetwork, numbers: &[f32], digits: &Digits, rng: &mut Rng) -> Vec<f32> {
     let batch = (0..BATCH).map(|_| rng.bits() as usize % digits.count());
     let pictures: Vec<f32> = batch.flat_map(|n| digits.picture(n)).copied().collect();
@@ -202,7 +203,7 @@ fn told_apart(
     total
 }
 
-/// Two digits drawn evenly among the classes: of one, or of two.
+/// Draws two digits, uniformly among the classes: of the same class or of two.
 fn pair(same: bool, by_class: &[Vec<usize>], rng: &mut Rng) -> [usize; 2] {
     let classes = by_class.len();
     let first = rng.bits() as usize % classes;

@@ -7,21 +7,21 @@ use std::f64::consts::PI;
 /// Sigma of 2.6.4, m.
 pub const SIGMA_M: f64 = 0.05;
 
-/// Pairs farther apart than so many sigmas are left out: each would have added less than e^-16 of
-/// what a pair at distance zero adds. What is missing of the entropy is less than e^-16 divided by
-/// the mean of all pairs in the same unit; that is 1e-4 nats for a cloud of entropy 2.
+/// Pairs farther apart than this many sigmas are left out: each would have added less than e^-16 of
+/// what a pair at distance zero adds. The resulting error of the entropy is less than e^-16 divided
+/// by the mean of all pairs in the same unit: 1e-4 nats for a cloud of entropy 2.
 const CUT_SIGMAS: f64 = 8.0;
 
-/// Points whose pairs are summed at most.
+/// Maximum number of points whose pairs are summed.
 const SAMPLE: usize = 10_000;
 
 type Point = [f32; 3];
 
-/// Entropy of a cloud, nats; NaN where it is empty or a point is not finite.
+/// Entropy of a cloud, nats; NaN if it is empty or a point is not finite.
 ///
-/// Of a cloud of more than [`SAMPLE`] points as many are drawn (the same ones for clouds of as many
-/// points), and the mean over their pairs stands for the mean over all pairs of different points;
-/// that of every point with itself counts by its share in the whole cloud.
+/// From a cloud of more than [`SAMPLE`] points that many are drawn (the same indices for clouds of
+/// equal size), and the mean over their pairs replaces the mean over all pairs of different points;
+/// pairs of a point with itself count by their share in the whole cloud.
 pub fn entropy(cloud: &[Point]) -> f64 {
     if cloud.is_empty() || cloud.iter().flatten().any(|v| !v.is_finite()) {
         return f64::NAN;
@@ -34,7 +34,7 @@ pub fn entropy(cloud: &[Point]) -> f64 {
     -(peak * (alone + (1.0 - alone) * others)).ln()
 }
 
-/// The points whose pairs are summed: a fixed draw without repetition.
+/// The points whose pairs are summed: a fixed draw without replacement.
 fn sample(cloud: &[Point]) -> Vec<Point> {
     let mut points = cloud.to_vec();
     if points.len() > SAMPLE {
@@ -69,7 +69,7 @@ fn pairs(mut points: Vec<Point>) -> f64 {
             sum += between(a, &points[n + 1..]);
         }
         let here = cell(&points[0]);
-        // Half of the neighbours: the other half have this one.
+        // Half of the neighbours: the others have this cell as theirs.
         for step in (-1..=1).flat_map(|x| (-1..=1).map(move |y| [x, y])) {
             for z in -1..=1 {
                 let step = [step[0], step[1], z];
@@ -90,7 +90,7 @@ fn pairs(mut points: Vec<Point>) -> f64 {
 mod tests {
     use super::*;
 
-    /// As it is defined.
+    /// By the definition.
     fn defined(cloud: &[Point]) -> f64 {
         let variance = 2.0 * SIGMA_M * SIGMA_M;
         let normal = |a: &Point, b: &Point| {

@@ -1,27 +1,27 @@
-//! Errors of a track: of what stands about its own mean, of what moves against the truth at the
-//! same point of the body.
+//! Errors of a track: of stationary objects about the track's own mean, of moving ones against the
+//! truth at the same point of the body.
 
 use super::object::{Moment, moment_at};
 use crate::labels::turn;
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 
-/// A constant transform in the frame of the body. Where on a body a tracker's frame lies, and which
-/// way it looks, no return tells: it is chosen once for a track, by least squares, and for every
-/// tracker alike.
+/// A constant transform in the frame of the body. No return determines where on a body a tracker's
+/// frame lies, and which way it faces: this is chosen once per track, by least squares, and in the
+/// same way for every tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
-    /// Where the true origin lies in the tracker's frame, m.
+    /// Position of the true origin in the tracker's frame, m.
     pub offset: DVec3,
-    /// True heading less the tracker's, -pi to pi, rad.
+    /// True heading minus the tracker's, -pi to pi, rad.
     pub heading: f64,
 }
 
 impl Alignment {
-    /// Brings a track nearest to the truth.
+    /// Finds the alignment that brings a track closest to the truth.
     ///
     /// # Panics
-    /// Where the truth is empty.
+    /// If the truth is empty.
     pub fn fit(track: &[Moment], truth: &[Moment]) -> Alignment {
         let (mut offset, mut way) = (DVec3::ZERO, DVec2::ZERO);
         for moment in track {
@@ -32,7 +32,7 @@ impl Alignment {
         Alignment { offset: offset / track.len().max(1) as f64, heading: way.y.atan2(way.x) }
     }
 
-    /// A point of the tracker's frame in the true one.
+    /// Transforms a point from the tracker's frame to the true one.
     pub fn bring(&self, at: DVec3) -> DVec3 {
         let off = at - self.offset;
         DVec2::from_angle(-self.heading).rotate(off.truncate()).extend(off.z)
@@ -65,8 +65,8 @@ pub struct Errors {
     pub heading: f64,
     /// rad²/s².
     pub turn_rate: f64,
-    /// Times that the heading leaps by more than a right angle, or is that far from the truth for
-    /// all of the track.
+    /// Number of times that the heading jumps by more than a right angle, or is that far from the
+    /// truth over the whole track.
     pub flips: usize,
 }
 
@@ -88,7 +88,8 @@ pub struct Rmse {
 }
 
 impl Errors {
-    /// Of what stands: position and heading about their means, velocity and turning rate from zero.
+    /// Errors of a stationary object: position and heading about their means, velocity and turn
+    /// rate from zero.
     pub fn standing(track: &[Moment]) -> Errors {
         let n = track.len().max(1) as f64;
         let position = track.iter().map(|m| m.position).sum::<DVec3>() / n;
@@ -100,7 +101,7 @@ impl Errors {
         errors
     }
 
-    /// Of what moves, after [`Alignment`].
+    /// Errors of a moving object, after [`Alignment`].
     pub fn moving(track: &[Moment], truth: &[Moment]) -> Errors {
         let alignment = Alignment::fit(track, truth);
         let backwards = alignment.heading.abs() > FRAC_PI_2;
@@ -148,7 +149,7 @@ impl Errors {
     }
 }
 
-/// How often a heading leaps against the true one by more than a right angle.
+/// How often a heading jumps by more than a right angle relative to the true one.
 fn leaps(track: &[Moment], truth: impl Fn(f64) -> f64) -> usize {
     let off = |m: &Moment| m.heading - truth(m.time_s);
     track.windows(2).filter(|m| turn(off(&m[0]), off(&m[1])).abs() > FRAC_PI_2).count()
@@ -159,7 +160,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// Round a bend and uphill.
+    /// Through a bend and uphill.
     fn truth() -> Vec<Moment> {
         let (rate, speed) = (0.4, 6.0);
         let moment = |n: usize| {
@@ -203,7 +204,7 @@ mod tests {
 
     #[test]
     fn what_no_constant_transform_explains_is_error() {
-        // To either side by turns, 0.1 m and 0.05 rad.
+        // Alternately to either side, by 0.1 m and 0.05 rad.
         let shake = |(n, m): (usize, &Moment)| {
             let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
             let side = DVec2::from_angle(m.heading).perp().extend(0.0);
@@ -232,7 +233,7 @@ mod tests {
             Errors::moving(&track, &truth()).flips
         };
         assert_eq!((flipped(&[]), flipped(&[45]), flipped(&[20, 30])), (0, 1, 2));
-        // Backwards all along, and for most of the time.
+        // Backwards throughout, and for most of the time.
         assert_eq!((flipped(&[0]), flipped(&[3])), (1, 2));
     }
 

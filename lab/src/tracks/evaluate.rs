@@ -1,4 +1,4 @@
-//! Every tracker over every object.
+//! Evaluates every tracker on every object.
 
 use super::entropy::entropy;
 use super::errors::Errors;
@@ -16,25 +16,25 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// A tracker with its numbers.
+/// A tracker with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// The extended Kalman filter of centroids, its states revised by what it learns later.
     Baseline,
-    /// The same as it is at the time.
+    /// The same with its states as first estimated.
     BaselineLive,
     /// Trajectory and shape together.
     Proposed(EstimateParams),
-    /// The same from the true trajectory instead of the baseline's: what the method itself makes of
-    /// the returns, whatever its start.
+    /// The same, started from the true trajectory instead of the baseline's: what the method itself
+    /// makes of the returns, whatever its start.
     FromTruth(EstimateParams),
-    /// The same over the last seconds, after every batch, as on board: judged by the states it has
-    /// at the time.
+    /// The same over the last seconds, after every batch, as on board: judged by its states as
+    /// first estimated.
     FixedLag(EstimateParams),
 }
 
-/// The trackers of the tables and their names: those of the dissertation, then each option by
-/// itself.
+/// The trackers of the tables and their names: those of the dissertation, then each option
+/// separately.
 pub fn methods() -> [(&'static str, Method); 18] {
     let (printed, ours) = (EstimateParams::DISSERTATION, EstimateParams::DEFAULT);
     let of = Method::Proposed;
@@ -67,31 +67,32 @@ pub fn methods() -> [(&'static str, Method); 18] {
     ]
 }
 
-/// Index of the tracker as printed, of 300 points, in [`methods`].
+/// Index in [`methods`] of the tracker as printed, with 300 points.
 pub const PRINTED: usize = 1;
-/// Index of our tracker of 300 points in [`methods`].
+/// Index in [`methods`] of our tracker with 300 points.
 pub const OURS: usize = 3;
-/// The baseline and those as printed in [`methods`] that table 2.1 is taken apart with.
+/// Indices in [`methods`] of the baseline and the trackers as printed that table 2.1 is broken down
+/// by.
 pub const AS_PRINTED: [usize; 4] = [0, 1, 5, 6];
-/// Trackers of the dissertation's tables, the first ones.
+/// Number of trackers in the dissertation's tables, the first ones.
 pub const MAIN: usize = 5;
 
-/// How one tracker did on one object.
+/// Results of one tracker on one object.
 #[derive(Clone, Debug)]
 pub struct Score {
     pub errors: Errors,
-    /// Of the whole cloud, nats.
+    /// Entropy of the whole cloud, nats.
     pub entropy: f64,
     /// Length, width, height of the cloud, m.
     pub extent: [f64; 3],
-    /// At the start and after each iteration; empty for the baseline.
+    /// Costs at the start and after each iteration; empty for the baseline.
     pub costs: Vec<Cost>,
     pub stop: Termination,
-    /// Time of the estimate, or of all of them where there is one a batch, s; 0 for the baseline.
+    /// Time of the estimate, or of all estimates if there is one per batch, s; 0 for the baseline.
     pub seconds: f64,
 }
 
-/// How all trackers did on one object.
+/// Results of all trackers on one object.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Drive and number.
@@ -99,7 +100,7 @@ pub struct Outcome {
     pub kind: Kind,
     /// Length, width and height of its box, m.
     pub size: [f64; 3],
-    /// Whether it stands.
+    /// Whether it is stationary.
     pub stationary: bool,
     pub returns: usize,
     pub span_s: f64,
@@ -107,9 +108,9 @@ pub struct Outcome {
     pub range_m: f64,
     /// Range of the nearest of its returns, m.
     pub nearest_m: f64,
-    /// By how much its true headings differ, rad.
+    /// Difference between its greatest and smallest true heading, rad.
     pub turned_rad: f64,
-    /// Entropy of its cloud by its true trajectory, nats.
+    /// Entropy of its cloud using its true trajectory, nats.
     pub entropy: f64,
     /// Extent of that cloud, m.
     pub extent: [f64; 3],
@@ -117,7 +118,7 @@ pub struct Outcome {
     pub scores: Vec<Score>,
 }
 
-/// What a tracker did.
+/// The raw result of a tracker.
 pub struct Run {
     pub track: Track,
     costs: Vec<Cost>,
@@ -155,12 +156,12 @@ pub fn track(
         Method::FixedLag(params) => fixed_lag(object, params, estimator),
     };
     let seconds = begin.elapsed().as_secs_f64();
-    // Judged by its states themselves, with the cloud by what joins them.
+    // Judged by its states themselves; the cloud uses the motion interpolated between them.
     let moments = live.iter().map(|s| Moment::from(*s)).collect();
     done(Track { moments, ..Track::of(object, motion(&live)) }, seconds)
 }
 
-/// What the object really did when a state tells of it.
+/// The true state of the object at the time of a state.
 fn true_state(object: &Object, state: &ObjectState) -> ObjectState {
     let truth = moment_at(&object.truth, state.time_s);
     let along = DVec2::from_angle(truth.heading);
@@ -174,7 +175,7 @@ fn true_state(object: &Object, state: &ObjectState) -> ObjectState {
     }
 }
 
-/// What a tracker makes of an object, measured.
+/// Scores a tracker on an object.
 fn score(
     object: &Object,
     history: &[ObjectState],
@@ -221,8 +222,8 @@ pub fn histories(objects: &[Object]) -> Vec<Vec<ObjectState>> {
     objects.iter().map(|o| baseline(o, &CentroidParams::DEFAULT)).collect()
 }
 
-/// Evaluates all trackers on all objects, with the baseline's history of each, `jobs` at a time; in
-/// the order of the objects.
+/// Evaluates all trackers on all objects, with the baseline's history of each, `jobs` at a time.
+/// Returns the outcomes in the order of the objects.
 pub fn evaluate(objects: &[Object], histories: &[Vec<ObjectState>], jobs: usize) -> Vec<Outcome> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {

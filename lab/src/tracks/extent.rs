@@ -2,18 +2,18 @@
 
 use glam::DVec2;
 
-/// Share of the points beyond either side of the box.
+/// Share of the points left outside on each side of the box.
 const OUTSIDE: f64 = 0.01;
 
-/// Steps of a right angle in which the box's heading is sought.
+/// Steps per right angle in the search for the box's heading.
 const STEPS: usize = 90;
 
-/// Points that are looked at, at most, evenly in their order.
+/// Maximum number of points inspected, evenly spaced in their order.
 const POINTS: usize = 2000;
 
-/// Length, width and height of a cloud, m: of the narrowest upright box seen from above that leaves
-/// out 1 % of the points on each side, the longer side first. Where the cloud's frame looks does
-/// not matter. NaN where the cloud is empty.
+/// Length, width and height of a cloud, m: of the upright box with the smallest area seen from
+/// above that leaves out 1 % of the points on each side, the longer side first. The heading of the
+/// cloud's frame does not matter. NaN if the cloud is empty.
 pub fn extent(cloud: &[[f32; 3]]) -> [f64; 3] {
     let step = cloud.len().div_ceil(POINTS).max(1);
     let sample: Vec<[f64; 3]> = cloud.iter().step_by(step).map(|p| p.map(f64::from)).collect();

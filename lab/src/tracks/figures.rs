@@ -12,10 +12,10 @@ use raywake_objects::centroid_ekf::CentroidParams;
 use raywake_objects::estimate::{Cost, Estimator};
 use raywake_sim::Rng;
 
-/// Returns of a cloud that are drawn at most.
+/// Maximum number of returns of a cloud that are drawn.
 const DRAWN: usize = 40_000;
 
-/// Figure 2.5: cost, and mean distance of a return from its model point, after each iteration over
+/// Figure 2.5: cost, and mean distance of a return from its model point, after each iteration on
 /// the simulated sets.
 pub fn convergence(sets: &[Set]) -> Chart {
     let part = |title: &str, y: &str, of: std::ops::Range<usize>, value: fn(&Cost) -> f64| {
@@ -53,7 +53,7 @@ fn means(scores: &[&Score], value: fn(&Cost) -> f64) -> Vec<[f64; 2]> {
     (0..most).map(after).collect()
 }
 
-/// The trackers that are drawn: the baseline, as printed, ours.
+/// The trackers drawn: the baseline, as printed, ours.
 fn drawn(object: &Object, estimator: &mut Estimator) -> [(&'static str, Track); 3] {
     let methods: [(&str, Method); 3] = [0, 1, OURS].map(|n| methods()[n]);
     let history = baseline(object, &CentroidParams::DEFAULT);
@@ -83,7 +83,7 @@ pub fn profile(object: &Object, estimator: &mut Estimator) -> Chart {
             let alignment = Alignment::fit(&track.moments, &object.truth);
             let mut moments: Vec<Moment> =
                 track.moments.iter().map(|m| alignment.apply(m)).collect();
-            // Whole turns mean nothing.
+            // Whole revolutions are irrelevant.
             let turns = really[0].heading - moments[0].heading;
             let turns = (turns / std::f64::consts::TAU).round() * std::f64::consts::TAU;
             moments.iter_mut().for_each(|m| m.heading += turns);
@@ -100,7 +100,7 @@ pub fn profile(object: &Object, estimator: &mut Estimator) -> Chart {
 
 /// Figures 2.1, 2.6, 2.8 and 2.9: the cloud of an object by each tracker and by its true motion.
 ///
-/// Fails where a picture cannot be drawn.
+/// Fails if a picture cannot be drawn.
 pub fn cloud(id: &str, object: &Object, estimator: &mut Estimator) -> Result<Picture, Error> {
     let really = Track::of(object, |t| moment_at(&object.truth, t));
     let tracks = drawn(object, estimator).into_iter().chain([("truth", really)]);
@@ -131,7 +131,7 @@ pub fn cloud(id: &str, object: &Object, estimator: &mut Estimator) -> Result<Pic
     Ok(Picture { id: id.into(), caption, png: clouds(&panels, reach)? })
 }
 
-/// Returns in the order in which they are drawn, not that of time: the last would hide the first.
+/// Returns in drawing order, which is random: in order of time the last would hide the first.
 fn order(count: usize) -> Vec<usize> {
     let mut rng = Rng::new(1);
     let mut order: Vec<usize> = (0..count).collect();

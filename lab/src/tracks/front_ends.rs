@@ -17,37 +17,37 @@ use raywake_objects::front_end::Track;
 use std::ops::Range;
 use std::path::Path;
 
-/// Returns of a track by which its object is told, at most, evenly in their order.
+/// Maximum number of returns of a track that identify its object, evenly spaced in their order.
 const SAMPLE: usize = 2000;
 
-/// How far a return of a box lies outside of it at most, m.
+/// How far outside a box its returns may lie, m.
 const MARGIN_M: f64 = 0.25;
 
-/// Tracks of fewer observations are none: they are too short to be anything.
+/// Tracks with fewer observations are ignored as too short.
 const OBSERVATIONS: usize = 10;
 
-/// An object is someone else's where most of a track's returns within such a time are, s.
+/// A track's object is determined in intervals of this length, by most of its returns, s.
 const OWNED_S: f64 = 1.0;
 
-/// What one front end finds of the labelled objects of some drives.
+/// Results of one front end on the labelled objects of some drives.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
-    /// Labelled objects, and those with a track of their own.
+    /// Labelled objects, and those with at least one track.
     pub objects: [usize; 2],
     /// Tracks, and those of a labelled object.
     pub tracks: [usize; 2],
-    /// Tracks of an object beyond its first, all objects together.
+    /// Tracks of an object beyond its first, summed over all objects.
     pub fragments: usize,
-    /// Times that a track goes over from an object to another.
+    /// Number of times that a track switches from one object to another.
     pub swaps: usize,
     /// The longest track of each object found.
     pub outcomes: Vec<Outcome>,
 }
 
 impl Found {
-    /// Adds a drive, through the front end of a kind.
+    /// Adds a drive, run through the front end of a kind.
     ///
-    /// Fails where the drive cannot be read or the flow has no backend.
+    /// Fails if the drive cannot be read or the flow has no backend.
     pub fn add(
         &mut self,
         path: &Path,
@@ -129,7 +129,7 @@ fn owners(track: &Track, objects: &[&Object]) -> Vec<(f64, Option<usize>)> {
     some.map(owner).collect()
 }
 
-/// The object whose box holds a place of the world at a time of the drive.
+/// The object whose box contains a place in the world at a time of the drive.
 fn owner(objects: &[&Object], time_s: f64, place: DVec3) -> Option<usize> {
     let holds = |object: &&Object| {
         let after_s = time_s - object.start_s;
@@ -143,7 +143,7 @@ fn owner(objects: &[&Object], time_s: f64, place: DVec3) -> Option<usize> {
     objects.iter().position(holds)
 }
 
-/// The object that more than half of some returns lie on.
+/// The object on which more than half of some returns lie.
 fn majority(owners: impl Iterator<Item = Option<usize>>) -> Option<usize> {
     let (mut counts, mut all) = (std::collections::BTreeMap::new(), 0);
     for owner in owners {
@@ -161,12 +161,12 @@ fn swaps(owners: &[(f64, Option<usize>)]) -> usize {
     of_bins.windows(2).filter(|o| o[0] != o[1]).count()
 }
 
-/// An object as a track has it: with the track's returns, batches and times.
+/// An object as seen by a track: with the track's returns, batches and times.
 fn seen_as(object: &Object, track: &Track) -> Object {
     let anchor = DVec3::from_array(track.anchor);
     let mut returns = track.returns().to_vec();
     returns.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    // A batch for each update of the filter, as near in time as any.
+    // A batch for each update of the filter, of the returns closest to it in time.
     let mut batches: Vec<Range<usize>> = Vec::new();
     for state in track.history() {
         let from = batches.last().map_or(0, |b| b.end);
@@ -206,13 +206,13 @@ mod tests {
             (most("1112"), most("1122"), most("111---"), most("")),
             (Some(1), None, None, None)
         );
-        // Four a second; a second without a majority says nothing.
+        // Four a second; a second without a majority is ignored.
         let count = |text: &str| swaps(&owners(text));
         assert_eq!((count("11112222"), count("1111111222222222")), (1, 1));
         assert_eq!((count("1111222211112222"), count("1111----1111"), count("")), (3, 0, 0));
     }
 
-    /// A wall of returns, followed by a track of its own, against two objects.
+    /// Boxes of two objects, and places inside and outside them over time.
     #[test]
     fn a_track_lies_on_the_object_whose_box_holds_it() {
         let object = |x: f64, speed: f64| {

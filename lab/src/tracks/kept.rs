@@ -1,7 +1,7 @@
-//! Simulated sets kept in a file: to cast them again takes minutes.
+//! Simulated sets kept in a file: casting them again takes minutes.
 //!
-//! Little-endian: what was asked for, then every object's head, returns, ends of batches and truth,
-//! then a checksum of it all.
+//! Little-endian: the key of the request, then every object's head, returns, ends of batches and
+//! truth, then a checksum of everything.
 
 use super::object::{Moment, Object};
 use super::simulated::{Sets, Wanted, rule, simulate};
@@ -14,13 +14,13 @@ use raywake_objects::ObjectReturn;
 use std::io::Write;
 use std::path::Path;
 
-/// Counts changes of the simulator and of the format: files of another number are made anew.
+/// Version of the simulator and the format: files of another version are regenerated.
 const VERSION: u32 = 3;
 
-/// The sets of a seed from a folder, or simulated and left there.
+/// The sets of a seed, read from a folder, or simulated and stored there.
 ///
-/// Fails where the folder cannot be written. A file that is damaged, or made of something else, is
-/// made anew.
+/// Fails if the folder cannot be written. A file that is damaged or was made from another request
+/// is regenerated.
 pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
     let path = folder.join(format!("objects-{seed}.bin"));
     let key = key(seed, wanted);
@@ -33,7 +33,7 @@ pub fn sets(folder: &Path, seed: u64, wanted: &Wanted) -> Result<Sets, Error> {
     Ok(sets)
 }
 
-/// What decides the objects.
+/// Digest of everything that decides the objects.
 pub fn key(seed: u64, wanted: &Wanted) -> u64 {
     Digest::of(format!("{VERSION} {seed} {wanted:?} {}", rule()).as_bytes())
 }
@@ -77,7 +77,7 @@ fn write_object(out: &mut Vec<u8>, o: &Object) {
     }
 }
 
-/// The sets of a file; none where it is damaged or has another key.
+/// The sets in a file; `None` if it is damaged or has another key.
 pub fn read(bytes: &[u8], key: u64) -> Option<Sets> {
     let (content, check) = bytes.split_last_chunk::<8>()?;
     if u64::from_le_bytes(*check) != Digest::of(content) {
@@ -90,7 +90,7 @@ pub fn read(bytes: &[u8], key: u64) -> Option<Sets> {
     Some(Sets { stationary: left.all(Left::object)?, moving: left.all(Left::object)? })
 }
 
-/// What is not read yet.
+/// The bytes not yet read.
 struct Left<'a>(&'a [u8]);
 
 impl Left<'_> {
@@ -108,7 +108,7 @@ impl Left<'_> {
         usize::try_from(self.word()?).ok()
     }
 
-    /// A count and so many of something.
+    /// A count, followed by that many items.
     fn all<T>(&mut self, one: impl Fn(&mut Self) -> Option<T>) -> Option<Vec<T>> {
         let count = self.count()?;
         (0..count).map(|_| one(self)).collect()

@@ -1,9 +1,9 @@
 //! `raywake-lab eval tracks`: chapter 2's tables and figures on objects whose trajectories are
 //! known.
 //!
-//! Segmentation and association are perfect here, as the dissertation assumes where it discards by
-//! hand what is not. Every object goes through the baseline and the proposed tracker; errors, the
-//! entropy of the cloud and its extent are compared with the truth.
+//! Segmentation and association are perfect here, as in the dissertation, which discards failures
+//! by hand. Every object goes through the baseline and the proposed tracker; errors, the entropy of
+//! the cloud and its extent are compared with the truth.
 
 mod entropy;
 mod errors;
@@ -39,20 +39,20 @@ use tables::Set;
 /// `raywake-lab eval tracks`: report.html, tables, charts and pictures.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Labelled drives, recorded or simulated, beside the simulated sets; the front ends run over
-    /// these
+    /// Labelled drives, recorded or simulated, in addition to the simulated sets; the front ends
+    /// run on these
     #[arg(value_name = "DRIVE")]
     drives: Vec<PathBuf>,
     /// Folder of results; the simulated objects are kept there for the next run
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Seed of the simulated sets: 1 to 6 are for choosing numbers
+    /// Seed of the simulated sets: 1 to 6 are for choosing parameters
     #[arg(long, default_value_t = 7)]
     seed: u64,
-    /// Objects at a time; as many as the machine runs at once unless given
+    /// Objects at a time [default: the number of threads the machine runs at once]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Front ends that run over the drives
+    /// Front ends to run on the drives
     #[arg(long, value_enum, value_name = "KIND,...", value_delimiter = ',')]
     #[arg(default_value = "variance,flow")]
     front_ends: Vec<FrontEndKind>,
@@ -68,7 +68,7 @@ struct Objects {
 
 /// Evaluates, writes and prints.
 ///
-/// Fails where a drive cannot be read or the report not be written.
+/// Fails if a drive cannot be read or the report cannot be written.
 pub fn run(args: &Args) -> Result<(), RunError> {
     let jobs = args.jobs.unwrap_or_else(cores);
     let begin = Instant::now();
@@ -118,7 +118,7 @@ pub fn run(args: &Args) -> Result<(), RunError> {
 /// Names of the sets of labelled drives.
 const DRIVES: [&str; 2] = ["drives-stationary", "drives-moving"];
 
-/// What each front end finds on the drives; nothing without drives.
+/// Results of each front end on the drives; empty without drives.
 fn found(
     args: &Args,
     drives: &[Recorded],
@@ -187,7 +187,7 @@ fn conclude(
 const FRONT_ENDS: &str = "Above, segmentation and association are perfect. Here the labelled \
     objects are followed as the front ends find them; each object counts by its longest track.";
 
-/// What the front ends find, and the errors of that.
+/// What the front ends find, and the errors of the resulting tracks.
 fn front_ends(found: &[(&'static str, Found)]) -> Vec<Table> {
     let mut all = vec![tables::front_ends(found)];
     for (n, (name, found)) in found.iter().enumerate() {
@@ -214,8 +214,8 @@ fn headlines(report: &mut Report, sets: &[Set]) {
     }
 }
 
-/// Clouds and profiles of a parked car, a cyclist and a bus: of each the one of most returns. Then
-/// the parked object that the estimate as printed is farthest off with.
+/// Clouds and profiles of a parked car, a cyclist and a bus: for each the one with most returns.
+/// Then the parked object on which the estimate as printed is worst.
 fn pictures(report: &mut Report, all: &[Objects], sets: &[Set]) -> Result<(), Error> {
     let find = |id: &str, kind: Kind| {
         let set = all.iter().find(|set| set.id == id)?;
@@ -241,8 +241,8 @@ fn pictures(report: &mut Report, all: &[Objects], sets: &[Set]) -> Result<(), Er
     Ok(())
 }
 
-/// The parked object that the estimate as printed is farthest off with: where it fails, it has seen
-/// the same face twice (figure 2.9).
+/// The parked object on which the estimate as printed is worst: where it fails, it has seen the
+/// same face twice (figure 2.9).
 fn fault_case<'a>(all: &'a [Objects], sets: &[Set]) -> Option<&'a Object> {
     let objects = &all.iter().find(|o| o.id == "stationary")?.objects;
     let outcomes = &sets.iter().find(|s| s.id == "stationary")?.outcomes;
@@ -251,7 +251,7 @@ fn fault_case<'a>(all: &'a [Objects], sets: &[Set]) -> Option<&'a Object> {
     pairs.max_by(|a, b| off(a.1).total_cmp(&off(b.1))).map(|(object, _)| object)
 }
 
-/// Every choice that decides what is counted.
+/// Every convention that decides what is counted.
 fn choices() -> String {
     format!(
         "Simulated objects are seen by four HDL-32E from a moving vehicle with exact poses: {}\n\n\

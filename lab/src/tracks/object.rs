@@ -1,4 +1,4 @@
-//! Objects whose every return and true trajectory are known: what a tracker is measured on.
+//! Objects for evaluating trackers, with all their returns and their true trajectory known.
 
 use crate::labels::Kind;
 use glam::{DVec2, DVec3};
@@ -14,18 +14,18 @@ pub struct Object {
     pub kind: Kind,
     /// Length, width and height of its box, m.
     pub size: [f64; 3],
-    /// Whether it stands; its tracker does not know.
+    /// Whether it is stationary, which its tracker does not know.
     pub stationary: bool,
-    /// Where positions are measured from, m in the world.
+    /// Origin of positions, m in the world.
     pub anchor: DVec3,
-    /// When times are measured from, s in the drive.
+    /// Origin of times, s in the drive.
     pub start_s: f64,
-    /// All its returns, in the order of time.
+    /// All its returns, in order of time.
     pub returns: Vec<ObjectReturn>,
-    /// Those that make one observation of the baseline, about 0.1 s of them (section 2.4); none is
-    /// empty.
+    /// Returns that form one observation of the baseline, about 0.1 s of them (section 2.4); none
+    /// is empty.
     pub batches: Vec<Range<usize>>,
-    /// What it really did, in the order of time.
+    /// Its true motion, in order of time.
     pub truth: Vec<Moment>,
 }
 
@@ -36,15 +36,15 @@ pub struct Seen {
     pub at: DVec3,
     /// Where it began, m.
     pub from: DVec3,
-    /// When, s in the drive.
+    /// When it was measured, s in the drive.
     pub time_s: f64,
-    /// As the rig counts them.
+    /// Index in the rig.
     pub sensor: u8,
     /// See [`ObjectReturn::passed`].
     pub passed: [bool; 2],
 }
 
-/// Finds where rays pass the returns of a sweep that are asked for.
+/// Finds on which sides neighbouring rays pass the wanted returns of a sweep.
 pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
     let ray = |s: &Seen| (s.sensor, [0.0; 3], (s.at - s.from).as_vec3().to_array());
     let mut panorama = raywake_alloc_guard::boxed!(Panorama, Panorama::new());
@@ -52,7 +52,7 @@ pub fn look_beside(seen: &mut [Seen], wanted: impl Fn(usize) -> bool) {
 }
 
 impl Seen {
-    /// As a return of an object.
+    /// Converts it to a return of an object.
     pub fn of_object(&self, anchor: DVec3, start_s: f64) -> ObjectReturn {
         let local = |at: DVec3| (at - anchor).as_vec3().to_array();
         ObjectReturn {
@@ -72,9 +72,9 @@ pub struct Moment {
     pub time_s: f64,
     /// Origin of its frame, m from its anchor.
     pub position: DVec3,
-    /// About +z, rad, without leaps by a turn.
+    /// About +z, rad, unwrapped.
     pub heading: f64,
-    /// Of the origin, along the axes of the world, m/s.
+    /// Velocity of the origin, along the axes of the world, m/s.
     pub velocity: DVec3,
     /// rad/s.
     pub turn_rate: f64,
@@ -94,7 +94,7 @@ impl From<ObjectState> for Moment {
 }
 
 impl Moment {
-    /// A point of the world, m from the anchor, in the object's frame.
+    /// Transforms a point of the world, m from the anchor, into the object's frame.
     pub fn project(&self, at: DVec3) -> DVec3 {
         let off = at - self.position;
         DVec2::from_angle(-self.heading).rotate(off.truncate()).extend(off.z)
@@ -111,7 +111,7 @@ impl Moment {
         }
     }
 
-    /// The same motion carried on for so long.
+    /// The same motion extrapolated by `dt_s`.
     fn carried(&self, dt_s: f64) -> Moment {
         Moment {
             time_s: self.time_s + dt_s,
@@ -122,11 +122,11 @@ impl Moment {
     }
 }
 
-/// The moment at a time, between two of a history on the line that joins them, before and after
-/// it by the motion of its ends.
+/// The moment at a time, linearly interpolated within a history, and extrapolated by the motion of
+/// its ends before and after it.
 ///
 /// # Panics
-/// Where the history is empty.
+/// If the history is empty.
 pub fn moment_at(history: &[Moment], time_s: f64) -> Moment {
     let next = history.partition_point(|m| m.time_s <= time_s);
     if next == 0 || next == history.len() {

@@ -10,34 +10,34 @@ use raywake_io::Error;
 use raywake_io::source::{self, OpenOptions, Source, SweepData};
 use std::path::Path;
 
-/// How far a box reaches beyond its sides, m.
+/// How far boxes are extended beyond their sides, m.
 const MARGIN_M: f64 = 0.15;
 
-/// Returns lower than this above a box's bottom count as ground, m.
+/// Returns below this height above a box's bottom count as ground, m.
 const GROUND_M: f64 = 0.2;
 
-/// Returns of a sweep, and sweeps with as many, at least.
+/// Minimum number of returns per sweep, and of sweeps that have as many.
 const BATCH_RETURNS: usize = 10;
 const BATCHES: usize = 10;
 
-/// The objects of a drive, and how far the labels of those that stand wander in the world.
+/// The objects of a drive, and the labels of those that are parked, which wander in the world.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// Parked ones.
     pub stationary: Vec<Object>,
     /// Moving ones; their truth is their smoothed labels.
     pub moving: Vec<Object>,
-    /// Labels of the parked ones as they are, in their order.
+    /// Labels of the parked ones as given, in the same order.
     pub labels: Vec<Vec<Moment>>,
-    /// Labelled tracks that are left out: seen too shortly or by too few returns, or neither parked
-    /// nor moving all along.
+    /// Labelled tracks left out: seen too briefly or by too few returns, or neither parked nor
+    /// moving throughout.
     pub left_out: usize,
 }
 
-/// The labelled objects of the drive at `path`: what lies in their boxes and above the ground, at
-/// the time and from the place of every return.
+/// The labelled objects of the drive at `path`: the returns in their boxes and above the ground, at
+/// the time and from the origin of every return.
 ///
-/// Fails where the drive or its labels cannot be read.
+/// Fails if the drive or its labels cannot be read.
 pub fn read(path: &Path) -> Result<Recorded, Error> {
     let mut source = source::open(path, &OpenOptions::default())?;
     let labels = labels::open(path, source.as_ref())?;
@@ -86,7 +86,7 @@ fn gather(
         let world_from_box = sweep.world_from_vehicle * *labelled;
         let half = 0.5 * DVec3::from_array(track.size);
         let within = |s: &&Seen| {
-            // The box moves on until the return's time.
+            // The box moves until the return's time.
             let moved = state.velocity * (s.time_s - sweep.stamp_s);
             let at = world_from_box.inverse().transform(s.at - moved);
             let out = at.abs() - half;
@@ -115,7 +115,7 @@ fn seen(clock: &ReturnClock, rig: &Rig, sweep: &SweepData, point: &Point) -> Opt
     Some(Seen { at, from, time_s, sensor: point.sensor as u8, passed: [false; 2] })
 }
 
-/// The object of a track and its labels as they are; none where it is left out.
+/// The object of a track and its labels as given; `None` if it is left out.
 fn object(
     source: &dyn Source,
     track: &Track,
@@ -158,7 +158,7 @@ fn object(
     Some((object, labelled.into_iter().filter(seen).collect()))
 }
 
-/// Times, poses and velocities in the world as moments; turning rates are differences of headings.
+/// Times, poses and velocities in the world as moments; turn rates are differences of headings.
 fn moments(states: &[(f64, Pose, DVec3)], anchor: DVec3, start_s: f64) -> Vec<Moment> {
     let mut moments: Vec<Moment> = Vec::with_capacity(states.len());
     for (stamp_s, pose, velocity) in states {
@@ -175,7 +175,7 @@ fn moments(states: &[(f64, Pose, DVec3)], anchor: DVec3, start_s: f64) -> Vec<Mo
     let last = moments.len().saturating_sub(1);
     let between = |n: usize| (moments[n.saturating_sub(1)], moments[(n + 1).min(last)]);
     let rate = |(a, b): (Moment, Moment)| (b.heading - a.heading) / (b.time_s - a.time_s);
-    // A single one tells no rate.
+    // A single moment determines no rate.
     let rates: Vec<f64> = (0..moments.len()).map(|n| rate(between(n))).collect();
     let turning =
         |(m, rate): (Moment, f64)| Moment { turn_rate: if last > 0 { rate } else { 0.0 }, ..m };
@@ -205,7 +205,7 @@ mod tests {
         };
         let point = |position| Point { position, ..Point::default() };
         let clock = ReturnClock::new();
-        // It turns clockwise: the left comes a quarter of a turn before the stamp.
+        // It rotates clockwise: the left comes a quarter of a revolution before the stamp.
         for ([x, y], early) in [([5.0, 0.0], 0.0), ([0.0, 5.0], 0.025), ([0.0, -5.0], -0.025)] {
             let Seen { at, from, time_s, .. } =
                 seen(&clock, &rig, &sweep, &point([x, y, 0.0])).unwrap();

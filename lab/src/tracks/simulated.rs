@@ -11,40 +11,40 @@ use std::ops::Range;
 /// Sweeps of a drive.
 const SWEEPS: usize = 100;
 
-/// A track ends where fewer returns than this ...
+/// A track ends if fewer returns than this ...
 const BATCH_RETURNS: usize = 20;
-/// ... come in each of more than so many batches.
+/// ... come in each of more than this many batches.
 const GAP_BATCHES: usize = 5;
 
-/// Batches from the first to the last of an object at least, and at most: longer ones are cut to
-/// what lies about the batch of most returns.
+/// Minimum and maximum number of batches from the first to the last of an object: longer ones are
+/// cut to those around the batch with most returns.
 const BATCHES: [usize; 2] = [40, 65];
 
-/// Returns of an object at least.
+/// Minimum number of returns of an object.
 const RETURNS: usize = 2000;
 
-/// What moves goes so far at least, m.
+/// Minimum distance covered by a moving object, m.
 const MOVED_M: f64 = 2.0;
 
-/// Parked objects of one drive at most, and moving ones of a kind, so that they are of many
-/// streets.
+/// Maximum number of parked objects from one drive, and of moving ones of a kind, so that they come
+/// from many streets.
 const PER_DRIVE: [usize; 2] = [6, 2];
 
-/// Between two samples of the truth, s.
+/// Time between two samples of the truth, s.
 const TRUTH_S: f64 = 0.01;
 
-/// Half the step of the difference that gives velocities, s.
+/// Half the time step of the difference quotient for velocities, s.
 const STEP_S: f64 = 5e-4;
 
-/// Drives that are laid out at most.
+/// Maximum number of drives laid out.
 const DRIVES_MAX: u64 = 400;
 
-/// How many objects are wanted.
+/// Numbers of objects wanted.
 #[derive(Clone, Debug)]
 pub struct Wanted {
     /// Parked vehicles.
     pub parked: usize,
-    /// What moves, of every kind.
+    /// Moving objects, by kind.
     pub moving: Vec<(Kind, usize)>,
 }
 
@@ -70,7 +70,7 @@ impl Wanted {
         self.parked == 0 && self.moving.iter().all(|m| m.1 == 0)
     }
 
-    /// Takes one off, parked or moving of a kind, if such a one is wanted.
+    /// Takes one off, parked or moving of a kind, if one is wanted.
     fn take(&mut self, moving: Option<Kind>) -> bool {
         let left = match moving {
             None => &mut self.parked,
@@ -84,7 +84,7 @@ impl Wanted {
         wanted
     }
 
-    /// Whether a drive may have something that is wanted.
+    /// Whether a drive may have an object that is wanted.
     fn may_have(&self, drive: &Drive) -> bool {
         let lacks = |kind| self.moving.iter().any(|m| m.0 == kind && m.1 > 0);
         let moves = |o: &raywake_sim::Object| !o.path.is_still() && lacks(of_class(o.class));
@@ -92,7 +92,7 @@ impl Wanted {
     }
 }
 
-/// Which objects are taken, for people.
+/// The rule for choosing objects, for display.
 pub fn rule() -> String {
     let ([least, most], [parked, of_a_kind]) = (BATCHES, PER_DRIVE);
     format!(
@@ -108,17 +108,17 @@ fn of_class(class: raywake_sim::Class) -> Kind {
     kind(class_name(class)).unwrap_or(Kind::Other)
 }
 
-/// Objects of the drives of a seed, those that stand and those that move.
+/// Objects of the drives of a seed, stationary and moving.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sets {
     /// Parked vehicles.
     pub stationary: Vec<Object>,
-    /// What moves.
+    /// Moving objects.
     pub moving: Vec<Object>,
 }
 
-/// Drives by a seed until there are as many objects as are wanted; the same on every run. Fewer
-/// where [`DRIVES_MAX`] drives do not have them.
+/// Simulates drives from a seed until there are as many objects as wanted, the same on every run;
+/// or fewer if [`DRIVES_MAX`] drives do not have them.
 pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
     let mut wanted = wanted.clone();
     let mut sets = Sets { stationary: Vec::new(), moving: Vec::new() };
@@ -147,7 +147,8 @@ pub fn simulate(seed: u64, wanted: &Wanted) -> Sets {
     sets
 }
 
-/// Drive `number` of a seed: three of five straight on, the others round a corner or to a stop.
+/// Drive `number` of a seed: three in five go straight on, the others round a corner or stop and
+/// go.
 fn drive(seed: u64, number: u64) -> Drive {
     let mut rng = Rng::split(seed, number);
     let ego = match (rng.unit() * 5.0) as u32 {
@@ -159,7 +160,7 @@ fn drive(seed: u64, number: u64) -> Drive {
     Drive::new(rng.bits(), options)
 }
 
-/// Everything in a drive that is seen well and long enough, in the order of ids.
+/// All objects in a drive that are seen well and long enough, in the order of ids.
 fn objects(drive: &Drive, number: u64) -> Vec<Object> {
     let mut seen: BTreeMap<u32, Vec<Seen>> = BTreeMap::new();
     for index in 0..drive.sweeps() {
@@ -201,7 +202,7 @@ fn objects(drive: &Drive, number: u64) -> Vec<Object> {
     found
 }
 
-/// The sweep, which is a batch, that a time belongs to.
+/// The batch, which is a sweep, that a time belongs to.
 fn batch(time_s: f64) -> usize {
     (time_s / PERIOD_S + 0.5).max(0.0) as usize
 }
@@ -215,7 +216,7 @@ fn batches(returns: &[Seen]) -> Vec<Range<usize>> {
     batches
 }
 
-/// Adds the returns of a sweep, each in the world by the vehicle's pose at its own time.
+/// Adds the returns of a sweep, each placed in the world by the vehicle's pose at its own time.
 fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>) {
     let rig = drive.rig();
     // All beams of a column have one time.
@@ -238,8 +239,8 @@ fn collect(drive: &Drive, sweep: &SimSweep, seen: &mut BTreeMap<u32, Vec<Seen>>)
     }
 }
 
-/// The longest stretch of batches without a gap, cut to what lies about its fullest batch; none
-/// where it is too short.
+/// The longest stretch of batches without a gap, cut to those around its fullest batch; `None` if
+/// it is too short.
 fn window(returns: &[Seen]) -> Option<Range<usize>> {
     let mut counts = [0; SWEEPS + 1];
     for r in returns {
@@ -259,7 +260,7 @@ fn window(returns: &[Seen]) -> Option<Range<usize>> {
     Some(begin..end.min(begin + most))
 }
 
-/// What an object does from `start_s` for so many batches.
+/// The true motion of an object from `start_s` on, over this many batches.
 fn truth(drive: &Drive, id: u32, anchor: DVec3, start_s: f64, batches: usize) -> Vec<Moment> {
     let scene = drive.scene();
     let object = &scene.objects[id as usize - 1];

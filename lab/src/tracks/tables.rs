@@ -1,4 +1,4 @@
-//! Tables 2.1 and 2.2 of the dissertation, and what else is counted.
+//! Tables 2.1 and 2.2 of the dissertation, and related counts.
 
 use super::errors::{Errors, Rmse};
 use super::evaluate::{AS_PRINTED, MAIN, OURS, Outcome, Score, methods};
@@ -10,10 +10,10 @@ use raywake::order_statistics::median;
 /// Tracks listed as the worst.
 const WORST: usize = 10;
 
-/// Ranges of nearest returns that are told apart, m: a lane beside it, a lane between, farther.
+/// Bins of the range of the nearest return, m: in the adjacent lane, one lane between, farther.
 const PASSING_M: [(f64, f64); 3] = [(0.0, 4.0), (4.0, 8.0), (8.0, f64::INFINITY)];
 
-/// What turns by less goes straight on, rad.
+/// An object that turns by less goes straight on, rad.
 const STRAIGHT_RAD: f64 = 0.1;
 
 /// Table 2.1: baseline, n_m = 300, n_m = 3000; m, m/s, rad, rad/s.
@@ -30,7 +30,7 @@ const PRINTED_ENTROPY: [(&str, [f64; 3]); 2] = [
 ];
 
 pub struct Set {
-    /// Part of the tables' names.
+    /// Part of the tables' ids.
     pub id: String,
     /// As in "simulated, stationary".
     pub name: String,
@@ -55,13 +55,13 @@ impl Set {
         self.mean(|o| o.scores[method].entropy)
     }
 
-    /// Share of the baseline's entropy above the truth's that a tracker takes away.
+    /// Share of the baseline's excess entropy over the truth that a tracker removes.
     pub fn gap_closed(&self, method: usize) -> f64 {
         let (truth, baseline) = (self.mean(|o| o.entropy), self.entropy(0));
         (baseline - self.entropy(method)) / (baseline - truth)
     }
 
-    /// Share of tracks of which a tracker's error is less than the baseline's.
+    /// Share of tracks on which a tracker's error is less than the baseline's.
     pub fn better(&self, method: usize, error: impl Fn(&Rmse) -> f64) -> f64 {
         let less = |o: &Outcome| {
             error(&o.scores[method].errors.rmse()) < error(&o.scores[0].errors.rmse())
@@ -74,7 +74,7 @@ impl Set {
         self.errors(method, |_| true).rmse()
     }
 
-    /// How many, and how long and well they are seen.
+    /// Number of objects, and how long and by how many returns they are seen.
     pub fn about(&self) -> String {
         format!(
             "{}: {} objects, each seen for {:.2} s by {:.0} returns in the mean",
@@ -86,19 +86,19 @@ impl Set {
     }
 }
 
-/// A table whose columns' titles are separated by bars.
+/// A table whose column titles are separated by `|`.
 fn table(id: String, caption: String, columns: &str, rows: Vec<TableRow>) -> Table {
     let columns = columns.split('|').map(|c| c.trim().to_string()).collect();
     Table { id, caption, columns, rows, notes: Vec::new() }
 }
 
-/// A row with a name and numbers of so many digits after the point.
+/// A row with a name and numbers with this many decimals.
 fn numbers(name: &str, numbers: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Cell> {
     let cells = numbers.into_iter().map(|v| Cell::Number(v, digits));
     [Cell::from(name)].into_iter().chain(cells).collect()
 }
 
-/// Errors as in table 2.1, of one set.
+/// Errors as in table 2.1, for one set.
 pub fn errors(set: &Set) -> Table {
     let stationary = set.outcomes.iter().any(|o| o.stationary);
     let mut rows = Vec::new();
@@ -133,8 +133,8 @@ pub fn errors(set: &Set) -> Table {
     table(format!("errors-{}", set.id), caption, columns, rows)
 }
 
-/// Errors of what the dissertation compares by how near the vehicle passes, and their ratios to the
-/// baseline's; what it prints as well.
+/// The errors compared in the dissertation, by how near the vehicle passes, and their ratios to the
+/// baseline's; and those it prints.
 pub fn by_distance(set: &Set) -> Table {
     let none = f64::NAN;
     let mut rows = Vec::new();
@@ -191,8 +191,8 @@ fn error_row(set: &Set, name: &str, method: usize, of: impl Fn(&Outcome) -> bool
     TableRow::new(cells.into_iter().chain([Cell::from(errors.flips)]))
 }
 
-/// A row of [`errors`]: how far labels of what stands wander in the world, with the drift of the
-/// poses and the labels' own errors.
+/// A row of [`errors`]: how far labels of parked objects wander in the world, including the drift
+/// of the poses and the labels' own errors.
 pub fn wandering(labels: &Errors) -> TableRow {
     let r = labels.rmse();
     let all = [r.position, r.ground, r.height, f64::NAN, r.heading, f64::NAN, f64::NAN];
@@ -257,7 +257,7 @@ pub fn entropies(sets: &[Set]) -> Table {
     table("entropy".into(), caption.into(), &columns, rows)
 }
 
-/// Errors of the baseline and of ours by kind.
+/// Errors of the baseline, as printed and of ours, by kind.
 pub fn kinds(set: &Set) -> Table {
     let mut rows = Vec::new();
     for kind in Kind::ALL {
@@ -294,7 +294,7 @@ pub fn kinds(set: &Set) -> Table {
     table(format!("kinds-{}", set.id), caption, &columns, rows)
 }
 
-/// Boxes around the clouds beside those of the vehicles.
+/// Boxes around the clouds compared with those of the vehicles.
 pub fn extents(sets: &[Set]) -> Table {
     let mut rows = Vec::new();
     for set in sets {
@@ -353,7 +353,7 @@ pub fn worst(set: &Set) -> Table {
     table(format!("worst-{}", set.id), caption, columns, rows)
 }
 
-/// What the front ends find of the labelled objects of some drives.
+/// Counts of what the front ends find of the labelled objects of some drives.
 pub fn front_ends(found: &[(&'static str, Found)]) -> Table {
     let row = |(name, found): &(&'static str, Found)| {
         let counts = [

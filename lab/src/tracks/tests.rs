@@ -14,7 +14,7 @@ fn wanted() -> Wanted {
     Wanted { parked: 5, moving: moving.map(|kind| (kind, 1)).into() }
 }
 
-/// Of one drive; to cast it takes seconds.
+/// Sets from one drive; casting them takes seconds.
 fn small() -> &'static Sets {
     static SETS: OnceLock<Sets> = OnceLock::new();
     SETS.get_or_init(|| simulate(1, &wanted()))
@@ -31,7 +31,7 @@ fn sets_have_what_is_asked_for_and_are_the_same_again() {
         assert!(object.span_s() > 3.8 && object.span_s() < 6.6, "{}", object.name);
         assert!(object.returns.is_sorted_by(|a, b| a.time_s <= b.time_s));
         assert_eq!(object.batches.iter().map(|b| b.len()).sum::<usize>(), object.returns.len());
-        // Its returns lie on it, all along.
+        // Its returns lie on it throughout.
         let half = 0.5 * DVec3::from_array(object.size) + 0.35;
         for (time_s, at) in object.batches().map(centroid) {
             let off = moment_at(&object.truth, time_s).project(at);
@@ -54,7 +54,7 @@ fn sets_have_what_is_asked_for_and_are_the_same_again() {
     assert!(kept::read(&whole, kept::key(2, &wanted())).is_none(), "other drives");
 }
 
-/// Errors by kind of the baseline and of ours: m, m/s, rad, rad/s, nats above the truth's.
+/// Errors by kind of the baseline and of ours: m, m/s, rad, rad/s, nats above the truth.
 const PINNED: &str = "\
 Car: 0.476 1.105 0.193 0.074 0.386 | 0.028 0.082 0.002 0.002 -0.015
 Car: 0.958 0.915 0.406 0.085 0.490 | 0.059 0.074 0.002 0.002 -0.022

@@ -1,4 +1,4 @@
-//! The trackers that are compared, each run over one object.
+//! The trackers compared, each run over one object.
 
 use super::object::{Moment, Object, centroid, moment_at};
 use crate::labels::turn;
@@ -7,17 +7,17 @@ use raywake_objects::centroid_ekf::{CentroidEkf, CentroidParams, Revision};
 use raywake_objects::estimate::{EstimateParams, Estimator, FixedLag};
 use raywake_objects::{ObjectReturn, ObjectState};
 
-/// What a tracker makes of an object.
+/// A tracker's result for an object.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
-    /// At the mean time of every batch.
+    /// Motion at the mean time of every batch.
     pub moments: Vec<Moment>,
-    /// Every return in the object's frame, m, by the pose at its own time.
+    /// Every return in the object's frame, m, using the pose at its own time.
     pub cloud: Vec<[f32; 3]>,
 }
 
 impl Track {
-    /// Of a motion: at the times of the object's batches, and of each of its returns.
+    /// Samples a motion at the times of the object's batches, and of each of its returns.
     pub fn of(object: &Object, mut at: impl FnMut(f64) -> Moment) -> Track {
         let moments = object.batches().map(|batch| at(centroid(batch).0)).collect();
         let project = |r: &ObjectReturn| {
@@ -29,9 +29,9 @@ impl Track {
     }
 }
 
-/// The baseline of section 2.4: states after every batch, the centroid of which the filter takes
-/// for the object's position. Where it finds out later which way the object looks, its earlier
-/// states are revised, as they are for the proposed tracker's start.
+/// The baseline of section 2.4: states after every batch, whose centroid the filter takes as the
+/// object's position. If it later finds out which way the object faces, its earlier states are
+/// revised, as for the start of the proposed tracker.
 pub fn baseline(object: &Object, params: &CentroidParams) -> Vec<ObjectState> {
     let mut history = Vec::new();
     follow(object, params, |state, revision, _| {
@@ -48,7 +48,8 @@ pub fn baseline_live(object: &Object, params: &CentroidParams) -> Vec<ObjectStat
     history
 }
 
-/// The estimate of the last seconds after every batch, with the baseline as it is at that time.
+/// The estimate over the last seconds after every batch, started from the baseline as it is at that
+/// time.
 pub fn fixed_lag(
     object: &Object,
     params: &EstimateParams,
@@ -62,7 +63,7 @@ pub fn fixed_lag(
     history
 }
 
-/// Shows the baseline's state after every batch, and what it says of those before.
+/// Passes on the baseline's state after every batch, and its revision of the earlier ones.
 fn follow(
     object: &Object,
     params: &CentroidParams,
@@ -87,7 +88,7 @@ fn follow(
     }
 }
 
-/// The motion of a history of states, between two of them on the line that joins them.
+/// The motion of a history of states, linearly interpolated.
 pub fn motion(history: &[ObjectState]) -> impl Fn(f64) -> Moment + use<> {
     let mut moments: Vec<Moment> = history.iter().map(|s| Moment::from(*s)).collect();
     for n in 1..moments.len() {

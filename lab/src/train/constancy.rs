@@ -17,9 +17,9 @@ use serde::Serialize;
 use std::fs;
 use std::path::PathBuf;
 
-/// Weights per unit: scores are indices of a table, so hundredths are what fits.
+/// Weights per unit: scores index a table, so hundredths are what fits.
 const SCALE: f64 = 100.0;
-/// Weight of the squared weights.
+/// Weight of the squared weights in the loss.
 const RIDGE: f64 = 1e-4;
 
 /// Options of `train constancy`.
@@ -32,7 +32,7 @@ pub struct Args {
     /// Other weights to measure on the same held-out drives.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     beside: Vec<PathBuf>,
-    /// By the recipe of section 3.5.1: the grid in the vehicle's frame, other columns from the
+    /// Follow the recipe of section 3.5.1: the grid in the vehicle's frame, other columns from the
     /// whole search neighbourhood.
     #[arg(long)]
     as_printed: bool,
@@ -44,24 +44,24 @@ struct Report {
     training: Counts,
     held_out: Counts,
     progress: Vec<Progress>,
-    /// The weights written first, then those to compare.
+    /// The newly trained weights first, then those to compare.
     measured: Vec<Measured>,
 }
 
-/// Weights on held-out drives.
+/// Performance of weights on held-out drives.
 #[derive(Debug, Serialize)]
 struct Measured {
     name: String,
-    /// Mean negative log-likelihood, both classes counting the same, nats.
+    /// Mean negative log-likelihood with equal weight for both classes, nats.
     log_loss: f64,
     auc: f64,
-    /// Columns of standing objects, the 3x3 window included.
+    /// Columns of stationary objects; costs are summed over the 3x3 window.
     standing: Ranking,
     /// Columns of moving objects.
     moving: Ranking,
 }
 
-/// What a drive yields: samples, and its pairs where it is held out.
+/// What a drive yields: samples, and its pairs if it is held out.
 type Yield = (Vec<Sample>, Vec<Pair>);
 
 /// Trains, writes and reports.
@@ -80,8 +80,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     args.outputs.write(&text, &report)
 }
 
-/// The weights file, and how it came about; `beside` are names and texts of others. In the
-/// vehicle's frame the recipe is the text's.
+/// Returns the weights file and the training report; `beside` holds names and texts of other
+/// weights. In the vehicle's frame the recipe is the dissertation's.
 fn learn(inputs: &Inputs, beside: &[(String, String)]) -> Result<(String, Report), Error> {
     let (negatives, option) = match inputs.frame {
         Frame::Lattice => (Negatives::Near, ""),

@@ -1,4 +1,4 @@
-//! Pairs of columns, true ones and others, for the constancy classifier.
+//! Pairs of columns, true and false ones, for the constancy classifier.
 
 use super::features::LEVELS;
 use super::pairs::Pair;
@@ -23,31 +23,31 @@ pub fn features(source: Column, target: Column) -> [u8; WIDTH] {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     pub features: [u8; WIDTH],
-    /// Whether the one went to where the other is.
+    /// Whether the source moved to the target.
     pub same: bool,
 }
 
-/// How far from the true column others are taken, cells.
+/// How far from the true column the others are taken, cells.
 ///
-/// The text draws them from the whole search neighbourhood about the source, the author's program
-/// from one as wide about the true column. Either way nearly all of them are somewhere else
-/// entirely, free or unknown, and easily told apart; what spoils flow is the column beside the
-/// right one. The nearer they are taken, the more often the true column comes first among the 31x31
-/// on drives held out. At one cell the evidence left is so weak against the smoothing that
-/// velocities of moving objects suffer; two serves both.
+/// The text draws them from the whole search neighbourhood around the source, the author's program
+/// from one of the same size around the true column. Either way nearly all of them are somewhere
+/// else entirely, free or unknown, and easily distinguished; what spoils flow is the column next to
+/// the right one. The nearer they are taken, the more often the true column comes first among the
+/// 31x31 on held-out drives. At one cell the remaining evidence is so weak relative to the
+/// smoothing that velocities of moving objects suffer; two serves both.
 const NEAR: i32 = 2;
 
-/// Which columns the true one is told from.
+/// Which columns the true one is to be distinguished from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Negatives {
     /// All that lie up to two cells from the true one.
     Near,
-    /// One for each true one, drawn from the search neighbourhood about the source, as the text has
-    /// it and as many as the author's program draws.
+    /// One for each true one, drawn from the search neighbourhood around the source as in the text,
+    /// and as many as the author's program draws.
     Search,
 }
 
-/// For every match of a pair the true column and others, as far as they lie in the window.
+/// Adds the true column and others for every match of a pair, as far as they lie in the window.
 pub fn samples(pair: &Pair, negatives: Negatives, rng: &mut Rng, into: &mut Vec<Sample>) {
     for m in &pair.matches {
         let mut add = |displacement: [i32; 2]| {
@@ -124,9 +124,10 @@ mod tests {
         let around = (32..37).flat_map(|i| (25..30).map(move |j| i * 61 + j));
         let wanted: Vec<Sample> = around.map(|t| at(30 * 61 + 30, t)).collect();
         assert_eq!(found[..25], wanted);
-        // In a corner of the window a quarter is left.
+        // In a corner of the window about a third of them are left.
         assert_eq!(found[25..], [0, 1, 2, 61, 62, 63, 122, 123, 124].map(|t| at(0, t)));
-        // The true one and another of the search, which from the corner may leave the window.
+        // The true one and another one of the search, which may lie outside the window at the
+        // corner.
         let found = sampled(Negatives::Search);
         let same: Vec<bool> = found.iter().map(|s| s.same).collect();
         assert!(same[..3] == [true, false, true] && same.len() <= 4, "{same:?}");

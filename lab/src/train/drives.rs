@@ -1,4 +1,4 @@
-//! Drives to learn from, simulated or recorded, behind one shape.
+//! Drives to learn from, simulated or recorded, behind one interface.
 
 use crate::labels::Kind;
 use glam::DVec3;
@@ -7,13 +7,13 @@ use raywake_core::sweep::Rig;
 use raywake_io::Error;
 use raywake_io::source::SweepData;
 
-/// A labelled object as a sweep shows it.
+/// A labelled object as seen in a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     /// The same for the same object in every sweep of the drive.
     pub id: usize,
     pub kind: Kind,
-    /// Its box's frame: centre, x forward, y left, z up.
+    /// Pose of its box: origin at the centre, x forward, y left, z up.
     pub vehicle_from_box: Pose,
     /// Length, width and height, m.
     pub size: [f64; 3],
@@ -24,10 +24,10 @@ pub struct LabelledSweep {
     /// Returns, pose and times.
     pub data: SweepData,
     pub objects: Vec<Seen>,
-    /// What every return comes from: an index of `objects`, or [`raywake_core::record::NONE`] for
-    /// the background. Empty where only the boxes tell.
+    /// What every return comes from: an index into `objects`, or [`raywake_core::record::NONE`] for
+    /// the background. Empty if only boxes are known.
     pub object_of_point: Vec<u32>,
-    /// What every return comes from by its class. Empty where only the boxes tell.
+    /// Class of what every return comes from. Empty if only boxes are known.
     pub class_of_point: Vec<raywake_sim::Class>,
 }
 
@@ -43,7 +43,7 @@ pub trait Labelled {
 
     fn len(&self) -> usize;
 
-    /// Reads a sweep; what `into` held is replaced.
+    /// Reads a sweep, replacing what `into` held.
     fn read(&mut self, index: usize, into: &mut LabelledSweep) -> Result<(), Error>;
 
     /// Whether objects are labelled at a place in the vehicle frame.

@@ -1,9 +1,10 @@
-//! What the classifier sees of a column, with or without the symmetry of the square built in.
+//! The classifier's view of a column, with or without the symmetry of the square built in.
 //!
-//! The lattice lies at any heading to the street, so a patch turned by a quarter or mirrored is as
-//! likely as the patch itself. The loss of a linear classifier is convex: averaged over the eight
-//! symmetries its minimum is symmetric. Fitting one weight per orbit of patch columns, to counts
-//! of voxels, therefore finds the minimum that augmenting the samples eightfold would.
+//! The lattice can have any heading relative to the street, so a patch rotated by a quarter turn or
+//! mirrored is as likely as the patch itself. The loss of a linear classifier is convex: averaged
+//! over the eight symmetries its minimum is symmetric. Fitting one weight per orbit of patch
+//! columns, to counts of voxels, therefore finds the minimum that augmenting the samples eightfold
+//! would find.
 
 use raywake_core::record::{Column, SweepUniform};
 use raywake_core::stages::background_filter::PATCH;
@@ -20,7 +21,7 @@ pub enum WeightTying {
     Untied,
 }
 
-/// Orbit of the patch column `n`, counted as in the weights file (`di` outermost).
+/// Orbit of the patch column `n`, numbered as in the weights file (`di` outermost).
 fn orbit(n: usize) -> usize {
     let [a, b] = [n / PATCH, n % PATCH].map(|d| d.abs_diff(PATCH / 2));
     match (a.max(b), a.min(b)) {
@@ -31,7 +32,7 @@ fn orbit(n: usize) -> usize {
 }
 
 impl WeightTying {
-    /// Set of patch columns with the same weights that column `n` is in.
+    /// Set of patch columns sharing weights that column `n` belongs to.
     fn set(self, n: usize) -> usize {
         match self {
             WeightTying::Square => orbit(n),
@@ -39,19 +40,19 @@ impl WeightTying {
         }
     }
 
-    /// Counts per sample: set, then free and occupied, then level.
+    /// Number of counts per sample: by set, then free and occupied, then level.
     pub fn width(self) -> usize {
         (1 + self.set(PATCH * PATCH - 1)) * 2 * LEVELS
     }
 
-    /// How many voxels of a set are free, and occupied, at each level around a column; what lies
+    /// How many voxels of a set are free, and occupied, at each level around a column; everything
     /// outside the window is unknown.
     pub fn features(self, step: &SweepUniform, columns: &[Column], index: usize) -> Vec<u8> {
         let side = step.side as usize;
         let half = PATCH / 2;
         let mut counts = vec![0; self.width()];
         for n in 0..PATCH * PATCH {
-            // Wraps below zero, and is then not within the window.
+            // Wraps below zero, and is then outside the window.
             let i = (index / side + n / PATCH).wrapping_sub(half);
             let j = (index % side + n % PATCH).wrapping_sub(half);
             if i >= side || j >= side {
@@ -68,7 +69,7 @@ impl WeightTying {
         counts
     }
 
-    /// Weights per set to weights per patch column, in the order of the weights file.
+    /// Expands weights per set to weights per patch column, in the order of the weights file.
     pub fn expand<T: Copy>(self, weights: &[T]) -> Vec<T> {
         (0..PATCH * PATCH)
             .flat_map(|n| &weights[self.set(n) * 2 * LEVELS..][..2 * LEVELS])

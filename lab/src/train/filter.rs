@@ -18,14 +18,14 @@ use serde::Serialize;
 const SCALE: f64 = 1000.0;
 /// The dissertation's threshold (section 3.4.2).
 const DISSERTATION_KEPT: f64 = 0.95;
-/// Weight of the squared weights. Held-out drives of all rigs hardly tell 0.001 from 0.01.
+/// Weight of the squared weights. On held-out drives of all rigs, 0.001 and 0.01 hardly differ.
 const RIDGE: f64 = 0.003;
-/// The text has none; without any, weights of voxels that are never seen have no value.
+/// The text uses none, but then weights of voxels that are never seen are undetermined.
 const RIDGE_AS_PRINTED: f64 = 1e-5;
 /// Share of the held-out foreground that the shipped threshold keeps.
 const KEPT: f64 = 0.97;
 
-/// How fast weights fade with the distance from the threshold, per nat.
+/// How fast a sample's weight fades with its distance from the threshold, per nat.
 const FOCUS: f64 = 0.7;
 
 /// Options of `train filter`.
@@ -35,17 +35,17 @@ pub struct Args {
     inputs: Inputs,
     #[command(flatten)]
     outputs: Outputs,
-    /// Share of the held-out foreground that the threshold keeps: 0.97, the dissertation's 95 %
-    /// and two more for what no simulation has; 0.95 as printed.
+    /// Share of the held-out foreground that the threshold keeps: 0.97, the dissertation's 95 % and
+    /// two more for what no simulation contains; 0.95 as printed.
     #[arg(long, value_name = "SHARE")]
     keep: Option<f64>,
-    /// By the recipe of section 3.4.2: the grid in the vehicle's frame, a weight for every voxel,
-    /// all objects alike, one fit.
+    /// Follow the recipe of section 3.4.2: the grid in the vehicle's frame, a weight for every
+    /// voxel, all objects alike, a single fit.
     #[arg(long)]
     as_printed: bool,
 }
 
-/// What section 3.4.2 leaves open, or we do otherwise.
+/// What section 3.4.2 leaves open, or we do differently.
 #[derive(Clone, Copy)]
 struct FilterRecipe {
     frame: Frame,
@@ -53,16 +53,16 @@ struct FilterRecipe {
     ridge: f64,
     /// Weight of trucks, buses and trams.
     long_vehicles: f64,
-    /// Whether it is fitted once more to what lies near the threshold.
+    /// Whether it is fitted again to what lies near the threshold.
     focused: bool,
     /// Share of the held-out foreground that the threshold keeps.
     keep: f64,
 }
 
 impl FilterRecipe {
-    /// That of the shipped weights. Trucks, buses and trams look like houses and have many columns:
-    /// at full weight cars are given up for them. On held-out simulated drives less weight gains
-    /// more among everything else than it costs among them.
+    /// The recipe of the shipped weights. Trucks, buses and trams look like houses and have many
+    /// columns: at full weight cars are sacrificed for them. On held-out simulated drives a lower
+    /// weight gains more among everything else than it costs among them.
     const OURS: FilterRecipe = FilterRecipe {
         frame: Frame::Lattice,
         tying: WeightTying::Square,
@@ -72,7 +72,7 @@ impl FilterRecipe {
         keep: KEPT,
     };
 
-    /// That of the text.
+    /// The recipe of the text.
     const AS_PRINTED: FilterRecipe = FilterRecipe {
         frame: Frame::Sensor,
         tying: WeightTying::Untied,
@@ -88,13 +88,13 @@ struct Report {
     inputs: String,
     training: Counts,
     held_out: Counts,
-    /// Of the fit to all samples alike and, where there is one, of that to those near its
+    /// Of the fit to all samples alike and, if there is one, of the fit to those near its
     /// threshold.
     progress: Vec<Vec<Progress>>,
     auc: f64,
     /// At the dissertation's recall.
     at_95: Operating,
-    /// As written, rounding included.
+    /// With the weights as written, rounding included.
     written: Operating,
     curve: Vec<Operating>,
     largest_weight: f64,
@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     args.outputs.write(&text, &report)
 }
 
-/// The weights file, and how it came about.
+/// Returns the weights file and the training report.
 fn learn(inputs: &Inputs, recipe: FilterRecipe) -> Result<(String, Report), Error> {
     let FilterRecipe { tying, keep, .. } = recipe;
     let inputs = &Inputs { frame: recipe.frame, ..inputs.clone() };
@@ -168,7 +168,7 @@ fn learn(inputs: &Inputs, recipe: FilterRecipe) -> Result<(String, Report), Erro
     Ok((text, report))
 }
 
-/// The weights file of integers per set, bias last.
+/// The weights file from integers per set, bias last.
 fn file(tying: WeightTying, integers: &[i32], provenance: &str) -> String {
     let width = tying.width();
     let mut all = tying.expand(&integers[..width]);
@@ -184,7 +184,7 @@ fn of_drive(visit: Visit, tying: WeightTying) -> Result<Vec<Sample>, Error> {
     Ok(sampling.samples)
 }
 
-/// Weights, and how the fits went.
+/// Fits; returns the weights and the progress of each fit.
 fn fits(
     mut learned: Data,
     checked: &Data,
@@ -208,9 +208,9 @@ fn fit(learned: &Data, checked: &Data) -> (Vec<f64>, Vec<Progress>) {
 }
 
 /// Weights of rows that fade with the distance of a row's score from the threshold that keeps this
-/// share of the foreground: the threshold lies far from where the two classes are as likely, and
-/// what a linear score can tell is best spent there. It rejects more background at 95 % recall and
-/// above on held-out drives of every rig, and less at low recall.
+/// share of the foreground: the threshold lies far from where the two classes are equally likely,
+/// and a linear score's limited capacity is best spent there. This rejects more background at 95 %
+/// recall and above on held-out drives of every rig, and less at low recall.
 fn focused(data: &Data, weights: &[f64], keep: f64) -> Vec<f32> {
     let score = |row: &[u8]| Data::score(weights, row);
     let cut = curve(data, score).at_recall(keep).threshold;
@@ -220,7 +220,7 @@ fn focused(data: &Data, weights: &[f64], keep: f64) -> Vec<f32> {
     Data::balanced(&data.labels, faded)
 }
 
-/// Both classes count the same.
+/// Both classes have the same total weight.
 fn data(samples: &[Sample], recipe: &FilterRecipe) -> Data {
     let labels: Vec<bool> = samples.iter().map(|s| s.foreground()).collect();
     let weight = |sample: &Sample| match sample.kind {
@@ -236,7 +236,7 @@ fn data(samples: &[Sample], recipe: &FilterRecipe) -> Data {
     }
 }
 
-/// Over the rows, the background's sampling undone.
+/// The curve over the rows, with the background's subsampling undone.
 fn curve(data: &Data, score: impl Fn(&[u8]) -> f64) -> Curve {
     let weight = |foreground| if foreground { 1.0 } else { 1.0 / BACKGROUND_KEPT };
     let rows = data.rows.chunks_exact(data.width).zip(&data.labels);
@@ -262,7 +262,7 @@ mod tests {
         assert!(report.auc > 0.8, "{}", report.auc);
         let losses: Vec<f64> = report.progress[0].iter().map(|p| p.training).collect();
         assert!(losses.len() > 2 && losses.is_sorted_by(|a, b| a >= b));
-        // The threshold within the bias, after rounding.
+        // The threshold is part of the bias, after rounding.
         assert!((report.written.recall - 0.97).abs() < 0.005, "{:?}", report.written);
     }
 

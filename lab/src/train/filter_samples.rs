@@ -8,12 +8,12 @@ use crate::labels::Kind;
 use raywake_io::Error;
 use raywake_sim::Rng;
 
-/// Share of the background columns that is kept.
+/// Share of the background columns that are kept.
 pub const BACKGROUND_KEPT: f64 = 0.2;
 
 pub struct Sample {
     pub features: Vec<u8>,
-    /// What it belongs to, whether that moves or not; `None`: to the background.
+    /// What it belongs to, whether moving or not; `None` for the background.
     pub kind: Option<Kind>,
 }
 
@@ -29,13 +29,13 @@ pub struct Sampling<'a> {
     pub grid: &'a mut Grid,
     pub rng: &'a mut Rng,
     pub tying: WeightTying,
-    /// What is worked with, kept so that its memory is reused.
+    /// Working memory, kept for reuse.
     pub sweep: LabelledSweep,
     pub samples: Vec<Sample>,
 }
 
 impl Sampling<'_> {
-    /// Adds those of a sweep of a drive.
+    /// Adds the samples of a sweep.
     pub fn add(&mut self, drive: &mut dyn Labelled, index: usize) -> Result<(), Error> {
         let Sampling { grid, rng, tying, sweep, samples } = self;
         drive.read(index, sweep)?;

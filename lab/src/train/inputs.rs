@@ -1,4 +1,4 @@
-//! Which drives are learned from and which are held out, and the walk over all of them.
+//! Which drives are learned from, which are held out, and the iteration over all of them.
 
 use super::drives::Labelled;
 use super::recorded::Recorded;
@@ -10,9 +10,9 @@ use raywake_io::Error;
 use raywake_sim::{Rng, Scenery};
 use std::path::PathBuf;
 
-/// Sweeps from one that is used to the next: neighbours are nearly the same.
+/// Stride between the sweeps used: neighbouring ones are nearly the same.
 const STRIDE: usize = 7;
-/// Every so many drives one is held out.
+/// One in this many drives is held out.
 const HELD_OUT: usize = 5;
 
 /// What to learn from.
@@ -24,7 +24,7 @@ pub struct Inputs {
     /// Sweeps (or pairs of them) of a simulated drive, 0.7 s apart.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub sweeps: u32,
-    /// Chooses the simulated drives, and what is sampled of all.
+    /// Seed that chooses the simulated drives, and what is sampled of all drives.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Recorded drives with labels; every seventh sweep is used. Every fifth drive is held out, or
@@ -58,20 +58,20 @@ pub struct Planned {
 
 /// A drive being worked on.
 pub struct Visit<'a> {
-    /// For its sweeps; its lattice lies anywhere.
+    /// Grid for its sweeps, with the lattice at a random offset.
     pub grid: &'a mut Grid,
     pub drive: &'a mut dyn Labelled,
     /// Sweeps to use.
     pub sweeps: Vec<usize>,
     /// Not learned from.
     pub held_out: bool,
-    /// Chance of its own.
+    /// The drive's own random generator.
     pub rng: Rng,
 }
 
 impl Inputs {
-    /// The drives in their order, simulated ones first. Fails where there are none to learn from
-    /// or none held out.
+    /// The drives in order, simulated ones first. Fails if there are none to learn from or none
+    /// held out.
     pub fn plan(&self) -> Result<Vec<Planned>, Error> {
         let name = |path: &PathBuf| path.file_name().map(|n| n.to_string_lossy().into_owned());
         let names: Vec<_> = self.data.iter().map(name).collect();
@@ -103,8 +103,8 @@ impl Inputs {
         }
     }
 
-    /// Calls `work` for every drive and returns the results in the drives' order; two threads, the
-    /// number of which does not show. The first drive that fails ends it.
+    /// Calls `work` for every drive, on two threads, and returns the results in the drives' order,
+    /// which do not depend on the threads. Fails with the error of the first drive that failed.
     pub fn visit<T: Send>(
         &self,
         plan: &[Planned],
@@ -135,7 +135,7 @@ impl Inputs {
         grid.restart(DVec3::from_array([0; 3].map(|_| rng.range(-half, half))));
         let wanted = STRIDE * (self.sweeps as usize - 1) + 1;
         let mut drive: Box<dyn Labelled> = match &planned.material {
-            // One more, for the last pair.
+            // One more sweep, for the last pair.
             Material::Simulated(n) => {
                 let scenery = match self.cluttered && n % 3 == 2 {
                     true => Scenery::StreetCluttered,

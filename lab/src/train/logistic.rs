@@ -1,31 +1,32 @@
-//! Logistic regression by Newton's method: a convex problem of few unknowns, solved exactly.
+//! Logistic regression by Newton's method: a convex problem with few unknowns, solved exactly.
 
 use super::solve::cholesky;
 use serde::Serialize;
 
-/// Labelled rows of numbers, of small counts by default.
+/// Labelled rows of numbers, by default small counts.
 pub struct Data<T = u8> {
     /// Numbers of a row.
     pub width: usize,
-    /// Rows, one behind the other.
+    /// The rows, one after another.
     pub rows: Vec<T>,
     pub labels: Vec<bool>,
-    /// Weight of every row; they are to sum up to about 1.
+    /// Weight of every row; they should sum to about 1.
     pub weights: Vec<f32>,
-    /// Half of this times the squared length of the weights, bias excepted, adds to the loss.
+    /// Half of this times the squared norm of the weights, excluding the bias, is added to the
+    /// loss.
     pub ridge: f64,
 }
 
 /// Losses after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Progress {
-    /// What is made small: with the weight of the squared weights.
+    /// The minimised loss, including the penalty on squared weights.
     pub training: f64,
-    /// Of data held out, without that.
+    /// Loss on held-out data, without the penalty.
     pub held_out: f64,
 }
 
-/// Loss, its gradient and, where asked for, the lower triangle of its second derivatives.
+/// Loss, its gradient and, if requested, the lower triangle of its second derivatives.
 #[derive(Clone)]
 struct Slope {
     loss: f64,
@@ -33,14 +34,14 @@ struct Slope {
     hessian: Vec<f64>,
 }
 
-/// Newton steps at most; some ten are needed.
+/// Maximum number of Newton steps; about ten are needed.
 const STEPS_MAX: usize = 40;
-/// Decrease of the loss below which it has converged.
+/// Decrease of the loss below which the fit has converged.
 const ENOUGH: f64 = 1e-9;
 
 impl Data {
-    /// Weights of rows, in proportion to `weights` within a class, under which both classes count
-    /// the same and all sum up to 1.
+    /// Weights of rows, in proportion to `weights` within a class, such that both classes count the
+    /// same and all weights sum to 1.
     pub fn balanced(labels: &[bool], weights: impl Iterator<Item = f64>) -> Vec<f32> {
         let mut sums = [0.0; 2];
         let weights: Vec<f64> = weights.collect();
@@ -60,7 +61,8 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
         self.slope(weights, false).loss
     }
 
-    /// The weights of least loss, bias last. `told` hears of weights and loss after every step.
+    /// The weights that minimise the loss, bias last. `told` is called with weights and loss after
+    /// every step.
     pub fn fit(&self, told: &mut dyn FnMut(&[f64], f64)) -> Vec<f64> {
         let mut weights = vec![0.0; self.width + 1];
         let mut here = self.slope(&weights, true);
@@ -69,7 +71,8 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
                 break;
             };
             let before = here.loss;
-            // Halved until it goes down: the full step may overshoot far from the minimum.
+            // The step is halved until the loss decreases: far from the minimum the full step may
+            // overshoot.
             let moved = (0..20).map(|n| 0.5f64.powi(n)).find_map(|share| {
                 let to: Vec<f64> = weights.iter().zip(&step).map(|(w, s)| w - share * s).collect();
                 (self.slope(&to, false).loss <= before).then_some(to)
@@ -87,7 +90,8 @@ impl<T: Copy + Into<f64> + Sync> Data<T> {
         weights
     }
 
-    /// Two threads, each with half of the rows, whatever the machine: sums do not depend on it.
+    /// Two threads, each with half of the rows, on any machine, so that the sums do not depend on
+    /// it.
     fn slope(&self, weights: &[f64], second: bool) -> Slope {
         let middle = self.labels.len() / 2;
         let [mut sum, other] = std::thread::scope(|scope| {
@@ -179,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_toy_has_the_known_optimum() {
-        // Three of four rows with the count are foreground, one of four without.
+        // Three of four rows with the count are foreground, and one of four without.
         let data = Data {
             width: 1,
             rows: vec![1, 1, 1, 1, 0, 0, 0, 0],

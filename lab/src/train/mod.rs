@@ -33,7 +33,7 @@ pub enum Command {
     Encoder(encoder::Args),
     /// The features of chapter 4 as printed, off-board
     Flsf(flsf::Args),
-    /// P(moves): how cues are weighed (after the refinement, which has no section)
+    /// P(moves): the weights of its cues (after the refinement, which has no section)
     Moves(moves::Args),
 }
 

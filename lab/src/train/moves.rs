@@ -1,4 +1,4 @@
-//! `raywake-lab train moves`: P(moves) from the cues of columns that `raywake-lab eval` left.
+//! `raywake-lab train moves`: P(moves) from the cues of columns in results of `raywake-lab eval`.
 
 use super::logistic::{Data, Progress};
 use super::report::{Counts, Outputs, RECALLS};
@@ -12,9 +12,9 @@ use std::path::PathBuf;
 
 /// Weight of the squared weights: there are few of them and many rows.
 const RIDGE: f64 = 1e-6;
-/// Every so many drives one is held out.
+/// One in this many drives is held out.
 const HELD_OUT: usize = 5;
-/// Parts that probabilities are compared with frequencies in.
+/// Number of bins in which probabilities are compared with frequencies.
 const BINS: usize = 10;
 
 /// Options of `train moves`.
@@ -32,9 +32,9 @@ struct Report {
     training: Counts,
     held_out: Counts,
     progress: Vec<Progress>,
-    /// Mean squared distance of P(moves) from the truth, of what was held out.
+    /// Mean squared difference between P(moves) and the truth, held-out columns.
     brier: f64,
-    /// By tenths of P(moves), of what was held out: its mean, how many moved, and of how many.
+    /// By tenths of P(moves), held-out columns: its mean, how many moved, and out of how many.
     reliability: Vec<(f64, u64, u64)>,
     curve: Vec<Operating>,
 }
@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     args.outputs.write(&configuration(&weights), &report)
 }
 
-/// Those of all drives: to learn from, and held out.
+/// Samples of all drives: to learn from, and held out.
 fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
     let empty = || Data {
         width: Cues::WEIGHTS.len(),
@@ -89,12 +89,12 @@ fn samples(results: &[PathBuf]) -> Result<[Data<f32>; 2], Error> {
     Ok(parts)
 }
 
-/// Whether something is known of the column, and it either moves or stands.
+/// Whether the column's truth is known, and it is either moving or static.
 fn counts(row: &Row) -> bool {
     row.is_matched() && row.moves().is_some()
 }
 
-/// Brier score and reliability of logits beside what is true.
+/// Brier score and reliability of logits, given the truth.
 fn reliability(scored: impl Iterator<Item = (f64, bool)>) -> (f64, Vec<(f64, u64, u64)>) {
     let (mut squares, mut bins) = (0.0, vec![(0.0, 0, 0); BINS]);
     for (score, moves) in scored {
@@ -108,7 +108,7 @@ fn reliability(scored: impl Iterator<Item = (f64, bool)>) -> (f64, Vec<(f64, u64
     (squares / count.max(1) as f64, bins)
 }
 
-/// For `--config`.
+/// The text of a file for `--config`.
 fn configuration(weights: &[f64]) -> String {
     let names = Cues::WEIGHTS.iter().chain([&"moves_bias"]);
     names.zip(weights).fold("base = \"hdl64\"\n".to_string(), |mut text, (name, weight)| {

@@ -6,8 +6,8 @@ use crate::labels::{Footprint, Kind};
 use raywake_core::frame::Window;
 use raywake_core::record::NONE;
 
-/// A column without a return of an object, its centre this close outside one, is left out: to
-/// which of them it belongs is no more than a matter of rounding, m.
+/// A column without a return of an object is left out if its centre lies this close outside one:
+/// which side it belongs to is only a matter of rounding, m.
 const DOUBT_M: f64 = 0.15;
 
 /// What a solid column belongs to.
@@ -17,12 +17,12 @@ pub enum Owner {
     Object(usize),
     /// Nothing that could move.
     Background,
-    /// At the rim of an object, in one of no kind, or where nothing is labelled.
+    /// At the edge of an object, in one of unknown kind, or where nothing is labelled.
     Unknown,
 }
 
 /// Owners of the solid columns of the sweep in the grid. An object owns a column if a return in it
-/// comes from the object, or the column's centre lies in its footprint.
+/// comes from the object or if the column's centre lies in its footprint.
 pub fn owners(
     grid: &Grid,
     window: &Window,

@@ -1,4 +1,4 @@
-//! Two sweeps in one window, and where the columns of the first really went.
+//! Two sweeps in one window, and the true motion of the first one's columns.
 
 use super::drives::{Labelled, LabelledSweep};
 use super::owner::{Owner, owners};
@@ -12,7 +12,7 @@ use raywake_core::stages::grid::shift::shift;
 use raywake_io::Error;
 use std::collections::HashMap;
 
-/// Over ground faster than this an object moves, m/s; labels of parked cars jitter below it.
+/// Speed over ground above which an object moves, m/s; labels of parked cars jitter below it.
 const MOVING_MPS: f64 = 1.0;
 
 /// A column of an object, and where it went.
@@ -36,14 +36,14 @@ pub struct Pair {
     pub matches: Vec<Match>,
 }
 
-/// What is worked with, kept so that its memory is reused.
+/// Working memory, kept for reuse.
 #[derive(Default)]
 pub struct Sweeps {
     first: LabelledSweep,
     second: LabelledSweep,
 }
 
-/// The pair that begins at sweep `index` of a drive; none where the second does not continue the
+/// The pair that begins at sweep `index` of a drive; `None` if the second does not continue the
 /// first.
 pub fn pair(
     grid: &mut Grid,
@@ -89,20 +89,20 @@ pub fn pair(
     Ok(Some(Pair { step, before, now: grid.columns.clone(), matches }))
 }
 
-/// Where a solid column of an object was, and where it went.
+/// Where a solid column of an object was, and where it moved.
 struct Place {
     /// Its index in the window of the first sweep.
     source: usize,
     /// Its centre, in the vehicle's frame of the first sweep, m.
     from: DVec3,
-    /// Where that went, in the vehicle's frame of the second sweep, m.
+    /// Where its centre moved, in the vehicle's frame of the second sweep, m.
     to: DVec3,
     /// Whether the object moves.
     moving: bool,
 }
 
-/// The solid columns of objects that both sweeps know, in the window of the first, which is in the
-/// grid.
+/// The solid columns of objects that are labelled in both sweeps, in the window of the first, which
+/// is in the grid.
 fn places(
     grid: &Grid,
     window: &Window,
@@ -142,8 +142,8 @@ mod tests {
     use raywake_core::params::Profile;
     use raywake_sim::{Drive, Options, Path, Scene, SensorRig, State};
 
-    /// A car ahead at 9 m/s to the left, one parked, one that goes farther than the search; the
-    /// vehicle drives at `speed`.
+    /// A car ahead moving left at 9 m/s, a parked one, and one that moves farther than the search;
+    /// the vehicle drives at `speed`.
     fn scene(speed: f64) -> Simulated {
         let mut scene = Scene::empty();
         let way = |x, y, yaw, speed| Path::from(State { x, y, yaw, speed });
@@ -176,7 +176,7 @@ mod tests {
             let pair = pair(&mut grid, &mut drive, 1, &mut Sweeps::default()).unwrap().unwrap();
             let count =
                 |wanted: &dyn Fn(&Match) -> bool| pair.matches.iter().filter(|m| wanted(m)).count();
-            // 0.9 m are three cells, whatever the vehicle does; a third of them seen.
+            // 0.9 m are three cells, whatever the vehicle does; a third of them are seen.
             assert!(count(&|m| m.moving) > 8 && count(&|m| !m.moving) > 8);
             assert!(
                 pair.matches

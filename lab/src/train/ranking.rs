@@ -1,4 +1,4 @@
-//! Where the true column stands among all that the search compares (3.13).
+//! Rank of the true column among all that the search compares (3.13).
 
 use super::pairs::{Match, Pair};
 use raywake::backend::Tables;
@@ -14,11 +14,11 @@ use serde::Serialize;
 /// Counts over columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Ranking {
-    /// Columns looked at.
+    /// Columns inspected.
     pub columns: usize,
     /// Columns whose true target costs least; a tie of n counts 1/n.
     pub first: f64,
-    /// Columns where what costs least is at most a cell from the truth along either axis.
+    /// Columns whose cheapest target is at most a cell from the truth along either axis.
     pub near: f64,
 }
 
@@ -36,7 +36,7 @@ impl Ranking {
     }
 }
 
-/// Storage for one pair after another.
+/// Storage, reused from pair to pair.
 pub struct Ranker {
     rank: Vec<u32>,
     list: Vec<u32>,
@@ -53,8 +53,8 @@ impl Ranker {
         }
     }
 
-    /// Adds the matches of a pair to the counts of standing and of moving objects. Every solid
-    /// column is foreground, so that no filter takes part.
+    /// Adds the matches of a pair to the counts of stationary and of moving objects. Every solid
+    /// column is foreground, so no filter is involved.
     pub fn add(&mut self, tables: &Tables, pair: &Pair, counts: &mut [Ranking; 2]) {
         let step = SweepUniform { score_min: tables.scores.min, ..pair.step };
         let marks: Vec<u32> = pair.before.iter().map(|c| (c[1] != 0) as u32).collect();
@@ -74,7 +74,7 @@ impl Ranker {
     }
 }
 
-/// Shares of the first place that the true target, and those next to it, have.
+/// Shares of first place held by the true target, and by it together with its neighbours.
 fn standing(step: &SweepUniform, m: &Match, row: &[u16]) -> (f64, f64) {
     let (i, j) = (m.source as i32 / step.side, m.source as i32 % step.side);
     let inside = |c: i32| (0..step.side).contains(&c);

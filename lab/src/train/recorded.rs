@@ -14,7 +14,7 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Opens a folder; fails where the recording or its labels cannot be read.
+    /// Opens a folder; fails if the recording or its labels cannot be read.
     pub fn open(folder: &Path) -> Result<Recorded, Error> {
         let source = open(folder, &OpenOptions::default())?;
         let labels = labels::open(folder, source.as_ref())?;

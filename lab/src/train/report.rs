@@ -1,4 +1,4 @@
-//! What training writes: weights, and a report of how it went.
+//! Output of training: weights, and a report on it.
 
 use raywake_io::Error;
 use raywake_io::sink::atomic;
@@ -50,7 +50,7 @@ impl Counts {
         })
     }
 
-    /// Fails where a class is missing in the drives of this part.
+    /// Fails if a class is missing in the drives of this part.
     pub fn both(&self, part: &str, positive: &str, negative: &str) -> Result<(), Error> {
         let missing = match self {
             Counts { positive: 0, .. } => positive,

@@ -1,4 +1,4 @@
-//! Simulated drives, each with a sensor and a street of its own.
+//! Simulated drives, each with its own sensor and street.
 
 use super::drives::{Labelled, LabelledSweep, Seen};
 use crate::labels::Kind;
@@ -32,14 +32,14 @@ impl Simulated {
         Simulated { tilt: tilt(&mut rng), ..Simulated::new(drive) }
     }
 
-    /// A drive put together elsewhere.
+    /// Wraps a drive built elsewhere.
     pub fn new(drive: Drive) -> Simulated {
         Simulated { rig: drive.rig(), drive, tilt: Pose::IDENTITY }
     }
 }
 
-/// Rigs by turns: every second drive has KITTI's, as the shipped numbers are for levels and ranges
-/// like its.
+/// Rigs in rotation: every second drive has KITTI's, since the shipped numbers are for similar
+/// levels and ranges.
 const RIGS: [fn() -> SensorRig; 6] = [
     SensorRig::hdl64,
     SensorRig::vlp32x2,
@@ -49,8 +49,8 @@ const RIGS: [fn() -> SensorRig; 6] = [
     SensorRig::beam128,
 ];
 
-/// A rig whose sensors differ a little from any other's in noise, strength, pitch and height, so
-/// that what is learned does not come to rely on one copy of it.
+/// A rig whose sensors vary a little in noise, strength, pitch and height, so that training does
+/// not come to rely on one particular unit.
 fn rig(index: u64, rng: &mut Rng) -> SensorRig {
     let mut rig = RIGS[(index % RIGS.len() as u64) as usize]();
     let higher = rng.range(-0.12, 0.2);
@@ -69,8 +69,8 @@ fn rig(index: u64, rng: &mut Rng) -> SensorRig {
     rig
 }
 
-/// How far a street is tilted along either axis of the world, as a slope: hills, and poses that do
-/// not know exactly where up is.
+/// How far a street is tilted along either axis of the world, as a slope: hills, and poses whose
+/// vertical is not exact.
 const SLOPE: f64 = 0.02;
 
 fn tilt(rng: &mut Rng) -> Pose {

@@ -1,7 +1,7 @@
 //! Linear equations with a positive definite matrix.
 
-/// Solves `a x = b` by Cholesky's factors, `a` row-major with its lower triangle filled. Nothing
-/// comes back where `a` is not positive definite.
+/// Solves `a x = b` by Cholesky factorisation, `a` row-major with its lower triangle filled.
+/// Returns `None` if `a` is not positive definite.
 pub fn cholesky(mut a: Vec<f64>, mut b: Vec<f64>) -> Option<Vec<f64>> {
     let n = b.len();
     for i in 0..n {

@@ -1,12 +1,12 @@
-//! The baseline of 2.4: an extended Kalman filter that takes the centroid of an object's returns
-//! for its position.
+//! The baseline of 2.4: an extended Kalman filter that takes the centroid of an object's returns as
+//! its position.
 //!
-//! State (2.2): x, y, z, heading, speed, speed upwards, turning rate; the process is the unicycle
-//! of (2.6). Positions are metres from the track's anchor, times seconds after its start. The first
-//! centroid tells no velocity, and a polar state without speed could only ever learn motion along
-//! its own heading: the filter rests until a centroid lies farther from the first than noise
-//! explains, or for [`CentroidParams::rest_max_s`], and is then born of both. If it turns out to
-//! have its object backwards, it reverses its heading, once. Either way [`Revision`] corrects the
+//! State (2.2): x, y, z, heading, speed, climb, turn rate; the process is the unicycle of (2.6).
+//! Positions are metres from the track's anchor, times seconds after its start. The first centroid
+//! gives no velocity, and a polar state without speed could only ever learn motion along its own
+//! heading: the filter rests until a centroid lies farther from the first than noise explains, or
+//! for [`CentroidParams::rest_max_s`], and is then initialised from both. If it turns out to have
+//! its object backwards, it reverses its heading, once. In either case [`Revision`] corrects the
 //! earlier states too, so that no history jumps by half a turn.
 
 #[cfg(test)]
@@ -24,7 +24,7 @@ type StateVector = SVector<f64, STATE>;
 type Covariance = SMatrix<f64, STATE, STATE>;
 
 raywake_core::params! {
-    /// The filter of centroids.
+    /// The centroid filter.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CentroidParams {
         /// Standard deviation of a centroid along each axis.
@@ -41,9 +41,9 @@ raywake_core::params! {
         /// rest.
         pub departure_d2: f64 = CHI2_99_2DOF, "", (above 0),
             "99 % quantile of chi-square with two degrees of freedom.";
-        /// Speed above which a departure is the view of another sensor on another side.
+        /// Speed above which a departure is taken for another sensor's view of another side.
         pub departure_max_mps: f64 = 60.0, "m/s", (above 0);
-        /// Standard deviations from zero from which the sign of a speed is certain.
+        /// Number of standard deviations from zero beyond which the sign of a speed is certain.
         pub facing_sigmas: f64 = 3.0, "", (above 0);
     } and {
         /// Process noise.
@@ -51,7 +51,7 @@ raywake_core::params! {
     }
 }
 
-/// What an update says of the states before it.
+/// What an update implies for the earlier states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Revision {
     /// Nothing.
@@ -78,15 +78,15 @@ impl Revision {
     }
 }
 
-/// How much of the motion is known. Counted from 1, so that no filter is all zeros.
+/// How much of the motion is known. Starts at 1, so that no filter is all zeros.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u8)]
 enum Phase {
-    /// Nothing: where and when the first centroid was seen.
+    /// Nothing: only where and when the first centroid was seen.
     Resting { first: [f64; 2], since_s: f64 } = 1,
     /// It may still be backwards.
     Moving,
-    /// Its heading has been seen to lead forwards: from now on a negative speed is reversing.
+    /// The heading is known to point forwards: from now on a negative speed means reversing.
     Facing,
 }
 
@@ -100,7 +100,7 @@ pub struct CentroidEkf {
 }
 
 impl CentroidEkf {
-    /// Of an object first seen at `centroid` at `time_s`.
+    /// Creates the filter of an object first seen at `centroid` at `time_s`.
     pub fn birth(params: &CentroidParams, time_s: f64, centroid: [f64; 3]) -> CentroidEkf {
         let [x, y, z] = centroid;
         let measured = params.centroid_sigma_m;
@@ -121,7 +121,7 @@ impl CentroidEkf {
         }
     }
 
-    /// Prediction until `time_s`; nothing happens where that is not later.
+    /// Predicts to `time_s`; does nothing if that is not later.
     pub fn predict(&mut self, params: &CentroidParams, time_s: f64) {
         let dt = time_s - self.time_s;
         if dt.is_nan() || dt <= 0.0 {
@@ -129,7 +129,7 @@ impl CentroidEkf {
         }
         self.time_s = time_s;
         let mut transition = if let Phase::Resting { .. } = self.phase {
-            // Any direction is as likely.
+            // All directions are equally likely.
             let spread = params.birth_sigma_mps * params.birth_sigma_mps * dt * dt;
             self.covariance[(0, 0)] += spread;
             self.covariance[(1, 1)] += spread;
@@ -138,7 +138,7 @@ impl CentroidEkf {
             jacobian(&self.mean, dt)
         };
         transition[(2, 5)] = dt;
-        // Noise that enters all along, half of it carried on: exact to the second order.
+        // Noise enters throughout, half of it propagated: exact to second order.
         let noise = Covariance::from_diagonal(&StateVector::from(
             params.noise.sigmas().map(|s| 0.5 * s * s * dt),
         ));
@@ -146,8 +146,8 @@ impl CentroidEkf {
         self.mean = advance(&self.mean, dt);
     }
 
-    /// Squared Mahalanobis distance between a centroid and where it is expected: chi-square with
-    /// three degrees of freedom.
+    /// Squared Mahalanobis distance between a centroid and its prediction: chi-square with three
+    /// degrees of freedom.
     pub fn distance2(&self, params: &CentroidParams, centroid: [f64; 3]) -> f64 {
         let innovation = self.innovation(centroid);
         (innovation.transpose() * self.weight(params) * innovation)[0]
@@ -175,7 +175,7 @@ impl CentroidEkf {
         self.time_s
     }
 
-    /// The state; the heading does not jump by a turn.
+    /// The state; the heading does not jump by a full turn.
     pub fn state(&self) -> ObjectState {
         let m = &self.mean;
         ObjectState {
@@ -213,15 +213,15 @@ impl CentroidEkf {
         Vector3::from(centroid) - self.mean.fixed_rows::<3>(0)
     }
 
-    /// Inverse covariance of a centroid where it is expected.
+    /// Inverse covariance of the innovation.
     fn weight(&self, params: &CentroidParams) -> Matrix3<f64> {
         let measured =
             Matrix3::from_diagonal_element(params.centroid_sigma_m * params.centroid_sigma_m);
-        // Positive definite by the noise.
+        // Positive definite because of the noise.
         (self.covariance.fixed_view::<3, 3>(0, 0) + measured).try_inverse().unwrap_or_default()
     }
 
-    /// A further centroid of what rests, and whether it departs.
+    /// Handles a further centroid while at rest; the filter may depart.
     fn rest(
         &mut self,
         params: &CentroidParams,
@@ -255,7 +255,7 @@ impl CentroidEkf {
         Revision::Departed
     }
 
-    /// Once the sign of the speed is sure, the heading leads forwards.
+    /// Makes the heading point forwards once the sign of the speed is certain.
     fn face(&mut self, sure: f64) -> Revision {
         let (speed, variance) = (self.mean[4], self.covariance[(4, 4)]);
         if self.phase == Phase::Facing || speed * speed <= sure * sure * variance {
@@ -287,7 +287,7 @@ fn advance(m: &StateVector, dt: f64) -> StateVector {
     next
 }
 
-/// Derivative of [`advance`] by the state.
+/// Derivative of [`advance`] with respect to the state.
 fn jacobian(m: &StateVector, dt: f64) -> Covariance {
     let way = m[3] + 0.5 * dt * m[6];
     let (along_x, along_y) = (libm::cos(way) * dt, libm::sin(way) * dt);

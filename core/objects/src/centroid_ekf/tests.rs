@@ -1,4 +1,4 @@
-//! Objects that move as the filter expects, and as it does not.
+//! Objects that move as the filter expects, and otherwise.
 
 extern crate std;
 use super::*;
@@ -21,7 +21,7 @@ fn the_jacobian_is_that_of_the_motion() {
     }
 }
 
-/// States after every update, history revised.
+/// Returns the states after every update, with the history revised.
 fn follow(truth: impl Fn(f64) -> [f64; 3], seed: u64, noise: f64) -> Vec<ObjectState> {
     let mut random = Random(seed);
     let mut see = |t: f64| truth(t).map(|v| v + noise * random.normal());
@@ -39,7 +39,7 @@ fn follow(truth: impl Fn(f64) -> [f64; 3], seed: u64, noise: f64) -> Vec<ObjectS
     states
 }
 
-/// As of two sensors that see two sides of an object one right after the other.
+/// As from two sensors that see two sides of an object in immediate succession.
 #[test]
 fn centroids_at_one_time_are_no_motion() {
     for after_s in [0.0, 1e-300, 1e-30, 1e-12, 1e-6] {
@@ -95,7 +95,7 @@ fn a_circle_unwraps_the_heading() {
 
 #[test]
 fn what_stands_stays() {
-    // Exactly, without ever a heading.
+    // Exactly, without ever having a heading.
     let states = follow(|_| [4.0, 5.0, 6.0], 1, 0.0);
     assert!(states.iter().all(|s| s.position == [4.0, 5.0, 6.0] && s.speed == 0.0));
     // Within its noise.
@@ -112,7 +112,7 @@ fn backwards_is_turned_once_and_reversing_stays() {
     // It reverses after three seconds.
     let truth = |t: f64| [if t < 3.0 { 4.0 * t } else { 24.0 - 4.0 * t }, 0.0, 0.0];
     let mut ekf = CentroidEkf::birth(&PARAMS, 0.0, truth(0.0));
-    // Two bad centroids first: it starts the wrong way.
+    // A bad centroid first: it starts the wrong way.
     for n in 1..60 {
         let t = n as f64 * 0.1;
         ekf.predict(&PARAMS, t);
@@ -135,7 +135,7 @@ fn the_covariance_opens_in_a_gap_and_time_never_runs_back() {
     let near = ekf.distance2(&PARAMS, [1.0, 0.0, 0.0]);
     ekf.predict(&PARAMS, 0.3);
     assert!(ekf.distance2(&PARAMS, [1.0, 0.0, 0.0]) < near);
-    // As far either way while nothing of its motion is known.
+    // Equally far in any direction while nothing of its motion is known.
     let apart = |c| ekf.distance2(&PARAMS, c);
     assert!((apart([1.0, 0.0, 0.0]) - apart([0.0, 1.0, 0.0])).abs() < 1e-12);
     let before = ekf;

@@ -28,8 +28,8 @@ impl<const N: usize, const L: usize> CholeskySystem<N, L> {
         self.matrix[i.max(j) * self.size + i.min(j)] += value;
     }
 
-    /// Eliminates an unknown whose own element is `diagonal`, with the right-hand side `rhs`: takes
-    /// `row row' / diagonal` from the block that begins at `from`.
+    /// Eliminates an unknown whose own element is `diagonal`, with the right-hand side `rhs`:
+    /// subtracts `row row' / diagonal` from the block that begins at `from`.
     pub fn eliminate(&mut self, from: usize, row: &[f64], diagonal: f64, rhs: f64) {
         for (i, &own) in row.iter().enumerate() {
             let factor = own / diagonal;
@@ -53,8 +53,8 @@ impl<const N: usize, const L: usize> CholeskySystem<N, L> {
     }
 
     /// Solves by Cholesky factorisation after scaling the diagonal to ones. A pivot below `least`,
-    /// of a direction that nothing determines, is raised to it: the solution then hardly goes
-    /// there. False where the system is not finite.
+    /// of a direction that nothing determines, is raised to it: the solution then hardly moves in
+    /// that direction. False if the solution is not finite.
     pub fn solve(&mut self, least: f64) -> bool {
         let n = self.size;
         for i in 0..n {
@@ -73,7 +73,7 @@ impl<const N: usize, const L: usize> CholeskySystem<N, L> {
                 row[j] = sum * other[j];
             }
             let pivot = row[i] - dot(&row[..i], &row[..i]);
-            // The reciprocal of the factor's diagonal stands in its place.
+            // The reciprocal of the factor's diagonal is stored in its place.
             row[i] = 1.0 / libm::sqrt(if pivot > least { pivot } else { least });
         }
         for i in 0..n {
@@ -95,7 +95,7 @@ impl<const N: usize, const L: usize> CholeskySystem<N, L> {
     }
 }
 
-/// Four sums at once, so that no addition waits for the one before.
+/// Four partial sums, so that no addition waits for the previous one.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -116,7 +116,7 @@ pub(super) mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// Gauss's elimination with pivots, of rows that end with the right-hand side.
+    /// Gaussian elimination with pivoting, of rows that end with the right-hand side.
     pub fn gauss(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
         let n = rows.len();
         for i in 0..n {
@@ -145,7 +145,7 @@ pub(super) mod tests {
         for n in [1, 2, 7, 23] {
             system.clear(n);
             let mut rows = vec![vec![0.0; n + 1]; n];
-            // Squares of random rows, of scales as far apart as the precisions are.
+            // Squares of random rows, with weights as far apart as the precisions are.
             for k in 0..2 * n {
                 let row: Vec<f64> = (0..n).map(|_| random.normal()).collect();
                 let weight = if k % 2 == 0 { 1e6 } else { 4.0 };

@@ -1,12 +1,12 @@
-//! Where an object ends, and what that says of its motion.
+//! Where an object ends, and what that implies for its motion.
 //!
-//! Along a smooth side all motions explain the returns alike: a long vehicle that passes by then
-//! seems to stand while its side grows (the failure of figure 2.9). But rays pass beyond its ends:
-//! in every part of the track the foremost and the hindmost return lie at the same two places of
-//! the object, unless something hides them. Both places are unknowns, eliminated as model points
-//! are. A return that falls short of its end weighs less than one beyond it, as the end may be
-//! hidden, unless rays pass there; and hardly anything where the sensor looks along the object from
-//! its other end.
+//! Along a smooth side all motions explain the returns equally well: a long vehicle that drives by
+//! then seems static while its side grows (the failure of figure 2.9). But rays pass beyond its
+//! ends: in every part of the track the foremost and the hindmost return lie at the same two places
+//! of the object, unless something hides them. Both places are unknowns, eliminated like model
+//! points. A return that falls short of its end weighs less than one beyond it, as the end may be
+//! hidden, unless rays pass there; and it weighs hardly anything if the sensor looks along the
+//! object from its other end.
 
 use super::equations::Equations;
 use super::model_point::ModelPoint;
@@ -19,12 +19,12 @@ use crate::ObjectState;
 use crate::spline::Knots;
 use heapless::Vec;
 
-/// Parts of a track at most; later ones tell nothing.
+/// Maximum number of parts of a track; later ones are not used.
 pub(super) const PARTS: usize = 160;
 /// Precision of an end without returns, 1/m²: makes its elimination regular.
 const PRIOR_PRECISION: f64 = 1e-6;
 
-/// All of the parts' indices.
+/// The indices of all parts.
 const INDICES: [u16; PARTS] = {
     let mut indices = [0; PARTS];
     let mut n = 0;
@@ -35,7 +35,7 @@ const INDICES: [u16; PARTS] = {
     indices
 };
 
-/// Whether rays pass a return on the side on which the object's front (0) or rear (1) is.
+/// Whether rays pass a return on the side of the object's front (0) or rear (1).
 fn passes(sample: &Sample, observation: &Observation, end: usize) -> bool {
     let [_, sensor, _] = observation.local_beyond(sample.origin_from_return());
     let [_, own, _] = observation.local();
@@ -47,7 +47,7 @@ fn passes(sample: &Sample, observation: &Observation, end: usize) -> bool {
 struct End {
     samples: [Sample; PARTS],
     observations: [Observation; PARTS],
-    /// Whether rays pass there: nothing hides the end.
+    /// Whether rays pass there, so that nothing hides the end.
     visible: [bool; PARTS],
 }
 
@@ -63,7 +63,7 @@ impl End {
 pub(super) struct Endpoints {
     ends: [End; 2],
     count: usize,
-    /// Of a return at an end, 1/m².
+    /// Precision of a return at an end, 1/m².
     precision: f64,
 }
 
@@ -72,7 +72,7 @@ impl Endpoints {
         Endpoints { ends: [End::NONE; 2], count: 0, precision: 0.0 }
     }
 
-    /// Finds the outermost returns among all, which are in the order of time.
+    /// Finds the outermost returns among all, which are in order of time.
     pub fn find(
         &mut self,
         samples: &[Sample],
@@ -118,8 +118,8 @@ impl Endpoints {
         self.count += 1;
     }
 
-    /// States of the object in every part by its front, by its rear (`share` 1 and 0), or by what
-    /// lies between.
+    /// States of the object in every part, located by its front (`share` 1), by its rear (0), or by
+    /// a point between them.
     pub fn states(
         &self,
         knots: &Knots,
@@ -142,7 +142,7 @@ impl Endpoints {
         (0..self.count).map(state).collect()
     }
 
-    /// Where the ends are at first, m: beyond all but a fifth of the outermost returns.
+    /// Initial places of the ends, m: beyond all but a fifth of the outermost returns.
     pub fn quantiles(&self) -> [f32; 2] {
         let mut places = [0.0f32; PARTS];
         let fifth = self.count / 5;
@@ -158,7 +158,7 @@ impl Endpoints {
         })
     }
 
-    /// Residuals and precisions at places of the ends, m; the cost.
+    /// Evaluates residuals and precisions for places of the ends, m; returns the cost.
     pub fn evaluate(&mut self, places: &[f32; 2], params: &EndpointParams) -> f64 {
         let mut cost = 0.0;
         for (n, (end, &at)) in self.ends.iter_mut().zip(places).enumerate() {
@@ -182,7 +182,7 @@ impl Endpoints {
         cost
     }
 
-    /// Adds them to the equations, the ends eliminated.
+    /// Adds the ends to the equations and eliminates them.
     pub fn add(&self, places: &[f32; 2], equations: &mut Equations) {
         for (end, &at) in self.ends.iter().zip(places) {
             let (samples, observations) = self.found(end);
@@ -191,7 +191,7 @@ impl Endpoints {
         }
     }
 
-    /// Moves the ends with a step of the control points.
+    /// Moves the ends according to a step of the control points.
     pub fn back_substitute(&self, places: &mut [f32; 2], step: &[ControlPoint]) {
         for (end, at) in self.ends.iter().zip(places) {
             *at += self.point(end, *at, &surface(*at)).back_substitute(step)[0] as f32;
@@ -213,7 +213,7 @@ fn surface(at: f32) -> Surface {
     Surface { prior_precision: PRIOR_PRECISION, prior_mean: [at, 0.0, 0.0], ..Surface::NONE }
 }
 
-/// Weight of an end seen from a sensor `ahead` of it and `aside`, m: in full from its own side, or
+/// Weight of an end seen from a sensor `ahead` of it and `aside`, m: full from beyond the end or
 /// from the side.
 fn view_weight(ahead: f64, aside: f64, full_slope: f64) -> f64 {
     let slope = if ahead < 0.0 { libm::fabs(aside) / -ahead } else { full_slope };
@@ -221,8 +221,8 @@ fn view_weight(ahead: f64, aside: f64, full_slope: f64) -> f64 {
     view * view
 }
 
-/// Share of the precision, and squared residual: Huber's loss beyond the end, that of Geman and
-/// McClure before it where it may be hidden.
+/// Share of the precision, and squared residual: Huber loss beyond the end, Geman-McClure loss
+/// short of it if it may be hidden.
 fn loss(residual: f64, hidden: bool, params: &EndpointParams) -> (f64, f64) {
     let (bound, scale) = (params.endpoint_bound_m, params.endpoint_hidden_m);
     if hidden {

@@ -1,11 +1,11 @@
-//! The normal equations of a Gauss-Newton step (2.5.3), the model points eliminated (Schur
+//! The normal equations of a Gauss-Newton step (2.5.3), with the model points eliminated (Schur
 //! complement, as in bundle adjustment: Triggs et al., 2000).
 //!
 //! A return couples one model point with five coefficients of each of four splines (position and
 //! heading), so with the model points eliminated only small systems of spline coefficients remain.
-//! The height is apart from the plane: no derivative couples them, so there are two systems. A
+//! The height is separate from the plane: no derivative couples them, so there are two systems. A
 //! model point's own block is diagonal in the axes of its surface, so each axis is eliminated as a
-//! row: the Schur complement is one rank-one update for each axis of each point.
+//! row: the Schur complement is one rank-one update per axis of each point.
 
 use super::cholesky::CholeskySystem;
 use super::model_point::{Block, ModelPoint};
@@ -18,7 +18,7 @@ use crate::spline::{BASES_MAX, Basis, SUPPORT};
 /// See [`CholeskySystem::solve`].
 const PIVOT_MIN: f64 = 1e-10;
 /// Precision of the second differences of the control points in a fit: it decides where the history
-/// says nothing, and hardly elsewhere.
+/// says nothing, and hardly matters elsewhere.
 const BENDING: f64 = 1e-3;
 /// Precision of every step of a control point in a fit: makes the system regular.
 const RIDGE: f64 = 1e-9;
@@ -60,7 +60,7 @@ impl Equations {
         }
     }
 
-    /// Adds an observation of the state: its residual and precision by element.
+    /// Adds an observation of the state, given its residual and precision by element.
     pub fn add_state(&mut self, basis: &Basis, residual: &ControlPoint, precision: &ControlPoint) {
         for (i, own) in basis.values.iter().enumerate() {
             for (element, (residual, precision)) in residual.iter().zip(precision).enumerate() {
@@ -73,7 +73,7 @@ impl Equations {
         }
     }
 
-    /// Adds a small resistance to bending splines, and to long steps.
+    /// Adds a small resistance to bending of the splines and to long steps.
     pub fn regularise(&mut self, control_points: &[ControlPoint]) {
         for k in 0..self.bases {
             (0..7).for_each(|element| self.add(element, k, k, RIDGE));
@@ -93,7 +93,7 @@ impl Equations {
         }
     }
 
-    /// Adds the returns, in the order of time, as if the model were known.
+    /// Adds the returns, in order of time, as if the model were known.
     pub fn add_returns(&mut self, samples: &[Sample], observations: &[Observation]) {
         let mut piece = Piece::EMPTY;
         let mut first = 0;
@@ -159,7 +159,7 @@ impl Equations {
         self.vertical.eliminate(low, row, own[2], rhs[2]);
     }
 
-    /// The solution as a step of the control points. None where there is none.
+    /// Solves for a step of the control points. None if there is no solution.
     pub fn solve(&mut self, step: &mut [ControlPoint]) -> Option<()> {
         let sound = self.planar.solve(PIVOT_MIN) & self.vertical.solve(PIVOT_MIN);
         for (k, step) in step.iter_mut().enumerate() {
@@ -170,7 +170,7 @@ impl Equations {
         sound.then_some(())
     }
 
-    /// Solves, and steps. False, and no step, where there is no solution.
+    /// Solves and applies the step. False, without a step, if there is no solution.
     pub fn step(&mut self, control_points: &mut [ControlPoint], step: &mut [ControlPoint]) -> bool {
         let step = &mut step[..control_points.len()];
         let solved = self.solve(step).is_some();
@@ -247,13 +247,14 @@ mod tests {
             self.samples.iter().enumerate().map(observe).collect()
         }
 
-        /// Everything at once: x, y, z and heading by basis function, then the model points.
+        /// All unknowns: x, y, z and heading by basis function, then the model points.
         fn unknowns(&self) -> Vec<f64> {
             let poses = self.control_points.iter().flat_map(|w| w[..4].to_vec());
             poses.chain(self.model.as_flattened().iter().map(|&v| f64::from(v))).collect()
         }
 
-        /// Residuals of the returns and of the model's prior, in deviations, written once more.
+        /// Residuals of the returns and of the model's prior, in standard deviations, computed
+        /// independently.
         fn residuals(&self, unknowns: &[f64]) -> Vec<f64> {
             let mut all = Vec::new();
             let model = &unknowns[4 * BASES..];
@@ -289,7 +290,7 @@ mod tests {
         }
     }
 
-    /// Both the derivatives, taken here by central differences, and the elimination.
+    /// Checks both the derivatives, taken here by central differences, and the elimination.
     #[test]
     fn elimination_solves_the_dense_problem() {
         let scene = scene();
@@ -315,7 +316,7 @@ mod tests {
             }
             rows[i][n] = -product(&columns[i], &residuals);
         }
-        // What both hold the poses with: returns alone need not determine them.
+        // Both hold the poses with this: returns alone need not determine them.
         for (i, row) in rows.iter_mut().enumerate().take(4 * BASES) {
             row[i] += 1.0;
         }

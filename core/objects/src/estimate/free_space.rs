@@ -1,4 +1,4 @@
-//! Free-space carving (Kutulakos and Seitz, 2000, on points): a ray that goes on beyond a model
+//! Free-space carving (Kutulakos and Seitz, 2000, on points): a ray that continues beyond a model
 //! point shows that nothing is there.
 
 use super::MODEL_MAX;
@@ -6,7 +6,7 @@ use super::params::FreeSpaceParams;
 use super::problem::Problem;
 use super::surface::Surface;
 
-/// A ray in the object's frame: its beginning, m, its direction, and the length that carves, m.
+/// A ray in the object's frame: its origin, m, its direction, and the length that carves, m.
 struct CarvingRay {
     from: [f64; 3],
     direction: [f64; 3],
@@ -14,7 +14,7 @@ struct CarvingRay {
 }
 
 impl CarvingRay {
-    /// None where it is too short to carve.
+    /// None if it is too short to carve.
     fn new(from: [f64; 3], to: [f64; 3], clearance_m: f64) -> Option<CarvingRay> {
         let way: [f64; 3] = core::array::from_fn(|d| to[d] - from[d]);
         let length = libm::sqrt(way.iter().map(|v| v * v).sum());
@@ -26,7 +26,7 @@ impl CarvingRay {
         })
     }
 
-    /// Whether it goes through a model point of a thin surface.
+    /// Whether it passes through a model point of a thin surface.
     fn crosses(
         &self,
         model: &[f32; 3],
@@ -47,8 +47,8 @@ impl CarvingRay {
 }
 
 impl Problem {
-    /// Removes model points with fewer returns than rays through them, unless that were all. How
-    /// many.
+    /// Removes model points whose returns are outweighed by the rays through them, unless that
+    /// would remove all. Returns how many.
     pub(super) fn carve(&mut self, return_sigma_m: f64, params: &FreeSpaceParams) -> usize {
         let samples = &self.samples.all()[self.active.clone()];
         let every = samples.len().div_ceil(params.carving_rays).max(1);

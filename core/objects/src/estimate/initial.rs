@@ -8,12 +8,12 @@ use super::report::EstimateReport;
 use super::state::{ControlPoint, TURN_RATE, elements, unwrapped};
 use crate::ObjectState;
 
-/// Steps that a growth takes at most, however long the track.
+/// Maximum number of growth steps, however long the track.
 const GROWTHS_MAX: f64 = 64.0;
 
 impl Problem {
-    /// The first trajectory of a solve, from a history. False where there is none: everything is
-    /// then at rest where the returns are on average.
+    /// Sets the first trajectory of a solve from a history. False if there is none: everything is
+    /// then at rest at the mean of the returns.
     pub fn start(&mut self, params: &EstimateParams, history: &[ObjectState]) -> bool {
         if !self.fit(history) {
             self.stand_at_mean();
@@ -25,7 +25,8 @@ impl Problem {
         true
     }
 
-    /// Least-squares fit of the splines to every state's elements. False where there is no history.
+    /// Least-squares fit of the splines to the elements of every state. False if there is no
+    /// history.
     fn fit(&mut self, history: &[ObjectState]) -> bool {
         let Some(first) = unwrapped(history).next().map(|state| elements(&state)) else {
             return false;
@@ -43,8 +44,8 @@ impl Problem {
         self.equations.step(control_points, &mut self.step)
     }
 
-    /// The trajectory that a history of positions and the process model make together (a smoother
-    /// by Gauss-Newton). What moves slowly has no heading in it but noise.
+    /// Finds the trajectory that a history of positions and the process model determine together (a
+    /// Gauss-Newton smoother). The headings of slow states are noise and hardly count.
     pub fn smooth(&mut self, params: &EstimateParams, history: &[ObjectState]) {
         let n = self.knots.bases();
         let control_points = &mut self.solution.control_points[..n];
@@ -70,7 +71,7 @@ impl Problem {
         }
     }
 
-    /// Everything at rest where the history is on average. False where there is none.
+    /// Sets everything at rest at the mean of the history. False if there is none.
     pub fn stand(&mut self, history: &[ObjectState]) -> bool {
         let mut sum = [0.0; 4];
         let mut count = 0.0;
@@ -88,7 +89,7 @@ impl Problem {
         count > 0.0
     }
 
-    /// Everything at rest where the returns are on average.
+    /// Sets everything at rest at the mean of the returns.
     pub fn stand_at_mean(&mut self) {
         let mut mean = [0.0; 7];
         for sample in self.samples.all() {
@@ -100,8 +101,8 @@ impl Problem {
         self.solution.control_points[..self.knots.bases()].fill(mean.map(|sum| sum / count));
     }
 
-    /// Grows the trajectory from the middle of the returns outwards: what is seen next is
-    /// registered with the model of what was seen so far, starting where the process model puts it.
+    /// Grows the trajectory from the middle of the returns outwards: the next returns are
+    /// registered to the model of those seen so far, starting where the process model puts them.
     pub fn grow(&mut self, params: &EstimateParams) {
         let growth = &params.growth;
         let sparse = &EstimateParams {
@@ -142,7 +143,7 @@ impl Problem {
     }
 }
 
-/// How precise a state of a history is, with its residual: in its positions, its heading and a turn
+/// Precision of a state of a history, given its residual: for its position, its heading and a turn
 /// rate of zero.
 fn history_precision(
     params: &SmoothingParams,

@@ -1,4 +1,4 @@
-//! Which returns are of which model point: a counting sort.
+//! Groups returns by model point: a counting sort.
 
 use super::MODEL_MAX;
 use super::observation::Observation;
@@ -15,7 +15,7 @@ impl Members {
         Members { indices: [0; RETURNS_MAX], starts: [0; MODEL_MAX + 1] }
     }
 
-    /// Groups the returns of a model of so many points.
+    /// Groups the returns of a model with this many points.
     pub fn group(&mut self, points: usize, observations: &[Observation]) {
         let starts = &mut self.starts[..=points];
         starts.fill(0);
@@ -30,7 +30,7 @@ impl Members {
             self.indices[usize::from(*at)] = i as u16;
             *at += 1;
         }
-        // Every start has moved on to the next one.
+        // Every start has advanced to the next one.
         starts.copy_within(..points, 1);
         starts[0] = 0;
     }

@@ -1,8 +1,8 @@
-//! Trajectory and shape of an object together, in continuous time (2.5): B-splines estimated from
+//! Joint trajectory and shape of an object in continuous time (2.5): B-splines estimated from
 //! asynchronous returns (Furgale, Barfoot and Sibley, ICRA 2012), the shape as points that are
 //! eliminated from each step.
 //!
-//! The estimate is the maximum of the posterior (2.1), of `p(x) p(m) p(z | x, m)`: the minimum of
+//! The estimate maximises the posterior (2.1), `p(x) p(m) p(z | x, m)`: it minimises
 //!
 //! ```text
 //! J_m = 1/2 Σ m' R_m^-1 m            R_m = shape_sigma_m² I
@@ -12,25 +12,25 @@
 //!
 //! The dissertation prints (2.7) without the minus and the half, (2.23) with `R_m` for its inverse,
 //! (2.24) and (2.25) without the half, (2.25) with `R_z` for its inverse and `R_z = σ_z I` for
-//! `σ_z² I`; the above follows from Bayes' rule and from what a Gaussian is.
+//! `σ_z² I`; the above follows from Bayes' rule and the definition of a Gaussian.
 //!
-//! Everything is in double precision but the places of returns and model points: `Q_u^-1` reaches
-//! 1e6 beside `R_z^-1` of 4.
+//! Everything is in double precision except the positions of returns and model points: `Q_u^-1`
+//! reaches 1e6, next to an `R_z^-1` of 4.
 //!
-//! The plain method stays where its start puts it: the visible face of an object changes as one
-//! passes it, a history of centroids slides along, and the model takes up two shifted copies of one
-//! face (figure 2.9). What cures that, each an option of [`EstimateParams`] that `raywake-lab eval
-//! tracks` measures by itself:
+//! The plain method stays where it starts: the visible face of an object changes as one passes it,
+//! a history of centroids slides along, and the model fits two shifted copies of one face (figure
+//! 2.9). The remedies, each an option of [`EstimateParams`] that `raywake-lab eval tracks` measures
+//! separately:
 //!
 //! - `endpoints`: where the object ends, and that rays pass there ([`crate::panorama`]);
-//! - `velocity_search`: more starts than one, found by a search over velocities;
-//! - `initial`: a start that grows from the middle of the track over a sparse model;
-//! - `surface`: returns that weigh across surfaces;
+//! - `velocity_search`: several starts, found by a search over velocities;
+//! - `initial`: a start grown from the middle of the track over a sparse model;
+//! - `surface`: returns weighted across surfaces;
 //! - `free_space`: removal of model points that rays went through;
 //! - `process`: a Student-t turn rate: steady motion with a few hard turns.
 //!
-//! A round object hides where on it the origin lies: with one behind it, as a trailer's axle, it
-//! turns later and more gently. So its points are near the origin
+//! A round object does not show where its origin lies: with one behind it, like a trailer's axle,
+//! it turns later and more gently. So its points are kept near the origin
 //! ([`EstimateParams::reference_length_m`]).
 
 mod cholesky;
@@ -71,9 +71,9 @@ use problem::{Problem, Solution};
 use state::{HEADING, SPEED, reverse, state_at};
 use velocity_search::VelocitySearch;
 
-/// Model points at most.
+/// Maximum number of model points.
 pub const MODEL_MAX: usize = 3000;
-/// Iterations of a solve at most.
+/// Maximum number of iterations of a solve.
 pub const ITERATIONS_MAX: usize = 64;
 
 /// The workspace of an estimate, and its result. Large: keep it in a box or a static.
@@ -90,13 +90,13 @@ impl Default for Estimator {
 }
 
 impl Estimator {
-    /// An empty one, all zeros: a static of it takes no room in a binary.
+    /// An empty estimator, all zeros: as a static it takes no room in a binary.
     pub const fn new() -> Estimator {
         Estimator { problem: Problem::new(), best: Solution::NONE, search: VelocitySearch::new() }
     }
 
     /// Estimates trajectory and model from the returns of an object (any number, in any order) and
-    /// the history of the tracker that found them.
+    /// the history of the tracker that found it.
     pub fn solve(
         &mut self,
         params: &EstimateParams,
@@ -134,7 +134,7 @@ impl Estimator {
         report
     }
 
-    /// Solves from steady motions too; the cheapest solution remains.
+    /// Also solves from steady motions; the cheapest solution remains.
     fn try_other_starts(&mut self, params: &EstimateParams, report: &mut EstimateReport) {
         let mut least = self.problem.cost_with_endpoints(params, report);
         for from in [InitialGuess::Steady, InitialGuess::Unsteady] {
@@ -151,7 +151,7 @@ impl Estimator {
         }
     }
 
-    /// Puts a start that was searched for into the problem. False where there is none.
+    /// Searches for a start and sets the problem to it. False if there is none.
     fn start(&mut self, from: InitialGuess, params: &EstimateParams) -> bool {
         let Estimator { problem, search, .. } = self;
         match from {
@@ -161,7 +161,7 @@ impl Estimator {
         }
     }
 
-    /// A solve from the trajectory of the problem.
+    /// Solves from the trajectory of the problem.
     fn run(&mut self, params: &EstimateParams, report: &mut EstimateReport) {
         let problem = &mut self.problem;
         report.costs.clear();
@@ -185,8 +185,8 @@ impl Estimator {
         }
     }
 
-    /// Backwards at one heading is forwards at the opposite one: of the two, the way it goes for
-    /// most of its track.
+    /// Backwards at one heading is forwards at the opposite one: chooses the one with which it
+    /// moves forwards for most of its track.
     fn face_forward(&mut self) {
         let control_points = &mut self.best.control_points[..self.problem.knots.bases()];
         let speed: f64 = control_points.iter().map(|point| point[SPEED]).sum();
@@ -198,8 +198,8 @@ impl Estimator {
         }
     }
 
-    /// What is too small or too round to have a heading may have made many turns on its way here:
-    /// whole ones mean nothing, and the heading begins within half a turn of zero.
+    /// An object too small or too round to have a heading may have made many turns by now: whole
+    /// turns carry no meaning, and the heading is made to begin within half a turn of zero.
     fn unwind(&mut self) {
         let knots = &self.problem.knots;
         let control_points = &mut self.best.control_points[..knots.bases()];
@@ -208,8 +208,8 @@ impl Estimator {
         control_points.iter_mut().for_each(|point| point[HEADING] -= turns);
     }
 
-    /// State of the object at `time_s`, extrapolated outside the time of its returns; all zeros
-    /// where there is no estimate.
+    /// State of the object at `time_s`, extrapolated outside the times of its returns; all zeros if
+    /// there is no estimate.
     pub fn state(&self, time_s: f64) -> ObjectState {
         let knots = &self.problem.knots;
         if *knots == Knots::NONE {

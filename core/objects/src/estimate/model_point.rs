@@ -1,4 +1,4 @@
-//! What the returns of a model point say of it.
+//! What the returns of a model point say about it.
 
 use super::observation::Observation;
 use super::samples::Sample;
@@ -17,7 +17,8 @@ pub(super) struct ModelPoint<'a> {
     pub surface: &'a Surface,
 }
 
-/// A model point's own block, which is diagonal, and right-hand side, in the axes of its surface.
+/// A model point's own block, which is diagonal, and its right-hand side, in the axes of its
+/// surface.
 pub(super) struct Block {
     pub precision: [f64; 3],
     pub rhs: [f64; 3],
@@ -45,13 +46,13 @@ impl<'a> ModelPoint<'a> {
         block
     }
 
-    /// Basis functions that some returns touch.
+    /// Range of the basis functions that its returns touch.
     pub fn bases(&self) -> Option<(usize, usize)> {
         let firsts = || self.returns().map(|(sample, _)| sample.basis.first);
         Some((firsts().min()?, firsts().max()? + SUPPORT))
     }
 
-    /// The point's step, m, that goes with a step of the control points.
+    /// The point's step, m, that follows from a step of the control points.
     pub fn back_substitute(&self, step: &[ControlPoint]) -> [f64; 3] {
         let mut block = self.block();
         for (sample, observation) in self.returns() {

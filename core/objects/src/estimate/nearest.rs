@@ -1,18 +1,18 @@
 //! Nearest model point (2.5.1.3): a grid of columns over the model, in fixed memory.
 
-/// Cells along an axis.
+/// Number of cells along an axis.
 const SIDE: usize = 64;
-/// Points for each cell: few, as they lie along an outline.
+/// Points per cell: few, as they lie along an outline.
 const POINTS_PER_CELL: f32 = 0.5;
 
 /// Shortest edge of a cell, m.
 const CELL_MIN_M: f32 = 0.01;
-/// A reach is looked through so much farther, and by so many metres: rounding moves distances and
+/// A search radius is widened by this factor, and by this many metres: rounding moves distances and
 /// cells by less.
 const WIDER: f32 = 1.0001;
 const WIDER_M: f32 = 1e-5;
 
-/// Points ordered by the cell they lie in.
+/// Points sorted by the cell they lie in.
 pub(super) struct NearestGrid<const N: usize> {
     low: [f32; 2],
     per_m: f32,
@@ -38,7 +38,7 @@ impl<const N: usize> NearestGrid<N> {
         }
     }
 
-    /// Takes in the first `N` of finite `points`.
+    /// Takes the first `N` of `points`, which are finite.
     pub fn fill(&mut self, points: &[[f32; 3]]) {
         let points = &points[..points.len().min(N)];
         self.count = points.len();
@@ -82,7 +82,7 @@ impl<const N: usize> NearestGrid<N> {
     }
 
     fn coordinate(&self, axis: usize, value: f32) -> usize {
-        // A float becomes an integer by saturation: what is below the grid is in its first cell.
+        // The conversion to an integer saturates: whatever is below the grid is in its first cell.
         (((value - self.low[axis]) * self.per_m) as usize).min(self.size[axis] - 1)
     }
 
@@ -90,9 +90,9 @@ impl<const N: usize> NearestGrid<N> {
         self.coordinate(1, point[1]) * self.size[0] + self.coordinate(0, point[0])
     }
 
-    /// Number and squared distance of the point nearest to `at`, of equally near ones the first.
-    /// None without points, and where no squared distance is finite. `guess` is a squared distance
-    /// that some point is known to have, which shortens the search.
+    /// Number and squared distance of the point nearest to `at`; of equally near ones, the first.
+    /// None without points, or if no squared distance is finite. `guess` is a squared distance that
+    /// some point is known to have, which shortens the search.
     pub fn find(&self, at: [f32; 3], guess: f32) -> Option<(u16, f32)> {
         if self.count == 0 || !at.iter().all(|value| value.is_finite()) {
             return None;
@@ -119,7 +119,7 @@ impl<const N: usize> NearestGrid<N> {
             if best <= reach * reach || reach > whole {
                 return (number != u16::MAX).then_some((number, best));
             }
-            // The nearest of all is no further than the best of these.
+            // The nearest of all is no farther than the best of these.
             reach = if best < f32::MAX { libm::sqrtf(best) } else { 2.0 * reach };
             if best < f32::MAX {
                 reach *= WIDER;

@@ -1,15 +1,15 @@
 //! A return as an iteration sees it: its place on the object, its residual and its derivatives.
 //!
-//! A return `z` at the time `t`, of the model point `m`, has the residual `e = R(φ)'(z - p) - m`.
-//! Turned into the world's axes, which leaves its length, its derivatives hold no sine: with `d = z
+//! A return `z` at time `t`, with model point `m`, has the residual `e = R(φ)'(z - p) - m`. Rotated
+//! into the world's axes, which preserves its length, its derivatives contain no sine: with `d = z
 //! - p`, `-1` for the position, `(d_y, -d_x)` for the heading, `-R` for `m`.
 
 use super::samples::Sample;
 use super::state::ControlPoint;
 use super::surface::Surface;
 
-/// A return at a trajectory. The axes of residual and precision are those of its model point's
-/// surface: across, along and up.
+/// A return observed from a trajectory. The axes of residual and precision are those of its model
+/// point's surface: across, along and up.
 #[derive(Clone, Copy)]
 pub(super) struct Observation {
     /// From the object's origin to the return, m, in the world's axes.
@@ -20,7 +20,7 @@ pub(super) struct Observation {
     pub nearest: u16,
     /// The first two axes, in the world's plane.
     pub axes: [[f64; 2]; 2],
-    /// Derivative of the return along them by the heading, m/rad.
+    /// Derivatives of the return along them with respect to the heading, m/rad.
     pub by_heading: [f64; 2],
     /// m.
     pub residual: [f64; 3],
@@ -40,7 +40,7 @@ impl Observation {
         precision: [0.0; 3],
     };
 
-    /// A return at the object's pose at its time.
+    /// Observes a return from the object's pose at its time.
     pub fn of(control_points: &[ControlPoint], sample: &Sample) -> Observation {
         let [x, y, z, heading] = sample.basis.pose(control_points);
         let (sin, cos) = libm::sincos(heading);
@@ -53,18 +53,18 @@ impl Observation {
         self.local_beyond([0.0; 3])
     }
 
-    /// In single precision, as model points are.
+    /// The same in single precision, like model points.
     pub fn local_f32(&self) -> [f32; 3] {
         self.local().map(|value| value as f32)
     }
 
-    /// What lies by `beyond` (m, along the world's axes) beyond the return, in the object's frame.
+    /// The point at `beyond` (m, along the world's axes) from the return, in the object's frame.
     pub fn local_beyond(&self, beyond: [f64; 3]) -> [f64; 3] {
         let [x, y, z]: [f64; 3] = core::array::from_fn(|d| self.offset[d] + beyond[d]);
         [self.cos * x + self.sin * y, self.cos * y - self.sin * x, z]
     }
 
-    /// Residual and derivatives at a model point; the cost.
+    /// Evaluates residual and derivatives at a model point; returns the cost.
     pub fn evaluate(&mut self, model: &[f32; 3], surface: &Surface) -> f64 {
         let [nx, ny] = surface.normal;
         let [x, y, z] = self.local();

@@ -6,9 +6,9 @@ raywake_core::params! {
     /// The estimate of trajectory and shape.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct EstimateParams {
-        /// Returns that take part at most, evenly spaced in time.
+        /// Maximum number of returns used, evenly spaced in time.
         pub returns: usize = 5000, "returns", (1 to 8192), "Dissertation, section 2.6.2.";
-        /// Model points (`n_m`).
+        /// Number of model points (`n_m`).
         pub model_points: usize = 300, "points", (1 to 3000), "Dissertation, section 2.6.2.";
         /// Time between knots.
         pub basis_s: f64 = 0.3, "s", (0.05 to 10), "The dissertation has 0.5 s.";
@@ -16,11 +16,11 @@ raywake_core::params! {
         pub shape_sigma_m: f64 = 10.0, "m", (above 0), "Dissertation, section 2.6.2.";
         /// Standard deviation of a return about its model point (`σ_z`).
         pub return_sigma_m: f64 = 0.05, "m", (above 0), "The dissertation has 0.5 m.";
-        /// Gauss-Newton iterations of a descent at most.
+        /// Maximum number of Gauss-Newton iterations of a descent.
         pub iterations: usize = 10, "iterations", (0 to 64), "Dissertation, section 2.6.2.";
         /// A descent has converged when an iteration lowers the cost by no more than this fraction.
         pub convergence: f64 = 1e-4, "", (0 to 1);
-        /// Whether steps that raise the cost are undone and damped (Levenberg and Marquardt).
+        /// Whether steps that raise the cost are undone and damped (Levenberg-Marquardt).
         pub damping: bool = true, "", (any), "`raywake-lab eval tracks` has a row of it alone.";
         /// Damping of the first iteration, a fraction of the diagonal.
         pub damping_first: f64 = 1e-4, "", (0 to 1);
@@ -28,25 +28,25 @@ raywake_core::params! {
         pub damping_up: f64 = 10.0, "", (above 1);
         /// Factor of the damping after a step that lowered the cost.
         pub damping_down: f64 = 0.3, "", (above 0 to 1);
-        /// Whether returns weigh by the surface that their model point stands for: fully across it,
+        /// Whether returns are weighted by the surface of their model point: fully across it,
         /// little along it.
         pub surfaces: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
         /// Additional standard deviation of a return along its surface.
         pub tangential_sigma_m: f64 = 0.3, "m", (0 to 10);
-        /// Whether the descent starts from a smoothed history and from motions that a search found.
+        /// Whether the descent starts from a smoothed history and from motions found by a search.
         pub multi_start: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
-        /// Whether rays that pass an object tell where it ends (see [`crate::panorama`]).
+        /// Whether rays that pass an object show where it ends (see [`crate::panorama`]).
         pub passing: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
-        /// Length of an object for which the noise, `basis_s` and `tangential_sigma_m` hold; 0: for
-        /// objects of any length. Turn rate noise is inversely proportional to the length, as is
-        /// the speed noise of longer objects; knots of shorter ones are closer, and their returns
-        /// less free along surfaces; `shape_sigma_m` is no more than the length.
+        /// Length of an object at which the noise, `basis_s` and `tangential_sigma_m` hold; 0: at
+        /// any length. Turn rate noise is inversely proportional to the length, as is the speed
+        /// noise of longer objects; shorter ones have closer knots, and their returns are less free
+        /// along surfaces; `shape_sigma_m` is at most the length.
         pub reference_length_m: f64 = 4.5, "m", (0 to 100), "A car's.";
-        /// Objects that look shorter count as of this length.
+        /// Objects that appear shorter are taken to be this long.
         pub length_min_m: f64 = 0.6, "m", (above 0);
-        /// Objects that look longer count as of this length.
+        /// Objects that appear longer are taken to be this long.
         pub length_max_m: f64 = 30.0, "m", (above 0);
-        /// Knots of short objects are no closer than this fraction of `basis_s`.
+        /// Lower bound of the knot spacing of short objects, as a fraction of `basis_s`.
         pub basis_ratio_min: f64 = 2.0 / 3.0, "", (above 0 to 1);
         /// Time in which a turn rate decays to a third.
         pub turn_decay_s: f64 = 1.5, "s", (at least 0.01);
@@ -59,7 +59,7 @@ raywake_core::params! {
     } and {
         /// Process noise (`Q_u`).
         pub noise: ProcessNoise = ProcessNoise {
-            // Town traffic turns into a bend within a second.
+            // Town traffic enters a bend within a second.
             turn_rate_sigma_radps: 0.15,
             ..ProcessNoise::DEFAULT
         };
@@ -82,13 +82,13 @@ raywake_core::params! {
     /// Endpoints: where an object begins and ends along itself.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct EndpointParams {
-        /// Standard deviation of a return at an end of the object; 0: ends are not used. They lead
+        /// Standard deviation of a return at an end of the object; 0: ends are not used. They guide
         /// the first descent, after which the returns alone decide.
         pub endpoint_sigma_m: f64 = 0.2, "m", (0 to 10),
             "`raywake-lab eval tracks` has a row without.";
         /// Time over which one foremost and one hindmost return are taken.
         pub endpoint_part_s: f32 = 0.2, "s", (above 0);
-        /// Returns that such a time needs to tell the ends.
+        /// Minimum number of returns in such a time to find the ends.
         pub endpoint_returns_min: usize = 6, "returns", (1 to 1000);
         /// Residual beyond which the cost of an end grows linearly (Huber).
         pub endpoint_bound_m: f64 = 0.3, "m", (above 0);
@@ -98,7 +98,7 @@ raywake_core::params! {
         pub endpoint_hidden_weight: f64 = 0.3, "", (0 to 1);
         /// Slope of the view, across to along, from which the far end counts in full.
         pub endpoint_slope: f64 = 0.3, "", (above 0);
-        /// Rays that pass a return no farther than this from an end show that nothing hides it.
+        /// Rays that pass a return within this distance of an end show that nothing hides it.
         pub endpoint_passing_m: f64 = 0.5, "m", (0 to 10);
     }
 }
@@ -107,20 +107,20 @@ raywake_core::params! {
     /// Free-space carving: model points that rays went through are removed.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct FreeSpaceParams {
-        /// Rounds of carving and descent at most; 0: nothing is carved.
+        /// Maximum number of rounds of carving and descent; 0: nothing is carved.
         pub carving_rounds: usize = 3, "rounds", (0 to 20),
             "`raywake-lab eval tracks` has a row without.";
-        /// Rays that carve, evenly spaced in time.
+        /// Number of rays that carve, evenly spaced in time.
         pub carving_rays: usize = 1000, "rays", (1 to 8192);
-        /// A ray goes through a model point that it passes this closely.
+        /// Distance within which a ray passes through a model point.
         pub carving_radius_m: f64 = 0.12, "m", (above 0);
         /// Length at the end of a ray that carves nothing.
         pub carving_clearance_m: f64 = 0.25, "m", (0 to 10);
-        /// Least cosine between a ray and the normal of a surface that it crosses.
+        /// Minimum cosine between a ray and the normal of a surface that it crosses.
         pub carving_cosine: f64 = 0.2, "", (0 to 1);
-        /// Least precision across a surface, as a fraction of a return's, of a thin surface.
+        /// Minimum precision across a thin surface, as a fraction of a return's.
         pub carving_thinness: f64 = 0.05, "", (0 to 1);
-        /// Returns of a model point that outweigh a ray through it, inverted: rays per return.
+        /// Number of returns of a model point that one ray through it outweighs.
         pub carving_rays_weight: usize = 8, "", (1 to 1000);
     }
 }
@@ -132,17 +132,17 @@ raywake_core::params! {
     pub struct GrowthParams {
         /// Whether it grows.
         pub growth: bool = true, "", (any), "`raywake-lab eval tracks` has a row without.";
-        /// Time by which a step reaches farther either way; the first reaches twice as far.
+        /// Time by which a step reaches farther either way; the first step reaches twice as far.
         pub growth_step_s: f64 = 0.2, "s", (0.01 to 100);
-        /// Standard deviation of a return meanwhile.
+        /// Standard deviation of a return during growth.
         pub growth_sigma_m: f64 = 0.15, "m", (above 0);
-        /// Model points meanwhile.
+        /// Number of model points during growth.
         pub growth_points: usize = 75, "points", (1 to 3000);
-        /// Models made in the first step.
+        /// Number of models made in the first step.
         pub growth_first_rounds: usize = 6, "rounds", (1 to 100);
         /// Iterations with each of them.
         pub growth_first_iterations: usize = 6, "iterations", (0 to 64);
-        /// Models made in a later step.
+        /// Number of models made in a later step.
         pub growth_rounds: usize = 2, "rounds", (1 to 100);
         /// Iterations with each of them.
         pub growth_iterations: usize = 2, "iterations", (0 to 64);
@@ -155,17 +155,18 @@ raywake_core::params! {
     pub struct SmoothingParams {
         /// Standard deviation of a position of the history.
         pub history_sigma_m: f64 = 0.3, "m", (above 0);
-        /// Standard deviation of the heading of what moves fast.
+        /// Standard deviation of the heading of a fast object.
         pub history_heading_sigma_rad: f64 = 0.1, "rad", (above 0);
         /// Standard deviation of the turn rate about zero.
         pub turn_rate_prior_radps: f64 = 0.3, "rad/s", (above 0);
-        /// Speed at which a heading weighs a quarter, and above which a direction of motion is one.
+        /// Speed at which a heading has a quarter of its weight, and above which the direction of
+        /// motion gives a heading.
         pub heading_speed_mps: f64 = 2.0, "m/s", (above 0);
         /// Gauss-Newton iterations.
         pub smoothing_iterations: usize = 6, "iterations", (1 to 64);
-        /// Iterations after which positions are weighed by their residual.
+        /// Iterations after which positions are weighted by their residuals.
         pub smoothing_plain_iterations: usize = 2, "iterations", (0 to 64);
-        /// Residual of a position at which it weighs a quarter (Geman and McClure).
+        /// Residual at which a position has a quarter of its weight (Geman-McClure).
         pub smoothing_outlier_m: f64 = 1.0, "m", (above 0);
     }
 }
@@ -174,81 +175,80 @@ raywake_core::params! {
     /// Search for the steady motion that makes a cloud crispest.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SearchParams {
-        /// Time over which a motion that is not steady is taken to be.
+        /// Time over which an unsteady motion is taken to be steady.
         pub unsteady_s: f64 = 1.0, "s", (above 0);
-        /// Returns needed.
+        /// Minimum number of returns.
         pub search_returns_min: usize = 10, "returns", (2 to 1500);
-        /// Time that the returns must span.
+        /// Minimum time that the returns span.
         pub search_span_min_s: f32 = 0.2, "s", (above 0);
-        /// Time about the middle of the returns that is used.
+        /// Time around the middle of the returns that is used.
         pub search_span_max_s: f32 = 10.0, "s", (above 0);
-        /// Returns that rays pass and that weigh as much as all others together.
+        /// Number of returns that rays pass from which these weigh as much as all others together.
         pub search_edges: usize = 100, "returns", (1 to 500);
-        /// Edge of a cell of the entropy; cells are twice as high.
+        /// Edge of a cell for the entropy; cells are twice as high.
         pub search_cell_m: f32 = 0.3, "m", (0.05 to 10);
-        /// Cells along a long object: its cells are larger.
+        /// Maximum number of cells along an object: longer ones have larger cells.
         pub search_cells_along: f32 = 60.0, "cells", (1 to 1000);
-        /// Lengths of the object that its centroid may move along it while it is seen.
+        /// Lengths of the object by which its centroid may move along it while it is seen.
         pub search_lengths: f32 = 1.3, "lengths", (0 to 10);
-        /// Further error of the centroid's velocity.
+        /// Additional error of the centroid's velocity.
         pub search_error_mps: f32 = 0.5, "m/s", (0 to 10);
-        /// Finer lattices about the best velocity, each of half the step.
+        /// Number of finer lattices around the best velocity, each with half the step.
         pub search_refinements: usize = 2, "lattices", (0 to 10);
         /// Factor of the cells' edge from one lattice to the next finer one.
         pub search_cell_ratio: f32 = 0.7, "", (above 0 to 1);
-        /// Steps that a finer lattice reaches either way.
+        /// Number of steps that a finer lattice reaches either way.
         pub search_refined_steps: u32 = 2, "steps", (1 to 10);
     }
 }
 
 raywake_core::params! {
-    /// The fixed-lag estimate: one over the last 2.5 s, with every sweep.
+    /// The fixed-lag estimate: over the last 2.5 s, with every sweep.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct FixedLagParams {
-        /// Gauss-Newton iterations with a sweep.
+        /// Gauss-Newton iterations per sweep.
         pub lag_iterations: usize = 2, "iterations", (1 to 10);
-        /// Additional standard deviation of a return along its surface, whatever the length.
+        /// Additional standard deviation of a return along its surface, at any length.
         pub lag_tangential_sigma_m: f64 = 0.5, "m", (0 to 10);
-        /// Distance between model points where one is added.
+        /// Distance from all model points at which a new one is added.
         pub lag_point_spacing_m: f32 = 0.3, "m", (above 0);
         /// Factor of this distance when there is no room for more model points.
         pub lag_spacing_growth: f32 = 1.25, "", (1.01 to 10);
-        /// Returns that have left the window and still hold a model point, at most.
+        /// Maximum number of returns that have left the window and still hold a model point.
         pub lag_prior_returns: f32 = 20.0, "returns", (1 to 1000);
-        /// Standard deviation of the state that the window begins with: position,
+        /// Standard deviation of the position at the start of the window.
         pub lag_prior_m: f64 = 0.1, "m", (above 0);
-        /// heading,
+        /// Standard deviation of the heading at the start of the window.
         pub lag_prior_heading_rad: f64 = 0.02, "rad", (above 0);
-        /// speed,
+        /// Standard deviation of the speed at the start of the window.
         pub lag_prior_speed_mps: f64 = 0.5, "m/s", (above 0);
-        /// climb,
+        /// Standard deviation of the climb at the start of the window.
         pub lag_prior_climb_mps: f64 = 0.2, "m/s", (above 0);
-        /// and turn rate.
+        /// Standard deviation of the turn rate at the start of the window.
         pub lag_prior_turn_rate_radps: f64 = 0.05, "rad/s", (above 0);
         /// Age below which other starts are tried with every sweep.
         pub young_s: f64 = 1.5, "s", (0 to 10);
         /// Displacement below which a young track counts as stationary; its heading is then
-        /// unobservable and kept.
+        /// unobservable and kept as it is.
         pub young_stationary_m: f64 = 0.5, "m", (0 to 10);
         /// Standard deviation of a return while the track is young.
         pub young_sigma_m: f64 = 0.15, "m", (above 0);
         /// Returns per model point while the track is young: with fewer, a model explains motion by
-        /// points of its own for every sweep.
+        /// separate points for every sweep.
         pub young_returns_per_point: usize = 6, "returns", (1 to 1000);
-        /// Least model points while the track is young.
+        /// Minimum number of model points while the track is young.
         pub young_points_min: usize = 12, "points", (1 to 3000);
-        /// Most model points while the track is young.
+        /// Maximum number of model points while the track is young.
         pub young_points_max: usize = 75, "points", (1 to 3000);
-        /// Net displacement backwards from which an object is turned round.
+        /// Net backward displacement from which an object is turned round.
         pub reversed_m: f64 = 0.3, "m", (0 to 10);
-        /// Length of the object, at most, by which the tracker's centroid may differ from the
-        /// estimate.
+        /// Cap on the object length by which the tracker's centroid may differ from the estimate.
         pub strayed_length_m: f64 = 15.0, "m", (0 to 100);
     }
 }
 
 impl EstimateParams {
-    /// The dissertation's (2.6.2).
+    /// The dissertation's parameters (2.6.2).
     pub const DISSERTATION: EstimateParams = EstimateParams {
         basis_s: 0.5,
         return_sigma_m: 0.5,
@@ -269,12 +269,12 @@ impl EstimateParams {
         ..EstimateParams::DEFAULT
     };
 
-    /// Those for an object of a length, m; unchanged where it is not known. Length tells agility: a
-    /// tram neither brakes nor turns as a car does, nor a car as a pedestrian.
+    /// The parameters for an object of a given length, m; unchanged if it is unknown. Length
+    /// implies agility: a tram neither brakes nor turns like a car, nor a car like a pedestrian.
     pub(super) fn for_length(&self, length_m: f32) -> EstimateParams {
         let mut params = *self;
         if self.reference_length_m > 0.0 && length_m > 0.0 {
-            // No `clamp`: it panics where a user's bounds are the wrong way round.
+            // No `clamp`: it panics if a user's bounds are the wrong way round.
             let length_m = f64::from(length_m).max(self.length_min_m).min(self.length_max_m);
             let shorter = self.reference_length_m / length_m;
             params.noise.turn_rate_sigma_radps *= shorter;
@@ -286,7 +286,7 @@ impl EstimateParams {
         params
     }
 
-    /// The same with Gaussian noise alone.
+    /// The same with Gaussian noise only.
     pub(super) fn gaussian(&self) -> EstimateParams {
         EstimateParams { student_dof: 0.0, ..*self }
     }
@@ -299,7 +299,7 @@ impl EstimateParams {
 }
 
 impl FixedLagParams {
-    /// Standard deviations of the state that the window begins with, by element.
+    /// Standard deviations of the state at the start of the window, by element.
     pub(super) fn prior_sigmas(&self) -> [f64; 7] {
         let m = self.lag_prior_m;
         let (heading, speed) = (self.lag_prior_heading_rad, self.lag_prior_speed_mps);

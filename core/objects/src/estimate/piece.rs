@@ -1,4 +1,4 @@
-//! Sums over the returns of one piece of the splines: they touch the same basis functions.
+//! Sums over the returns of one piece of the splines, which touch the same basis functions.
 
 use super::cholesky::CholeskySystem;
 use crate::spline::{BASES_MAX, SUPPORT};
@@ -6,11 +6,11 @@ use crate::spline::{BASES_MAX, SUPPORT};
 const PLANAR: usize = 5 * BASES_MAX;
 const VERTICAL: usize = 2 * BASES_MAX;
 
-/// The system of the plane, and that of the height.
+/// The system of the plane and that of the height.
 pub(super) type Planar = CholeskySystem<PLANAR, { PLANAR * PLANAR }>;
 pub(super) type Vertical = CholeskySystem<VERTICAL, { VERTICAL * VERTICAL }>;
 
-/// What a return adds for a pair of basis functions, before their values.
+/// Number of terms that a return adds for a pair of basis functions, before their values.
 pub(super) const TERMS: usize = 7;
 const PAIRS: usize = SUPPORT * (SUPPORT + 1) / 2;
 

@@ -1,5 +1,5 @@
-//! One trajectory and model being estimated: iterations of Gauss and Newton, damped as Levenberg
-//! and Marquardt do, each with new nearest model points (as iterated closest points have).
+//! One trajectory and model being estimated: Gauss-Newton iterations with Levenberg-Marquardt
+//! damping, each with new nearest model points (as in iterated closest points).
 
 use core::ops::Range;
 
@@ -24,7 +24,7 @@ pub(super) struct Solution {
     pub control_points: [ControlPoint; BASES_MAX],
     pub model: [[f32; 3]; MODEL_MAX],
     pub surfaces: [Surface; MODEL_MAX],
-    /// Model points.
+    /// Number of model points.
     pub points: usize,
     /// Front and rear, m along the object.
     pub ends: [f32; 2],
@@ -48,7 +48,7 @@ impl Solution {
     }
 }
 
-/// A state known beside the returns.
+/// A state known independently of the returns.
 #[derive(Clone, Copy)]
 pub(super) struct StatePrior {
     pub time_s: f64,
@@ -60,7 +60,7 @@ pub(super) struct StatePrior {
 pub(super) struct Problem {
     pub knots: Knots,
     pub samples: Samples,
-    /// Samples that the equations are made of.
+    /// Samples that the equations are built from.
     pub active: Range<usize>,
     pub prior: Option<StatePrior>,
     pub solution: Solution,
@@ -75,7 +75,7 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    /// All zeros: a static of it takes no room in a binary.
+    /// All zeros: as a static it takes no room in a binary.
     pub const fn new() -> Problem {
         Problem {
             knots: Knots::NONE,
@@ -100,7 +100,7 @@ impl Problem {
         self.active = 0..self.samples.all().len();
     }
 
-    /// Puts the active samples on the trajectory.
+    /// Observes the active samples from the trajectory.
     pub fn observe(&mut self) {
         let samples = &self.samples.all()[self.active.clone()];
         for (sample, observation) in samples.iter().zip(&mut self.observations) {
@@ -132,7 +132,7 @@ impl Problem {
         self.endpoints.find(samples, &self.observations[..samples.len()], &params.endpoints);
     }
 
-    /// States of the object by its visible ends; see [`Endpoints::states`].
+    /// States of the object located by its visible ends; see [`Endpoints::states`].
     pub fn endpoint_states(
         &mut self,
         params: &EstimateParams,
@@ -142,7 +142,7 @@ impl Problem {
         self.endpoints.states(&self.knots, &self.solution.control_points, share)
     }
 
-    /// Cost of the last descent, with that of the endpoints.
+    /// Cost of the last descent, including that of the endpoints.
     pub fn cost_with_endpoints(&mut self, params: &EstimateParams, report: &EstimateReport) -> f64 {
         self.find_endpoints(params);
         let ends = self.endpoints.quantiles();
@@ -150,7 +150,7 @@ impl Problem {
         report.costs.last().map_or(f64::MAX, Cost::total) + cost
     }
 
-    /// Gauss-Newton iterations. Needs a model.
+    /// Runs Gauss-Newton iterations. Needs a model.
     pub fn descend(
         &mut self,
         params: &EstimateParams,
@@ -193,7 +193,7 @@ impl Problem {
         Termination::Iterations
     }
 
-    /// Residuals and derivatives at the solution; the cost.
+    /// Computes residuals and derivatives at the solution; returns the cost.
     fn linearise(&mut self, params: &EstimateParams) -> Cost {
         self.associate();
         if params.surfaces {
@@ -203,7 +203,7 @@ impl Problem {
         Cost { process: self.begin_equations(params), ..cost }
     }
 
-    /// Begins the equations with the process model and the prior; their cost.
+    /// Begins the equations with the process model and the prior; returns their cost.
     fn begin_equations(&mut self, params: &EstimateParams) -> f64 {
         let n = self.knots.bases();
         let control_points = &self.solution.control_points[..n];
@@ -232,7 +232,7 @@ impl Problem {
             *observation = Observation::of(&self.solution.control_points, sample);
             let local = observation.local_f32();
             let far = model.get(guess).map_or(f32::MAX, |guess| square_distance(guess, &local));
-            // Any will do for what is not finite: its cost tells.
+            // If it is not finite, any will do: the cost shows it.
             observation.nearest = self.nearest.find(local, far).map_or(0, |(number, _)| number);
         }
         self.members.group(model.len(), &self.observations[..samples.len()]);
@@ -250,7 +250,7 @@ impl Problem {
         }
     }
 
-    /// Residuals of the samples at their model points; the cost, but for the process.
+    /// Evaluates the samples at their model points; returns the cost without the process term.
     fn evaluate(&mut self, params: &EstimateParams) -> Cost {
         let mut cost = Cost::default();
         let points = self.solution.model[..self.solution.points].iter();
@@ -272,7 +272,7 @@ impl Problem {
         cost
     }
 
-    /// One step of trajectory, model and ends; the equations hold process and prior. None where
+    /// Takes one step of trajectory, model and ends; the equations hold process and prior. None if
     /// there is no finite solution.
     fn step(&mut self, damping: f64) -> Option<()> {
         let samples = &self.samples.all()[self.active.clone()];

@@ -1,21 +1,22 @@
 //! Process model (2.5.1.1): `J_u = 1/2 ∫ e_u' Q_u^-1 e_u`, with `e_u` the derivative of the splines
 //! minus that of the unicycle.
 //!
-//! The integral is taken over every piece of the splines by Gauss and Legendre's rule with six
-//! nodes, which is exact for polynomials of degree 11. All but the unicycle's `v cos` and `v sin`
-//! of the heading are polynomials of degree 8 at most; those two are as smooth, and over a piece,
-//! in which a heading turns by a fraction of a radian, six nodes leave less than a millionth of the
-//! integral (`the_integral_is_exact_enough`).
+//! The integral over every piece of the splines is taken by Gauss-Legendre quadrature with six
+//! nodes, which is exact for polynomials of degree 11. Everything except the unicycle's `v cos` and
+//! `v sin` of the heading is a polynomial of degree 8 at most; those two are as smooth, and over a
+//! piece, in which a heading turns by a fraction of a radian, six nodes leave an error of less than
+//! a millionth of the integral (`the_integral_is_exact_enough`).
 //!
 //! Ours differs in the turn rate `ω`. Turns end: `dω/dt = -ω / turn_decay_s`. And motion is steady
-//! but for a few hard turns, which no Gaussian says: it lets the steady parts jitter and smooths
-//! the turns. The noise is Student-t instead (as in Roth, Özkan and Gustafsson, ICASSP 2013): the
-//! variance of each manoeuvre of `m` pieces is unknown, its reciprocal Gamma distributed with `ν`
-//! degrees of freedom. Integrated out, with `S = ∫ e² / q²` over the manoeuvre, its cost is `(ν +
-//! m) / 2 ln(1 + S / ν)` where a Gaussian's is `S / 2`. As nobody knows when manoeuvres begin, the
-//! cost is the mean over all `m` ways to cut the track into them. Gauss-Newton takes it as a
-//! Gaussian of precision `(ν + m) / (ν + S)` times `1 / q²` (iteratively reweighted least squares),
-//! which has the same gradient. It has further minima, so trajectories are found with Gaussian
+//! except for a few hard turns, which a Gaussian does not describe: it lets the steady parts jitter
+//! and smooths the turns. The noise is Student-t instead (as in Roth, Özkan and Gustafsson, ICASSP
+//! 2013): the variance of each manoeuvre of `m` pieces is unknown, its reciprocal Gamma distributed
+//! with `ν` degrees of freedom. Integrated out, with `S = ∫ e² / q²` over the manoeuvre, its cost
+//! is `(ν + m) / 2 ln(1 + S / ν)` where a Gaussian's is `S / 2`. As it is unknown when manoeuvres
+//! begin, the cost is the mean over all `m` ways to cut the track into them. Gauss-Newton treats it
+//! as a Gaussian of precision `(ν + m) / (ν + S)` times `1 / q²` (iteratively reweighted least
+//! squares), which has the same gradient. It has further minima, so trajectories are found with
+//! Gaussian noise first.
 //! noise first.
 
 use super::cholesky::CholeskySystem;
@@ -67,7 +68,7 @@ impl ProcessModel {
         }
     }
 
-    /// Cost of the turn rate's noise; replaces its square in every piece by its weight there.
+    /// Cost of the turn rate's noise; replaces the squared noise of every piece by its weight.
     fn turn_rate_cost(&self, spacing_s: f64, pieces: &mut [f64]) -> f64 {
         let nu = self.student_dof;
         if nu <= 0.0 {
@@ -146,7 +147,7 @@ fn nodes(knots: &Knots, mut visit: impl FnMut(&[f64; SUPPORT], &[f64; SUPPORT], 
     }
 }
 
-/// The seven elements of `e_u` (2.8), where the basis functions have `values` and `slopes`.
+/// The seven elements of `e_u` (2.8), given `values` and `slopes` of the basis functions.
 fn residuals(
     control_points: &[ControlPoint],
     values: &[f64; SUPPORT],
@@ -186,7 +187,7 @@ fn parts(row: &Row) -> &[(usize, [f64; SUPPORT])] {
     &row.parts[..count]
 }
 
-/// Adds a row to the system whose unknowns `index` numbers by basis function and spline.
+/// Adds a row to the system; `index` numbers its unknowns by basis function and spline.
 fn accumulate<const N: usize, const L: usize>(
     system: &mut CholeskySystem<N, L>,
     index: impl Fn(usize, usize) -> usize,
@@ -306,7 +307,7 @@ mod tests {
         let (cost, counts) = turning([0.0, 0.0, 7.0, 0.0, 0.0, 0.0]);
         assert!((cost - 0.5 * (3.0 * 8f64.ln())).abs() < 1e-12, "{cost}");
         assert_eq!(counts, [2.5, 1.6875, 0.375, 1.6875, 3.0, 2.5]);
-        // A second one beside it costs less than one elsewhere.
+        // A second one next to it costs less than one elsewhere.
         let [beside, apart] = [[0.0, 0.0, 7.0, 7.0, 0.0, 0.0], [0.0, 7.0, 0.0, 0.0, 7.0, 0.0]];
         assert!(turning(beside).0 < 0.9 * turning(apart).0);
         let step = 1e-6;

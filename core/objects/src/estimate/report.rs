@@ -30,9 +30,9 @@ pub enum Termination {
     NoReturns,
     /// The cost has converged.
     Converged,
-    /// After the last iteration it was allowed.
+    /// The iterations allowed are used up.
     Iterations,
-    /// A step had no finite solution; the estimate is the one before.
+    /// A step had no finite solution; the estimate is the previous one.
     NotFinite,
 }
 
@@ -44,7 +44,7 @@ pub enum InitialGuess {
     History,
     /// The one velocity that makes the cloud of all returns crispest.
     Steady,
-    /// Such velocities of parts of the track.
+    /// Such velocities for parts of the track.
     Unsteady,
 }
 

@@ -1,27 +1,25 @@
-//! The returns that take part in an estimate: a bounded number, as evenly spaced in time as they
-//! allow.
+//! The returns that an estimate uses: a bounded number, as evenly spaced in time as possible.
 
 use crate::spline::{Basis, Knots};
 use crate::{ObjectReturn, RETURNS_MAX};
 
-/// Time bins of a track, within which returns keep the order given.
+/// Time bins of a track, within which returns keep the given order.
 const TICKS: usize = 4096;
 /// No track gets so far from its anchor and its start, m and s.
 const FAR: f32 = 1e5;
-/// Least time that ticks divide, s: all returns may be of one instant.
+/// Minimum time that ticks divide, s: all returns may be of one instant.
 const SPAN_MIN_S: f32 = 1e-3;
-/// Parts of a track that may give equally many returns.
+/// Number of parts of a track, which may contribute equally many returns.
 const PARTS: usize = 128;
 const TICKS_PER_PART: usize = TICKS / PARTS;
 
-/// Time in which the length of an object is measured, s: it hardly moves meanwhile.
+/// Time over which the length of an object is measured, s: it hardly moves meanwhile.
 const GLANCE_S: f32 = 0.1;
-/// Glances used at most, and returns that one needs.
+/// Maximum number of glances used, and returns that one needs.
 const GLANCES: usize = 128;
 const GLANCE_RETURNS: usize = 6;
 
-/// A return that takes part. Positions are metres from the track's anchor, times seconds after its
-/// start.
+/// A return in use. Positions are metres from the track's anchor, times seconds after its start.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
     pub position: [f32; 3],
@@ -42,18 +40,18 @@ impl Sample {
         basis: Basis { first: 0, values: [0.0; 5] },
     };
 
-    /// One without a ray.
+    /// A sample without a ray.
     pub fn at(position: [f32; 3], time_s: f32) -> Sample {
         Sample { position, origin: position, time_s, ..Sample::NONE }
     }
 
-    /// From the end of its ray to its beginning, m.
+    /// Vector from the end of its ray to the ray's origin, m.
     pub fn origin_from_return(&self) -> [f64; 3] {
         core::array::from_fn(|d| f64::from(self.origin[d]) - f64::from(self.position[d]))
     }
 }
 
-/// Samples in the order of time.
+/// Samples in order of time.
 pub(super) struct Samples {
     all: [Sample; RETURNS_MAX],
     count: usize,
@@ -61,7 +59,7 @@ pub(super) struct Samples {
     length_m: f32,
 }
 
-/// What became of the returns of a track.
+/// First and last time of the returns taken, and the number of unsound ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Taken {
     pub first_s: f32,
@@ -69,8 +67,8 @@ pub(super) struct Taken {
     pub unsound: usize,
 }
 
-/// Returns that a part gives at most, so that all together give no more than `at_most` (or one
-/// each).
+/// Maximum number of returns taken from a part, such that all parts together give at most `at_most`
+/// (or one each).
 fn quota(counts: &[u32; PARTS], at_most: usize) -> u32 {
     let (mut low, mut high) = (1, at_most as u32 + 1);
     while high - low > 1 {
@@ -81,7 +79,7 @@ fn quota(counts: &[u32; PARTS], at_most: usize) -> u32 {
     low
 }
 
-/// Whether a return is finite, and one that a track can hold.
+/// Whether a return is finite and within the range of a track.
 pub(super) fn is_sound_return(one: &ObjectReturn) -> bool {
     let places = one.position.iter().chain(&one.origin);
     one.time_s.abs() <= FAR && places.map(|value| value.abs()).all(|value| value <= FAR)
@@ -92,9 +90,9 @@ impl Samples {
         Samples { all: [Sample::NONE; RETURNS_MAX], count: 0, ticks: [0; TICKS], length_m: 0.0 }
     }
 
-    /// Takes at most `at_most` of the returns: parts of the track that have more than their quota
-    /// give every k-th, in time order (within a tick, in the order given), with or without what
-    /// rays pass. None where no return is sound.
+    /// Takes at most `at_most` of the returns: parts of the track with more than their quota give
+    /// every k-th, in time order (within a tick, in the given order). Which rays pass is kept only
+    /// if `passing`. None if no return is sound.
     pub fn take(
         &mut self,
         returns: &[ObjectReturn],
@@ -151,7 +149,8 @@ impl Samples {
         counts
     }
 
-    /// By time, and of one time by place: nothing may depend on the order of an unstable sort.
+    /// By time, and at equal times by position: nothing may depend on the order of an unstable
+    /// sort.
     fn sort(&mut self) {
         self.all[..self.count].sort_unstable_by(|a, b| {
             let places = a.position.iter().zip(&b.position);
@@ -160,8 +159,7 @@ impl Samples {
         });
     }
 
-    /// Takes the first [`RETURNS_MAX`] of these positions and times, which are in the order of
-    /// time.
+    /// Takes the first [`RETURNS_MAX`] of these positions and times, which are in order of time.
     pub fn set(&mut self, returns: impl Iterator<Item = ([f32; 3], f32)>) {
         self.count = 0;
         for (sample, (position, time_s)) in self.all.iter_mut().zip(returns) {
@@ -178,8 +176,8 @@ impl Samples {
         }
     }
 
-    /// Visible length of the object, m: the diagonal of what is seen of it in a glance, which four
-    /// of five glances do not exceed; 0 where no glance tells.
+    /// Visible length of the object, m: the diagonal of the part seen in a glance that four of five
+    /// glances do not exceed; 0 if no glance has enough returns.
     pub fn length_m(&self) -> f32 {
         self.length_m
     }

@@ -42,7 +42,7 @@ pub(super) fn elements(state: &ObjectState) -> ControlPoint {
     [x, y, z, state.heading, state.speed, state.climb, state.turn_rate]
 }
 
-/// Whether all elements are finite, and such as a track can have.
+/// Whether all elements are finite and within the range of a track.
 pub(super) fn is_sound(state: &ObjectState) -> bool {
     elements(state).iter().chain(&[state.time_s]).all(|value| value.abs() <= ELEMENT_MAX)
 }
@@ -60,7 +60,7 @@ pub(super) fn unwrapped(history: &[ObjectState]) -> impl Iterator<Item = ObjectS
     })
 }
 
-/// State at `time_s`, extrapolated at constant velocity from `inside`, a time of the splines'
+/// State at `time_s`, extrapolated at constant velocity from `inside`, a time in the splines'
 /// domain.
 pub(super) fn state_at(
     knots: &Knots,

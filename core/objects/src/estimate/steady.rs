@@ -1,22 +1,22 @@
-//! First trajectories of steady motion, and of motion that is steady for a time.
+//! First trajectories of steady motion, and of motion that is steady for a while at a time.
 //!
-//! Gauss-Newton only descends to a near minimum, so an estimate has three starts: the tracker's
+//! Gauss-Newton only descends to a nearby minimum, so an estimate has three starts: the tracker's
 //! history, grown from the middle of the track; one steady motion for the whole track; and motions
 //! that are steady for [`SearchParams::unsteady_s`](super::params::SearchParams) each. Each is
-//! solved, and the solution of least cost, endpoints included, is kept. In practice that
-//! is where a descent from the true trajectory ends too.
+//! solved, and the solution of least cost, endpoints included, is kept. In practice that is where a
+//! descent from the true trajectory ends too.
 
 use super::params::EstimateParams;
 use super::problem::Problem;
 use super::velocity_search::{SteadyMotion, VelocitySearch, within};
 use crate::wrap_angle;
 
-/// Least time between motions for an interpolation, s.
+/// Minimum time between motions for interpolation, s.
 const STEP_MIN_S: f64 = 1e-3;
-/// Parts of a track at most that are steady.
+/// Maximum number of steady parts of a track.
 const PARTS_MAX: usize = 16;
 
-/// The steady motion of all samples. False where they have none.
+/// Starts from the steady motion of all samples. False if they have none.
 pub(super) fn start_steady(
     problem: &mut Problem,
     search: &mut VelocitySearch,
@@ -35,8 +35,8 @@ pub(super) fn start_steady(
     true
 }
 
-/// Motion that is steady about each of some times: what brakes or bends has no one velocity. False
-/// where there are not two such.
+/// Starts from motion that is steady around each of several times: an object that brakes or turns
+/// has no single velocity. False if there are fewer than two such times.
 pub(super) fn start_unsteady(
     problem: &mut Problem,
     search: &mut VelocitySearch,
@@ -72,7 +72,7 @@ pub(super) fn start_unsteady(
     true
 }
 
-/// Motions of the parts that have one, in the order of time.
+/// Motions of the parts that have one, in order of time.
 fn steady_parts(
     problem: &Problem,
     search: &mut VelocitySearch,
@@ -90,7 +90,7 @@ fn steady_parts(
     found
 }
 
-/// Velocity at a time: linear between motions, and that of the nearest outside them.
+/// Velocity at a time: linear between motions, that of the nearest one outside them.
 fn velocity_at(motions: &[SteadyMotion], time: f64) -> [f64; 2] {
     let next = motions.partition_point(|motion| motion.time_s <= time);
     let (a, b) = (&motions[next.max(1) - 1], &motions[next.min(motions.len() - 1)]);

@@ -1,20 +1,20 @@
-//! The piece of surface that a model point stands for (generalised ICP: Segal, Haehnel and Thrun,
-//! RSS 2009, with the covariance of the model's side alone).
+//! The patch of surface that a model point stands for (generalised ICP: Segal, Haehnel and Thrun,
+//! RSS 2009, with the covariance of the model's side only).
 
 use super::params::EstimateParams;
 
-/// A plane patch about a model point, upright: its normal lies in the plane of motion.
+/// An upright planar patch around a model point: its normal lies in the plane of motion.
 #[derive(Clone, Copy)]
 pub(super) struct Surface {
     /// Unit normal, in the object's frame.
     pub normal: [f64; 2],
     /// Precision of a return across, along and up, 1/m².
     pub precision: [f64; 3],
-    /// Where the model point is expected before any return, m.
+    /// Position of the model point expected before any return, m.
     pub prior_mean: [f32; 3],
-    /// Precision of that, 1/m².
+    /// Precision of that position, 1/m².
     pub prior_precision: f64,
-    /// Returns before those of the equations, and how they lay about the point.
+    /// Returns from before those of the equations, and their scatter around the point.
     pub scatter: Scatter,
 }
 
@@ -27,7 +27,7 @@ impl Surface {
         scatter: Scatter { count: 0.0, sums: [0.0; 4] },
     };
 
-    /// Of the same precision, 1/m², in every direction.
+    /// A surface with the same precision, 1/m², in every direction.
     pub const fn isotropic(precision: f64) -> Surface {
         Surface {
             normal: [1.0, 0.0],
@@ -37,7 +37,7 @@ impl Surface {
         }
     }
 
-    /// Normal and precision from the scatter of all returns: along the eigenvectors of its
+    /// Fits normal and precision to the scatter of all returns: along the eigenvectors of its
     /// covariance in the plane.
     pub fn fit(&mut self, scatter: &Scatter, params: &EstimateParams) {
         let count = f64::from(scatter.count);
@@ -45,7 +45,7 @@ impl Surface {
         let half = 0.5 * (xx - yy);
         let spread = libm::sqrt(half * half + xy * xy);
         let middle = 0.5 * (xx + yy);
-        // Of the smaller eigenvalue.
+        // Eigenvector of the smaller eigenvalue.
         let (nx, ny) = if half < 0.0 { (spread - half, -xy) } else { (-xy, spread + half) };
         let length = libm::sqrt(nx * nx + ny * ny);
         self.normal = if length > 0.0 { [nx / length, ny / length] } else { [1.0, 0.0] };
@@ -62,7 +62,7 @@ impl Surface {
     }
 }
 
-/// Returns about a model point: how many, and the sums of x x, x y, y y and z z, m².
+/// Returns around a model point: their number, and the sums of x x, x y, y y and z z, m².
 #[derive(Clone, Copy)]
 pub(super) struct Scatter {
     pub count: f32,
@@ -70,7 +70,7 @@ pub(super) struct Scatter {
 }
 
 impl Scatter {
-    /// As if one return lay 0.1 m off in every direction: no patch is singular.
+    /// As if one return lay 0.1 m off in every direction, so that no patch is singular.
     pub const ONE: Scatter = Scatter { count: 1.0, sums: [0.01, 0.0, 0.01, 0.01] };
 
     /// Adds a return in the object's frame.
@@ -82,7 +82,7 @@ impl Scatter {
         }
     }
 
-    /// Weighs the returns as no more than `most`.
+    /// Limits the weight of the returns to that of `most`.
     pub fn limit(&mut self, most: f32) {
         if self.count > most {
             let share = most / self.count;

@@ -1,5 +1,5 @@
-//! Cars of two boxes, seen by spinning sensors on a passing vehicle: only what faces a sensor is
-//! seen.
+//! Cars made of two boxes, seen by spinning sensors on a passing vehicle: only what faces a sensor
+//! is seen.
 
 extern crate std;
 
@@ -7,7 +7,7 @@ use crate::random::Random;
 use crate::{ObjectReturn, ObjectState};
 use std::vec::Vec;
 
-/// Body, then cabin: lowest and highest corner, m.
+/// Body, then cabin: minimum and maximum corner, m.
 type Boxes = [([f64; 3], [f64; 3]); 2];
 
 fn boxes(length: f64, width: f64, height: f64) -> Boxes {
@@ -16,7 +16,7 @@ fn boxes(length: f64, width: f64, height: f64) -> Boxes {
     [([-l, -w, 0.3], [l, w, waist]), ([-0.8 * l, -0.9 * w, waist], [0.35 * l, 0.9 * w, height])]
 }
 
-/// How far along a ray one of the boxes is.
+/// Distance along a ray to the nearest box that it hits.
 fn hit(boxes: &Boxes, from: [f64; 3], along: [f64; 3]) -> Option<f64> {
     let mut best = f64::MAX;
     for (low, high) in boxes {
@@ -37,9 +37,9 @@ fn hit(boxes: &Boxes, from: [f64; 3], along: [f64; 3]) -> Option<f64> {
 pub struct Drive {
     pub returns: Vec<ObjectReturn>,
     pub history: Vec<ObjectState>,
-    /// At the ends of the sweeps.
+    /// At the middle of each sweep in which it is seen.
     pub truth: Vec<ObjectState>,
-    /// Returns up to the end of each sweep.
+    /// Number of returns up to the end of each sweep.
     pub until: Vec<usize>,
     pub plan: Plan,
 }
@@ -69,7 +69,7 @@ pub struct Plan {
     pub height: f64,
 }
 
-/// A parked car that is passed.
+/// A parked car that the vehicle passes.
 pub fn parked(seed: u64) -> Plan {
     let mut r = Random(seed * 7919 + 1);
     let vehicle_mps = f64::from(r.between(6.0, 11.0));
@@ -95,7 +95,7 @@ pub fn parked(seed: u64) -> Plan {
     }
 }
 
-/// A moving one: ahead, overtaken or oncoming, turning.
+/// A moving car: ahead, overtaken or oncoming, turning.
 pub fn moving(seed: u64) -> Plan {
     let mut r = Random(seed * 104729 + 5);
     let still = parked(seed + 1000);
@@ -195,7 +195,7 @@ pub fn drive(plan: Plan) -> Drive {
     out
 }
 
-/// Integrated finely once.
+/// The path as a function of time, finely integrated once.
 fn path(plan: &Plan) -> impl Fn(f64) -> ObjectState + use<> {
     let plan = *plan;
     const STEP: f64 = 0.001;
@@ -230,7 +230,7 @@ fn path(plan: &Plan) -> impl Fn(f64) -> ObjectState + use<> {
     }
 }
 
-/// A filter of the centroid, each axis by itself: place and velocity.
+/// A filter of the centroid, each axis separately: position and velocity.
 type Tracker = ([f64; 3], [f64; 3], f64, f64, f64);
 
 fn follow(tracker: &mut Option<Tracker>, mean: [f64; 3], time: f64) {
@@ -239,7 +239,7 @@ fn follow(tracker: &mut Option<Tracker>, mean: [f64; 3], time: f64) {
         return;
     };
     *count += 1.0;
-    // Gains of a memory that grows, down to steady ones.
+    // Gains of a growing memory, down to steady ones.
     let both = *count * (*count + 1.0);
     let (alpha, beta) = ((2.0 * (2.0 * *count - 1.0) / both).max(0.5), (6.0 / both).max(0.15));
     let dt = time - *last;
@@ -267,7 +267,7 @@ fn history_of((place, velocity, time, heading, _): &Tracker) -> ObjectState {
 /// Root mean square errors: position, velocity, heading, turn rate.
 pub type Errors = [f64; 4];
 
-/// Errors after one transform in the body's frame that is the same for the whole track.
+/// Errors after a transform in the body's frame that is the same for the whole track.
 pub fn errors(truth: &[ObjectState], estimate: impl Fn(f64) -> ObjectState) -> Errors {
     let states: Vec<ObjectState> = truth.iter().map(|t| estimate(t.time_s)).collect();
     let n = truth.len() as f64;
@@ -279,7 +279,7 @@ pub fn errors(truth: &[ObjectState], estimate: impl Fn(f64) -> ObjectState) -> E
         c += off.cos();
     }
     let off = s.atan2(c);
-    // Mean place of the true origin in the estimate's frame.
+    // Mean position of the true origin in the estimate's frame.
     let mut lever = [0.0; 3];
     for (t, e) in truth.iter().zip(&states) {
         let d = [0, 1, 2].map(|i| t.position[i] - e.position[i]);
@@ -309,7 +309,7 @@ pub fn errors(truth: &[ObjectState], estimate: impl Fn(f64) -> ObjectState) -> E
     sums.map(|sum| (sum / n).sqrt())
 }
 
-/// The same of a history at its own times.
+/// The same for a history, at its own times.
 pub fn history_errors(drive: &Drive) -> Errors {
     errors(&drive.truth, |time| {
         *drive
@@ -320,7 +320,7 @@ pub fn history_errors(drive: &Drive) -> Errors {
     })
 }
 
-/// It comes towards the vehicle and passes it.
+/// A tram that comes towards the vehicle and passes it.
 pub fn tram(seed: u64, speed: f64) -> Plan {
     Plan {
         seconds: 6.0,

@@ -40,7 +40,7 @@ fn point() -> (Vec<ObjectReturn>, Vec<ObjectState>) {
     (returns.collect(), history.collect())
 }
 
-/// The optimum has no cost at all: the model point at the origin, the trajectory a straight line.
+/// The optimum has zero cost: the model point at the origin, the trajectory a straight line.
 #[test]
 fn finds_the_optimum_of_a_point_in_uniform_motion() {
     let (returns, history) = point();
@@ -100,8 +100,8 @@ fn moving_cars_are_followed() {
     }
 }
 
-/// A side says nothing of motion along it: where it ends does (figure 2.9), and that it ends there
-/// is told by the rays that pass.
+/// A side says nothing about motion along it: where it ends does (figure 2.9), and the rays that
+/// pass show that it ends there.
 #[test]
 fn long_sides_move_with_their_ends() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -117,7 +117,7 @@ fn long_sides_move_with_their_ends() {
     assert!(worst > 1.0, "{worst}");
 }
 
-/// Steady for a second at a time, a motion is found that brakes and bends.
+/// For braking and turning, a start is found that is steady for a second at a time.
 #[test]
 fn unsteady_motion_has_a_start() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -134,13 +134,13 @@ fn unsteady_motion_has_a_start() {
     let steady = errors(&drive.truth, |time| estimator.state(time));
     assert!(found[0] < 0.5 && found[1] < 1.0, "{found:?}");
     assert!(found[0] < 0.5 * steady[0] && found[1] < 0.7 * steady[1], "{found:?} {steady:?}");
-    // What is too short for two such has none.
+    // A track too short for two such parts has no start.
     let short = &drive.returns[..drive.returns.partition_point(|seen| seen.time_s < 1.5)];
     estimator.solve(&EstimateParams::DEFAULT, short, &[]);
     assert!(!estimator.start(InitialGuess::Unsteady, &params));
 }
 
-/// One and the same optimum from histories that are off in different ways.
+/// The same optimum from histories that are off in different ways.
 #[test]
 fn perturbed_starts_converge() {
     let drive = drive(synthetic::moving(3));
@@ -152,7 +152,7 @@ fn perturbed_starts_converge() {
         for state in &mut history {
             state.position[0] += x * state.time_s / 3.0;
             state.position[1] += y;
-            // Wraps are nothing to it.
+            // Wraps make no difference.
             state.heading += turned + core::f64::consts::TAU * random.below(3) as f64;
         }
         estimator.solve(&EstimateParams::DEFAULT, &drive.returns, &history);
@@ -161,8 +161,8 @@ fn perturbed_starts_converge() {
     }
 }
 
-/// Two systems of the same problem, in metres and with everything a hundredfold heavier, agree: no
-/// digit that matters is lost between precisions of 4 and 1e6.
+/// Two versions of the same problem, as is and with all precisions a hundred times as large, agree:
+/// no significant digit is lost between precisions of 4 and 1e6.
 #[test]
 fn conditioning_leaves_the_step_exact() {
     let (returns, history) = point();
@@ -268,7 +268,7 @@ fn bad_input_is_bounded_and_reported() {
 #[test]
 fn takes_as_many_as_it_may_evenly_in_time() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
-    // A tenth of the returns in nine tenths of the time, and in no order.
+    // A tenth of the returns in nine tenths of the time, unordered.
     let mut random = Random(5);
     let returns: Vec<ObjectReturn> = (0..40_000)
         .map(|i| {
@@ -297,7 +297,7 @@ fn takes_as_many_as_it_may_evenly_in_time() {
     }
 }
 
-/// What is counted is of the start that led to the estimate, not of all that were tried.
+/// The count is that of the start that led to the estimate, not of all starts tried.
 #[test]
 fn carved_points_are_those_that_lack() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -316,7 +316,7 @@ fn carved_points_are_those_that_lack() {
     assert!(carved > 0);
 }
 
-/// A crumb has no heading that returns could tell, but neither does it spin.
+/// A crumb has no heading that returns could show, but it does not spin either.
 #[test]
 fn whole_turns_are_taken_back() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -376,7 +376,7 @@ fn what_is_long_is_sluggish() {
     assert_eq!(by(2.25), (all(1.0, 2.0), [0.5, 2.0 / 3.0], 2.25));
     assert_eq!(by(500.0), by(30.0));
     assert_eq!(by(30.0).2, ours.shape_sigma_m);
-    // The length is not known, or does not matter.
+    // The length is unknown, or does not matter.
     assert_eq!(ours.for_length(0.0), ours);
     let plain = EstimateParams::DISSERTATION;
     assert_eq!(plain.for_length(9.0), plain);

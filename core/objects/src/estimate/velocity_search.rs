@@ -1,25 +1,25 @@
-//! Steady motion that lays the returns of a time over each other.
+//! Steady motion that brings the returns of a period into coincidence.
 //!
 //! Of all velocities that a centroid allows, the search takes the one that makes the cloud
-//! crispest: of least entropy over cells (compare 2.6.4; Sheehan, Harrison and Newman, 2012). It
-//! goes over a lattice of velocities, as Gauss-Newton does not find far minima. Along a smooth side
-//! all velocities are as crisp, but for where the object ends: returns that rays pass count once
-//! more, by themselves.
+//! crispest: that of least entropy over cells (compare 2.6.4; Sheehan, Harrison and Newman, 2012).
+//! It scans a lattice of velocities, as Gauss-Newton does not find distant minima. Along a smooth
+//! side all velocities are equally crisp, except where the object ends: returns that rays pass are
+//! counted once more, separately.
 
 use super::params::SearchParams;
 use super::samples::Sample;
 
-/// Returns that take part, evenly spaced in time.
+/// Maximum number of returns used, evenly spaced in time.
 const POINTS: usize = 1500;
-/// Those of them that rays pass, at most.
+/// Maximum number of returns that rays pass, used once more.
 const EDGES: usize = 500;
-/// Slots of the cells' counts: two cells share one now and then, which hardly tells.
+/// Slots for the cells' counts: two cells sometimes share one, which hardly matters.
 const SLOTS: usize = 1 << 14;
 
 /// A steady motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SteadyMotion {
-    /// Mean time, s, and place, m, of the returns.
+    /// Mean time, s, and position, m, of the returns.
     pub time_s: f64,
     pub position: [f64; 3],
     /// m/s.
@@ -33,14 +33,14 @@ struct CentredReturn {
     time_s: f32,
 }
 
-/// How many returns take part, and how many that rays pass, which come after them.
+/// Number of returns used, and of those that rays pass, which come after them.
 #[derive(Clone, Copy)]
 struct Counts {
     all: usize,
     edges: usize,
 }
 
-/// A lattice of velocities about a centre, and the cells' edge.
+/// A lattice of velocities around a centre, and the edge of the cells.
 struct Lattice {
     /// m/s.
     centre: [f64; 2],
@@ -51,7 +51,7 @@ struct Lattice {
     cell_m: f32,
 }
 
-/// Indices of `count` of all, evenly spaced.
+/// Indices of `count` of `all` elements, evenly spaced.
 fn evenly(all: usize, count: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |n| (2 * n + 1) * all / (2 * count))
 }
@@ -75,8 +75,8 @@ impl VelocitySearch {
         }
     }
 
-    /// The motion of returns, in the order of time, of an object about so long, m. None where there
-    /// are too few, or at one time.
+    /// Finds the motion of an object about `length_m` long from its returns, in order of time. None
+    /// if there are too few, or over too short a time.
     pub fn find(
         &mut self,
         samples: &[Sample],
@@ -95,7 +95,7 @@ impl VelocitySearch {
         let count = self.gather(samples, count, &mean);
         let length_m = length_m.max(1.0);
         let mut cell_m = params.search_cell_m.max(length_m / params.search_cells_along);
-        // A step moves the first and the last by a cell.
+        // A step moves the first and the last return by a cell.
         let mut step = 2.0 * cell_m / span;
         let reach_mps = params.search_lengths * length_m / span + params.search_error_mps;
         let reach = libm::ceilf(reach_mps / step) as i32;
@@ -111,7 +111,7 @@ impl VelocitySearch {
         Some(SteadyMotion { velocity, ..mean })
     }
 
-    /// Takes so many returns and, behind them, those that rays pass, about a motion.
+    /// Takes `count` returns and, after them, those that rays pass, relative to a motion.
     fn gather(&mut self, samples: &[Sample], count: usize, mean: &SteadyMotion) -> Counts {
         let centred = |one: &Sample| CentredReturn {
             at: core::array::from_fn(|d| (f64::from(one.position[d]) - mean.position[d]) as f32),
@@ -153,7 +153,7 @@ impl VelocitySearch {
         best.1
     }
 
-    /// Sum of `n ln n` over the cells by a velocity, for a return each.
+    /// Sum of `n ln n` over the cells at a velocity, per return.
     fn fullness(
         &mut self,
         count: Counts,
@@ -161,7 +161,7 @@ impl VelocitySearch {
         per_m: f32,
         edges_full: usize,
     ) -> f32 {
-        // Far below any index, so that truncation is downwards.
+        // Far below any index, so that truncation rounds downwards.
         const LOW: f32 = 32768.0;
         let index = |value: f32, per_m: f32| (value * per_m + LOW) as u32;
         let mut sums = [0.0; 2];
@@ -169,7 +169,7 @@ impl VelocitySearch {
         let points = self.points[..together].iter().zip(&mut self.touched).enumerate();
         for (n, (CentredReturn { at: [x, y, z], time_s }, touched)) in points {
             let is_edge = n >= count.all;
-            // Edges are upright; index 0 is no height's.
+            // Edges are upright; no height has index 0.
             let up = if is_edge { 0 } else { index(*z, 0.5 * per_m) };
             let hash = index(x - time_s * vx, per_m).wrapping_mul(0x9e37_79b1)
                 ^ index(y - time_s * vy, per_m).wrapping_mul(0x85eb_ca77)
@@ -187,14 +187,14 @@ impl VelocitySearch {
     }
 }
 
-/// Those no farther from a time than `by`, s.
+/// Samples no farther from a time than `by`, s.
 pub(super) fn within(samples: &[Sample], time_s: f32, by: f32) -> &[Sample] {
     let from = samples.partition_point(|one| one.time_s < time_s - by);
     let to = samples.partition_point(|one| one.time_s <= time_s + by);
     &samples[from..to]
 }
 
-/// Mean of the returns, and how it goes.
+/// Mean of the returns, and the velocity fitted to them.
 fn drift(samples: &[Sample]) -> SteadyMotion {
     let count = samples.len() as f64;
     let (mut time_s, mut position) = (0.0, [0.0; 3]);
@@ -222,8 +222,8 @@ mod tests {
     use crate::random::Random;
     use std::vec::Vec;
 
-    /// The side and the front of something so long that passes at `velocity`, its front hidden
-    /// until the sixth part of ten.
+    /// The side and the front of an object of this length that passes at `velocity`, its front
+    /// hidden for the first six tenths of the time.
     fn passing(length_m: f32, velocity: [f32; 2]) -> Vec<Sample> {
         let mut random = Random(3);
         let speed = libm::hypotf(velocity[0], velocity[1]);
@@ -268,8 +268,8 @@ mod tests {
         }
     }
 
-    /// A smooth side behind a gap: its front shows until it leaves the gap, its rear when it
-    /// enters.
+    /// A smooth side behind a gap: its front is visible until it leaves the gap, its rear once it
+    /// has entered it.
     #[test]
     fn where_it_ends_tells_how_a_side_moves() {
         let mut search = raywake_alloc_guard::boxed!(VelocitySearch, VelocitySearch::new());
@@ -323,7 +323,7 @@ mod tests {
                 Sample { position, time_s: 30.0 * n as f32, ..Sample::NONE }
             })
             .collect();
-        // A day, cut to ten seconds of it, in which there is one return.
+        // A day, of which ten seconds are used, with one return in them.
         assert_eq!(search.find(&wild, 1e5, &SearchParams::DEFAULT), None);
         wild.iter_mut().for_each(|one| one.time_s *= 1e-4);
         let found = search.find(&wild, 1e5, &SearchParams::DEFAULT).unwrap();

@@ -1,9 +1,9 @@
-//! The assignment of segments to tracks with the least sum of costs (Kuhn, 1955; Munkres, 1957).
+//! The assignment of segments to tracks with the least total cost (Kuhn, 1955; Munkres, 1957).
 
 use super::{SEGMENTS_MAX, TRACKS_MAX};
 use raywake_core::record::NONE;
 
-/// Segments, and one column for each track that none continues.
+/// Segments, and one column per track for having no segment.
 const COLUMNS: usize = SEGMENTS_MAX + TRACKS_MAX;
 
 /// Tracks are rows, segments columns; a track without a segment costs the gate. Rows are added one
@@ -16,7 +16,7 @@ pub(super) struct Assignment {
     of_column: [f64; COLUMNS],
     /// Row of each column.
     row: [u32; COLUMNS],
-    /// The column before on the path, [`NONE`] at its start, and the length of the path.
+    /// The previous column on the path, [`NONE`] at its start, and the length of the path.
     before: [u32; COLUMNS],
     length: [f64; COLUMNS],
     visited: [bool; COLUMNS],
@@ -41,7 +41,7 @@ impl Assignment {
         &mut self.cost[track]
     }
 
-    /// Assigns the first so many tracks to the first so many segments.
+    /// Assigns the first `tracks` tracks to the first `segments` segments.
     pub fn solve(&mut self, tracks: usize, segments: usize, gate: f32) {
         let columns = segments + tracks;
         self.of_row[..tracks].fill(0.0);
@@ -62,14 +62,14 @@ impl Assignment {
         }
     }
 
-    /// Track that a segment continues.
+    /// Returns the track that a segment continues.
     pub fn track(&self, segment: usize) -> Option<usize> {
         let row = self.row[segment];
         (row != NONE).then_some(row as usize)
     }
 
-    /// The column without a row that is nearest to a row without a column. There always is one:
-    /// that of the row itself.
+    /// Returns the nearest column without a row to a row without a column. There always is one: the
+    /// row's own.
     fn nearest_free(&mut self, track: usize, segments: usize, columns: usize, gate: f32) -> usize {
         self.length[..columns].fill(f64::INFINITY);
         self.visited[..columns].fill(false);
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn at_capacity() {
         let mut solver = raywake_alloc_guard::boxed!(Assignment, Assignment::new());
-        // All want the first segment most.
+        // All prefer the first segment.
         for track in 0..TRACKS_MAX {
             for (segment, cost) in solver.costs(track).iter_mut().enumerate() {
                 *cost = segment as f32 * 1e-3;

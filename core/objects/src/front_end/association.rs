@@ -1,5 +1,5 @@
-//! Which segment continues which track: global nearest neighbour within the gates of the filters'
-//! predictions (Bar-Shalom and Fortmann, 1988).
+//! Finds which segment continues which track: global nearest neighbour within the gates of the
+//! filters' predictions (Bar-Shalom and Fortmann, 1988).
 
 use super::assignment::Assignment;
 use super::batch::Batch;
@@ -62,7 +62,7 @@ impl Association {
         self.slot_of_segment[segment]
     }
 
-    /// Gives a segment the track that begins with it.
+    /// Gives a segment to the track that begins with it.
     pub fn begin(&mut self, segment: usize, slot: usize) {
         self.slot_of_segment[segment] = slot as u32;
     }
@@ -104,12 +104,12 @@ fn gate_share<const R: usize, const H: usize>(
     (share <= 1.0).then_some(share)
 }
 
-/// Squared Mahalanobis distance between a velocity of the flow and that of a filter.
+/// Squared Mahalanobis distance between the velocity from the flow and that of a filter.
 pub(super) fn velocity_distance2(ekf: &CentroidEkf, velocity: [f64; 2], sigma_mps: f64) -> f64 {
     let (expected, [xx, xy, yy]) = ekf.velocity();
     let off = Vector2::new(velocity[0] - expected[0], velocity[1] - expected[1]);
     let noise = Matrix2::from_diagonal_element(sigma_mps * sigma_mps);
-    // Positive definite by the noise.
+    // Positive definite because of the noise.
     let weight = (Matrix2::new(xx, xy, xy, yy) + noise).try_inverse().unwrap_or_default();
     (off.transpose() * weight * off)[0]
 }

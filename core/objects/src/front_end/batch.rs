@@ -1,4 +1,4 @@
-//! The returns of some 100 ms, of any number of sensors, in the world.
+//! The returns of about 100 ms, from any number of sensors, in the world.
 
 use super::{CELL_M, FrontEndParams, SIDE};
 use glam::{DMat3, DVec3};
@@ -16,20 +16,20 @@ use raywake_core::thinning::TakenPoints;
 pub(super) struct BatchReturn {
     /// m from the batch's corner.
     pub position: [f32; 3],
-    /// Where its ray began, m from there.
+    /// Where its ray began, m from the corner.
     pub origin: [f32; 3],
     /// s after the batch's stamp.
     pub time_s: f32,
     /// Index of the sensor.
     pub sensor: u8,
-    /// Whether rays pass to its left and right, once they have been looked at.
+    /// Whether rays pass on its left and right, once that is known.
     pub passed: [bool; 2],
-    /// Over ground by the flow, m/s, as far as it tells.
+    /// Velocity over ground by the flow, m/s, if known.
     pub velocity: Option<[f32; 2]>,
-    /// P(moves) by the flow and the class of its column, as far as they are told.
+    /// P(moves) by the flow and the class of its column, if known.
     pub p_moves: Option<f32>,
     pub class: Option<ColumnClass>,
-    /// Which of its sweep's returns it is.
+    /// Its index among its sweep's returns.
     pub index: u32,
     /// Index of the cell it lies in.
     pub cell: u32,
@@ -38,33 +38,33 @@ pub(super) struct BatchReturn {
 /// The flow of a sweep's returns.
 #[derive(Clone, Copy, Debug)]
 pub struct Flows<'a> {
-    /// Of every return.
+    /// Those of all returns.
     pub of: PointFlows<'a>,
-    /// Returns farther from the vehicle lie outside the flow's window, m.
+    /// Distance from the vehicle beyond which returns lie outside the flow's window, m.
     pub reach_m: f64,
 }
 
 impl Flows<'_> {
-    /// How far the window of a profile reaches: all its columns, but for one at the edge, m.
+    /// How far the window of a profile reaches: all its columns except one at the edge, m.
     pub fn reach_m(profile: &Profile) -> f64 {
         (0.5 * f64::from(profile.side) - 1.0) * profile.voxel_m
     }
 
-    /// That of a return `away` (m) from the vehicle.
+    /// The flow of a return `away` (m) from the vehicle.
     fn at(&self, n: usize, away: [f64; 2]) -> Option<PointFlow> {
         let inside = away[0] * away[0] + away[1] * away[1] < self.reach_m * self.reach_m;
         self.of.get(n).filter(|f| inside && f.status != Status::OverCapacity)
     }
 }
 
-/// Velocity of a return, m/s, where the flow is sure of it.
+/// Velocity of a return, m/s, if the flow is certain of it.
 fn velocity(flow: PointFlow, sigma_max_mps: f32) -> Option<[f32; 2]> {
     let sum = flow.covariance[0] + flow.covariance[2];
     let certain = sum < 2.0 * sigma_max_mps * sigma_max_mps;
     (certain && flow.basis != FlowBasis::Unmatched).then_some(flow.velocity_world_mps)
 }
 
-/// Indices of the cell of a place in the window, along x and y.
+/// Indices of the cell that contains a point of the window, along x and y.
 pub(super) fn cell_along(at: [f32; 3]) -> [usize; 2] {
     [at[0], at[1]].map(|v| ((v / CELL_M) as usize).min(SIDE - 1))
 }
@@ -75,7 +75,7 @@ pub(super) fn cell(at: [f32; 3]) -> u32 {
     (i * SIDE + j) as u32
 }
 
-/// What has been taken since the last step.
+/// What was taken since the last step.
 pub(super) struct Batch {
     /// Made with the first sweep.
     clock: Option<ReturnClock>,
@@ -85,9 +85,9 @@ pub(super) struct Batch {
     /// ground under the vehicle along z.
     pub corner: DVec3,
     pub returns: heapless::Vec<BatchReturn, POINTS_MAX>,
-    /// Left out since the last step.
+    /// Returns left out since the last step.
     pub dropped: DroppedReturns,
-    /// Whether the step is done: what is here is the last step's.
+    /// Whether the step is done: the contents are those of the last step.
     pub is_done: bool,
 }
 
@@ -113,13 +113,14 @@ impl Batch {
         }
     }
 
-    /// A place given from the corner, in the world, m.
+    /// Converts a point relative to the corner to the world, m.
     pub fn in_world(&self, at: [f64; 3]) -> [f64; 3] {
         let corner = self.corner.to_array();
         [0, 1, 2].map(|a| corner[a] + at[a])
     }
 
-    /// Adds the returns of a sweep. Those of a sweep without a finite stamp or pose are not finite.
+    /// Adds the returns of a sweep. All returns of a sweep without a finite stamp or pose count as
+    /// not finite.
     pub fn take(
         &mut self,
         params: &FrontEndParams,
@@ -194,7 +195,7 @@ struct SlotPose {
     translation: DVec3,
     /// s after the sweep's stamp.
     offset_s: f64,
-    /// Of the sensors, m from the corner.
+    /// Origins of the sensors' rays, m from the corner.
     origins: [[f32; 3]; SENSORS_MAX],
 }
 
@@ -203,7 +204,7 @@ struct SweepMotion {
     slots: [SlotPose; SLOTS],
     /// Whether returns have times.
     timed: bool,
-    /// Velocity of the vehicle within a slot, where it distorts the sweep, m/s.
+    /// Velocity of the vehicle within a slot if it distorts the sweep, m/s.
     drift: DVec3,
 }
 
@@ -227,7 +228,7 @@ impl SweepMotion {
         SweepMotion { slots, timed, drift }
     }
 
-    /// An admitted point at its time in slots, and that time after the stamp, s.
+    /// Places an admitted point by its time in slots; also returns that time after the stamp, s.
     fn place(&self, rig: &Rig, point: &Point, when: f32) -> (BatchReturn, f64) {
         let slot = &self.slots[if self.timed { slot_of(when) } else { 0 }];
         let offset_s = rig.timing.offset_s(f64::from(when));
@@ -236,7 +237,7 @@ impl SweepMotion {
         let one = BatchReturn {
             position: single(slot.rotation * DVec3::new(x, y, z) + slot.translation + drift),
             origin: slot.origins[point.sensor as usize],
-            // There is such a sensor, and there are few.
+            // The sensor exists, and there are few.
             sensor: point.sensor as u8,
             ..BatchReturn::default()
         };

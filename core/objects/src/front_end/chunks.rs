@@ -4,7 +4,7 @@ use super::batch::{BatchReturn, cell_along};
 use super::{CELLS, FrontEndParams, SIDE};
 use raywake_core::record::NONE;
 
-/// Chunks of a batch; returns that would need more are dropped and counted.
+/// Maximum number of chunks of a batch; returns that would need more are dropped and counted.
 pub(super) const CHUNKS_MAX: usize = 32_768;
 
 /// Sums over returns.
@@ -13,7 +13,7 @@ pub(super) struct ReturnSums {
     pub count: u32,
     pub position: [f64; 3],
     pub time_s: f64,
-    /// Returns with a velocity, and the sum of these.
+    /// Number of returns with a velocity, and the sum of their velocities.
     pub with_velocity: u32,
     pub velocity: [f64; 2],
     pub low: [f32; 3],
@@ -58,14 +58,14 @@ impl ReturnSums {
     }
 }
 
-/// What is looked at of a chunk that may be near: of the return that opened it.
+/// What is inspected of a chunk that may be near: the return that opened it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chunk {
     /// m from the batch's corner.
     pub position: [f32; 3],
     /// s after the batch's stamp.
     pub time_s: f32,
-    /// m/s, where it is known.
+    /// m/s, if known.
     pub velocity: Option<[f32; 2]>,
     /// The next chunk of the cell, or [`NONE`].
     next: u32,
@@ -76,7 +76,7 @@ pub(super) struct Chunks {
     /// First chunk of every cell, or [`NONE`].
     heads: [u32; CELLS],
     all: heapless::Vec<Chunk, CHUNKS_MAX>,
-    /// Over the returns of each.
+    /// Sums over the returns of each chunk.
     sums: heapless::Vec<ReturnSums, CHUNKS_MAX>,
 }
 
@@ -100,8 +100,8 @@ impl Chunks {
         &self.sums[chunk as usize]
     }
 
-    /// Adds a return to the nearest chunk that it may join, or to one of its own. The chunk, or
-    /// [`NONE`] where there is no room.
+    /// Adds a return to the nearest chunk that it may join, or to a new one. Returns the chunk, or
+    /// [`NONE`] if there is no room.
     pub fn add(&mut self, params: &FrontEndParams, one: &BatchReturn) -> u32 {
         let index = self.nearest(params, one).unwrap_or_else(|| self.open(one));
         if let Some(sums) = self.sums.get_mut(index as usize) {
@@ -110,7 +110,7 @@ impl Chunks {
         index
     }
 
-    /// The nearest chunk that a return may join; of two as near, the one found first.
+    /// The nearest chunk that a return may join; of two equally near ones, the one found first.
     fn nearest(&self, params: &FrontEndParams, one: &BatchReturn) -> Option<u32> {
         let radius = params.chunk_radius_m;
         let mut best = (radius * radius, None);
@@ -137,7 +137,7 @@ impl Chunks {
         self.heads[cell]
     }
 
-    /// Visits the chunks of the cells within `reach` (m) of a place.
+    /// Visits the chunks of the cells within `reach` (m) of a point.
     pub fn around<'a>(&'a self, at: [f32; 3], reach: f32, mut visit: impl FnMut(u32, &'a Chunk)) {
         let low = cell_along([at[0] - reach, at[1] - reach, 0.0]);
         let high = cell_along([at[0] + reach, at[1] + reach, 0.0]);

@@ -8,7 +8,7 @@ macro_rules! counts {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         pub struct $group {
-            /// Returns left out before they were looked at.
+            /// Returns left out before they were examined.
             pub dropped: DroppedReturns,
             $($(#[$count_doc])* pub $count: u64,)*
         }
@@ -30,7 +30,7 @@ macro_rules! counts {
 }
 
 counts! {
-    /// What a step did, or several.
+    /// Counts of one step or several.
     TrackingCounts {
         /// Returns of objects.
         object_returns,
@@ -38,15 +38,15 @@ counts! {
         unchunked,
         /// Segments that may be objects.
         segments,
-        /// Segments too small for one.
+        /// Segments too small for an object.
         too_small,
-        /// Segments too large.
+        /// Segments too large for an object.
         too_large,
         /// Segments beyond the capacity.
         unlisted,
         /// Tracks begun.
         born,
-        /// Segments that found no room for a track.
+        /// Segments without a track for lack of room.
         unborn,
         /// Tracks continued.
         updated,
@@ -54,7 +54,7 @@ counts! {
         waiting,
         /// Tracks ended.
         ended,
-        /// Of these, because time went backwards.
+        /// Tracks ended because time went backwards, included in `ended`.
         reset,
     }
 }

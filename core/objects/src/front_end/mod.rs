@@ -5,14 +5,14 @@
 //!                              z varies           connected      gate of the EKF
 //!                                                 chunks
 //! ```
-//! Returns of some 100 ms, of any number of sensors, each at its own time, are put into the world
-//! (`batch`); those of objects are found by the variance of z in 2-D cells and by the ground
-//! (`object_returns`); they are gathered in small containers in space and time (`chunks`),
-//! whose connected components are segments (`segments`). Each segment continues at most one track
+//! Returns of about 100 ms, from any number of sensors, each at its own time, are placed in the
+//! world (`batch`); those of objects are found by the variance of z in 2-D cells and by the ground
+//! (`object_returns`); they are gathered in small containers in space and time (`chunks`), whose
+//! connected components are segments (`segments`). Each segment continues at most one track
 //! (`association`), or begins one; a track that is not observed for a while ends.
 //!
-//! With the flow of the returns ([`FrontEnd::take`]) what moves is an object's wherever it is,
-//! neighbours that move differently are two objects, and the velocity of a segment joins its
+//! With the flow of the returns ([`FrontEnd::take`]), whatever moves belongs to an object wherever
+//! it is, neighbours that move differently are two objects, and the velocity of a segment joins its
 //! position in the gate.
 
 mod assignment;
@@ -45,13 +45,13 @@ use raywake_core::params::SIDE_MAX;
 use raywake_core::sweep::{Rig, Sweep};
 use segments::Segmentation;
 
-/// Tracks followed at once at most.
+/// Maximum number of tracks followed at once.
 pub const TRACKS_MAX: usize = 160;
-/// Segments of a batch that may be objects; further ones are counted.
+/// Maximum number of segments of a batch that may be objects; further ones are counted.
 pub const SEGMENTS_MAX: usize = 1024;
 /// Edge of a 2-D cell, m. With [`SIDE`] it sizes the window.
 pub const CELL_M: f32 = 0.4;
-/// Cells along an axis of the window around the vehicle: 102 m.
+/// Number of cells along an axis of the window around the vehicle: 102 m.
 pub const SIDE: usize = 255;
 const CELLS: usize = SIDE * SIDE;
 
@@ -91,8 +91,8 @@ impl FrontEnd {
         }
     }
 
-    /// Adds a sweep to the batch of the next step, as many as there are, each with its own stamp.
-    /// `flows` are those of its points, where they are known.
+    /// Adds a sweep to the batch of the next step; there may be several, each with its own stamp.
+    /// `flows` are those of its points, if known.
     pub fn take(
         &mut self,
         params: &FrontEndParams,
@@ -103,8 +103,8 @@ impl FrontEnd {
         self.batch.take(params, rig, sweep, flows);
     }
 
-    /// Continues the tracks with what has been taken since the last step. `tracks` are the same as
-    /// then, the first [`TRACKS_MAX`] of them are used; those that have ended can be looked at
+    /// Continues the tracks with what was taken since the last step. `tracks` are the same as in
+    /// that step; the first [`TRACKS_MAX`] of them are used. Those that have ended can be read
     /// until the next step.
     pub fn step<const R: usize, const H: usize>(
         &mut self,
@@ -130,7 +130,7 @@ impl FrontEnd {
             association.find(params, batch, segments.all(), tracks);
             self.continue_tracks(params, tracks, &mut counts);
             self.begin_tracks(params, tracks, &mut counts);
-            // For estimates alone.
+            // Needed by estimates only.
             if R > 0 {
                 self.find_passing(params);
             }
@@ -141,8 +141,8 @@ impl FrontEnd {
         counts
     }
 
-    /// The returns of the last step's sweeps that belong to a track: which of its sweep's returns
-    /// it is, and the slot of its track.
+    /// The returns of the last step's sweeps that belong to a track: the return's index in its
+    /// sweep, and the slot of its track.
     pub fn members(&self) -> impl Iterator<Item = (usize, usize)> {
         let slot = |n: usize| Some(self.association.slot(self.segments.of_return(n)?));
         let all = self.batch.returns.iter().enumerate();
@@ -194,7 +194,7 @@ impl FrontEnd {
         }
     }
 
-    /// Begins a track with each segment that has none, as far as there is room: largest first.
+    /// Begins a track with each segment that has none, largest first, as long as there is room.
     fn begin_tracks<const R: usize, const H: usize>(
         &mut self,
         params: &FrontEndParams,
@@ -217,7 +217,7 @@ impl FrontEnd {
         }
     }
 
-    /// Hands the returns of every segment to its track.
+    /// Passes the returns of every segment to its track.
     fn distribute<const R: usize, const H: usize>(&self, tracks: &mut [Track<R, H>]) {
         let Some(stamp_s) = self.last_s else { return };
         for (n, one) in self.batch.returns.iter().enumerate() {
@@ -231,7 +231,7 @@ impl FrontEnd {
     }
 }
 
-/// Frees the room of tracks that have ended.
+/// Frees the slots of tracks that have ended.
 fn free_ended<const R: usize, const H: usize>(tracks: &mut [Track<R, H>]) {
     tracks.iter_mut().filter(|t| t.life == Life::Ended).for_each(Track::free);
 }

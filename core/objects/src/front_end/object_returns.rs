@@ -1,4 +1,4 @@
-//! Which returns belong to objects: by the variance of z in 2-D cells, and by their height.
+//! Finds which returns belong to objects: by the variance of z in 2-D cells, and by their height.
 
 use super::batch::{Batch, BatchReturn};
 use super::{CELL_M, CELLS, FrontEndParams, SIDE};
@@ -9,21 +9,21 @@ use raywake_core::params::{GroundParams, POINTS_MAX};
 const GROUND: GroundParams =
     GroundParams { ground_cell_m: 2.0, ground_drop_m: 0.6, ..GroundParams::DEFAULT };
 
-/// Heights of the ground on a grid of square cells, made beforehand.
+/// Heights of the ground on a grid of square cells, computed in advance.
 #[derive(Clone, Copy, Debug)]
 pub struct GroundMap<'a> {
     /// World position of the corner of the first cell, m.
     pub corner: [f64; 2],
     /// Edge of a cell, m.
     pub cell_m: f64,
-    /// Cells along x; as many as fit along y.
+    /// Number of cells along x; along y, as many as there are heights for.
     pub columns: usize,
-    /// Heights in the world, m, rows of equal y one after the other; NaN where unknown.
+    /// Heights in the world, m, row after row of equal y; NaN where unknown.
     pub heights: &'a [f32],
 }
 
 impl GroundMap<'_> {
-    /// Height of the ground at a place, m, where it is known.
+    /// Height of the ground at a point, m, if known.
     pub fn height(&self, x: f64, y: f64) -> Option<f32> {
         let [i, j] = [(x - self.corner[0]) / self.cell_m, (y - self.corner[1]) / self.cell_m];
         if !(i >= 0.0 && i < self.columns as f64 && j >= 0.0) {
@@ -57,7 +57,7 @@ impl HeightVariance {
 pub(super) struct ObjectReturns {
     estimator: GroundEstimator,
     ground: GroundHeights,
-    /// Of the ground above the batch's corner, m; infinite where unknown.
+    /// Height of the ground above the batch's corner, m; infinite where unknown.
     height: [f32; CELLS],
     variance: [HeightVariance; CELLS],
     is_object: [bool; POINTS_MAX],
@@ -74,9 +74,9 @@ impl ObjectReturns {
         }
     }
 
-    /// Finds the returns of objects: those of cells whose z varies and those well above the ground.
-    /// What the flow has moving is an object's in any cell. Ground and what is overhead are none's,
-    /// as far as the ground is known.
+    /// Finds the returns of objects: those in cells whose z varies and those well above the ground.
+    /// What moves according to the flow belongs to an object in any cell. Ground and overhead
+    /// returns belong to none, where the ground is known.
     pub fn find(&mut self, params: &FrontEndParams, batch: &Batch, map: Option<&GroundMap>) {
         self.find_ground(batch, map);
         self.variance.fill(HeightVariance::NONE);
@@ -123,7 +123,7 @@ impl ObjectReturns {
         }
     }
 
-    /// Height above the ground, m, where that is known.
+    /// Height above the ground, m, if that is known.
     fn above(&self, cell: usize, one: &BatchReturn) -> Option<f32> {
         let ground = self.height[cell];
         ground.is_finite().then(|| one.position[2] - ground)

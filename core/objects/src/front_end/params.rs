@@ -7,33 +7,33 @@ raywake_core::params! {
     /// The front end: for cars, cyclists and people around a car with spinning sensors.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct FrontEndParams {
-        /// Variance of z in a cell above which its returns are an object's.
+        /// Variance of z in a cell above which its returns belong to an object.
         pub variance_m2: f32 = 0.01, "m²", (above 0);
-        /// Returns lower above the ground than this are the ground's.
+        /// Returns lower than this above the ground belong to the ground.
         pub ground_clearance_m: f32 = 0.2, "m", (0 to 2);
-        /// Returns at least this high above the ground are an object's in any cell.
+        /// Returns at least this high above the ground belong to an object in any cell.
         pub object_height_m: f32 = 0.5, "m", (0 to 10);
-        /// Returns at least this high above the ground are no object's.
+        /// Returns at least this high above the ground belong to no object.
         pub overhead_m: f32 = 4.0, "m", (0 to 20);
-        /// Speed by the flow from which a return is an object's in any cell.
+        /// Speed by the flow from which a return belongs to an object in any cell.
         pub moving_mps: f32 = 0.5, "m/s", (0 to 100);
-        /// Largest standard deviation of a velocity of the flow that is used.
+        /// Maximum standard deviation of a velocity of the flow that is used.
         pub flow_sigma_max_mps: f32 = 0.7, "m/s", (above 0);
         /// A return joins a chunk whose first return is closer than this.
         pub chunk_radius_m: f32 = 0.25, "m", (0 to 2);
-        /// And seen within this time of it.
+        /// And no farther from it in time than this.
         pub chunk_span_s: f32 = 0.05, "s", (0 to 1);
-        /// Chunks no farther from each other than this, along the ground, are of one segment.
+        /// Chunks no farther apart than this along the ground belong to one segment.
         pub link_m: f32 = 0.7, "m", (0 to 5);
-        /// And no farther than this up.
+        /// And no farther apart than this vertically.
         pub link_up_m: f32 = 1.0, "m", (0 to 20);
-        /// Difference between velocities of one object.
+        /// Maximum difference between velocities of one object.
         pub velocity_tolerance_mps: f32 = 0.5, "m/s", (0 to 100);
-        /// Further difference, as a fraction of the speed.
+        /// Additional difference, as a fraction of the speed.
         pub velocity_tolerance_ratio: f32 = 0.25, "", (0 to 1);
-        /// Segments of fewer returns are no objects.
+        /// Segments with fewer returns are not objects.
         pub returns_min: u32 = 15, "returns", (1 to 10000);
-        /// Segments that extend farther along x or y are no objects.
+        /// Segments that extend farther along x or y are not objects.
         pub extent_max_m: f32 = 18.0, "m", (above 0);
         /// Gate of a segment's centroid: squared Mahalanobis distance.
         pub association_d2: f64 = 11.345, "", (above 0),
@@ -49,15 +49,15 @@ raywake_core::params! {
         pub coarse_gate_mps: f64 = 45.0, "m/s", (above 0), "Saves time alone: faster than any car.";
         /// Time without an observation after which a track ends.
         pub patience_s: f64 = 0.5, "s", (0 to 60);
-        /// Mean P(moves) of its returns from which a track is seen to move.
+        /// Mean P(moves) of its returns from which a track counts as moving.
         pub track_moves_min: f32 = 0.5, "", (0 to 1);
-        /// Way from its first place to its last one that a track must have come to be an object
-        /// because it moved.
+        /// Distance between its first and last positions from which a track that moved is an
+        /// object.
         pub track_way_min_m: f64 = 1.0, "m", (0 to 100);
-        /// Share of its returns that the encoder takes for vehicles, people or two-wheelers, of
-        /// those it tells of, from which a track that stands is an object.
+        /// Share of a track's classified returns that are vehicles, people or two-wheelers from
+        /// which it is an object even if stationary.
         pub road_user_share_min: f32 = 0.5, "", (0 to 1);
-        /// Tracks of fewer observations end with the first batch without one.
+        /// Tracks with fewer observations end with the first batch without one.
         pub observations_min: u32 = 3, "observations", (1 to 100);
     } and {
         /// The tracks' filters.
@@ -68,12 +68,12 @@ raywake_core::params! {
 }
 
 impl FrontEndParams {
-    /// Whether the flow has a return moving.
+    /// Whether a return moves according to the flow.
     pub(super) fn is_moving(&self, velocity: Option<[f32; 2]>) -> bool {
         velocity.is_some_and(|[x, y]| x * x + y * y >= self.moving_mps * self.moving_mps)
     }
 
-    /// Whether two velocities may be of one object; an unknown one may be any.
+    /// Whether two velocities may belong to one object; an unknown one matches any.
     pub(super) fn is_similar(&self, a: Option<[f32; 2]>, b: Option<[f32; 2]>) -> bool {
         let (Some(a), Some(b)) = (a, b) else { return true };
         let square = |v: [f32; 2]| v[0] * v[0] + v[1] * v[1];

@@ -36,7 +36,7 @@ impl Thing {
         Thing { at: [x, y], size: [4.0, 1.8, 1.5], velocity }
     }
 
-    /// Points of its sides `time_s` after the beginning.
+    /// Points of its sides `time_s` after the start.
     pub fn points(&self, time_s: f64) -> Vec<[f64; 3]> {
         let [l, w, h] = self.size;
         let centre = [0, 1].map(|a| self.at[a] + time_s * self.velocity[a]);

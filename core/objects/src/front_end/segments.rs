@@ -1,9 +1,8 @@
-//! Segments: connected components of chunks (Euclidean clustering: Rusu, 2009; here in velocity and
-//! time too).
+//! Segments: connected components of chunks (Euclidean clustering: Rusu, 2009; here also in
+//! velocity and time).
 //!
-//! Objects that touch but move differently become two segments where the flow is known. A return
-//! whose velocity is unknown, because it lies outside the flow's window or is unmatched, may join
-//! either.
+//! Objects that touch but move differently become two segments if the flow is known. A return whose
+//! velocity is unknown, because it lies outside the flow's window or is unmatched, may join either.
 
 use super::batch::Batch;
 use super::chunks::{CHUNKS_MAX, Chunk, Chunks, ReturnSums};
@@ -15,13 +14,13 @@ use raywake_core::record::NONE;
 /// Returns that belong together.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Segment {
-    /// Returns.
+    /// Number of returns.
     pub count: u32,
     /// m from the batch's corner.
     pub centroid: [f64; 3],
     /// Mean of the returns' times, s after the batch's stamp.
     pub time_s: f64,
-    /// Mean velocity of the returns that have one, m/s, where most have.
+    /// Mean velocity of the returns that have one, m/s, if most do.
     pub velocity: Option<[f64; 2]>,
 }
 
@@ -37,7 +36,7 @@ impl Segment {
         }
     }
 
-    /// Its time, s, and place, m, in the world.
+    /// Its time, s, and position, m, in the world.
     pub fn in_world(&self, batch: &Batch) -> (f64, [f64; 3]) {
         (batch.stamp_s.unwrap_or(0.0) + self.time_s, batch.in_world(self.centroid))
     }
@@ -65,7 +64,7 @@ impl Segmentation {
         }
     }
 
-    /// Finds them in the returns of objects.
+    /// Finds the segments in the returns of objects.
     pub fn find(
         &mut self,
         params: &FrontEndParams,
@@ -136,7 +135,7 @@ impl Segmentation {
     }
 }
 
-/// Whether two chunks are of one segment.
+/// Whether two chunks belong to one segment.
 fn is_linked(params: &FrontEndParams, a: &Chunk, b: &Chunk) -> bool {
     let d = [0, 1, 2].map(|n| a.position[n] - b.position[n]);
     d[0] * d[0] + d[1] * d[1] <= params.link_m * params.link_m
@@ -179,7 +178,7 @@ mod tests {
         batch
     }
 
-    /// Every chunk with all that can be reached from it.
+    /// Labels every chunk with the first one that it is connected to.
     fn flood(firsts: &[Chunk]) -> Vec<usize> {
         let mut label = vec![usize::MAX; firsts.len()];
         for n in 0..firsts.len() {
@@ -233,7 +232,7 @@ mod tests {
                     assert_eq!(chunk, NONE);
                     continue;
                 }
-                // Of the chunks there were, the nearest it may join; else its own.
+                // Of the chunks so far, the nearest it may join; otherwise its own.
                 let joins = |c: &Chunk| {
                     let d2: f32 = (0..3).map(|a| (c.position[a] - one.position[a]).powi(2)).sum();
                     let near = d2 < PARAMS.chunk_radius_m * PARAMS.chunk_radius_m

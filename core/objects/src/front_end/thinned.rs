@@ -1,6 +1,7 @@
 //! Sequences of any length in fixed memory.
 
-/// Every k-th of a sequence, with k doubled whenever there is no room for more; of no room, none.
+/// Every k-th element of a sequence, with k doubled whenever there is no room for more; none if N
+/// is 0.
 #[derive(Clone, Debug)]
 pub struct Thinned<T, const N: usize> {
     kept: heapless::Vec<T, N>,
@@ -10,14 +11,14 @@ pub struct Thinned<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> Thinned<T, N> {
-    /// Nothing yet.
+    /// An empty sequence.
     pub const fn new() -> Thinned<T, N> {
-        // What is kept stays at even multiples when every other one goes.
+        // Kept elements stay at even multiples when every other one is dropped.
         assert!(N.is_multiple_of(2));
         Thinned { kept: heapless::Vec::new(), doublings: 0, seen: 0 }
     }
 
-    /// Adds the next one.
+    /// Adds the next element.
     pub fn push(&mut self, item: T) {
         if N > 0 && self.seen.is_multiple_of(1 << self.doublings) {
             if self.kept.is_full() {
@@ -33,22 +34,22 @@ impl<T: Copy, const N: usize> Thinned<T, N> {
         self.seen += 1;
     }
 
-    /// Those kept, in their order.
+    /// The kept elements, in order.
     pub fn kept(&self) -> &[T] {
         &self.kept
     }
 
-    /// The same, to change them.
+    /// The kept elements, mutable.
     pub(super) fn kept_mut(&mut self) -> &mut [T] {
         &mut self.kept
     }
 
-    /// How many there were.
+    /// Number of elements added.
     pub fn seen(&self) -> u64 {
         self.seen
     }
 
-    /// Forgets all.
+    /// Forgets everything.
     pub fn clear(&mut self) {
         self.kept.clear();
         (self.doublings, self.seen) = (0, 0);

@@ -1,7 +1,7 @@
 //! A track: an object from its birth to its end.
 //!
-//! Tracks live in a slice of the caller's, who thus chooses their number where their memory is. A
-//! track of any length fits: of its returns and states it keeps every k-th, and k doubles when
+//! Tracks live in a slice of the caller's, who thus chooses their number and where their memory is.
+//! A track of any length fits: it keeps every k-th of its returns and states, and k doubles when
 //! there is no more room ([`Thinned`]).
 
 use super::FrontEndParams;
@@ -11,36 +11,36 @@ use crate::centroid_ekf::{CentroidEkf, CentroidParams};
 use crate::{ObjectReturn, ObjectState, RETURNS_MAX};
 use raywake_core::encoder::ColumnClass;
 
-/// States of the filter that a track keeps.
+/// Maximum number of filter states that a track keeps.
 pub const HISTORY_MAX: usize = 512;
-/// Returns of its last batch that a track keeps.
+/// Maximum number of returns of its last batch that a track keeps.
 pub const LATEST_MAX: usize = 256;
 
-/// Where a track is in its life.
+/// Stage in the life of a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
-    /// Room for one.
+    /// A free slot.
     #[default]
     Free,
     /// Tracked.
     Live,
-    /// Ended; its room is free from the next step on.
+    /// Ended; its slot is free from the next step on.
     Ended,
 }
 
-/// An object followed over time, with room for so many of its returns and states: all that an
-/// estimate at its end takes, unless less is asked for.
+/// An object followed over time, with room for the given numbers of returns and states: by default
+/// all that an estimate at its end uses.
 #[derive(Clone, Debug, Default)]
 pub struct Track<const RETURNS: usize = RETURNS_MAX, const HISTORY: usize = HISTORY_MAX> {
-    /// Number among all tracks, from 0 in the order of their births.
+    /// Number among all tracks, from 0 in order of birth.
     pub id: u32,
-    /// Where it is in its life.
+    /// Stage in its life.
     pub life: Life,
-    /// Place in the world from which its positions count, m: its first centroid.
+    /// Point in the world that its positions are relative to, m: its first centroid.
     pub anchor: [f64; 3],
     /// Time of its first centroid, s.
     pub start_s: f64,
-    /// Centroids observed.
+    /// Number of centroids observed.
     pub observations: u32,
     pub(super) ekf: Option<CentroidEkf>,
     history: Thinned<ObjectState, HISTORY>,
@@ -52,7 +52,7 @@ pub struct Track<const RETURNS: usize = RETURNS_MAX, const HISTORY: usize = HIST
     variances: Thinned<StateVariances, HISTORY>,
 }
 
-/// How sure the filter is of a state.
+/// The filter's uncertainty about a state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateVariances {
     /// Covariance of the position (xx, xy, yy, zz), m².
@@ -77,14 +77,14 @@ impl StateVariances {
     }
 }
 
-/// What flow and encoder tell of its returns.
+/// What flow and encoder say about its returns.
 #[derive(Clone, Copy, Debug, Default)]
 struct Told {
-    /// Of the last observation: the sum of P(moves), and of how many returns.
+    /// For the last observation: the sum of P(moves), and the number of returns in it.
     p_moves: (f32, u32),
-    /// Returns of each class, in the order of [`ColumnClass::ALL`], of all observations.
+    /// Number of returns of each class, in the order of [`ColumnClass::ALL`], in all observations.
     classes: [u32; ColumnClass::ALL.len()],
-    /// Observations in which it was seen to move.
+    /// Number of observations in which it was seen to move.
     moving: u32,
 }
 
@@ -93,7 +93,7 @@ impl Told {
 }
 
 impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
-    /// Room for a track.
+    /// A free slot.
     pub const fn new() -> Self {
         Track {
             id: 0,
@@ -111,8 +111,8 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         }
     }
 
-    /// States after its updates, as the filter had them in the end: heading and speed before it
-    /// knew the one or the other are those it learned.
+    /// States after its updates, as revised by the filter: before heading and speed were known,
+    /// they are those learned later.
     pub fn history(&self) -> &[ObjectState] {
         self.history.kept()
     }
@@ -122,27 +122,27 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.returns.kept()
     }
 
-    /// Those of its last observation.
+    /// Returns of its last observation.
     pub fn latest(&self) -> &[ObjectReturn] {
         self.latest.kept()
     }
 
-    /// Returns seen in all.
+    /// Number of returns seen in total.
     pub fn returns_seen(&self) -> u64 {
         self.returns.seen()
     }
 
-    /// How sure the filter was of every state of [`Track::history`] at its time.
+    /// The filter's uncertainty about every state of [`Track::history`] at its time.
     pub fn variances(&self) -> &[StateVariances] {
         self.variances.kept()
     }
 
-    /// How sure the filter is of its state.
+    /// The filter's uncertainty about its current state.
     pub fn variances_now(&self) -> Option<StateVariances> {
         self.ekf.as_ref().map(StateVariances::of)
     }
 
-    /// From the place of its first state to that of its last one, along the ground, m.
+    /// Distance from the position of its first state to that of its last one, along the ground, m.
     pub fn moved_m(&self) -> f64 {
         let (Some(first), Some(last)) = (self.history().first(), self.state()) else {
             return 0.0;
@@ -151,35 +151,35 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         libm::hypot(x, y)
     }
 
-    /// Mean P(moves) of its returns at every state of [`Track::history`]; NaN where the flow does
-    /// not tell, 0 to 1 else.
+    /// Mean P(moves) of its returns at every state of [`Track::history`], 0 to 1; NaN if the flow
+    /// gives none.
     pub fn p_moves(&self) -> &[f32] {
         self.p_moves.kept()
     }
 
-    /// That of its last observation; none where the flow does not tell.
+    /// Mean P(moves) at its last observation; none if the flow gives none.
     pub fn p_moves_now(&self) -> Option<f32> {
         let (sum, returns) = self.told.p_moves;
         (returns > 0).then(|| sum / returns as f32)
     }
 
-    /// What the encoder takes most of its returns for; none where it does not tell.
+    /// The class that the encoder assigns to most of its returns; none if it assigns none.
     pub fn class(&self) -> Option<ColumnClass> {
         let count = |class: &ColumnClass| self.told.classes[*class as usize];
-        // Of equal ones the first.
+        // The first of equal ones.
         let most = ColumnClass::ALL.into_iter().rev().max_by_key(count)?;
         (count(&most) > 0).then_some(most)
     }
 
-    /// The share of its returns that the encoder takes for that, 0 to 1.
+    /// Share of its classified returns that have that class, 0 to 1.
     pub fn class_share(&self) -> f32 {
         let most = self.told.classes.into_iter().max().unwrap_or(0);
         most as f32 / self.told.classes.iter().sum::<u32>().max(1) as f32
     }
 
-    /// Whether flow and encoder tell that it is an object of the traffic: it was seen to move as
-    /// often as a track must be seen and came somewhere, or most of its returns are taken for what
-    /// could. Outside the flow's window nothing is.
+    /// Whether flow and encoder show that it is a road user: it was seen to move in as many
+    /// observations as a track needs and got somewhere, or most of its classified returns are of
+    /// classes that could move. Outside the flow's window nothing is.
     pub fn is_object(&self, params: &FrontEndParams) -> bool {
         let told: u32 = self.told.classes.iter().sum();
         let count = |class: ColumnClass| self.told.classes[class as usize];
@@ -189,7 +189,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         is_user || moved && self.moved_m() >= params.track_way_min_m
     }
 
-    /// The filter's state, unless there is room only.
+    /// The filter's state; none for a free slot.
     pub fn state(&self) -> Option<ObjectState> {
         self.ekf.as_ref().map(CentroidEkf::state)
     }
@@ -211,7 +211,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.variances.clear();
     }
 
-    /// Begins a track at a place in the world.
+    /// Begins a track at a point in the world.
     pub(super) fn begin(&mut self, id: u32, params: &CentroidParams, time_s: f64, at: [f64; 3]) {
         self.free();
         (self.id, self.life) = (id, Life::Live);
@@ -223,12 +223,12 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.observations = 1;
     }
 
-    /// A place in the world, from the anchor.
+    /// Converts a point in the world to one relative to the anchor.
     pub(super) fn place(&self, at: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|a| at[a] - self.anchor[a])
     }
 
-    /// Observes a centroid in the world.
+    /// Updates the filter with a centroid in the world.
     pub(super) fn observe(&mut self, params: &CentroidParams, time_s: f64, at: [f64; 3]) {
         let place = self.place(at);
         let Some(ekf) = &mut self.ekf else { return };
@@ -243,7 +243,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.observations += 1;
     }
 
-    /// After all returns of an observation.
+    /// Completes an observation, after all its returns.
     pub(super) fn complete(&mut self, params: &FrontEndParams) {
         if self.life != Life::Live || self.p_moves.seen() >= self.history.seen() {
             return;
@@ -253,7 +253,7 @@ impl<const RETURNS: usize, const HISTORY: usize> Track<RETURNS, HISTORY> {
         self.p_moves.push(mean);
     }
 
-    /// Keeps a return that lies and began at places in the world.
+    /// Keeps a return, given the world positions of the return and of its ray's origin.
     pub(super) fn keep(&mut self, time_s: f64, at: [f64; 3], origin: [f64; 3], one: &BatchReturn) {
         let place = |at| self.place(at).map(|v| v as f32);
         let kept = ObjectReturn {

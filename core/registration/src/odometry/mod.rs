@@ -1,13 +1,13 @@
-//! The way of a vehicle from its sweeps alone: each is registered with a local map of those before
-//! it (as in KISS-ICP, Vizzo et al. 2023, but from points to planes).
+//! The trajectory of a vehicle from its sweeps alone: each is registered with a local map of those
+//! before it (as in KISS-ICP, Vizzo et al. 2023, but from points to planes).
 //!
-//! A sweep is expected where an even motion leads. While it is registered, its returns are moved to
-//! the stamp by the motion found so far. Then it becomes part of the map.
+//! A sweep is expected where constant motion leads. While it is registered, its returns are moved
+//! to the stamp by the motion found so far. Then it becomes part of the map.
 //!
-//! The motion at the start is unknown: of several, the one that lays the second sweep best onto the
-//! first is taken. Between guard rails, among traffic as fast as the vehicle, others do so about as
-//! well: 20 m/s and more may be taken for standing still. Sweeps are degenerate then, and several
-//! motions are tried again every now and then, until one is clearly best.
+//! The motion at the start is unknown: of several, the one that best aligns the second sweep with
+//! the first is taken. Between guard rails, among traffic as fast as the vehicle, others fit about
+//! as well: 20 m/s and more may be mistaken for standing still. Sweeps are degenerate then, and
+//! several motions are tried again every now and then until one is clearly best.
 
 mod surfels;
 mod thinned;
@@ -22,44 +22,45 @@ use raywake_core::sweep::{Point, Rig};
 use surfels::Surfels;
 use thinned::ThinnedSweep;
 
-/// Returns of a sweep that are matched, at most: evenly chosen. Not measured on its own.
+/// Maximum number of returns of a sweep that are matched, evenly chosen. Not tuned separately.
 const MATCHED_MAX: usize = 3000;
-/// Fewer returns, one a voxel, are no sweep.
+/// Fewer returns than this, one per voxel, do not make a sweep.
 const RETURNS_MIN: usize = 100;
-/// Widths of the kernel, m, from coarse to fine; the first one is for unknown motions alone. Not
-/// measured on their own.
+/// Widths of the kernel, m, from coarse to fine; the first is only for unknown motions. Not tuned
+/// separately.
 const KERNELS_M: [f64; 3] = [1.0, 0.4, 0.1];
-/// Of them, where the motion is expected.
+/// Index of the first kernel used when the motion is expected.
 const EXPECTED_FROM: usize = 1;
-/// Steps with each kernel at most; 2 to 5 are usual.
+/// Maximum number of steps with each kernel; 2 to 5 are usual.
 const STEPS: usize = 15;
-/// Least share of the matched returns that lie on the map's planes where the sweep is located: of
-/// neighbours it is 0.8 or more (KITTI, simulated drives).
+/// Minimum share of the matched returns that must lie on the map's planes for a sweep to count as
+/// located: for consecutive sweeps it is 0.8 or more (KITTI, simulated drives).
 const AGREE_MIN: f64 = 0.6;
-/// Speeds ahead that are tried where the motion is unknown, m/s. Each reaches 10 m/s to both sides
-/// where anything stands beside the way.
+/// Forward speeds that are tried when the motion is unknown, m/s. Each covers 10 m/s to either side
+/// if anything stands beside the path.
 const SPEEDS_MPS: [f64; 4] = [0.0, 10.0, 20.0, 30.0];
-/// Motions whose speeds differ by more are two, m/s: half of what lies between starts.
+/// Motions whose velocities differ by more than this are distinct, m/s: half the spacing of starts.
 const DISTINCT_MPS: f64 = 5.0;
-/// Share of the inliers of the best motion from which on another one fits as well. Of 110 first
-/// pairs (simulated streets and outskirts, four rigs; KITTI, KITTI-360, Argoverse 2) 15 were taken
-/// for another motion, 14 of them on motorways: there it was 0.945 to 1.03. Of the others it was
-/// below 0.88 but in four, 0.94 to 0.975.
+/// Share of the best motion's inliers from which another motion counts as fitting as well. Of 110
+/// first pairs (simulated streets and outskirts, four rigs; KITTI, KITTI-360, Argoverse 2) 15 were
+/// taken for another motion, 14 of them on motorways: for those it was 0.945 to 1.03. For the
+/// others it was below 0.88, except for four with 0.94 to 0.975.
 const RIVAL: f64 = 0.91;
-/// The same where the motion was not clear before: at 0.91 two of 19 such drives, and a part of a
-/// third, then were taken for another motion.
+/// The same if the motion was unclear before: at 0.91, two of 19 such drives and part of a third
+/// were then taken for another motion.
 const RIVAL_AGAIN: f64 = 0.8;
-/// While the motion is not clear, several are tried at every so many sweeps: it takes ten times as
-/// long as a sweep does else.
+/// While the motion is unclear, several are tried every this many sweeps: such a sweep takes ten
+/// times as long as usual.
 const TRIED_EVERY: u32 = 10;
-/// A motion is found when it moves no return by this much more or less than the one before, m.
-/// Where the stamp is at an end of a sweep, a round leaves a third of the error before it.
+/// A motion has settled when it moves no return by this much more or less than the previous one, m.
+/// If the stamp is at an end of the sweep, a round leaves a third of the previous error.
 const SETTLED_M: f64 = 0.01;
-/// Rounds to get there, at most: what is left of 30 m/s then is below 1 cm.
+/// Maximum number of rounds to get there: what is left of 30 m/s then is below 1 cm.
 const ROUNDS_MAX: usize = 5;
-/// Where returns are that a turn moves, m.
+/// Assumed distance of returns moved by a rotation, m.
 const AWAY_M: f64 = 20.0;
-/// Stamps this close to whole turns of the sensor are of a coarser clock, turns.
+/// Intervals between stamps this close to whole revolutions of the sensor come from a coarser
+/// clock, revolutions.
 const WHOLE: f64 = 0.2;
 
 /// How a sweep was located.
@@ -69,16 +70,16 @@ pub enum Locating {
     Start,
     /// By registration.
     Registered,
-    /// What it shows does not determine all of its motion on the ground: the rest was taken from
-    /// the motion before. Or the first sweeps fit several motions, and none has been clearly best
-    /// since.
+    /// It does not determine all of its motion on the ground: the rest was taken from the previous
+    /// motion. Or the first sweeps fit several motions, and none has been clearly best since.
     Degenerate,
-    /// It fits nothing known: its pose is expected from the motion before, and a new map begins.
+    /// It fits nothing known, and a new map begins, or it has too few returns: its pose is
+    /// extrapolated from the previous motion.
     Lost,
 }
 
 impl Locating {
-    /// In a word.
+    /// Returns the name, a single word.
     pub const fn name(self) -> &'static str {
         match self {
             Locating::Start => "start",
@@ -89,24 +90,24 @@ impl Locating {
     }
 }
 
-/// Where a sweep was made.
+/// Where a sweep was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
     /// `world_from_vehicle` at the stamp; the world is the vehicle's frame at the first sweep.
     pub world_from_vehicle: Pose,
     /// Velocity at the stamp.
     pub twist: Twist,
-    /// Whence.
+    /// How that is known.
     pub locating: Locating,
 }
 
-/// The map, and the motion so far.
+/// The map and the motion so far.
 pub struct Odometry {
     map: Surfels,
-    /// Every other sweep: the last one counted and the one before it.
+    /// The current sweep and the one before it, indexed by the parity of `count`.
     sweeps: [ThinnedSweep; 2],
     correspondences: [Correspondence; MATCHED_MAX],
-    /// Sweeps so far.
+    /// Number of sweeps so far.
     count: u32,
     stamp_s: f64,
     pose: Pose,
@@ -124,7 +125,7 @@ impl Default for Odometry {
 }
 
 impl Odometry {
-    /// Before the first sweep, all zeros: a static of it takes no room in a binary.
+    /// The state before the first sweep, all zeros: as a static it takes no room in a binary.
     pub const fn new() -> Odometry {
         Odometry {
             map: Surfels::new(),
@@ -139,7 +140,7 @@ impl Odometry {
         }
     }
 
-    /// Tells what motion to expect of the next sweep, along the axes of the vehicle there.
+    /// Sets the motion to expect for the next sweep, along the axes of the vehicle there.
     pub fn expect(&mut self, twist: Twist) {
         (self.twist, self.told) = (twist, true);
     }
@@ -164,18 +165,18 @@ impl Odometry {
         Located { world_from_vehicle: self.pose, twist: self.twist, locating }
     }
 
-    /// Returns of the sweep, one a voxel.
+    /// Returns of the current sweep, one per voxel.
     fn points(&self) -> &[TimedPoint] {
         self.sweeps[self.count as usize % 2].points()
     }
 
-    /// Goes on evenly.
+    /// Continues with constant motion.
     fn miss(&mut self, dt_s: f64) -> Locating {
         self.pose = self.pose * self.twist.over(dt_s);
         Locating::Lost
     }
 
-    /// Registers the sweep with the map; where that fails, with the sweep before.
+    /// Registers the sweep with the map or, if that fails, with the previous sweep.
     fn follow(&mut self, dt_s: f64) -> Locating {
         if self.unsure && self.count.is_multiple_of(TRIED_EVERY) {
             return self.start(dt_s);
@@ -188,7 +189,7 @@ impl Odometry {
         self.start(dt_s)
     }
 
-    /// Tries motions for the sweep and the one before it.
+    /// Tries several motions for the sweep and the one before it.
     fn start(&mut self, dt_s: f64) -> Locating {
         let best = self.best_start(dt_s);
         let (found, before) = self.settle(best, dt_s);
@@ -200,15 +201,15 @@ impl Odometry {
         self.miss(dt_s)
     }
 
-    /// The motion that fits best of several. Where others fit as well it is not sure, and the
-    /// expected one is kept if it was not before.
+    /// The best-fitting of several motions. If others fit as well, it is unsure, and if it already
+    /// was before, the expected one is kept.
     fn best_start(&mut self, dt_s: f64) -> (Registration, Twist) {
         let speeds_mps = if self.told { &[][..] } else { &SPEEDS_MPS };
         let ahead = speeds_mps.iter().map(|x| Twist { linear: DVec3::X * *x, ..Twist::ZERO });
         let expected = self.pair(self.twist, dt_s);
         let mut all = heapless::Vec::<_, { SPEEDS_MPS.len() + 1 }>::from([expected]);
         for motion in ahead {
-            // There is room for all.
+            // There is room for all of them.
             let _ = all.push(self.pair(motion, dt_s));
         }
         let rank = |r: &Registration| (is_located(r), r.unobserved.planar == 0, r.inliers);
@@ -223,7 +224,7 @@ impl Odometry {
         if keeps { expected } else { best }
     }
 
-    /// Whether another motion has at least that share of the best one's inliers.
+    /// Whether another, distinct motion has more than this share of the best one's inliers.
     fn rivals(&self, share: f64, other: &Registration, best: &Registration, dt_s: f64) -> bool {
         let linear = |r: &Registration| (self.pose.inverse() * r.pose).twist(dt_s).linear;
         is_located(other)
@@ -231,22 +232,23 @@ impl Odometry {
             && (linear(other) - linear(best)).length() > DISTINCT_MPS
     }
 
-    /// Registers the sweep with the one before it alone, both moved evenly, first as told and then
-    /// as found; and the motion that the one before was moved by.
+    /// Registers the sweep with only the one before it, both deskewed by constant motion, first as
+    /// given and then as found. Also returns the motion that the one before was deskewed by.
     fn pair(&mut self, motion: Twist, dt_s: f64) -> (Registration, Twist) {
         self.map_of_before(&motion);
         let found = self.register(self.pose * motion.over(dt_s), dt_s, &KERNELS_M);
         self.again(&found, dt_s)
     }
 
-    /// Registers them once more, the one before moved by the motion found; and that motion.
+    /// Registers them once more, the one before deskewed by the motion found. Also returns that
+    /// motion.
     fn again(&mut self, found: &Registration, dt_s: f64) -> (Registration, Twist) {
         let motion = (self.pose.inverse() * found.pose).twist(dt_s);
         self.map_of_before(&motion);
         (self.register(found.pose, dt_s, &KERNELS_M[EXPECTED_FROM..]), motion)
     }
 
-    /// Goes on so until the motion moves returns as the one before did.
+    /// Repeats this until the motion moves returns as the previous one did.
     fn settle(
         &mut self,
         (found, before): (Registration, Twist),
@@ -265,20 +267,20 @@ impl Odometry {
         (found, before)
     }
 
-    /// A map of nothing but the sweep before, whose vehicle had a motion.
+    /// Rebuilds the map from only the previous sweep, deskewed by a motion.
     fn map_of_before(&mut self, motion: &Twist) {
         self.map.clear();
         self.put(self.count - 1, motion);
     }
 
-    /// Puts a sweep into the map: the last one, or the one before it, at the pose known last.
+    /// Puts a sweep, the current one or the one before it, into the map at the last known pose.
     fn put(&mut self, sweep: u32, motion: &Twist) {
         for point in self.sweeps[sweep as usize % 2].points() {
             self.map.add(self.pose.transform(point.at_stamp(motion)), sweep);
         }
     }
 
-    /// Takes over what was found.
+    /// Adopts the pose that was found.
     fn go(&mut self, found: &Registration, dt_s: f64) -> Locating {
         self.twist = at_now(&(self.pose.inverse() * found.pose), dt_s);
         self.pose = found.pose;
@@ -286,7 +288,7 @@ impl Odometry {
         if tells { Locating::Registered } else { Locating::Degenerate }
     }
 
-    /// The pose that lays the sweep onto the map, started at `initial`.
+    /// Finds the pose that aligns the sweep with the map, starting at `initial`.
     fn register(&mut self, initial: Pose, dt_s: f64, kernels_m: &[f64]) -> Registration {
         let points = self.sweeps[self.count as usize % 2].points();
         let stride = points.len().div_ceil(MATCHED_MAX).max(1);
@@ -309,7 +311,7 @@ impl Odometry {
     }
 }
 
-/// Correspondences of points of a sweep with a map; returns their number.
+/// Finds correspondences of points of a sweep with a map. Returns their number.
 fn matched<'a>(
     points: impl Iterator<Item = &'a TimedPoint>,
     map: &mut Surfels,
@@ -329,12 +331,12 @@ fn is_located(found: &Registration) -> bool {
     found.overlap >= AGREE_MIN && found.inliers >= CORRESPONDENCES_MIN
 }
 
-/// The even motion that led here in `dt_s`, along the axes that the vehicle has now.
+/// The constant motion that led here in `dt_s`, along the current axes of the vehicle.
 fn at_now(before_from_now: &Pose, dt_s: f64) -> Twist {
     before_from_now.inverse().twist(-dt_s)
 }
 
-/// Time between two stamps: whole turns where it is about that, as stamps are often coarser.
+/// Time between two stamps: rounded to whole revolutions if close, as stamps are often coarser.
 fn duration_s(rig: &Rig, between_s: f64) -> f64 {
     let turn_s = span_s(rig).filter(|turn_s| *turn_s > 0.0).unwrap_or(between_s);
     let turns = between_s / turn_s;

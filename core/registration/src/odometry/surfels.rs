@@ -1,34 +1,35 @@
-//! The local map: planes of cells of three sizes (a normal distributions transform, Magnusson
-//! 2009), in a table that forgets what was not seen for longest.
+//! The local map: planes in cells of three sizes (a normal distributions transform, Magnusson
+//! 2009), in a table that forgets what has not been seen for longest.
 
 use super::voxel::{hash, index_of};
 use crate::gauss_newton::Correspondence;
 use crate::moments::PointMoments;
 use glam::DVec3;
 
-/// Sides of the cells, m, from fine to coarse: a fine one tells more exactly where a surface is, a
-/// coarse one has enough returns of what is far, and reaches farther.
+/// Sides of the cells, m, from fine to coarse: a fine one locates a surface more exactly, a coarse
+/// one gets enough returns of distant surfaces and reaches farther.
 pub const SIDES_M: [f64; 3] = [0.5, 1.0, 2.0];
-/// Cells of all sizes.
+/// Number of cells of all sizes together.
 const CELLS: usize = 1 << 17;
-/// Cells that may stand in each other's place.
+/// Number of slots that a cell may be put into.
 const PROBES: usize = 8;
-/// Returns of a cell from which on a normal is looked for.
+/// Minimum number of returns in a cell for a normal.
 const COUNT_MIN: f64 = 6.0;
-/// At this many returns the older ones count half: a cell follows what the pose drifts.
+/// Beyond this many returns the older ones count half: a cell follows the drift of the pose.
 const COUNT_MAX: f64 = 120.0;
 /// Normals whose direction has a larger variance do not count, rad^2 (2 degrees). In a tunnel they
-/// would pass for something that tells how far the vehicle has gone.
+/// would appear to show how far the vehicle has moved.
 const UNSURE: f64 = 1.2e-3;
-/// A plane is found anew when a cell has this many times its returns.
+/// A plane is recomputed when its cell has this many times the returns it was found from.
 const GROWTH: f64 = 1.3;
 
-/// Which cell, and when it was hit: apart from what it holds, as most of a search reads no more.
+/// Which cell it is and when it was hit: separate from its contents, as most of a search reads no
+/// more than this.
 #[derive(Clone, Copy)]
 struct Key {
     index: [i32; 3],
     level: u8,
-    /// Sweep that hit it last; 0 in an empty one.
+    /// Sweep that hit it last; 0 if empty.
     seen: u32,
 }
 
@@ -47,18 +48,18 @@ impl Key {
 
 #[derive(Clone, Copy)]
 struct Surfel {
-    /// Of its returns, relative to its corner.
+    /// Moments of its returns, relative to its corner.
     moments: PointMoments,
-    /// Returns that the normal was found from.
+    /// Number of returns the normal was found from.
     planned: f64,
-    /// Zero where there is no plane.
+    /// Zero if there is no plane.
     normal: DVec3,
 }
 
 impl Surfel {
     const EMPTY: Surfel = Surfel { moments: PointMoments::NONE, planned: 0.0, normal: DVec3::ZERO };
 
-    /// A point of the plane, from the corner, and its normal.
+    /// A point on the plane, relative to the corner, and its normal.
     fn plane(&mut self) -> Option<(DVec3, DVec3)> {
         if self.moments.count < COUNT_MIN {
             return None;
@@ -132,7 +133,7 @@ impl Surfels {
         None
     }
 
-    /// Where a cell is, or may be put: a free place, or that of the cell unseen for longest.
+    /// Where a cell is or may be put: a free slot, or that of the cell unseen for longest.
     fn slot(&self, level: u8, index: [i32; 3]) -> usize {
         let first = hash(index).wrapping_add(u32::from(level) << 13) as usize;
         let mut stalest = first % CELLS;

@@ -1,4 +1,4 @@
-//! Drives whose motion is known.
+//! Drives with known motion.
 
 use super::*;
 use core::f64::consts::TAU;
@@ -43,7 +43,7 @@ fn simulated_drives_from_nothing() {
     }
 }
 
-/// With the stamp at the start of each sweep the first motion moves all returns one way.
+/// With the stamp at the start of each sweep, the first motion moves all returns in one direction.
 #[test]
 fn stamps_at_the_start_of_a_sweep() {
     let drive = drive(4, Ego::Straight { speed: 11.0 }, 4);
@@ -54,14 +54,14 @@ fn stamps_at_the_start_of_a_sweep() {
     let points = sweeps.iter_mut().flat_map(|sweep| &mut sweep.points);
     points.for_each(|point| point.offset_s -= sooner_s as f32);
     let found = located(&rig, &sweeps);
-    // The motion is even: what is between stamps is between starts.
+    // The motion is constant: it is the same between stamps as between starts.
     for (sweep, found) in sweeps.iter().zip(&found) {
         let off = way(sweep, &sweeps[0]).inverse() * found.world_from_vehicle;
         assert!(off.translation.length() < 0.02, "{off:?}");
     }
 }
 
-/// Sweeps that are missing or empty on the way: it goes on evenly, and finds its way again.
+/// Missing or empty sweeps along the way: it continues with constant motion, then recovers.
 #[test]
 fn gaps() {
     let drive = drive(4, Ego::Straight { speed: 11.0 }, 9);
@@ -99,8 +99,8 @@ fn a_tunnel_does_not_tell_how_far() {
     }
 }
 
-/// A sweep of a vehicle at 22 m/s between guard rails, among others that are as fast; with posts
-/// beside the rails, or without.
+/// A sweep of a vehicle at 22 m/s between guard rails, among others that are as fast, with or
+/// without posts beside the rails.
 fn motorway(rng: &mut Rng, sweep: usize, posts: bool) -> Vec<Point> {
     let gone_m = 2.2 * sweep as f64;
     let mut points = Vec::new();
@@ -115,7 +115,7 @@ fn motorway(rng: &mut Rng, sweep: usize, posts: bool) -> Vec<Point> {
             .into_iter()
             .for_each(|y| (0..4).for_each(|k| add([x, y, 0.25 * f64::from(k) - 1.7])));
     }
-    // The back of each.
+    // The rear of each of the others.
     for (x, y) in [(12.0, 0.0), (-9.0, 3.5), (20.0, 3.5)] {
         (0..8).for_each(|j| {
             (0..6).for_each(|k| add([x, y + 0.25 * f64::from(j), 0.25 * f64::from(k) - 1.5]))
@@ -142,13 +142,13 @@ fn a_motorway_among_others_does_not_tell_how_fast() {
         .collect();
     let among = &found[1..12];
     assert!(among.iter().all(|l| l.locating == Locating::Degenerate), "{among:?}");
-    // What stands tells, once there is some.
+    // Static structure decides, once there is some.
     let last = found[23];
     assert_eq!(last.locating, Locating::Registered, "{last:?}");
     assert!((last.twist.linear.x - 22.0).abs() < 0.3, "{last:?}");
 }
 
-/// Clouds as they were at the stamp.
+/// A rig whose clouds are as they were at the stamp.
 fn at_stamp() -> Rig {
     Rig {
         sensors: [Pose::IDENTITY].into_iter().collect(),

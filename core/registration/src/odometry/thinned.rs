@@ -1,4 +1,4 @@
-//! A sweep thinned by a table of voxels: faster than by sorting, and in place.
+//! A sweep thinned by a hash table of voxels: faster than sorting, and in place.
 
 use super::voxel::{hash, index_of};
 use crate::deskew::TimedPoint;
@@ -8,15 +8,15 @@ use raywake_core::sweep::{Point, Rig};
 
 /// Side of the voxels that keep one return each, m.
 const VOXEL_M: f64 = 0.25;
-/// Voxels that a sweep keeps a return of, at most; an HDL-64E fills 20,000 to 40,000.
+/// Maximum number of voxels of a sweep that keep a return; an HDL-64E fills 20,000 to 40,000.
 const KEPT_MAX: usize = 1 << 16;
-/// Slots of the table: at most half of them are taken.
+/// Number of slots in the table: at most half of them are taken.
 const SLOTS: usize = 2 * KEPT_MAX;
 
-/// One return a voxel, the first of each, in the order of the sweep.
+/// One return per voxel, the first of each, in the order of the sweep.
 pub struct ThinnedSweep {
     points: Vec<TimedPoint, KEPT_MAX>,
-    /// Voxel and filling that a slot was taken by.
+    /// Voxel that took a slot, and the filling it did so in.
     slots: [([i32; 3], u32); SLOTS],
     filling: u32,
 }
@@ -27,7 +27,7 @@ impl ThinnedSweep {
         ThinnedSweep { points: Vec::new(), slots: [([0; 3], 0); SLOTS], filling: 0 }
     }
 
-    /// Replaces the points by those of a sweep. What is over the capacity is left out.
+    /// Replaces the points with those of a sweep. Points beyond the capacity are left out.
     pub fn fill(&mut self, points: &[Point], rig: &Rig) {
         self.points.clear();
         self.filling += 1;
@@ -42,7 +42,7 @@ impl ThinnedSweep {
         }
     }
 
-    /// Takes the voxel of a point unless it is taken.
+    /// Takes the voxel of a point, unless it is already taken. Returns whether it was free.
     fn is_new(&mut self, point: &Point) -> bool {
         let voxel = index_of(DVec3::from_array(point.position.map(f64::from)), VOXEL_M);
         let mut slot = hash(voxel) as usize % SLOTS;

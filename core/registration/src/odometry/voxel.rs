@@ -2,15 +2,16 @@
 
 use glam::DVec3;
 
-/// Index of the cube of a side that holds a place near enough to the origin.
+/// Index of the cube of side `side_m` that contains a place, which must not be too far from the
+/// origin.
 #[inline]
 pub fn index_of(at: DVec3, side_m: f64) -> [i32; 3] {
     let at = at / side_m;
-    // `map` of arrays is a call.
+    // `map` on an array compiles to a call.
     [floor(at.x), floor(at.y), floor(at.z)]
 }
 
-/// Rounded down. Without a function of `libm`: this is most of what thinning does.
+/// Rounds down. Does without a `libm` function: this is most of the work of thinning.
 #[inline]
 fn floor(v: f64) -> i32 {
     let towards_zero = v as i32;

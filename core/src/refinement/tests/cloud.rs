@@ -1,4 +1,4 @@
-//! Clouds, their ground, and segments against naive oracles.
+//! Clouds, their ground and segments against naive oracles.
 
 use super::super::segments::Segments;
 use super::*;
@@ -79,7 +79,7 @@ fn of_each_part_of_a_voxel_the_first_return_stays() {
 
 #[test]
 fn returns_beyond_the_capacity_are_counted() {
-    // The middle of every part of a voxel, in an order of no meaning.
+    // The middle of every part of a voxel, in random order.
     let mut parts = Vec::new();
     for column in (0..SIDE * SIDE).step_by(7) {
         for n in 0..9 * 20 {
@@ -101,17 +101,17 @@ fn returns_beyond_the_capacity_are_counted() {
     assert!(dropped > 20_000);
     let all = all_kept(&cloud);
     assert_eq!(all.len(), CLOUD_MAX);
-    // Those of the last columns go.
+    // Those of the last columns are dropped.
     let in_column = |p: &[f32; 3], c: u32| column_of(*p) < c;
     let last = column_of(all[CLOUD_MAX - 1].0);
     let before = parts.iter().filter(|p| in_column(p, last)).count();
     assert!(
         before <= CLOUD_MAX && parts.iter().filter(|p| in_column(p, last + 1)).count() >= CLOUD_MAX
     );
-    // The same again, whatever the cloud held.
+    // The result is the same whatever the cloud held before.
     assert_eq!(returns.fill(&mut cloud).0, dropped);
     assert!(all == all_kept(&cloud));
-    // And it can be worked with.
+    // And it can be used.
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     for n in 0..3 {
         give(&mut refinement, &returns, n);
@@ -228,7 +228,7 @@ fn mirrored_returns_do_not_pull_the_ground_down() {
         returns.add([x, y, GROUND - random.between(6.0, 20.0)], 0);
     }
     assert_eq!(occupied(&returns.cloud()), BTreeSet::new());
-    // What lies on it is apart from clusters, and what hangs high above; what stands on it is not.
+    // Returns on it, and high above it, are apart from clusters; those in between are not.
     let heights = [0.1, 1.0, 13.5, 14.5];
     heights.iter().for_each(|h| returns.add([30.5, 30.5, GROUND + h], 0));
     let last = returns.points.len() - heights.len();

@@ -1,4 +1,4 @@
-//! The sweeps that are remembered, and when their returns were seen.
+//! The sweeps that are remembered and when their returns were seen.
 
 use super::super::places::Places;
 use super::*;
@@ -11,7 +11,7 @@ fn clusters_are_compared_with_every_other_sweep() {
     let mut apart = [false; SIDE * SIDE + 1];
     assert_eq!(ring.span_s(), None);
     for n in 0..12 {
-        // Above flat ground one return a sweep, on a level of its own.
+        // One return per sweep above flat ground, each on a different level.
         let mut returns = Returns::flat();
         returns.add([10.5, 10.5, GROUND + 1.5 + n as f32], 0);
         let profile = profile();
@@ -21,7 +21,7 @@ fn clusters_are_compared_with_every_other_sweep() {
         let before = [1.0, -1.0, -3.0].into_iter().filter(|share| n as f32 - 1.0 + share >= 0.0);
         let shares: Vec<f32> = ring.targets(span_s).iter().map(|t| t.share).collect();
         assert_eq!((span_s, shares), (1.0, before.collect()), "{n}");
-        // Each has the detail that was found with it.
+        // Each has its own detail.
         for (sweep, n) in [(ring.first(), n - 1), (ring.second(), n)] {
             let at = [10.5, 10.5, GROUND + 1.5 + n as f32];
             assert!(sweep.stamp_s == n as f64 && sweep.is_hit(at), "{n}");

@@ -6,12 +6,12 @@ use crate::refinement::history::History;
 use crate::refinement::hypothesis::Hypothesis;
 use crate::refinement::motion::Motion;
 
-/// Columns a block is long, and sweeps that see it.
+/// Length of a block, columns, and number of sweeps that see it.
 const LENGTH: usize = 4;
 const SWEEPS: usize = 5;
 
-/// A sweep that sees a block of columns, from column `from` on along x, in a window whose corner
-/// lies `corner` columns on.
+/// A sweep that sees a block of columns, starting at column `from` along x, in a window whose
+/// corner is at column `corner`.
 fn cloud(from: i32, corner: i32, n: usize) -> Kept {
     let mut returns = Returns::flat();
     for i in 0..LENGTH {
@@ -24,7 +24,7 @@ fn cloud(from: i32, corner: i32, n: usize) -> Kept {
     kept
 }
 
-/// What became of a block that is said to go `by` columns a sweep and was seen at `at(n)`.
+/// The looks at a block that is claimed to move by `by` columns per sweep and was seen at `at(n)`.
 fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks {
     let mut history = raywake_alloc_guard::boxed!(History, History::new());
     for n in 0..SWEEPS {
@@ -44,8 +44,8 @@ fn looks(by: f32, at: impl Fn(i32) -> i32, corner: impl Fn(i32) -> i32) -> Looks
 
 #[test]
 fn what_comes_from_elsewhere_is_fresh_and_what_stands_is_worn() {
-    // In front of the block nothing was hit before it came: the first sweep back one column, the
-    // second two, from then on all four.
+    // Nothing was hit in front of the block before it came: in one column one sweep back, in two
+    // columns two sweeps back, and so on up to all four.
     let mover = looks(1.0, |n| 10 + n, |_| 0);
     assert_eq!(mover.worn(), 0.0);
     let made = 2.0 * (1 + 2 + 3 + 4 + 4) as f32;
@@ -63,7 +63,7 @@ fn the_window_goes_along() {
 
 #[test]
 fn nothing_is_known_of_what_it_hides_itself_or_of_no_sweep() {
-    // Slower than a column in all sweeps: each place may have been its own.
+    // Slower than a column over all sweeps: each place may have been its own.
     assert_eq!(looks(0.05, |_| 10, |_| 0), Looks::default());
     assert_eq!((Looks::default().worn(), Looks::default().fresh()), (0.0, 0.0));
 }
@@ -82,7 +82,7 @@ fn what_came_since_is_new() {
     assert_eq!(new(&history, 0.15), [15, 16]);
     assert_eq!(new(&history, 0.35), [14, 15, 16]);
     assert!(new(&history, 0.55).is_empty());
-    // Where it was not in view nothing is known.
+    // Nothing is known where it was out of view.
     history.clear();
     history.push(cloud(10, 15, 0).all(), |_| false);
     assert_eq!(new(&history, 0.0), [15, 16]);

@@ -1,4 +1,4 @@
-//! The refinement against naive oracles, and on clusters whose motion is known.
+//! The refinement against naive oracles and on clusters with known motion.
 
 extern crate std;
 mod cloud;
@@ -28,7 +28,7 @@ use std::vec::Vec;
 const SIDE: usize = 63;
 /// Height of the ground in the window, voxels: 1.73 m below the middle of level 7.
 const GROUND: f32 = 7.5 - 1.73 / 0.3;
-/// Where the sensors are: beside the window, 1.8 m above the ground.
+/// Position of the sensors: beside the window, 1.8 m above the ground.
 const EYE: [f32; 3] = [31.5, -20.0, GROUND + 6.0];
 
 const SENSORS: SensorPaths = SensorPaths::at_rest([EYE; 2]);
@@ -55,7 +55,7 @@ struct Returns {
 }
 
 impl Returns {
-    /// The same, and rays of [`EYE`] that end beyond the window, where `beyond` takes the end.
+    /// The same plus rays from [`EYE`] that end beyond the window, if `beyond` accepts the end.
     fn in_sight(&self, beyond: impl Fn([f32; 3]) -> bool) -> Returns {
         let mut all = self.clone();
         for azimuth in -150..150 {
@@ -76,7 +76,7 @@ impl Returns {
         self.columns.push(column_of(at));
     }
 
-    /// One return of the ground in every column.
+    /// One ground return in every column.
     fn ground(height: impl Fn(f32, f32) -> f32) -> Returns {
         let mut returns = Returns::default();
         for c in 0..SIDE * SIDE {
@@ -108,7 +108,7 @@ impl Returns {
         }
     }
 
-    /// How many had no room, and which are apart from clusters.
+    /// Returns how many had no room and which are apart from clusters.
     fn fill(&self, kept: &mut Kept) -> (usize, Vec<bool>) {
         let (mut apart, mut scratch) =
             (vec![false; self.points.len()], raywake_alloc_guard::boxed!(Scratch, Scratch::new()));
@@ -152,7 +152,7 @@ impl Deref for Kept {
     }
 }
 
-/// Places and sensors of the returns that are kept of a column.
+/// Places and sensors of the returns kept in a column.
 fn kept(cloud: &Cloud, column: usize) -> Vec<([f32; 3], u32)> {
     cloud.column(column).map(|n| cloud.sample(n)).map(|s| (s.at, s.sensor)).collect()
 }
@@ -171,7 +171,7 @@ fn scattered(random: &mut Random, count: usize, height: f32) -> Returns {
     returns
 }
 
-/// A car: two sides of a box of 15 by 6 by 4.5 voxels, seen at places of its own in every sweep.
+/// A car: two sides of a box of 15 by 6 by 4.5 voxels, sampled anew in every sweep.
 struct Car {
     centre: [f32; 2],
     yaw: f32,
@@ -207,7 +207,7 @@ fn give_with(refinement: &mut Refinement, profile: &Profile, returns: &Returns, 
     give_seen(refinement, profile, &returns.in_sight(|_| true), &SENSORS, n);
 }
 
-/// The same with these sensors, and no other rays than those of the returns.
+/// The same with the given sensors, and no rays other than those of the returns.
 fn give_seen(
     refinement: &mut Refinement,
     profile: &Profile,
@@ -232,7 +232,7 @@ fn run(refinement: &mut Refinement, flows: &[Flow]) {
     run_knowing(refinement, flows, None, &[]);
 }
 
-/// The same where every tracklet predicts a displacement.
+/// The same, with every tracklet predicting a displacement.
 fn run_expecting(refinement: &mut Refinement, flows: &[Flow], expected: Option<[f32; 2]>) {
     run_knowing(refinement, flows, expected, &[]);
 }
@@ -267,7 +267,7 @@ fn check_sane(found: &[Moved]) {
     }
 }
 
-/// What is found after some sweeps, the pair's two the last.
+/// What is found after some sweeps, the last two being the pair.
 fn found_in(sweeps: &[Returns], flows: &[Flow]) -> Vec<Moved> {
     let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     sweeps.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));

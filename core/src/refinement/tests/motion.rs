@@ -1,12 +1,12 @@
-//! Clusters whose motion is known.
+//! Clusters with known motion.
 
 use super::super::cluster::{Cluster, VisitedColumns};
 use super::super::hypothesis::{self, Hypothesis};
 use super::super::motion::Motion;
 use super::*;
 
-/// What is found of a car that moves steadily, over some sweeps: columns of it that move, the
-/// median and the largest error of their motion, voxels.
+/// What is found about a car that moves steadily, over some sweeps: the number of its columns that
+/// move, and the median and the largest error of their motion, voxels.
 fn error_of_steady(sweeps: u32, by: [f32; 2], turn: f32, seed: u64) -> (usize, f32, f32) {
     let mut random = Random(seed);
     let start = [0; 2].map(|_| random.between(27.0, 36.0));
@@ -55,7 +55,7 @@ fn cars_move_by_fractions_of_a_voxel() {
     }
 }
 
-/// A wall of 40 voxels along x, seen at places of its own in every sweep.
+/// A wall of 40 voxels along x, sampled anew in every sweep.
 fn side(centre: f32, random: &mut Random) -> Returns {
     let mut returns = Returns::flat();
     for _ in 0..800 {
@@ -67,7 +67,7 @@ fn side(centre: f32, random: &mut Random) -> Returns {
 
 #[test]
 fn ends_tell_how_far_a_side_slid() {
-    // Registration alone leaves all of them at rest: any displacement along it fits the side.
+    // Registration alone leaves all of them at rest: any displacement along the side fits it.
     for by in [5.3, -4.1, 3.2] {
         let mut random = Random(12);
         let all: Vec<Returns> = (0..3).map(|n| side(31.5 + n as f32 * by, &mut random)).collect();
@@ -85,7 +85,7 @@ fn ends_tell_how_far_a_side_slid() {
 
 #[test]
 fn what_is_seen_later_has_moved_for_longer() {
-    // Seen 4 ms later in every sweep, as one that is overtaken.
+    // Seen 4 ms later in each successive sweep, like a car being overtaken.
     let late = 0.004;
     for n in 0..16 {
         let mut random = Random(300 + n);
@@ -104,7 +104,7 @@ fn what_is_seen_later_has_moved_for_longer() {
         let moved: Vec<_> = found.iter().flatten().map(|m| m.0).collect();
         assert!(moved.len() >= 15, "{n}: {}", moved.len());
         for m in moved {
-            // As seen it would be 0.16.
+            // Without allowing for the delay it would be 0.16.
             assert!((m[0] - by[0]).hypot(m[1] - by[1]) < 0.04, "{n}: {m:?}, not {by:?}");
         }
     }
@@ -118,7 +118,7 @@ fn what_stands_is_exactly_still() {
         let all: Vec<Returns> = (0..3).map(|_| sweep_of(&car, &mut random)).collect();
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
         all.iter().enumerate().for_each(|(n, r)| give(&mut refinement, r, n));
-        // Whatever energy minimisation made of it.
+        // Whatever energy minimisation found for it.
         let wrong = vec![pack_flow([random.below(7) as i32 - 3, 1]); SIDE * SIDE];
         run(&mut refinement, &wrong);
         assert!(motions(&refinement).iter().all(Option::is_none), "{n}");
@@ -131,7 +131,7 @@ fn columns_that_could_not_move_are_left_behind() {
     let of = |n: usize| Car { centre: [25.0 + 2.0 * n as f32, 31.0], yaw: 0.3 };
     let sweeps: Vec<Returns> = (0..3).map(|n| sweep_of(&of(n), &mut random)).collect();
     let flows = vec![pack_flow([2, 0]); SIDE * SIDE];
-    // Whatever lies beyond a line could not.
+    // Columns beyond a line could not move.
     let stays = |c: usize| c / SIDE < 26;
     let found = |scores: &[ColumnScores]| {
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
@@ -147,7 +147,7 @@ fn columns_that_could_not_move_are_left_behind() {
     };
     assert!(moved(&all, &stays) > 5 && moved(&all, &|c| !stays(c)) > 5);
     assert_eq!(moved(&some, &stays), 0);
-    // The rest moves as before, apart from ground that was below the whole.
+    // The rest moves as before, except for ground below the whole.
     assert!(moved(&some, &|c| !stays(c)) > 20);
     assert!((0..all.len()).all(|c| some[c].is_none() || all[c].is_some()));
 }
@@ -171,7 +171,7 @@ fn few_returns_move_nothing_by_themselves() {
 
 #[test]
 fn a_wall_that_seems_to_move_stands() {
-    // Longer than anything that moves, with a pattern that does.
+    // Longer than anything that moves, with a moving pattern.
     let big = Profile { side: 167, ..Profile::hdl64() };
     let wall = |n: usize| {
         let mut returns = Returns::default();
@@ -209,7 +209,7 @@ fn a_wall_that_seems_to_move_stands() {
     assert!(!refinement.clusters.found().iter().any(moves));
 }
 
-/// A long side that slides along itself, and a few returns before it that tell how it moved.
+/// A long side that slides along itself, and a few returns in front of it that show how it moved.
 fn long_side(moved: f32) -> Returns {
     let mut returns = Returns::flat();
     for k in 0..100 {
@@ -241,7 +241,7 @@ fn what_moved_goes_on_by_less() {
     assert_eq!(moving(&still, Some([1.2, 0.0])), 0);
 }
 
-/// The same scores for every column: 127 for what could move for sure, 0 for what is not told.
+/// The same scores for every column: 127 for what could certainly move, 0 for unknown.
 fn scored(score: i8) -> Vec<ColumnScores> {
     vec![[score; SCORES]; SIDE * SIDE]
 }
@@ -249,7 +249,7 @@ fn scored(score: i8) -> Vec<ColumnScores> {
 #[test]
 fn the_rest_of_a_body_goes_with_the_part_that_tells() {
     let moving = |sweeps: &[Returns; 3], scores: &[ColumnScores]| {
-        // Only what lies before the side has a match.
+        // Only what lies in front of the side has a match.
         let flow = |c: usize| if c % SIDE < 30 { pack_flow([1, 0]) } else { 0 };
         let flows: Vec<Flow> = (0..SIDE * SIDE).map(flow).collect();
         let mut refinement = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
@@ -277,7 +277,7 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     let mut random = Random(10);
     let [first, second] =
         [25.0, 27.0].map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random));
-    // Of the second sweep nothing beyond a line is seen: rays that pass there are missing.
+    // The second sweep sees nothing beyond a line: rays that would pass there are missing.
     let hidden = 28.0;
     let mut seen = Returns::default();
     for placed in second.placed.iter().filter(|p| p.at[0] < hidden) {
@@ -301,7 +301,7 @@ fn what_could_move_may_go_where_nothing_is_seen() {
     };
     let [unknown, known] = [cluster(&[]), cluster(&could)].map(residual);
     assert!(unknown > 0.12 && known < 0.05, "{unknown} {known}");
-    // What moved before can, too.
+    // What moved before can also move.
     let moved = |_| Some(Prediction { by: [2.0, 0.0], certainty: 3.0 });
     let found = hypothesis::test(cluster(&[]), |_| 0, moved, &mut VisitedColumns::new());
     assert!(found.is_dynamic && found.cues.residual < 0.05, "{}", found.cues.residual);
@@ -310,7 +310,7 @@ fn what_could_move_may_go_where_nothing_is_seen() {
 #[test]
 fn what_comes_into_the_window_was_beyond_it() {
     let mut random = Random(12);
-    // A third of the car was beyond the window in the sweep before the pair.
+    // A third of the car was outside the window in the sweep before the pair.
     let [earlier, first, second] = [61.0, 53.0, 45.0]
         .map(|x| sweep_of(&Car { centre: [x, 31.0], yaw: 0.0 }, &mut random).cloud());
     let target = |index, cloud, share| Target { index, cloud, offset: [0.0; 3], share };
@@ -327,7 +327,7 @@ fn what_comes_into_the_window_was_beyond_it() {
 
 #[test]
 fn who_walks_along_a_wall_is_found() {
-    // 1 m/s: a third of a voxel from sweep to sweep, a column beside a wall of one cluster with it.
+    // 1 m/s, a third of a voxel per sweep, a column away from a wall that is in the same cluster.
     let mut random = Random(11);
     let mut sweep = |n: usize| {
         let mut returns = Returns::flat();
@@ -357,7 +357,7 @@ fn who_walks_along_a_wall_is_found() {
     }
     let count = |n: usize| moving[n].iter().flatten().count();
     assert!(count(1) == 0 && count(5) >= 4, "{:?}", (0..6).map(count).collect::<Vec<_>>());
-    // Him, and what of the wall touches him: to within 3 mm.
+    // The pedestrian, and the part of the wall touching him: to within 3 mm.
     for (c, (by, _)) in moving[5].iter().enumerate().filter_map(|(c, m)| Some((c, (*m)?))) {
         let right = (by[0] - 1.0 / 3.0).abs() < 0.01 && by[1].abs() < 0.01;
         assert!(right && (22..27).contains(&(c / SIDE)), "{c} {by:?}");

@@ -1,4 +1,4 @@
-//! Sweeps that make no sense, and the same twice.
+//! Sweeps that make no sense, and the same sweeps twice.
 
 use super::*;
 
@@ -54,7 +54,7 @@ fn odd_sweeps_yield_no_nonsense() {
         }
     }
     assert!(moving > 0, "nothing was there to be wrong");
-    // A sweep alone has no pair.
+    // A single sweep makes no pair.
     assert!(
         found_in(&[odd[0].clone(), Returns::default()], &no_flow()).iter().all(Option::is_none)
     );
@@ -79,7 +79,7 @@ fn the_same_sweeps_yield_the_same_bits() {
     let wanted = found_in(&sweeps, &flows);
     assert!(wanted.iter().flatten().count() > 10);
     assert_eq!(found_in(&sweeps, &flows), wanted);
-    // Whatever was before.
+    // Whatever came before.
     let mut used = raywake_alloc_guard::boxed!(Refinement, Refinement::new());
     others.iter().enumerate().for_each(|(n, r)| give(&mut used, r, n));
     run(&mut used, &flows);

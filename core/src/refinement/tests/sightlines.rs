@@ -1,4 +1,4 @@
-//! What rays tell of a place.
+//! What rays say about a place.
 
 use super::super::sample::SurfaceWeight;
 use super::super::sightlines::{Sightlines, UnsortedRay};
@@ -13,7 +13,7 @@ use raywake_simd::Simd;
 
 /// A sensor in the window, and one beside it.
 const EYES: [[f32; 3]; 2] = [[20.0, 20.0, 5.0], [-40.0, 30.0, 5.0]];
-/// A surface whose returns tell nothing: across the line of sight.
+/// A surface of unknown orientation: taken as perpendicular to the line of sight.
 const UNKNOWN: SurfaceWeight = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0];
 
 fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sightlines> {
@@ -30,7 +30,7 @@ fn sightlines(sensors: &SensorPaths, ends: &[([f32; 3], u32, f32)]) -> Box<Sight
 #[test]
 fn a_ray_goes_through_ends_at_a_place_or_before_it() {
     let sensors = SensorPaths::at_rest(EYES);
-    // Around the sensor, across the seam of azimuths too.
+    // All around the sensor, including across the seam of azimuths.
     for n in 0..400 {
         let azimuth = n as f32 * std::f32::consts::TAU / 400.0;
         let along = |distance: f32| {
@@ -42,12 +42,12 @@ fn a_ray_goes_through_ends_at_a_place_or_before_it() {
             let [x, y, z] = along(20.0);
             rays.depth(Simd::BASELINE, &scaled(), [x, y, z + off], &UNKNOWN, 0.0)
         };
-        // The slope makes 20 voxels in the plane 20.1 of the ray.
+        // With the slope, 20 voxels in the plane are 20.1 along the ray.
         for end in [12.0, 20.0, 33.0] {
             let behind = depth(end, 0.0).unwrap();
             assert!((behind - 1.005 * (end - 20.0)).abs() < 0.05, "{n}: {end} {behind}");
         }
-        // 0.1 m are a third of a voxel.
+        // 0.1 m is a third of a voxel.
         assert!(depth(33.0, 0.3).is_some() && depth(33.0, -0.3).is_some(), "{n}");
         assert!(depth(33.0, 0.4).is_none() && depth(33.0, -0.4).is_none(), "{n}");
     }
@@ -68,7 +68,7 @@ fn the_nearest_ray_of_all_sensors_tells() {
     };
     assert!(depth(&[at, through(1, 0.0)]) > 10.0);
     assert!(depth(&[at, through(1, 0.2)]).abs() < 0.1);
-    // Seen along a wall a ray passes near and never meets it.
+    // Along a wall, a ray passes near and never meets it.
     let wall: SurfaceWeight = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
     let beside = ([60.0, 29.9, 5.0], 1, 0.0);
     let along = sightlines(&SensorPaths::at_rest([EYES[0], [-40.0, 29.8, 5.0]]), &[beside]);
@@ -82,8 +82,8 @@ fn the_nearest_ray_of_all_sensors_tells() {
 
 #[test]
 fn a_sensor_is_where_it_was_as_it_looked() {
-    // It goes 7 voxels a sweep and turns once, clockwise from the rear; 20 voxels off, 7 are 19
-    // degrees.
+    // It moves 7 voxels per sweep and rotates once, clockwise from the rear; at 20 voxels, 7 voxels
+    // are 19 degrees.
     let twist = Twist { linear: glam::DVec3::X * 21.0, ..Default::default() };
     let rig = Rig {
         sensors: [Pose::IDENTITY].into_iter().collect(),
@@ -102,7 +102,7 @@ fn a_sensor_is_where_it_was_as_it_looked() {
     let [first, last] = [-0.05, 0.05].map(eye);
     let gone: [f32; 3] = std::array::from_fn(|a| last[a] - first[a]);
     assert!((gone[0] - 7.0).abs() < 1e-4 && gone[1] == 0.0 && gone[2] == 0.0, "{gone:?}");
-    // At the stamp it is 1.73 m, 5.77 voxels, above the ground, which the anchor is as far above.
+    // At the stamp it is 1.73 m, 5.77 voxels, above the ground, at the height of the anchor.
     assert!(
         (eye(0.0)[0] - 31.5).abs() < 1e-4 && (eye(0.0)[2] - 7.5).abs() < 1e-4,
         "{:?}",
@@ -117,10 +117,10 @@ fn a_sensor_is_where_it_was_as_it_looked() {
     };
     let ends: Vec<_> = (0..4000).map(|n| along(n, 30.0)).collect();
     let rays = sightlines(&sensors, &ends);
-    // Apart from the rear, which it passes as the sweep begins and ends.
+    // Except for the rear, where the sweep begins and ends.
     for n in (400..3600).step_by(7) {
         let place = along(n, 20.0).0;
-        // Whenever it is thought to have been seen.
+        // Whenever it is assumed to have been seen.
         for offset_s in [-0.05, 0.0, 0.05] {
             let behind = rays.depth(Simd::BASELINE, &scaled(), place, &UNKNOWN, offset_s);
             assert!(behind.is_some_and(|b| (b - 10.0).abs() < 0.1), "{n} {offset_s}: {behind:?}");
@@ -139,7 +139,7 @@ fn more_rays_than_there_is_room_for_are_thinned_evenly() {
     };
     let ends: Vec<_> = (0..4 * SIGHTLINES_MAX).map(end).collect();
     let rays = sightlines(&sensors, &ends);
-    // Of each place a ray is kept within its reach: of every fourth ring alone there would be none.
+    // Every place has a kept ray within reach; with only every fourth ring, some would have none.
     for n in (0..ends.len()).step_by(37) {
         let behind = rays.depth(Simd::BASELINE, &scaled(), ends[n].0, &UNKNOWN, 0.0);
         assert!(behind.is_some_and(|behind| behind.abs() < 0.1), "{n}: {behind:?}");
@@ -148,7 +148,7 @@ fn more_rays_than_there_is_room_for_are_thinned_evenly() {
 
 #[test]
 fn a_ring_that_moves_with_the_sensor_stands() {
-    // A wall 6 voxels beside a lane of 7 voxels a sweep, of which one ring is seen: a hyperbola.
+    // A wall 6 voxels beside the path, at 7 voxels per sweep; one ring is seen on it: a hyperbola.
     let wall = |n: usize| {
         let eye = [10.0 + 7.0 * n as f32, 20.0, GROUND + 6.0];
         // No ray reaches what lies behind it.
@@ -174,7 +174,7 @@ fn a_ring_that_moves_with_the_sensor_stands() {
         run(&mut refinement, &vec![pack_flow([7, 0]); SIDE * SIDE]);
         motions(&refinement).iter().flatten().count()
     };
-    // Where what is near decides alone it moves.
+    // If only nearby returns decide, it moves.
     let [told, near] = [scaled().params.sight_residual, 1.1].map(found);
     assert!(told == 0 && near > 20, "{told} {near}");
 }
@@ -190,7 +190,7 @@ fn bands_hide_no_ray() {
         paths.sensors = sensors;
         sightlines(&paths, &ends)
     };
-    // Of one sensor, and as if there were so many that each has two bands.
+    // For one sensor, and as if there were so many that each has two bands.
     let [many, few] = [with(1), with(8)];
     let mut told = 0;
     for n in 0..20_000 {

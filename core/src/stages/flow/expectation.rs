@@ -1,4 +1,4 @@
-//! Expectation (section 3.5.2.1): the feasible displacement of least energy for every column.
+//! Expectation (section 3.5.2.1): the feasible displacement of minimum energy for every column.
 
 use crate::params::{LINE, REACH, ROW, SIDE};
 use crate::record::{
@@ -6,13 +6,13 @@ use crate::record::{
 };
 use crate::stages::window::{Costs, WindowCosts, outside_cost};
 
-/// Proposes a flow for every column of `foreground`: the displacement of least energy (3.14) among
-/// those that are feasible, the first in scan order among equals.
+/// Proposes a flow for every column of `foreground`: the displacement of minimum energy (3.14)
+/// among those that are feasible, the first in scan order among equals.
 ///
 /// `pair_cost` holds a row of [`ROW`] costs for each of them, `min_cost` and `proposal` an element.
-/// A displacement is feasible where it would win its target, or keeps the column's own. `min_cost`,
-/// as [`window`](super::super::window::window) leaves it, spares whoever looks at less than
-/// everything; the formula looks at everything.
+/// A displacement is feasible if it would win its target, or is the column's present one.
+/// `min_cost`, as [`window`](super::super::window::window) leaves it, is for implementations that
+/// do not examine everything; the formula does.
 #[expect(clippy::too_many_arguments, reason = "one for every buffer")]
 pub fn expectation(
     sweep: &SweepUniform,
@@ -33,7 +33,8 @@ pub fn expectation(
         for index in (0..ROW).filter(|index| index % LINE < SIDE) {
             let d = displacement(index as i32);
             let Some(target) = inside(sweep, column, d) else { continue };
-            // Energies are never negative: unsigned order is theirs, and NONE is above all.
+            // Energies are never negative, so their unsigned order is the same, and NONE is above
+            // all.
             let energy = (row[index] as i32 + outside + prior(sweep, &around, d)) as u32;
             let feasible = energy < target_energy[target] || flow[column as usize] == pack_flow(d);
             if feasible && energy < proposal[1] {
@@ -43,15 +44,15 @@ pub fn expectation(
     }
 }
 
-/// Energy of a displacement before it is compared with anything: of its length, and of how far it
-/// is from those around.
+/// Energy of a displacement regardless of costs: from its length, and from how far it is from those
+/// around it.
 fn prior(sweep: &SweepUniform, around: &[[i32; 2]], d: [i32; 2]) -> i32 {
     let square = |d: [i32; 2]| d[0] * d[0] + d[1] * d[1];
     let smoothing = around.iter().map(|s| square([d[0] - s[0], d[1] - s[1]]));
     sweep.displacement_cost * square(d) + sweep.smoothing * smoothing.sum::<i32>()
 }
 
-/// Where a displacement leads, if that is in the window.
+/// The target of a displacement, if that is in the window.
 fn inside(sweep: &SweepUniform, column: u32, d: [i32; 2]) -> Option<usize> {
     let (side, column) = (sweep.side, column as i32);
     let (i, j) = (column / side + d[0], column % side + d[1]);

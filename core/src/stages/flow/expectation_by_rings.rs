@@ -1,4 +1,4 @@
-//! Expectation by rings: what the scalar backend runs, and devices that are CPUs.
+//! Expectation by rings: run by the scalar backend, and by devices that are CPUs.
 
 use super::expectation::displacement;
 use crate::params::{LINE, REACH, ROW};
@@ -7,7 +7,7 @@ use crate::record::{
 };
 use crate::stages::window::{Costs, WindowCosts, outside_cost};
 
-/// [`expectation`](super::expectation::expectation) without looking at everything: see [`propose`].
+/// [`expectation`](super::expectation::expectation) without examining everything: see [`propose`].
 #[expect(clippy::too_many_arguments, reason = "one for every buffer")]
 #[inline(always)]
 pub fn expectation_by_rings(
@@ -26,14 +26,14 @@ pub fn expectation_by_rings(
     }
 }
 
-/// What a column proposes: one to nine candidates in the place of 961.
+/// The proposal of a column, from one to nine candidates instead of 961.
 ///
-/// `least` is the least energy of the column at any displacement, smoothing apart, and its place.
-/// Smoothing over `n` valid neighbours with displacements `s` collapses to
+/// `least` is the minimum energy of the column over all displacements, without smoothing, and its
+/// place. Smoothing over `n` valid neighbours with displacements `s` collapses to
 /// `w_p (S2 + n |d|² - 2 d.S1)` with `S1`, `S2` the sums of `s` and `|s|²`. A column without valid
-/// neighbours takes the least if that is feasible, else looks at everything. With neighbours, the
-/// least plus the smoothing term, a paraboloid around their mean, excludes all but a few: rings
-/// around the rounded mean are visited until no farther ring can win or tie.
+/// neighbours takes `least` if that is feasible, and otherwise examines everything. With
+/// neighbours, `least` plus the smoothing term, a paraboloid around their mean, excludes all but a
+/// few: rings around the rounded mean are visited until no farther ring can win or tie.
 #[inline(always)]
 pub fn propose(
     sweep: &SweepUniform,
@@ -71,7 +71,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Without a branch for each of them.
+    /// Without a branch per flow.
     #[inline(always)]
     fn of(sweep: &SweepUniform, flow: &[Flow], column: u32) -> Sums {
         let (side, column) = (sweep.side, column as i32);
@@ -86,7 +86,7 @@ impl Sums {
         n
     }
 
-    /// Adds a flow so many times if it is valid.
+    /// Adds a flow the given number of times if it is valid.
     #[inline(always)]
     fn add(&mut self, flow: Flow, times: i32) {
         let times = if flow & VALID != 0 { times } else { 0 };
@@ -133,13 +133,13 @@ impl<C: Costs> Search<'_, C> {
         }
         let d = displacement(index);
         let target = super::maximisation::target(self.sweep, self.column, d);
-        // Energies are never negative: unsigned order is theirs, and NONE is above all.
+        // Energies are never negative, so their unsigned order is the same, and NONE is above all.
         if (energy as u32) < self.target_energy[target] || self.own == pack_flow(d) {
             *best = Best { energy, index };
         }
     }
 
-    /// Rows and columns of the search that lie inside the window.
+    /// Displacements along an axis that stay inside the window.
     fn reach(&self, at: i32) -> core::ops::RangeInclusive<i32> {
         (-REACH).max(-at)..=REACH.min(self.sweep.side - 1 - at)
     }
@@ -167,10 +167,10 @@ impl<C: Costs> Search<'_, C> {
             let smooth = around.squares + n * square - 2 * (u * su + v * sv);
             self.outside + self.sweep.displacement_cost * square + smoothing * smooth
         };
-        // |s - mean|² summed: what the smoothing costs at the mean itself, rounded down.
+        // Sum of |s - mean|²: the smoothing cost at the mean itself, rounded down.
         let spread = (n * around.squares - su * su - sv * sv) / n;
         for ring in 0..=2 * REACH {
-            // On a ring some component lies at least ring - 1/2 from the mean.
+            // On a ring some component is at least ring - 1/2 from the mean.
             let near = (2 * ring - 1).max(0);
             if least.saturating_add(smoothing * (n * near * near / 4 + spread)) > best.energy {
                 break;
@@ -193,7 +193,7 @@ impl<C: Costs> Search<'_, C> {
     }
 }
 
-/// `a / n` to the nearest integer, halves upwards; `n` is positive.
+/// `a / n` rounded to the nearest integer, halves upwards; `n` is positive.
 #[inline]
 fn round_div(a: i32, n: i32) -> i32 {
     (2 * a + n).div_euclid(2 * n)

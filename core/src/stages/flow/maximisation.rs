@@ -1,8 +1,9 @@
-//! Maximisation (section 3.5.2.2): every target keeps the claimant of least energy, the first in
+//! Maximisation (section 3.5.2.2): every target keeps the claimant of minimum energy, the first in
 //! column order among equals; all others lose their flow.
 //!
-//! By scatter, in three passes over the foreground, because an energy and an index do not fit one
-//! 32-bit word together: least energy per target, then least index among the equal, then the rest.
+//! By scatter, in three passes over the foreground, because an energy and an index do not fit
+//! together in one 32-bit word: minimum energy per target, then minimum index among equals, then
+//! the rest.
 
 use crate::record::{Flow, Proposal, SweepUniform, flow_displacement};
 
@@ -22,7 +23,7 @@ pub fn maximisation(
     settle(sweep, foreground, proposal, target_index, flow);
 }
 
-/// Least energy per target.
+/// Finds the minimum energy per target.
 pub fn claim(
     sweep: &SweepUniform,
     foreground: &[u32],
@@ -37,7 +38,7 @@ pub fn claim(
     }
 }
 
-/// Least foreground index among the claimants of least energy.
+/// Finds the minimum foreground index among the claimants of minimum energy.
 pub fn elect(
     sweep: &SweepUniform,
     foreground: &[u32],
@@ -70,7 +71,7 @@ pub fn settle(
     }
 }
 
-/// Column a displacement leads to; the caller knows that it lies inside.
+/// The column a displacement leads to; the caller knows that it lies inside.
 #[inline]
 pub(super) fn target(sweep: &SweepUniform, column: u32, d: [i32; 2]) -> usize {
     (column as i32 + d[0] * sweep.side + d[1]) as usize

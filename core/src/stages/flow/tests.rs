@@ -12,7 +12,7 @@ use crate::stages::window::{Costs, WindowCosts, outside_cost, window};
 use std::vec;
 use std::vec::Vec;
 
-/// Equation 3.14 and sections 3.5.2.1-2 by brute force: every sum written out, no bound.
+/// Equation 3.14 and sections 3.5.2.1-2 by brute force: every sum written out, no pruning.
 fn brute_force(
     sweep: &SweepUniform,
     rounds: u32,
@@ -75,7 +75,7 @@ fn brute_force(
 type Expectation =
     fn(&SweepUniform, &[u32], &[u32], &[u16], &[Flow], &[u32], &[MinCost], &mut [Proposal]);
 
-/// The rounds as [`crate::stages::FLOW`] has them.
+/// The rounds as in [`crate::stages::FLOW`].
 fn run(
     step: Expectation,
     sweep: &SweepUniform,
@@ -113,7 +113,8 @@ fn equals_brute_force() {
             ..Default::default()
         };
         let foreground: Vec<u32> = (0..37 * 37).filter(|_| random(share) == 0).collect();
-        // Costs of few values, so that ties are common, with a preferred displacement a half.
+        // Costs with few distinct values, so that ties are common, and a preferred displacement for
+        // each half.
         let costs: Vec<u16> = (0..foreground.len() * ROW)
             .map(|n| {
                 let liked = n % ROW == if 2 * n < foreground.len() * ROW { 500 } else { 333 };

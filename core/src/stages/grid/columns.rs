@@ -1,9 +1,9 @@
-//! Columns as bit masks: all that the flow needs of the grid.
+//! Columns as bit masks: all that the flow needs from the grid.
 
 use crate::params::LOG_ODDS_SOLID;
 use crate::record::{Column, SweepUniform};
 
-/// Log-odds to masks: free where negative, occupied where positive (3.4, 3.5 with epsilon = 0),
+/// Turns log-odds into masks: free if negative, occupied if positive (3.4, 3.5 with epsilon = 0),
 /// solid from [`LOG_ODDS_SOLID`] on. `log_odds` must hold `levels` elements per column.
 #[inline(always)]
 pub fn columns(sweep: &SweepUniform, log_odds: &[i32], columns_now: &mut [Column]) {

@@ -1,5 +1,5 @@
-//! Distinct rays. A trace depends on nothing but the voxels of its origin and its end, so equal
-//! rays are traced once with a weight: 5 to 8 times fewer rays on real sweeps, the same sums.
+//! Distinct rays. A trace depends only on the voxels of its origin and its end, so equal rays are
+//! traced once with a weight: 5 to 8 times fewer rays on real sweeps, the same sums.
 
 use crate::params::{MERGE_PROBES, MERGE_SLOTS};
 use crate::record::{Ray, SweepUniform};
@@ -7,11 +7,11 @@ use crate::stages::DISTINCT_COUNT;
 
 /// Merges equal rays in an open-addressed table of indices into `rays`.
 ///
-/// `slots` must hold [`MERGE_SLOTS`] zeros and receives `index + 1` of one ray of each kind, and
-/// how many of it there are; `distinct` receives the used slots in an order of no meaning, and word
-/// [`DISTINCT_COUNT`] of `counters`, which must be zero, their number. A ray that finds no place
-/// within [`MERGE_PROBES`] is appended as `MERGE_SLOTS + index` and counts once: which rays that
-/// meets changes no sum.
+/// `slots` must hold [`MERGE_SLOTS`] zeros and receives, for each distinct ray, `index + 1` of one
+/// instance and the number of instances; `distinct` receives the used slots in no particular order,
+/// and word [`DISTINCT_COUNT`] of `counters`, which must be zero, their number. A ray that finds no
+/// slot within [`MERGE_PROBES`] is appended as `MERGE_SLOTS + index` and counts once: which rays
+/// this happens to changes no sum.
 pub fn ray_merge(
     sweep: &SweepUniform,
     rays: &[Ray],
@@ -31,7 +31,7 @@ pub fn ray_merge(
     counters[DISTINCT_COUNT] = used as u32;
 }
 
-/// Merges one ray. Returns its entry of `distinct`, unless an equal one is there already.
+/// Merges one ray. Returns its entry of `distinct`, unless an equal one is already there.
 #[inline]
 fn merge(rays: &[Ray], index: usize, slots: &mut [[u32; 2]]) -> Option<u32> {
     let first = hash(rays[index]);

@@ -7,8 +7,8 @@ use crate::record::{NO_END, Ray, SweepUniform, ray_end, ray_origin};
 
 /// Adds the updates of every entry of `distinct` to `log_odds` (tenths, one per voxel): each voxel
 /// passed inside the window gets the free update, the end the occupied one. A ray that leaves the
-/// window, goes beyond `range_steps` or carries `no_end` leaves only free space. Integer sums: the
-/// order of the rays does not matter.
+/// window, goes beyond `range_steps` or carries `no_end` leaves only free space. The sums are
+/// integers, so the order of the rays does not matter.
 pub fn ray_trace(
     sweep: &SweepUniform,
     origins: &[[i32; 4]],
@@ -17,8 +17,8 @@ pub fn ray_trace(
     distinct: &[u32],
     log_odds: &mut [i32],
 ) {
-    // Looked up some at a time: the rays lie scattered, and a processor waits for several at once
-    // where no walk lies between.
+    // Looked up in batches: the rays are scattered in memory, and a processor waits for several at
+    // once if there is no walk in between.
     let mut batch = [([0; 2], 0); BATCH];
     for entries in distinct.chunks(BATCH) {
         let batch = &mut batch[..entries.len()];
@@ -30,7 +30,7 @@ pub fn ray_trace(
     }
 }
 
-/// Rays that are looked up at once.
+/// Number of rays looked up at once.
 const BATCH: usize = 64;
 
 /// Adds the updates of a ray that counts `weight` times: those of [`Walk`], clipped to the window
@@ -48,14 +48,14 @@ fn trace(sweep: &SweepUniform, start: [i32; 3], ray: Ray, weight: i32, log_odds:
 }
 
 /// A [`Walk`] in closed form: after `n` steps it has gone `(2 extent n + length) / (2 length)`
-/// voxels along an axis, rounded down, for the error that decides on a step of it is then
+/// voxels along an axis, rounded down, since the error that decides the next step along it is then
 /// `2 extent (n + 1) - length - 2 length gone`.
 struct WalkInWindow {
     /// Voxels along every axis, and along the one that steps every time.
     extent: [i64; 3],
     length: i64,
     step: [i32; 3],
-    /// Between neighbours along every axis in the order of the grid.
+    /// Index distance of neighbours along every axis, in the order of the grid.
     stride: [i32; 3],
 }
 
@@ -69,8 +69,7 @@ impl WalkInWindow {
         WalkInWindow { extent, length, step: delta.map(i32::signum), stride }
     }
 
-    /// Steps after which it has gone so many voxels along an axis: more than there are where it
-    /// never has.
+    /// Steps after which it has gone this many voxels along an axis; `i64::MAX` if it never does.
     #[inline]
     fn steps_to(&self, voxels: i32, axis: usize) -> i64 {
         let voxels = i64::from(voxels);
@@ -84,8 +83,8 @@ impl WalkInWindow {
         }
     }
 
-    /// The steps before which it is inside the window: from the first to before the last, as far as
-    /// a ray reaches.
+    /// The range of steps before which it is inside the window, the last excluded, as far as a ray
+    /// reaches.
     #[inline]
     fn clip(&self, sweep: &SweepUniform, start: [i32; 3]) -> (i64, i64) {
         let sizes = [sweep.side, sweep.side, sweep.levels];
@@ -104,8 +103,7 @@ impl WalkInWindow {
         (from, to)
     }
 
-    /// Visits the voxels before these steps by their indices. No branch depends on the ray but the
-    /// loop's.
+    /// Visits the voxels before these steps by index. Only the loop's branch depends on the ray.
     #[inline]
     fn walk(&self, from: i64, to: i64, start: [i32; 3], mut visit: impl FnMut(usize)) {
         if from >= to {
@@ -119,7 +117,7 @@ impl WalkInWindow {
         let at = |axis: usize| start[axis] + self.step[axis] * gone[axis] as i32;
         let mut index = (0..3).map(|axis| at(axis) * self.stride[axis]).sum::<i32>();
         let by = |axis: usize| self.step[axis] * self.stride[axis];
-        // The others step where their error says.
+        // The others step when their error says so.
         let others = [(longest + 1) % 3, (longest + 2) % 3];
         let rise = others.map(|axis| 2 * self.extent[axis] as i32);
         let mut error = others.map(|axis| {
@@ -131,7 +129,7 @@ impl WalkInWindow {
             visit(index as usize);
             index += always;
             for n in 0..2 {
-                // All ones where the error is not negative.
+                // All ones if the error is not negative.
                 let steps = !(error[n] >> 31);
                 index += sometimes[n] & steps;
                 error[n] += rise[n] - (fall & steps);
@@ -187,7 +185,7 @@ mod tests {
                 range_steps: draw(1, 300),
                 ..Default::default()
             };
-            // Every fourth far away on all sides.
+            // Every fourth one far away on all sides.
             let reach = if n % 4 == 0 { 32_000 } else { 60 };
             let mut place = || [0; 3].map(|_| draw(-reach, reach));
             let (start, end) = (place(), place());

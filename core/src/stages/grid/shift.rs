@@ -1,9 +1,10 @@
-//! The lattice keeps still while the window moves.
+//! The lattice stays fixed while the window moves.
 
 use crate::record::{Column, SweepUniform};
 
-/// The columns of the sweep before, seen from the new window: cell `(i, j)` held what was
-/// `(i + shift_x, j + shift_y)`, its levels moved by `shift_z`. What comes into view is unknown.
+/// The columns of the previous sweep, seen from the new window: cell `(i, j)` receives what was at
+/// `(i + shift_x, j + shift_y)`, its levels moved by `shift_z`. Columns that come into view are
+/// unknown.
 pub fn shift(sweep: &SweepUniform, columns_now: &[Column], columns_before: &mut [Column]) {
     let side = sweep.side;
     let mask = (1u32 << sweep.levels) - 1;

@@ -1,7 +1,8 @@
-//! The voxels a ray passes.
+//! The voxels a ray passes through.
 
-/// The voxels a ray passes, start included and end excluded: Bresenham's walk in three dimensions,
-/// in integers. The axis of the longest extent steps every time, the others when their error says.
+/// The voxels a ray passes through, start included and end excluded: Bresenham's walk in three
+/// dimensions, in integers. The axis of the longest extent steps every time, the others when their
+/// error says so.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
     /// Voxel about to be visited.

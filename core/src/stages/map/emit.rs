@@ -7,7 +7,7 @@ use crate::stages::grid::ray_merge::merged;
 use crate::stages::grid::ray_trace::inside;
 use crate::stages::grid::walk::Walk;
 
-/// `counts[n]` becomes the number of updates of `distinct[n]` whose keys lie in the band, 0 behind
+/// `counts[n]` becomes the number of updates of `distinct[n]` whose keys lie in the band, 0 after
 /// the last.
 pub fn count(
     sweep: &SweepUniform,
@@ -23,7 +23,7 @@ pub fn count(
     }
 }
 
-/// Writes the updates of every distinct ray in the band, from `offsets` on.
+/// Writes the updates of every distinct ray in the band, starting at `offsets`.
 pub fn emit(
     sweep: &SweepUniform,
     origins: &[[i32; 4]],
@@ -69,7 +69,8 @@ fn walk(
     }
 }
 
-/// Whether a ray lies beside the band's slabs: keys ascend with x, so it has nothing in it.
+/// Whether a ray lies outside the band's slabs: keys ascend with x, so it has no updates in the
+/// band.
 #[inline]
 fn is_beside_band(sweep: &SweepUniform, from_x: i32, to_x: i32) -> bool {
     let slab = sweep.side * sweep.levels;

@@ -4,7 +4,7 @@ use crate::params::TILE;
 use crate::record::Update;
 
 /// Sorts the first `count_tiles[TILE]` of `updates` by key; equal keys keep their order. `scratch`
-/// must have room for as many. Digits are bytes here; the kernels take four bits at a time.
+/// must have room for the same number. Digits are bytes here; the kernels take four bits at a time.
 pub fn radix_sort(count_tiles: &[u32], updates: &mut [Update], scratch: &mut [Update]) {
     let count = count_tiles[TILE] as usize;
     let (updates, scratch) = (&mut updates[..count], &mut scratch[..count]);
@@ -25,7 +25,7 @@ pub fn radix_sort(count_tiles: &[u32], updates: &mut [Update], scratch: &mut [Up
             to[*place as usize] = update;
             *place += 1;
         }
-        // Four passes: the result ends where it began.
+        // After four passes the result is back in `updates`.
         core::mem::swap(&mut from, &mut to);
     }
 }

@@ -4,7 +4,8 @@ use crate::params::TILE;
 use crate::record::Update;
 
 /// Sums runs of equal keys among the first `count_tiles[TILE]` of the sorted `updates` into
-/// `voxels`, which must have room for as many; `run_tiles[TILE]` becomes the number of runs.
+/// `voxels`, which must have room for the same number; `run_tiles[TILE]` becomes the number of
+/// runs.
 pub fn reduce_by_key(
     count_tiles: &[u32],
     updates: &[Update],

@@ -14,16 +14,16 @@ fn noise() -> Matrix2<f32> {
     Matrix2::from_diagonal_element(0.15 * 0.15)
 }
 
-/// Just born.
+/// A newborn tracklet.
 fn tracklet(ekf: Ekf) -> Tracklet {
     Tracklet { ekf, age: 0, missed: 0, column: 0, place: [0.5; 2], probability: 1.0 }
 }
 
-/// One object seen `steps` times with half a cell of noise; speed error and normalised squared
-/// error of the state after the last observation, or `None` where the gate closed.
+/// Tracks one object seen `steps` times with half a cell of noise: speed error and normalised
+/// squared error of the state after the last observation, or `None` if the gate rejected one.
 fn track(seed: u64, speed: f64, turn: Option<f64>, steps: usize) -> Option<(f32, f32)> {
     let params = Profile::hdl64().tracklet;
-    // A gate that never closes: a closed one would cut the tail off the error.
+    // A gate that never closes: a closing one would cut off the tail of the error.
     let open = TrackletParams { gate_d2: f32::INFINITY, ..params };
     let mut random = Random(seed * 7919 + 17);
     let drawn = random.normal() * params.turn_birth_radps as f64;
@@ -87,9 +87,9 @@ fn speed_is_right_at_age_ten() {
 
 #[test]
 fn the_covariance_is_honest() {
-    // Mean of 1,000 chi-square values of 5 degrees of freedom: 95 % within 5 +- 0.196. At
-    // 5 m/s two positions half a cell off leave the heading open by 24 degrees: until age 12
-    // or so, linearisation makes a few states of a thousand too sure.
+    // Mean of 1,000 chi-square values with 5 degrees of freedom: 95 % within 5 +- 0.196. At 5 m/s
+    // two positions half a cell off leave the heading uncertain by 24 degrees: until about age 12,
+    // linearisation makes a few states in a thousand overconfident.
     let band = 1.96 * (2.0f32 * 5.0 / 1000.0).sqrt();
     for speed in [5.0, 10.0, 20.0] {
         let sum: f32 = (0..1000).map(|s| track(s, speed, None, 25).unwrap().1).sum();
@@ -99,8 +99,8 @@ fn the_covariance_is_honest() {
     }
 }
 
-/// Slow walkers, seen by the cell they are in, live and show their velocity whichever way they
-/// go: starting at rest, a polar state must not prefer the x axis.
+/// Tracklets of slow walkers, seen only by the cell they are in, survive and have the right
+/// velocity in any direction: starting at rest, a polar state must not prefer the x axis.
 #[test]
 fn slow_walkers_in_any_direction() {
     use crate::tracklet::observe;
@@ -146,9 +146,9 @@ fn slow_walkers_in_any_direction() {
     assert!(xx == yy && xx > 1.0 && xy == 0.0);
 }
 
-/// Scale, and squared error of the velocity in terms of its covariance, of a cluster whose refined
-/// displacements err by themselves, 1 cm and `factor` times that, its speed and turning rate
-/// changing by `factor` times what is assumed.
+/// Scale, and squared error of the velocity normalised by its covariance, for a cluster whose
+/// refined displacements have independent errors of `factor` times 1 cm, and whose speed and turn
+/// rate change by `factor` times what is assumed.
 fn displaced(seed: u64, factor: f64, innovation_sweeps: f32) -> (f32, f32) {
     use crate::tracklet::observe;
     let mut profile = Profile::hdl64();
@@ -193,8 +193,8 @@ fn displaced_mean(factor: f64, innovation_sweeps: f32) -> (f32, f32) {
 
 #[test]
 fn displacements_that_err_by_themselves() {
-    // Chi-square of 2 degrees of freedom. Were they taken for differences of positions that err by
-    // themselves, it would be 2.7: such errors cancel in time.
+    // Chi-square with 2 degrees of freedom. If they were taken as differences of positions with
+    // independent errors, it would be 2.7: such errors cancel over time.
     let (scale, d2) = displaced_mean(1.0, 0.0);
     std::println!("mean squared error {d2}");
     assert_eq!(scale, 1.0);
@@ -210,7 +210,7 @@ fn innovations_tell_how_large_the_noise_is() {
         assert!((scale / variance - 1.0).abs() < 0.1, "{factor}: {scale}");
         assert!((1.75..2.5).contains(&d2), "{factor}: {d2}");
     }
-    // What stands exactly tells nothing.
+    // What is exactly at rest says nothing.
     let params = Profile::hdl64().tracklet;
     let mut rest = Ekf::birth(&params, noise(), [0.0; 2], DT);
     rest.predict(&params, DT);
@@ -225,7 +225,7 @@ fn the_gate_and_the_authors_late_start() {
     // Noise-free, 10 and 15 m/s straight ahead; his start is a step late.
     for (params, speed, kept) in [(&ours, 15.0, true), (&his, 10.0, true), (&his, 15.0, false)] {
         let mut ekf = Ekf::birth(params, noise(), [speed * DT, 0.0], DT);
-        // The next match leads one step further: measured from the cell of birth.
+        // The next match is one step further, measured from the cell of birth.
         ekf.predict(params, DT);
         assert_eq!(ekf.update(params, noise(), [speed * DT, 0.0]), kept, "{speed} m/s");
     }

@@ -1,4 +1,4 @@
-//! The flow of a few sweeps, without an operating system and without a heap: on QEMU's board `virt`
+//! The flow of a few sweeps without an operating system or a heap: on QEMU's `virt` board
 //! (aarch64), and as a plain program on the host. Both print the same digest.
 //!
 //! ```sh
@@ -27,9 +27,9 @@ use raywake_core::sweep::{Rig, Timing};
 use raywake_core::team::Alone;
 use raywake_embed::{EstimatorOptions, FlowEstimator, Memory, SweepPlace};
 
-/// Memory of the estimator: what it asks for has room.
+/// Memory for the estimator: enough for what it asks for.
 const BYTES: usize = 72 << 20;
-/// Sweeps, a tenth of a second apart.
+/// Number of sweeps, 0.1 s apart.
 const SWEEPS: u32 = 4;
 
 /// A window of 12 m around a robot, with few returns.
@@ -50,7 +50,7 @@ fn options() -> EstimatorOptions {
     }
 }
 
-/// Steps through the sweeps and tells what was found.
+/// Steps through the sweeps and prints what was found.
 fn run(memory: Memory, out: &mut impl Write) -> fmt::Result {
     let options = options();
     writeln!(out, "memory     {} bytes", options.bytes().unwrap_or(0))?;

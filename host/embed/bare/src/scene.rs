@@ -5,7 +5,7 @@ use raywake_core::sweep::Point;
 
 /// Height of the sensor above the ground, m.
 pub const HEIGHT_M: f64 = 1.7;
-/// Beams, and returns of each.
+/// Number of beams, and of returns of each.
 const BEAMS: u32 = 32;
 const COLUMNS: u32 = 720;
 /// Returns of a sweep.
@@ -16,10 +16,10 @@ const YARD_M: f64 = 10.0;
 const OWN_MPS: f64 = 1.0;
 const BOX_MPS: f64 = 5.0;
 
-/// Least and greatest x, y and z in the world, m.
+/// Minimum and maximum x, y and z in the world, m.
 type Obstacle = [[f64; 2]; 3];
 
-/// Returns of the sweep at a time, in the frame of the sensor.
+/// Returns of the sweep at a given time, in the sensor frame.
 pub fn returns(time_s: f64) -> impl ExactSizeIterator<Item = Point> {
     let sensor = [OWN_MPS * time_s, 0.0, HEIGHT_M];
     let ahead = -4.0 + BOX_MPS * time_s;
@@ -37,7 +37,7 @@ pub fn returns(time_s: f64) -> impl ExactSizeIterator<Item = Point> {
     })
 }
 
-/// A ray's direction: once around by a polygon, which needs no sine.
+/// Direction of a ray. A revolution follows a square, which needs no sine.
 fn direction(column: u32, beam: u32) -> [f64; 3] {
     let around = 4.0 * f64::from(column) / f64::from(COLUMNS);
     let (side, along) = (around as u32, 2.0 * (around - f64::from(around as u32)) - 1.0);
@@ -50,7 +50,7 @@ fn direction(column: u32, beam: u32) -> [f64; 3] {
     [x, y, -0.45 + 0.5 * f64::from(beam) / f64::from(BEAMS)]
 }
 
-/// How far it is to a wall or to the ground, in lengths of the ray.
+/// Distance to a wall or the ground, in ray lengths.
 fn walls(from: &[f64; 3], ray: &[f64; 3]) -> f64 {
     let to = |axis: usize, bound: f64| {
         let ahead = (bound - from[axis]) / ray[axis];
@@ -60,7 +60,7 @@ fn walls(from: &[f64; 3], ray: &[f64; 3]) -> f64 {
     sides.into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// How far it is to a block, if it is hit.
+/// Distance to a block, in ray lengths, if it is hit.
 fn hit(block: &Obstacle, from: &[f64; 3], ray: &[f64; 3]) -> Option<f64> {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! A recording of many files as one file, for a fuzzer to damage.
+//! A recording of many files as a single file, for a fuzzer to damage.
 //!
 //! ```text
 //! day/drive scene-0061        what to open, below the folder; topics
@@ -11,19 +11,19 @@ use std::path::{Component, Path};
 
 const FILE: &[u8] = b"\n%%% ";
 
-/// Files of a recording, by their place below its folder.
+/// Files of a recording, by path below its folder.
 #[derive(Debug, Default, PartialEq)]
 pub struct Bundle {
     /// What is opened, below the folder.
     pub root: String,
-    /// What is chosen within it.
+    /// Topics chosen within it.
     pub topics: Vec<String>,
-    /// Content by place.
+    /// Contents by path.
     pub files: BTreeMap<String, Vec<u8>>,
 }
 
 impl Bundle {
-    /// Reads what [`bytes`](Bundle::bytes) makes. `None` for anything else, and for places outside
+    /// Parses what [`bytes`](Bundle::bytes) writes. `None` for anything else, and for paths outside
     /// the folder.
     pub fn parse(bytes: &[u8]) -> Option<Bundle> {
         let mut parts = split(bytes, FILE).into_iter();
@@ -46,13 +46,13 @@ impl Bundle {
     }
 }
 
-/// A file's place, and after the line what is in it.
+/// A file's path, and its contents after the line break.
 fn file(part: &[u8]) -> Option<(String, Vec<u8>)> {
     let end = part.iter().position(|byte| *byte == b'\n')?;
     Some((str::from_utf8(&part[..end]).ok()?.to_string(), part[end + 1..].to_vec()))
 }
 
-/// Whether a place is below the folder.
+/// Whether a path is below the folder.
 fn inside(place: &String) -> bool {
     let names = |part| matches!(part, Component::Normal(_));
     !place.contains('\0') && place.len() < 200 && Path::new(place).components().all(names)

@@ -1,6 +1,6 @@
 #![forbid(unsafe_code)]
-//! What targets do with bytes: read them as a recording, or as weights. Whatever they are, that
-//! ends in an error or with a sweep.
+//! What targets do with bytes: read them as a recording or as weights. Whatever the bytes are, this
+//! ends with an error or a sweep.
 
 use raywake_core::encoder::EncoderWeights;
 use raywake_core::stages::{background_filter, occupancy_constancy};
@@ -15,18 +15,18 @@ use tempfile::TempDir;
 pub mod bundle;
 use bundle::Bundle;
 
-/// Sweeps that are read of each.
+/// Maximum number of sweeps read from each recording.
 const SWEEPS: usize = 3;
-/// Levels that weights are read for.
+/// Number of levels that weights are read for.
 const LEVELS: usize = 10;
 
-/// Files of one recording after the other.
+/// Holds the files of one recording after another.
 static FOLDER: LazyLock<TempDir> = LazyLock::new(|| {
     bear_guarded_panics();
     TempDir::new().expect("a temporary folder")
 });
 
-/// A decoder of other people's that panics is caught, and is no find.
+/// A panic in a third-party decoder is caught and does not count as a finding.
 fn bear_guarded_panics() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -44,7 +44,7 @@ pub fn recording(bytes: &[u8]) {
     }
 }
 
-/// Has the folder hold these files. Most inputs differ from the last one in one file.
+/// Makes the folder hold these files. Most inputs differ from the previous one in one file.
 fn replace(files: BTreeMap<String, Vec<u8>>) -> std::io::Result<()> {
     static WRITTEN: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut written = WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -54,7 +54,7 @@ fn replace(files: BTreeMap<String, Vec<u8>>) -> std::io::Result<()> {
     let mut changed = files.iter().filter(|(place, content)| old.get(*place) != Some(content));
     let write = |()| changed.try_for_each(|(place, content)| write(place, content));
     if let Err(error) = removed.and_then(write) {
-        // A file's place is another's folder.
+        // The path of one file is the folder of another.
         fs::remove_dir_all(FOLDER.path())?;
         fs::create_dir_all(FOLDER.path())?;
         return Err(error);

@@ -1,4 +1,4 @@
-//! Scene flow as the Argoverse 2 scene flow grader reads it.
+//! Scene flow in the format of the Argoverse 2 scene flow grader.
 
 use std::path::{Path, PathBuf};
 
@@ -11,13 +11,13 @@ use super::table::TableWriter;
 use crate::Error;
 
 /// Writes `<out>/<log>/<timestamp_ns>.feather`: one row per return of the pair's first sweep, in
-/// its order, of `flow_tx_m flow_ty_m flow_tz_m` (float32: motion over `dt_s` in the vehicle frame
-/// of the first sweep, that of the vehicle removed) and `is_valid` (bool: false for foreground
-/// without a match).
+/// its order, with `flow_tx_m flow_ty_m flow_tz_m` (float32: motion over `dt_s` in the vehicle
+/// frame of the first sweep, without the vehicle's own motion) and `is_valid` (bool: false for
+/// foreground without a match).
 ///
 /// `first` is `world_from_vehicle` of the first sweep, `dt_s` the time to the second. Returns the
-/// file's path. Fails with [`Error::Usage`] where `log` cannot name a folder, and where the file
-/// cannot be written.
+/// file's path. Fails with [`Error::Usage`] if `log` cannot name a folder, and if the file cannot
+/// be written.
 pub fn export(
     out: &Path,
     log: &str,
@@ -39,7 +39,7 @@ pub fn export(
     Ok(path)
 }
 
-/// Motion over ground in `dt_s` along the vehicle's axes, m.
+/// Motion over ground in `dt_s`, along the vehicle's axes, m.
 pub fn displacement(flow: &PointFlow, world_from_vehicle: &Pose, dt_s: f64) -> [f32; 3] {
     let [x, y] = flow.velocity_world_mps.map(f64::from);
     let motion = world_from_vehicle.rotation.conjugate() * DVec3::new(x, y, 0.0) * dt_s;
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn world_velocity_along_the_vehicles_axes() {
-        // The vehicle heads along world y; something drives along world y too: straight ahead.
+        // The vehicle heads along world y and the return moves along world y: straight ahead.
         let pose = Pose::planar(100.0, -50.0, 1.0, core::f64::consts::FRAC_PI_2);
         let flow = PointFlow { velocity_world_mps: [0.0, 20.0], ..PointFlow::default() };
         let d = displacement(&flow, &pose, 0.1);

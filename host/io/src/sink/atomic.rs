@@ -1,4 +1,4 @@
-//! Files that are whole or absent.
+//! Files that are complete or absent.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use crate::Error;
 
-/// Writes `path` whole or not at all, see [`Partial`].
+/// Writes `path` completely or not at all, see [`Partial`].
 ///
 /// Fails with the system's reason (disk full, permission, no such folder), or with what `content`
-/// returned; the temporary file is then gone.
+/// returned; the temporary file is removed.
 pub fn write(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -21,22 +21,23 @@ pub fn write(
     partial.keep()
 }
 
-/// A temporary file `.NAME.partial` beside the file that it will be, which takes the name only when
-/// everything is in it and on the disk; whatever has that name stays until then. Dropped before, it
-/// is removed; what a process that was killed has left is removed by the next one.
+/// A temporary file `.NAME.partial` next to the final one. It takes the final name only once
+/// everything is written and on disk; until then, any existing file of that name stays. If dropped
+/// earlier, it is removed; one left by a killed process is removed by the next process.
 pub struct Partial {
     path: PathBuf,
     partial: PathBuf,
-    /// The open file again, for what is done at the end. While it is open it is locked.
+    /// A second handle of the open file, for the last steps. The file is locked while it is open.
     file: File,
     kept: bool,
 }
 
-/// How often another process may remove a temporary file just before it is locked.
+/// Maximum number of attempts, as another process may remove a temporary file just before it is
+/// locked.
 const ATTEMPTS: usize = 8;
 
 impl Partial {
-    /// Creates the temporary file of `path`. Fails where another process is writing it.
+    /// Creates the temporary file of `path`. Fails if another process is writing it.
     pub fn create(path: &Path) -> Result<(Partial, BufWriter<File>), Error> {
         let partial = partial_path(path)?;
         let file = create_locked(&partial).map_err(Error::writing(path))?;
@@ -50,10 +51,10 @@ impl Partial {
         Error::writing(&self.path)(io::Error::other(e))
     }
 
-    /// Gives it its name. All must have been written.
+    /// Gives the file its final name. Everything must have been written.
     pub fn keep(mut self) -> Result<(), Error> {
         match self.file.sync_data() {
-            // Some file systems cannot.
+            // Some file systems do not support it.
             Err(e) if !matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {
                 return Err(Error::writing(&self.path)(e));
             }
@@ -67,16 +68,16 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        // With its own name it is done; by now another process may use the temporary one. Without,
-        // it is of no use. The first failure is the one to tell.
+        // Once renamed, the file is done, and another process may be using the temporary name. If
+        // not, it is of no use. The first failure is the one to report.
         if !self.kept {
             let _ = fs::remove_file(&self.partial);
         }
     }
 }
 
-/// Creates a file that was not there and locks it. One that is there is left by a process that was
-/// killed, unless it is locked; it is removed, and not opened for writing: it may be a link.
+/// Creates a file that did not exist and locks it. An existing one was left by a killed process
+/// unless it is locked; it is removed rather than opened for writing, as it may be a link.
 fn create_locked(path: &Path) -> io::Result<File> {
     let busy = || io::Error::new(ErrorKind::ResourceBusy, "another process is writing it");
     for _ in 0..ATTEMPTS {
@@ -87,7 +88,7 @@ fn create_locked(path: &Path) -> io::Result<File> {
                 }
             }
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                // While it is locked here nobody else removes it.
+                // While it is locked here, nobody else removes it.
                 match LeftOver::at(path)? {
                     LeftOver::Gone => (),
                     LeftOver::Locked => return Err(busy()),
@@ -100,13 +101,13 @@ fn create_locked(path: &Path) -> io::Result<File> {
     Err(busy())
 }
 
-/// What is where a temporary file is to be.
+/// What already exists at the path of a temporary file.
 enum LeftOver {
-    /// Nothing any more: it has got its name, or another process has removed it.
+    /// Nothing any more: it was renamed, or another process removed it.
     Gone,
-    /// What another process is writing.
+    /// A file that another process is writing.
     Locked,
-    /// What nobody writes, locked while this lives where it is an ordinary file.
+    /// A file that nobody is writing; if it is a regular file, it is locked while this lives.
     Free(Option<File>),
 }
 
@@ -128,8 +129,8 @@ impl LeftOver {
     }
 }
 
-/// Locks a file or folder, unless another process has: then `false`. Where there are no locks, none
-/// has.
+/// Locks a file or folder; `false` if another process has locked it. Where locks are not supported,
+/// none has.
 fn lock(file: &File) -> bool {
     !matches!(file.try_lock(), Err(TryLockError::WouldBlock))
 }
@@ -142,20 +143,20 @@ fn is_at(file: &File, path: &Path) -> bool {
     of(file.metadata()) == of(path.symlink_metadata())
 }
 
-/// Open files cannot be removed there.
+/// Open files cannot be removed on these systems.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> bool {
     true
 }
 
-/// A folder that no other process writes results to, while this value lives.
+/// A folder to which no other process writes results while this value lives.
 #[derive(Debug)]
 pub struct FolderClaim {
-    /// None where folders cannot be opened.
+    /// `None` if folders cannot be opened.
     _locked: Option<File>,
 }
 
-/// Creates a folder, with those above it, and claims it. Fails where another process has.
+/// Creates a folder and its parents, and claims it. Fails if another process has claimed it.
 pub fn claim_folder(path: &Path) -> Result<FolderClaim, Error> {
     create_folder(path)?;
     let folder = File::open(path).ok();
@@ -166,12 +167,12 @@ pub fn claim_folder(path: &Path) -> Result<FolderClaim, Error> {
     Ok(FolderClaim { _locked: folder })
 }
 
-/// Creates a folder and those above it.
+/// Creates a folder and its parents.
 pub fn create_folder(path: &Path) -> Result<(), Error> {
     fs::create_dir_all(path).map_err(Error::writing(path))
 }
 
-/// The temporary name.
+/// The temporary path.
 fn partial_path(path: &Path) -> Result<PathBuf, Error> {
     let name = path.file_name().ok_or_else(|| {
         Error::writing(path)(io::Error::new(io::ErrorKind::InvalidInput, "is not a file name"))

@@ -1,4 +1,4 @@
-//! What stands for [`BagSink`] where messages cannot be written: nothing makes one.
+//! Stand-in for [`BagSink`] in builds that cannot write messages; never constructed.
 
 use raywake_core::output::PairFlows;
 use raywake_core::sweep::Point;
@@ -8,16 +8,16 @@ use super::streams::{Content, StreamTargets};
 use crate::Error;
 use crate::source::SweepData;
 
-/// No stream.
+/// A stream that cannot exist.
 pub enum Absent {}
 
 pub use Absent as BagSink;
 
 impl Absent {
-    /// None where none is asked for.
+    /// Returns `None` if no stream is requested.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where one is.
+    /// [`Error::Unsupported`] if one is.
     pub fn create(streams: &StreamTargets, _: u64, _: Content) -> Result<Option<Absent>, Error> {
         match streams.is_empty() {
             true => Ok(None),

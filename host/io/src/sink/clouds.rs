@@ -9,7 +9,7 @@ use super::atomic;
 use super::table::TableWriter;
 use crate::Error;
 
-/// Numbers of a return in files that name them: m, 0 to 1, and s after the sweep's stamp.
+/// Numbers of a return in formats that name them: m, 0 to 1, and s after the sweep's stamp.
 const NAMES: [&str; 5] = ["x", "y", "z", "intensity", "time"];
 
 fn numbers(point: &Point) -> [f32; NAMES.len()] {
@@ -17,8 +17,8 @@ fn numbers(point: &Point) -> [f32; NAMES.len()] {
     [x, y, z, point.intensity, point.offset_s]
 }
 
-/// Writes returns as the extension of the path says: `npy`, `pcd`, `ply`, `feather`, or as KITTI
-/// does (`bin`: little-endian float32 x, y, z, intensity each). `bin` and `npy` have no times.
+/// Writes returns in the format of the path's extension: `npy`, `pcd`, `ply`, `feather`, or KITTI's
+/// (`bin`: little-endian float32 x, y, z, intensity per return). `bin` and `npy` have no times.
 pub fn write_cloud(path: &Path, points: &[Point]) -> Result<(), Error> {
     let rows: Vec<[f32; NAMES.len()]> = points.iter().map(numbers).collect();
     let bare = || rows.iter().flat_map(|[x, y, z, intensity, _]| [*x, *y, *z, *intensity]);
@@ -41,7 +41,7 @@ pub fn write_cloud(path: &Path, points: &[Point]) -> Result<(), Error> {
     }
 }
 
-/// The head of an array of numpy of so many rows of four numbers: a multiple of 64 bytes.
+/// The head of a numpy array of this many rows of four numbers, padded to a multiple of 64 bytes.
 fn npy_head(rows: usize) -> Vec<u8> {
     let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, 4), }}");
     let before = 10;
@@ -75,7 +75,7 @@ pub fn write_ply<const N: usize>(
     })
 }
 
-/// Writes a label a return as SemanticKITTI does: little-endian, 32 bits.
+/// Writes one label per return as SemanticKITTI does: little-endian, 32 bits.
 pub fn write_labels(path: &Path, labels: &[u32]) -> Result<(), Error> {
     atomic::write(path, |out| labels.iter().try_for_each(|l| out.write_all(&l.to_le_bytes())))
 }

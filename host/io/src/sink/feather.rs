@@ -25,10 +25,10 @@ const STATE: [&str; 5] = ["x", "y", "heading", "speed", "turn"];
 /// `vx_ego_mps vy_ego_mps`, `cov_xx cov_xy cov_yy` ((m/s)^2, of the world velocity) float32;
 /// `displacement_i displacement_j` (whole cells), `energy_millinats` int32; `dx_world_m dy_world_m`
 /// (refined displacement over ground until the next sweep) and its covariance `cov_dx_dx cov_dx_dy
-/// cov_dy_dy` (m^2) float32; `age` uint32; `p_moves` (how likely it is that the column moves)
-/// float32; `foreground` (not explained by odometry) and `valid`
-/// (with a match of its own or part of a thing that moves) bool; `class` uint8, what the encoder
-/// takes the column for: the numbers of [`ColumnClass`], whose names are in the metadata, or 255.
+/// cov_dy_dy` (m^2) float32; `age` uint32; `p_moves` (probability that the column moves) float32;
+/// `foreground` (not explained by odometry) and `valid` (with a match of its own or part of a
+/// moving cluster) bool; `class` uint8, the class that the encoder assigns to the column: the
+/// number of a [`ColumnClass`], whose names are in the metadata, or 255.
 pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["cell_i", "cell_j"], columns, |c| c.cell);
@@ -53,10 +53,10 @@ pub fn columns(columns: &[ColumnFlow]) -> TableWriter {
 ///
 /// `x_m y_m z_m`, `vx_world_mps vy_world_mps`, `vx_ego_mps vy_ego_mps vz_ego_mps`, `cov_xx cov_xy
 /// cov_yy` of the world velocity float32; `age` uint32; `p_moves` float32; `foreground`, `valid`
-/// bool; `status` uint8, what became of the return: the numbers of
+/// bool; `status` uint8, what became of the return: the number of a
 /// [`raywake_core::output::Status`], whose names are in the metadata, as are those of `class`.
 ///
-/// `points` and `flows` are of the same sweep.
+/// `points` and `flows` belong to the same sweep.
 pub fn points(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     t.array(["x_m", "y_m", "z_m"], points, |p| p.position);
@@ -66,8 +66,8 @@ pub fn points(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     t
 }
 
-/// The same without what the recording tells: places are those of what moves, null for the rest,
-/// and velocities are over ground.
+/// The same without what the recording itself contains: positions only of moving returns (null for
+/// the others), and velocities only over ground.
 pub fn points_in_short(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     let mut t = TableWriter::default();
     let rows: Vec<_> = points.iter().zip(flows).collect();
@@ -80,7 +80,7 @@ pub fn points_in_short(points: &[Point], flows: &[PointFlow]) -> TableWriter {
     t
 }
 
-/// What was found of returns beside their velocities.
+/// The results for returns besides their velocities.
 fn found(t: &mut TableWriter, flows: &[PointFlow]) {
     t.array(["cov_xx", "cov_xy", "cov_yy"], flows, |f| f.covariance);
     t.column("age", flows, |f| f.age);
@@ -91,12 +91,12 @@ fn found(t: &mut TableWriter, flows: &[PointFlow]) {
     t.column("class", flows, |f| ColumnClass::number(f.class));
 }
 
-/// `class`: the name of every number, separated by commas.
+/// `class`: the names of all numbers, separated by commas.
 pub fn class_names() -> (&'static str, String) {
     ("class", ColumnClass::ALL.map(ColumnClass::name).join(","))
 }
 
-/// `status`: the name of every number, separated by commas.
+/// `status`: the names of all numbers, separated by commas.
 pub fn status_names() -> (&'static str, String) {
     ("status", Status::ALL.map(Status::name).join(","))
 }
@@ -127,20 +127,20 @@ pub fn tracklets(tracklets: &[TrackletState]) -> TableWriter {
     t
 }
 
-/// A voxel of a map of occupancy.
+/// A voxel of an occupancy map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Voxel {
-    /// Place on the map's lattice.
+    /// Position in the map's lattice.
     pub index: [i32; 3],
     /// Log-odds of being occupied, tenths of nats.
     pub log_odds_tenths: i32,
 }
 
-/// Writes a map of occupancy, one row per voxel: `i j k` int32, `log_odds` float32 (nats, positive
-/// is occupied), `probability` float32 (of being occupied, the log-odds cut off at `clip_nats`).
+/// Writes an occupancy map, one row per voxel: `i j k` int32, `log_odds` float32 (nats, positive is
+/// occupied), `probability` float32 (of being occupied, with the log-odds clipped at `clip_nats`).
 ///
 /// Voxel (i, j, k) spans from `origin_m + resolution_m * (i, j, k)` one resolution further along
-/// every axis of the world; both go to the metadata as `origin_x_m`, `origin_y_m`, `origin_z_m`,
+/// every axis of the world; both go into the metadata as `origin_x_m`, `origin_y_m`, `origin_z_m`,
 /// `resolution_m`, the limit as `clip_nats`.
 pub fn write_map(
     path: &Path,

@@ -1,4 +1,4 @@
-//! The tables of a run's flow: a feather file each sweep, or a Parquet file for all.
+//! The tables of a run's flow: a feather file per sweep, or a Parquet file for all.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use super::{Meta, atomic};
 use crate::Error;
 use crate::source::whole;
 
-/// The sweep that rows are of.
+/// The sweep that rows belong to.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepMark {
     /// Its frame number or timestamp.
@@ -31,21 +31,21 @@ const TRACKLETS: usize = 2;
 
 /// Where tables go.
 pub enum FlowTables {
-    /// A folder for each kind in this one, a file `FRAME.feather` each sweep in that.
+    /// A folder for each kind under a root, with a file `FRAME.feather` per sweep.
     Folders(Folders),
-    /// A file of each kind.
+    /// One file of each kind.
     Files(Box<[ParquetFile; KINDS.len()]>),
 }
 
-/// Tables of single sweeps. What is there already is kept, as an interrupted run left it.
+/// Tables of single sweeps. Existing ones are kept, as left by an interrupted run.
 pub struct Folders {
     root: PathBuf,
-    /// Whether a table of a kind that was there was found to be the one that would be written.
+    /// Whether an existing table of a kind was found identical to the one that would be written.
     checked: [bool; KINDS.len()],
 }
 
 impl FlowTables {
-    /// Creates folders for all kinds, but for that of returns where they are not wanted.
+    /// Creates folders for all kinds, except that of returns if it is not wanted.
     pub fn folders(root: &Path, with_points: bool) -> Result<FlowTables, Error> {
         let kinds = KINDS.iter().enumerate().filter(|(n, _)| with_points || *n != POINTS);
         kinds.map(|(_, name)| root.join(name)).try_for_each(|f| atomic::create_folder(&f))?;
@@ -65,7 +65,8 @@ impl FlowTables {
         self.write(COLUMNS, of, rows.len(), feather::columns(rows), &[class_names()])
     }
 
-    /// Writes the flow of returns: [`feather::points`], in one file [`feather::points_in_short`].
+    /// Writes the flow of returns: [`feather::points`], or in a single file
+    /// [`feather::points_in_short`].
     pub fn points(
         &mut self,
         of: &SweepMark,
@@ -122,7 +123,7 @@ impl Folders {
         table: TableWriter,
         meta: Meta<'_>,
     ) -> Result<(), Error> {
-        // Ten digits, so that names sort as frames do.
+        // Ten digits, so that names sort in frame order.
         let path = self.root.join(format!("{}/{:010}.feather", KINDS[kind], of.frame));
         let is_there = path.is_file();
         if is_there && self.checked[kind] {

@@ -1,5 +1,5 @@
-//! Where results go: feather, Parquet and MCAP files and Argoverse 2 submissions, each whole or
-//! absent, and viewers.
+//! Outputs: feather, Parquet and MCAP files and Argoverse 2 submissions, each complete or absent,
+//! and viewers.
 
 pub mod argoverse;
 pub mod atomic;
@@ -16,6 +16,6 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-/// What is written into a file's metadata besides the version of this program: keys and values,
-/// such as `("frame", "17")`, `("stamp_s", "1.72")`.
+/// File metadata besides the version of this program: keys and values, such as `("frame", "17")`,
+/// `("stamp_s", "1.72")`.
 pub type Meta<'a> = &'a [(&'a str, String)];

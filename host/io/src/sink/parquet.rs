@@ -1,4 +1,4 @@
-//! Tables of all sweeps in one Parquet file, a row group each.
+//! Tables of all sweeps in one Parquet file, one row group each.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -14,10 +14,10 @@ use super::atomic::Partial;
 use super::table::TableWriter;
 use crate::Error;
 
-/// A file while it is written; it takes its name when it is finished.
+/// A file being written; it takes its name when it is finished.
 pub struct ParquetFile {
     path: PathBuf,
-    /// From the first table on, which tells the columns.
+    /// Set from the first table on, which determines the columns.
     begun: Option<(ArrowWriter<BufWriter<File>>, Partial)>,
 }
 
@@ -27,7 +27,7 @@ impl ParquetFile {
         ParquetFile { path: path.to_path_buf(), begun: None }
     }
 
-    /// Appends a row group; all tables have the same columns, and metadata for the file.
+    /// Appends a row group; all tables must have the same columns and file metadata.
     pub fn append(&mut self, table: TableWriter, meta: Meta<'_>) -> Result<(), Error> {
         let batch = table.batch(meta).map_err(Error::writing(&self.path))?;
         let failed = |e| Error::writing(&self.path)(reason(e));
@@ -44,7 +44,7 @@ impl ParquetFile {
         writer.write(&batch).and_then(|()| writer.flush()).map_err(failed)
     }
 
-    /// Completes the file; where nothing was appended there is none.
+    /// Completes the file; there is none if nothing was appended.
     pub fn finish(self) -> Result<(), Error> {
         let Some((writer, partial)) = self.begun else { return Ok(()) };
         writer.close().map_err(|e| Error::writing(&self.path)(reason(e)))?;
@@ -52,7 +52,7 @@ impl ParquetFile {
     }
 }
 
-/// The system's reason where there is one.
+/// The system's reason if there is one.
 fn reason(e: ParquetError) -> io::Error {
     match e {
         ParquetError::External(e) => match e.downcast::<io::Error>() {

@@ -1,4 +1,4 @@
-//! What stands for [`ParquetFile`] where there are none.
+//! Stand-in for [`ParquetFile`] in builds without Parquet.
 
 use std::path::Path;
 
@@ -6,13 +6,13 @@ use super::Meta;
 use super::table::TableWriter;
 use crate::Error;
 
-/// No file.
+/// A file to which nothing can be written.
 pub struct NoParquet;
 
 pub use NoParquet as ParquetFile;
 
 impl NoParquet {
-    /// For nothing.
+    /// Does nothing.
     pub fn new(_: &Path) -> NoParquet {
         NoParquet
     }
@@ -22,7 +22,7 @@ impl NoParquet {
         Err(Error::lacking("a Parquet file", "parquet"))
     }
 
-    /// Nothing was written.
+    /// Does nothing: nothing was written.
     pub fn finish(self) -> Result<(), Error> {
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Where messages go, and what they are of.
+//! Where messages go, and what they contain.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -8,37 +8,37 @@ use std::path::PathBuf;
 pub struct StreamTargets {
     /// An MCAP file.
     pub mcap: Option<PathBuf>,
-    /// Address of this machine at which viewers connect.
+    /// Address of this machine to which viewers connect.
     pub live: Option<SocketAddr>,
-    /// When viewers are sent a message.
+    /// When messages are sent to viewers.
     pub pace: Pace,
 }
 
 impl StreamTargets {
-    /// Whether they go nowhere.
+    /// Whether messages go nowhere.
     pub fn is_empty(&self) -> bool {
         self.mcap.is_none() && self.live.is_none()
     }
 }
 
-/// When viewers are sent a message.
+/// When messages are sent to viewers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pace {
-    /// When it is time for it, as the stamps of a recording have it.
+    /// At their times, as stamped in the recording.
     #[default]
     Recorded,
-    /// At once.
+    /// Immediately.
     AtOnce,
 }
 
-/// What the messages of a stream are of.
+/// What the messages of a stream contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// The flow of every sweep.
     Flow,
     /// The flow of every sweep and the objects in it.
     FlowAndObjects,
-    /// The objects in every sweep, and whose returns are which.
+    /// The objects in every sweep, and the returns of each.
     Objects,
     /// The returns of every sweep.
     Clouds,

@@ -1,4 +1,4 @@
-//! Named columns as an Arrow IPC file, or as a part of a Parquet file.
+//! Named columns as an Arrow IPC file, or as part of a Parquet file.
 
 #[cfg(feature = "arrow")]
 use std::io;
@@ -34,7 +34,7 @@ pub struct TableWriter {
 }
 
 impl TableWriter {
-    /// Adds a column of a value of every row; all columns must be of the same length.
+    /// Adds a column with one value per row; all columns must have the same length.
     pub fn column<R, V>(&mut self, name: &str, rows: &[R], value: impl Fn(&R) -> V)
     where
         Values: From<Vec<V>>,
@@ -57,20 +57,20 @@ impl TableWriter {
         }
     }
 
-    /// The columns of both tables, which have the same rows.
+    /// Joins the columns of two tables that have the same rows.
     pub fn beside(mut self, other: TableWriter) -> TableWriter {
         self.columns.extend(other.columns);
         self
     }
 
-    /// Writes the table, compressed by Zstandard: a third is left of a sweep's flow. The metadata
-    /// goes to the schema, with this program's version as `raywake`.
+    /// Writes the table, compressed with Zstandard, which reduces a sweep's flow to a third. The
+    /// metadata goes into the schema, with this program's version as `raywake`.
     pub fn write(self, path: &Path, meta: Meta<'_>) -> Result<(), Error> {
         let bytes = self.file(path, meta)?;
         super::atomic::write(path, |out| out.write_all(&bytes))
     }
 
-    /// What the file of a name would hold.
+    /// Returns the bytes of the file; `path` is for errors.
     #[cfg(feature = "arrow")]
     pub fn file(self, path: &Path, meta: Meta<'_>) -> Result<Vec<u8>, Error> {
         let mut bytes = Vec::new();
@@ -85,7 +85,7 @@ impl TableWriter {
         arrow::batch(self.columns, meta).map_err(arrow::reason)
     }
 
-    /// Fails: this build has no feather files.
+    /// Fails: this build does not support feather files.
     #[cfg(not(feature = "arrow"))]
     pub fn file(self, path: &Path, _: Meta<'_>) -> Result<Vec<u8>, Error> {
         Err(Error::lacking(path.display(), "arrow"))
@@ -128,7 +128,7 @@ mod arrow {
         RecordBatch::try_new(Arc::new(schema), arrays)
     }
 
-    /// Takes over the memory of a column.
+    /// Converts a column, without copying its numbers.
     fn array(column: Values) -> ArrayRef {
         match column {
             Values::F32(v) => Arc::new(Float32Array::from(v)),
@@ -152,7 +152,7 @@ mod arrow {
         writer.finish()
     }
 
-    /// The system's reason where there is one.
+    /// The system's reason if there is one.
     pub fn reason(e: ArrowError) -> io::Error {
         match e {
             ArrowError::IoError(_, e) => e,

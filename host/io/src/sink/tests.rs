@@ -1,4 +1,4 @@
-//! What sinks write is read back.
+//! Reads back what sinks write.
 
 use std::fs;
 use std::io::{self, Write};
@@ -35,7 +35,7 @@ fn a_file_is_whole_or_absent() {
     let absent = t.path().join("no/such/folder/a.txt");
     assert!(atomic::write(&absent, |_| Ok(())).unwrap_err().to_string().contains("folder/a.txt"));
     assert!(atomic::write(Path::new("/"), |_| Ok(())).is_err());
-    // A folder has the name already.
+    // A folder already has the name.
     assert!(atomic::write(&t.path().join("."), |_| Ok(())).is_err());
     let folder = t.path().join("folder/f");
     atomic::create_folder(&folder).unwrap();
@@ -219,7 +219,7 @@ mod tables {
         let e = write(7, &[]).unwrap_err();
         assert!(e.to_string().contains("0000000007.feather is not what this run finds"), "{e}");
         assert_eq!((e.exit_code(), time()), (2, first));
-        // Once it is known that they are the same, they are not read again.
+        // Once the tables are known to be the same, they are not read again.
         let mut tables = FlowTables::folders(t.path(), false).unwrap();
         write(8, &rows).unwrap();
         tables.columns(&MARK, &rows).unwrap();
@@ -252,7 +252,7 @@ mod tables {
         assert_eq!(frames.values(), &[7, 7, 8, 8]);
         let y = b.column_by_name("y_m").unwrap().as_primitive::<Float32Type>();
         assert_eq!(y.iter().collect::<Vec<_>>(), [Some(2.0), None, Some(2.0), None]);
-        // No table, no file; and no folder is an error that names the file.
+        // Without a table there is no file; a missing folder is an error that names the file.
         FlowTables::files(t.path()).finish().unwrap();
         let e = FlowTables::files(&t.path().join("no")).columns(&MARK, &[]).unwrap_err();
         assert!(e.to_string().contains("columns.parquet") && e.exit_code() == 4, "{e}");

@@ -1,7 +1,7 @@
 //! Argoverse 2 sensor logs.
 //!
-//! The vehicle frame is theirs: x forward, y left, z up, origin at the rear axle's centre. The
-//! world is the city frame. Sweeps are stamped at their start and already compensated for the
+//! The vehicle frame is the dataset's: x forward, y left, z up, origin at the rear axle's centre.
+//! The world is the city frame. Sweeps are stamped at their start and already compensated for the
 //! vehicle's motion, though their returns have times.
 
 use std::path::{Path, PathBuf};
@@ -17,30 +17,31 @@ use super::{OpenOptions, Overview, Source, SourceGaps, SweepData, Unlocated};
 use super::{apply, folder_name};
 use crate::Error;
 
-/// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners turn once in
-/// 100 ms but do not start together.
+/// Returns' times after the stamp: 2.6 to 106.1 ms in the logs, as the two scanners take 100 ms per
+/// revolution but do not start together.
 const TIMING: Timing = Timing::Offset { from_s: 0.0, span_s: 0.11 };
 
 /// Height of the ground under the vehicle, m: the radius of the loaded wheels. A plane fitted to
-/// the returns within 7 m of a real sweep passes at -0.34 m below the rear axle.
+/// the returns of a real sweep within 7 m passes 0.34 m below the rear axle.
 const GROUND_M: f64 = -0.33;
 
-/// The vehicle around its rear axle with its mirrors, m. The logs hold no returns from it.
+/// Extent of the vehicle around its rear axle, with mirrors, m. The logs hold no returns from it.
 const OWN_VEHICLE: [[f32; 2]; 2] = [[-1.2, -1.1], [4.1, 1.1]];
 
 /// Names of the scanners in the calibration, in the order of [`Rig::sensors`].
 const SCANNERS: [&str; 2] = ["up_lidar", "down_lidar"];
 
-/// Lasers of one scanner: numbers from 0 are one scanner's, numbers from here the other's.
+/// Lasers per scanner: numbers from 0 are one scanner's, numbers from here on the other's.
 const LASERS: i64 = 32;
 
-/// Furthest a pose may be from a sweep's stamp, ns: 3 cm at 30 m/s. Logs have poses at the stamps.
+/// Largest time between a pose and a sweep's stamp, ns: 3 cm at 30 m/s. Logs have poses at the
+/// stamps.
 const POSE_WITHIN_NS: u64 = 1_000_000;
 
 /// Columns of a sweep.
 const COLUMNS: [&str; 6] = ["x", "y", "z", "intensity", "laser_number", "offset_ns"];
 
-/// Columns of a table of poses after its key.
+/// Columns of a pose table after its key.
 const POSE_COLUMNS: [&str; 7] = ["qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m"];
 
 /// An open log.
@@ -89,9 +90,9 @@ impl Argoverse {
         Ok(log)
     }
 
-    /// Finds out which lasers are which scanner's. Lasers 0 to 31 are the upper one's in the log
-    /// that was looked at, but nothing in a log says so: seen from its own scanner, a laser keeps
-    /// its elevation while it turns, seen from the other it does not.
+    /// Determines which lasers belong to which scanner. Lasers 0 to 31 are the upper one's in the
+    /// log that was examined, but nothing in a log says so: seen from its own scanner, a laser
+    /// keeps its elevation as it turns, seen from the other it does not.
     fn assign_lasers(&mut self, scanners: &[Pose; 2]) -> Result<(), Error> {
         let mut first = SweepData::default();
         let lasers = self.read_points(0, &mut first)?;
@@ -104,7 +105,7 @@ impl Argoverse {
         Ok(())
     }
 
-    /// Reads the returns of a sweep, and hands back their laser numbers.
+    /// Reads the points of a sweep, and returns their laser numbers.
     fn read_points(&self, index: usize, into: &mut SweepData) -> Result<Vec<i64>, Error> {
         let path = &self.files[index];
         into.points.clear();
@@ -128,7 +129,8 @@ impl Argoverse {
     }
 }
 
-/// The assignment of lasers is swapped where that makes elevations this much steadier.
+/// The assignment of lasers is swapped if that reduces the spread of elevations to less than this
+/// share.
 const SWAP_BELOW: f64 = 0.7;
 
 impl Source for Argoverse {
@@ -153,11 +155,11 @@ impl Source for Argoverse {
     }
 }
 
-/// Mean deviation (rad) of the lasers' elevations, each seen from its scanner when lasers 0 to 31
+/// Mean deviation (rad) of the lasers' elevations, each seen from its scanner if lasers 0 to 31
 /// belong to `scanners[low]`; 0 without usable returns.
 fn elevation_spread(points: &[Point], lasers: &[i64], scanners: &[Pose; 2], low: usize) -> f64 {
     let inverse = [scanners[low].inverse(), scanners[1 - low].inverse()];
-    // Near returns are rounded too coarsely, to 16 bits, to tell an elevation.
+    // Near returns are rounded too coarsely, to 16 bits, to give an elevation.
     let elevation = |(p, &laser): (&Point, &i64)| {
         let p = DVec3::from_array(p.position.map(f64::from));
         let q = inverse[usize::from(laser >= LASERS)].transform(p);
@@ -224,7 +226,7 @@ fn nearest(by_time: &[(u64, usize)], stamp: u64) -> Option<(u64, usize)> {
     around.iter().map(|&(t, row)| (t.abs_diff(stamp), row)).min()
 }
 
-/// Columns of poses.
+/// The columns of a pose table.
 struct PoseTable<'a> {
     path: &'a Path,
     columns: Vec<Vec<f64>>,
@@ -236,7 +238,7 @@ impl<'a> PoseTable<'a> {
         Ok(PoseTable { path, columns })
     }
 
-    /// The pose of a row, an error where its numbers are none.
+    /// The pose of a row; an error if its numbers are not a pose.
     fn pose(&self, row: usize) -> Result<Pose, Error> {
         let value = |column: usize| self.columns[column][row];
         let q = DQuat::from_xyzw(value(1), value(2), value(3), value(0));

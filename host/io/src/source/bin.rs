@@ -1,4 +1,4 @@
-//! `.bin` files: little-endian float32, some numbers per return. And `.npy`: floats in rows.
+//! `.bin` files: little-endian float32, a fixed number per return. And `.npy`: floats in rows.
 
 use std::path::Path;
 
@@ -10,21 +10,21 @@ use crate::Error;
 
 /// Bytes of a number.
 const NUMBER: usize = 4;
-/// Numbers of a return that are believed.
+/// Maximum accepted count of numbers per return.
 const NUMBERS_MAX: usize = 64;
-/// A file with a larger share of negative intensities holds other numbers.
+/// A file with a larger share of negative intensities is taken to hold other numbers.
 const NEGATIVE_MAX: f64 = 0.05;
 
-/// What the numbers of a return are, in their order: names of [`super::returns`], or others for
-/// numbers that are passed over.
+/// What the numbers of a return are, in order: names from [`super::returns`], or others for numbers
+/// to skip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BinFields(Vec<String>);
 
 impl BinFields {
-    /// Of the text of an option: names with commas between them.
+    /// Parses the text of an option: names separated by commas.
     ///
     /// # Errors
-    /// Where a coordinate is missing, or a name is there twice.
+    /// If a coordinate is missing, a name occurs twice, or there are too many names.
     pub fn parse(text: &str) -> Result<BinFields, String> {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
         if names.len() > NUMBERS_MAX {
@@ -38,7 +38,7 @@ impl BinFields {
         Ok(fields)
     }
 
-    /// KITTI's; nuScenes' where the name ends as its files' do.
+    /// KITTI's fields, or nuScenes' if the file name ends like its files'.
     fn usual(path: &Path) -> BinFields {
         let nuscenes = path.to_string_lossy().ends_with(".pcd.bin");
         let names = ["x", "y", "z", "intensity", "ring"].map(str::to_owned);
@@ -51,11 +51,11 @@ impl BinFields {
     }
 }
 
-/// Replaces `points` by the returns of a `.bin` file; an empty file has none. Returns whether they
-/// have times.
+/// Replaces `points` with the returns of a `.bin` file; an empty file has none. Returns whether
+/// they have times.
 ///
-/// Fails, leaving no points, where the file cannot be read, ends within a return, or, if the fields
-/// are not told, seems to have others.
+/// Fails, leaving no points, if the file cannot be read, ends within a return, or, if no fields are
+/// given, seems to have others.
 pub(super) fn read(
     path: &Path,
     told: Option<&BinFields>,
@@ -86,7 +86,7 @@ pub(super) fn read(
     Ok(found.returns(rows, |row, field| value(row, field).into(), points))
 }
 
-/// The same of a `.npy` file, whose columns are x, y, z and intensity unless told.
+/// The same for a `.npy` file, whose columns are x, y, z and intensity unless fields are given.
 pub(super) fn read_npy(
     path: &Path,
     told: Option<&BinFields>,

@@ -1,4 +1,4 @@
-//! XML as boost serialises it: tracklets of KITTI's drives, calibrations of Velodyne's.
+//! XML as serialised by boost: tracklets of KITTI drives, calibrations of Velodyne sensors.
 
 use std::path::Path;
 
@@ -7,17 +7,17 @@ use roxmltree::{Document, ParsingOptions};
 use super::whole;
 use crate::Error;
 
-/// Elements, texts and attributes that are believed: labels of 25 sweeps of a full simulated street
-/// have 46,000.
+/// Maximum accepted number of elements, texts and attributes: labels of 25 sweeps of a full
+/// simulated street have 46,000.
 const NODES_MAX: u32 = 1 << 20;
-/// Attributes of an element that are believed: those of such files have five at most.
+/// Maximum accepted number of attributes per element: such files have five at most.
 const ATTRIBUTES_MAX: usize = 100;
 
-/// What `each` makes of a file.
+/// Parses a file and returns what `each` makes of it.
 ///
 /// # Errors
-/// The file cannot be read, is no whole XML, or would take memory or time out of proportion to its
-/// size: text that is defined once and put in many times, and attributes and namespaces, each of
+/// The file cannot be read, is not complete XML, or would take memory or time out of proportion to
+/// its size: text defined once and inserted many times, and attributes and namespaces, each of
 /// which is compared with those before it. Or what `each` returns.
 pub fn read<T>(path: &Path, each: impl FnOnce(&Document) -> Result<T, Error>) -> Result<T, Error> {
     let text = whole::read_text(path)?;
@@ -36,7 +36,7 @@ fn check_size(text: &str) -> Result<(), String> {
     if text.contains("xmlns") {
         return Err("has namespaces, which boost does not".into());
     }
-    // In the value of an attribute there may be a `>`, but no `<`.
+    // The value of an attribute may contain a `>`, but not a `<`.
     match text.split('<').map(|tag| tag.matches('=').count()).max() {
         Some(most) if most > ATTRIBUTES_MAX => Err(format!("{most} attributes in one element")),
         _ => Ok(()),

@@ -1,4 +1,4 @@
-//! A folder of clouds with the track of the vehicle.
+//! A folder of clouds with the vehicle's trajectory.
 
 use std::path::{Path, PathBuf};
 
@@ -19,11 +19,11 @@ pub(super) struct Clouds {
     pub poses_from: String,
     /// File of every sweep.
     pub files: Vec<PathBuf>,
-    /// Poses of the clouds, where their points are in the world and not in the vehicle's frame.
+    /// Poses of the clouds, if their points are in the world and not in the vehicle's frame.
     pub world_from_cloud: Vec<Pose>,
-    /// What the numbers of a return are, where the user tells.
+    /// What the numbers of a return are, if the user says so.
     pub fields: Option<BinFields>,
-    /// Files that tell times and sensors of returns.
+    /// Files with the times and sensors of returns.
     pub sidecars: Option<Sidecars>,
 }
 
@@ -54,12 +54,12 @@ impl Source for Clouds {
     }
 }
 
-/// Replaces `points` by the returns of a file, whose extension tells the format: `bin`, `npy`,
+/// Replaces `points` with the returns of a file in the format of its extension: `bin`, `npy`,
 /// `pcd`, `ply`, or `feather` with columns `x`, `y` and `z`; returns whether they have times.
-/// `fields` are those of the first two, where they are not the usual ones.
+/// `fields` are those of the first two formats, if they are not the usual ones.
 ///
-/// Fails, leaving no points, where the extension is another one, and where the file cannot be read
-/// or is damaged.
+/// Fails, leaving no points, if the extension is another one, and if the file cannot be read or is
+/// damaged.
 pub fn read_cloud(
     path: &Path,
     fields: Option<&BinFields>,
@@ -96,5 +96,5 @@ fn read_feather(path: &Path, _: &mut Vec<Point>) -> Result<(), Error> {
     Err(Error::lacking(format!("{}, a feather file,", path.display()), "arrow"))
 }
 
-/// Names of files of clouds end so in a folder of clouds.
+/// Extensions of the clouds in a folder of clouds.
 pub(super) const EXTENSIONS: [&str; 4] = ["bin", "npy", "pcd", "ply"];

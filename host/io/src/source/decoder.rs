@@ -1,9 +1,9 @@
-//! Decoders of other people's that panic on damaged files.
+//! Third-party decoders that panic on damaged files.
 //!
-//! Parquet's does where a page's levels are cut short, Arrow's where a buffer ends within a number,
-//! MCAP's where a record is longer than its chunk, as our profiles have it look for overflows. What
-//! they decode is named while they work, so that the program can say which file is damaged,
-//! however its panics end.
+//! Parquet's panics if a page's levels are cut short, Arrow's if a buffer ends within a number, and
+//! MCAP's if a record is longer than its chunk, as our profiles enable overflow checks. The file
+//! being decoded is recorded meanwhile, so that the program can say which file is damaged, however
+//! its panics end.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,7 +15,7 @@ thread_local! {
     static DECODED: RefCell<Option<PathBuf>> = const { RefCell::new(None) };
 }
 
-/// The error of a file whose decoder panics on this thread, for the program's panic hook.
+/// The error for the file whose decoder is panicking on this thread, for the program's panic hook.
 pub fn damaged() -> Option<Error> {
     DECODED.with_borrow(|path| path.as_deref().map(error))
 }
@@ -24,7 +24,8 @@ fn error(path: &Path) -> Error {
     Error::input(path, "", "is damaged: it cannot be decoded")
 }
 
-/// What a decoder makes of a file. Where it panics: [`damaged`], if panics unwind.
+/// Runs a decoder on a file. If it panics, the error is that of [`damaged`], provided panics
+/// unwind.
 pub(super) fn guarded<T>(path: &Path, decode: impl FnOnce() -> T) -> Result<T, Error> {
     DECODED.set(Some(path.to_path_buf()));
     let decoded = catch_unwind(AssertUnwindSafe(decode));

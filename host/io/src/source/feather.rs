@@ -17,19 +17,19 @@ use super::decoder::guarded;
 use super::{feather_check, whole};
 use crate::Error;
 
-/// The columns of a file that were asked for.
+/// The requested columns of a file.
 pub struct FeatherTable {
     path: PathBuf,
     batches: Vec<RecordBatch>,
 }
 
 impl FeatherTable {
-    /// Reads `columns`. Fails where the file is unreadable or damaged, or lacks one of them.
+    /// Reads `columns`. Fails if the file is unreadable or damaged, or lacks one of them.
     pub fn read(path: &Path, columns: &[&str]) -> Result<FeatherTable, Error> {
         FeatherTable::parse(path, &whole::read(path)?, columns)
     }
 
-    /// Takes `columns` from the content of the file at `path`.
+    /// Parses `columns` from the contents of the file at `path`.
     pub fn parse(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<FeatherTable, Error> {
         feather_check::check(bytes).map_err(|what| Error::input(path, "", what))?;
         let batches = guarded(path, || batches(path, bytes, columns))??;
@@ -102,7 +102,7 @@ impl FeatherTable {
         })
     }
 
-    /// The values of a column that may hold no null.
+    /// The values of a column that must not contain nulls.
     fn filled<T>(&self, name: &str, values: Vec<Option<T>>) -> Result<Vec<T>, Error> {
         let filled = |(row, v): (usize, Option<T>)| {
             let what = || format!("column `{name}` is null or out of range");
@@ -131,10 +131,10 @@ impl FeatherTable {
     }
 }
 
-/// What a file has of some columns.
+/// The record batches of a file, with some of its columns.
 fn batches(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<Vec<RecordBatch>, Error> {
     let damaged = |e: ArrowError| Error::input(path, "", format!("damaged: {e}"));
-    // Once for the schema, once with the columns: others may have types nobody here needs.
+    // Once for the schema, once with the columns: others may have types not needed here.
     let all = FileReaderBuilder::new().build(Cursor::new(bytes)).map_err(damaged)?.schema();
     let mut wanted = Vec::with_capacity(columns.len());
     for name in columns {
@@ -148,7 +148,7 @@ fn batches(path: &Path, bytes: &[u8], columns: &[&str]) -> Result<Vec<RecordBatc
     reader.collect::<Result<_, _>>().map_err(damaged)
 }
 
-/// Appends the numbers of a column; none where a number is null or cannot be a `V`.
+/// Appends the numbers of a column; `None` where a number is null or cannot be a `V`.
 fn extend<T, V>(column: &dyn Array, out: &mut Vec<Option<V>>)
 where
     T: ArrowPrimitiveType,

@@ -1,5 +1,5 @@
-//! Whether the bytes of a feather file are whole, before the Arrow reader sees them: that reader
-//! takes offsets and lengths in the file on trust and stops the process on some wrong ones.
+//! Checks that the bytes of a feather file are complete before the Arrow reader sees them: that
+//! reader trusts offsets and lengths in the file, and aborts the process on some wrong ones.
 
 use arrow_ipc::{Block, RecordBatch, root_as_footer, root_as_message};
 
@@ -8,10 +8,10 @@ use super::whole::check_unpacked;
 /// First and last bytes of a feather file.
 const MAGIC: &[u8] = b"ARROW1";
 
-/// Length of the footer and [`MAGIC`], at the end of the file.
+/// Bytes of the footer's length and of [`MAGIC`], at the end of the file.
 const TRAILER: usize = 10;
 
-/// What record batches claim to have. It is allocated before it is verified.
+/// What record batches claim to contain. It is allocated before it is verified.
 #[derive(Clone, Copy, Default)]
 struct Claims {
     /// Bytes that their columns unpack to.
@@ -28,7 +28,7 @@ impl Claims {
     }
 }
 
-/// `Err` with what is wrong.
+/// Checks a file; `Err` says what is wrong.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(MAGIC) {
         return Err("is not a feather file (it does not start with ARROW1)".into());
@@ -42,7 +42,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let start = body.len().checked_sub(length as usize);
     let start = start.ok_or("damaged: the footer is longer than the file")?;
     let footer = root_as_footer(&body[start..]).map_err(|e| format!("damaged footer: {e}"))?;
-    // They are unpacked whether or not their column is asked for, and nobody here needs them.
+    // Dictionaries are unpacked even if their column is not requested, and none is needed here.
     if footer.dictionaries().is_some_and(|blocks| !blocks.is_empty()) {
         return Err("has columns coded by dictionary: write them plainly".into());
     }
@@ -50,11 +50,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     for block in footer.recordBatches().into_iter().flatten() {
         claims = claims.with(check_block(&body[..start], block)?);
     }
-    // A column may be of nothing, and have any number of rows.
+    // A null column may have any number of rows.
     check_unpacked(bytes.len(), claims.bytes, claims.rows)
 }
 
-/// A block lies within the file and its message within the block. Returns what it claims.
+/// Checks that a block lies within the file and its message within the block. Returns what it
+/// claims.
 fn check_block(file: &[u8], block: &Block) -> Result<Claims, String> {
     let outside = || format!("damaged: a record batch at byte {} is cut off", block.offset());
     let size = |v: i64| usize::try_from(v).map_err(|_| outside());
@@ -73,7 +74,8 @@ fn check_block(file: &[u8], block: &Block) -> Result<Claims, String> {
     batch.map_or(Ok(Claims::default()), |batch| check_batch(&batch, body))
 }
 
-/// Every buffer of a batch lies within its body, and no length is absurd. Returns what it claims.
+/// Checks that every buffer of a batch lies within its body and that no length is absurd. Returns
+/// what it claims.
 fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<Claims, String> {
     let sensible = |rows: i64| (0..=i64::from(i32::MAX)).contains(&rows);
     let nodes = batch.nodes().into_iter().flatten();
@@ -87,7 +89,7 @@ fn check_batch(batch: &RecordBatch<'_>, body: &[u8]) -> Result<Claims, String> {
             usize::try_from(buffer.offset()).ok().zip(usize::try_from(buffer.length()).ok());
         let bytes = range.and_then(|(from, n)| body.get(from..)?.get(..n));
         let bytes = bytes.ok_or("damaged: a column reaches beyond its record batch")?;
-        // Packed ones begin with their length; a negative one says that they are not packed.
+        // Compressed buffers begin with their length; if negative, they are not compressed.
         let claimed = bytes.first_chunk().map(|b| i64::from_le_bytes(*b));
         let claimed = claimed.filter(|_| batch.compression().is_some());
         let length = claimed.and_then(|n| u64::try_from(n).ok()).unwrap_or(bytes.len() as u64);

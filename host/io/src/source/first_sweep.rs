@@ -1,5 +1,5 @@
-//! What the first sweep tells of a rig of which nothing else is known: when its returns were
-//! measured, where the ground is, and how high sensors are above it.
+//! What the first sweep reveals about an otherwise unknown rig: when its returns were measured,
+//! where the ground is, and how high sensors are above it.
 
 use raywake_core::sweep::Point;
 #[cfg(any(feature = "mcap", feature = "pcap"))]
@@ -13,9 +13,9 @@ use super::sidecars::SPAN_MAX_S;
 #[cfg(any(feature = "mcap", feature = "pcap"))]
 use super::{OpenOptions, Overview, PoseTrack, mounting};
 
-/// Earliest time after the stamp and duration of a sweep, s; `None` where all times are the same.
+/// Earliest time after the stamp and duration of a sweep, s; `None` if all times are the same.
 ///
-/// Fails where the times are those of no sweep.
+/// Fails if the times cannot be those of a sweep.
 pub(super) fn span(points: &[Point]) -> Result<Option<[f64; 2]>, String> {
     let times = points.iter().map(|p| f64::from(p.offset_s)).filter(|t| t.is_finite());
     let limits = (f64::INFINITY, f64::NEG_INFINITY);
@@ -50,10 +50,11 @@ pub(super) fn before(
     }
 }
 
-/// Completes what is known of a recording by its first sweep, whose returns have times or not;
-/// `names` are those of its sensors, for people.
+/// Completes what is known of a recording from its first sweep; `timed` says whether its returns
+/// have times, `names` are those of its sensors, for messages.
 ///
-/// Fails where times are those of no sweep, and where no ground is found and the user names none.
+/// Fails if the times cannot be those of a sweep, and if no ground is found and the user gives
+/// none.
 #[cfg(any(feature = "mcap", feature = "pcap"))]
 pub(super) fn learn(
     overview: &mut Overview,
@@ -80,7 +81,7 @@ pub(super) fn learn(
     Ok(())
 }
 
-/// Lifts sensors above the ground whose clouds are in a frame that lies on it.
+/// Lifts sensors above the ground if their clouds are in a frame that lies on it.
 #[cfg(any(feature = "mcap", feature = "pcap"))]
 fn mount(rig: &mut Rig, names: &[&str], notes: &mut Vec<String>) {
     let ground_m = rig.ground_m;

@@ -1,6 +1,6 @@
 //! KITTI drives and odometry sequences, and folders of clouds that look like them.
 //!
-//! The vehicle frame is that of the Velodyne HDL-64E, unless sidecars tell of other sensors.
+//! The vehicle frame is that of the Velodyne HDL-64E, unless sidecars describe other sensors.
 
 use std::path::{Path, PathBuf};
 
@@ -19,23 +19,24 @@ use super::{
 };
 use crate::Error;
 
-/// Duration of a turn of KITTI's scanner where stamps do not tell, s: the median of the scanner's
-/// own stamps in the raw drives.
+/// Duration of a revolution of KITTI's scanner if stamps do not give it, s: the median by the
+/// scanner's own stamps in the raw drives.
 const TURN_S: f64 = 0.1036;
 
-/// Turns an HDL-64E can be set to, s (20 to 5 Hz). Stamps outside are not those of single turns.
+/// Revolution times of an HDL-64E, s (20 to 5 Hz). Stamps outside are not those of single
+/// revolutions.
 const TURN_LIMITS_S: [f64; 2] = [0.05, 0.2];
 
 /// Height of the ground under KITTI's Velodyne, m.
 const GROUND_M: f64 = -1.73;
 
-/// KITTI's recording vehicle around the Velodyne, m.
+/// Extent of KITTI's recording vehicle around the Velodyne, m.
 const OWN_VEHICLE: [[f32; 2]; 2] = [[-1.5, -1.75], [4.5, 1.75]];
 
 /// Folder of clouds of a raw drive.
 const RAW_CLOUDS: &str = "velodyne_points/data";
 
-/// A KITTI raw drive. `poses.txt` (or the option `poses`) wins over `oxts`.
+/// Opens a KITTI raw drive. `poses.txt` (or the option `poses`) takes precedence over `oxts`.
 pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
     let mut opening = Opening::new(drive, &drive.join(RAW_CLOUDS), "bin", "KITTI raw drive")?;
     opening.read_times(&["times.txt", "velodyne_points/timestamps.txt", "oxts/timestamps.txt"])?;
@@ -50,7 +51,7 @@ pub(super) fn open_raw(drive: &Path, options: &OpenOptions) -> Result<Clouds, Er
     Ok(opening.finish(options))
 }
 
-/// A KITTI odometry sequence. Its poses are in `poses.txt` or, as distributed, in
+/// Opens a KITTI odometry sequence. Its poses are in `poses.txt` or, as distributed, in
 /// `../../poses/NN.txt`.
 pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
     let mut opening = Opening::new(sequence, &sequence.join("velodyne"), "bin", "KITTI odometry")?;
@@ -65,7 +66,8 @@ pub(super) fn open_odometry(sequence: &Path, options: &OpenOptions) -> Result<Cl
     Ok(opening.finish(options))
 }
 
-/// A folder of clouds of one kind; the option `poses` alone tells where they were made.
+/// Opens a folder of clouds of one format; poses come from the option `poses` or the headers of PCD
+/// files.
 pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds, Error> {
     let mut kinds = extensions(folder)?;
     let kind = kinds.next().unwrap_or("bin");
@@ -88,21 +90,21 @@ pub(super) fn open_folder(folder: &Path, options: &OpenOptions) -> Result<Clouds
     Ok(opening.finish(options))
 }
 
-/// A recording while it is being opened.
+/// A recording that is being opened.
 struct Opening {
     root: PathBuf,
     kind: &'static str,
     poses_from: String,
     files: Vec<(u64, PathBuf)>,
     track: PoseTrack,
-    /// Whether the stamps were read and not assumed.
+    /// Whether the stamps were read rather than assumed.
     timed: bool,
     sidecars: Option<Sidecars>,
-    /// Earliest time after the stamp and duration of a sweep, s, where clouds have times.
+    /// Earliest time after the stamp and duration of a sweep, s, if clouds have times.
     span: Option<[f64; 2]>,
-    /// Height of the ground in the frame of the vehicle, m.
+    /// Height of the ground in the vehicle frame, m.
     ground_m: f64,
-    /// Poses of the clouds, where their points are in the world and not in the vehicle's frame.
+    /// Poses of the clouds, if their points are in the world and not in the vehicle's frame.
     world_from_cloud: Vec<Pose>,
     notes: Vec<String>,
 }
@@ -178,8 +180,8 @@ impl Opening {
         Ok(())
     }
 
-    /// Poses from `oxts/data`, by frame number; sweeps without a packet are left out. The world is
-    /// the Velodyne frame of the first sweep that has one.
+    /// Reads poses from `oxts/data`, by frame number; sweeps without a packet are left out. The
+    /// world is the Velodyne frame of the first sweep that has one.
     fn read_oxts(&mut self) -> Result<(), Error> {
         let imu_from_velo = self.velo_from_imu()?.inverse();
         let folder = self.root.join("oxts/data");
@@ -210,7 +212,7 @@ impl Opening {
     /// The drive's calibration, its day's, or KITTI's usual one with a note.
     fn velo_from_imu(&mut self) -> Result<Pose, Error> {
         let name = "calib_imu_to_velo.txt";
-        // Of the resolved path: a drive named `.` has a parent too.
+        // From the resolved path: a drive named `.` has a parent too.
         let full = self.root.canonicalize().map_err(Error::reading(&self.root))?;
         let places = [Some(full.as_path()), full.parent()];
         let found = places.into_iter().flatten().map(|p| p.join(name)).find(|p| p.is_file());
@@ -287,7 +289,7 @@ impl Opening {
         }
     }
 
-    /// A sensor as KITTI's HDL-64E on its vehicle.
+    /// A rig like KITTI's HDL-64E on its vehicle.
     fn velodyne(&self, frames: &[u64]) -> Rig {
         Rig {
             sensors: core::iter::once(Pose::IDENTITY).collect(),
@@ -301,9 +303,10 @@ impl Opening {
         }
     }
 
-    /// Duration of one turn: the scanner is stamped once a turn, so it is the mean time between
-    /// sweeps of neighbouring numbers, without those far from the median, where a turn is missing.
-    /// The mean, because stamps from a clock of coarse steps have a median that is one of these.
+    /// Duration of one revolution: the scanner is stamped once per revolution, so it is the mean
+    /// time between sweeps of consecutive numbers, without those far from the median, where a
+    /// revolution is missing. The mean, because with a coarse clock the median is a whole number of
+    /// its steps.
     fn turn_s(&self, frames: &[u64]) -> f64 {
         let stamps = self.track.stamps_s.windows(2);
         let mut steps: Vec<f64> = frames

@@ -1,15 +1,15 @@
 //! LZF, the compression of Lehmann's liblzf that PCD files use.
 
-/// Bytes that one byte can become, at most: three bytes stand for up to 264.
+/// Maximum number of bytes that one byte can become: three bytes stand for up to 264.
 const GROWTH_MAX: usize = 88;
 
 /// Unpacks `packed` to exactly `size` bytes.
 ///
-/// A byte below 32 says how many bytes follow as they are, less one. Another begins a repetition:
-/// its three upper bits are the length less two, 7 of them meaning that the next byte adds to it;
-/// the lower five with the byte after are the way back, less one.
+/// A byte below 32 is the number of literal bytes that follow, minus one. Any other begins a
+/// repetition: its upper three bits are the length minus two, where 7 means that the next byte is
+/// added to it; the lower five bits and the byte after that are the distance back, minus one.
 pub(super) fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, &'static str> {
-    // Before the memory is taken.
+    // Before memory is allocated.
     if size / GROWTH_MAX > packed.len() {
         return Err("damaged: claims more bytes than it can hold");
     }
@@ -52,7 +52,7 @@ mod tests {
         // A run of one byte: 9 + 40 more.
         assert_eq!(unpack(&[0, 7, 0xe0, 40, 0], 50).unwrap(), [7; 50]);
         assert!(unpack(&[], 0).unwrap().is_empty());
-        // As far back as it goes.
+        // As far back as possible.
         let mut far = vec![];
         for chunk in 0..256u32 {
             far.push(31);

@@ -1,19 +1,19 @@
-//! Where sweeps come from: folders of recorded clouds with the vehicle's poses.
+//! Sources of sweeps: recorded clouds with the vehicle's poses.
 //!
 //! | format | clouds | poses |
 //! |---|---|---|
-//! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt`, else `oxts/data/N.txt` |
+//! | [`Format::KittiRaw`] | `velodyne_points/data/N.bin` | `poses.txt` or `oxts/data/N.txt` |
 //! | [`Format::KittiOdometry`] | `velodyne/N.bin` | `poses.txt` of the camera, with `calib.txt` |
 //! | [`Format::Argoverse2`] | `sensors/lidar/NS.feather` | `city_SE3_egovehicle.feather` |
 //! | [`Format::NuScenes`] | `LIDAR_TOP` of a scene in `sample_data.json` | `ego_pose.json` |
-//! | [`Format::Waymo`] | images of ranges in `lidar/SEGMENT.parquet` | `vehicle_pose` beside it |
+//! | [`Format::Waymo`] | range images in `lidar/SEGMENT.parquet` | `vehicle_pose` next to it |
 //! | [`Format::Clouds`] | `*.bin`, `*.npy`, `*.pcd` or `*.ply` | a named file, PCD's `VIEWPOINT` |
 //! | [`Format::Mcap`] | `sensor_msgs/PointCloud2` in `*.mcap` | odometry or transforms in it |
 //! | [`Format::Pcap`] | packets of an Ouster or Velodyne in `*.pcap`, `*.pcapng` | a named file |
 //!
 //! A `.bin` is little-endian float32 x, y, z, intensity per return, or as [`BinFields`] say. Poses
 //! and times are read and checked when a source is opened, clouds one at a time. A KITTI raw drive
-//! of several sensors has `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` beside its
+//! of several sensors has `velodyne_points/{sensors.txt, offset_s/N.bin, sensor/N.bin}` next to its
 //! clouds.
 
 #[cfg(feature = "arrow")]
@@ -78,18 +78,19 @@ pub use pose_files::read_pose;
 pub use poses::{PoseTrack, pose_row, rigid};
 pub use recognise::recognise;
 
-/// One sweep in memory; keep it and read into it again, so that its memory is reused.
+/// One sweep in memory; keep it and read into it again to reuse its memory.
 #[derive(Clone, Debug, Default)]
 pub struct SweepData {
     /// Number of the sweep's file: frame number, or timestamp in ns for Argoverse 2.
     pub frame: u64,
-    /// Time of the sweep's stamp, s; since the first sweep, or as the source's `times.txt` has it.
+    /// Time of the sweep's stamp, s; since the first sweep, or as given by the source's
+    /// `times.txt`.
     pub stamp_s: f64,
-    /// Returns in the order of the file, all of them: NaN and infinite ones too.
+    /// Returns in the order of the file, all of them, including NaN and infinite ones.
     pub points: Vec<Point>,
     /// Pose of the vehicle at the stamp.
     pub world_from_vehicle: Pose,
-    /// Velocity of the vehicle, along the axes it has at the stamp.
+    /// Velocity of the vehicle, along its axes at the stamp.
     pub twist: Twist,
     /// What the source lacks at this sweep.
     pub dropped: SourceGaps,
@@ -110,33 +111,33 @@ impl SweepData {
 /// What a source lacks at a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SourceGaps {
-    /// Sweeps that frame numbers say are missing between the one before and this one.
+    /// Sweeps missing between the previous one and this one, according to the frame numbers.
     pub sweeps_before: u64,
     /// Rows without a coordinate (null in a feather file); their points hold NaN.
     pub null_rows: u32,
 }
 
-/// What is known of a recording before a cloud of it is read.
+/// What is known of a recording before any of its clouds is read.
 #[derive(Clone)]
 pub struct Overview {
     /// Name of the log's or drive's folder.
     pub name: String,
-    /// Sensors, timing and frame of the vehicle.
+    /// Sensors, timing and vehicle frame.
     pub rig: Rig,
     /// File number (or timestamp in ns) of every sweep; at least one.
     pub frames: Vec<u64>,
-    /// Stamp of every sweep, and pose where poses are known.
+    /// Stamp of every sweep, and its pose if poses are known.
     pub track: PoseTrack,
-    /// Time of the first stamp since 1970, ns; 0 where the recording does not tell.
+    /// Time of the first stamp since 1970, ns; 0 if the recording does not contain it.
     pub epoch_ns: u64,
-    /// Whether the poses are to be used without a check.
+    /// Whether to use the poses without checking them.
     pub trusted: bool,
-    /// What the user should know: assumptions, gaps in frame numbers.
+    /// Notes for the user: assumptions, gaps in frame numbers.
     pub notes: Vec<String>,
 }
 
 impl Overview {
-    /// Puts into `sweep` what is known of the one with this index: all but its points and what the
+    /// Fills in what is known of the sweep with this index: everything but its points and what the
     /// source lacks there.
     fn begin(&self, index: usize, sweep: &mut SweepData) {
         sweep.frame = self.frames[index];
@@ -146,12 +147,12 @@ impl Overview {
         sweep.twist = known.map_or(Twist::ZERO, |_| self.track.twist(index));
     }
 
-    /// Sweeps that frame numbers say are missing before one.
+    /// Number of sweeps missing before one, according to the frame numbers.
     fn missing_before(&self, index: usize) -> u64 {
         index.checked_sub(1).map_or(0, |before| self.frames[index] - self.frames[before] - 1)
     }
 
-    /// Number of sweeps and time from the first to the last, for people.
+    /// Number of sweeps and time from the first to the last, for messages.
     fn length(&self) -> String {
         format!("{} sweeps, {:.1} s", self.frames.len(), self.track.duration_s())
     }
@@ -162,15 +163,15 @@ pub trait Source: Send {
     /// What is known before a cloud is read.
     fn overview(&self) -> &Overview;
 
-    /// One line for people: format, folder, number of sweeps, duration, where the poses are from.
+    /// One line for users: format, folder, number of sweeps, duration, where the poses are from.
     fn describe(&self) -> String;
 
-    /// Reads a sweep; the content of `into` is replaced and its memory reused.
+    /// Reads a sweep; the contents of `into` are replaced and its memory reused.
     ///
-    /// Fails where the file is unreadable or damaged; `into` then holds no points.
+    /// Fails if the file is unreadable or damaged; `into` then holds no points.
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error>;
 
-    /// Extension of files of clouds like its own; none where they come as messages or packets.
+    /// Extension of cloud files like its own; `None` if clouds come as messages or packets.
     fn extension(&self) -> Option<&str> {
         Some("bin")
     }
@@ -210,7 +211,7 @@ pub trait Source: Send {
         !self.overview().track.poses.is_empty()
     }
 
-    /// `world_from_vehicle` at the stamp of a sweep of a source that is located.
+    /// `world_from_vehicle` at the stamp of a sweep, if the source is located.
     fn pose(&self, index: usize) -> Pose {
         self.overview().track.poses[index]
     }
@@ -221,23 +222,23 @@ pub trait Source: Send {
     }
 }
 
-/// What a format is known by.
+/// How a format is recognised and opened.
 struct FormatRow {
     kind: Format,
-    /// What a folder of it has, for people.
+    /// What a folder of it contains, for messages.
     marks: &'static [&'static str],
-    /// Whether a folder is one.
+    /// Whether a folder has this format.
     holds: fn(&Path) -> Result<bool, Error>,
-    /// Extensions of files that are one.
+    /// Extensions of files that have this format.
     files: &'static [&'static str],
-    /// Whether [`OpenOptions::topics`] choose within it.
+    /// Whether [`OpenOptions::topics`] select within it.
     topics: bool,
     open: fn(&Path, &OpenOptions) -> Opened,
 }
 
 type Opened = Result<Box<dyn Source>, Error>;
 
-/// [`Format`] and what is known of every format.
+/// [`Format`] and the properties of every format.
 macro_rules! formats {
     ($($(#[$meta:meta])* $kind:ident {
         marks: $marks:expr, holds: $holds:expr, files: $files:expr, topics: $topics:literal,
@@ -249,7 +250,7 @@ macro_rules! formats {
             $($(#[$meta])* $kind,)*
         }
 
-        /// In the order in which a folder is asked.
+        /// In the order in which they are tried on a folder.
         const FORMATS: &[FormatRow] = &[$(FormatRow {
             kind: Format::$kind,
             marks: &$marks,
@@ -261,7 +262,7 @@ macro_rules! formats {
     };
 }
 
-/// The function that opens a format, or says which feature it is for.
+/// The function that opens a format, or reports which feature it needs.
 macro_rules! opened {
     ($open:path) => {
         |root, options| Ok(Box::new($open(root, options)?))
@@ -298,18 +299,18 @@ formats! {
         marks: ["velodyne"], holds: |p| Ok(p.join("velodyne").is_dir()),
         files: [], topics: false, open: kitti::open_odometry
     }
-    /// Segments of Waymo's Open Dataset in Parquet.
+    /// Waymo Open Dataset segments in Parquet.
     Waymo {
         marks: ["lidar_calibration"], holds: recognise::is_waymo,
         files: [], topics: true, open: waymo::Waymo::open, if "parquet": "Waymo's segments"
     }
-    /// Scenes of nuScenes.
+    /// nuScenes scenes.
     #[value(name = "nuscenes")]
     NuScenes {
         marks: [recognise::SCENES], holds: recognise::is_nuscenes,
         files: [], topics: true, open: nuscenes::NuScenes::open, if "nuscenes": "nuScenes"
     }
-    /// A recording of ROS: an `.mcap` file, or a folder of them.
+    /// A ROS recording: an `.mcap` file, or a folder of them.
     Mcap {
         marks: ["*.mcap"], holds: |p| recognise::has_extension(p, recognise::MCAP),
         files: [recognise::MCAP], topics: true,
@@ -337,9 +338,9 @@ impl Format {
 
 /// Opens the recording at `path`, or the only one in a folder below it.
 ///
-/// Fails where no known format is recognised, where poses (unless it may come without), times or
-/// calibration are missing, do not fit the sweeps or make no sense, and where this build cannot
-/// read the format.
+/// Fails if no known format is recognised, if poses (unless it may come without), times or
+/// calibration are missing, do not match the sweeps or make no sense, and if this build cannot read
+/// the format.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error> {
     if let Some(ground_m) = options.ground_m {
         plausible::ground(ground_m).map_err(Error::Usage)?;
@@ -362,7 +363,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Source>, Error
     Ok(source)
 }
 
-/// Last part of a path, resolved so that `.` has a name too.
+/// Last component of a path, resolved so that `.` has a name too.
 fn folder_name(path: &Path) -> String {
     let full = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     full.file_name().map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned())

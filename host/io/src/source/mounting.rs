@@ -1,14 +1,14 @@
-//! Where a sensor is mounted of which nothing is known but its clouds.
+//! Where a sensor is mounted if only its clouds are known.
 
 use glam::DVec3;
 use raywake_core::params::ANCHOR_ABOVE_GROUND_M;
 
-/// A sensor is not mounted this near to the ground, m: such clouds are in a vehicle's frame, with
+/// A sensor is not mounted this close to the ground, m: such clouds are in a vehicle's frame, with
 /// its origin at an axle or below.
 const MOUNTED_MIN_M: f64 = 0.6;
 
-/// The place that is taken to be the sensor's, m, where the origin of its clouds is too close to
-/// the ground to be it; `ground_m` is the height of the ground in their frame.
+/// The assumed position of the sensor, m, if the origin of its clouds is too close to the ground to
+/// be it; `ground_m` is the height of the ground in their frame.
 pub fn above(ground_m: f64) -> Option<DVec3> {
     let place = DVec3::new(0.0, 0.0, ground_m + ANCHOR_ABOVE_GROUND_M);
     (ground_m >= -MOUNTED_MIN_M).then_some(place)

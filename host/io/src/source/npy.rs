@@ -1,4 +1,4 @@
-//! NumPy files of rows of floats: clouds, poses, rasters of heights.
+//! NumPy files of rows of floats: clouds, poses, height rasters.
 
 use std::path::Path;
 
@@ -15,21 +15,21 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 pub struct Array {
     /// Number of rows, at least 1.
     pub rows: usize,
-    /// Numbers in a row, at least 1; of an array of more dimensions, all but those of the first.
+    /// Numbers per row, at least 1; if there are more dimensions, the product of all but the first.
     pub columns: usize,
     /// Row after row.
     pub values: Vec<f64>,
 }
 
-/// Reads `<f2`, `<f4` or `<f8`, row after row, in versions 1 to 3 of the format.
+/// Reads `<f2`, `<f4` or `<f8` in row-major order, in versions 1 to 3 of the format.
 ///
 /// # Errors
-/// Where the file cannot be read, is too large for a cloud, or holds something else.
+/// If the file cannot be read, is too large for a cloud, or holds something else.
 pub fn read(path: &Path) -> Result<Array, Error> {
     parse(&whole::read(path)?).map_err(|what| Error::input(path, "", what))
 }
 
-/// `Err` with what is wrong.
+/// Parses a file; `Err` says what is wrong.
 fn parse(bytes: &[u8]) -> Result<Array, String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("is no NumPy file")?;
     let (header, data) = split(rest).ok_or("truncated within the header")?;
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(parse(&file(&header("<f4"), &singles)), Ok(want.clone()));
         let doubles: Vec<u8> = [1.5f64, -2.0].iter().flat_map(|v| v.to_le_bytes()).collect();
         assert_eq!(parse(&file(&header("<f8"), &doubles)), Ok(want.clone()));
-        // Version 2 has a longer length.
+        // Version 2 has a longer length field.
         let mut longer = file(&header("<f8"), &doubles);
         longer[MAGIC.len()] = 2;
         longer.splice(MAGIC.len() + 4..MAGIC.len() + 4, [0, 0]);

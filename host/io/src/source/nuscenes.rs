@@ -1,9 +1,10 @@
-//! Scenes of nuScenes: `samples` and `sweeps` of `LIDAR_TOP`, with ego poses.
+//! nuScenes scenes: `samples` and `sweeps` of `LIDAR_TOP`, with ego poses.
 //!
-//! The vehicle frame is theirs: x forward, y left, z up, origin on the ground below the middle of
-//! the rear axle. The world is the map's frame. Sweeps come at 20 Hz, are stamped at the end of the
-//! turn and compensated for the vehicle's motion (Caesar et al. 2020, section 3). The tables, of a
-//! gigabyte for all scenes, are read row by row; what is kept is of one scene.
+//! The vehicle frame is the dataset's: x forward, y left, z up, origin on the ground below the
+//! middle of the rear axle. The world is the map's frame. Sweeps come at 20 Hz, are stamped at the
+//! end of the revolution and compensated for the vehicle's motion (Caesar et al. 2020, section 3).
+//! The tables, a gigabyte for all scenes, are read row by row; only what belongs to one scene is
+//! kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -25,11 +26,11 @@ use crate::Error;
 
 /// The channel whose sweeps are read.
 const LIDAR: &str = "LIDAR_TOP";
-/// Scenes that an error names.
+/// Maximum number of scenes named in an error.
 const NAMED: usize = 12;
 
-/// The vehicle around its rear axle with its mirrors, m: a Renault Zoe of 4.08 m with a wheelbase
-/// of 2.59 m and a front overhang of 0.84 m.
+/// Extent of the vehicle around its rear axle, with mirrors, m: a Renault Zoe of 4.08 m with a
+/// wheelbase of 2.59 m and a front overhang of 0.84 m.
 const OWN_VEHICLE: [[f32; 2]; 2] = [[-0.8, -1.0], [3.6, 1.0]];
 
 #[derive(serde::Deserialize)]
@@ -56,7 +57,7 @@ struct CalibrationRow {
     sensor_token: String,
 }
 
-/// Of a vehicle or a sensor.
+/// The placement of a vehicle or a sensor.
 #[derive(serde::Deserialize)]
 struct PlacedRow {
     token: String,
@@ -80,13 +81,13 @@ pub(super) struct NuScenes {
     overview: Overview,
     root: PathBuf,
     files: Vec<PathBuf>,
-    /// Of every sweep.
+    /// For every sweep.
     vehicle_from_lidar: Vec<Pose>,
 }
 
 impl NuScenes {
-    /// Opens a scene: that which is named as topic, or the only one. `root` holds the tables, or
-    /// the folder of them.
+    /// Opens a scene: the one named as topic, or the only one. `root` holds the tables, or the
+    /// folder of them.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<NuScenes, Error> {
         if options.poses.is_some() || options.poses_frame.is_some() {
             let what = "scenes of nuScenes bring their own poses; --poses does not apply";
@@ -152,7 +153,7 @@ impl Source for NuScenes {
     }
 }
 
-/// The folder of the tables.
+/// The folder that holds the tables.
 fn tables(root: &Path) -> Result<PathBuf, Error> {
     let has = |folder: &PathBuf| folder.join(SWEEPS).is_file();
     let mut found: Vec<PathBuf> = Some(root.to_path_buf()).filter(has).into_iter().collect();
@@ -170,7 +171,7 @@ fn tables(root: &Path) -> Result<PathBuf, Error> {
     }
 }
 
-/// The scene that is asked for, or the only one.
+/// The requested scene, or the only one.
 fn scene(tables: &Path, topics: &[String]) -> Result<SceneRow, Error> {
     let path = tables.join("scene.json");
     let mut scenes: Vec<SceneRow> = Vec::new();
@@ -222,7 +223,7 @@ fn sweeps(tables: &Path, scene: &str) -> Result<Vec<SweepRow>, Error> {
     Ok(sweeps)
 }
 
-/// The pose that a token of every sweep names in a table.
+/// For every sweep, the pose in a table that its token refers to.
 fn poses(
     path: &Path,
     sweeps: &[SweepRow],
@@ -244,7 +245,7 @@ fn poses(
     sweeps.iter().map(|sweep| pose(token(sweep))).collect()
 }
 
-/// Hands out the rows of a table, one after the other.
+/// Passes the rows of a table to `see`, one after another.
 fn each<T: DeserializeOwned>(path: &Path, see: impl FnMut(T)) -> Result<(), Error> {
     let (file, _) = whole::open(path)?;
     let mut table = serde_json::Deserializer::from_reader(BufReader::new(file));
@@ -252,7 +253,7 @@ fn each<T: DeserializeOwned>(path: &Path, see: impl FnMut(T)) -> Result<(), Erro
     read.map_err(|e| Error::input(path, "", e.to_string()))
 }
 
-/// What the rows of a table are shown to.
+/// Passes each row of a table to a function.
 struct EachRow<T, F> {
     see: F,
     of: PhantomData<T>,

@@ -1,4 +1,4 @@
-//! What the user says about a recording instead of what its folder tells.
+//! What the user specifies about a recording in place of what its folder contains.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use super::Format;
 use super::bin::BinFields;
 use crate::Error;
 
-/// Frame whose motion a file of poses tells.
+/// Frame whose motion a pose file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum PosesFrame {
-    /// The left camera of KITTI; `calib.txt` tells where it sits.
+    /// KITTI's left camera; `calib.txt` gives its mounting pose.
     Camera,
     /// The frame of the clouds.
     Vehicle,
@@ -20,25 +20,26 @@ pub enum PosesFrame {
 /// Whether a recording may be opened without poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unlocated {
-    /// It fails to open.
+    /// Fails to open.
     #[default]
     Refuse,
-    /// Where it has none.
+    /// Accepted if it has none.
     Accept,
-    /// Those that it has are left out.
+    /// Any that it has are ignored.
     Always,
 }
 
-/// What the user says about a recording instead of what its folder tells.
+/// What the user specifies about a recording in place of what its folder contains.
 #[derive(Clone, Debug, Default)]
 pub struct OpenOptions {
     /// Kind of recording.
     pub format: Option<Format>,
-    /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; where there are none, the only one
-    /// or those of all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`; for
-    /// [`Format::NuScenes`] and [`Format::Waymo`] a scene or segment.
+    /// Topics whose clouds are the sweeps, for [`Format::Mcap`]; if empty, the only one or those of
+    /// all lidars. For [`Format::Pcap`] a sensor, as `ADDRESS:PORT`; for [`Format::NuScenes`] and
+    /// [`Format::Waymo`] a scene or segment.
     pub topics: Vec<String>,
-    /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep of the first, or of TUM.
+    /// File of poses: 3x4 numbers or a `.npy` of 4x4, one row per sweep from the first on, or TUM's
+    /// format.
     pub poses: Option<PathBuf>,
     /// Whether poses are needed at all.
     pub unlocated: Unlocated,
@@ -46,7 +47,7 @@ pub struct OpenOptions {
     pub trusted: bool,
     /// Frame of the poses; the camera for [`Format::KittiOdometry`], otherwise the vehicle.
     pub poses_frame: Option<PosesFrame>,
-    /// Where lidars sit, for [`Format::Mcap`].
+    /// Mounting poses of lidars, for [`Format::Mcap`].
     pub extrinsics: Option<PathBuf>,
     /// What the numbers of a return are, for `.bin` and `.npy` files.
     pub bin_fields: Option<BinFields>,
@@ -59,8 +60,8 @@ pub struct OpenOptions {
 }
 
 impl OpenOptions {
-    /// Leaves the poses of a recording unknown, in which this was found instead, or fails where
-    /// they are needed.
+    /// Leaves the poses of a recording unknown, or fails if they are needed; `found` says what was
+    /// found instead.
     pub(super) fn go_without_poses(&self, root: &Path, found: &str) -> Result<(), Error> {
         match self.unlocated {
             Unlocated::Refuse => {
@@ -72,7 +73,7 @@ impl OpenOptions {
     }
 }
 
-/// What the user's options change in a rig.
+/// Applies the user's options to a rig.
 pub(super) fn apply(options: &OpenOptions, rig: &mut Rig) {
     rig.distorted = options.deskew.unwrap_or(rig.distorted);
     rig.ground_m = options.ground_m.unwrap_or(rig.ground_m);

@@ -1,5 +1,5 @@
-//! Poses from the GPS and inertial unit of a KITTI drive, by the convention of its development
-//! kit: Mercator position scaled by the first latitude, `Rz(yaw) Ry(pitch) Rx(roll)`.
+//! Poses from the GPS and inertial unit of a KITTI drive, by the convention of its development kit:
+//! Mercator position scaled by the first latitude, `Rz(yaw) Ry(pitch) Rx(roll)`.
 
 use std::path::Path;
 
@@ -13,11 +13,11 @@ use crate::Error;
 /// Radius of the sphere of the Mercator projection, m.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;
 
-/// Numbers in a packet that are used: lat (deg), lon (deg), alt (m), roll, pitch, yaw (rad).
+/// Number of values used from a packet: lat (deg), lon (deg), alt (m), roll, pitch, yaw (rad).
 const FIELDS: usize = 6;
 
-/// `velo_from_imu` of KITTI's recording vehicle to the centimetre, for drives without their
-/// calibration: axes taken as parallel, (-0.81, 0.32, -0.80) m.
+/// `velo_from_imu` of KITTI's recording vehicle to the centimetre, for drives without a
+/// calibration: axes assumed parallel, (-0.81, 0.32, -0.80) m.
 pub(super) fn default_velo_from_imu() -> Pose {
     shift(DVec3::new(-0.81, 0.32, -0.80))
 }
@@ -36,7 +36,7 @@ pub(super) fn read_calibration(path: &Path) -> Result<Pose, Error> {
     pose_from(&rows, path, format!("line {line}"))
 }
 
-/// One packet file: `lat lon alt roll pitch yaw` and more, which is not used.
+/// One packet file: `lat lon alt roll pitch yaw` and more that is not used.
 pub(super) fn read_packet(path: &Path) -> Result<[f64; FIELDS], Error> {
     let text = whole::read_text(path)?;
     let (line, content) =
@@ -51,19 +51,19 @@ pub(super) fn read_packet(path: &Path) -> Result<[f64; FIELDS], Error> {
     Ok(packet)
 }
 
-/// Numbers a projection can be made of.
+/// Checks that the numbers can be projected.
 fn check(packet: &[f64; FIELDS]) -> Result<(), String> {
     if packet.iter().any(|v| !v.is_finite()) {
         return Err("a NaN or infinite number".into());
     }
-    // The Mercator projection has no poles.
+    // The Mercator projection excludes the poles.
     if packet[0].abs() > 89.0 || packet[1].abs() > 360.0 {
         return Err(format!("({}, {}) is not a latitude and longitude", packet[0], packet[1]));
     }
     Ok(())
 }
 
-/// Scale of the projection that is true to length at this latitude (deg).
+/// Scale at which the projection preserves lengths at this latitude (deg).
 pub(super) fn scale(latitude_deg: f64) -> f64 {
     libm::cos(latitude_deg.to_radians())
 }
@@ -91,7 +91,7 @@ mod tests {
         let s = scale(49.0);
         let a = pose(&[49.0, 8.4, 100.0, 0.0, 0.0, FRAC_PI_2], s);
         let b = pose(&[49.001, 8.4, 101.0, 0.0, 0.0, FRAC_PI_2], s);
-        // Heading north: the way is forward.
+        // Heading north: the displacement is forward.
         let way = (a.inverse() * b).translation;
         let expected = EARTH_RADIUS_M * 0.001f64.to_radians();
         assert!((way.x - expected).abs() < 0.01, "{way}");

@@ -1,7 +1,7 @@
 //! PCD files of the Point Cloud Library, version 0.7: text, binary or compressed.
 //!
-//! The fields are those of [`super::returns`]. `VIEWPOINT`, where the sensor was, makes poses of a
-//! folder of files that have it ([`super::viewpoints`]).
+//! The fields are those of [`super::returns`]. `VIEWPOINT`, the pose of the sensor, gives the poses
+//! of a folder of files that have it ([`super::viewpoints`]).
 
 use std::io::Read;
 use std::path::Path;
@@ -14,10 +14,10 @@ use super::returns::{Attribute, Fields, Head, Number, records, table};
 use super::{lzf, text, whole};
 use crate::Error;
 
-/// Replaces `points` by those of a file; returns whether they have times.
+/// Replaces `points` with those of a file; returns whether they have times.
 ///
-/// Fails, leaving no points, where the file cannot be read, its header does not fit together, or it
-/// ends early.
+/// Fails, leaving no points, if the file cannot be read, its header is inconsistent, or it ends
+/// early.
 pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
     points.clear();
     let bytes = whole::read(path)?;
@@ -43,20 +43,19 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
         Data::Compressed => {
             let unpacked = unpack(path, &bytes, at, rows, header.record())?;
             let before = header.before(Field::size);
-            // Field after field, each of all points.
+            // Field after field, each for all points.
             let columns = header.columns(|f| (rows * before[f], header.fields[f].size()));
             Ok(fields.returns(rows, |row, f| columns[f].value(&unpacked, row, false), points))
         }
     }
 }
 
-/// Bytes of a file that its header is looked for in.
+/// Bytes of a file that are searched for its header.
 const HEADER_MAX: u64 = 4096;
 
-/// What a header says of where the sensor was, x, y, z and quaternion w, x, y, z; `None` where it
-/// says nothing.
+/// The pose of the sensor in a header, x, y, z and quaternion w, x, y, z; `None` if there is none.
 ///
-/// Fails where the file cannot be read, and where that is no pose.
+/// Fails if the file cannot be read, and if the numbers are not a pose.
 pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
     let (file, _) = whole::open(path)?;
     let mut bytes = Vec::new();
@@ -74,8 +73,8 @@ pub(super) fn viewpoint(path: &Path) -> Result<Option<Pose>, Error> {
     Ok(None)
 }
 
-/// The body of a compressed file: its packed and unpacked length, 32 bits each, and the former's
-/// bytes.
+/// Unpacks the body of a compressed file: its packed and unpacked length, 32 bits each, and the
+/// packed bytes.
 fn unpack(
     path: &Path,
     bytes: &[u8],
@@ -112,7 +111,7 @@ enum Data {
 struct Field {
     name: String,
     number: Number,
-    /// Numbers it has; the first is taken.
+    /// Its count of numbers; only the first is used.
     count: usize,
 }
 
@@ -128,7 +127,7 @@ struct PcdHeader {
     data: Data,
 }
 
-/// Fields and numbers of a field that are believed.
+/// Maximum accepted number of fields, and of numbers in a field.
 const FIELDS_MAX: usize = 1 << 10;
 
 impl PcdHeader {
@@ -176,7 +175,7 @@ impl PcdHeader {
         self.fields.iter().map(Field::size).sum()
     }
 
-    /// What the fields before each field take.
+    /// The sum of a quantity over the fields before each field.
     fn before(&self, of: impl Fn(&Field) -> usize) -> Vec<usize> {
         let mut sum = 0;
         let place = |f: &Field| {
@@ -225,7 +224,7 @@ fn fields(
     (0..n).map(field).collect()
 }
 
-/// Whole numbers of a header's line.
+/// Whole numbers of a header line.
 fn whole(head: &Head, words: &[&str]) -> Result<Vec<usize>, Error> {
     let number = |w: &&str| w.parse().map_err(|_| head.wrong(format!("`{w:.20}` is not a count")));
     words.iter().map(number).collect()

@@ -1,25 +1,25 @@
-//! What no vehicle does: numbers of a recording that are finite and still cannot be, whatever
-//! format they come from. Beyond them arithmetic overflows, and returns fall where they are not.
+//! Plausibility limits for recordings of any format: numbers that are finite but impossible for a
+//! vehicle. Beyond them arithmetic overflows, and returns end up in the wrong places.
 
 use glam::DVec3;
 use raywake_core::pose::Pose;
 
 use super::Overview;
 
-/// Farthest a drive leads from its first pose, m; positions beyond are typing errors.
+/// Largest distance of a drive from its first pose, m; positions beyond are typing errors.
 const REACH_MAX_M: f64 = 1e6;
-/// Farthest the first pose lies from the origin of the world, m: grids of maps have origins some
+/// Largest distance of the first pose from the origin of the world, m: map grids have origins some
 /// thousands of kilometres away.
 const WORLD_MAX_M: f64 = 1e8;
-/// Farthest a sensor or the ground lies from the origin of the returns, m: there the numbers of a
-/// return are 1 mm apart.
+/// Largest distance of a sensor or the ground from the origin of the returns, m: there,
+/// neighbouring coordinates of a return are 1 mm apart.
 const FRAME_MAX_M: f64 = 1e4;
-/// Largest time that is believed, s: 1970 is 1.8e9 s ago.
+/// Largest accepted time, s: 1970 is 1.8e9 s ago.
 pub(super) const TIME_MAX_S: f64 = 1e10;
 /// Shortest time between two sweeps, s.
 const STEP_MIN_S: f64 = 1e-6;
 
-/// `Err` with what is wrong in a recording.
+/// Checks a recording; `Err` says what is wrong.
 pub(super) fn check(overview: &Overview) -> Result<(), String> {
     let Overview { rig, frames, track, .. } = overview;
     ground(rig.ground_m)?;
@@ -34,7 +34,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
         reach(first, pose).map_err(|what| format!("the pose of frame {frame}: {what}"))?;
     }
     for (frame, &stamp_s) in frames.iter().zip(&track.stamps_s) {
-        // Not the other way round: NaN lies within nothing.
+        // Written this way because NaN is in no range.
         if !(-TIME_MAX_S..=TIME_MAX_S).contains(&stamp_s) {
             return Err(format!("frame {frame} has a time of {stamp_s:e} s"));
         }
@@ -49,7 +49,7 @@ pub(super) fn check(overview: &Overview) -> Result<(), String> {
     }
 }
 
-/// `Err` where a drive with its first pose at `first` does not lead to a pose.
+/// `Err` if a pose is out of reach of a drive whose first pose is at `first`.
 pub(super) fn reach(first: DVec3, pose: &Pose) -> Result<(), String> {
     let away = pose.translation - first;
     match pose.rotation.is_finite() && within(away, REACH_MAX_M) {
@@ -58,12 +58,12 @@ pub(super) fn reach(first: DVec3, pose: &Pose) -> Result<(), String> {
     }
 }
 
-/// `Err` where the ground cannot be at that height in the frame of the returns, m.
+/// `Err` if the ground cannot be at this height in the frame of the returns, m.
 pub fn ground(height_m: f64) -> Result<(), String> {
     place(DVec3::Z * height_m).map_err(|what| format!("the ground: {what}"))
 }
 
-/// `Err` where nothing of a vehicle can be at that place in the frame of the returns, m.
+/// `Err` if no part of a vehicle can be at this position in the frame of the returns, m.
 pub fn place(place: DVec3) -> Result<(), String> {
     match within(place, FRAME_MAX_M) {
         true => Ok(()),
@@ -71,7 +71,7 @@ pub fn place(place: DVec3) -> Result<(), String> {
     }
 }
 
-/// NaN is not.
+/// False for NaN.
 fn within(place: DVec3, most_m: f64) -> bool {
     place.is_finite() && place.abs().max_element() <= most_m
 }

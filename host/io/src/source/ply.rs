@@ -10,10 +10,10 @@ use super::returns::{Attribute, Fields, Head, Number, records, table};
 use super::whole;
 use crate::Error;
 
-/// Replaces `points` by the vertices of a file; returns whether they have times.
+/// Replaces `points` with the vertices of a file; returns whether they have times.
 ///
-/// Fails, leaving no points, where the file cannot be read, its header does not fit together, other
-/// elements come before the vertices, or it ends early.
+/// Fails, leaving no points, if the file cannot be read, its header is inconsistent, other elements
+/// come before the vertices, or it ends early.
 pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> {
     points.clear();
     let bytes = whole::read(path)?;
@@ -37,14 +37,14 @@ pub(super) fn read(path: &Path, points: &mut Vec<Point>) -> Result<bool, Error> 
 }
 
 struct PlyHeader {
-    /// Name and type of the properties of a vertex.
+    /// Name and type of each property of a vertex.
     fields: Vec<(String, Number)>,
     rows: usize,
-    /// Whether numbers have the most significant byte first; `None` for text.
+    /// Whether numbers are big-endian; `None` for text.
     big: Option<bool>,
 }
 
-/// The element that a line of a header belongs to.
+/// The element that a header line belongs to.
 #[derive(PartialEq)]
 enum Element {
     None,

@@ -1,10 +1,10 @@
-//! Files of poses, `world_from_vehicle` each.
+//! Files of `world_from_vehicle` poses.
 //!
-//! | a row | as in | for |
+//! | a row | as in | one per |
 //! |---|---|---|
-//! | 12 numbers, a 3x4 matrix | KITTI's `poses.txt` | a sweep |
-//! | 8 numbers: time in s, x, y, z, quaternion x, y, z, w | TUM's RGB-D benchmark | a time |
-//! | 4x4 numbers in a `.npy` | what `kiss-icp` writes | a sweep |
+//! | 12 numbers, a 3x4 matrix | KITTI's `poses.txt` | sweep |
+//! | 8 numbers: time in s, x, y, z, quaternion x, y, z, w | TUM's RGB-D benchmark | time |
+//! | 4x4 numbers in a `.npy` | what `kiss-icp` writes | sweep |
 
 use std::path::Path;
 
@@ -16,22 +16,23 @@ use super::trajectory::Trajectory;
 use super::{npy, text, whole};
 use crate::Error;
 
-/// A stamp this little before the first pose or after the last one has that, ns: text rounds times.
+/// A stamp at most this far before the first or after the last pose takes that pose, ns: text
+/// rounds times.
 const SLACK_NS: i64 = 1_000_000;
 
 /// A row of a file.
 struct PoseRow {
-    /// `line 3`, for people.
+    /// `line 3`, for messages.
     place: String,
     time_s: Option<f64>,
     pose: Pose,
 }
 
-/// The pose at each of some stamps, ns, by a file; `None` where it has none.
+/// The pose of a file at each of some stamps, ns; `None` where it has none.
 ///
-/// Rows without a time are those of the first sweeps, and so are rows with times of another clock,
-/// if there is one for each sweep. Fails where a row is no pose, where one lies out of reach
-/// of any drive, where there are more rows without time than sweeps, and where no sweep has a pose.
+/// Rows without times belong to the first sweeps, and so do rows with times of another clock if
+/// there is one for each sweep. Fails if a row is not a pose, if one is out of reach of any drive,
+/// if there are more rows without times than sweeps, and if no sweep has a pose.
 pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, Error> {
     let (rows, sweeps) = (rows(path)?, stamps_ns.len());
     let timed = rows.first().is_some_and(|row| row.time_s.is_some());
@@ -52,7 +53,7 @@ pub(super) fn read(path: &Path, stamps_ns: &[i64]) -> Result<Vec<Option<Pose>>, 
 
 /// The pose in a file of one row.
 ///
-/// Fails where the file cannot be read, or has no row, several, or one that is no pose.
+/// Fails if the file cannot be read, or has no row, several, or one that is not a pose.
 pub fn read_pose(path: &Path) -> Result<Pose, Error> {
     let poses = read(path, &[0])?;
     poses[0].ok_or_else(|| Error::input(path, "", "0 poses, expected 1"))
@@ -64,7 +65,7 @@ pub(super) fn keep<T>(all: &mut Vec<T>, poses: &[Option<Pose>]) {
     all.retain(|_| known.next().unwrap_or(false));
 }
 
-/// A note on sweeps without a pose.
+/// Adds a note on sweeps without a pose.
 pub(super) fn note_missing(poses: &[Option<Pose>], name: &str, notes: &mut Vec<String>) {
     let missing = poses.iter().filter(|pose| pose.is_none()).count();
     if missing > 0 {
@@ -72,7 +73,7 @@ pub(super) fn note_missing(poses: &[Option<Pose>], name: &str, notes: &mut Vec<S
     }
 }
 
-/// The poses of rows with times at some stamps.
+/// The poses of rows with times, at some stamps.
 fn at(rows: &[PoseRow], stamps_ns: &[i64]) -> Vec<Option<Pose>> {
     let mut trajectory = Trajectory::default();
     for row in rows {
@@ -115,7 +116,7 @@ fn row(path: &Path, place: String, numbers: &[f64]) -> Result<PoseRow, Error> {
     let (time_s, pose) = match *numbers {
         [time_s, x, y, z, a, b, c, d] => {
             let pose = rigid([x, y, z], [a, b, c, d]).map_err(wrong)?;
-            // Not the other way round: NaN lies within nothing.
+            // Written this way because NaN is in no range.
             if !(-TIME_MAX_S..=TIME_MAX_S).contains(&time_s) {
                 return Err(wrong(&format!("a time of {time_s} s")));
             }
@@ -156,13 +157,13 @@ mod tests {
             let line = |n: u32| format!("{} {n} 0 0 0 0 0 1\n", from + 0.4 * f64::from(n));
             format!("# time x y z qx qy qz qw\n{}{}{}", line(0), line(1), line(2))
         };
-        // Between two poses, at them, and beyond; by the clock and by the time since the start.
+        // Between two poses, at them, and beyond; with times of the clock and since the start.
         let stamps = [-S / 10, 0, S / 5, S * 4 / 5 + 1000, S];
         let expected = [None, Some(0.0), Some(0.5), Some(2.0), None];
         assert_eq!(x("t.txt", &tum(0.0), &stamps), expected);
         let since = 1_700_000_000;
         assert_eq!(x("t.txt", &tum(since as f64), &stamps.map(|ns| ns + since * S)), expected);
-        // Of another clock: one a sweep.
+        // Of another clock: one per sweep.
         assert_eq!(x("t.txt", &tum(77.0), &[0, S, 2 * S]), [Some(0.0), Some(1.0), Some(2.0)]);
         let refused = |name: &str, text: &str, stamps_ns: &[i64]| {
             read(&t.write(name, text), stamps_ns).unwrap_err().to_string()

@@ -1,5 +1,5 @@
-//! Poses and times: the rows of `poses.txt`, the lines of `times.txt` and `timestamps.txt`, and
-//! the track of the vehicle they make.
+//! Poses and times: the rows of `poses.txt`, the lines of `times.txt` and `timestamps.txt`, and the
+//! vehicle's trajectory that they form.
 
 use std::path::{Path, PathBuf};
 
@@ -10,22 +10,22 @@ use raywake_core::pose::{Pose, PoseError, Twist};
 use super::{text, whole};
 use crate::Error;
 
-/// Interval between sweeps that is assumed where a source has no times, s.
+/// Interval between sweeps that is assumed if a source has no times, s.
 pub(super) const INTERVAL_S: f64 = 0.1;
 
 /// Stamp and pose of every sweep of a source.
 #[derive(Clone, Debug, Default)]
 pub struct PoseTrack {
-    /// s, rising.
+    /// s, increasing.
     pub stamps_s: Vec<f64>,
-    /// `world_from_vehicle` at the stamps; none where the poses are unknown.
+    /// `world_from_vehicle` at the stamps; empty if the poses are unknown.
     pub poses: Vec<Pose>,
 }
 
 impl PoseTrack {
-    /// Velocity at sweep `i`, in the vehicle frame at its stamp: what leads from the sweep before
-    /// it to it, or from it to the next where that is no motion, as on the first sweep or after a
-    /// jump. Between two of those it stands still.
+    /// Velocity at sweep `i`, in the vehicle frame at its stamp: from the step from the previous
+    /// sweep, or from the step to the next if the former is not a continuous motion, as on the
+    /// first sweep or after a jump. Between two jumps it is zero.
     pub fn twist(&self, i: usize) -> Twist {
         let steady = |a: usize, b: usize| {
             let dt_s = self.stamps_s[b] - self.stamps_s[a];
@@ -36,7 +36,7 @@ impl PoseTrack {
             _ if i + 1 < self.poses.len() && steady(i, i + 1) => i + 1,
             _ => return Twist::ZERO,
         };
-        // Seen from sweep i, so that the result is along the axes it has at its own stamp.
+        // Seen from sweep i, so that the result is along the axes at its own stamp.
         let here_from_other = self.poses[i].inverse() * self.poses[other];
         here_from_other.twist(self.stamps_s[other] - self.stamps_s[i])
     }
@@ -50,7 +50,7 @@ impl PoseTrack {
     }
 }
 
-/// Fails where a stamp does not come after the one before it; `place(i)` names stamp `i`.
+/// Fails if a stamp does not come after the previous one; `place(i)` names stamp `i`.
 pub(super) fn check_rising(
     stamps_s: &[f64],
     path: &Path,
@@ -66,10 +66,10 @@ pub(super) fn check_rising(
     Ok(())
 }
 
-/// How far the length of a quaternion may be from 1.
+/// Largest deviation of a quaternion's length from 1.
 const UNIT_TOLERANCE: f64 = 1e-2;
 
-/// A pose from a place and a quaternion x, y, z, w, or what is wrong with it.
+/// A pose from a position and a quaternion x, y, z, w, or what is wrong with it.
 pub fn rigid(place: [f64; 3], [x, y, z, w]: [f64; 4]) -> Result<Pose, &'static str> {
     let (rotation, place) = (DQuat::from_xyzw(x, y, z, w), DVec3::from_array(place));
     if !rotation.is_finite() || !place.is_finite() {
@@ -92,7 +92,7 @@ pub(super) fn pose_from(rows: &[f64; 12], path: &Path, place: String) -> Result<
     })
 }
 
-/// A pose as such a row: 3x4 numbers that read back as they are.
+/// A pose as such a row: 3x4 numbers that parse to the same values.
 pub fn pose_row(pose: &Pose) -> String {
     let (m, t) = (pose.matrix(), pose.translation);
     let rows = [0, 1, 2].map(|i| {
@@ -102,7 +102,7 @@ pub fn pose_row(pose: &Pose) -> String {
     rows.join(" ")
 }
 
-/// `camera_from_velodyne`, the line `Tr:` of an odometry sequence's `calib.txt`.
+/// Reads `camera_from_velodyne`, the line `Tr:` of an odometry sequence's `calib.txt`.
 pub(super) fn read_camera(path: &Path) -> Result<Pose, Error> {
     let text = whole::read_text(path)?;
     match text::keyed(path, &text, "Tr")? {
@@ -111,8 +111,8 @@ pub(super) fn read_camera(path: &Path) -> Result<Pose, Error> {
     }
 }
 
-/// Poses of the camera as poses of the Velodyne: `inv(Tr) * P * Tr`, so that the world is the
-/// Velodyne frame where the poses' world is the camera frame.
+/// Converts poses of the camera to poses of the Velodyne: `inv(Tr) * P * Tr`, so that the world is
+/// the Velodyne frame if the poses' world is the camera frame.
 pub(super) fn from_camera(poses: &mut [Pose], camera_from_velodyne: Pose) {
     let velodyne_from_camera = camera_from_velodyne.inverse();
     for pose in poses {
@@ -123,15 +123,15 @@ pub(super) fn from_camera(poses: &mut [Pose], camera_from_velodyne: Pose) {
 /// Times of sweeps, s, and where they come from.
 pub(super) struct Times {
     pub stamps_s: Vec<f64>,
-    /// The file; `None` where 10 Hz were assumed.
+    /// The file; `None` if 10 Hz was assumed.
     pub path: Option<PathBuf>,
 }
 
 /// The times of the sweeps with these frame numbers, from the first of `candidates` that exists,
-/// otherwise 10 Hz by frame number.
+/// otherwise at 10 Hz by frame number.
 ///
-/// Lines are sweeps in order where their counts agree, otherwise line n + 1 is frame n: a KITTI
-/// drive keeps the lines of sweeps it lacks. Fails where neither fits, and where times do not rise.
+/// Lines are sweeps in order if their counts agree, otherwise line n + 1 is frame n: a KITTI drive
+/// keeps the lines of sweeps it lacks. Fails if neither fits, and if times do not increase.
 pub(super) fn read_times(candidates: &[PathBuf], frames: &[u64]) -> Result<Times, Error> {
     let Some(path) = candidates.iter().find(|p| p.is_file()) else {
         let first = frames.first().copied().unwrap_or(0);
@@ -160,7 +160,7 @@ fn choose(all: &[(usize, f64)], frames: &[u64], path: &Path) -> Result<Vec<(usiz
     })
 }
 
-/// Every time of a file, with its line: seconds, or dates as seconds since the first date.
+/// Every time in a file, with its line: seconds, or dates as seconds since the first date.
 fn read_stamps(path: &Path) -> Result<Vec<(usize, f64)>, Error> {
     let text = whole::read_text(path)?;
     let mut first_ns = None;
@@ -170,7 +170,7 @@ fn read_stamps(path: &Path) -> Result<Vec<(usize, f64)>, Error> {
             let ns = date_ns(content).ok_or_else(|| {
                 Error::input(path, format!("line {line}"), format!("`{content}` is not a date"))
             })?;
-            // Differences in whole nanoseconds: a double of seconds since 1970 keeps only 0.2 us.
+            // Differences in whole nanoseconds: a double of seconds since 1970 resolves 0.2 us.
             (ns - *first_ns.get_or_insert(ns)) as f64 * 1e-9
         } else {
             text::exactly::<1>(path, line, content)?[0]
@@ -208,7 +208,7 @@ fn date_ns(text: &str) -> Option<i64> {
     Some(seconds * 1_000_000_000 + ns)
 }
 
-/// Days since 1970-01-01 in the Gregorian calendar, counted with years that begin in March so that
+/// Days since 1970-01-01 in the Gregorian calendar, counted in years that begin in March so that
 /// the leap day comes last.
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let y = if month <= 2 { year - 1 } else { year };
@@ -217,7 +217,7 @@ fn days(year: i64, month: i64, day: i64) -> i64 {
     era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468
 }
 
-/// A translation alone.
+/// A pure translation.
 pub(super) fn shift(translation: DVec3) -> Pose {
     Pose { translation, ..Pose::IDENTITY }
 }
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn twist_is_along_the_axes_at_the_sweep() {
-        // A turn to the left at 1 rad/s while driving 10 m/s forward.
+        // A left turn at 1 rad/s while driving 10 m/s forward.
         let step = Pose::planar(1.0, 0.0, 0.0, 0.1);
         let poses = vec![Pose::planar(5.0, 5.0, 0.0, 2.0), Pose::planar(5.0, 5.0, 0.0, 2.0) * step];
         let track = PoseTrack { stamps_s: vec![0.0, 0.1], poses };

@@ -8,21 +8,21 @@ use super::clouds::EXTENSIONS;
 use super::{FORMATS, Format, FormatRow};
 use crate::Error;
 
-/// Extension of recordings of ROS.
+/// Extension of ROS recordings.
 pub(super) const MCAP: &str = "mcap";
 
-/// The folder of a Waymo segment's images, beside that of their calibration.
+/// The folder of a Waymo segment's images, next to that of their calibration.
 pub(super) const WAYMO_LASERS: &str = "lidar";
 
-/// The table by which scenes of nuScenes are known.
+/// The table by which nuScenes scenes are recognised.
 pub(super) const SCENES: &str = "sample_data.json";
 
-/// Levels of folders below the named one that are searched for a recording.
+/// Levels of folders below the given one that are searched for a recording.
 const DEPTH: usize = 2;
 
 /// Format and folder of the recording at `path`, or of the only one up to two levels below.
 ///
-/// Fails where there is none, where there are several, and where `path` is no readable folder.
+/// Fails if there is none, if there are several, and if `path` cannot be read.
 pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
     let meta = fs::metadata(path).map_err(Error::reading(path))?;
     if !meta.is_dir() {
@@ -47,7 +47,7 @@ pub fn recognise(path: &Path) -> Result<(Format, PathBuf), Error> {
     }
 }
 
-/// The format of a recording that is a file, by its extension.
+/// The format of a single-file recording, by its extension.
 fn format_of_file(path: &Path) -> Result<Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str());
     let is_of = |row: &&FormatRow| extension.is_some_and(|e| row.files.contains(&e));
@@ -80,7 +80,7 @@ fn below(path: &Path, depth: usize) -> Result<Vec<(Format, PathBuf)>, Error> {
     Ok(found)
 }
 
-/// The format a folder has by the names in it.
+/// The format of a folder by the names in it.
 fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     for row in FORMATS {
         if (row.holds)(path)? {
@@ -90,18 +90,18 @@ fn format_of(path: &Path) -> Result<Option<Format>, Error> {
     Ok(None)
 }
 
-/// Whether a folder holds segments of Waymo's.
+/// Whether a folder holds Waymo segments.
 pub(super) fn is_waymo(path: &Path) -> Result<bool, Error> {
     Ok(path.join(WAYMO_LASERS).is_dir() && path.join("lidar_calibration").is_dir())
 }
 
-/// Whether a folder, or one in it, holds the tables of nuScenes.
+/// Whether a folder, or one in it, holds nuScenes tables.
 pub(super) fn is_nuscenes(path: &Path) -> Result<bool, Error> {
     let has_tables = |p: &PathBuf| p.join(SCENES).is_file();
     Ok(has_tables(&path.to_path_buf()) || entries(path)?.iter().any(has_tables))
 }
 
-/// Whether a folder has a file of an extension.
+/// Whether a folder has a file with this extension.
 pub(super) fn has_extension(path: &Path, extension: &str) -> Result<bool, Error> {
     Ok(entries(path)?.iter().any(|p| p.extension().is_some_and(|e| e == extension)))
 }
@@ -122,11 +122,11 @@ pub(super) fn entries(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(entries)
 }
 
-/// Files of a folder with this extension and their numbers (`0000000012.bin` is 12), in the order
-/// of the numbers; in the order of names and counted from 0 where a name is not a number.
+/// Files of a folder with this extension and their numbers (`0000000012.bin` is 12), in numerical
+/// order; if a name is not a number, in the order of names and counted from 0.
 ///
-/// The second value is false in that case. Fails where there are none, or where two files have the
-/// same number.
+/// The second value is false in that case. Fails if there are none, or if two files have the same
+/// number.
 pub(super) fn numbered(path: &Path, extension: &str) -> Result<(Vec<(u64, PathBuf)>, bool), Error> {
     let mut files = entries(path)?;
     files.retain(|p| p.extension().is_some_and(|e| e == extension));
@@ -147,7 +147,7 @@ pub(super) fn numbered(path: &Path, extension: &str) -> Result<(Vec<(u64, PathBu
     Ok((files, true))
 }
 
-/// Adds a note on numbers that are missing from the sequence.
+/// Adds a note on numbers missing from the sequence.
 pub(super) fn note_gaps(frames: &[u64], notes: &mut Vec<String>) {
     let gaps: Vec<_> = frames.windows(2).filter(|w| w[1] > w[0] + 1).collect();
     if gaps.is_empty() {

@@ -1,16 +1,16 @@
-//! Returns of clouds whose files name their fields (PCD and PLY).
+//! Returns of clouds with named fields (of PCD and PLY files and others).
 //!
 //! | field | names | as |
 //! |---|---|---|
-//! | position | `x`, `y`, `z` | m, in the frame of the vehicle |
+//! | position | `x`, `y`, `z` | m, in the vehicle frame |
 //! | intensity | `intensity`, `i`, `reflectivity` | 0..1, or 0..255 if any is above 1 |
 //! | time | `offset_time`, `t`, `time`, `timestamp`, `time_stamp` | unit by type, as in drivers |
 //!
-//! Times in integers are ns (Ouster `t`, Livox `offset_time`), those in floats s (Velodyne `time`,
-//! Hesai and RoboSense `timestamp`), or ns where they are too large for any date (Livox
-//! `timestamp`). They count from the sweep's stamp, but where the earliest is more than a second
-//! away from it they are of a clock, and count from that earliest, or from the stamp where that is
-//! of the same clock. Other fields, `ring` too, are passed over.
+//! Integer times are ns (Ouster `t`, Livox `offset_time`), float times are s (Velodyne `time`,
+//! Hesai and RoboSense `timestamp`), or ns if they are too large for any date (Livox `timestamp`).
+//! They count from the sweep's stamp, but if the earliest is more than a second away from it they
+//! are clock times, and count from that earliest one, or from the stamp if that is of the same
+//! clock. Other fields, including `ring`, are ignored.
 
 use std::path::Path;
 
@@ -19,10 +19,10 @@ use raywake_core::sweep::Point;
 use super::text;
 use crate::Error;
 
-/// Seconds that no date has reached: times beyond are ns.
+/// Seconds beyond any date: larger times are ns.
 const SECONDS_MAX: f64 = 1e12;
 
-/// Times this far from the stamp are those of a clock, s.
+/// Times farther than this from the stamp are those of a clock, s.
 const OFFSET_MAX_S: f64 = 1.0;
 
 /// How a number is stored.
@@ -35,7 +35,7 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// Bytes of it.
+    /// Its size in bytes.
     pub fn size(self) -> usize {
         match self {
             Number::Unsigned(size) | Number::Signed(size) => size,
@@ -44,7 +44,7 @@ impl Number {
         }
     }
 
-    /// The number at the start of `bytes`, which hold it; `big` for the most significant first.
+    /// The number at the start of `bytes`, which are long enough; `big` for big-endian.
     pub fn read(self, bytes: &[u8], big: bool) -> f64 {
         let size = self.size();
         let mut word = [0; 8];
@@ -65,18 +65,18 @@ impl Number {
     }
 }
 
-/// Which fields a return is made of.
+/// The fields that make up a return.
 pub(super) struct Fields {
-    /// Numbers of x, y, z, intensity and time among all fields.
+    /// Indices of x, y, z, intensity and time among all fields.
     places: [Option<usize>; 5],
-    /// Seconds of a unit of time.
+    /// Seconds per unit of time.
     unit_s: f64,
-    /// The sweep's stamp, s, where it is known.
+    /// The sweep's stamp, s, if it is known.
     stamp_s: Option<f64>,
 }
 
 impl Fields {
-    /// Finds them by name. Fails where a coordinate is missing.
+    /// Finds them by name. Fails if a coordinate is missing.
     pub fn find(all: &[(String, Number)]) -> Result<Fields, String> {
         let find = |names: &[&str]| {
             let at = |name: &&str| all.iter().position(|f| f.0.eq_ignore_ascii_case(name));
@@ -93,13 +93,13 @@ impl Fields {
         Ok(Fields { places: [0, 1, 2, 3, 4].map(|n| places[n]), unit_s, stamp_s: None })
     }
 
-    /// The same, of a sweep whose stamp is known.
+    /// The same for a sweep whose stamp is known.
     #[cfg(feature = "mcap")]
     pub fn stamped(self, stamp_ns: i64) -> Fields {
         Fields { stamp_s: Some(stamp_ns as f64 * 1e-9), ..self }
     }
 
-    /// Replaces `into` by `rows` returns; `value(row, field)` is a number of the file. Returns
+    /// Replaces `into` with `rows` returns; `value(row, field)` is a number of the file. Returns
     /// whether they have times.
     pub fn returns(
         &self,
@@ -121,7 +121,7 @@ impl Fields {
         into.extend((0..rows).map(|row| Point {
             position: [0, 1, 2].map(|axis| get(row, axis) as f32),
             intensity: (get(row, 3) / scale) as f32,
-            // The difference first: a clock's time leaves no room for fractions.
+            // The difference first: a clock time leaves no precision for fractions.
             offset_s: ((get(row, 4) - from) * unit_s) as f32,
             sensor: 0,
         }));
@@ -129,7 +129,7 @@ impl Fields {
     }
 }
 
-/// A column of numbers in bytes: its first at `start`, the others `step` bytes apart.
+/// A column of numbers in bytes: the first at `start`, the others `step` bytes apart.
 #[derive(Clone, Copy)]
 pub(super) struct Attribute {
     pub number: Number,
@@ -143,7 +143,7 @@ impl Attribute {
     }
 }
 
-/// The records of `size` bytes at `at` in a file, `rows` of them; what follows is not looked at.
+/// The `rows` records of `size` bytes at `at` in a file; what follows is ignored.
 pub(super) fn records<'a>(
     path: &Path,
     bytes: &'a [u8],
@@ -158,8 +158,8 @@ pub(super) fn records<'a>(
     })
 }
 
-/// The numbers of `rows` lines, `width` each, from the text at `at` in a file; the line there is
-/// number `line`.
+/// The numbers of `rows` lines, `width` each, from the text at `at` in a file; the first line there
+/// has the number `line`.
 pub(super) fn table(
     path: &Path,
     bytes: &[u8],
@@ -201,7 +201,7 @@ impl<'a> Head<'a> {
         Head { path, bytes, next: (0, 1) }
     }
 
-    /// The words of the next line. Fails where the file ends without one, or it is not UTF-8 text.
+    /// The words of the next line. Fails if the file ends without one, or if it is not UTF-8 text.
     pub fn words(&mut self) -> Result<Vec<&'a str>, Error> {
         let (at, line) = self.next;
         let rest = &self.bytes[at..];

@@ -1,15 +1,16 @@
-//! Files beside the clouds of a drive in KITTI's raw layout whose azimuths do not give the time and
-//! sensor of a return: several scanners, or one whose lasers do not fire column by column.
+//! Files next to the clouds of a drive in KITTI's raw layout, for clouds whose azimuths do not give
+//! the time and sensor of a return: from several scanners, or one whose lasers do not fire column
+//! by column.
 //!
 //! | in `velodyne_points` | content |
 //! |---|---|
 //! | `sensors.txt` | the lines below |
 //! | `offset_s/N.bin` | little-endian float32 per return of `data/N.bin`: s after the stamp |
-//! | `sensor/N.bin` | a byte per return: its sensor, counted from 0 |
+//! | `sensor/N.bin` | one byte per return: its sensor, counted from 0 |
 //!
 //! `span: FROM DURATION` is the earliest offset and the duration of a sweep, s; `ground: Z` the
-//! height of the ground in the vehicle frame, m; then one `sensor:` with the 3x4 row-major
-//! `vehicle_from_sensor` of each sensor. A drive has all three or none.
+//! height of the ground in the vehicle frame, m; then for each sensor one line `sensor:` with its
+//! 3x4 row-major `vehicle_from_sensor`. A drive has all three or none.
 
 use std::path::{Path, PathBuf};
 
@@ -21,26 +22,26 @@ use super::poses::pose_from;
 use super::{text, whole};
 use crate::Error;
 
-/// Longest sweep that is believed, s.
+/// Longest accepted sweep, s.
 pub(super) const SPAN_MAX_S: f64 = 1.0;
 
-/// How far a return's time may lie outside the declared span, s: rounding, nothing more.
+/// How far a return's time may lie outside the declared span, s: only rounding.
 const SLACK_S: f32 = 1e-4;
 
 /// The sidecars of a drive.
 pub(super) struct Sidecars {
     /// `velodyne_points`.
     folder: PathBuf,
-    /// Sensors, time span and ground, as `sensors.txt` has them.
+    /// Sensors, time span and ground, from `sensors.txt`.
     pub rig: Rig,
     /// Earliest and latest offset, s.
     limits_s: [f32; 2],
 }
 
 impl Sidecars {
-    /// Of the clouds in `velodyne_points`; `None` where there are no such files.
+    /// Opens those of the clouds in `velodyne_points`; `None` if there are no such files.
     ///
-    /// Fails where one of the three is missing, and where `sensors.txt` is damaged.
+    /// Fails if one of the three is missing, and if `sensors.txt` is damaged.
     pub fn open(velodyne_points: &Path) -> Result<Option<Sidecars>, Error> {
         let path = velodyne_points.join("sensors.txt");
         let found = ["offset_s", "sensor"].map(|name| velodyne_points.join(name).is_dir());
@@ -57,15 +58,15 @@ impl Sidecars {
         Ok(Some(Sidecars { folder: velodyne_points.to_path_buf(), rig, limits_s }))
     }
 
-    /// Fills in time and sensor of the returns of a cloud.
+    /// Fills in the times and sensors of the returns of a cloud.
     ///
-    /// Fails where a file is missing, has not one value per return, or has one that cannot be.
+    /// Fails if a file is missing, does not have one value per return, or has an impossible one.
     pub fn fill(&self, cloud: &Path, points: &mut [Point]) -> Result<(), Error> {
         let (path, bytes) = self.read("offset_s", cloud, points.len(), 4)?;
         let (offsets, _) = bytes.as_chunks::<4>();
         for (n, (point, bytes)) in points.iter_mut().zip(offsets).enumerate() {
             let offset_s = f32::from_le_bytes(*bytes);
-            // Not the other way round: NaN lies within nothing.
+            // Written this way because NaN is in no range.
             if !(self.limits_s[0]..=self.limits_s[1]).contains(&offset_s) {
                 let what = format!("{offset_s} s is outside the span of a sweep in sensors.txt");
                 return Err(Error::input(&path, format!("return {n}"), what));
@@ -83,7 +84,7 @@ impl Sidecars {
         Ok(())
     }
 
-    /// A sidecar's path and content, `width` bytes for each of `returns`.
+    /// A sidecar's path and contents, `width` bytes for each of `returns`.
     fn read(
         &self,
         name: &str,

@@ -1,21 +1,21 @@
-//! A simulated drive as a recording, with its truth.
+//! A simulated drive as a recording, with ground truth.
 
 use raywake_sim::{Drive, Options, Truth, stamp_s};
 
 use super::{Overview, PoseTrack, Source, SourceGaps, SweepData};
 use crate::Error;
 
-/// A drive through a street that a seed draws.
+/// A drive through a street generated from a seed.
 pub struct Simulated {
     overview: Overview,
     drive: Drive,
     seed: u64,
-    /// Truth of the last two sweeps read: index and truth of every return.
+    /// Truth of the last two sweeps read: index of the sweep and truth of every return.
     truth: [(usize, Vec<Truth>); 2],
 }
 
 impl Simulated {
-    /// A drive of some sweeps, at least one.
+    /// A drive of this many sweeps, at least one.
     pub fn new(seed: u64, sweeps: usize) -> Simulated {
         let drive = Drive::new(seed, Options { sweeps: sweeps.max(1), ..Options::default() });
         let stamps_s: Vec<f64> = (0..drive.sweeps()).map(stamp_s).collect();
@@ -63,7 +63,7 @@ impl Source for Simulated {
     fn read(&mut self, index: usize, into: &mut SweepData) -> Result<(), Error> {
         let sweep = self.drive.sweep(index);
         self.overview.begin(index, into);
-        // Exact, where that of a track is made of differences.
+        // Exact, whereas that of a track is derived from differences.
         into.twist = sweep.twist;
         into.points = sweep.points;
         into.dropped = SourceGaps::default();

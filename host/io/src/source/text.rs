@@ -1,10 +1,10 @@
-//! Small text files of numbers, read with the place of every mistake.
+//! Small text files of numbers; errors give the place of the mistake.
 
 use std::path::Path;
 
 use crate::Error;
 
-/// The lines that hold something, each with its number counted from 1.
+/// The lines that are not empty, each with its number counted from 1.
 pub fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     numbered.filter(|(_, line)| !line.is_empty())
@@ -28,8 +28,8 @@ pub fn exactly<const N: usize>(path: &Path, line: usize, text: &str) -> Result<[
     })
 }
 
-/// The `N` numbers after `key` at the start of a line (`Tr: 1 2 …`), with the line's number;
-/// `None` where no line starts so.
+/// The `N` numbers after `key` at the start of a line (`Tr: 1 2 …`), with the line's number; `None`
+/// if no line starts with it.
 pub fn keyed<const N: usize>(
     path: &Path,
     text: &str,

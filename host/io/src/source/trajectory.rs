@@ -1,14 +1,14 @@
-//! Where a vehicle was, over time.
+//! Poses of a vehicle over time.
 
 use raywake_core::pose::Pose;
 
-/// Longest time between two poses that is bridged, ns.
+/// Longest time between two poses that is interpolated, ns.
 const GAP_MAX_NS: i64 = 500_000_000;
 
-/// Where a frame was, over time.
+/// Poses of a frame over time.
 #[derive(Default)]
 pub(super) struct Trajectory {
-    /// Times, ns, and poses; in order of time once it is sorted.
+    /// Times, ns, and poses; ordered by time once sorted.
     rows: Vec<(i64, Pose)>,
 }
 
@@ -21,15 +21,15 @@ impl Trajectory {
         self.rows.sort_by_key(|row| row.0);
     }
 
-    /// The pose at a time, ns; beyond an end by no more than `slack_ns`, the one there.
+    /// The pose at a time, ns; up to `slack_ns` beyond an end, the pose there.
     pub fn near(&self, stamp_ns: i64, slack_ns: i64) -> Option<Pose> {
         let (first, last) = (self.rows.first()?.0, self.rows.last()?.0);
         let inside = stamp_ns.clamp(first, last);
         self.at(inside).filter(|_| inside.abs_diff(stamp_ns) <= slack_ns.unsigned_abs())
     }
 
-    /// The pose at a time, ns, between the two beside it; `None` before the first, after the last
-    /// and in gaps.
+    /// The pose at a time, ns, interpolated between its neighbours; `None` before the first, after
+    /// the last and in gaps.
     pub fn at(&self, stamp_ns: i64) -> Option<Pose> {
         let after = self.rows.partition_point(|row| row.0 < stamp_ns);
         let (end_ns, end) = *self.rows.get(after)?;

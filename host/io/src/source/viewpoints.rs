@@ -1,6 +1,6 @@
-//! Poses in the headers of PCD files, as benchmarks of dynamic points in maps have them
-//! (KTH's DynamicMap Benchmark, DUFOMap): where the sensor was, the points in the world. Others
-//! leave the points in the frame of the sensor; which it is, the farthest cloud tells.
+//! Poses in the headers of PCD files, as in benchmarks of dynamic points in maps (KTH's DynamicMap
+//! Benchmark, DUFOMap): the pose of the sensor, with the points in the world. Other files have the
+//! points in the frame of the sensor; the farthest cloud shows which it is.
 
 use std::path::PathBuf;
 
@@ -12,8 +12,8 @@ use super::median::median;
 use super::pcd;
 use crate::Error;
 
-/// The poses of some clouds, and whether their points are in the world; `None` where not all files
-/// have one, or all the same.
+/// The poses of some clouds, and whether their points are in the world; `None` if not all files
+/// have one, or if all are the same.
 pub(super) fn read(files: &[(u64, PathBuf)]) -> Result<Option<(Vec<Pose>, bool)>, Error> {
     let mut poses = Vec::with_capacity(files.len());
     for (_, path) in files {
@@ -27,13 +27,13 @@ pub(super) fn read(files: &[(u64, PathBuf)]) -> Result<Option<(Vec<Pose>, bool)>
     let farthest = (0..poses.len()).max_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
     let mut points = Vec::new();
     pcd::read(&files[farthest].1, &mut points)?;
-    // Around a sensor points lie densest where it is.
+    // Points are densest around their sensor.
     let sensor = median_distance(&points, poses[farthest].translation);
     let in_world = sensor < median_distance(&points, DVec3::ZERO);
     Ok(Some((poses, in_world)))
 }
 
-/// Takes points from the world to the frame of a pose.
+/// Transforms points from the world to the frame of a pose.
 pub(super) fn leave_world(points: &mut [Point], pose: &Pose) {
     let vehicle_from_world = pose.inverse();
     for point in points {
@@ -53,7 +53,7 @@ mod tests {
     use super::super::tests::Temp;
     use super::super::{OpenOptions, SweepData, Unlocated, open};
 
-    /// A ring around the sensor, which drives along x and looks to the left.
+    /// A ring around the sensor, which drives along x and looks left.
     fn clouds(in_world: bool) -> Temp {
         let t = Temp::new();
         for n in 0..3 {
@@ -103,7 +103,7 @@ mod tests {
                 );
             }
         }
-        // One without, and all the same: no poses.
+        // One file without a pose: no poses.
         let t = clouds(false);
         t.write(
             "1.pcd",

@@ -1,4 +1,4 @@
-//! Files that are read at once: ordinary ones, no longer than any of their kind is.
+//! Files that are read at once: regular ones, no longer than any of their kind.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -8,25 +8,26 @@ use raywake_core::sweep::Point;
 
 use crate::Error;
 
-/// Longest file that is read at once, bytes: 16 million returns of a `.bin`, a hundred times what a
-/// sweep has, and the poses of two million sweeps. It is kept while the file is read, too: a file
-/// may grow.
+/// Longest file that is read at once, bytes: 16 million returns of a `.bin`, a hundred times those
+/// of a sweep, and the poses of two million sweeps. The limit also holds while the file is read: a
+/// file may grow.
 pub(super) const SIZE_MAX: u64 = 256 << 20;
 
-/// What a packed file may unpack to: so many bytes, and so many times its own size. Files of an
-/// Argoverse 2 log unpack to six times theirs at most; zeros pack to nothing, and 16 MiB are 64
-/// bytes for each return of the largest sweep.
+/// What a packed file may unpack to: this many bytes, plus this many times its own size. Files of
+/// an Argoverse 2 log unpack to at most six times their size; zeros pack to nothing, and 16 MiB are
+/// 64 bytes for each return of the largest sweep.
 const UNPACKED_BASE: u64 = 16 << 20;
 const UNPACKED_RATIO: u64 = 64;
-/// What a row takes at least, however little it unpacks to.
+/// Minimum size of a row, however little it unpacks to.
 const ROW: u64 = size_of::<Point>() as u64;
 
-/// Most bytes that what is packed in so many may unpack to.
+/// Maximum number of bytes to which this many packed bytes may unpack.
 pub(super) fn unpacked_max(packed: u64) -> u64 {
     packed.saturating_mul(UNPACKED_RATIO).saturating_add(UNPACKED_BASE)
 }
 
-/// Whether a file that is read at once, of `packed` bytes, may unpack to so many, and so many rows.
+/// Checks that a file that is read at once, of `packed` bytes, may unpack to this many bytes and
+/// rows.
 pub(super) fn check_unpacked(packed: usize, bytes: u64, rows: u64) -> Result<(), String> {
     let most = unpacked_max(packed as u64).min(SIZE_MAX);
     match bytes.max(rows.saturating_mul(ROW)) {
@@ -35,20 +36,20 @@ pub(super) fn check_unpacked(packed: usize, bytes: u64, rows: u64) -> Result<(),
     }
 }
 
-/// The content of a file of at most [`SIZE_MAX`] bytes.
+/// The contents of a file of at most [`SIZE_MAX`] bytes.
 ///
 /// # Errors
-/// What is no ordinary file, and so may never end or never begin, and what is too long.
+/// If it is not a regular file, and so may never end or never begin, and if it is too long.
 pub fn read(path: &Path) -> Result<Vec<u8>, Error> {
     read_up_to(path, SIZE_MAX)
 }
 
-/// Opens an ordinary file. With it comes its length, bytes.
+/// Opens a regular file and returns it with its length, bytes.
 ///
 /// # Errors
-/// As those of [`read`], but that it may be of any length.
+/// As for [`read`], except that it may have any length.
 pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
-    // Asked before it is opened: opening a pipe waits for its other end.
+    // Checked before it is opened: opening a pipe waits for its other end.
     let metadata = path.metadata().map_err(Error::reading(path))?;
     if metadata.is_dir() {
         return Err(Error::reading(path)(io::ErrorKind::IsADirectory.into()));
@@ -59,7 +60,7 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), Error> {
     Ok((File::open(path).map_err(Error::reading(path))?, metadata.len()))
 }
 
-/// The content of a file of at most so many bytes, see [`read`].
+/// The contents of a file of at most this many bytes, see [`read`].
 pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     let too_long = |size: u64| {
         Error::input(path, "", format!("has {size} bytes or more, at most {most} are read"))
@@ -78,7 +79,7 @@ pub(super) fn read_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// The content of a file of text.
+/// The contents of a text file.
 pub fn read_text(path: &Path) -> Result<String, Error> {
     String::from_utf8(read(path)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();

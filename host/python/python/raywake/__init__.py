@@ -35,10 +35,10 @@ from ._raywake import (
     odometry,
 )
 
-#: What became of a return: field ``status`` of its record.
+#: Outcome for a return: field ``status`` of its record.
 STATIC, MOVING, UNMATCHED, OUTSIDE_WINDOW, OVER_CAPACITY, OWN_VEHICLE, NO_ECHO, INVALID = range(8)
 
-#: What a column may be: field ``class_id`` of a record; 255 where nothing is known.
+#: Classes of a column: field ``class_id`` of a record; 255 if unknown.
 CLASSES = (
     "ground",
     "structure",
@@ -89,9 +89,9 @@ class CommandError(RuntimeError):
 
 
 def command(*args: str | os.PathLike[str]) -> str:
-    """Does what ``raywake ARGS`` does, in a process of its own, and returns what it printed.
+    """Does what ``raywake ARGS`` does, in a separate process, and returns what it printed.
 
-    Raises CommandError with what it said where it failed.
+    Raises CommandError with its error message if it fails.
     """
     call = [sys.executable, "-m", "raywake", *map(os.fspath, args)]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
@@ -103,7 +103,7 @@ def command(*args: str | os.PathLike[str]) -> str:
 def clean(
     data: str | os.PathLike[str], out: str | os.PathLike[str], *options: str
 ) -> str:
-    """Removes what moves from a recording: labels, clouds and a map of what stands go to ``out``.
+    """Removes what moves from a recording: writes labels, clouds and a static map to ``out``.
 
     ``options`` are those of ``raywake clean --help``.
     """

@@ -1,22 +1,22 @@
-//! Cars and vans: no side is one plane, so that a piece of it tells how far it has come.
+//! Cars and vans: no side is a single plane, so that a piece of it reveals how far it has moved.
 
 use super::{axle, block, mirrors};
 use crate::object::{Class, Object, Surface};
 use crate::path::Path;
 use crate::rng::Rng;
 
-/// How far the body stays behind the mirrors on each side, m.
+/// How far the body is inset from the mirrors on each side, m.
 const MIRROR: f64 = 0.07;
 
 /// A car: a body that narrows towards both ends, a glazed cabin that narrows towards its roof,
-/// mirrors, wheels that stand out a little.
+/// mirrors, wheels that protrude a little.
 pub fn car(id: u32, path: Path, rng: &mut Rng) -> Object {
     let (l, w, h) = (rng.range(3.7, 4.9), rng.range(1.7, 1.95), rng.range(1.4, 1.65));
     let paint = Surface::matt(rng.range(0.05, 0.7));
     let glass = Surface::glass(paint.reflectivity);
     let (body, waist) = (w - 2.0 * MIRROR, rng.range(0.56, 0.62) * h);
     let (bonnet, nose) = (rng.range(0.8, 0.92) * waist, rng.range(0.62, 0.75) * waist);
-    // Hatchbacks end in their cabin, others in a boot.
+    // Hatchbacks end with their cabin, others with a boot.
     let tail = if rng.chance(0.5) { waist } else { rng.range(0.85, 0.95) * waist };
     let cabin = 0.5 * rng.range(0.48, 0.6) * l;
     let middle = -rng.range(0.02, 0.09) * l;

@@ -1,20 +1,20 @@
-//! Trucks, buses and trams: each one rigid body, however long.
+//! Trucks, buses and trams: each a single rigid body, however long.
 
 use super::{axle, block, mirrors};
 use crate::object::{Class, Object, Part, Surface};
 use crate::path::Path;
 use crate::rng::Rng;
 
-/// Length of a wheel's arch, m.
+/// Length of a wheel arch, m.
 const ARCH: f64 = 1.25;
 
 /// Width of the posts between panes, m.
 const POST: f64 = 0.12;
 
-/// How far panes lie behind their posts, m: they are set in rubber.
+/// How far panes are recessed behind their posts, m: they are set in rubber.
 const INSET: f64 = 0.03;
 
-/// Panes of about `pane` m from `x[0]` to `x[1]`, with posts between them and at both ends.
+/// Panes about `pane` m long from `x[0]` to `x[1]`, with posts between them and at both ends.
 fn windows(
     x: [f64; 2],
     width: f64,
@@ -34,7 +34,7 @@ fn windows(
     parts
 }
 
-/// A truck: cab, a gap, the load over a chassis; a third are semi-trailers.
+/// A truck: cab, a gap, the load on a chassis; a third are semi-trailers.
 pub fn truck(id: u32, path: Path, rng: &mut Rng) -> Object {
     let long = rng.chance(0.33);
     let l = if long { rng.range(12.0, 16.5) } else { rng.range(6.2, 10.0) };
@@ -45,7 +45,7 @@ pub fn truck(id: u32, path: Path, rng: &mut Rng) -> Object {
     let cab = front - rng.range(1.7, 2.3);
     let behind = cab - rng.range(0.25, 0.7);
     let (bed, roof) = (1.05, rng.range(2.6, 3.0f64.min(h)));
-    // A third carry nothing, or something low.
+    // A third carry nothing, or a low load.
     let top = if rng.chance(0.33) { rng.range(1.3, 2.2) } else { h };
     let size = [l, w, top.max(roof)];
     let h = size[2];
@@ -64,8 +64,8 @@ pub fn truck(id: u32, path: Path, rng: &mut Rng) -> Object {
     Object { id, class: Class::Truck, size, base: [0.6 * l, w - 0.35], path, parts }
 }
 
-/// A bus, a quarter of them articulated: panels between its wheels' arches, a band of windows, a
-/// roof, a front and a rear that are a little narrower, mirrors.
+/// A bus, articulated in a quarter of cases: panels between the wheel arches, a band of windows, a
+/// roof, a slightly narrower front and rear, mirrors.
 pub fn bus(id: u32, path: Path, rng: &mut Rng) -> Object {
     let long = rng.chance(0.25);
     let l = if long { rng.range(17.5, 18.4) } else { rng.range(10.4, 13.0) };
@@ -80,7 +80,7 @@ pub fn bus(id: u32, path: Path, rng: &mut Rng) -> Object {
         block([side[1], front], 0.9 * w, [0.3, sill], h, paint),
         block([side[1], front - 0.05], 0.9 * w, [sill, top], h, Surface::glass(0.4)),
         block([side[1], front], 0.9 * w, [top, h - 0.15], h, paint),
-        // What is seen in the arches.
+        // Visible through the arches.
         block(side, w - 0.7, [0.35, sill], h, Surface::matt(0.1)),
         block(side, w, [0.95, sill], h, paint),
         block(side, w, [top, h - 0.1], h, paint),
@@ -99,7 +99,8 @@ pub fn bus(id: u32, path: Path, rng: &mut Rng) -> Object {
     Object { id, class: Class::Bus, size: [l, w, h], base: [0.5 * l, w - 0.32], path, parts }
 }
 
-/// A tram of several sections in line, with bellows between them and gear on the roof.
+/// A tram of several sections in a straight line, with bellows between them and equipment on the
+/// roof.
 pub fn tram(id: u32, path: Path, rng: &mut Rng) -> Object {
     let count = 3 + (3.0 * rng.unit()) as u32;
     let section = rng.range(6.8, 7.3);

@@ -1,4 +1,4 @@
-//! Traffic participants, put together from a few solids each.
+//! Traffic participants, each built from a few solids.
 
 mod cars;
 mod heavy;
@@ -20,13 +20,13 @@ fn part(shape: Shape, at: [f64; 3], height: f64, surface: Surface) -> Part {
     Part { shape, rest: Pose { rotation: DQuat::IDENTITY, translation }, surface, swing: None }
 }
 
-/// A box from `x[0]` to `x[1]` along and from `z[0]` to `z[1]` above the ground, `width` wide.
+/// A box from `x[0]` to `x[1]` lengthwise and from `z[0]` to `z[1]` above the ground, `width` wide.
 fn block(x: [f64; 2], width: f64, z: [f64; 2], height: f64, surface: Surface) -> Part {
     let shape = Shape::cuboid(x[1] - x[0], width, z[1] - z[0]);
     part(shape, [0.5 * (x[0] + x[1]), 0.0, 0.5 * (z[0] + z[1])], height, surface)
 }
 
-/// A wheel that stands on the ground at (x, y), its axle across.
+/// A wheel on the ground at (x, y), its axle across.
 fn wheel(x: f64, y: f64, [radius, width]: [f64; 2], height: f64, surface: Surface) -> Part {
     let mut wheel = part(Shape::cylinder(radius, width), [x, y, radius], height, surface);
     wheel.rest.rotation = DQuat::from_rotation_x(FRAC_PI_2);
@@ -39,7 +39,7 @@ fn axle(x: f64, track: f64, radius: f64, height: f64) -> [Part; 2] {
     [0.5, -0.5].map(|side| wheel(x, side * track, [radius, 0.2], height, rubber))
 }
 
-/// Mirrors that reach to the sides of the box, at x and `z` above the ground.
+/// Mirrors that extend to the sides of the box, at x and `z` above the ground.
 fn mirrors(x: f64, width: f64, z: f64, height: f64, surface: Surface) -> [Part; 2] {
     let (out, shape) = (0.1, Shape::ellipsoid(0.09, 0.1, 0.1));
     [1.0, -1.0].map(|side| part(shape, [x, side * (0.5 * width - out), z], height, surface))
@@ -56,7 +56,7 @@ mod tests {
 
     type Model = fn(u32, Path, &mut Rng) -> Object;
 
-    /// Every model with its class and the shortest and longest it may be, m.
+    /// Every model with its class and its minimum and maximum length, m.
     const ALL: [(Model, Class, [f64; 2]); 8] = [
         (car, Class::Car, [3.5, 5.0]),
         (van, Class::Van, [4.5, 6.5]),

@@ -8,7 +8,7 @@ use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 
-/// A limb that hangs `length` down from `pivot` (its height above the ground) and swings.
+/// A limb that hangs `length` down from `pivot` (given by its height above the ground) and swings.
 fn limb(
     radius: f64,
     length: f64,
@@ -21,18 +21,18 @@ fn limb(
     let mut limb = part(Shape::cylinder(radius, length), at, height, cloth);
     let [amplitude, rate, phase] = swing;
     let pivot = DVec3::new(pivot[0], pivot[1], pivot[2] - 0.5 * height);
-    // Who stands keeps the limbs still, so that nothing of them moves.
+    // The limbs of someone standing do not swing, so that nothing of them moves.
     limb.swing = (rate > 0.0).then_some(Swing { pivot, amplitude, rate, phase });
     limb
 }
 
-/// A part that leans forward by `lean`, rad.
+/// A part leaning forward by `lean`, rad.
 fn leaning(mut part: Part, lean: f64) -> Part {
     part.rest.rotation = DQuat::from_rotation_y(lean);
     part
 }
 
-/// A cyclist: two wheels, frame, rider leaning forward, legs that pedal.
+/// A cyclist: two wheels, frame, rider leaning forward, pedalling legs.
 pub fn cyclist(id: u32, path: Path, rng: &mut Rng) -> Object {
     let h = rng.range(1.6, 1.85);
     let cloth = Surface::matt(rng.range(0.15, 0.6));
@@ -75,7 +75,7 @@ pub fn motorcycle(id: u32, path: Path, rng: &mut Rng) -> Object {
     Object { id, class: Class::Motorcycle, size: [l, 0.76, h], base: [0.0; 2], path, parts }
 }
 
-/// Somebody on foot: torso, head, and legs and arms that swing with the pace.
+/// A person on foot: torso, head, and legs and arms that swing with the pace.
 pub fn pedestrian(id: u32, path: Path, rng: &mut Rng) -> Object {
     let h = rng.range(1.5, 1.92);
     let cloth = Surface::matt(rng.range(0.1, 0.6));

@@ -1,4 +1,4 @@
-//! A car park: rows of parked cars, shelters for trolleys, cars that manoeuvre, people between.
+//! A car park: rows of parked cars, trolley shelters, manoeuvring cars, people in between.
 
 use super::crowd::{Crowd, Model};
 use super::site::{Site, every};
@@ -14,24 +14,24 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Length of a bay, m.
 const BAY_M: f64 = 5.2;
-/// Aisles on either side of the vehicle's.
+/// Number of aisles on either side of the vehicle's.
 const AISLES: i32 = 3;
-/// Between the heads of two rows there is a bed or a path this wide, m.
+/// Width of the bed or path between the heads of two rows, m.
 const BED_M: f64 = 1.6;
 
 pub(super) struct CarPark {
-    /// Width of an aisle and of a bay, m.
+    /// Widths of an aisle and of a bay, m.
     aisle: f64,
     bay: f64,
-    /// Share of the bays that is taken.
+    /// Share of the bays that are taken.
     full: f64,
-    /// Of the vehicle, m/s.
+    /// Speed of the vehicle, m/s.
     speed: f64,
     course: Course,
     wave: [f64; 3],
-    /// Of the rows, m.
+    /// Extent of the rows, m.
     x: [f64; 2],
-    /// Between two groups of bays there is a way across: x of its middle, m.
+    /// x of the middle of the cross aisle, which separates two groups of bays, m.
     across: f64,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct CarPark {
 enum Course {
     Straight,
     Stops,
-    /// Into the way across.
+    /// Into the cross aisle.
     Turns,
 }
 
@@ -60,7 +60,7 @@ impl CarPark {
         }
     }
 
-    /// Between the middles of two aisles.
+    /// Distance between the middles of two aisles.
     fn pitch(&self) -> f64 {
         self.aisle + 2.0 * BAY_M + BED_M
     }
@@ -69,12 +69,12 @@ impl CarPark {
         f64::from(aisle) * self.pitch()
     }
 
-    /// Whether bays at this x would lie on the way across.
+    /// Whether bays at this x would lie in the cross aisle.
     fn crossed(&self, x: f64) -> bool {
         (x - self.across).abs() < 0.5 * self.aisle + 1.5
     }
 
-    /// Middle of every bay and the way in (rad), row by row.
+    /// Centre of every bay and its inward heading (rad), row by row.
     fn bays(&self) -> Vec<[f64; 3]> {
         let count = ((self.x[1] - self.x[0]) / self.bay) as u32;
         let mut bays = Vec::new();
@@ -88,7 +88,7 @@ impl CarPark {
         bays
     }
 
-    /// Trees, lamps, kerbs and low hedges in the beds between the rows.
+    /// Places trees, lamps, kerbs and low hedges in the beds between the rows.
     fn beds(&self, site: &mut Site) {
         for aisle in -AISLES..AISLES {
             let y = self.middle(aisle) + 0.5 * self.pitch();
@@ -102,7 +102,7 @@ impl CarPark {
         }
     }
 
-    /// A shelter over two bays: posts, a roof, panes on three sides, and trolleys in rows.
+    /// A shelter over two bays: posts, a roof, panes on three sides, and rows of trolleys.
     fn shelter(&self, site: &mut Site, bay: [f64; 3]) {
         let (long, wide) = (BAY_M - 0.6, 2.0 * self.bay - 0.8);
         for along in [-0.5 * long, 0.0, 0.5 * long] {
@@ -128,7 +128,7 @@ impl CarPark {
         self.middle(AISLES) + 0.5 * self.pitch()
     }
 
-    /// A market behind a front of glass and pillars, under a roof.
+    /// A supermarket behind a front of glass and pillars, under a roof.
     fn market(&self, site: &mut Site) {
         let [from, to] = self.x;
         let (y, deep, high) = (self.edge() + 10.0, 30.0, site.rng.range(5.0, 8.0));
@@ -142,7 +142,7 @@ impl CarPark {
         }
     }
 
-    /// A fence of mesh on one side, trees behind it.
+    /// A mesh fence on one side, trees behind it.
     fn fence(&self, site: &mut Site) {
         let (mesh, y) = (Surface::porous(0.35, site.rng.range(0.5, 0.85)), -self.edge() - 3.0);
         every(self.x, 2.5, |x| {
@@ -166,7 +166,7 @@ impl CarPark {
         }
     }
 
-    /// Out of a bay in reverse, a halt, and off along the aisle.
+    /// Out of a bay in reverse, a stop, and off along the aisle.
     fn leaving_bay(&self, rng: &mut Rng, [x, y, yaw]: [f64; 3], duration_s: f64) -> Path {
         let (speed, way) = (rng.range(1.0, 1.9), rng.sign());
         let radius = rng.range(4.0, 5.0);
@@ -179,7 +179,7 @@ impl CarPark {
         path.then(1.0, speed, 0.0).then(rng.range(0.3, 1.5), 0.0, 0.0).then(2.0, 1.2, 0.0)
     }
 
-    /// Cars on their way out of bays near the vehicle, and in search of one.
+    /// Cars leaving bays near the vehicle, and cars in search of one.
     fn manoeuvring(&self, crowd: &mut Crowd) {
         let here = 0.5 * self.speed * crowd.duration_s;
         let mut near = self.bays();
@@ -220,7 +220,7 @@ impl CarPark {
         Path::standing(x, y, yaw)
     }
 
-    /// Along an aisle, between parked cars, or here and there with a bend.
+    /// Along an aisle, between parked cars, or in any direction, sometimes with a turn.
     fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
         let speed = rng.range(1.0, 1.6);
         let x = self.speed * 0.5 * duration_s + rng.range(-28.0, 28.0);
@@ -241,7 +241,7 @@ impl CarPark {
     }
 }
 
-/// One thing in a bed, and the kerbs beside it.
+/// One item in a bed, and the kerbs beside it.
 fn bed(site: &mut Site, [x, y]: [f64; 2], planted: bool) {
     match site.count(0, 8) {
         0 => site.forked_tree([x, y]),
@@ -257,13 +257,13 @@ fn bed(site: &mut Site, [x, y]: [f64; 2], planted: bool) {
     }
 }
 
-/// A place in a bay: so far in, so far to the left.
+/// A place in a bay, from its centre: this far in and this far to the left.
 fn within([x, y, yaw]: [f64; 3], along: f64, aside: f64) -> [f64; 3] {
     let (s, c) = yaw.sin_cos();
     [x + along * c - aside * s, y + along * s + aside * c, yaw]
 }
 
-/// Trolleys pushed into one another: wire, most of which rays go through, and wheels below.
+/// Trolleys pushed into one another: wire that most rays pass through, and wheels below.
 fn trolleys(site: &mut Site, at: [f64; 3], long: f64) {
     let [wire, wheels] = [0.55, 0.8].map(|porosity| Surface::porous(0.4, porosity));
     site.raised(Class::Fixture, at, [long, 0.55, 0.55], 0.45, wire);
@@ -278,7 +278,7 @@ fn aisle(rng: &mut Rng) -> i32 {
 impl Layout for CarPark {
     fn ground(&self) -> Ground {
         let far = self.middle(AISLES + 1);
-        // It falls to one side, for the rain.
+        // It slopes to one side, for drainage.
         let level = Bend { curvature: 0.0 };
         let banks = Term::Banks(level, vec![[-far, -0.01 * far], [far, 0.01 * far]]);
         let terms = vec![banks, Term::Wave(self.wave)];
@@ -296,7 +296,7 @@ impl Layout for CarPark {
                 .then_to_speed(self.speed, 1.0, 0.5 * EASE_S),
             Course::Turns => {
                 let turned = Path::from(start.at(0.0)).then_turn(-FRAC_PI_2, 6.0, EASE_S).end();
-                // So that the turn ends in the way across.
+                // So that the turn ends in the cross aisle.
                 let before = (self.across - 1.0 - turned.x) / self.speed;
                 start.then(before.max(0.1), 0.0, 0.0).then_turn(-FRAC_PI_2, 6.0, EASE_S)
             }

@@ -1,22 +1,23 @@
-//! Who and what is in whose way, by the outlines of their boxes on the ground.
+//! Overlaps between paths and fixtures, by the outlines of their boxes on the ground.
 
 use crate::ground::Ground;
 use crate::object::Fixture;
 use crate::path::Path;
 use glam::{DMat3, DVec2, DVec3};
 
-/// Times at which ways are compared, s apart.
+/// Interval between times at which paths are compared, s.
 const CHECK_S: f64 = 0.1;
-/// Before and after a drive to be clear as well, s: sweeps and their truth reach beyond it.
+/// Time before and after a drive that is kept clear as well, s: sweeps and their truth extend
+/// beyond it.
 const BEYOND_S: f64 = 0.2;
-/// What rises less than this above the ground is stepped or driven over, m.
+/// Anything rising less than this above the ground is stepped or driven over, m.
 const STEP_M: f64 = 0.12;
 
 /// A rectangle on the ground.
 #[derive(Clone, Copy, Debug)]
 struct Outline {
     centre: DVec2,
-    /// Along its length, a unit vector.
+    /// Unit vector along its length.
     along: DVec2,
     half: DVec2,
 }
@@ -37,7 +38,7 @@ impl Outline {
         if to.length_squared() > reach * reach {
             return false;
         }
-        // Convex outlines are apart if they are so along a normal of one of their sides.
+        // Convex outlines are apart if they are separated along a normal of one of their sides.
         let extent = |o: &Outline, axis: DVec2| {
             o.half.x * o.along.dot(axis).abs() + o.half.y * o.along.perp().dot(axis).abs()
         };
@@ -46,10 +47,10 @@ impl Outline {
     }
 }
 
-/// What a box covers over time.
+/// The area that a box covers over time.
 #[derive(Clone, Debug)]
 pub(super) struct Way {
-    /// By time; a single one where it never moves.
+    /// By time; a single one if it never moves.
     outlines: Vec<Outline>,
     /// Lowest and highest corner.
     bounds: [DVec2; 2],
@@ -67,7 +68,7 @@ impl Way {
         Way { outlines, bounds, span }
     }
 
-    /// Of a box of this length, width and height, kept clear by `margin` all around (m), on a path
+    /// Of a box of this length, width and height, enlarged by `margin` all around (m), on a path
     /// during a drive.
     pub(super) fn along(path: &Path, size: [f64; 3], margin: f64, duration_s: f64) -> Way {
         let half = 0.5 * DVec2::new(size[0], size[1]) + margin;
@@ -94,7 +95,7 @@ impl Way {
         Way::of(vec![outline], [middle - around.z, middle + around.z])
     }
 
-    /// Whether the two are ever in the same place.
+    /// Whether the two are ever in the same place at the same time.
     pub(super) fn meets(&self, other: &Way) -> bool {
         let apart = |axis: usize| {
             self.bounds[1][axis] < other.bounds[0][axis]
@@ -110,7 +111,7 @@ impl Way {
     }
 }
 
-/// Half extents along the axes of a box that holds the turned one.
+/// Half extents, along the axes, of the box around the rotated one.
 fn extents(turn: &DMat3, half: DVec3) -> DVec3 {
     turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z
 }

@@ -1,4 +1,4 @@
-//! A country road: banks, ditches, hedges dense and gappy, wooden fences, single trees, reflectors.
+//! A country road: banks, ditches, dense and gappy hedges, wooden fences, single trees, reflectors.
 
 use super::crowd::{Crowd, Model};
 use super::site::{Site, away, every};
@@ -12,19 +12,19 @@ use crate::relief::{Relief, Term};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// How much longer than a drive a path bends along the road, s.
+/// How much longer than a drive a path continues along the road, s.
 const ON_S: f64 = 20.0;
 
 pub(super) struct Country {
     axis: Bend,
-    /// Half of the road's width, m.
+    /// Half the road's width, m.
     half: f64,
     /// Profiles of the right and the left side: distance from the road's edge and height, m.
     sides: [Vec<[f64; 2]>; 2],
     wave: [f64; 3],
-    /// Of the vehicle, m/s.
+    /// Speed of the vehicle, m/s.
     speed: f64,
-    /// The vehicle brakes to a stop rather than going on.
+    /// The vehicle brakes sharply rather than keeping its speed.
     stops: bool,
     stations: [f64; 2],
 }
@@ -56,7 +56,7 @@ impl Country {
     pub(super) fn drawn(rng: &mut Rng, duration_s: f64) -> Country {
         let speed = if rng.chance(0.1) { 0.0 } else { rng.range(9.0, 22.0) };
         let end = speed * duration_s + VIEW_M;
-        // No road here turns by more than a radian and a half.
+        // No road here turns by more than 1.5 radians.
         let sharpest = (1.0 / 140.0f64).min(1.5 / (end + VIEW_M));
         let curvature = if rng.chance(0.25) { 0.0 } else { rng.range(-sharpest, sharpest) };
         Country {
@@ -70,12 +70,12 @@ impl Country {
         }
     }
 
-    /// Offset of a place `out` beyond the road's edge on a side.
+    /// Offset of a place `out` metres beyond the road's edge on this side.
     fn beyond(&self, side: f64, out: f64) -> f64 {
         side * (self.half + out)
     }
 
-    /// Where the bank of a side ends, from the road's edge, m.
+    /// Distance of the end of a side's bank from the road's edge, m.
     fn foot(&self, side: f64) -> f64 {
         let points = &self.sides[usize::from(side > 0.0)];
         points[points.len() - 2][0]
@@ -142,7 +142,7 @@ impl Country {
         });
     }
 
-    /// Thin posts with wire between, which few rays meet.
+    /// Thin posts with wire in between, which few rays hit.
     fn wire_fence(&self, site: &mut Site, stretch: [f64; 2], offset: f64) {
         let (step, wire) = (site.rng.range(2.5, 4.0), Surface::porous(0.3, 0.93));
         every(stretch, step, |station| {
@@ -186,7 +186,7 @@ impl Country {
         }
     }
 
-    /// Poles that carry a line along one side.
+    /// Poles that carry a power line along one side.
     fn line(&self, site: &mut Site) {
         let offset = self.beyond(1.0, self.foot(1.0) + 4.0);
         every(self.stations, site.rng.range(35.0, 55.0), |station| {
@@ -195,7 +195,7 @@ impl Country {
         });
     }
 
-    /// Somebody in a lane who is somewhere near the vehicle at some time.
+    /// Someone in a lane who is somewhere near the vehicle at some time.
     fn driving(&self, rng: &mut Rng, long_s: f64, beside: f64, speeds: [f64; 2]) -> Path {
         let (way, speed) = (rng.sign(), rng.range(speeds[0], speeds[1]));
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-60.0, 60.0));
@@ -207,7 +207,7 @@ impl Country {
         }
     }
 
-    /// Brakes or speeds up from a time on.
+    /// Brakes or accelerates from a certain time on.
     fn changing(
         &self,
         rng: &mut Rng,

@@ -1,4 +1,4 @@
-//! Who moves and who is parked: each on a way clear of fixtures, of the others and of the vehicle.
+//! Moving and parked objects: each on a path clear of fixtures, of the others and of the vehicle.
 
 use super::clearance::Way;
 use crate::ground::Ground;
@@ -6,9 +6,9 @@ use crate::object::{Fixture, Object};
 use crate::path::Path;
 use crate::rng::Rng;
 
-/// Tries to find a clear way for somebody.
+/// Attempts at finding a clear path for an object.
 const TRIES: u32 = 15;
-/// Kept clear around everybody, m.
+/// Margin kept clear around every object, m.
 const MARGIN_M: f64 = 0.1;
 
 /// One of [`crate::models`].
@@ -18,14 +18,14 @@ pub(super) type Model = fn(u32, Path, &mut Rng) -> Object;
 pub(super) struct Crowd<'a> {
     pub(super) objects: Vec<Object>,
     pub(super) rng: &'a mut Rng,
-    /// Of the drive, s.
+    /// Duration of the drive, s.
     pub(super) duration_s: f64,
     density: f64,
     taken: Vec<Way>,
 }
 
 impl<'a> Crowd<'a> {
-    /// Nobody yet, among these fixtures and the vehicle on its way.
+    /// An empty crowd among these fixtures, with the vehicle on its path.
     pub(super) fn new(
         (ground, fixtures): (&Ground, &[Fixture]),
         vehicle: Way,
@@ -37,7 +37,7 @@ impl<'a> Crowd<'a> {
         Crowd { objects: Vec::new(), rng, duration_s, density, taken }
     }
 
-    /// Adds somebody if the path is clear, and says so.
+    /// Adds an object if its path is clear; returns whether it was.
     pub(super) fn offer(&mut self, model: Model, path: Path) -> bool {
         let object = model(self.objects.len() as u32 + 1, path, self.rng);
         let way = Way::along(&object.path, object.size, MARGIN_M, self.duration_s);
@@ -49,14 +49,14 @@ impl<'a> Crowd<'a> {
         clear
     }
 
-    /// Adds somebody who stands there with the density as probability, if there is room.
+    /// Adds a stationary object there, with the density as probability, if there is room.
     pub(super) fn park(&mut self, model: Model, path: Path) {
         if self.rng.chance(self.density) {
             self.offer(model, path);
         }
     }
 
-    /// So many of a kind at the density 1, each on the first drawn path that is clear.
+    /// Adds this many of a kind at density 1, each on the first drawn path that is clear.
     pub(super) fn add(
         &mut self,
         amount: f64,

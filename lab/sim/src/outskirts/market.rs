@@ -1,4 +1,4 @@
-//! A market street: fronts with rooms behind, stalls, scaffolds, and a crowd.
+//! A market street: house fronts with rooms behind, stalls, scaffolds, and a crowd.
 
 use super::crowd::Crowd;
 use super::openings::Front;
@@ -16,13 +16,13 @@ use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Half width of what is kept free for those who walk and deliver, m.
+/// Half width of the strip kept free for walking and deliveries, m.
 const FREE_M: f64 = 2.2;
 
 pub(super) struct Market {
-    /// From the middle to the fronts, m.
+    /// Distance from the middle to the fronts, m.
     half: f64,
-    /// Of the vehicle, m/s.
+    /// Speed of the vehicle, m/s.
     speed: f64,
     stops: bool,
     x: [f64; 2],
@@ -52,7 +52,7 @@ impl Market {
             }
             x += long;
             if site.rng.chance(0.15) {
-                // An alley, with a wall across it farther back.
+                // An alley, with a wall across its far end.
                 let wide = site.rng.range(1.5, 4.0);
                 let back = [x + 0.5 * wide, y + side * site.rng.range(9.0, 25.0), 0.0];
                 site.block(Class::Building, back, [wide + 6.0, 0.4, 6.0], Surface::matt(0.4));
@@ -61,7 +61,7 @@ impl Market {
         }
     }
 
-    /// Standards in two rows, boards on every lift, guard rails, braces, a net here and there.
+    /// Standards in two rows, boards on every lift, guard rails, braces, an occasional net.
     fn scaffold(&self, site: &mut Site, [from, to]: [f64; 2], side: f64) {
         let (step, lift, steel) = (2.5, 2.0, Surface::matt(0.4));
         let rows = [self.half - 0.35, self.half - 1.25].map(|y| side * y);
@@ -88,7 +88,7 @@ impl Market {
         }
     }
 
-    /// A table with goods under an awning on four posts, a cloth behind.
+    /// A table with goods under an awning on four posts, a cloth behind it.
     fn stall(&self, site: &mut Site, x: f64, side: f64) {
         let (long, deep) = (site.rng.range(2.0, 3.6), site.rng.range(1.2, 1.8));
         let y = side * (FREE_M + 0.35 + 0.5 * deep);
@@ -111,7 +111,8 @@ impl Market {
         }
     }
 
-    /// A sheet that falls towards the middle of the street, from `heights[1]` to `heights[0]`.
+    /// A sheet that slopes down towards the middle of the street, from `heights[1]` to
+    /// `heights[0]`.
     fn awning(&self, site: &mut Site, at: [f64; 3], size: [f64; 2], heights: [f64; 2]) {
         let [x, y, side] = at;
         let slope = side * (heights[1] - heights[0]).atan2(size[1]);
@@ -161,7 +162,7 @@ impl Market {
         site.leaves([x, y], [1.2, 0.7, 0.8], 0.4, 0.4);
     }
 
-    /// Somebody who walks up or down the street near the vehicle, perhaps with a bend.
+    /// Someone walking up or down the street near the vehicle, perhaps with a turn.
     fn walking(&self, rng: &mut Rng, duration_s: f64) -> Path {
         let (way, speed) = (rng.sign(), rng.range(0.5, 1.6));
         let t = rng.range(0.0, duration_s);
@@ -192,7 +193,7 @@ fn goods(site: &mut Site, [x, y]: [f64; 2], [long, deep]: [f64; 2]) {
     }
 }
 
-/// A board that says what there is to eat.
+/// A menu board.
 fn menu(site: &mut Site, [x, y]: [f64; 2]) {
     let yaw = site.rng.range(0.0, PI);
     site.block(Class::Fixture, [x, y, yaw], [0.05, 0.7, 1.1], Surface::matt(0.3));

@@ -1,7 +1,8 @@
-//! A second kind of scenery, to be tested on and never trained or tuned on: none of what is put up
-//! or drawn here comes from the builders of the first ([`crate::street`], [`crate::traffic`]).
+//! A second kind of scenery, for testing only, never for training or tuning: nothing that is placed
+//! or drawn here comes from the builders of the first kind ([`crate::street`], [`crate::traffic`]).
 //!
-//! Solids, models of vehicles and people, paths, relief and casting are the simulator's own.
+//! Solids, models of vehicles and people, paths, relief and casting are shared with the rest of the
+//! simulator.
 
 mod car_park;
 mod clearance;
@@ -30,9 +31,9 @@ use std::f64::consts::PI;
 
 /// Length, width and height of the vehicle that carries the sensors, m.
 const VEHICLE: [f64; 3] = [4.6, 1.9, 2.2];
-/// Kept clear around it, m.
+/// Margin kept clear around it, m.
 const MARGIN_M: f64 = 0.35;
-/// How far ahead and behind there is something to see, m.
+/// How far ahead and behind the scene extends, m.
 const VIEW_M: f64 = 120.0;
 
 /// A kind of place.
@@ -44,9 +45,9 @@ pub enum Place {
     Motorway,
     /// Traffic circling a planted mound.
     Roundabout,
-    /// Rows of parked cars, people among them, cars that manoeuvre.
+    /// Rows of parked cars, people among them, manoeuvring cars.
     CarPark,
-    /// Fronts with rooms behind, stalls, scaffolds, a crowd.
+    /// House fronts with rooms behind, stalls, scaffolds, a crowd.
     Market,
     /// Houses in gardens behind fences, hedges and walls.
     Residential,
@@ -63,7 +64,7 @@ impl Place {
         Place::Residential,
     ];
 
-    /// The one that a seed draws.
+    /// The place drawn by a seed.
     pub fn drawn(seed: u64) -> Place {
         let mut rng = Rng::split(seed, 4);
         Place::ALL[(rng.unit() * Place::ALL.len() as f64) as usize]
@@ -102,7 +103,7 @@ trait Layout {
     fn populate(&self, crowd: &mut Crowd);
 }
 
-/// A scene of a kind around a drive of its own, and the vehicle's path through it.
+/// Draws a scene of this kind around its own drive, and the vehicle's path through it.
 pub(crate) fn draw(place: Place, seed: u64, duration_s: f64, density: f64) -> (Scene, Path) {
     let mut rng = Rng::split(seed, 5);
     let [x, y, yaw] = [200.0, 200.0, PI].map(|far| rng.range(-far, far));

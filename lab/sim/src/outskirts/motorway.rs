@@ -14,28 +14,28 @@ use std::f64::consts::TAU;
 
 /// Width of a lane, m.
 const LANE_M: f64 = 3.6;
-/// Between the middle and the first lane, m.
+/// Distance between the middle and the first lane, m.
 const INNER_M: f64 = 2.0;
 /// Width of the hard shoulder, m.
 const SHOULDER_M: f64 = 2.8;
-/// How much longer than a drive a path bends along the road, s.
+/// How much longer than a drive a path continues along the road, s.
 const ON_S: f64 = 20.0;
 
 pub(super) struct Motorway {
     axis: Bend,
-    /// Each way.
+    /// Lanes each way.
     lanes: u32,
-    /// Of the vehicle, from the outer one.
+    /// The vehicle's lane, counted from the outer one.
     lane: u32,
-    /// m/s.
+    /// Speed of the vehicle, m/s.
     speed: f64,
     wave: [f64; 3],
-    /// Height of the land beyond the shoulders over the road, right and left, m.
+    /// Height of the land beyond the shoulders relative to the road, right and left, m.
     land: [f64; 2],
     stations: [f64; 2],
 }
 
-/// What stands beyond the guard rail.
+/// What lies beyond the guard rail.
 #[derive(Clone, Copy)]
 enum Border {
     NoiseWall,
@@ -70,7 +70,7 @@ impl Motorway {
         INNER_M + LANE_M * f64::from(self.lanes) + SHOULDER_M
     }
 
-    /// Posts and a rail of two waves.
+    /// Posts and a rail with two corrugations.
     fn guard_rail(&self, site: &mut Site, offset: f64) {
         let (step, steel) = (2.0, Surface::matt(0.55));
         every(self.stations, step, |station| {
@@ -85,7 +85,7 @@ impl Motorway {
         });
     }
 
-    /// A concrete barrier, wide at its foot.
+    /// A concrete barrier with a wide foot.
     fn barrier(&self, site: &mut Site) {
         let (long, concrete) = (6.0, Surface::matt(0.45));
         let height = site.rng.range(0.8, 1.1);
@@ -117,7 +117,7 @@ impl Motorway {
         }
     }
 
-    /// Panels between steel posts, here and there one of glass.
+    /// Panels between steel posts, some with glass on top.
     fn noise_wall(&self, site: &mut Site, stretch: [f64; 2], side: f64) {
         let (step, height) = (site.rng.range(3.5, 5.0), site.rng.range(2.5, 5.0));
         let offset = side * (self.edge() + site.rng.range(1.2, 2.2));
@@ -136,7 +136,7 @@ impl Motorway {
         });
     }
 
-    /// Bushes and trees behind the rail, so many a metre.
+    /// Bushes and trees behind the rail, `a_metre` of them per metre.
     fn planted(&self, site: &mut Site, [from, to]: [f64; 2], side: f64, a_metre: f64) {
         for _ in 0..((to - from) * a_metre) as u32 {
             let out = 1.5 + 20.0 * site.rng.unit();
@@ -148,7 +148,7 @@ impl Motorway {
         }
     }
 
-    /// Legs, a beam over both roads, signs on it.
+    /// Legs, a beam across both carriageways, signs on it.
     fn gantry(&self, site: &mut Site, station: f64) {
         let (out, high, steel) = (self.edge() + 0.9, 6.2, Surface::matt(0.5));
         for side in [-1.0, 1.0] {
@@ -167,14 +167,15 @@ impl Motorway {
         }
     }
 
-    /// In a lane either way, beside or near the vehicle at some time of the drive.
+    /// In a lane either way, near the vehicle at some time of the drive.
     fn driving(&self, rng: &mut Rng, long_s: f64, way: f64, lane: u32, speed: f64) -> Path {
         let (t, ahead) = (rng.range(0.0, long_s), rng.range(-70.0, 90.0));
         let station = self.speed * t + ahead - way * speed * t;
         self.axis.follow([station, -way * self.lane(lane)], way, speed, long_s + ON_S)
     }
 
-    /// All that goes one way: who comes towards the vehicle is soon behind it, so there are more.
+    /// All traffic in one direction; oncoming vehicles are soon behind the vehicle, so there are
+    /// more.
     fn one_way(&self, crowd: &mut Crowd, way: f64) {
         let a_second = if way < 0.0 { 0.2 } else { 0.03 };
         let more = 1.0 + a_second * crowd.duration_s;
@@ -206,7 +207,7 @@ impl Layout for Motorway {
     fn ground(&self) -> Ground {
         let edge = self.edge() + 1.5;
         let [right, left] = self.land;
-        // Two metres of run for each of rise.
+        // Slopes with two metres of run per metre of rise.
         let points = vec![
             [-edge - 2.0 * right.abs() - 1.0, right],
             [-edge, 0.0],
@@ -240,7 +241,7 @@ impl Layout for Motorway {
         for way in [1.0, -1.0] {
             self.one_way(crowd, way);
         }
-        // Somebody has stopped on the shoulder.
+        // A truck has stopped on the shoulder.
         crowd.add(1.0, models::truck, |r, _| {
             let side = r.sign();
             let place = [r.range(0.0, self.stations[1]), side * (self.edge() - 1.3)];

@@ -1,4 +1,4 @@
-//! House fronts with openings one sees through into rooms: walls behind walls.
+//! House fronts with openings that give a view into rooms: walls behind walls.
 
 use super::site::Site;
 use crate::object::{Class, Surface};
@@ -15,8 +15,8 @@ pub(super) struct Front {
     pub(super) y: f64,
 }
 
-/// Openings of a storey: how high they begin and end over its floor, their width and the width of
-/// the piers between, m.
+/// Openings of a storey: the heights above its floor where they begin and end, their width and the
+/// width of the piers between them, m.
 struct Openings {
     from: f64,
     to: f64,
@@ -29,14 +29,14 @@ impl Front {
         self.x[1] - self.x[0]
     }
 
-    /// A place at x, so far behind the face.
+    /// A place at x, this far behind the face.
     fn behind(&self, x: f64, back: f64) -> [f64; 3] {
         [x, self.y + self.y.signum() * back, 0.0]
     }
 }
 
 impl Site<'_> {
-    /// A house: two storeys with rooms, a block above, something solid behind.
+    /// A house: two storeys with rooms, a block above, a solid block behind.
     pub(super) fn open_house(&mut self, front: Front) {
         let wall = Surface::matt(self.rng.range(0.2, 0.65));
         let (storey, storeys) = (self.rng.range(2.9, 3.8), self.count(2, 5));
@@ -57,7 +57,7 @@ impl Site<'_> {
         self.block(Class::Building, back, [front.length(), 4.0, 2.0 * storey + above], wall);
     }
 
-    /// Shop windows below, windows above.
+    /// Shop windows on the ground floor, ordinary windows above.
     fn openings(&mut self, shop: bool, storey: f64) -> Openings {
         let head = storey - self.rng.range(0.35, 0.7);
         if shop {
@@ -68,7 +68,7 @@ impl Site<'_> {
         Openings { from, to: head, wide, pier: self.rng.range(0.6, 1.6) }
     }
 
-    /// One storey's front: a band below, a band above, piers, and what fills the openings.
+    /// The front of one storey: a band below, a band above, piers, and whatever fills the openings.
     fn storey(&mut self, front: Front, floor: f64, tall: f64, o: &Openings, wall: Surface) {
         let middle = front.behind(0.5 * (front.x[0] + front.x[1]), 0.5 * THICK_M);
         let sunk = if floor == 0.0 { 0.4 } else { 0.0 };
@@ -95,7 +95,7 @@ impl Site<'_> {
         }
     }
 
-    /// A pane, set back; a door or shutter; or nothing at all.
+    /// A recessed pane; a door or shutter; or nothing.
     fn filling(&mut self, front: Front, x: f64, [wide, tall]: [f64; 2], lift: f64) {
         let back = self.rng.range(0.06, 0.25);
         let at = front.behind(x, back);
@@ -103,7 +103,7 @@ impl Site<'_> {
             0..2 => {}
             2 => self.raised(Class::Building, at, [wide, 0.05, tall], lift, Surface::matt(0.4)),
             _ => {
-                // Most rays go through clean glass; some come back, some are lost.
+                // Most rays pass through clean glass; some return, some are lost.
                 let through = self.rng.range(0.4, 0.85);
                 let pane = Surface { porosity: through, ..Surface::glass(0.3) };
                 self.raised(Class::Building, at, [wide, 0.03, tall], lift, pane);

@@ -1,4 +1,4 @@
-//! Trees, bushes and hedges: trunks that fork, crowns at the ends of branches, hedges with gaps.
+//! Trees, bushes and hedges: forked trunks, crowns at the ends of branches, hedges with gaps.
 
 use super::site::{Site, away};
 use crate::object::{Class, Surface};
@@ -24,7 +24,7 @@ impl Site<'_> {
         }
     }
 
-    /// A slim tree, leaves all along its trunk from some height on.
+    /// A slender tree with leaves all along its trunk from a certain height.
     pub(super) fn column_tree(&mut self, at: [f64; 2]) {
         let (height, wide) = (self.rng.range(5.0, 12.0), self.rng.range(0.9, 1.9));
         self.post(Class::Pole, at, [trunk_radius(height), 0.9 * height]);
@@ -37,7 +37,7 @@ impl Site<'_> {
         }
     }
 
-    /// A bush of stems that spread from one root, leaves around each.
+    /// A bush of stems spreading from one root, with leaves around each.
     pub(super) fn spread_bush(&mut self, at: [f64; 2]) {
         let (height, porosity) = (self.rng.range(0.6, 2.2), self.rng.range(0.4, 0.85));
         for _ in 0..self.count(3, 7) {
@@ -48,14 +48,14 @@ impl Site<'_> {
         }
     }
 
-    /// A piece of trimmed hedge at (x, y, yaw), so long, wide and high.
+    /// A piece of trimmed hedge at (x, y, yaw) of this length, width and height.
     pub(super) fn trimmed_hedge(&mut self, at: [f64; 3], size: [f64; 3]) {
         let leaves = Surface::porous(0.45, self.rng.range(0.08, 0.35));
         self.block(Class::Vegetation, at, size, leaves);
     }
 }
 
-/// Radius of the trunk of a slim tree, m.
+/// Radius of the trunk of a slender tree, m.
 fn trunk_radius(height: f64) -> f64 {
     0.012 * height + 0.03
 }

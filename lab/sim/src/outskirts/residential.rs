@@ -17,25 +17,25 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 /// Width of a footpath beside the road, m.
 const PATH_M: f64 = 1.6;
-/// How much longer than a drive a path is laid, s.
+/// How much longer than a drive a path lasts, s.
 const ON_S: f64 = 20.0;
 /// Longer than any drive, s.
 const LONG_S: f64 = 1e4;
-/// Width of a drive to a garage, m.
+/// Width of a garage's driveway, m.
 const DRIVE_M: f64 = 3.4;
 
 pub(super) struct Residential {
     axis: Bend,
     /// Half width of the road, m.
     half: f64,
-    /// Of the vehicle, m/s.
+    /// Speed of the vehicle, m/s.
     speed: f64,
     stops: bool,
-    /// How much higher gardens lie than the road, right and left, m.
+    /// Height of the gardens above the road, right and left, m.
     gardens: [f64; 2],
     wave: [f64; 3],
     stations: [f64; 2],
-    /// Station and side of every plot's drive.
+    /// Station and side of every plot's driveway.
     drives: Vec<[f64; 2]>,
     plots: Vec<Plot>,
 }
@@ -46,7 +46,7 @@ struct Plot {
     side: f64,
     from: f64,
     to: f64,
-    /// From the footpath to the house, m.
+    /// Distance from the footpath to the house, m.
     garden: f64,
 }
 
@@ -89,7 +89,7 @@ impl Residential {
         self.axis.at(station, self.edge(side) + side * out)
     }
 
-    /// What parts a garden from the footpath, with a gap for the drive.
+    /// Whatever separates a garden from the footpath, with a gap for the driveway.
     fn border(&self, site: &mut Site, plot: Plot) {
         let stretch = [plot.from, plot.to - DRIVE_M - 1.2];
         match site.count(0, 10) {
@@ -123,14 +123,14 @@ impl Residential {
         }
     }
 
-    /// Pieces of a stretch, about `step` long each: their middle and length.
+    /// Splits a stretch into pieces about `step` long; passes on their middle and length.
     fn pieces(&self, [from, to]: [f64; 2], step: f64, mut put: impl FnMut(f64, f64)) {
         let count = ((to - from) / step).ceil().max(1.0);
         let long = (to - from) / count;
         (0..count as u32).for_each(|n| put(from + long * (f64::from(n) + 0.5), long));
     }
 
-    /// Posts and mesh, through which most rays go.
+    /// Posts and mesh that most rays pass through.
     fn chain_link(&self, site: &mut Site, side: f64, stretch: [f64; 2]) {
         let (high, mesh) = (site.rng.range(0.9, 1.9), site.rng.range(0.6, 0.9));
         self.pieces(stretch, 2.5, |middle, long| {
@@ -168,7 +168,7 @@ impl Residential {
         }
     }
 
-    /// A terrace before the house, with a rail.
+    /// A terrace in front of the house, with a rail.
     fn terrace(&self, site: &mut Site, plot: Plot, station: f64, long: f64) {
         let high = site.rng.range(0.3, 1.0);
         let at = self.at(station, plot.side, plot.garden - 1.2);
@@ -197,7 +197,7 @@ impl Residential {
         }
     }
 
-    /// A garage at the end of a drive: walls, a roof, its door shut or open.
+    /// A garage at the end of a driveway: walls, a roof, its door shut or open.
     fn garage(&self, site: &mut Site, [station, side]: [f64; 2], garden: f64) {
         let (deep, high, wall) = (5.8, 2.4, Surface::matt(0.45));
         let out = garden + 1.5;
@@ -215,7 +215,7 @@ impl Residential {
         }
     }
 
-    /// Trees, bushes, swings and stacked wood behind the border, bins before it.
+    /// Trees, bushes, swings and stacked wood behind the border, bins in front of it.
     fn garden(&self, site: &mut Site, plot: Plot) {
         for _ in 0..site.count(2, 8) {
             let station = site.rng.range(plot.from, plot.to - DRIVE_M - 1.5);
@@ -245,14 +245,14 @@ impl Residential {
         self.axis.follow([station, -way * beside], way, speed, long_s + ON_S)
     }
 
-    /// On the footpath of either side, either way.
+    /// On the footpath of either side, in either direction.
     fn walking(&self, rng: &mut Rng, long_s: f64) -> Path {
         let path = self.half + rng.range(0.4, PATH_M - 0.3);
         let beside = path * rng.sign();
         self.driving(rng, long_s, beside, [0.8, 1.8])
     }
 
-    /// A car on a drive, and one by the road.
+    /// A car on a driveway, and one by the road.
     fn parked(&self, crowd: &mut Crowd, [station, side]: [f64; 2]) {
         let out = if crowd.rng.chance(0.4) { 0.0 } else { PI };
         let [x, y, yaw] = self.at(station, side, crowd.rng.range(2.6, 3.2));
@@ -265,7 +265,7 @@ impl Residential {
         }
     }
 
-    /// Out of a drive in reverse, a halt on the road, and off.
+    /// Out of a driveway in reverse, a stop on the road, and off.
     fn backing(&self, rng: &mut Rng, long_s: f64) -> Path {
         let near = |d: &&[f64; 2]| (d[0] - 0.5 * self.speed * long_s).abs() < 35.0;
         let drives: Vec<_> = self.drives.iter().filter(near).collect();
@@ -281,7 +281,7 @@ impl Residential {
     }
 }
 
-/// A roof over a house of this size: a beam that stands on one of its edges.
+/// A roof for a house of this size: a beam that lies on one of its edges.
 fn roof(site: &mut Site, [x, y, yaw]: [f64; 3], [long, deep, high]: [f64; 3]) {
     let slant = deep / 2.0f64.sqrt();
     let turn = DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(FRAC_PI_4);
@@ -290,7 +290,7 @@ fn roof(site: &mut Site, [x, y, yaw]: [f64; 3], [long, deep, high]: [f64; 3]) {
     site.fix(Class::Building, shape, Pose::new(turn, at), Surface::matt(0.25));
 }
 
-/// Something that grows or stands in a garden.
+/// A plant or an object in a garden.
 fn in_garden(site: &mut Site, at: [f64; 3]) {
     let [x, y, _] = at;
     match site.count(0, 9) {
@@ -303,7 +303,7 @@ fn in_garden(site: &mut Site, at: [f64; 3]) {
     }
 }
 
-/// Two slanting pairs of legs and a beam.
+/// Two pairs of slanted legs and a beam.
 fn swing(site: &mut Site, [x, y, yaw]: [f64; 3]) {
     let ((s, c), wood) = (yaw.sin_cos(), Surface::matt(0.35));
     for (end, leg) in [(-1.0, -0.6), (-1.0, 0.6), (1.0, -0.6), (1.0, 0.6)] {
@@ -325,7 +325,7 @@ impl Layout for Residential {
     fn ground(&self) -> Ground {
         let edge = self.half + PATH_M;
         let [right, left] = self.gardens;
-        // A dropped kerb, and gardens that rise behind the footpath.
+        // A dropped kerb, and gardens that slope behind the footpath.
         let points = vec![
             [-edge - 2.5, 0.09 + right],
             [-edge, 0.09],

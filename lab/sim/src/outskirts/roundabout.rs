@@ -1,4 +1,5 @@
-//! A roundabout: traffic circles a planted mound, comes and goes on its arms; cyclists go around.
+//! A roundabout: traffic circles a planted mound, arrives and leaves on its arms; cyclists go
+//! around.
 
 use super::crowd::{Crowd, Model};
 use super::site::{Site, away};
@@ -12,21 +13,21 @@ use crate::relief::{Relief, Term};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Distance of a lane's middle from the middle of an arm, m.
+/// Distance of a lane's centre from the middle of an arm, m.
 const LANE_M: f64 = 1.8;
 /// Half width of an arm, m.
 const ARM_M: f64 = 3.7;
-/// How much longer than a drive a path is laid, s.
+/// How much longer than a drive a path lasts, s.
 const ON_S: f64 = 20.0;
 
 pub(super) struct Roundabout {
-    /// Of the mound, the middle of the ring and its outer edge, m.
+    /// Radii of the mound, the middle of the ring and its outer edge, m.
     radii: [f64; 3],
     height: f64,
     /// Headings of the arms, outwards, rad.
     arms: Vec<f64>,
     wave: [f64; 3],
-    /// What the vehicle does, its speed and the angle at which it begins.
+    /// The vehicle's course, its speed and the angle at which it begins.
     vehicle: (Course, f64, f64),
 }
 
@@ -34,9 +35,9 @@ pub(super) struct Roundabout {
 enum Course {
     /// Round and round.
     Circles,
-    /// Comes on an arm and stops before the ring.
+    /// Arrives on an arm and stops before the ring.
     Yields,
-    /// Comes on an arm and takes the ring.
+    /// Arrives on an arm and enters the ring.
     Enters,
 }
 
@@ -45,7 +46,7 @@ fn arc_s(angle: f64, radius: f64, speed: f64) -> f64 {
     angle * radius / speed
 }
 
-/// A place at an angle, so far from the middle.
+/// A place at this angle and distance from the middle.
 fn around_middle(angle: f64, far: f64) -> [f64; 2] {
     away([0.0; 2], angle, far)
 }
@@ -76,7 +77,7 @@ impl Roundabout {
         }
     }
 
-    /// A place on an arm: so far out, so far to the left of the way out.
+    /// A place on an arm: this far out, and this far to the left when looking outwards.
     fn on_arm(&self, arm: f64, out: f64, left: f64) -> [f64; 2] {
         let (s, c) = arm.sin_cos();
         [out * c - left * s, out * s + left * c]
@@ -89,15 +90,15 @@ impl Roundabout {
         Path::from(start).then(long_s, 0.0, 1.0 / away)
     }
 
-    /// Radius of the bends into the ring and out of it, m; the distance out at which they meet the
-    /// arm's lane, and the angle about the middle over which they bend.
+    /// Radius of the curves into and out of the ring, m; the distance out at which they meet the
+    /// arm's lane, and the angle around the middle that they span.
     fn bend(&self) -> (f64, f64, f64) {
         let (radius, aside) = (12.0, LANE_M + 12.0);
         let out = ((self.radii[1] + radius).powi(2) - aside * aside).max(1.0).sqrt();
         (radius, out, aside.atan2(out))
     }
 
-    /// In on an arm, which it is on until `wait_s`, and around.
+    /// In on an arm, which it follows for `wait_s`, and around.
     fn entering(&self, arm: f64, speed: f64, wait_s: f64, round_s: f64, eased: bool) -> Path {
         let (radius, out, about) = self.bend();
         let [x, y] = self.on_arm(arm, out + speed * wait_s, LANE_M);
@@ -136,7 +137,7 @@ impl Roundabout {
         start.then(before_s, 0.0, 0.0).then_to_speed(0.0, rate, EASE_S)
     }
 
-    /// What grows and stands on the mound.
+    /// Plants and objects on the mound.
     fn island(&self, site: &mut Site) {
         for _ in 0..site.count(4, 22) {
             let far = (self.radii[0] - 1.5) * site.rng.unit().sqrt();
@@ -161,7 +162,7 @@ impl Roundabout {
         }
     }
 
-    /// Signs that show the way around, before each arm.
+    /// Signs showing the way around, facing each arm.
     fn signs(&self, site: &mut Site) {
         for &arm in &self.arms {
             let [x, y] = around_middle(arm, self.radii[0] - 0.6);
@@ -246,8 +247,8 @@ impl Roundabout {
         self.arms[(rng.unit() * self.arms.len() as f64) as usize]
     }
 
-    /// On the ring, in, out, and waiting. All on the ring go as fast as the vehicle, so that none
-    /// catches up.
+    /// Vehicles on the ring, arriving, leaving and waiting. All on the ring are as fast as the
+    /// vehicle, so that none catches up with another.
     fn driving(&self, crowd: &mut Crowd, amount: f64, model: Model) {
         let (speed, on_s) = (self.vehicle.1, crowd.duration_s + ON_S);
         crowd.add(0.5 * amount, model, |r, _| {
@@ -282,7 +283,7 @@ impl Layout for Roundabout {
     fn ground(&self) -> Ground {
         let [mound, ..] = self.radii;
         let terms = vec![Term::Mound([0.0; 2], mound - 0.4, self.height), Term::Wave(self.wave)];
-        // Rough nowhere: the mound is planted over.
+        // Rough nowhere: the mound is covered with plants.
         Ground::of(Relief { terms, paved: (Bend { curvature: 0.0 }, VIEW_M) })
     }
 

@@ -1,4 +1,4 @@
-//! Puts up fixtures, save where the vehicle drives.
+//! Places fixtures, except where the vehicle drives.
 
 use super::clearance::Way;
 use crate::ground::Ground;
@@ -8,26 +8,26 @@ use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// How far everything that stands is sunk, m: no ray passes beneath it where the ground slopes.
+/// How deep everything on the ground is sunk, m, so that no ray passes beneath it on a slope.
 const SUNK_M: f64 = 0.4;
 
-/// Every `step` metres from one station up to another.
+/// Calls `put` every `step` metres from one station up to another.
 pub(super) fn every([from, to]: [f64; 2], step: f64, put: impl FnMut(f64)) {
     let count = ((to - from) / step).ceil() as u32;
     (0..count).map(|n| from + step * f64::from(n)).for_each(put);
 }
 
-/// The place so far away from another in a direction, rad.
+/// The place this far away from another in a direction, rad.
 pub(super) fn away([x, y]: [f64; 2], turn: f64, far: f64) -> [f64; 2] {
     [x + far * turn.cos(), y + far * turn.sin()]
 }
 
-/// A scene's background while it is being put up.
+/// A scene's background under construction.
 pub(super) struct Site<'a> {
     pub(super) ground: &'a Ground,
     pub(super) rng: &'a mut Rng,
     pub(super) fixtures: Vec<Fixture>,
-    /// The vehicle's.
+    /// The vehicle's path.
     way: Way,
 }
 
@@ -36,7 +36,7 @@ impl<'a> Site<'a> {
         Site { ground, rng, fixtures: Vec::new(), way }
     }
 
-    /// Adds a fixture (`pose` is `street_from_shape`), unless it is in the vehicle's way.
+    /// Adds a fixture (`pose` is `street_from_shape`) unless it is in the vehicle's way.
     pub(super) fn fix(&mut self, class: Class, shape: Shape, pose: Pose, surface: Surface) {
         let fixture = Fixture { class, shape, pose, surface };
         if !Way::under(&fixture, self.ground).meets(&self.way) {
@@ -44,7 +44,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// A box at (x, y) turned by yaw, its lower face `lift` above the ground there.
+    /// A box at (x, y) rotated by yaw, with its lower face `lift` above the ground there.
     pub(super) fn raised(
         &mut self,
         class: Class,
@@ -58,7 +58,7 @@ impl<'a> Site<'a> {
         self.fix(class, shape, Pose::planar(x, y, z, yaw), surface);
     }
 
-    /// A box that stands at (x, y) turned by yaw.
+    /// A box standing at (x, y), rotated by yaw.
     pub(super) fn block(&mut self, class: Class, at: [f64; 3], size: [f64; 3], surface: Surface) {
         let [length, width, height] = size;
         self.raised(class, at, [length, width, height + SUNK_M], -SUNK_M, surface);
@@ -76,7 +76,7 @@ impl<'a> Site<'a> {
         self.fix(class, shape, Pose::planar(x, y, z, 0.0), Surface::matt(0.4));
     }
 
-    /// A bar from one point to another, each (x, y, above the ground there), m.
+    /// A bar from one point to another, each (x, y, height above the ground there), m.
     pub(super) fn bar(&mut self, class: Class, ends: [[f64; 3]; 2], radius: f64, surface: Surface) {
         let [a, b] = ends.map(|[x, y, up]| DVec3::new(x, y, self.ground.height(x, y) + up));
         let turn = DQuat::from_rotation_arc(DVec3::Z, (b - a).normalize());
@@ -84,7 +84,7 @@ impl<'a> Site<'a> {
         self.fix(class, shape, Pose::new(turn, 0.5 * (a + b)), surface);
     }
 
-    /// A clump of leaves of these full extents, its lower end `lift` above the ground.
+    /// A clump of leaves of these full extents, with its lower end `lift` above the ground.
     pub(super) fn leaves(&mut self, [x, y]: [f64; 2], size: [f64; 3], lift: f64, porosity: f64) {
         let turn = DQuat::from_rotation_z(self.rng.range(0.0, 3.0));
         let tilt = DQuat::from_rotation_x(self.rng.range(-0.25, 0.25));
@@ -94,7 +94,7 @@ impl<'a> Site<'a> {
         self.fix(Class::Vegetation, shape, Pose::new(turn * tilt, DVec3::new(x, y, z)), surface);
     }
 
-    /// Whole number from `from` up to but excluding `to`.
+    /// A random integer from `from` up to but excluding `to`.
     pub(super) fn count(&mut self, from: u32, to: u32) -> u32 {
         from + (self.rng.unit() * f64::from(to - from)) as u32
     }

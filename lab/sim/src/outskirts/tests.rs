@@ -1,4 +1,4 @@
-//! That nobody drives through anything, that there is something to see, and that it moves.
+//! Checks that nobody drives through anything, that there is something to see, and that it moves.
 
 use super::{Place, VEHICLE, draw};
 use crate::collisions::check_clear;

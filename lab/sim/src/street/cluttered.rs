@@ -1,6 +1,6 @@
-//! What real streets have and the plain one lacks, and what makes still things seem to move: edges
-//! that are no edges. Fences of pickets and mesh with things behind, bushes with gaps, walls seen
-//! through slots, banks, posts behind parked cars, flat sides half hidden.
+//! What real streets have and the plain one lacks, and what makes static structure appear to move:
+//! apparent edges that are not real ones. Picket and mesh fences with things behind them, bushes
+//! with gaps, walls seen through slots, banks, posts behind parked cars, flat sides half hidden.
 
 use super::Yard;
 use crate::dimensions::{EDGE, ROAD_HALF};
@@ -9,12 +9,12 @@ use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// Walkers keep to the inner part of the sidewalk: what stands beyond this distance from the
-/// road's middle is in nobody's way, m.
+/// Walkers keep to the inner part of the sidewalk: beyond this distance from the road's middle
+/// nothing is in anyone's way, m.
 const FREE_M: f64 = EDGE - 0.4;
 
 impl Yard<'_> {
-    /// Along both sides of the main road.
+    /// Clutters both sides of the main road.
     pub(super) fn clutter(&mut self, x: [f64; 2]) {
         for side in [-1.0, 1.0] {
             self.edge_of_sidewalk(x, side);
@@ -22,7 +22,7 @@ impl Yard<'_> {
         }
     }
 
-    /// One kind of border after another, with gaps between.
+    /// One kind of border after another, with gaps in between.
     fn edge_of_sidewalk(&mut self, x: [f64; 2], side: f64) {
         let mut from = x[0] + self.rng.range(0.0, 6.0);
         while from < x[1] {
@@ -43,7 +43,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Pickets on two rails, a hand's breadth apart.
+    /// Pickets on two rails, about a hand's breadth apart.
     fn pickets(&mut self, [from, to]: [f64; 2], y: f64) {
         let (height, wide) = (self.rng.range(0.8, 1.5), self.rng.range(0.05, 0.12));
         let (step, wood) = (wide + self.rng.range(0.04, 0.14), Surface::matt(0.5));
@@ -59,7 +59,7 @@ impl Yard<'_> {
         self.things_behind([from, to], y);
     }
 
-    /// Mesh between posts, through which one sees what stands behind.
+    /// Mesh between posts, through which objects behind are visible.
     fn mesh(&mut self, [from, to]: [f64; 2], y: f64) {
         let (height, porosity) = (self.rng.range(1.0, 2.2), self.rng.range(0.5, 0.9));
         let middle = 0.5 * (from + to);
@@ -91,7 +91,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Bushes in a row, each with gaps to the next and in itself.
+    /// Bushes in a row, with gaps between them and within each.
     fn loose_bushes(&mut self, [from, to]: [f64; 2], y: f64) {
         let mut at = from;
         while at < to {
@@ -107,7 +107,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Boards or pieces of wall with slots between, and a wall a few metres behind.
+    /// Boards or sections of wall with slots in between, and a wall a few metres behind.
     fn slotted_wall(&mut self, [from, to]: [f64; 2], y: f64) {
         let (height, stone) = (self.rng.range(1.4, 3.0), Surface::matt(self.rng.range(0.25, 0.6)));
         let mut at = from;
@@ -121,7 +121,7 @@ impl Yard<'_> {
         self.cuboid(Class::Building, [0.5 * (from + to), back], size, 0.0, stone);
     }
 
-    /// Pillars before whatever flat there is behind.
+    /// Pillars in front of whatever flat surface lies behind.
     fn pillars(&mut self, [from, to]: [f64; 2], y: f64) {
         let (step, wide) = (self.rng.range(1.2, 3.5), self.rng.range(0.2, 0.6));
         let (height, round) = (self.rng.range(2.5, 4.0), self.rng.chance(0.5));
@@ -140,7 +140,7 @@ impl Yard<'_> {
         self.raised(Class::Building, beam, [to - from, wide, 0.4], 0.0, Surface::matt(0.45));
     }
 
-    /// A bank that rises from the sidewalk's edge: a slab of earth on one of its edges.
+    /// A bank rising from the sidewalk's edge: a tilted slab of earth.
     fn bank(&mut self, [from, to]: [f64; 2], side: f64) {
         let (slope, out) = (self.rng.range(0.15, 0.7), self.rng.range(2.0, 5.0));
         let (x, y) = (0.5 * (from + to), side * (FREE_M + 0.5 * out));
@@ -174,7 +174,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Posts at the kerb, seen over and between parked cars.
+    /// Posts at the kerb, visible over and between parked cars.
     fn posts_behind_cars(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0] + self.rng.range(0.0, 10.0);
         while at < x[1] {

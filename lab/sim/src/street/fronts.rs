@@ -1,11 +1,11 @@
-//! A house and its front: plain, or with windows one sees into, and what sticks out of it.
+//! A house and its front: plain, or with windows one can see into, and whatever protrudes from it.
 
 use super::Yard;
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
-    /// A house of this length (along x), depth and height whose front lies `front` beside the
-    /// road's centre line.
+    /// A house of this length (along x), depth and height whose front lies at a distance `front`
+    /// from the road's centre line.
     pub(super) fn house(&mut self, middle: f64, side: f64, front: f64, size: [f64; 3]) {
         let [length, depth, height] = size;
         let wall = Surface::matt(self.rng.range(0.25, 0.6));
@@ -19,7 +19,7 @@ impl Yard<'_> {
     }
 
     /// A front with a row of windows, through which some rays reach the room behind: bands of wall
-    /// below and above, piers between, panes, and what stands in the room.
+    /// below and above, piers in between, panes, and the contents of the room.
     fn windows(&mut self, middle: f64, front: f64, size: [f64; 3], wall: Surface) {
         let [length, room, height] = size;
         let (sill, head) = (self.rng.range(0.1, 1.1), self.rng.range(2.0, 2.8));
@@ -43,15 +43,15 @@ impl Yard<'_> {
             self.cuboid(Class::Building, at, [width, thick + out, height], 0.0, wall);
             x += width + step;
         }
-        // The sides of the room.
+        // The side walls of the room.
         for end in [-0.5, 0.5] {
             let at = [middle + end * (length - 0.2), place(0.0, 0.5 * room)[1]];
             self.cuboid(Class::Building, at, [0.2, room, height], 0.0, wall);
         }
     }
 
-    /// What sticks out of a front: bays, porches, stairs, balconies, downpipes, awnings, so that
-    /// walls are not all planes.
+    /// Whatever protrudes from a front: bays, porches, stairs, balconies, downpipes, awnings, so
+    /// that walls are not all planes.
     fn front(&mut self, middle: f64, side: f64, front: f64, size: [f64; 2], wall: Surface) {
         let [length, height] = size;
         for _ in 0..self.count(1, 3 + (length / 3.0) as u32) {

@@ -1,5 +1,5 @@
-//! What stands on the sidewalks: lamps, signs, bins, bollards, benches, bicycles, shelters, and
-//! the borders of plots.
+//! Objects on the sidewalks: lamps, signs, bins, bollards, benches, bicycles, shelters, and the
+//! borders of plots.
 
 use super::Yard;
 use crate::dimensions::{CROSS_HALF, EDGE, ROAD_HALF};
@@ -10,7 +10,7 @@ use raywake_core::pose::Pose;
 use std::f64::consts::FRAC_PI_2;
 
 impl Yard<'_> {
-    /// What stands between kerb and walkers.
+    /// Objects between the kerb and the walkers.
     pub(super) fn kerb_side(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0] + self.rng.range(0.0, 8.0);
         while at < x[1] {
@@ -31,8 +31,8 @@ impl Yard<'_> {
         }
     }
 
-    /// What stands at the far edge of the sidewalk, `gaps` apart (m). Some of it is the size of
-    /// cars, which is what a background filter has to tell apart.
+    /// Objects at the far edge of the sidewalk, `gaps` apart (m). Some are the size of cars, which
+    /// a background filter has to distinguish.
     pub(super) fn house_side(&mut self, x: [f64; 2], side: f64, gaps: [f64; 2]) {
         let mut at = x[0] + self.rng.range(0.0, 10.0);
         while at < x[1] {
@@ -118,7 +118,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Bicycles left side by side, with nobody on them.
+    /// Bicycles parked side by side, with nobody on them.
     fn bicycles(&mut self, x: f64, y: f64) {
         let (count, lean) = (self.count(1, 7), self.rng.range(-0.15, 0.15));
         let across = count > 2;
@@ -158,7 +158,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A shelter at a stop: posts, a roof, panes behind.
+    /// A shelter at a stop: posts, a roof, panes at the back.
     fn shelter(&mut self, x: f64, side: f64) {
         let (length, y) = (self.rng.range(3.0, 5.0), side * (EDGE + 0.2));
         let pane = Surface::glass(0.4);

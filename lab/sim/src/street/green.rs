@@ -1,13 +1,14 @@
-//! Trees, bushes and hedges, each of several clumps of leaves that let a share of the rays through.
+//! Trees, bushes and hedges, each made of several clumps of leaves that some of the rays pass
+//! through.
 
 use super::Yard;
 use crate::dimensions::EDGE;
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
-    /// A tree: broad, slim, or a conifer with branches down to the ground.
+    /// A tree: broad, slender, or a conifer with branches down to the ground.
     pub(super) fn tree(&mut self, x: f64, y: f64) {
-        // Sparse and dense trees: how much a clump lets through.
+        // Sparse and dense trees: the share of rays that pass through a clump.
         let porosity = self.rng.range(0.3, 0.75);
         match self.count(0, 6) {
             0 => self.conifer(x, y, porosity),
@@ -20,7 +21,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A tree by the kerb: nothing of it hangs low, where people walk and cars are parked.
+    /// A tree by the kerb: nothing hangs low where people walk and cars park.
     pub(super) fn street_tree(&mut self, x: f64, y: f64) {
         let stem = [self.rng.range(0.06, 0.24), self.rng.range(2.2, 3.4)];
         let (spread, clumps) = (self.rng.range(0.9, 2.6), self.count(3, 9));
@@ -69,7 +70,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A bed of loose shrubs a few metres across, out of which rays come back from any depth.
+    /// A bed of loose shrubs a few metres across, which returns rays from any depth.
     pub(super) fn bed(&mut self, x: f64, y: f64) {
         let half = [self.rng.range(1.0, 3.0), self.rng.range(0.6, 1.8)];
         let (height, porosity) = (self.rng.range(0.4, 1.6), self.rng.range(0.5, 0.85));
@@ -85,7 +86,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A hedge along x: trimmed in one piece, or grown out in pieces of their own height.
+    /// A hedge along x: trimmed in one piece, or overgrown in pieces of different heights.
     pub(super) fn hedge(&mut self, x: f64, y: f64, length: f64) {
         let (wide, height) = (self.rng.range(0.4, 0.9), self.rng.range(0.7, 2.0));
         let porosity = self.rng.range(0.1, 0.4);
@@ -108,7 +109,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Trees and bushes without houses, to some distance.
+    /// Trees and bushes without houses, to some depth.
     pub(super) fn park(&mut self, x: [f64; 2], side: f64) {
         let amount = ((x[1] - x[0]) * 0.9) as u32;
         for _ in 0..amount {

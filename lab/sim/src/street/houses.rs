@@ -5,7 +5,7 @@ use crate::dimensions::{CROSS_HALF, EDGE};
 use crate::object::{Class, Surface};
 
 impl Yard<'_> {
-    /// A row with a gap here and there, at or a little behind the sidewalk.
+    /// A row with occasional gaps, at or a little behind the sidewalk.
     pub(super) fn row_of_houses(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0];
         while at < x[1] {
@@ -13,7 +13,7 @@ impl Yard<'_> {
             let middle = at + 0.5 * length;
             at += length;
             if self.in_crossing(middle, 0.5 * length) {
-                // Step on in small strides so that the corner houses stand near the corner.
+                // Advance in small steps so that the corner houses are near the corner.
                 at += 2.0 - length;
                 continue;
             }
@@ -28,7 +28,7 @@ impl Yard<'_> {
         }
     }
 
-    /// A gap between houses: shrubs, a tree, something farther back.
+    /// A gap between houses: shrubs, a tree, a building farther back.
     fn gap(&mut self, x: f64, y: f64) {
         for _ in 0..self.count(0, 4) {
             let (aside, back) = (self.rng.range(-2.0, 2.0), self.rng.range(-3.0, 8.0));
@@ -47,7 +47,7 @@ impl Yard<'_> {
         }
     }
 
-    /// Detached houses behind gardens, which a hedge, fence or wall parts from the sidewalk.
+    /// Detached houses behind gardens, separated from the sidewalk by a hedge, fence or wall.
     pub(super) fn gardens(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0];
         while at < x[1] {

@@ -1,4 +1,4 @@
-//! The street's background, block by block: closed rows of houses, houses behind gardens, green.
+//! The street's background, block by block: closed rows of houses, houses behind gardens, parks.
 
 mod cluttered;
 mod fronts;
@@ -15,7 +15,7 @@ use crate::shape::Shape;
 use glam::{DQuat, DVec3};
 use raywake_core::pose::Pose;
 
-/// How far around the vehicle's path there is something to see, m.
+/// How far the scene extends around the vehicle's path, m.
 const VIEW: f64 = 125.0;
 
 /// Part of the street frame that is furnished: minimum and maximum, m.
@@ -39,7 +39,7 @@ impl Extent {
     }
 }
 
-/// The background on this ground; `crossing` is x of the crossing road's centre line, m.
+/// Builds the background on this ground; `crossing` is x of the crossing road's centre line, m.
 pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rng) -> Vec<Fixture> {
     let mut yard = Yard { ground, fixtures: Vec::new(), crossing, rng };
     for side in [-1.0, 1.0] {
@@ -51,7 +51,7 @@ pub(crate) fn build(ground: &Ground, extent: Extent, crossing: f64, rng: &mut Rn
     yard.fixtures
 }
 
-/// More of it, for [`crate::Scenery::StreetCluttered`].
+/// Builds the additional background of [`crate::Scenery::StreetCluttered`].
 pub(crate) fn clutter(
     ground: &Ground,
     extent: Extent,
@@ -71,7 +71,7 @@ struct Yard<'a> {
 }
 
 impl Yard<'_> {
-    /// What lies beyond the sidewalk, in blocks of one kind each.
+    /// Everything beyond the sidewalk, in blocks of one kind each.
     fn blocks(&mut self, x: [f64; 2], side: f64) {
         let mut at = x[0];
         while at < x[1] {
@@ -110,9 +110,9 @@ impl Yard<'_> {
         self.fix(class, shape, Pose::planar(at[0], at[1], z, yaw), surface);
     }
 
-    /// A box of this length, width and height that stands at (x, y).
+    /// A box of this length, width and height standing at (x, y).
     fn cuboid(&mut self, class: Class, at: [f64; 2], size: [f64; 3], yaw: f64, surface: Surface) {
-        // Sunk a little, so that no ray passes beneath where the ground slopes.
+        // Sunk a little, so that no ray passes beneath it on a slope.
         let height = size[2] + 0.5;
         let shape = Shape::cuboid(size[0], size[1], height);
         self.put(class, shape, [at[0], at[1], -0.5], height, yaw, surface);
@@ -123,7 +123,7 @@ impl Yard<'_> {
         self.put(class, Shape::cuboid(size[0], size[1], size[2]), at, size[2], yaw, surface);
     }
 
-    /// A clump of leaves of these full extents, its lower end `at[2]` above the ground.
+    /// A clump of leaves of these full extents, with its lower end `at[2]` above the ground.
     fn leaves(&mut self, at: [f64; 3], size: [f64; 3], porosity: f64) {
         let tilt = DQuat::from_rotation_y(self.rng.range(-0.3, 0.3));
         let turn = DQuat::from_rotation_z(self.rng.range(0.0, 3.0));
@@ -139,12 +139,13 @@ impl Yard<'_> {
         self.put(Class::Pole, shape, [x, y, -0.2], height + 0.2, 0.0, Surface::matt(0.4));
     }
 
-    /// Whether (a stretch around) x lies where the crossing road or its sidewalks are.
+    /// Whether x, or a stretch of this half length around it, touches the crossing road or its
+    /// sidewalks.
     fn in_crossing(&self, x: f64, half: f64) -> bool {
         (x - self.crossing).abs() < CROSS_HALF + 3.0 + half
     }
 
-    /// Whole number from `from` up to but excluding `to`.
+    /// A random integer from `from` up to but excluding `to`.
     fn count(&mut self, from: u32, to: u32) -> u32 {
         from + (self.rng.unit() * f64::from(to - from)) as u32
     }

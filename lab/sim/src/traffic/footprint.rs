@@ -1,15 +1,15 @@
-//! Who would run into whom.
+//! Collision checks between paths.
 
 use crate::object::Fixture;
 use crate::path::Path;
 use crate::shape::Shape;
 
-/// Times at which paths are compared, s apart.
+/// Interval between times at which paths are compared, s.
 const CHECK_S: f64 = 0.1;
 
 /// Discs that cover an object over time.
 pub(super) struct Footprint {
-    /// Centres per time, then along the object, m; a single time where it never moves.
+    /// Centres by time, then along the object, m; a single time if it never moves.
     centres: Vec<Vec<[f64; 2]>>,
     radius: f64,
     /// Box of all centres, grown by the radius: minimum and maximum, m.
@@ -54,8 +54,8 @@ impl Footprint {
     }
 }
 
-/// Footprint of what somebody could walk into: poles, bins, bicycles and the like. Whatever is
-/// longer stands where no path leads, and crowns hang above.
+/// Footprint of something one could walk into: poles, bins, bicycles and similar. Longer fixtures
+/// lie where no path leads, and crowns hang above.
 pub(super) fn obstacle(fixture: &Fixture) -> Option<Footprint> {
     let [length, width] = match fixture.shape {
         Shape::Cylinder { radius, .. } => [2.0 * radius; 2],

@@ -17,10 +17,10 @@ use std::f64::consts::PI;
 
 type Model = fn(u32, Path, &mut Rng) -> Object;
 
-/// Tries to find a clear path for somebody.
+/// Attempts at finding a clear path for an object.
 const TRIES: u32 = 12;
 
-/// Who drives: share of all that drive, model, and whether it is short enough to turn.
+/// Kinds of drivers: share of all drivers, model, and whether it is short enough to turn.
 const DRIVERS: [(f64, Model, bool); 6] = [
     (0.62, models::car, true),
     (0.12, models::van, true),
@@ -45,7 +45,7 @@ pub(crate) fn fill(
     fill.park(extent.x, density);
     let amount =
         |fixed: f64, per_second: f64| (density * (fixed + per_second * duration_s)).round() as u32;
-    // First those that need most room.
+    // Those that need the most room first.
     for _ in 0..amount(2.0, 0.2) {
         fill.overtaking();
     }
@@ -92,7 +92,7 @@ impl Fill<'_> {
         Routes { plan: self.plan, duration_s: self.duration_s, rng: self.rng }
     }
 
-    /// Tries paths until one is clear; the path that was, if any.
+    /// Tries paths until one is clear; returns that one, if any.
     fn mover(&mut self, model: Model, route: impl Fn(&mut Routes) -> Path) -> Option<Path> {
         (0..TRIES).find_map(|_| {
             let path = route(&mut self.routes());
@@ -100,7 +100,7 @@ impl Fill<'_> {
         })
     }
 
-    /// Somebody who walks with another, half a metre to a metre beside, where there is room.
+    /// Someone walking with another, half a metre to a metre to the side, if there is room.
     fn companion(&mut self, path: Path) {
         let beside = self.rng.sign() * self.rng.range(0.55, 1.0);
         self.offer(models::pedestrian, path.moved(0.0, beside));
@@ -122,7 +122,7 @@ impl Fill<'_> {
         self.mover(model, |r| r.driver(nimble));
     }
 
-    /// Somebody slow and a car that passes it; in every third case the slow one is the vehicle
+    /// A slow vehicle and a car that passes it; in one case in three the slow one is the vehicle
     /// that carries the sensors.
     fn overtaking(&mut self) {
         let slow = if self.rng.chance(0.33) {

@@ -1,4 +1,4 @@
-//! Paths that people take: along, across, turning, braking, overtaking.
+//! Paths of traffic: along, across, turning, braking, overtaking.
 
 use crate::dimensions::ROAD_HALF;
 use crate::ego::{LANE, Pace, Plan};
@@ -6,7 +6,7 @@ use crate::path::{EASE_S, Path, State};
 use crate::rng::Rng;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Time in which somebody on foot begins and ends a turn, s.
+/// Time over which a pedestrian's turn builds up and fades, s.
 const WALKER_EASE_S: f64 = 0.4;
 
 /// Draws paths that meet the vehicle's during a drive.
@@ -17,14 +17,14 @@ pub(super) struct Routes<'a> {
 }
 
 impl Routes<'_> {
-    /// A time during the drive and a place abeam of the vehicle's then.
+    /// A time during the drive, and an x near the vehicle's at that time.
     fn meeting(&mut self) -> (f64, f64) {
         let t = self.rng.range(0.0, self.duration_s);
         let reach = 20.0 + 45.0 * self.rng.unit();
         (t, self.plan.path.at(t).x + self.rng.range(-reach, reach))
     }
 
-    /// Of somebody who drives, in something short enough to turn (`nimble`) or not.
+    /// Path of a driver, in a vehicle short enough to turn (`nimble`) or not.
     pub(super) fn driver(&mut self, nimble: bool) -> Path {
         match (self.plan.pace, nimble) {
             (Pace::Fast, true) => self.fast(36.0),
@@ -45,7 +45,7 @@ impl Routes<'_> {
         }
     }
 
-    /// What is too long to turn stays on its road.
+    /// Vehicles too long to turn stay on their road.
     fn heavy(&mut self) -> Path {
         match (self.rng.unit() * 20.0) as u32 {
             0..11 => self.along(LANE, 2.0, 13.0),
@@ -54,7 +54,7 @@ impl Routes<'_> {
         }
     }
 
-    /// As out of town, on either road.
+    /// At out-of-town speeds, on either road.
     fn fast(&mut self, fastest: f64) -> Path {
         if self.rng.chance(0.7) {
             self.along(LANE, 15.0, fastest)
@@ -63,7 +63,7 @@ impl Routes<'_> {
         }
     }
 
-    /// In a queue that moves, on either road.
+    /// In a moving queue, on either road.
     fn creeping(&mut self) -> Path {
         match (self.rng.unit() * 10.0) as u32 {
             0..4 => self.along(LANE, 0.5, 4.0),
@@ -83,7 +83,7 @@ impl Routes<'_> {
         Path::from(State { x: x - way * speed * t, ..lane(way, beside, speed) })
     }
 
-    /// Brakes or speeds up, beginning when it meets the vehicle.
+    /// Brakes or accelerates, beginning around the time it meets the vehicle.
     fn changing(&mut self, [slow, fast]: [f64; 2]) -> Path {
         let (t, x) = self.meeting();
         let (way, speed) = (self.rng.sign(), self.rng.range(slow, fast));
@@ -94,20 +94,20 @@ impl Routes<'_> {
         };
         let rate = self.rng.range(1.0, 4.0);
         let start = State { x: x - way * speed * t, ..lane(way, LANE, speed) };
-        // Half begin before the drive does.
+        // Up to two seconds earlier, but not before the drive begins.
         let begin = (t - self.rng.range(0.0, 2.0)).max(0.0);
         let path = Path::from(start).then(begin, 0.0, 0.0);
         path.then_to_speed(if later < 0.8 { 0.0 } else { later }, rate, EASE_S)
     }
 
-    /// Past somebody on the main road and back into the lane, a few m/s faster.
+    /// Past another vehicle on the main road and back into the lane, a few m/s faster.
     pub(super) fn past(&mut self, slow: &Path) -> Path {
         let abreast = self.rng.range(0.0, self.duration_s);
         let other = slow.at(abreast);
         let way = if other.yaw.cos() < 0.0 { -1.0 } else { 1.0 };
         let speed = (other.speed + self.rng.range(4.0, 8.0)).max(7.0);
         let aside = self.rng.range(2.8, 3.5);
-        // The lane is left this far behind the other, and taken again this far ahead of it.
+        // It leaves the lane this far behind the other, and returns to it this far ahead.
         let (gap, change_s) = (self.rng.range(9.0, 14.0), self.rng.range(2.2, 3.5));
         let before = gap / (speed - other.speed) + change_s;
         let start = State { x: other.x - way * speed * before, ..lane(way, LANE, speed) };
@@ -157,7 +157,7 @@ impl Routes<'_> {
             1..4 => {
                 let before = t * self.rng.unit();
                 let start = State { x: x - way * speed * before, y, yaw, speed };
-                // Left or right by a quarter onto the road, back along the other sidewalk.
+                // A quarter turn left or right onto the road, back along the other sidewalk.
                 let quarter = -side * way * FRAC_PI_2;
                 let turn = |path: Path, angle| path.then_turn(angle, 0.8, WALKER_EASE_S);
                 let path = turn(Path::from(start).then(before, 0.0, 0.0), quarter);
@@ -169,7 +169,7 @@ impl Routes<'_> {
     }
 }
 
-/// Start in a lane of the main road, heading along +x or -x, on the right side of it.
+/// Start in a lane of the main road, heading along +x or -x, on the right-hand side.
 fn lane(way: f64, beside: f64, speed: f64) -> State {
     State { x: 0.0, y: -way * beside, yaw: if way > 0.0 { 0.0 } else { PI }, speed }
 }

@@ -1,4 +1,4 @@
-//! That what traffic is to show occurs.
+//! Checks that all the manoeuvres that traffic should show occur.
 
 use crate::ego::Ego;
 use crate::object::Class;
@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 const DURATION_S: f64 = 6.0;
 
-/// States of everybody every half second; the vehicle last.
+/// States of all objects every half second, with the vehicle last.
 fn states(seed: u64) -> (Vec<Class>, Vec<Vec<State>>) {
     let plan = Ego::Any.plan(seed, DURATION_S);
     let scene = Scene::around(seed, &plan, DURATION_S, 1.0, false);
@@ -18,7 +18,7 @@ fn states(seed: u64) -> (Vec<Class>, Vec<Vec<State>>) {
     (scene.objects.iter().map(|o| o.class).collect(), states)
 }
 
-/// Whether `a` gets from behind `b` to before it, both going the same way beside each other.
+/// Whether `a` gets from behind `b` to ahead of it, both side by side in the same direction.
 fn passes(a: &[State], b: &[State]) -> bool {
     let ahead = |i: usize| {
         let (s, c) = b[i].yaw.sin_cos();

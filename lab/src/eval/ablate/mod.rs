@@ -1,4 +1,4 @@
-//! `raywake-lab ablate`: what every choice of a profile is worth, in one table.
+//! `raywake-lab ablate`: what every choice in a profile is worth, in one table.
 
 mod table;
 mod variants;
@@ -28,7 +28,7 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     inputs: Inputs,
-    /// Only these variants, in the order of the table
+    /// Evaluate only these variants, in the order of the table
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     #[arg(value_parser = PossibleValuesParser::new(table::names()))]
     only: Vec<String>,
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     failures("variants", &failed)
 }
 
-/// The base with a variant's change.
+/// The base with a variant's change applied.
 fn settings(variant: &Variant, base: &Settings) -> Result<Settings, Error> {
     let profile = variant.profile(&base.profile);
     profile.check().map_err(|e| Error::Usage(format!("{} must be {}", e.field, e.must)))?;

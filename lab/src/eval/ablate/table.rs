@@ -1,4 +1,4 @@
-//! One row a variant.
+//! One row per variant.
 
 use super::variants::{VARIANTS, Variant};
 use crate::eval::facts::Facts;
@@ -37,14 +37,14 @@ const COLUMNS: [&str; 22] = [
     "False a sweep, 2 m and more from movers",
 ];
 
-/// Stages of a pair that are shown together.
+/// Stages of a pair that are shown as one figure.
 const PARTS: [&[&str]; 3] = [
     &["occupancy_constancy", "window"],
     &["expectation", "maximisation"],
     &["refine", "track", "out"],
 ];
 
-/// The row of a variant: what its rows and facts tell.
+/// The row of a variant, from its rows and facts.
 pub fn row(
     variant: &Variant,
     profile: &Profile,
@@ -85,19 +85,19 @@ pub fn row(
     TableRow::new(cells)
 }
 
-/// The row of a variant that has no figures.
+/// The row of a variant without figures.
 pub fn failed(variant: &Variant) -> TableRow {
     let head = [variant.name, variant.what].map(Cell::from).into_iter();
     TableRow::new(head.chain(std::iter::repeat_n(Cell::Empty, COLUMNS.len() - 2)))
 }
 
-/// Time of some stages together, by pair, ms.
+/// Summed time of some stages for each pair, ms.
 fn part<'a>(facts: &'a Facts, names: &'a [&str]) -> impl Iterator<Item = f64> + 'a {
     let stages = || facts.stages.iter().filter(|s| names.contains(&s.name.as_str()));
     (0..facts.totals.len()).map(move |n| stages().filter_map(|s| s.ms.get(n)).sum())
 }
 
-/// The table of all rows; `failures`: why variants have no figures.
+/// The table of all rows; `failures` states why variants have no figures.
 pub fn table(rows: Vec<TableRow>, failures: &[String]) -> Table {
     let caption = "Variants of the base, one thing changed in each: error of the raw flow of \
         labelled columns (labels as they are) and of the background, median error of the velocity \

@@ -1,19 +1,19 @@
-//! What is changed, one thing at a time.
+//! The variants: one change at a time.
 
 use raywake_core::params::{Frame, Profile};
 
-/// Where a variant's learned numbers come from.
+/// Source of a variant's learned parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Numbers {
     /// Those of the base.
     Base,
-    /// The same without a background filter.
+    /// Those of the base, without a background filter.
     NoFilter,
-    /// Without the encoder.
+    /// Those of the base, without the encoder.
     NoEncoder,
-    /// The same with the author's published occupancy constancy.
+    /// Those of the base, with the author's published occupancy constancy.
     Author,
-    /// Those shipped for the dissertation's profile, which its recipes trained.
+    /// Those shipped for the dissertation's profile, trained by its recipes.
     AsPrinted,
     /// The same with the author's published occupancy constancy.
     AsPrintedAuthor,
@@ -22,15 +22,15 @@ pub enum Numbers {
 /// The author's published constants of the occupancy constancy.
 pub const AUTHOR: &str = include_str!("../../../weights/author.txt");
 
-/// A change of the base.
+/// A change to the base.
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {
-    /// Unlike any other's: letters, digits, `-` and `.`.
+    /// Unique name: letters, digits, `-` and `.`.
     pub name: &'static str,
     /// What is changed.
     pub what: &'static str,
     change: fn(Profile) -> Profile,
-    /// Its learned numbers.
+    /// Its learned parameters.
     pub numbers: Numbers,
 }
 
@@ -43,7 +43,7 @@ impl Variant {
         (self.change)(base.clone())
     }
 
-    /// Whether nothing is changed: in every series one variant is the base.
+    /// Whether nothing is changed: in every series one variant equals the base.
     pub fn is_base(&self, base: &Profile) -> bool {
         self.numbers == Numbers::Base && self.profile(base) == *base
     }
@@ -57,7 +57,7 @@ fn cells(base: Profile, voxel_m: f64, side: u32) -> Profile {
     Profile { voxel_m, side, ..base }
 }
 
-/// All of them, as they are listed.
+/// All variants, in the order listed.
 pub const VARIANTS: [Variant; 26] = [
     of(BASE, "as given", |p| p),
     of("refine-0", "whole cells", |p| Profile { refinement_sweeps: 0, ..p }),
@@ -119,7 +119,7 @@ mod tests {
                 }
             }
         }
-        // On the sensor's frame nothing is refined, and that is all that fails.
+        // In the sensor's frame nothing may be refined; only those variants fail.
         let base = Profile::dissertation();
         let fails = |v: &&Variant| v.profile(&base).check().is_err();
         let failing: Vec<_> = VARIANTS.iter().filter(fails).map(|v| v.name).collect();
@@ -130,7 +130,7 @@ mod tests {
     fn the_authors_constants_have_his_range() {
         let (mut weights, mut costs) = (vec![0; WEIGHT_WORDS], vec![0; SCORES_MAX]);
         let scores = load(AUTHOR, 14, &mut weights, &mut costs).unwrap();
-        // The figures published beside the constants: scores of -537 to 2052.
+        // The range published with the constants: scores of -537 to 2052.
         assert_eq!((scores.min, scores.min + scores.count - 1), (-537, 2052));
     }
 

@@ -1,15 +1,15 @@
 //! Covariance ellipses: how far out of them an error lies.
 
-/// The smaller variance is taken to be at least this share of the greater: single precision cannot
-/// tell a thinner ellipse from a line.
+/// The smaller variance is taken to be at least this share of the larger: single precision cannot
+/// distinguish a thinner ellipse from a line.
 const THIN: f64 = 1e-6;
 
-/// Content of the least ellipse of a covariance (xx, xy, yy) that holds an error, 0..1: where the
-/// errors are normal and the covariance is theirs, any `p` is exceeded by `1 - p` of them. 1 for
-/// what no ellipse holds: a covariance that is none, or an error that is not a number.
+/// Content of the smallest ellipse of a covariance (xx, xy, yy) that contains an error, 0..1: if
+/// the errors are normal with that covariance, it exceeds any `p` for a share `1 - p` of them. 1
+/// for whatever no ellipse contains: an invalid covariance, or an error that is not a number.
 pub fn content(error: [f32; 2], covariance: [f32; 3]) -> f64 {
     let d2 = squared_distance(error.map(f64::from), covariance.map(f64::from));
-    // The distribution of chi-square with two degrees of freedom.
+    // The chi-square distribution with two degrees of freedom.
     -(-0.5 * d2).exp_m1()
 }
 
@@ -27,7 +27,7 @@ fn squared_distance([x, y]: [f64; 2], [xx, xy, yy]: [f64; 3]) -> f64 {
     along * along / great + across * across / small.max(THIN * great)
 }
 
-/// Standard deviation along one axis, of both alike: the root of half the trace.
+/// Standard deviation along one axis, the same for both: the root of half the trace.
 pub fn deviation([xx, _, yy]: [f32; 3]) -> f32 {
     (0.5 * (xx + yy)).sqrt()
 }
@@ -43,7 +43,7 @@ mod tests {
         assert!((squared_distance([x, y], [xx, xy, yy]) - by_hand).abs() < 1e-12);
         // Along an axis, three deviations out.
         assert!((squared_distance([0.0, 1.5], [4.0, 0.0, 0.25]) - 9.0).abs() < 1e-12);
-        // The quantiles of chi-square that tables have.
+        // Tabulated quantiles of chi-square.
         for (d2, share) in [(2.279f32, 0.68), (5.991, 0.95)] {
             assert!((content([d2.sqrt(), 0.0], [1.0, 0.0, 1.0]) - share).abs() < 1e-4);
         }
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn ellipses_as_thin_as_a_line() {
-        // Variance along the diagonal only, as single precision has it.
+        // Variance along the diagonal only, in single precision.
         let line = [0.09f32, 0.09, 0.09];
         assert!((content([0.3, 0.3], line) - content([0.3, 0.0], [0.09, 0.0, 0.09])).abs() < 1e-3);
         assert!(content([0.3, -0.3], line) > 0.999_999);

@@ -1,4 +1,4 @@
-//! Whether covariances say how large errors are: shares of true values in the ellipses claimed.
+//! Whether covariances predict how large errors are: shares of true values in the ellipses claimed.
 
 mod ellipse;
 mod show;
@@ -11,7 +11,7 @@ use super::statistics::{Errors, Sorted, Weight};
 use super::tally::SETTLED;
 use ellipse::{content, deviation};
 
-/// What is claimed.
+/// The value a covariance is claimed for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Displacement between the sweeps, m.
@@ -23,10 +23,10 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All of them, as they are listed.
+    /// All of them, in the order listed.
     pub const ALL: [Quantity; 3] = [Quantity::Flow, Quantity::Settled, Quantity::Velocity];
 
-    /// Error and the covariance claimed; none where the row claims nothing of the kind.
+    /// The error and the covariance claimed; `None` if the row makes no such claim.
     fn of(self, row: &Row) -> Option<([f32; 2], [f32; 3])> {
         let truth = [row.smooth_x, row.smooth_y];
         match self {
@@ -43,19 +43,19 @@ impl Quantity {
     }
 }
 
-/// Which columns.
+/// A set of columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
-    /// Those put out with a displacement over ground, whatever they are.
+    /// Those output with a displacement over ground, whatever they are.
     Displaced,
-    /// Those of a group with a motion.
+    /// Those of a group with a given motion.
     Of(ClassGroup, MotionGroup),
 }
 
 /// Claims and errors of some columns.
 #[derive(Clone, Debug, Default)]
 struct Claims {
-    /// Content of the least ellipse that holds the truth.
+    /// Content of the smallest ellipse that contains the truth.
     content: Errors,
     deviation: Errors,
     error: Errors,
@@ -63,23 +63,23 @@ struct Claims {
     without: u64,
 }
 
-/// The same in ascending order.
+/// Claims and errors of some columns, in ascending order.
 #[derive(Clone, Debug)]
 pub struct Sample {
-    /// Content of the least ellipse that holds the truth, 0..1.
+    /// Content of the smallest ellipse that contains the truth, 0..1.
     pub content: Sorted,
     /// Standard deviation claimed along an axis, m or m/s.
     pub deviation: Sorted,
     /// Distance from the truth, m or m/s.
     pub error: Sorted,
-    /// Columns that claim no covariance: background and what has no match.
+    /// Columns that claim no covariance: background and those without a match.
     pub without: u64,
 }
 
-/// By class, [`Row::motion`], and whether a displacement was put out.
+/// By class, [`Row::motion`], and whether a displacement was output.
 type Cells = [[[Claims; 2]; 3]; COUNT];
 
-/// Claims of all rows, against smoothed labels; those of exact ones apart.
+/// Claims of all rows, against smoothed labels; those of exact labels separately.
 #[derive(Clone, Debug, Default)]
 pub struct Calibration {
     /// By quantity as in [`Quantity::ALL`], then by whether labels are exact.
@@ -87,7 +87,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Counts a row; `exact`: of a drive whose labels are exact.
+    /// Counts a row; `exact`: it is from a drive with exact labels.
     pub fn row(&mut self, row: &Row, exact: bool) {
         if !row.in_view {
             return;
@@ -107,7 +107,7 @@ impl Calibration {
         }
     }
 
-    /// What was claimed of some columns.
+    /// The claims of some columns.
     pub fn sample(&self, quantity: Quantity, exact: bool, columns: Columns) -> Sample {
         let n = Quantity::ALL.iter().position(|q| *q == quantity).expect("all are listed");
         let of = &self.claims[n][usize::from(exact)];
@@ -149,9 +149,10 @@ mod tests {
 
     const COUNT: u64 = 4000;
 
-    /// A column whose flow errs by what `flow` has and whose velocity errs by `velocity` of it.
+    /// A column whose flow error is drawn from `flow`'s covariance and whose velocity error is 20
+    /// times that.
     fn row(n: u64) -> Row {
-        // Covariance (0.04, 0.03, 0.09): by its root.
+        // Covariance (0.04, 0.03, 0.09), from its root.
         let [a, b] = normal(n);
         let error = [0.2 * a, 0.15 * a + 0.0675f64.sqrt() * b];
         Row {
@@ -194,7 +195,7 @@ mod tests {
         }
         assert!((flow.deviation.quantile(0.5) - 0.065f64.sqrt()).abs() < 1e-6);
         assert!((flow.error.quantile(0.5) / 0.065f64.sqrt() - 1.15).abs() < 0.1);
-        // Velocities err twice as much as they claim: 4 of chi-square's scale.
+        // Velocities err twice as much as they claim: 4 times chi-square's scale.
         let expected = |d2: f64| 1.0 - (-d2 / 8.0).exp();
         let velocity = calibration.sample(Quantity::Velocity, true, moving);
         let share = velocity.content.share_below(0.95);

@@ -1,12 +1,12 @@
-//! Table and figure of calibration.
+//! The table and figure of calibration.
 
 use super::{Calibration, Columns, Quantity};
 use crate::eval::groups::{ClassGroup, MotionGroup};
 use crate::report::{Axis, Cell, Chart, Guide, Lines, Plot, Series, Table, TableRow};
 
-/// Contents of the ellipses of the table.
+/// Contents of the table's ellipses.
 const CONTENTS: [f64; 2] = [0.68, 0.95];
-/// The curves end at this content: nothing is claimed for certain.
+/// The curves end at this content: nothing is claimed with certainty.
 const END: f64 = 0.99;
 /// Points of a curve.
 const POINTS: usize = 99;
@@ -34,7 +34,7 @@ impl Columns {
         }
     }
 
-    /// As they are listed.
+    /// All sets of columns, in the order listed.
     fn all() -> impl Iterator<Item = Columns> {
         let movers = ClassGroup::labelled().map(|g| Columns::Of(g, MotionGroup::Moving));
         let rest = [MotionGroup::Slow, MotionGroup::Parked, MotionGroup::Any];
@@ -44,7 +44,7 @@ impl Columns {
     }
 }
 
-/// Which truth, for people.
+/// Name of the truth, for display.
 pub fn truth(exact: bool) -> &'static str {
     if exact { "exact" } else { "labels" }
 }
@@ -94,7 +94,7 @@ pub fn table(calibration: &Calibration) -> Table {
     Table::new("calibration", caption, &columns, rows).note(note)
 }
 
-/// Share of true values in ellipses of every content; on the diagonal covariances are right.
+/// Share of true values in ellipses of every content; correct covariances lie on the diagonal.
 pub fn reliability(calibration: &Calibration) -> Chart {
     let series = |quantity, exact, motion: MotionGroup| {
         let columns = Columns::Of(ClassGroup::Labelled, motion);

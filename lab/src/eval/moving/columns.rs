@@ -12,17 +12,17 @@ use crate::report::{Cell, Table, TableRow};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct PutOut {
     columns: u64,
-    /// Put out as moving.
+    /// Reported as moving.
     moving: u64,
-    /// By the displacement alone.
+    /// Moving by the displacement alone.
     by_flow: u64,
 }
 
-/// Verdicts of one kind of truth.
+/// Verdicts with one kind of truth.
 #[derive(Clone, Debug, Default)]
 struct OfTruth {
     counts: MotionCounts,
-    /// With the ground below objects, as boxes have it.
+    /// Including the ground below objects, as with boxes.
     by_boxes: MotionCounts,
     /// By class, then by [`Row::motion`].
     kinds: [[PutOut; 3]; COUNT],
@@ -34,7 +34,7 @@ struct OfTruth {
 pub struct ColumnVerdicts([OfTruth; 2]);
 
 impl ColumnVerdicts {
-    /// Counts a row; `exact`: of a drive whose labels are exact.
+    /// Counts a row; `exact`: it is from a drive with exact labels.
     pub fn row(&mut self, row: &Row, exact: bool) {
         if !row.in_view {
             return;
@@ -58,19 +58,19 @@ impl ColumnVerdicts {
         }
     }
 
-    /// Of any truth.
+    /// Counts over both kinds of truth.
     pub fn all(&self) -> MotionCounts {
         let mut all = self.counts(true);
         all.merge(&self.counts(false));
         all
     }
 
-    /// Of one kind of truth.
+    /// Counts with one kind of truth.
     pub fn counts(&self, exact: bool) -> MotionCounts {
         self.0[usize::from(exact)].counts
     }
 
-    /// The same with the ground below objects, as boxes have it.
+    /// The same including the ground below objects, as with boxes.
     pub fn counts_by_boxes(&self, exact: bool) -> MotionCounts {
         self.0[usize::from(exact)].by_boxes
     }
@@ -86,7 +86,7 @@ impl ColumnVerdicts {
         all
     }
 
-    /// What is put out as moving, by what it is.
+    /// What is reported as moving, by what it is.
     pub fn by_kind(&self) -> Table {
         let mut rows = Vec::new();
         for exact in [true, false] {
@@ -113,7 +113,7 @@ impl ColumnVerdicts {
         Table::new("moving-by-class", caption, &columns, rows)
     }
 
-    /// Where false motion is, by what the columns are like.
+    /// Where false motion occurs, by properties of the columns.
     pub fn false_motion(&self, drives: &[Facts]) -> Table {
         let of = |exact| (exact, sweeps(drives, exact), &self.0[usize::from(exact)].wrong);
         FalseMotion::table([true, false].map(of))
@@ -140,11 +140,11 @@ mod tests {
         for row in [
             row(1, 2, 0.3, 2.9, 0.0),
             row(1, 2, 0.0, 0.0, 0.0),
-            // A displacement, though the tracklet says that it stands, and the reverse.
+            // A displacement though the tracklet is at rest, and the reverse.
             row(1, 0, 0.3, 0.2, 9.0),
             row(1, 0, 0.0, 2.0, 9.0),
             row(0, 0, -0.3, -3.0, 1.0),
-            // A displacement slower than what moves; what is slow may be put out as it likes.
+            // A displacement too slow to count as moving; slow objects may be reported either way.
             row(0, 0, 0.04, 3.0, 0.2),
             row(8, 1, 0.1, 1.0, 0.0),
             Row { in_view: false, ..row(0, 0, 0.3, 3.0, 0.0) },
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(of(ClassGroup::Labelled, MotionGroup::Parked), [2, 0, 1]);
         assert_eq!(of(ClassGroup::Labelled, MotionGroup::Slow), [1, 1, 1]);
         assert_eq!(of(ClassGroup::Class(0), MotionGroup::Any), [2, 1, 1]);
-        // Cars and all labelled, moving and parked; what is slow, twice; the background.
+        // Cars and all labelled, moving and parked; slow ones, twice; the background.
         assert_eq!(verdicts.by_kind().rows.len(), 7);
     }
 }

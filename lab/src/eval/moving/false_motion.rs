@@ -1,20 +1,20 @@
-//! What false motion is like: class, range, age of the tracklet, height, basis.
+//! Distribution of false motion: class, range, age of the tracklet, height, basis.
 
 use super::{ZONES, per_sweep, percent, zone};
 use crate::eval::calibration::truth;
 use crate::eval::row::{CLASSES, Row};
 use crate::report::{Cell, Table, TableRow};
 
-/// Something by which columns are told apart.
+/// A property by which columns are binned.
 struct Aspect {
     name: &'static str,
     bins: &'static [&'static str],
     bin: fn(&Row) -> usize,
 }
 
-/// Ends of the bins of ranges, m: a third of the default window's reach each, about.
+/// Ends of the bins of ranges, m: each about a third of the default window's reach.
 const RANGES_M: [f32; 3] = [10.0, 20.0, 30.0];
-/// First ages of the bins: 10 is where tracklets count as settled.
+/// First ages of the bins: from 10 on tracklets count as settled.
 const AGES: [u32; 4] = [1, 3, 6, 10];
 /// First numbers of occupied voxels of the bins.
 const VOXELS: [u8; 3] = [2, 3, 5];
@@ -48,20 +48,20 @@ const ASPECTS: [Aspect; 6] = [
     },
 ];
 
-/// Columns that stand.
+/// Static columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Standing {
     columns: u64,
-    /// Put out as moving, by zone.
+    /// Reported as moving, by zone.
     wrong: [u64; 3],
 }
 
-/// Columns that stand, by aspect and bin.
+/// Static columns, by aspect and bin.
 #[derive(Clone, Debug, Default)]
 pub struct FalseMotion([[Standing; CLASSES.len()]; ASPECTS.len()]);
 
 impl FalseMotion {
-    /// Counts a column that stands; `put_out`: as moving.
+    /// Counts a static column; `put_out`: it is reported as moving.
     pub fn standing(&mut self, row: &Row, put_out: bool) {
         for (aspect, bins) in ASPECTS.iter().zip(&mut self.0) {
             let standing = &mut bins[(aspect.bin)(row)];
@@ -70,7 +70,8 @@ impl FalseMotion {
         }
     }
 
-    /// Of exact truth or not, sweeps, and what was counted in them.
+    /// Builds the table from, for each kind of truth: whether it is exact, the sweeps, and what was
+    /// counted in them.
     pub fn table(all: [(bool, u64, &FalseMotion); 2]) -> Table {
         let mut rows = Vec::new();
         for (exact, sweeps, counted) in all {
@@ -113,7 +114,7 @@ mod tests {
         let ranges: Vec<u64> = counted.0[2].iter().map(|b| b.columns).take(4).collect();
         assert_eq!(ranges, [1, 1, 0, 1]);
         let none = FalseMotion::default();
-        // All, background, and three bins of the others.
+        // All, background, and three bins of each of the others.
         assert_eq!(FalseMotion::table([(true, 0, &none), (false, 2, &counted)]).rows.len(), 14);
     }
 }

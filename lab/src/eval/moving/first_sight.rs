@@ -1,4 +1,4 @@
-//! How long it takes from the first sight of a mover until it is put out as moving.
+//! Time from the first sight of a mover until it is reported as moving.
 
 use crate::eval::calibration::truth;
 use crate::eval::groups::ClassGroup;
@@ -12,13 +12,13 @@ use std::collections::BTreeMap;
 struct Glimpse {
     /// Solid columns in view.
     columns: u32,
-    /// Put out as moving.
+    /// Reported as moving.
     moving: u32,
     stamp_s: f64,
     dt_s: f64,
 }
 
-/// All that is seen of a mover, by sweep.
+/// All glimpses of a mover, by sweep.
 #[derive(Clone, Debug, Default)]
 struct Sight {
     class: u8,
@@ -27,9 +27,9 @@ struct Sight {
 }
 
 impl Sight {
-    /// Time from the first sweep in which something of it is solid and in view until the end of
-    /// the first pair in which `enough` of its columns are put out as moving, s; infinite where
-    /// that never happens.
+    /// Time from the first sweep in which any column of it is solid and in view until the end of
+    /// the first pair in which `enough` of its columns are reported as moving, s; infinite if that
+    /// never happens.
     fn delay_s(&self, enough: impl Fn(&Glimpse) -> bool) -> f64 {
         let mut glimpses = self.glimpses.values();
         let first = self.glimpses.values().next().map_or(0.0, |g| g.stamp_s);
@@ -43,7 +43,7 @@ impl Sight {
 pub struct FirstSights(BTreeMap<(String, u32), Sight>);
 
 impl FirstSights {
-    /// Counts a row of a drive; `exact`: its labels are.
+    /// Counts a row of a drive; `exact`: its labels are exact.
     pub fn row(&mut self, drive: &str, row: &Row, exact: bool) {
         if row.moves() != Some(true) {
             return;
@@ -56,7 +56,7 @@ impl FirstSights {
         glimpse.moving += u32::from(row.is_put_out_moving());
     }
 
-    /// Median and 90 % by class.
+    /// Median and 90 % quantile by class.
     pub fn table(&self) -> Table {
         let mut rows = Vec::new();
         for exact in [true, false] {
@@ -120,7 +120,7 @@ mod tests {
             velocity_x: speed,
             ..Row::default()
         };
-        // Stands, is hidden, moves: seen from the third sweep on.
+        // Static, hidden, moving: seen from the third sweep on.
         for row in [
             row(0, 0, 2.0),
             Row { in_view: false, ..row(1, 2, 2.0) },

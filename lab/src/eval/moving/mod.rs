@@ -1,4 +1,4 @@
-//! Moving or not: what is put out as moving beside what moves, by columns and by returns.
+//! Moving or not: what is reported as moving against what moves, by columns and by returns.
 
 mod columns;
 mod false_motion;
@@ -17,28 +17,28 @@ use crate::labels::trajectory::MOVING_MPS;
 use crate::report::{Cell, Table, TableRow};
 use serde::{Deserialize, Serialize};
 
-/// Up to here from the box of a mover false motion is forgiven in one of the columns, m: labels,
-/// swinging limbs and columns on the border are no finer.
+/// Up to this distance from a mover's box false motion is forgiven in one of the columns, m:
+/// labels, swinging limbs and columns on the border are no more precise.
 pub const FORGIVEN_M: f32 = 0.5;
-/// Up to here it is near a mover, m: what a cluster drags along.
+/// Up to this distance false motion counts as near a mover, m: dragged along by its cluster.
 pub const NEAR_M: f32 = 2.0;
 
 /// Names of the zones around movers; see [`zone`].
 const ZONES: [&str; 3] = ["within 0.5 m of a mover", "0.5 to 2 m", "farther"];
 
-/// The zone of something so far from the nearest mover's box, m.
+/// The zone at this distance from the nearest mover's box, m.
 fn zone(mover_m: f32) -> usize {
     [FORGIVEN_M, NEAR_M].iter().filter(|end| mover_m > **end).count()
 }
 
-/// Verdicts on columns or returns of which is known whether they move.
+/// Verdicts on columns or returns whose motion is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MotionCounts {
-    /// Move, and are put out so.
+    /// Moving, and reported so.
     pub found: u64,
-    /// Move, and are not.
+    /// Moving, but not reported so.
     pub missed: u64,
-    /// Stand and are put out as moving, by zone.
+    /// Static, but reported as moving, by zone.
     pub wrong: [u64; 3],
 }
 
@@ -56,7 +56,7 @@ fn per_sweep(count: u64, sweeps: u64) -> Cell {
 }
 
 impl MotionCounts {
-    /// Counts one, so far from the nearest mover's box, m.
+    /// Counts one at this distance from the nearest mover's box, m.
     pub fn add(&mut self, moves: bool, put_out: bool, mover_m: f32) {
         match (moves, put_out) {
             (true, true) => self.found += 1,
@@ -73,27 +73,27 @@ impl MotionCounts {
         self.wrong.iter_mut().zip(other.wrong).for_each(|(a, b)| *a += b);
     }
 
-    /// Share of what is put out as moving that moves.
+    /// Share of what is reported as moving that does move.
     pub fn precision(&self) -> f64 {
         share(self.found, self.found + self.wrong.iter().sum::<u64>())
     }
 
-    /// The same, but for what lies within [`FORGIVEN_M`] of a mover.
+    /// The same, ignoring whatever lies within [`FORGIVEN_M`] of a mover.
     pub fn forgiven_precision(&self) -> f64 {
         share(self.found, self.found + self.wrong[1] + self.wrong[2])
     }
 
-    /// False ones farther from movers than [`NEAR_M`].
+    /// False motion farther from movers than [`NEAR_M`].
     pub fn far(&self) -> u64 {
         self.wrong[2]
     }
 
-    /// Share of what moves that is put out so.
+    /// Share of what moves that is reported so.
     pub fn recall(&self) -> f64 {
         share(self.found, self.found + self.missed)
     }
 
-    /// As [`COLUMNS`] has them.
+    /// The cells under [`COLUMNS`], from "True" on.
     fn cells(&self, sweeps: u64) -> Vec<Cell> {
         let MotionCounts { found, missed, wrong } = *self;
         let all_wrong: u64 = wrong.iter().sum();
@@ -125,7 +125,7 @@ const COLUMNS: [&str; 12] = [
     "Farther",
 ];
 
-/// Moving against standing, by columns and by returns.
+/// Moving against static, by columns and by returns.
 pub fn table(columns: &ColumnVerdicts, drives: &[Facts]) -> Table {
     let mut rows = Vec::new();
     for exact in [true, false] {

@@ -1,4 +1,4 @@
-//! P(moves) beside what moves: is it calibrated, and what does an operating point give?
+//! P(moves) against what moves: is it calibrated, and what does each operating point yield?
 
 use super::percent;
 use crate::eval::calibration::truth;
@@ -8,7 +8,7 @@ use crate::report::{Axis, Cell, Chart, Guide, Lines, Plot, Series, Style, Table,
 /// Bins of P(moves), of equal width.
 const BINS: usize = 20;
 
-/// Operating points that are shown.
+/// Operating points shown.
 const POINTS: [f64; 9] = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 0.9];
 
 /// Columns whose P(moves) lies in a bin.
@@ -17,15 +17,15 @@ struct Bin {
     columns: u64,
     /// Those that move.
     moving: u64,
-    /// Of P(moves).
+    /// Sum of P(moves).
     sum: f64,
 }
 
-/// Columns in view of one kind of truth, but for what is slow.
+/// Columns in view with one kind of truth, except slow ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct OfTruth {
     bins: [Bin; BINS],
-    /// Of squared differences between P(moves) and what is true, 0 or 1.
+    /// Sum of squared differences between P(moves) and the truth, 0 or 1.
     squares: f64,
 }
 
@@ -41,12 +41,12 @@ impl OfTruth {
 pub struct MovesReliability([OfTruth; 2]);
 
 impl MovesReliability {
-    /// Counts a row; `exact`: of a drive whose labels are exact.
+    /// Counts a row; `exact`: it is from a drive with exact labels.
     pub fn row(&mut self, row: &Row, exact: bool) {
         let Some(moves) = row.moves() else { return };
         let of = &mut self.0[usize::from(exact)];
         let p = f64::from(row.probability);
-        // A hundredth of a bin: what is 0.3 in single precision counts as 0.3.
+        // A hundredth of a bin: 0.3 in single precision counts as 0.3.
         let bin = &mut of.bins[((p * BINS as f64 + 0.01) as usize).min(BINS - 1)];
         bin.columns += 1;
         bin.moving += u64::from(moves);
@@ -54,7 +54,7 @@ impl MovesReliability {
         of.squares += (p - f64::from(u8::from(moves))).powi(2);
     }
 
-    /// What is found at operating points.
+    /// Results at the operating points.
     pub fn table(&self) -> Table {
         let mut rows = Vec::new();
         for exact in [true, false] {
@@ -82,7 +82,7 @@ impl MovesReliability {
         Table::new("p-moves", caption, &columns, rows)
     }
 
-    /// Share of the columns of every bin that move.
+    /// Share of moving columns in every bin.
     pub fn chart(&self) -> Chart {
         let part = |exact: bool| {
             let bins = self.0[usize::from(exact)].bins;
@@ -123,7 +123,7 @@ mod tests {
         for r in [row(0.0, 0), row(0.3, 2), row(0.32, 0), row(0.9, 2), row(1.0, 2), row(0.2, 2)] {
             reliability.row(&r, false);
         }
-        // What is slow, and what is out of view, is neither.
+        // Slow objects, and those out of view, are neither.
         reliability.row(&row(0.7, 1), false);
         reliability.row(&Row { in_view: false, ..row(0.7, 2) }, false);
         let of = reliability.0[0];

@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What was counted of a drive's returns.
+/// Counts of a drive's returns.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReturnCounts {
     /// Those in view, by the boxes.
     pub in_boxes: MotionCounts,
-    /// By SemanticKITTI's class: how many, and put out as moving.
+    /// By SemanticKITTI's class: number of returns, and of those reported as moving.
     pub classes: BTreeMap<u16, [u64; 2]>,
 }
 
@@ -28,7 +28,7 @@ pub struct ReturnVerdicts {
     view: View,
     margin_m: f64,
     semantic: Option<Semantic>,
-    /// So far.
+    /// Counts so far.
     pub counts: ReturnCounts,
 }
 
@@ -38,8 +38,8 @@ impl ReturnVerdicts {
         ReturnVerdicts { view, margin_m, semantic, counts: ReturnCounts::default() }
     }
 
-    /// Counts the returns of a pair's first sweep, with what was put out of each as moving, by the
-    /// exact truth where there is any. Fails where its classes cannot be read.
+    /// Counts the returns of a pair's first sweep, with whether each was reported as moving,
+    /// against exact truth if there is any. Fails if its classes cannot be read.
     pub fn pair(
         &mut self,
         seen: &PairData,
@@ -60,7 +60,7 @@ impl ReturnVerdicts {
             let there = object.map_or(Some(seen.now()), |o| Some(o.step?.raw * seen.now()));
             let stays = |by| self.view.holds((next_from_world * by).transform(at));
             let Some(moves) = moves(object).filter(|_| there.is_some_and(stays)) else { continue };
-            // The distance matters to false motion alone.
+            // The distance matters only for false motion.
             let mover_m = if *put_out { Present::mover_m(present, at) } else { 0.0 };
             self.counts.in_boxes.add(moves, *put_out, mover_m);
         }
@@ -74,7 +74,7 @@ impl ReturnVerdicts {
     }
 }
 
-/// Whether what belongs to an object moves; `None` where that cannot be told.
+/// Whether a return of an object moves; `None` if unknown.
 fn moves(object: Option<&Present>) -> Option<bool> {
     match object.map(|o| o.motion) {
         Some(Motion::Moving) => Some(true),
@@ -87,7 +87,7 @@ fn moves(object: Option<&Present>) -> Option<bool> {
 pub struct Semantic(PathBuf);
 
 impl Semantic {
-    /// Of the drive in a folder; none where it has none for its first sweep.
+    /// The labels of the drive in a folder; `None` if its first sweep has none.
     pub fn of(drive: &Path, source: &dyn Source) -> Option<Semantic> {
         let drive = recognise(drive).map_or_else(|_| drive.to_path_buf(), |found| found.1);
         labels::file(&drive, source.frame(0)).is_file().then_some(Semantic(drive))
@@ -102,9 +102,9 @@ impl Semantic {
 /// The classes of all drives.
 #[derive(Default)]
 struct ClassSums {
-    /// How many returns, and put out as moving.
+    /// Number of returns, and of those reported as moving.
     classes: BTreeMap<u16, [u64; 2]>,
-    /// Of those that stand, and of those that move.
+    /// The same for static and for moving returns.
     of_motion: [[u64; 2]; 2],
 }
 
@@ -136,14 +136,14 @@ fn label(class: u16) -> PointLabel {
     PointLabel { class, instance: 0 }
 }
 
-/// Whether the returns of a class move; `None` where that cannot be told. A drive whose moving
-/// objects have no classes of their own tells nothing of what could move.
+/// Whether the returns of a class move; `None` if unknown. If a drive's moving objects have no
+/// classes of their own, nothing is known about objects that could move.
 fn class_moves(label: PointLabel, drive_tells: bool) -> Option<bool> {
     let told = drive_tells || label.kind().is_none();
     (told && !label.is_unlabelled()).then_some(label.moving())
 }
 
-/// False motion by SemanticKITTI's classes; none where no drive has any.
+/// False motion by SemanticKITTI's classes; `None` if no drive has any.
 pub fn semantic_kitti<'a>(drives: impl Iterator<Item = &'a ReturnCounts>) -> Option<Table> {
     let mut sums = ClassSums::default();
     drives.for_each(|drive| sums.add(&drive.classes));
@@ -186,7 +186,7 @@ mod tests {
         let both = semantic_kitti([merged, told].iter()).unwrap();
         assert!(format!("{:?}", both.rows[6]).contains("Count(350), Count(6)"), "{both:?}");
         assert!(format!("{:?}", both.rows[7]).contains("Count(40), Count(30)"), "{both:?}");
-        // 30 of 40 that move and 6 that stand.
+        // 30 of 40 that move and 6 static ones.
         assert!(both.notes[0].contains("65.2 %"), "{:?}", both.notes);
     }
 

@@ -1,6 +1,6 @@
-//! Recorded drives: what is measured on them must not get worse. `RAYWAKE_DATA` names the folder
-//! that holds them. Limits stand a little beyond what was measured when they were written; where
-//! something gets better, tighten them.
+//! Recorded drives: results on them must not get worse. `RAYWAKE_DATA` names their folder. The
+//! limits are slightly looser than the values measured when they were set; tighten them after
+//! improvements.
 
 use super::{eval, figure};
 use crate::scratch::Scratch;

@@ -34,7 +34,7 @@ impl Logs {
         Log::open(&self.0.path().join("val/log"), None, true).map_err(|e| e.to_string())
     }
 
-    /// What the command says of an estimate in `folder`.
+    /// The command's response to an estimate in `folder`.
     fn grade(&self, folder: &str) -> String {
         #[derive(Parser)]
         struct Command {
@@ -58,7 +58,7 @@ fn f64s(values: &[f64]) -> ArrayRef {
     Arc::new(Float64Array::from(values.to_vec()))
 }
 
-/// The columns of three poses, `x` apart, without rotation, 10 m above the city's zero.
+/// The columns of poses at these `x`, without rotation, 10 m above the city's zero.
 fn poses<'a>(x: &[f64]) -> Vec<(&'a str, ArrayRef)> {
     let all = |v: f64| f64s(&vec![v; x.len()]);
     let mut columns = vec![("qw", all(1.0)), ("qx", all(0.0)), ("qy", all(0.0)), ("qz", all(0.0))];
@@ -129,10 +129,10 @@ fn a_pair() {
     let t = log();
     let mut log = t.open().unwrap();
     assert_eq!((log.name(), log.pairs().count()), ("log", 2));
-    // In any order: sweeps at hand are taken for what they are.
+    // In any order: cached sweeps are identified correctly.
     for sweep in [1, 0, 1, 0, 0] {
         let pair = log.pair(sweep).unwrap();
-        // 0.375 m above the ground is the ground's; where the map has a hole nothing is.
+        // A return 0.375 m above the ground belongs to it; where the map has a hole none does.
         assert_eq!(pair.points.iter().map(|p| p.ground).collect::<Vec<_>>(), [false, true, false]);
         assert_eq!(pair.points[0].category.class(), Some(Class::Car));
         assert_eq!(pair.points[0].flow_m, [0.5, 0.0, 0.0]);
@@ -148,7 +148,7 @@ fn a_pair() {
     assert!(without.unwrap().pair(0).unwrap().points.iter().all(|p| !p.ground));
 }
 
-/// The ground is told by height over the map: 0.4 m and everything below.
+/// Ground is decided by height above the map: up to 0.4 m, and everything below.
 #[test]
 fn ground() {
     let t = log();
@@ -166,11 +166,11 @@ fn ground() {
 #[test]
 fn by_name_or_by_order() {
     let t = log();
-    // One pair of the truth is missing: the other keeps its place, unlike in the grader.
+    // One pair of the truth is missing: the other keeps its index, unlike in the grader.
     fs::remove_file(t.0.path().join(TRUTH)).unwrap();
     assert_eq!(t.open().unwrap().pairs().next().unwrap().0, 1);
     assert_eq!(t.grade("out"), "");
-    // Names that are no stamps count by order; others are passed over.
+    // Names that are not stamps count by order; other files are ignored.
     t.feather("count/log/0000000000.feather", flow(&[0.0; 3], &[true; 3]));
     t.write("count/log/0000000000_occ.feather", "");
     assert!(t.grade("count").contains("count/log: has no estimate of sweep 1100000000, but "));
@@ -205,7 +205,7 @@ fn wrong_estimates() {
     columns[3].1 = Arc::new(BooleanArray::from(vec![Some(true), None, Some(true)]));
     t.feather(ESTIMATE, columns);
     assert!(t.grade("out").contains("1000000000.feather, row 1: column `is_valid` is null"));
-    // On the ground it does not count, and what is not valid counts all the same.
+    // A return on the ground does not count; one that is not valid still does.
     t.feather(ESTIMATE, flow(&[0.0, f32::NAN, 0.0], &[false; 3]));
     assert_eq!(t.grade("out"), "");
     let mut log = t.open().unwrap();
@@ -239,7 +239,7 @@ fn wrong_truth() {
     let text = pair(truth(&[0.0; 3], &[0, 30, 0]));
     assert!(text.contains("1000000000.feather, row 1: classes_0 30 is none of"), "{text}");
     assert!(pair(flow(&[0.0; 3], &[true; 3])).contains("has no column `classes_0`"));
-    // NaN where it counts is named with the truth's file, whatever is graded.
+    // NaN that counts is reported with the truth's file, whatever is graded.
     t.feather(TRUTH, truth(&[f32::NAN, 0.0, 0.0], &[18, -1, -1]));
     let text = t.grade("out");
     assert!(text.contains("val_sceneflow_feather/log/1000000000.feather: row 0: the true"));

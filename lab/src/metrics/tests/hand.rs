@@ -51,7 +51,7 @@ fn bucket_normalised() {
     let pedestrian = &errors.classes[3];
     near(pedestrian.static_epe_m, 0.04);
     assert!(pedestrian.dynamic.is_nan() && pedestrian.buckets[1].epe_m.is_nan());
-    // Classes without anything are left out, and the sign, wrong as it is, is no class at all.
+    // Empty classes are left out, and the sign, though wrong, belongs to no class.
     near(errors.mean_static_epe_m, 0.03);
     near(errors.mean_dynamic, car.dynamic);
     assert!(errors.classes[2].static_epe_m.is_nan());
@@ -92,7 +92,7 @@ fn nothing_and_nothing_that_moves() {
     assert!(grades.three_way.errors(Range::Near).mean_epe_m().is_nan());
 }
 
-/// Buckets of speeds on or next to an edge. As the grader: rounded to f32, compared in f64.
+/// Buckets of speeds on or next to an edge. As in the grader: rounded to f32, compared in f64.
 #[test]
 fn edges_of_speed() {
     let bucket = |speed: f32| {
@@ -111,7 +111,7 @@ fn edges_of_speed() {
     assert!(moving(0.05) && !moving(0.05f32.next_down()));
 }
 
-/// Bounds are excluded, and lie in the vehicle's frame at the second sweep.
+/// Bounds are excluded, and are in the vehicle's frame at the second sweep.
 #[test]
 fn edges_of_range() {
     let mut pair = still(vec![point("BUS", [0.0; 3])]);
@@ -158,10 +158,10 @@ fn what_cannot_be_scored() {
     }
     pair.points[0].flow_m[2] = f32::NAN;
     assert_eq!(refused(&pair, &[[0.0; 3]; 2]), "row 0: the true flow is not finite");
-    // Where it does not count it does not matter.
+    // Errors that do not count do not matter.
     pair.points[0].valid = false;
     assert_eq!(score(&pair, &[[f32::NAN; 3], [0.0; 3]]).len(), 1);
-    // And nothing is counted of a pair that is refused.
+    // And nothing of a refused pair is counted.
     let mut grades = Grades::default();
     assert!(grades.add(&pair, &[[0.0; 3], [f32::NAN; 3]], &Rules::OFFICIAL).is_err());
     assert_eq!(grades, Grades::default());
@@ -208,7 +208,7 @@ fn accuracies() {
     assert_eq!(accuracy(1.0, 1.09), [0.0, 1.0, 0.0]);
     assert_eq!(accuracy(3.0, 3.25), [0.0, 1.0, 0.0]);
     assert_eq!(accuracy(1.0, 1.2), [0.0, 0.0, 1.0]);
-    // An outlier by length alone, and what stands: an outlier by share, however near.
+    // An outlier by length alone; static returns are outliers by share, however small the error.
     assert_eq!(accuracy(10.0, 10.4), [1.0, 1.0, 1.0]);
     assert_eq!(accuracy(0.0, 0.01), [1.0, 1.0, 1.0]);
     assert_eq!(accuracy(0.0, 0.0), [1.0, 1.0, 0.0]);
@@ -237,7 +237,7 @@ fn accuracies_by_class_and_motion() {
 
 #[test]
 fn the_vehicles_motion() {
-    // The vehicle drives one metre ahead: what stands comes one metre closer.
+    // The vehicle drives one metre ahead: static structure comes one metre closer.
     let mut pair = still(vec![point("BUS", [0.0; 3]), point("BUS", [1.0, 0.0, 0.0])]);
     pair.second_from_first = Pose::planar(-1.0, 0.0, 0.0, 0.0);
     let estimates = reference::carried(&pair);
@@ -247,7 +247,7 @@ fn the_vehicles_motion() {
     let seen = scored[0].with_ego_motion(&pair.second_from_first);
     assert_eq!((seen.truth_m, seen.estimate_m), ([-1.0, 0.0, 0.0], [0.0; 3]));
     assert!(!seen.moving());
-    // Turning, too, carries along.
+    // Rotation, too, carries along.
     pair.second_from_first = Pose::planar(0.0, 0.0, 0.0, -0.1);
     let scored = score(&pair, &reference::carried(&pair));
     let seen = scored[0].with_ego_motion(&pair.second_from_first);

@@ -1,4 +1,4 @@
-//! The metrics on cases worked by hand, on files made up, and against the official graders.
+//! The metrics on cases worked by hand, on synthetic files, and against the official graders.
 
 mod files;
 mod hand;
@@ -18,7 +18,7 @@ fn point(category: &str, flow_m: [f32; 3]) -> TruePoint {
     }
 }
 
-/// Returns seen by a vehicle that stands.
+/// Returns seen by a stationary vehicle.
 fn still(points: Vec<TruePoint>) -> Pair {
     Pair { points, second_from_first: Pose::IDENTITY }
 }

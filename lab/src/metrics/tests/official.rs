@@ -1,6 +1,6 @@
 //! The figures of the official graders on a real pair, by class and bucket.
 //!
-//! `official.txt` holds what they said of estimates that a formula makes of the truth (32-bit
+//! `official.txt` holds their results for estimates derived from the truth by a formula (32-bit
 //! floats, `i` the row):
 //!
 //! | estimate | flow |
@@ -20,7 +20,7 @@
 //!
 //! `both` is one evaluator given two frames: `zero` without ground, then `pattern` with it.
 //!
-//! `accuracy` lines (count, EPE, strict, relaxed, outliers, angle) are the formulas of av2-api's
+//! `accuracy` lines (count, EPE, strict, relaxed, outliers, angle) follow the formulas of av2-api's
 //! `evaluation/scene_flow/eval.py`, and for outliers FlowNet3D's, in numpy on the returns that the
 //! grader above counts without ground, with the vehicle's motion `removed` or `included`.
 

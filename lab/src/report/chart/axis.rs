@@ -3,7 +3,7 @@
 use crate::report::encode::{fixed, short};
 use std::ops::Range;
 
-/// Shortest axis and largest value: plotters looks for labels without end beyond these.
+/// Shortest axis and largest value: beyond these plotters searches for labels forever.
 const SPAN: [f64; 2] = [1e-9, 1e12];
 
 /// One axis of a plot.
@@ -11,22 +11,22 @@ const SPAN: [f64; 2] = [1e-9, 1e12];
 pub struct Axis {
     /// Quantity and unit, as in "error, m".
     pub label: String,
-    /// Ends; those of the data where none are given. What lies outside is not drawn.
+    /// Ends; those of the data if none are given. What lies outside is not drawn.
     pub range: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// As long as its data.
+    /// An axis as long as its data.
     pub fn new(label: &str) -> Axis {
         Axis { label: label.into(), range: None }
     }
 
-    /// The same from `low` to `high`.
+    /// The same axis from `low` to `high`.
     pub fn range(self, low: f64, high: f64) -> Axis {
         Axis { range: Some([low, high]), ..self }
     }
 
-    /// Ends that hold these values, all of them drawable; none where there are no such ends.
+    /// Ends that contain these values, all of them drawable; none if there are no such ends.
     pub(super) fn ends(&self, values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
         let data = values.into_iter().fold(None, |ends: Option<[f64; 2]>, v| {
             Some(ends.map_or([v, v], |[low, high]| [low.min(v), high.max(v)]))
@@ -38,7 +38,7 @@ impl Axis {
     }
 }
 
-/// Data's ends with a margin; a span that begins near zero says more with its zero.
+/// Ends of the data with a margin; a span that begins near zero is extended to zero.
 fn grown([low, high]: [f64; 2]) -> [f64; 2] {
     if low == high {
         return if low == 0.0 { [0.0, 1.0] } else { [low.min(0.0), high.max(0.0)] };

@@ -1,4 +1,4 @@
-//! Bars from left to right: times of stages, figures beside reference figures.
+//! Horizontal bars: times of stages, figures beside reference figures.
 
 use super::axis::{Axis, linear_label};
 use super::colours::{INK, REFERENCE, series};
@@ -10,7 +10,7 @@ use plotters::element::{EmptyElement, PathElement, Rectangle, Text};
 use plotters::style::text_anchor::HPos;
 use plotters::style::{Color, RGBColor};
 
-/// Height of a bar and of the space between two categories, units.
+/// Thickness of a bar and space between two categories, units.
 const BAR: f64 = 17.0;
 const BETWEEN: f64 = 13.0;
 /// Height of the axis below, units.
@@ -30,11 +30,11 @@ pub struct Bars {
 /// Bars of one colour.
 #[derive(Clone, Debug)]
 pub struct BarSeries {
-    /// In the legend.
+    /// Shown in the legend.
     pub name: String,
-    /// Whether these are somebody else's figures: they are then grey.
+    /// Whether these are someone else's figures: they are then grey.
     pub reference: bool,
-    /// One for each category; where it is absent there is none to tell.
+    /// One for each category; `None` if there is no value.
     pub bars: Vec<Option<Bar>>,
 }
 
@@ -43,7 +43,7 @@ pub struct BarSeries {
 pub struct Bar {
     /// Its length.
     pub value: f64,
-    /// A thin line from and to, such as a confidence interval or median to p99.
+    /// Ends of a thin line, such as a confidence interval or median to p99.
     pub spread: Option<[f64; 2]>,
 }
 
@@ -54,7 +54,7 @@ impl From<f64> for Bar {
 }
 
 impl Bar {
-    /// How far it and its spread reach.
+    /// How far the bar and its spread reach.
     fn reach(&self) -> f64 {
         self.spread.map_or(self.value, |[_, to]| to.max(self.value))
     }
@@ -83,7 +83,7 @@ impl Bars {
         self.group_height() * self.categories.len().max(2) as f64 + FOOT + 8.0
     }
 
-    /// Category, series and bar of all that can be drawn.
+    /// Category, series and bar of everything that can be drawn.
     fn drawable(&self) -> impl Iterator<Item = (usize, usize, Bar)> {
         let mut all = Vec::new();
         for (j, s) in self.series.iter().enumerate() {
@@ -107,7 +107,7 @@ impl Bars {
             .x_label_area_size(px(FOOT))
             .y_label_area_size(px(names.min(0.4 * super::WIDTH) + 12.0))
             .build_cartesian_2d(x.clone(), down..0.0)?;
-        // What lies beyond a given end stops there.
+        // Whatever lies beyond a given end is cut off there.
         let within = |v: f64| v.clamp(x.start, x.end);
         let x_label = linear_label(x.clone());
         let mut mesh = plane.configure_mesh();

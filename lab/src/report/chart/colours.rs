@@ -1,17 +1,17 @@
-//! Colours of charts, safe for colour-blind readers (Okabe and Ito) and apart in print. The page's
-//! style sheet replaces them by these values in the dark.
+//! Colours of charts, safe for colour-blind readers (Okabe and Ito) and distinguishable in print.
+//! In dark mode the page's style sheet replaces them, selecting on these values.
 
 use plotters::style::RGBColor;
 
 pub(super) const INK: RGBColor = rgb(0x1f2430);
-/// Text that steps back, and reference values.
+/// De-emphasised text, and reference values.
 pub(super) const MUTED: RGBColor = rgb(0x667085);
 pub(super) const GRID: RGBColor = rgb(0xe4e7ec);
 /// Lines at zero.
 pub(super) const AXIS: RGBColor = rgb(0x98a2b3);
 /// Bars of reference values.
 pub(super) const REFERENCE: RGBColor = rgb(0xc3cad5);
-/// Marks upon curves.
+/// Marks on curves.
 pub(super) const MARK: RGBColor = rgb(0xc0182b);
 
 const SERIES: [u32; 10] = [
@@ -25,12 +25,12 @@ const fn rgb(v: u32) -> RGBColor {
     RGBColor((v >> 16) as u8, (v >> 8) as u8, v as u8)
 }
 
-/// Of the `i`-th of several series; repeats after ten.
+/// Colour of the `i`-th of several series; repeats after ten.
 pub(super) fn series(i: usize) -> RGBColor {
     rgb(SERIES[i % SERIES.len()])
 }
 
-/// Of the `i`-th of `n` series that have an order, pale to dark.
+/// Colour of the `i`-th of `n` ordered series, pale to dark.
 pub(super) fn ordered(i: usize, n: usize) -> RGBColor {
     let last = ORDERED.len() - 1;
     rgb(ORDERED[if n > 1 { (i * last / (n - 1)).min(last) } else { last }])

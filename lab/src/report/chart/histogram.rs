@@ -11,7 +11,7 @@ use plotters::series::DashedLineSeries;
 use plotters::style::Color;
 use plotters::style::text_anchor::HPos;
 
-/// The bin of all that lies beyond the others, as parts of their length.
+/// The bin of everything beyond the others, as fractions of their total width.
 const BEYOND: [f64; 2] = [1.04, 1.12];
 
 /// Counts in bins of equal width from zero, and of all beyond them.
@@ -27,7 +27,7 @@ pub struct Histogram {
     pub counts: Vec<u64>,
     /// Values beyond the bins.
     pub overflow: u64,
-    /// A dashed line at this value, with its name: the cell size.
+    /// A dashed line at this value, with its name, such as the cell size.
     pub line: Option<(f64, String)>,
 }
 

@@ -24,7 +24,7 @@ pub(super) enum Sign {
     Block(RGBColor),
 }
 
-/// Places of the entries from the upper left corner, and the height in all, units.
+/// Positions of the entries from the upper left corner, and the total height, units.
 fn places(entries: &[Entry], limit: f64) -> (Vec<[f64; 2]>, f64) {
     let (mut x, mut y) = (0.0, 0.0);
     let mut places = Vec::new();

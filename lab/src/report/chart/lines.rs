@@ -18,15 +18,15 @@ use plotters::style::{Color, RGBColor};
 /// Curves or dots over two axes.
 #[derive(Clone, Debug)]
 pub struct Lines {
-    /// To the right.
+    /// The horizontal axis.
     pub x: Axis,
-    /// Up.
+    /// The vertical axis.
     pub y: Axis,
-    /// What is drawn.
+    /// The curves and dots.
     pub series: Vec<Series>,
-    /// Dashed lines to compare with.
+    /// Dashed lines for comparison.
     pub guides: Vec<Guide>,
-    /// Whether the series have an order, such as ages: they are then coloured pale to dark.
+    /// Whether the series are ordered, such as by age: they are then coloured pale to dark.
     pub ordered: bool,
     /// Whether y is logarithmic: only values above zero are drawn.
     pub log_y: bool,
@@ -35,13 +35,13 @@ pub struct Lines {
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// In the legend; give n here.
+    /// Shown in the legend; give n here.
     pub name: String,
     /// x and y; a point that cannot be drawn interrupts the curve.
     pub points: Vec<[f64; 2]>,
     /// How it is drawn.
     pub style: Style,
-    /// Places upon it worth a word, such as operating points.
+    /// Labelled points on the curve, such as operating points.
     pub marks: Vec<Mark>,
 }
 
@@ -50,23 +50,23 @@ pub struct Series {
 pub enum Style {
     /// Straight from point to point.
     Line,
-    /// A dot each.
+    /// A dot for each point.
     Dots,
 }
 
-/// A place with a word.
+/// A labelled point.
 #[derive(Clone, Debug)]
 pub struct Mark {
     /// x and y.
     pub at: [f64; 2],
-    /// Beside it.
+    /// Shown beside it.
     pub label: String,
 }
 
 /// A dashed line across the plot, named in the legend.
 #[derive(Clone, Debug)]
 pub enum Guide {
-    /// Level at y.
+    /// Horizontal, at this y.
     Y(f64, String),
     /// Where y equals x.
     Diagonal(String),
@@ -75,7 +75,7 @@ pub enum Guide {
 type Plane<'a, 'b, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, Y>>;
 
 impl Lines {
-    /// Nothing yet over two axes.
+    /// An empty plot with these axes.
     pub fn new(x: Axis, y: Axis) -> Lines {
         let (series, guides) = (Vec::new(), Vec::new());
         Lines { x, y, series, guides, ordered: false, log_y: false }
@@ -145,7 +145,7 @@ impl Lines {
         for guide in &self.guides {
             let points = match guide {
                 Guide::Y(level, _) => vec![[x.start, *level], [x.end, *level]],
-                // By parts: on a logarithmic axis it is no straight line.
+                // In segments: on a logarithmic axis it is not a straight line.
                 Guide::Diagonal(_) => (0..=64)
                     .map(|i| x.start + (x.end - x.start) * f64::from(i) / 64.0)
                     .map(|v| [v, v])
@@ -175,7 +175,7 @@ impl Lines {
         }
         let marks = self.series.iter().flat_map(|s| &s.marks).filter(|m| inside(m.at));
         plane.draw_series(marks.enumerate().map(|(n, mark)| {
-            // In turn on either side of a curve that falls.
+            // Alternately on either side of a falling curve.
             let sides = [(px(-9.0), px(5.0), HPos::Right), (px(9.0), px(-5.0), HPos::Left)];
             let (x, y, side) = sides[n % 2];
             EmptyElement::at((mark.at[0], mark.at[1]))

@@ -26,13 +26,13 @@ use plotters::style::{Color, IntoFont, RGBColor, TRANSPARENT, TextStyle};
 
 /// Width of every chart, units.
 const WIDTH: f64 = 736.0;
-/// Height of a plot beside another and of one alone, units.
+/// Height of a plot beside another and of a single one, units.
 const HEIGHTS: [f64; 2] = [240.0, 372.0];
 /// Height of the title of a part, units.
 const TITLE: f64 = 24.0;
 /// Height of letters, units.
 const LETTER: f64 = 12.5;
-/// plotters draws in whole pixels: so many of them make a unit, for curves to be smooth.
+/// plotters draws in whole pixels: this many make a unit, for curves to be smooth.
 const FINE: f64 = 16.0;
 
 type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -40,19 +40,19 @@ type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 /// Whether there was anything to draw.
 type Outcome = Result<bool, DrawingAreaErrorKind<std::io::Error>>;
 
-/// Units as plotters' pixels.
+/// Converts units to plotters' pixels.
 fn px(units: f64) -> i32 {
     (units * FINE).round() as i32
 }
 
-/// Letters of a colour that lie on this side of their place, their middle at its height.
+/// Coloured letters that lie on this side of their anchor, vertically centred on it.
 fn font(size: f64, colour: RGBColor, side: HPos) -> TextStyle<'static> {
     // plotters takes 1.24 of the size that it writes.
     let font = ("sans-serif", size * FINE * 1.24).into_font();
     font.color(&colour).pos(Pos::new(side, VPos::Center))
 }
 
-/// Grid, axes and labels of every plot look the same.
+/// Gives grid, axes and labels of every plot the same look.
 fn styled<X, Y>(mesh: &mut MeshStyle<X, Y, SVGBackend>)
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -68,29 +68,29 @@ where
         .y_labels(6);
 }
 
-/// About how wide a text is, units; rather more than less.
+/// Approximate width of a text, units; rather too wide than too narrow.
 fn width(text: &str, size: f64) -> f64 {
     0.56 * size * text.chars().count() as f64
 }
 
-/// A figure of one plot, or of several small ones that are to be compared.
+/// A figure of one plot, or of several small ones for comparison.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// Name of its files, unlike any other's in the report: letters, digits, `-` and `_`.
     pub id: String,
-    /// What one sees, in which units, of how many.
+    /// What the chart shows, in which units, from how many samples.
     pub caption: String,
     parts: Vec<(String, Plot)>,
 }
 
-/// What a chart shows.
+/// The content of a chart.
 #[derive(Clone, Debug)]
 pub enum Plot {
     /// Curves or dots over two axes.
     Lines(Lines),
     /// Counts in bins.
     Histogram(Histogram),
-    /// Bars from left to right, to compare.
+    /// Horizontal bars for comparison.
     Bars(Bars),
 }
 
@@ -100,7 +100,7 @@ impl Chart {
         Chart::small_multiples(id, caption, vec![(String::new(), plot)])
     }
 
-    /// Small plots two by two, each under its title; axes are each plot's own.
+    /// Small plots two by two, each under its title and with its own axes.
     pub fn small_multiples(id: &str, caption: &str, parts: Vec<(String, Plot)>) -> Chart {
         Chart { id: id.into(), caption: caption.into(), parts }
     }
@@ -143,7 +143,7 @@ impl Chart {
         (labelled(&svg, size, &self.caption), size)
     }
 
-    /// The legend of all parts where they have the same.
+    /// The legend of all parts if they share one.
     fn shared_legend(&self) -> Option<Vec<Entry>> {
         let mut legends = self.parts.iter().map(|(_, plot)| plot.legend());
         let first = legends.next()?;
@@ -161,7 +161,7 @@ impl Chart {
                     row.insert(0, if i == 0 { "part".into() } else { title.clone() });
                 }
             }
-            // Parts of one kind share a header.
+            // Consecutive parts of one kind share a header.
             if table[0] != header {
                 header.clone_from(&table[0]);
                 rows.push(header.clone());
@@ -172,7 +172,7 @@ impl Chart {
     }
 }
 
-/// The drawing in units, with words for those who cannot see it.
+/// The drawing in units, with a label for those who cannot see it.
 fn labelled(svg: &str, [w, h]: [f64; 2], label: &str) -> String {
     let body = svg.split_once('>').map_or("", |(_, body)| body);
     let [fine_w, fine_h] = [w, h].map(px);
@@ -207,7 +207,7 @@ impl Plot {
         }
     }
 
-    /// Its numbers, the first row naming the columns.
+    /// Its numbers; the first row names the columns.
     fn table(&self) -> Vec<Vec<String>> {
         match self {
             Plot::Lines(lines) => lines.table(),

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Appended to a copy of the page: tells in the title how many images the browser could show, and
+/// Appended to a copy of the page: reports in the title how many images the browser could show, and
 /// how many charts have a size.
 const COUNT: &str = "<script>window.onload = () => { \
     const shown = [...document.images].filter(i => i.complete && i.naturalWidth > 100).length; \
@@ -16,7 +16,7 @@ const COUNT: &str = "<script>window.onload = () => { \
     const wide = document.documentElement.scrollWidth > innerWidth; \
     document.title = 'images ' + shown + ' charts ' + drawn + ' overflow ' + wide; }</script>";
 
-/// `RAYWAKE_BROWSER`, or what is on the path.
+/// `RAYWAKE_BROWSER`, or a browser on the path.
 fn browser() -> PathBuf {
     if let Some(named) = std::env::var_os("RAYWAKE_BROWSER") {
         return named.into();

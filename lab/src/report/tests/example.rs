@@ -1,11 +1,11 @@
-//! A report with every kind of element, of invented numbers.
+//! A report with every kind of element, with synthetic numbers.
 
 use crate::labels::Kind;
 use crate::report::*;
 use raywake_core::pose::Pose;
 use raywake_sim::Rng;
 
-/// Errors of 10 cm or so: most small, some far off.
+/// Errors of about 10 cm: most small, some far off.
 fn errors(seed: u64, n: usize, typical: f64) -> Vec<f64> {
     let mut rng = Rng::new(seed);
     let mut uniform = move || 1.0 - rng.unit();
@@ -197,7 +197,7 @@ pub fn table() -> Table {
     }
 }
 
-/// A street of invented returns with one labelled car.
+/// A street of synthetic returns with one labelled car.
 pub fn panel(title: &str, way: [f64; 2]) -> Panel {
     let ring = |r: i32| {
         (0..720).map(move |i| {
@@ -243,7 +243,7 @@ pub fn look() -> Look {
     }
 }
 
-/// All of it.
+/// The whole report.
 pub fn report() -> Report {
     let mut report = Report::new("Scene flow <on> two drives", "Chapter 3 & appendix B, evaluated");
     report

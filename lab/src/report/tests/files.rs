@@ -1,4 +1,4 @@
-//! What a written report holds.
+//! What a written report contains.
 
 use super::example;
 use crate::report::*;
@@ -10,7 +10,7 @@ fn text(folder: &Scratch, name: &str) -> String {
     fs::read_to_string(folder.path().join(name)).unwrap()
 }
 
-/// How many colours a picture has.
+/// Number of colours in a picture.
 fn colours(png: &[u8]) -> usize {
     let picture = resvg::tiny_skia::Pixmap::decode_png(png).unwrap();
     let pixels = picture.data().chunks(4).map(|p| [p[0], p[1], p[2], p[3]]);

@@ -1,10 +1,10 @@
-//! Digits as scikit-learn ships them: a line each, the pixels from 0 to 16, then the digit.
+//! Digits as shipped with scikit-learn: one per line, the pixels from 0 to 16, then the digit.
 
 use super::{CLASSES, Digits, bytes};
 use raywake_io::Error;
 use std::path::Path;
 
-/// The brightest pixel.
+/// Value of the brightest pixel.
 const TOP: f32 = 16.0;
 
 /// All digits of a file.

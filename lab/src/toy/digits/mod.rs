@@ -14,38 +14,38 @@ use std::path::Path;
 
 /// Classes of digits.
 pub const CLASSES: usize = 10;
-/// Bytes of a file unpacked, at most: sixty thousand digits of 28 x 28 are 47 MB.
+/// Maximum unpacked size of a file, bytes: sixty thousand digits of 28 x 28 take 47 MB.
 const BYTES_MAX: u64 = 1 << 29;
 
-/// Square pictures of one size, each of a digit.
+/// Square pictures of one size, each showing a digit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Digits {
     /// Pixels of a picture.
     pub pixels: usize,
     /// Brightness from 0 to 1, picture after picture.
     pub values: Vec<f32>,
-    /// 0 to 9.
+    /// Digits, 0 to 9.
     pub labels: Vec<u8>,
 }
 
-/// What a network learns from, and what it is judged by.
+/// What a network is trained on, and what it is tested on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DigitSets {
     /// For learning.
     pub training: Digits,
-    /// Never seen before it is judged.
+    /// Not seen during training.
     pub test: Digits,
-    /// Where they come from and how they were divided.
+    /// Where the digits come from and how they were divided.
     pub origin: String,
 }
 
 impl Digits {
-    /// How many.
+    /// Number of digits.
     pub fn count(&self) -> usize {
         self.labels.len()
     }
 
-    /// The picture of an index.
+    /// The picture with this index.
     pub fn picture(&self, n: usize) -> &[f32] {
         &self.values[n * self.pixels..][..self.pixels]
     }
@@ -59,7 +59,7 @@ impl Digits {
         indices
     }
 
-    /// Those of some indices.
+    /// The digits with these indices.
     fn of(&self, indices: &[usize]) -> Digits {
         Digits {
             pixels: self.pixels,
@@ -69,11 +69,11 @@ impl Digits {
     }
 }
 
-/// Opens digits: a folder of MNIST's IDX files, plain or packed with gzip; a folder of `0.json` to
-/// `9.json`; or a file of comma-separated values, `.csv` or `.csv.gz`. Where training and test are
-/// not kept apart, one of five, drawn by the seed, is for the test.
+/// Opens digits: a folder of MNIST's IDX files, plain or gzipped; a folder of `0.json` to `9.json`;
+/// or a file of comma-separated values, `.csv` or `.csv.gz`. If training and test digits are not
+/// kept apart, one in five, drawn by the seed, is used for the test.
 ///
-/// Fails where a file is missing, cut short, of another kind, or the digits are not all there.
+/// Fails if a file is missing, truncated or of another kind, or if a digit does not occur.
 pub fn open(path: &Path, seed: u64) -> Result<DigitSets, Error> {
     let sets = match () {
         () if path.is_file() => divided(csv_file::read(path)?, path, seed),
@@ -89,7 +89,7 @@ pub fn open(path: &Path, seed: u64) -> Result<DigitSets, Error> {
     Ok(sets)
 }
 
-/// One of five for the test.
+/// Sets one in five aside for the test.
 fn divided(all: Digits, path: &Path, seed: u64) -> DigitSets {
     let mut order: Vec<usize> = (0..all.count()).collect();
     let mut rng = Rng::split(seed, 1);
@@ -106,7 +106,7 @@ fn divided(all: Digits, path: &Path, seed: u64) -> DigitSets {
     DigitSets { training: all.of(training), test: all.of(test), origin }
 }
 
-/// All bytes of a file, unpacked where its name ends in `.gz`.
+/// All bytes of a file, unpacked if its name ends in `.gz`.
 fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let file = File::open(path).map_err(Error::reading(path))?;
     let mut bytes = Vec::new();

@@ -2,13 +2,13 @@ use super::*;
 use crate::scratch::Scratch;
 use std::io::Write;
 
-/// IDX bytes of these counts.
+/// IDX file with these counts.
 fn idx(magic: u32, counts: &[u32], bytes: &[u8]) -> Vec<u8> {
     let head = [magic].into_iter().chain(counts.iter().copied());
     head.flat_map(u32::to_be_bytes).chain(bytes.iter().copied()).collect()
 }
 
-/// `count` pictures of 2 x 2 and their digits in turn.
+/// `count` pictures of 2 x 2 and their digits, cycling.
 fn files(count: u32) -> [Vec<u8>; 2] {
     let pixels: Vec<u8> = (0..4 * count).map(|n| (n % 256) as u8).collect();
     let labels: Vec<u8> = (0..count).map(|n| (n % 10) as u8).collect();

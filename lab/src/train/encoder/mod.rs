@@ -1,9 +1,9 @@
 //! `raywake-lab train encoder`: the encoder (after chapter 4).
 //!
-//! Every step takes a batch of windows, half of the batch a thread. The gradients are summed in the
-//! order of the batch and nothing depends on the instructions of the machine: the same weights come
-//! out everywhere. Half way the numbers are rounded as core's are, and learn to live with that
-//! (quantisation-aware training).
+//! Every step takes a batch of windows, half of it on each of two threads. The gradients are summed
+//! in the order of the batch and nothing depends on the machine's instructions: the same weights
+//! come out everywhere. After [`UNROUNDED`] of the steps the numbers are rounded as core's are, and
+//! the rest of the training adapts to that (quantisation-aware training).
 
 mod network;
 mod optimiser;
@@ -33,13 +33,13 @@ use std::path::{Path, PathBuf};
 
 /// Windows of a batch.
 const BATCH: usize = 8;
-/// Weights of the classes in the loss: what is rare, and what matters, counts for more.
+/// Weights of the classes in the loss: rare and important ones count for more.
 const CLASS_WEIGHTS: [f32; 8] = [0.5, 1.0, 1.0, 2.0, 1.0, 1.5, 4.0, 4.0];
-/// Weight of what could move against what could not.
+/// Weight of columns that could move relative to those that could not.
 const MOVES_WEIGHT: f32 = 3.0;
-/// Share of the steps before the numbers are rounded.
+/// Share of the steps before rounding begins.
 const UNROUNDED: f64 = 0.6;
-/// Steps from one checkpoint to the next.
+/// Steps between checkpoints.
 const CHECKPOINT: usize = 100;
 
 /// Options of `train encoder`.
@@ -49,10 +49,10 @@ pub struct Args {
     inputs: Inputs,
     #[command(flatten)]
     outputs: Outputs,
-    /// How many times every window is looked at.
+    /// How many times every window is used, on average.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     epochs: u32,
-    /// File to go on from where training was interrupted.
+    /// File to resume from if training was interrupted.
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
 }
@@ -66,7 +66,7 @@ struct Report {
     losses: Vec<f64>,
     auc: f64,
     curve: Vec<Operating>,
-    /// Share of the columns of a class, by row, that are taken for another, by column.
+    /// Share of the columns of a class (row) that are classified as another (column).
     confusion: Vec<Vec<f64>>,
 }
 
@@ -116,7 +116,7 @@ fn learn(inputs: &Inputs, args: &Args) -> Result<(String, Report), Error> {
     Ok((text("encoder", &[NUMBERS], f64::from(ONE), &numbers, &provenance), report))
 }
 
-/// Learns from the samples; returns where it ended, and the mean loss of every hundred steps.
+/// Trains on the samples; returns the final state and the mean loss of every hundred steps.
 fn fit(
     samples: &[Sample],
     steps: usize,
@@ -184,8 +184,8 @@ fn slope(
     (loss, into)
 }
 
-/// Cross-entropy of the classes (4.7), weighted, and logistic loss of what could move; and the
-/// gradient by every score.
+/// Weighted cross-entropy of the classes (4.7) plus logistic loss of what could move, with the
+/// gradient with respect to every score.
 fn loss(scores: &[[f32; SCORES]], labels: &[u8]) -> (f64, Vec<f32>) {
     let (mut loss, mut slopes) = (0.0, Vec::with_capacity(scores.len() * SCORES));
     let share = 1.0 / labels.len().max(1) as f32;
@@ -211,8 +211,8 @@ fn loss(scores: &[[f32; SCORES]], labels: &[u8]) -> (f64, Vec<f32>) {
     (loss, slopes)
 }
 
-/// What core makes of the held-out windows: how well it tells what could move, and the confusion of
-/// the classes.
+/// Evaluates core's results on the held-out windows: how well it recognises what could move, and
+/// the confusion of the classes.
 fn judge(
     samples: &[Sample],
     numbers: &[i32],

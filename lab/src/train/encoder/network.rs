@@ -1,25 +1,25 @@
 //! The encoder in floating point, with its gradients.
 //!
-//! Activations are in units of 1: core's integers count sixteenths of them. Where the network is
-//! quantised, weights are whole multiples of their channel's step and activations of 1/16. Every
-//! sum is then exact in f32, so that the result is core's bit for bit, whatever the order.
+//! Activations are in units of 1: core's integers count sixteenths. If the network is quantised,
+//! weights are integer multiples of their channel's step and activations are multiples of 1/16.
+//! Every sum is then exact in f32, so the result matches core's bit for bit, whatever the order.
 
 use super::parameters::Parameters;
 use super::planes::*;
 use raywake_core::encoder::layers::*;
 
-/// What the network sees of a window, padded to whole octets: masks of `side` x `side` columns,
-/// and those that it is asked about.
+/// The network's input for a window, padded to whole octets: masks of `side` x `side` columns, and
+/// the columns asked about.
 pub struct Input {
     pub side: usize,
     pub masks: Vec<u32>,
     pub asked: Vec<usize>,
 }
 
-/// One step of the walk through the network; numbers are of planes.
+/// One operation of the walk through the network; its fields are indices of planes.
 #[derive(Clone, Copy, Debug)]
 enum Op {
-    /// The first layer, on every column.
+    /// The first layer, applied to every column.
     Columns {
         out: usize,
     },
@@ -54,7 +54,7 @@ enum Op {
         from: usize,
         out: usize,
     },
-    /// What is around the columns asked about, and what they are.
+    /// The surroundings of the columns asked about, and the columns themselves.
     Pick {
         around: usize,
         columns: usize,
@@ -67,7 +67,7 @@ enum Op {
     },
 }
 
-/// The walk as it is laid out.
+/// The sequence of operations.
 #[derive(Default)]
 struct Walk {
     ops: Vec<Op>,
@@ -149,7 +149,7 @@ impl Network {
         Network { walk: Walk::through(), quantised }
     }
 
-    /// Rounded down to sixteenths where it is quantised, and cut.
+    /// Clamps, after rounding down to sixteenths if the network is quantised.
     fn cut(&self, x: f32, least: f32) -> f32 {
         let one = ONE as f32;
         let x = if self.quantised { (x * one).floor() / one } else { x };
@@ -223,8 +223,8 @@ impl Network {
         out
     }
 
-    /// Adds the gradient of the parameters, given that of the scores. Rounding passes gradients on
-    /// unchanged, a cut stops them.
+    /// Adds the gradient of the parameters to `into`, given that of the scores. Rounding passes
+    /// gradients on unchanged; clamping stops them.
     pub fn backward(
         &self,
         p: &Parameters,

@@ -10,13 +10,13 @@ use std::path::Path;
 
 /// Decay of the mean gradient, and of its square.
 const DECAY: [f32; 2] = [0.9, 0.99];
-/// The highest rate, reached after [`WARM_UP`] of the steps.
+/// The highest learning rate, reached after [`WARM_UP`] of the steps.
 const RATE: f64 = 3e-3;
 const WARM_UP: f64 = 0.1;
-/// Room for weights to grow after their shifts are chosen.
+/// Headroom for weights to grow after their shifts are chosen.
 const ROOM: f32 = 1.25;
 
-/// How the rate goes, and when numbers begin to be rounded.
+/// The learning rate over the steps, and when rounding begins.
 pub struct Schedule {
     pub steps: usize,
     /// The first step with rounded numbers.
@@ -24,7 +24,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Up evenly, then down to nothing: a parabola, which needs no transcendental function.
+    /// Linearly up, then down to zero along a parabola, which needs no transcendental function.
     pub fn rate(&self, step: usize) -> f32 {
         let at = (step as f64 + 0.5) / self.steps as f64;
         let part = if at < WARM_UP { at / WARM_UP } else { (1.0 - at) / (1.0 - WARM_UP) };
@@ -32,19 +32,19 @@ impl Schedule {
     }
 }
 
-/// Training as it stands.
+/// State of the training.
 pub struct Optimiser {
     pub parameters: Parameters,
     means: Parameters,
     squares: Parameters,
-    /// Of every output, once they are chosen; all zero before.
+    /// Shift of every output, once chosen; all zero before that.
     shifts: Vec<u8>,
     pub step: usize,
 }
 
 impl Optimiser {
-    /// Weights drawn by the seed, as He et al. (2015) for cut activations; those that are added to
-    /// something begin at a tenth of it.
+    /// Weights drawn by the seed, as in He et al. (2015) for clamped activations; layers whose
+    /// result is added to a plane, and the scores, begin at 0.3 times their deviation.
     pub fn new(seed: u64) -> Optimiser {
         let mut rng = Rng::split(seed, 3 << 32);
         let mut parameters = Parameters::zeros();
@@ -61,7 +61,7 @@ impl Optimiser {
         Optimiser { parameters, means, squares, shifts: vec![0; TOTAL[1]], step: 0 }
     }
 
-    /// A step down the gradient.
+    /// Makes a step down the gradient.
     pub fn advance(&mut self, slope: &Parameters, rate: f32) {
         self.step += 1;
         let unbiased = DECAY.map(|d| 1.0 - f64::from(d).powi(self.step as i32) as f32);
@@ -73,7 +73,7 @@ impl Optimiser {
         }
     }
 
-    /// Fixes the step of every output's weights by the largest of them.
+    /// Fixes the step of every output's weights according to the largest of them.
     pub fn choose_shifts(&mut self) {
         let mut weights = self.parameters.weights.iter();
         let mut shifts = self.shifts.iter_mut();
@@ -87,7 +87,7 @@ impl Optimiser {
         }
     }
 
-    /// Every number as core has it: weights, biases and shifts by layer.
+    /// Every number in core's form: weights, biases and shifts by layer.
     pub fn numbers(&self) -> Vec<i32> {
         let mut numbers = Vec::with_capacity(NUMBERS);
         for (n, layer) in LAYERS.iter().enumerate() {
@@ -105,7 +105,7 @@ impl Optimiser {
         numbers
     }
 
-    /// The parameters as they are after rounding.
+    /// The parameters after rounding.
     pub fn rounded(&self) -> Parameters {
         let mut parameters = self.parameters.clone();
         for (n, layer) in LAYERS.iter().enumerate() {
@@ -124,7 +124,7 @@ impl Optimiser {
         parameters
     }
 
-    /// Writes a checkpoint of the training called `of`.
+    /// Writes a checkpoint of the training identified by `of`.
     pub fn write(&self, to: &mut impl Write, of: u64) -> io::Result<()> {
         let mut body = (self.step as u64).to_le_bytes().to_vec();
         body.extend(&self.shifts);
@@ -134,7 +134,7 @@ impl Optimiser {
         checkpoint::write(to, MAGIC, of, &body)
     }
 
-    /// Reads a checkpoint; fails where it is damaged, or of another training than `of`.
+    /// Reads a checkpoint; fails if it is damaged or belongs to another training than `of`.
     pub fn read(file: &Path, of: u64) -> Result<Optimiser, Error> {
         let parameters: usize = TOTAL.iter().sum();
         let length = 8 + TOTAL[1] + 3 * 4 * parameters;
@@ -153,10 +153,10 @@ impl Optimiser {
     }
 }
 
-/// What a checkpoint begins with.
+/// Magic of a checkpoint.
 const MAGIC: &[u8] = b"raywake-encoder-training 1\n";
 
-/// A number as a multiple of its step, at most `most`.
+/// A number as a multiple of its step, clamped to `most` either way.
 fn whole(x: f32, shift: u8, most: i32) -> i32 {
     ((x * (1u32 << shift) as f32).round() as i32).clamp(-most, most)
 }

@@ -1,8 +1,8 @@
-//! The numbers of the network that training changes.
+//! The trainable numbers of the network.
 
 use raywake_core::encoder::layers::*;
 
-/// Numbers of the network: weights of a layer, an output's after another's; and biases.
+/// Numbers of the network: weights, layer by layer and output by output; and biases.
 #[derive(Clone)]
 pub struct Parameters {
     pub weights: Vec<f32>,

@@ -1,9 +1,9 @@
-//! Layers on planes of numbers, and what they pass back of a gradient.
+//! Layers on planes of numbers, and how they pass gradients back.
 
 use super::parameters::Parameters;
 use raywake_core::encoder::layers::*;
 
-/// Bits of a column's masks as the first layer counts them.
+/// Set bits of a column's masks, numbered as in the first layer.
 pub fn bits(masks: u32) -> impl Iterator<Item = usize> {
     (0..BITS).filter(move |bit| masks >> (bit / LEVELS * 16 + bit % LEVELS) & 1 == 1)
 }
@@ -13,12 +13,12 @@ fn side_of(plane: &[f32], channels: usize) -> usize {
     (plane.len() / channels).isqrt()
 }
 
-/// First channel, in the finest level, of the cell above a column.
+/// Index of the first channel, in the finest level, of the cell above a column.
 pub fn parent(column: usize, side: usize) -> usize {
     (column / side / 2 * (side / 2) + column % side / 2) * COLUMN_CHANNELS
 }
 
-/// What a cut lets through of a slope.
+/// The slope that passes through a clamp.
 pub fn passed(values: &[f32], slope: &[f32], least: f32) -> Vec<f32> {
     let top = TOP as f32 / ONE as f32;
     let inside = |v: f32| v > least && v < top;
@@ -30,7 +30,8 @@ pub fn transposed<const OUT: usize>(weights: &[f32]) -> Vec<[f32; OUT]> {
     (0..inputs).map(|i| std::array::from_fn(|o| weights[o * inputs + i])).collect()
 }
 
-/// Calls a function of the sizes of a dense layer: loops of known length are whole vectors.
+/// Calls a function instantiated for the sizes of a dense layer: loops of known length vectorise
+/// fully.
 macro_rules! of_size {
     ($of:ident $args:tt of $size:expr; $($inputs:literal $outputs:literal),*) => {
         match $size {
@@ -76,12 +77,12 @@ fn add<const N: usize>(to: &mut [f32; N], by: f32, values: &[f32; N]) {
     }
 }
 
-/// Adds numbers to as many others.
+/// Adds numbers element by element.
 pub fn add_slices(to: &mut [f32], values: &[f32]) {
     to.iter_mut().zip(values).for_each(|(t, v)| *t += v);
 }
 
-/// Gradients by some parameters, added to what is there.
+/// Gradients with respect to parameters, added to those already there.
 pub struct Gradients<'a> {
     pub of: &'a Parameters,
     pub into: &'a mut Parameters,
@@ -105,14 +106,14 @@ impl Gradients<'_> {
         }
     }
 
-    /// Of a dense layer; that of what entered it, `x`, is added to `below`.
+    /// Of a dense layer; the gradient of its input `x` is added to `below`.
     pub fn dense(&mut self, layer: usize, x: &[f32], slope: &[f32], below: &mut [f32]) {
         let Layer { inputs, outputs } = LAYERS[layer];
         let (weights, into) = (self.of.of(layer).0, self.into.of_mut(layer));
         of_size!(dense_slope_sized(weights, into, x, slope, below) of (inputs, outputs));
     }
 
-    /// Of a depthwise layer, as of a dense one.
+    /// Of a depthwise layer; otherwise as for a dense one.
     pub fn depthwise(&mut self, layer: usize, x: &[f32], slope: &[f32], below: &mut [f32]) {
         let channels = LAYERS[layer].outputs;
         let by_tap = by_tap(self.of.of(layer).0, channels);
@@ -152,12 +153,12 @@ fn dense_slope_sized<const IN: usize, const OUT: usize>(
     }
 }
 
-/// Adds products of numbers to as many others.
+/// Adds products of numbers element by element.
 fn add_products(to: &mut [f32], a: &[f32], b: &[f32]) {
     to.iter_mut().zip(a).zip(b).for_each(|((t, a), b)| *t += a * b);
 }
 
-/// A cell and its neighbours in a depthwise layer.
+/// Number of cells in the window of a depthwise layer: a cell and its neighbours.
 const TAPS: usize = 9;
 
 /// Weights of a depthwise layer with the channels innermost.
@@ -170,7 +171,7 @@ fn each_tap(side: usize, mut each: impl FnMut(usize, usize, usize)) {
     for row in 0..side {
         for at in 0..side {
             for tap in 0..TAPS {
-                // Wraps below zero, and is then not within the level.
+                // Wraps below zero, and is then outside the level.
                 let [i, j] = [row + tap / 3, at + tap % 3].map(|n| n.wrapping_sub(1));
                 if i < side && j < side {
                     each(row * side + at, i * side + j, tap);
@@ -191,14 +192,14 @@ pub fn depthwise((weights, biases): (&[f32], &[f32]), x: &[f32]) -> Vec<f32> {
     out
 }
 
-/// 2 x 2 cells of a level side by side.
+/// Puts the 2 x 2 cells below each cell side by side.
 pub fn gather(x: &[f32], channels: usize) -> Vec<f32> {
     let half = side_of(x, channels) / 2;
     let cell = move |n: usize| (0..4).map(move |k| below(n, k, half));
     (0..half * half).flat_map(cell).flat_map(|c| &x[c * channels..][..channels]).copied().collect()
 }
 
-/// Adds what [`gather`] put side by side to where it came from.
+/// Adds what [`gather`] put side by side back to where it came from.
 pub fn scatter(x: &[f32], channels: usize, into: &mut [f32]) {
     let half = side_of(into, channels) / 2;
     for (n, x) in x.chunks(channels).enumerate() {
@@ -211,7 +212,7 @@ fn below(n: usize, k: usize, side: usize) -> usize {
     (n / side * 2 + k / 2) * 2 * side + n % side * 2 + k % 2
 }
 
-/// Every cell's values to the 2 x 2 below it.
+/// Copies every cell's values to the 2 x 2 cells below it.
 pub fn spread(x: &[f32], channels: usize) -> Vec<f32> {
     let side = side_of(x, channels);
     let mut out = vec![0.0; 4 * x.len()];
@@ -221,7 +222,7 @@ pub fn spread(x: &[f32], channels: usize) -> Vec<f32> {
     out
 }
 
-/// The sums over the 2 x 2 cells below each.
+/// Sums over the 2 x 2 cells below each cell.
 pub fn summed(x: &[f32], channels: usize) -> Vec<f32> {
     let side = side_of(x, channels) / 2;
     let mut out = vec![0.0; x.len() / 4];

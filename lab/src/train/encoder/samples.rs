@@ -14,14 +14,14 @@ use raywake_sim::{Class, Rng};
 
 /// Nothing is known of the column, or it is not solid.
 pub const UNKNOWN: u8 = 255;
-/// It cannot move; what it is, is not labelled.
+/// The column cannot move, and its class is not labelled.
 pub const STAYS: u8 = 8;
 
 /// A window of one sweep.
 #[derive(Clone)]
 pub struct Sample {
     pub side: usize,
-    /// First column of the window in the world's.
+    /// First column of the window, in columns of the world.
     pub corner: [i32; 2],
     pub masks: Vec<u32>,
     /// [`ColumnClass`] of each column, [`STAYS`] or [`UNKNOWN`].
@@ -46,7 +46,7 @@ pub fn of_drive(visit: Visit) -> Result<Vec<Sample>, Error> {
 
 pub fn sample(grid: &mut Grid, drive: &dyn Labelled, sweep: &LabelledSweep) -> Sample {
     let window = grid.sweep(drive.rig(), &sweep.data.sweep());
-    // Returns of what stands, by class.
+    // Returns of static structure, by class.
     let mut hits = vec![[0u16; 4]; grid.columns.len()];
     for (&column, &class) in grid.of_point.iter().zip(&sweep.class_of_point) {
         if let (true, Some(class)) = (column != NONE, standing(class)) {
@@ -69,7 +69,7 @@ pub fn sample(grid: &mut Grid, drive: &dyn Labelled, sweep: &LabelledSweep) -> S
     }
 }
 
-/// What most returns above the ground come from; the ground if there are none.
+/// The class of most returns above the ground; the ground if there are none.
 fn most(hits: &[u16; 4]) -> u8 {
     let above = (1..4).max_by_key(|n| hits[*n]).filter(|n| hits[*n] > 0);
     match above {
@@ -99,28 +99,28 @@ fn moving(kind: Kind) -> Option<ColumnClass> {
     }
 }
 
-/// Share of the ground's columns that a step of training looks at: there are three times as many
-/// of them as of all others.
+/// Share of the ground columns that a training step uses: there are three times as many of them as
+/// of all others.
 const GROUND_KEPT: f64 = 0.25;
-/// Shares, in eighths, of voxels that are taken to be unknown, one of them for each step: sensors
-/// with fewer beams, and chapter 4's dropout of its input.
+/// Shares of voxels, in eighths, that are treated as unknown; one is drawn for each sample. This
+/// imitates sensors with fewer beams, and chapter 4's dropout of its input.
 const LOST_EIGHTHS: [u8; 4] = [0, 0, 1, 2];
 
 impl Sample {
-    /// The columns, as core has them.
+    /// The columns in core's form.
     pub fn columns(&self) -> Vec<Column> {
         let solid = self.labels.iter().map(|l| u32::from(*l != UNKNOWN));
         self.masks.iter().zip(solid).map(|(m, solid)| [*m, solid]).collect()
     }
 
-    /// As it is, with all that is labelled asked about.
+    /// The sample as it is, asking about every labelled column.
     #[cfg(test)]
     pub fn input(&self) -> (Input, Vec<u8>) {
         let at = |i, j| (i, j);
         self.laid(self.corner.map(|c| c.rem_euclid(OCTET as i32) as usize), at, |_| true)
     }
 
-    /// Turned or mirrored, anywhere on the lattice, with some voxels missing: the square's
+    /// Rotated or mirrored, anywhere on the lattice, with some voxels missing: the square's
     /// symmetries as in section 4.4.3.1.
     pub fn drawn(&self, rng: &mut Rng) -> (Input, Vec<u8>) {
         let draw = rng.bits();
@@ -136,7 +136,7 @@ impl Sample {
         let (mut input, labels) = self.laid(phase, at, kept);
         let lost = LOST_EIGHTHS[(draw >> 24) as usize % LOST_EIGHTHS.len()];
         for masks in input.masks.iter_mut().filter(|m| lost > 0 && **m != 0) {
-            // Of three random bits a voxel, all are set in an eighth, the first two in a quarter.
+            // Of three random bits per voxel, all are set in an eighth, the first two in a quarter.
             let (a, b) = (rng.bits(), rng.bits());
             let quarter = (a & a >> 32) as u32;
             *masks &= !(if lost == 2 { quarter } else { quarter & b as u32 });

@@ -19,7 +19,7 @@ fn street() -> Sample {
     samples::sample(&mut grid, &drive, &sweep)
 }
 
-/// A few columns of it.
+/// A few of its columns.
 fn few(sample: &Sample, side: usize) -> Sample {
     let from = (sample.side - side) / 2;
     let cells = || (0..side * side).map(|n| (from + n / side) * sample.side + from + n % side);
@@ -35,7 +35,8 @@ fn few(sample: &Sample, side: usize) -> Sample {
 fn gradients_are_those_of_central_differences() {
     let (input, labels) = few(&street(), 24).input();
     let mut state = Optimiser::new(3);
-    // Biases above zero: few activations are cut, which differences would step across.
+    // Biases above zero, so that few activations are clamped, where differences would step across
+    // the kink.
     state.parameters.biases.iter_mut().for_each(|b| *b = 0.3);
     let network = Network::new(false);
     let of = |p: &Parameters| loss(network.forward(p, &input).scores(), &labels).0;
@@ -103,7 +104,8 @@ fn one_window_can_be_learned_by_heart_and_interrupted() {
     let steps = 300;
     let (state, losses) = fit(&samples, steps, 1, Some(&file)).unwrap();
     assert!(losses[2] < 0.6 * losses[0], "{losses:?}");
-    // Interrupted after the last checkpoint, it comes to the same end; other trainings refuse it.
+    // Interrupted after the last checkpoint, it reaches the same end; other trainings reject the
+    // file.
     let (again, _) = fit(&samples, steps, 1, Some(&file)).unwrap();
     assert!(again.numbers() == state.numbers());
     let error = |e: Result<_, Error>| e.map(|_: (Optimiser, _)| ()).unwrap_err().to_string();

@@ -1,18 +1,18 @@
 //! Fixed-lag smoothing: the same estimate over the last seconds, with every sweep.
 //!
-//! What leaves the window stays as a prior: the state at the window's first time where the estimate
-//! had it when the window last moved on, and for each model point the mean of the returns that
-//! left, as precise as they were many. An object needs its [`FixedLag`] (some 30 KB); the workspace
-//! is one for all.
+//! What leaves the window remains as a prior: the state at the window's first time, as estimated
+//! when the window last advanced, and for each model point the mean of the returns that left, with
+//! a precision proportional to their number. Every object needs its own [`FixedLag`] (about 30 KB);
+//! one workspace serves all.
 //!
-//! A young track is solved twice with every sweep, over a sparse model made anew: from where it is,
-//! and from one other start, which take turns; the cheaper remains.
+//! A young track is solved twice with every sweep, over a new sparse model: from its current
+//! estimate, and from one of several other starts in turn; the cheaper solution is kept.
 //!
 //! The turn rate keeps its Gaussian noise and does not decay here: a sweep's two iterations would
 //! not find the minima that Student-t noise adds.
 //!
-//! So the work of a push is bounded, however young its track and however many appear at once:
-//! [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
+//! The work of a push is thus bounded, however young its track and however many tracks appear at
+//! once: [`FixedLag::ITERATIONS_MAX`] over [`FixedLag::RETURNS_MAX`] returns.
 
 mod model;
 #[cfg(test)]
@@ -31,19 +31,19 @@ use crate::{ObjectReturn, ObjectState};
 use heapless::Vec;
 use model::WindowModel;
 
-/// The window, s. It sizes what is kept, as do the following.
+/// Length of the window, s. It and the following constants size what is kept.
 const WINDOW_S: f64 = 2.5;
-/// Pieces of the splines at most, and their length, s: a piece more than the window, into which
-/// time runs on.
+/// Maximum number of pieces of the splines, and their length, s: one piece more than the window,
+/// for time to advance into.
 const PIECES: usize = 6;
 const PIECE_S: f64 = 0.5;
 const BASES: usize = PIECES + DEGREE;
-/// Returns of a sweep, beside its foremost and hindmost, and of the window at 10 Hz.
+/// Returns kept of a sweep, besides its foremost and hindmost, and of the window at 10 Hz.
 const PER_SWEEP: usize = 32;
 const RETURNS: usize = 26 * (PER_SWEEP + 2);
-/// States of the tracker: those of the window at 10 Hz.
+/// Number of tracker states kept: those of the window at 10 Hz.
 const HISTORY: usize = 32;
-/// States of a young track that were put out.
+/// Number of published states of a young track that are kept.
 const PUBLISHED: usize = 16;
 
 /// A return of the window.
@@ -67,11 +67,11 @@ pub struct FixedLag {
     ends: [f32; 2],
     /// Displacement forwards, m.
     forward_m: f64,
-    /// States put out while the track was young.
+    /// States published while the track was young.
     published: Vec<ObjectState, PUBLISHED>,
-    /// Starts tried.
+    /// Number of starts tried.
     attempts: usize,
-    /// Iterations of the last push.
+    /// Number of iterations of the last push.
     iterations: usize,
     /// First and last time of the track's returns, s.
     born_s: f64,
@@ -87,12 +87,12 @@ impl Default for FixedLag {
 }
 
 impl FixedLag {
-    /// Gauss-Newton iterations of a push at most: those of both solves of a young track.
+    /// Maximum number of Gauss-Newton iterations of a push: those of both solves of a young track.
     pub const ITERATIONS_MAX: usize = 2 * young::ROUNDS * young::ITERATIONS;
-    /// Returns of each at most.
+    /// Maximum number of returns in each iteration.
     pub const RETURNS_MAX: usize = RETURNS;
 
-    /// That of an object not seen yet.
+    /// The estimate of an object not seen yet.
     pub const fn new() -> FixedLag {
         FixedLag {
             knots: Knots::NONE,
@@ -113,7 +113,7 @@ impl FixedLag {
         }
     }
 
-    /// Forgets the object, for another one.
+    /// Forgets the object, to start with another one.
     pub fn clear(&mut self) {
         self.prior = None;
         self.returns.clear();
@@ -125,12 +125,13 @@ impl FixedLag {
         self.restarts = 0;
     }
 
-    /// Takes in the returns of a sweep and the state of the tracker that found the object, and
-    /// returns the object's state at the time of the newest return; without a sound return, the
-    /// state extrapolated to the tracker's time. A young track that has hardly moved is stationary.
+    /// Takes the returns of a sweep and the state of the tracker that found the object, and returns
+    /// the object's state at the time of the newest return or, without a sound return, the state
+    /// extrapolated to the tracker's time. A young track that has hardly moved is stationary.
     ///
-    /// Returns before the window are ignored. After a gap as long as the window, or when the
-    /// estimate leaves the tracker's by more than `shape_sigma_m`, the estimate starts again.
+    /// Returns from before the window are ignored. After a gap as long as the window, or when the
+    /// estimate deviates from the tracker's by more than `shape_sigma_m` plus the object's length,
+    /// at most `strayed_length_m`, the estimate restarts.
     pub fn push(
         &mut self,
         estimator: &mut Estimator,
@@ -175,7 +176,7 @@ impl FixedLag {
         state
     }
 
-    /// How often the estimate started again.
+    /// Number of times the estimate restarted.
     pub fn restarts(&self) -> u32 {
         self.restarts
     }
@@ -191,7 +192,7 @@ impl FixedLag {
             return;
         }
         let mut state = *baseline;
-        // Backwards for a tracker that has not found out yet which way the object faces.
+        // Backwards if the tracker has not found out yet which way the object faces.
         if state.speed < 0.0 {
             state.heading += core::f64::consts::PI;
             state.speed = -state.speed;
@@ -199,8 +200,8 @@ impl FixedLag {
         push_last(&mut self.history, state);
     }
 
-    /// Takes evenly spaced returns of a sweep, its foremost and its hindmost; those older than the
-    /// window leave. How many are new.
+    /// Takes evenly spaced returns of a sweep, its foremost and its hindmost; drops those older
+    /// than the window. Returns how many are new.
     fn take(
         &mut self,
         returns: &[ObjectReturn],
@@ -227,7 +228,7 @@ impl FixedLag {
         fresh
     }
 
-    /// Which of the sound returns are foremost and hindmost, as the object moves on.
+    /// Finds the foremost and the hindmost of the sound returns, allowing for the object's motion.
     fn outermost(&self, returns: &[ObjectReturn], baseline: &ObjectState) -> [Option<usize>; 2] {
         let state = if self.begun { self.state(self.newest_s) } else { *baseline };
         let (sin, cos) = libm::sincos(state.heading);
@@ -256,7 +257,7 @@ impl FixedLag {
         self.knots = Knots::pieces(self.born_s, PIECE_S, 1);
     }
 
-    /// Whether the estimate is farther than this from the tracker's.
+    /// Whether the estimate is farther than `distance_m` from the tracker's.
     fn strayed(&self, state: &ObjectState, distance_m: f64) -> bool {
         let Some(baseline) = self.history.last() else { return !is_sound(state) };
         let ahead = state.time_s - baseline.time_s;
@@ -275,7 +276,7 @@ impl FixedLag {
         state_at(&self.knots, &self.control_points, time_s.min(self.newest_s), time_s)
     }
 
-    /// Drops returns from before `oldest`; each weighs on its model point from now on.
+    /// Drops returns from before `oldest`; from now on each contributes to its model point.
     fn forget(&mut self, oldest: f64, params: &FixedLagParams) {
         let left = self.returns.partition_point(|one| f64::from(one.time_s) < oldest);
         for one in &self.returns[..left] {
@@ -288,8 +289,8 @@ impl FixedLag {
         self.returns.truncate(self.returns.len() - left);
     }
 
-    /// Moves the splines on until they hold the newest time: first by more pieces, then by later
-    /// ones.
+    /// Advances the splines until they contain the newest time: first by adding pieces, then by
+    /// shifting them.
     fn advance(&mut self, params: &FixedLagParams) {
         while self.newest_s > self.knots.end() {
             let pieces = self.knots.spans();
@@ -322,7 +323,7 @@ impl FixedLag {
         problem.prior = self.prior;
         problem.samples.set(self.returns.iter().map(|one| (one.position, one.time_s)));
         problem.set_knots(self.knots);
-        // Two iterations with a sweep do not find the other minima that hard turns bring.
+        // Two iterations per sweep do not find the other minima that hard turns bring.
         let params = &EstimateParams {
             tangential_sigma_m: params.fixed_lag.lag_tangential_sigma_m,
             shape_sigma_m: params.shape_sigma_m,
@@ -337,7 +338,7 @@ impl FixedLag {
         }
     }
 
-    /// Solves from where it is, with the model that it has.
+    /// Solves from the current estimate, with the existing model.
     fn estimate_on(&mut self, problem: &mut Problem, params: &EstimateParams, fresh: usize) {
         let lag = &params.fixed_lag;
         problem.solution.control_points[..BASES].copy_from_slice(&self.control_points);
@@ -363,14 +364,14 @@ impl FixedLag {
         self.model.extend(&mut self.returns, &problem.observations, fresh, lag);
     }
 
-    /// Takes over the trajectory of the problem.
+    /// Adopts the trajectory of the problem.
     fn keep(&mut self, problem: &Problem) {
         self.control_points.copy_from_slice(&problem.solution.control_points[..BASES]);
         self.ends = problem.solution.ends;
     }
 }
 
-/// Appends to the last states, of which the first leaves where there is no room.
+/// Appends to the last states, dropping the first if there is no room.
 fn push_last<const N: usize>(states: &mut Vec<ObjectState, N>, state: ObjectState) {
     if states.is_full() {
         states.remove(0);

@@ -8,9 +8,9 @@ use crate::estimate::params::FixedLagParams;
 use crate::estimate::surface::{Scatter, Surface};
 use heapless::Vec;
 
-/// Prior of a new model point, returns: makes its elimination regular.
+/// Minimum prior of a model point, in returns: makes its elimination regular.
 const PRIOR_RETURNS_MIN: f32 = 0.1;
-/// Model points at most.
+/// Maximum number of model points.
 const MODEL: usize = 128;
 
 #[derive(Clone, Copy)]
@@ -18,13 +18,13 @@ pub(super) struct WindowPoint {
     pub at: [f32; 3],
     /// Mean of the returns that left the window.
     pub prior_mean: [f32; 3],
-    /// Returns that left the window, at most [`FixedLagParams::lag_prior_returns`].
+    /// Number of returns that left the window, at most [`FixedLagParams::lag_prior_returns`].
     prior_returns: f32,
     scatter: Scatter,
 }
 
 impl WindowPoint {
-    /// As a model point of the equations; `precision` is a return's, 1/m².
+    /// Converts it to a model point of the equations; `precision` is that of a return, 1/m².
     pub fn surface(&self, precision: f64) -> Surface {
         Surface {
             prior_mean: self.prior_mean,
@@ -51,7 +51,7 @@ impl WindowModel {
         self.spacing_m = params.lag_point_spacing_m;
     }
 
-    /// Lets a return that leaves the window weigh on its model point.
+    /// Adds a return that leaves the window to its model point.
     pub fn absorb(&mut self, point: u16, local: [f64; 3], params: &FixedLagParams) {
         let Some(point) = self.points.get_mut(usize::from(point)) else { return };
         point.prior_returns = (point.prior_returns + 1.0).min(params.lag_prior_returns);
@@ -62,7 +62,7 @@ impl WindowModel {
         point.scatter.add(local, point.at);
     }
 
-    /// Makes model points of the last `fresh` returns where there are none near, and notes the
+    /// Makes model points of those of the last `fresh` returns that have none near, and records the
     /// model point of each return.
     pub fn extend(
         &mut self,
@@ -101,7 +101,7 @@ impl WindowModel {
         self.points[..count].iter().any(|point| square_distance(&point.at, at) < square)
     }
 
-    /// Removes points that are nearer to an earlier one than the spacing.
+    /// Removes points closer to an earlier one than the spacing.
     fn thin(&mut self) {
         let mut left = 0;
         for i in 0..self.points.len() {
@@ -114,7 +114,7 @@ impl WindowModel {
         self.points.truncate(left);
     }
 
-    /// Nearest model points by brute force, where the model is new.
+    /// Finds the nearest model points by brute force, for a new model.
     fn assign(&self, returns: &mut [WindowReturn], observations: &[Observation]) {
         for (one, observation) in returns.iter_mut().zip(observations) {
             let local = observation.local_f32();

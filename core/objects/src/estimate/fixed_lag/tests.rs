@@ -1,4 +1,4 @@
-//! Drives sweep by sweep.
+//! Drives, sweep by sweep.
 
 extern crate std;
 
@@ -7,7 +7,7 @@ use crate::estimate::synthetic::{self, Drive, Errors, drive, errors};
 use crate::random::Random;
 use std::vec::Vec;
 
-/// A drive sweep by sweep: the states that came out, and the iterations that each took.
+/// Pushes a drive sweep by sweep: returns the resulting states and the iterations that each took.
 fn pushed(estimator: &mut Estimator, drive: &Drive) -> Vec<(ObjectState, usize)> {
     let mut lag = raywake_alloc_guard::boxed!(FixedLag, FixedLag::new());
     let mut states = Vec::new();
@@ -23,13 +23,13 @@ fn pushed(estimator: &mut Estimator, drive: &Drive) -> Vec<(ObjectState, usize)>
         }
     }
     assert_eq!(lag.restarts(), 0);
-    // Not by a whole turn, whichever way it is found to face.
+    // No jump by a whole turn, whichever way it is found to face.
     let turns = |pair: &[(ObjectState, usize)]| (pair[1].0.heading - pair[0].0.heading).abs() > 4.0;
     assert!(!states.windows(2).any(turns), "{states:?}");
     states
 }
 
-/// Errors of the states that came out, but for the first few.
+/// Errors of the resulting states, except for the first few.
 fn streamed(estimator: &mut Estimator, drive: &Drive, without: usize) -> Errors {
     let states = pushed(estimator, drive);
     let states: Vec<ObjectState> = states[without..].iter().map(|(state, _)| *state).collect();
@@ -45,7 +45,7 @@ fn a_window_follows_sweep_by_sweep() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
     for seed in [1, 4] {
         let parked = drive(synthetic::parked(seed));
-        // It stands, where it is, from the first state on.
+        // It is static, in its place, from the first state on.
         let ours = streamed(&mut estimator, &parked, 0);
         assert!(ours[0] < 0.2 && ours[1] < 0.1 && ours[2] < 0.05, "{ours:?}");
         let ours = streamed(&mut estimator, &parked, 15);
@@ -55,7 +55,7 @@ fn a_window_follows_sweep_by_sweep() {
     }
 }
 
-/// From the first sweep on, in which many objects may appear at once.
+/// Holds from the first sweep on, in which many objects may appear at once.
 #[test]
 fn the_work_of_a_sweep_is_bounded() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -71,7 +71,7 @@ fn the_work_of_a_sweep_is_bounded() {
     }
 }
 
-/// One end of it comes into view while the middle of what is seen hardly moves.
+/// One end of it comes into view while the middle of the visible part hardly moves.
 #[test]
 fn a_window_finds_out_that_a_long_side_moves() {
     let mut estimator = raywake_alloc_guard::boxed!(Estimator, Estimator::new());
@@ -113,17 +113,17 @@ fn a_window_survives_bad_input() {
     for (i, count) in [0, 1, 1, 40, 4000, 0, 0, 7, 5, 300].into_iter().enumerate() {
         push(&mut lag, 0.1 * i as f64, count, 2.0);
     }
-    // Back in time, a gap of a second, one longer than the window.
+    // Back in time; a gap of a second; one longer than the window.
     push(&mut lag, -3.0, 50, 2.0);
     push(&mut lag, 2.0, 50, 2.0);
     assert_eq!(lag.restarts(), 0);
     push(&mut lag, 8.0, 50, 2.0);
     assert_eq!(lag.restarts(), 1);
-    // Larger than the prior, so that the model has no room, and for long.
+    // Larger than the prior, so that the model has no room, and for a long time.
     for i in 0..60 {
         push(&mut lag, 8.0 + 0.1 * f64::from(i), 400, 12.0);
     }
-    // What is no number at all.
+    // Not a number at all.
     let state = ObjectState { heading: f64::NAN, ..Default::default() };
     lag.clear();
     assert!(lag.push(&mut estimator, &params, &[ObjectReturn::default()], &state).heading == 0.0);

@@ -9,7 +9,8 @@ use crate::estimate::state::{ControlPoint, HEADING, reverse};
 use crate::spline::Knots;
 use crate::wrap_angle;
 
-/// Models that a solve makes, and iterations with each: they bound the work of a sweep.
+/// Number of models that a solve makes, and of iterations with each: they bound the work of a
+/// sweep.
 pub(super) const ROUNDS: usize = 2;
 pub(super) const ITERATIONS: usize = 3;
 
@@ -20,17 +21,18 @@ enum Guess {
     Rest,
     /// The tracker's history.
     History,
-    /// What is seen: at this share of the way from its hindmost to its foremost return.
+    /// The visible part: at this share of the way from its hindmost to its foremost return.
     Visible(f64),
 }
 
-/// Starts, which take turns. One end of what is visible may be where the view ends, while the other
+/// Starts, used in turn. One end of the visible part may be where the view ends, while the other
 /// moves.
 const GUESSES: [Guess; 5] =
     [Guess::Rest, Guess::History, Guess::Visible(0.5), Guess::Visible(1.0), Guess::Visible(0.0)];
 
 impl FixedLag {
-    /// Solves from where it is, and from the start whose turn it is; the cheaper remains.
+    /// Solves from the current estimate, and from the next start in turn; keeps the cheaper
+    /// solution.
     pub(super) fn estimate_young(&mut self, estimator: &mut Estimator, params: &EstimateParams) {
         let problem = &mut estimator.problem;
         let mut least = f64::MAX;
@@ -56,7 +58,7 @@ impl FixedLag {
         self.anchor();
     }
 
-    /// Puts a start into the problem.
+    /// Sets the problem to a start.
     fn start(&self, guess: Guess, problem: &mut Problem, params: &EstimateParams) {
         match guess {
             Guess::Rest => {
@@ -80,8 +82,8 @@ impl FixedLag {
         }
     }
 
-    /// Solves from the trajectory of the problem, with sparse models of what is seen by then; its
-    /// cost.
+    /// Solves from the trajectory of the problem, extracting a sparse model in each round; returns
+    /// the cost.
     fn solve(&mut self, problem: &mut Problem, params: &EstimateParams) -> f64 {
         let lag = &params.fixed_lag;
         let points = self.returns.len() / lag.young_returns_per_point;
@@ -101,7 +103,7 @@ impl FixedLag {
         cost
     }
 
-    /// Of both headings, the one with which it moved forward on the whole.
+    /// Reverses the object if it moved backwards overall.
     pub(super) fn face_forward(&mut self, reversed_m: f64) {
         if self.forward_m > -reversed_m {
             return;
@@ -118,8 +120,8 @@ impl FixedLag {
         self.ends = [-rear, -front];
     }
 
-    /// Moves the state to the point of the object that published states are of, with its heading
-    /// within half a turn of theirs: each start has an origin of its own.
+    /// Shifts the state to the point of the object that published states refer to, with its heading
+    /// within half a turn of theirs: each start has its own origin.
     fn anchor(&mut self) {
         let mut by = [0.0; 3];
         for state in &self.published {
@@ -131,7 +133,7 @@ impl FixedLag {
             by[2] += off[2];
         }
         let by = by.map(|by| by / self.published.len().max(1) as f64);
-        // Whole turns mean nothing.
+        // Whole turns carry no meaning.
         let turns = self.published.last().map_or(0.0, |state| {
             let off = self.knots.value(&self.control_points, state.time_s)[HEADING] - state.heading;
             off - wrap_angle(off)

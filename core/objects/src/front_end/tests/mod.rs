@@ -1,4 +1,4 @@
-//! Sweeps put together by hand, and what becomes of them.
+//! Hand-made sweeps, and the resulting tracks.
 
 mod objects;
 
@@ -18,7 +18,7 @@ use std::vec::Vec;
 fn cars_are_followed_far_from_the_origin() {
     let things = [Thing::car(10.0, 4.0, [8.0, 0.0]), Thing::car(30.0, -4.0, [-8.0, 0.0])];
     let mut run = Run::new(1, 8);
-    // The world's origin is a country away.
+    // The world's origin is thousands of kilometres away.
     run.place = Pose::planar(4e5, 5e6, 300.0, 0.0);
     for n in 0..20 {
         let counts = run.see(&things, n as f64 * 0.1);
@@ -40,7 +40,7 @@ fn cars_are_followed_far_from_the_origin() {
         assert!((state.heading.cos() - thing.velocity[0] / 8.0).abs() < 0.05, "{state:?}");
         assert!((state.position[0] - 1.9 * thing.velocity[0]).abs() < 0.2, "{state:?}");
         assert_eq!((track.history().len(), track.observations), (20, 20));
-        // Before it departed it was the same car.
+        // The states before it departed have its heading, too.
         assert!((track.history()[0].heading - state.heading).abs() < 0.3);
         assert!(track.returns_seen() > 3000);
         assert_eq!(track.state(), Some(state));
@@ -59,7 +59,7 @@ fn cars_are_followed_far_from_the_origin() {
     assert!(run.live().is_empty());
 }
 
-/// Two sensors that see the same car half a turn apart, as one sweep or as two.
+/// Two sensors that see the same car half a revolution apart, as one sweep or as two.
 #[test]
 fn sensors_need_not_be_in_step() {
     let things = [Thing::car(12.0, 3.0, [15.0, 0.0])];
@@ -86,10 +86,10 @@ fn sensors_need_not_be_in_step() {
         let mut of_sensor = [0; 2];
         for r in track.returns() {
             of_sensor[r.sensor as usize] += 1;
-            // Where the car was at the return's own time, from the first mean time on.
+            // On the car at the return's own time, relative to the first mean time.
             let off = r.position[0] as f64 - 15.0 * r.time_s as f64;
             assert!(off.abs() < 2.1, "{apart}: {r:?}");
-            // Each sensor's rays begin there.
+            // Each sensor's rays begin at that sensor.
             let y = r.origin[1] as f64 + track.anchor[1];
             assert!((y - r.sensor as f64).abs() < 1e-4);
         }
@@ -108,7 +108,7 @@ fn a_moving_vehicle_sees_what_stands_standing() {
         let stamp_s = n as f64 * 0.1;
         run.place = Pose::planar(10.0 * stamp_s, 0.0, 0.0, 0.0);
         let as_seen = |p: [f64; 3]| {
-            // From the vehicle where it is when the sensor looks that way.
+            // As seen from where the vehicle is when the sensor faces that way.
             let mut t = 0.0;
             for _ in 0..20 {
                 let x = p[0] - 10.0 * (stamp_s + t);
@@ -150,7 +150,7 @@ fn walls_and_crumbs_are_no_objects() {
 
 #[test]
 fn a_map_of_the_ground_serves_where_none_is_seen() {
-    // A slope that the returns do not show, and a box lying on it flat as a table.
+    // A slope that the returns do not show, and a flat table standing on it.
     let height = |x: f64| 0.3 * x;
     let heights: Vec<f32> =
         (0..100 * 100).map(|n| height((n % 100) as f64 - 49.5) as f32).collect();
@@ -207,7 +207,7 @@ fn the_flow_tells_neighbours_apart() {
     assert_ne!(without.len(), 2, "{without:?}");
 }
 
-/// Two cars that pass each other so fast that positions alone could mean either.
+/// Two cars that pass each other so fast that positions alone are ambiguous.
 #[test]
 fn velocities_join_the_gate() {
     let mut ekf = CentroidEkf::birth(&PARAMS.centroid, 0.0, [0.0; 3]);
@@ -268,7 +268,7 @@ fn chunks_and_segments_beyond_their_capacity() {
     assert!(chunked == chunks::CHUNKS_MAX as u64 && counts.unchunked > 0, "{counts:?}");
     assert_eq!(counts.segments, SEGMENTS_MAX as u64);
     assert!(counts.unlisted > 0 && counts.born == 8, "{counts:?}");
-    // The next batch is as if nothing had happened.
+    // The next batch is unaffected.
     let counts = run.see(&[Thing::car(10.0, 0.0, [0.0; 2])], 0.1);
     assert_eq!((counts.unchunked, counts.segments), (0, 1));
 }
@@ -308,18 +308,18 @@ fn what_is_not_finite_leaves_no_trace() {
 fn unseen_tracks_wait_then_end() {
     let car = [Thing::car(10.0, 4.0, [5.0, 0.0])];
     let mut run = Run::new(1, 8);
-    // Seen once, it does not wait.
+    // Seen only once, it does not wait.
     run.see(&car, 0.0);
     assert_eq!(run.see(&[], 0.1).ended, 1);
     for n in 2..10 {
         run.see(&car, n as f64 * 0.1);
     }
-    // A batch without a return, and none at all.
+    // A batch without returns, and no batch at all.
     run.take(1.0, &[], None);
     let counts = run.step();
     assert_eq!((counts.waiting, counts.ended), (1, 0));
     assert_eq!(run.step(), TrackingCounts::default());
-    // It is found again where it has gone.
+    // It is found again where it has moved to.
     let counts = run.see(&car, 1.1);
     assert_eq!((counts.updated, counts.born), (1, 0));
     for n in 12..16 {
@@ -327,7 +327,7 @@ fn unseen_tracks_wait_then_end() {
     }
     let counts = run.see(&[], 1.7);
     assert_eq!((counts.waiting, counts.ended), (0, 1));
-    // It can be looked at until the next step.
+    // It can be read until the next step.
     let ended: Vec<&Track> = run.tracks.iter().filter(|t| t.life == Life::Ended).collect();
     assert_eq!((ended.len(), ended[0].observations), (1, 9));
     assert!((ended[0].last_s() - 1.1).abs() < 1e-6);

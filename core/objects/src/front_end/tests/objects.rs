@@ -1,4 +1,4 @@
-//! What is put out as an object.
+//! Which tracks are reported as objects.
 
 extern crate std;
 use super::super::scene::{PARAMS, Run, Thing, ground, seen};
@@ -8,7 +8,7 @@ use raywake_core::output::{ColumnFlow, PointFlows, ReturnFlow, Status};
 use std::vec;
 use std::vec::Vec;
 
-/// A wall, a parked car, a person who walks, and a wall that the flow has moving for a while.
+/// A wall, a parked car, a walking person, and a wall that the flow reports as moving for a while.
 #[test]
 fn objects_are_what_moves_and_what_could() {
     let wall = |y| Thing { at: [5.0, y], size: [6.0, 0.4, 2.0], velocity: [0.0; 2] };
@@ -53,9 +53,9 @@ fn objects_are_what_moves_and_what_could() {
         objects.sort();
         (run.live().len(), objects)
     };
-    // The person is of no class, but moves.
+    // The person has no class, but moves.
     assert_eq!(run(true, true), (4, vec![(None, 20, 20), (car, 0, 20)]));
-    // Without classes that is all.
+    // Without classes, only the person remains.
     assert_eq!(run(false, true), (4, vec![(None, 20, 20)]));
     assert_eq!(run(true, false), (4, Vec::new()));
 }

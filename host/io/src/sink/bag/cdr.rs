@@ -1,11 +1,11 @@
-//! CDR, little-endian: messages as ROS 2 sends them.
+//! CDR, little-endian: the encoding of ROS 2 messages.
 
 use raywake_core::pose::Pose;
 
-/// Kind of encapsulation: plain, least significant byte first.
+/// Kind of encapsulation: plain, little-endian.
 const HEAD: [u8; 4] = [0, 1, 0, 0];
 
-/// A message while it is written, field after field.
+/// A message being written, field by field.
 pub(crate) struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -13,7 +13,7 @@ impl Cdr {
         Cdr(HEAD.to_vec())
     }
 
-    /// Appends bytes, beginning at a multiple of `alignment` after the head.
+    /// Appends bytes, aligned to a multiple of `alignment` after the head.
     fn aligned(&mut self, alignment: usize, bytes: &[u8]) {
         let length = (self.0.len() - HEAD.len()).next_multiple_of(alignment) + HEAD.len();
         self.0.resize(length, 0);
@@ -42,7 +42,7 @@ impl Cdr {
         self.0.push(0);
     }
 
-    /// Bytes after their number, as `fill` appends them.
+    /// A byte sequence, preceded by its length, as `fill` appends it.
     pub fn bytes(&mut self, fill: impl FnOnce(&mut Vec<u8>)) {
         self.word(0);
         let begin = self.0.len();
@@ -51,7 +51,7 @@ impl Cdr {
         self.0[begin - 4..begin].copy_from_slice(&length.to_le_bytes());
     }
 
-    /// A header: time and name of a frame.
+    /// A header: time and frame name.
     pub fn header(&mut self, stamp_ns: u64, frame: &str) {
         self.word((stamp_ns / 1_000_000_000) as u32);
         self.word((stamp_ns % 1_000_000_000) as u32);
@@ -68,13 +68,13 @@ impl Cdr {
         self.doubles(pose.rotation.to_array());
     }
 
-    /// A place and a direction about +z, rad.
+    /// A position and a direction about +z, rad.
     pub fn planar(&mut self, at: [f64; 3], direction: f64) {
         let (sin, cos) = libm::sincos(0.5 * direction);
         self.doubles(at.into_iter().chain([0.0, 0.0, sin, cos]));
     }
 
-    /// A field of a point: its name, first byte, kind, and that it is one number.
+    /// A point field: its name, offset and type, and a count of one.
     pub fn field(&mut self, name: &str, offset: u32, kind: u8) {
         self.text(name);
         self.word(offset);

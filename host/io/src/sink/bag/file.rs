@@ -12,7 +12,7 @@ use super::Topic;
 use crate::Error;
 use crate::sink::atomic::Partial;
 
-/// A file while it is written; it takes its name when it is finished.
+/// A file being written; it takes its name when it is finished.
 pub(super) struct MessageFile {
     writer: Writer<BufWriter<File>>,
     partial: Partial,
@@ -22,7 +22,7 @@ pub(super) struct MessageFile {
 }
 
 impl MessageFile {
-    /// Begins a file. Fails with the system's reason where it cannot be written.
+    /// Creates a file. Fails with the system's reason if it cannot be written.
     pub fn create(path: &Path, topics: &[Topic]) -> Result<MessageFile, Error> {
         let (partial, file) = Partial::create(path)?;
         let options = WriteOptions::new()
@@ -43,7 +43,7 @@ impl MessageFile {
         Ok(MessageFile { writer, partial, channels, sequence: 0 })
     }
 
-    /// Appends a message of a topic.
+    /// Appends a message to a topic.
     pub fn write(&mut self, topic: usize, time_ns: u64, message: &[u8]) -> Result<(), Error> {
         let header = MessageHeader {
             channel_id: self.channels[topic],

@@ -1,4 +1,4 @@
-//! Messages to viewers that connect: the protocol of Foxglove, over a websocket.
+//! Messages to connected viewers: Foxglove's protocol over a websocket.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -13,16 +13,16 @@ use super::super::streams::Pace;
 use super::Topic;
 use crate::Error;
 
-/// The longest wait for the time of a message, s: where times of a recording jump, it goes on.
+/// Longest wait before a message, s: playback goes on where the times of a recording jump.
 const WAIT_MAX_S: f64 = 1.0;
-/// Before the first message, as a viewer asks for one topic after the other, and after the last
-/// one, as closing drops what is still to be sent.
+/// Wait before the first message, as a viewer subscribes to one topic after another, and after the
+/// last one, as closing drops what has not been sent yet.
 const GRACE: Duration = Duration::from_millis(200);
 
-/// A server that plays messages at the pace of their times. What nobody sees is not sent.
+/// A server that plays messages at the pace of their times. Topics nobody watches are not sent.
 pub(super) struct LiveServer {
     server: WebSocketServerHandle,
-    /// What connects them: channels and server hold it weakly.
+    /// Connects server and channels, which hold it weakly.
     _context: Arc<Context>,
     channels: Vec<Arc<RawChannel>>,
     pace: Pace,
@@ -31,7 +31,7 @@ pub(super) struct LiveServer {
 }
 
 impl LiveServer {
-    /// Begins to listen. Fails where the address is not to be had.
+    /// Starts listening. Fails if the address is not available.
     pub fn start(address: SocketAddr, pace: Pace, topics: &[Topic]) -> Result<LiveServer, Error> {
         let failed = |e| Error::Unsupported(format!("--live {address}: {e}"));
         let context = Context::new();
@@ -48,12 +48,12 @@ impl LiveServer {
         Ok(LiveServer { server, _context: context, channels, pace, last: None })
     }
 
-    /// Whether a viewer has asked for a topic.
+    /// Whether a viewer has subscribed to a topic.
     pub fn is_watched(&self) -> bool {
         self.channels.iter().any(|channel| channel.has_sinks())
     }
 
-    /// Sends a message of a topic when it is time for it.
+    /// Sends a message of a topic when it is due.
     pub fn write(&mut self, topic: usize, time_ns: u64, message: &[u8]) {
         if self.pace == Pace::Recorded {
             self.wait(time_ns);
@@ -61,7 +61,7 @@ impl LiveServer {
         self.channels[topic].log_with_meta(message, PartialMetadata::with_log_time(time_ns));
     }
 
-    /// Waits until it is time for a message.
+    /// Waits until a message is due.
     fn wait(&mut self, time_ns: u64) {
         if self.last.is_none() {
             thread::sleep(GRACE);
@@ -76,7 +76,7 @@ impl LiveServer {
         }
     }
 
-    /// Closes the connections, after what was sent last.
+    /// Closes the connections after giving the last messages time to be sent.
     pub fn finish(self) {
         thread::sleep(GRACE);
         self.server.stop().wait_blocking();

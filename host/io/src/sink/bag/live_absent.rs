@@ -1,4 +1,4 @@
-//! What stands for [`LiveServer`] where viewers cannot connect: nothing makes one.
+//! Stand-in for [`LiveServer`] in builds without viewers; never constructed.
 
 use std::net::SocketAddr;
 
@@ -6,7 +6,7 @@ use super::super::streams::Pace;
 use super::Topic;
 use crate::Error;
 
-/// No server.
+/// A server that cannot exist.
 pub(super) enum NoServer {}
 
 pub(super) use NoServer as LiveServer;

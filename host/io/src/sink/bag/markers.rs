@@ -1,4 +1,4 @@
-//! What moves as `visualization_msgs/Marker`, which rviz shows.
+//! Objects and motion as `visualization_msgs/Marker`, which rviz shows.
 
 use raywake_objects::tracked::TrackedObject;
 
@@ -26,17 +26,17 @@ pub(super) fn cube(stamp_ns: u64, object: &TrackedObject) -> Vec<u8> {
     cdr.message()
 }
 
-/// Lines along motions; they last until the next sweep's.
+/// Lines along motions, shown until the next sweep's.
 pub(super) fn lines(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, VEHICLE);
     cdr.text("motion");
-    // Number, type, and to add or replace it.
+    // ID, type, and action: add or replace.
     [0, LINE_LIST, 0].into_iter().for_each(|n| cdr.word(n));
     cdr.planar([0.0; 3], 0.0);
     cdr.doubles([LINE_M, 0.0, 0.0]);
     MOVING.into_iter().for_each(|v| cdr.float(v));
-    // It lasts, and stays in its frame.
+    // Shown until replaced, and locked to its frame.
     [0, 0].into_iter().for_each(|n| cdr.word(n));
     cdr.byte(1);
     cdr.word(2 * moving.len() as u32);
@@ -48,7 +48,7 @@ pub(super) fn lines(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
     cdr.message()
 }
 
-/// The rest of a marker that has no colours of points, no texture, no text and no mesh.
+/// The rest of a marker without point colours, texture, text or mesh.
 fn without_looks(cdr: &mut Cdr) {
     cdr.word(0);
     cdr.text("");

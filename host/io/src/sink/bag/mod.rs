@@ -1,9 +1,9 @@
-//! Results as messages of ROS 2, in an MCAP file or to viewers that connect, for Foxglove,
-//! Lichtblick, Rerun, rviz and Autoware (`ros2 bag play`) and whoever else reads those.
+//! Results as ROS 2 messages, in an MCAP file or to connected viewers, for Foxglove, Lichtblick,
+//! Rerun, rviz, Autoware (`ros2 bag play`) and anything else that reads them.
 //!
-//! | topic | message | what |
+//! | topic | message | content |
 //! |---|---|---|
-//! | `/tf` | `tf2_msgs/TFMessage` | the vehicle in the world, as the poses have it |
+//! | `/tf` | `tf2_msgs/TFMessage` | the vehicle in the world, according to the poses |
 //! | `/raywake/points` | `sensor_msgs/PointCloud2` | returns of a sweep with their flow |
 //! | `/raywake/motion` | `visualization_msgs/Marker` | half a second of motion, for rviz |
 //! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | the same as arrows: Foxglove |
@@ -12,19 +12,20 @@
 //! velocity_y` (over ground, along the vehicle's axes) and `speed`, m/s; `p_moves`; `status`, a
 //! uint8: the number of a [`raywake_core::output::Status`].
 //!
-//! A stream of objects has, in place of all but the first:
+//! A stream of objects has these in place of all but the first:
 //!
-//! | topic | message | what |
+//! | topic | message | content |
 //! |---|---|---|
 //! | `/raywake/tracked_points` | `sensor_msgs/PointCloud2` | returns: `x y z intensity`, `track` |
-//! | `/raywake/objects` | `visualization_msgs/Marker` | a box for each object, red where it moves |
-//! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all that is known |
+//! | `/raywake/objects` | `visualization_msgs/Marker` | a box for each object, red if it moves |
+//! | `/raywake/scene` | `foxglove_msgs/SceneUpdate` | boxes, arrows, names, all attributes |
 //! | `/raywake/tracked_objects` | `autoware_perception_msgs/TrackedObjects` | for Autoware |
 //!
 //! A stream of both has all but `/raywake/tracked_points`. A stream of clouds has `/tf` and
 //! `/points`: `x y z intensity`, and `time`, s after the stamp.
 //!
-//! `track` is an int32, the number of the return's track, or -1; a marker has the same number.
+//! `track` is an int32, the number of the return's track, or -1; the track's marker has the same
+//! number.
 
 pub(crate) mod cdr;
 mod file;
@@ -49,7 +50,7 @@ use file::MessageFile;
 use live::LiveServer;
 use schemas::{MARKER, POINT_CLOUD, SCENE, Schema, TRACKED_OBJECTS, TRANSFORMS};
 
-/// Frames of what is written.
+/// Frames of the messages.
 const WORLD: &str = "world";
 const VEHICLE: &str = "vehicle";
 
@@ -57,14 +58,14 @@ const VEHICLE: &str = "vehicle";
 const AHEAD_S: f32 = 0.5;
 /// Width of a line, m.
 const LINE_M: f64 = 0.08;
-/// Colour of what moves: red, green, blue, opacity.
+/// Colour of anything moving: red, green, blue, opacity.
 const MOVING: [f32; 4] = [0.84, 0.15, 0.16, 1.0];
-/// Colour of an object that stands.
+/// Colour of a stationary object.
 const STANDING: [f32; 4] = [0.45, 0.5, 0.6, 0.6];
-/// How long a box is shown after its sweep, ns: some sweeps of most sensors.
+/// How long a box is shown after its sweep, ns: a few sweeps of most sensors.
 const BOX_SHOWN_NS: u32 = 250_000_000;
 
-/// A topic: its name and its messages' definition.
+/// A topic: its name and the definition of its messages.
 type Topic = (&'static str, Schema);
 
 const TF: Topic = ("/tf", TRANSFORMS);
@@ -99,7 +100,7 @@ impl BagSink {
     /// Begins a stream, unless it goes nowhere; `epoch_ns` is added to the sweeps' stamps.
     ///
     /// # Errors
-    /// Where the file cannot be written or the address is not to be had, with the system's reason.
+    /// If the file cannot be written or the address is not available, with the system's reason.
     pub fn create(
         streams: &StreamTargets,
         epoch_ns: u64,
@@ -115,17 +116,17 @@ impl BagSink {
         Ok(is_wanted.then_some(BagSink { file, live, topics, epoch_ns }))
     }
 
-    /// From now on this is added to the sweeps' stamps, ns.
+    /// Sets what is added to the sweeps' stamps from now on, ns.
     pub fn since(&mut self, epoch_ns: u64) {
         self.epoch_ns = epoch_ns;
     }
 
-    /// Whether somebody sees what goes to viewers, or nothing does.
+    /// Whether a viewer is watching; true if there is no server.
     pub fn is_watched(&self) -> bool {
         self.live.as_ref().is_none_or(LiveServer::is_watched)
     }
 
-    /// Writes a sweep and the flow of a pair that it begins.
+    /// Writes a sweep and the flow of the pair that it begins.
     pub fn pair(&mut self, first: &SweepData, flows: &PairFlows) -> Result<(), Error> {
         let (stamp_ns, pose) = (self.stamp_ns(first), &first.world_from_vehicle);
         self.write(&TF, stamp_ns, transform(stamp_ns, pose))?;
@@ -136,8 +137,7 @@ impl BagSink {
         self.write(&SCENES, stamp_ns, scene::motion(stamp_ns, &moving))
     }
 
-    /// Writes a sweep, the number of the track of each of its returns (-1: of none), and the
-    /// objects in it.
+    /// Writes a sweep, the track number of each of its returns (-1: none) and the objects in it.
     pub fn objects(
         &mut self,
         sweep: &SweepData,
@@ -150,7 +150,7 @@ impl BagSink {
         self.boxes(sweep, objects)
     }
 
-    /// Writes the objects in a sweep that is written.
+    /// Writes the objects in a sweep that was already written.
     pub fn boxes(&mut self, sweep: &SweepData, objects: &[TrackedObject]) -> Result<(), Error> {
         let stamp_ns = self.stamp_ns(sweep);
         for object in objects {
@@ -160,7 +160,7 @@ impl BagSink {
         self.write(&TRACKED, stamp_ns, tracked::objects(stamp_ns, objects))
     }
 
-    /// Writes a sweep, or what is left of it: these returns.
+    /// Writes a sweep with only these returns.
     pub fn cloud(&mut self, sweep: &SweepData, returns: &[Point]) -> Result<(), Error> {
         let stamp_ns = self.stamp_ns(sweep);
         self.write(&TF, stamp_ns, transform(stamp_ns, &sweep.world_from_vehicle))?;
@@ -179,14 +179,14 @@ impl BagSink {
         self.file.as_mut().map_or(Ok(()), |file| file.write(channel, time_ns, &message))
     }
 
-    /// Completes the file; viewers see that it is over.
+    /// Completes the file and closes the connections to viewers.
     pub fn finish(self) -> Result<(), Error> {
         self.live.into_iter().for_each(LiveServer::finish);
         self.file.map_or(Ok(()), MessageFile::finish)
     }
 }
 
-/// A column that moves, in the vehicle's frame.
+/// A moving column, in the vehicle's frame.
 struct MovingColumn {
     /// m.
     at: [f32; 2],

@@ -22,18 +22,18 @@ const WITH_FLOW: [(&str, u8); 9] = [
     ("velocity_y", FLOAT32),
     ("speed", FLOAT32),
     ("p_moves", FLOAT32),
-    // Three bytes after it are not used, so that numbers stay aligned.
+    // Followed by three unused bytes, so that numbers stay aligned.
     ("status", UINT8),
 ];
 /// Fields of a return with its track.
 const WITH_TRACK: [(&str, u8); 5] =
     [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("intensity", FLOAT32), ("track", INT32)];
 
-/// Fields of a return as it came.
+/// Fields of a return by itself.
 const ALONE: [(&str, u8); 5] =
     [("x", FLOAT32), ("y", FLOAT32), ("z", FLOAT32), ("intensity", FLOAT32), ("time", FLOAT32)];
 
-/// Returns as they came.
+/// Returns by themselves.
 pub(super) fn alone(stamp_ns: u64, returns: &[Point]) -> Vec<u8> {
     let fields = |point: &Point| {
         let [x, y, z] = point.position;
@@ -55,7 +55,7 @@ pub(super) fn with_tracks(stamp_ns: u64, sweep: &SweepData, tracks: &[i32]) -> V
     cloud(stamp_ns, &WITH_TRACK, returns.map(|(point, track)| track_fields(point, *track)))
 }
 
-/// As [`WITH_FLOW`] names them.
+/// In the order of [`WITH_FLOW`].
 fn flow_fields(pose: &Pose, point: &Point, flow: PointFlow) -> [[u8; 4]; WITH_FLOW.len()] {
     let [x, y, z] = point.position.map(f32::to_le_bytes);
     let [vx, vy] = pose.along_axes(flow.velocity_world_mps);
@@ -64,13 +64,13 @@ fn flow_fields(pose: &Pose, point: &Point, flow: PointFlow) -> [[u8; 4]; WITH_FL
     [x, y, z, i, vx, vy, speed, p, [flow.status as u8, 0, 0, 0]]
 }
 
-/// As [`WITH_TRACK`] names them.
+/// In the order of [`WITH_TRACK`].
 fn track_fields(point: &Point, track: i32) -> [[u8; 4]; WITH_TRACK.len()] {
     let [x, y, z] = point.position.map(f32::to_le_bytes);
     [x, y, z, point.intensity.to_le_bytes(), track.to_le_bytes()]
 }
 
-/// Returns with these fields, in the vehicle's frame.
+/// A cloud of returns with these fields, in the vehicle's frame.
 fn cloud<const FIELDS: usize>(
     stamp_ns: u64,
     fields: &[(&str, u8); FIELDS],
@@ -81,7 +81,7 @@ fn cloud<const FIELDS: usize>(
     cdr.header(stamp_ns, VEHICLE);
     [1, count, FIELDS as u32].into_iter().for_each(|n| cdr.word(n));
     (0..).zip(fields).for_each(|(n, (name, kind))| cdr.field(name, 4 * n, *kind));
-    // Least significant byte first.
+    // Little-endian.
     cdr.byte(0);
     cdr.word(step);
     cdr.word(step * count);
@@ -89,7 +89,7 @@ fn cloud<const FIELDS: usize>(
         bytes.reserve((step * count) as usize);
         returns.for_each(|one| bytes.extend_from_slice(one.as_flattened()));
     });
-    // Whether no coordinate may be missing.
+    // `is_dense`: coordinates may be missing.
     cdr.byte(0);
     cdr.message()
 }

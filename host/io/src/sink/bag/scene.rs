@@ -1,30 +1,30 @@
-//! What moves as `foxglove_msgs/SceneUpdate`, which Foxglove and Lichtblick show, with what is
-//! known of an object where it is clicked on.
+//! Objects and motion as `foxglove_msgs/SceneUpdate`, which Foxglove and Lichtblick show; clicking
+//! on an object shows its attributes.
 
 use raywake_objects::tracked::TrackedObject;
 
 use super::cdr::Cdr;
 use super::{AHEAD_S, BOX_SHOWN_NS, LINE_M, MOVING, MovingColumn, STANDING, VEHICLE, WORLD};
 
-/// Height of a name, m, and how far above its box it is, m.
+/// Height of a name, and its distance above the box, m.
 const TEXT_M: f64 = 0.6;
-/// Opacity of a box: what is in it is seen.
+/// Opacity of a box: its contents stay visible.
 const BOX_OPACITY: f32 = 0.35;
 
-/// An entity: what it consists of, in the order of the message; spheres and the like are left out.
+/// An entity: its parts, in the order of the message; spheres and other shapes are left out.
 #[derive(Default)]
 struct Entity {
     metadata: Vec<(&'static str, String)>,
-    /// Places, directions about +z (rad) and lengths (m).
+    /// Positions, directions about +z (rad) and lengths (m).
     arrows: Vec<([f64; 3], f64, f64)>,
-    /// Place, direction and size of a box.
+    /// Position, direction and size of a box.
     cube: Option<([f64; 3], f64, [f64; 3])>,
-    /// A name, and its place.
+    /// Position of a name, and the name.
     text: Option<([f64; 3], String)>,
     colour: [f32; 4],
 }
 
-/// Motions as arrows, until the next sweep's.
+/// Motions as arrows, shown until the next sweep's.
 pub(super) fn motion(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
     let arrow = |m: &MovingColumn| {
         let [u, v] = m.velocity;
@@ -42,7 +42,7 @@ pub(super) fn motion(stamp_ns: u64, moving: &[MovingColumn]) -> Vec<u8> {
     cdr.message()
 }
 
-/// Objects: an entity each.
+/// Objects: one entity each.
 pub(super) fn objects(stamp_ns: u64, objects: &[TrackedObject]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     [0, objects.len() as u32].into_iter().for_each(|n| cdr.word(n));
@@ -98,7 +98,7 @@ impl Entity {
         }
         cdr.word(self.arrows.len() as u32);
         for (at, direction, length) in &self.arrows {
-            // The head is a third of it, twice as thick as the shaft.
+            // The head is a third of the length, twice as thick as the shaft.
             cdr.planar(*at, *direction);
             cdr.doubles([length * 2.0 / 3.0, LINE_M, length / 3.0, 2.0 * LINE_M]);
             cdr.doubles([r, g, b, opacity].map(f64::from));
@@ -109,12 +109,12 @@ impl Entity {
             cdr.doubles(size);
             cdr.doubles([r, g, b, BOX_OPACITY].map(f64::from));
         }
-        // No spheres, cylinders, lines and triangles.
+        // No spheres, cylinders, lines or triangles.
         [0; 4].into_iter().for_each(|n| cdr.word(n));
         cdr.word(self.text.is_some().into());
         if let Some((at, text)) = &self.text {
             cdr.planar(*at, 0.0);
-            // It faces the viewer, and has its size in metres.
+            // It faces the viewer; its size is in metres.
             cdr.byte(1);
             cdr.double(TEXT_M);
             cdr.byte(0);

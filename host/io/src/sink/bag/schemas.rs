@@ -1,6 +1,6 @@
-//! Definitions of the messages of ROS 2 that are written, as MCAP files carry them.
+//! Definitions of the ROS 2 messages that are written, as carried by MCAP files.
 
-/// A kind of message: its name, and the names of the definitions that make it, its own first.
+/// A message type: its name, and the names of the definitions it consists of, its own first.
 pub(super) struct Schema {
     pub name: &'static str,
     parts: &'static [&'static str],
@@ -230,7 +230,7 @@ const FIELDS: [(&str, &str); 43] = [
 ];
 
 impl Schema {
-    /// The definitions one after the other, a field a line.
+    /// The definitions one after another, one field per line.
     pub fn text(&self) -> String {
         let fields = |part: &str| {
             let found = FIELDS.iter().find(|(name, _)| *name == part);

@@ -1,7 +1,7 @@
 //! Objects as `autoware_perception_msgs/TrackedObjects`.
 //!
-//! What is put out exists (1); what is not known, the acceleration and the directions that do not
-//! lie in the plane, has covariance 0. The position's covariance is that of the object's centroid.
+//! Every object written exists (probability 1); unknowns (the acceleration and directions out of
+//! the plane) have covariance 0. The position's covariance is that of the object's centroid.
 
 use raywake_core::encoder::ColumnClass;
 use raywake_objects::front_end::StateVariances;
@@ -72,7 +72,7 @@ fn kinematics(cdr: &mut Cdr, object: &TrackedObject) {
     cdr.byte(object.velocity.is_none().into());
 }
 
-/// 6 x 6: along the axes, and about +z.
+/// 6 x 6: along the axes and about +z.
 fn covariance(cdr: &mut Cdr, along: [[f32; 3]; 3], about_z: f32) {
     for row in along {
         cdr.doubles(row.into_iter().chain([0.0; 3]).map(f64::from));

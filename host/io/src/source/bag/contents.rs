@@ -1,4 +1,4 @@
-//! What is in the files of a recording: clouds, frames, poses. One walk through each file.
+//! What the files of a recording contain: clouds, frames, poses. One pass through each file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -19,7 +19,7 @@ const FIXED_TOPIC: &str = "tf_static";
 /// A cloud that can be read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CloudMessage {
-    /// Which of the files it is in.
+    /// Index of its file.
     pub file: usize,
     pub place: Place,
     pub stamp_ns: i64,
@@ -33,15 +33,15 @@ pub(super) struct CloudTopic {
     pub form: CloudForm,
     pub frame: String,
     pub clouds: Vec<CloudMessage>,
-    /// Messages without a point.
+    /// Messages without points.
     empty: u64,
-    /// Messages that are not later than one before.
+    /// Messages that are not later than the one before.
     late: u64,
-    /// Messages in another frame than the first.
+    /// Messages in a different frame from the first.
     foreign: u64,
 }
 
-/// Who says where a frame was: an odometry's topic, or that of transforms.
+/// Where poses of a frame come from: a topic of odometry or of transforms.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct PoseSource {
     pub topic: String,
@@ -64,11 +64,11 @@ pub(super) struct Contents {
     /// Other topics with the names of their schemas, for errors.
     pub others: BTreeSet<String>,
     pub notes: Vec<String>,
-    /// Transforms that are none.
+    /// Number of transforms that are not rigid.
     wrong: u64,
 }
 
-/// A channel that is of use.
+/// A channel whose messages are used.
 struct Channel {
     topic: String,
     encoding: String,
@@ -76,7 +76,7 @@ struct Channel {
 }
 
 impl Contents {
-    /// Of all files, in their order.
+    /// Reads all files, in their order.
     pub fn read(files: &mut [BagFile]) -> Result<Contents, Error> {
         let mut contents = Contents::default();
         for (n, file) in files.iter_mut().enumerate() {
@@ -132,7 +132,7 @@ impl Contents {
         Ok(())
     }
 
-    /// The channel, if its messages are of use; otherwise it is noted.
+    /// Returns the channel if its messages are used; otherwise notes its topic.
     fn channel(&mut self, channel: mcap::records::Channel, schema: &str) -> Option<Channel> {
         let mcap::records::Channel { topic, message_encoding: encoding, .. } = channel;
         let known = ["cdr", "ros1"].contains(&encoding.as_str());
@@ -186,7 +186,7 @@ impl Contents {
             topic.empty += 1;
             return;
         }
-        // A driver without a clock leaves the stamp at zero. No date is too late for 63 bits.
+        // A driver without a clock leaves the stamp at zero. Dates are limited to 63 bits.
         let logged_ns = || i64::try_from(message.log_time).unwrap_or(i64::MAX);
         let stamp_ns = if cloud.stamp_ns == 0 { logged_ns() } else { cloud.stamp_ns };
         match topic.clouds.last() {
@@ -208,11 +208,11 @@ impl Contents {
         self.poses.entry(source).or_default().add(stamp_ns, parent_from_child);
     }
 
-    /// Where a base was at some times, as each source says that tells of it or of what is fixed to
-    /// it at half of the times or more.
+    /// Poses of a base at some times, from each source that has it, or a frame fixed to it, at half
+    /// of the times or more.
     pub fn tracks(&self, base: &str, stamps_ns: &[i64]) -> Vec<(&PoseSource, Vec<Option<Pose>>)> {
         let tells = |(source, trajectory): (&'_ PoseSource, &Trajectory)| {
-            // An odometry that names no frame tells of the vehicle.
+            // An odometry that names no frame describes the vehicle.
             let child = if source.child.is_empty() { base } else { &source.child };
             let (of, base_from_child) = self.fixed.base(child)?;
             let child_from_base = base_from_child.inverse();

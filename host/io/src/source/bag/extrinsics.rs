@@ -1,4 +1,5 @@
-//! Where lidars sit, as the user tells: links between frames, in place of those of `/tf_static`.
+//! Mounting poses of lidars given by the user: links between frames that replace those of
+//! `/tf_static`.
 
 use std::path::Path;
 
@@ -8,13 +9,13 @@ use crate::Error;
 use crate::source::poses::rigid;
 use crate::source::{text, whole};
 
-/// Adds the links of a file to those of the recording, before which they count. A line each: the
-/// parent's frame, the child's, and the child's place (x y z, m) and quaternion (x y z w) in the
-/// parent. The child may be a topic, whose clouds then are in a frame of that name. Text from `#`
-/// on is passed over.
+/// Adds the links of a file to those of the recording, over which they take precedence. One per
+/// line: the parent frame, the child frame, and the child's position (x y z, m) and quaternion (x y
+/// z w) in the parent. The child may be a topic, whose clouds then are in a frame of that name.
+/// Text after `#` is ignored.
 ///
 /// # Errors
-/// With the line where it is no such link, and where nothing is in the child's frame.
+/// With the line if it is not such a link, or if nothing is in the child frame.
 pub(super) fn add(path: &Path, contents: &mut Contents) -> Result<(), Error> {
     let content = whole::read_text(path)?;
     for (number, line) in text::lines(&content) {
@@ -85,7 +86,7 @@ mod tests {
         let mut source = open(&path, &by_frame).unwrap();
         assert_eq!(points(source.as_mut()), points(whole.as_mut()));
         assert!(source.is_located() && source.rig().sensors == whole.rig().sensors);
-        // Topics may be named where drivers say the same frame for all lidars.
+        // Topics may be named if drivers use the same frame for all lidars.
         let by_topic = BY_FRAME.replace(" lidar ", " /points ").replace(" rear ", " /rear ");
         let (path, by_topic) = told(&temp, &by_topic);
         assert_eq!(points(open(&path, &by_topic).unwrap().as_mut()), points(whole.as_mut()));

@@ -1,5 +1,4 @@
-//! MCAP files: records one after the other, most of them in chunks. They are read in pieces, never
-//! whole.
+//! MCAP files: a sequence of records, most of them in chunks. They are read in pieces, never whole.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -13,44 +12,44 @@ use crate::Error;
 use crate::source::decoder::guarded;
 use crate::source::whole::{self, unpacked_max};
 
-/// Longest record that is read, bytes; a chunk may be longer, as it is read in pieces.
+/// Maximum length of a record, bytes; a chunk may be longer, as it is read in pieces.
 const RECORD_MAX: u64 = 256 << 20;
 
-/// What a file begins with.
+/// The first bytes of a file.
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// Bytes before the content of a record: its kind and its length.
+/// Bytes before the content of a record: its kind and length.
 const HEAD: u64 = 9;
 
 /// Where a message is in its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place {
-    /// First byte of the record it is, or of the chunk it is in.
+    /// First byte of the record itself, or of the chunk that contains it.
     pub record: u64,
     /// Number of records before it there.
     pub before: u32,
 }
 
-/// Bytes read at once, at most.
+/// Maximum number of bytes read at once.
 const PIECE: usize = 1 << 20;
 
-/// A file that is open.
+/// An open file.
 pub(super) struct BagFile {
     pub path: PathBuf,
     file: File,
-    /// Bytes of it.
+    /// Its length, bytes.
     length: u64,
-    /// Bytes of the records that one call has walked through.
+    /// Bytes of the records that the current call has read.
     unpacked: u64,
     open: Option<OpenRecord>,
 }
 
-/// A record of the file while it is read: itself, or those in it.
+/// A record of the file being read: the record itself, or those in it.
 struct OpenRecord {
     reader: LinearReader,
-    /// Place of what comes next in it.
+    /// Place of the next record in it.
     next: Place,
-    /// Bytes of it that are still in the file.
+    /// Bytes of it that have not been read from the file.
     left: u64,
 }
 
@@ -58,12 +57,12 @@ struct OpenRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileEnd {
     Whole,
-    /// It is cut off in the record that begins at this byte.
+    /// Cut off in the record that begins at this byte.
     Cut(u64),
 }
 
 impl BagFile {
-    /// Fails where it cannot be read or is no MCAP file.
+    /// Opens a file. Fails if it cannot be read or is not an MCAP file.
     pub fn open(path: &Path) -> Result<BagFile, Error> {
         let (mut file, length) = whole::open(path)?;
         let mut magic = [0; MAGIC.len()];
@@ -74,10 +73,10 @@ impl BagFile {
         Ok(BagFile { path: path.to_path_buf(), file, length, unpacked: 0, open: None })
     }
 
-    /// Hands every schema, channel and message to `each`, in the order of the file.
+    /// Passes every schema, channel and message to `each`, in file order.
     ///
-    /// Fails where the file cannot be read or is damaged; a file that is cut off is read up to
-    /// there.
+    /// Fails if the file cannot be read or is damaged; a file that is cut off is read up to that
+    /// point.
     pub fn walk(
         &mut self,
         mut each: impl FnMut(Place, Record) -> Result<(), Error>,
@@ -105,7 +104,7 @@ impl BagFile {
         Ok(FileEnd::Cut(self.length))
     }
 
-    /// Bytes of the message at a place. Quick where it follows the one read before.
+    /// Bytes of the message at a place. Fast if it follows the one read before.
     pub fn message(&mut self, wanted: Place) -> Result<Vec<u8>, Error> {
         self.unpacked = 0;
         let gone = "the message that was here is gone: has the file changed?";
@@ -126,7 +125,7 @@ impl BagFile {
         Err(self.wrong(wanted.record, gone))
     }
 
-    /// Kind and length of the record at a byte; `None` where the file ends in its head.
+    /// Kind and length of the record at a byte; `None` if the file ends in its head.
     fn head(&mut self, at: u64) -> Result<Option<(u8, u64)>, Error> {
         let mut head = [0; HEAD as usize];
         if at + HEAD > self.length {
@@ -139,7 +138,7 @@ impl BagFile {
         Ok(Some((kind, u64::from_le_bytes(length))))
     }
 
-    /// Goes to the record at a byte, whose content has some length.
+    /// Starts reading the record at a byte, whose content has this length.
     fn begin(&mut self, record: u64, length: u64) -> Result<(), Error> {
         self.file.seek(SeekFrom::Start(record)).map_err(Error::reading(&self.path))?;
         let options = LinearReaderOptions::default()
@@ -153,7 +152,7 @@ impl BagFile {
         Ok(())
     }
 
-    /// The next record in that one; `None` after its end, and where the file is cut off in it.
+    /// The next record in the open one; `None` after its end, and if the file is cut off in it.
     fn next(&mut self) -> Result<Option<(Place, Record<'static>)>, Error> {
         let most = unpacked_max(self.length);
         let Some(OpenRecord { reader, next, left }) = &mut self.open else { return Ok(None) };
@@ -181,7 +180,7 @@ impl BagFile {
                     if read == 0 && *left > 0 {
                         break;
                     }
-                    // Nothing more of the record says that it has ended.
+                    // Zero bytes tell the reader that the record has ended.
                     reader.notify_read(read);
                     *left -= read as u64;
                 }

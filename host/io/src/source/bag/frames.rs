@@ -1,4 +1,4 @@
-//! Which frames hang together.
+//! How frames are connected.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use raywake_core::pose::Pose;
 
 use super::messages::Transform;
 
-/// Frames that never move in another one: `/tf_static`.
+/// Frames that never move in another frame: `/tf_static`.
 #[derive(Default)]
 pub(super) struct FixedFrames {
     /// Parent of a frame, and where the frame is in it.
@@ -14,7 +14,7 @@ pub(super) struct FixedFrames {
 }
 
 impl FixedFrames {
-    /// Adds a link; the last word on a frame counts.
+    /// Adds a link; the last one given for a frame counts.
     pub fn add(&mut self, transform: Transform) {
         let Transform { parent, child, parent_from_child, .. } = transform;
         self.parents.insert(child, (parent, parent_from_child));
@@ -25,8 +25,8 @@ impl FixedFrames {
         self.parents.contains_key(frame)
     }
 
-    /// The frame that a frame is fixed to in the end, itself where it is to none, and its place in
-    /// that: that of a vehicle for its sensors. `None` where links lead in a circle.
+    /// The frame that a frame is ultimately fixed to (itself if to none), and the frame's pose in
+    /// it: for sensors, the vehicle's. `None` if links form a circle.
     pub fn base(&self, frame: &str) -> Option<(String, Pose)> {
         let (mut base, mut base_from_frame) = (frame, Pose::IDENTITY);
         for _ in 0..=self.parents.len() {

@@ -1,4 +1,4 @@
-//! The messages of ROS that tell sweeps and poses, as their definitions have them:
+//! The ROS messages that carry sweeps and poses, according to their definitions:
 //! `sensor_msgs/PointCloud2`, Livox's `CustomMsg`, `tf2_msgs/TFMessage` and `nav_msgs/Odometry`.
 
 use raywake_core::pose::Pose;
@@ -8,12 +8,12 @@ use super::wire::Wire;
 use crate::source::poses::rigid;
 use crate::source::returns::{Attribute, Fields, Number};
 
-/// Fields of a cloud that are believed.
+/// Maximum accepted number of fields of a cloud.
 const FIELDS_MAX: u32 = 1 << 10;
-/// Transforms of a message that are believed.
+/// Maximum accepted number of transforms in a message.
 const TRANSFORMS_MAX: u32 = 1 << 14;
 
-/// How a message tells a cloud.
+/// Message type of a cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum CloudForm {
     #[default]
@@ -31,7 +31,7 @@ pub(super) enum MessageKind {
 }
 
 impl MessageKind {
-    /// By the name of the schema, of ROS 1 or 2.
+    /// From the name of the schema, in ROS 1 or 2.
     pub fn of(schema: &str) -> Option<MessageKind> {
         match schema {
             "sensor_msgs/msg/PointCloud2" | "sensor_msgs/PointCloud2" => {
@@ -49,7 +49,7 @@ impl MessageKind {
     }
 }
 
-/// Where a frame was in another one.
+/// The pose of a frame in another one, at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Transform {
     pub stamp_ns: i64,
@@ -58,7 +58,7 @@ pub(super) struct Transform {
     pub parent_from_child: Pose,
 }
 
-/// The transforms of a message. Those that are no rigid transform are left out and counted.
+/// The transforms of a message. Those that are not rigid are left out and counted.
 pub(super) fn transforms(mut wire: Wire) -> Result<(Vec<Transform>, u64), String> {
     let count = wire.word()?;
     if count > TRANSFORMS_MAX {
@@ -81,7 +81,7 @@ pub(super) fn transforms(mut wire: Wire) -> Result<(Vec<Transform>, u64), String
     Ok((found, wrong))
 }
 
-/// Where the vehicle was; `None` where that is no pose.
+/// The vehicle's pose; `None` if it is not a valid one.
 pub(super) fn odometry(mut wire: Wire) -> Result<Option<Transform>, String> {
     let (stamp_ns, parent) = wire.header()?;
     let child = wire.text()?.trim_start_matches('/');
@@ -90,7 +90,7 @@ pub(super) fn odometry(mut wire: Wire) -> Result<Option<Transform>, String> {
     Ok(pose(&mut wire)?.map(transform))
 }
 
-/// A translation and a quaternion, x, y, z, w; `None` where these are no rigid transform.
+/// A translation and a quaternion, x, y, z, w; `None` if they are not a rigid transform.
 fn pose(wire: &mut Wire) -> Result<Option<Pose>, String> {
     let mut numbers = [0.0; 7];
     for number in &mut numbers {
@@ -100,12 +100,12 @@ fn pose(wire: &mut Wire) -> Result<Option<Pose>, String> {
     Ok(rigid([x, y, z], [a, b, c, d]).ok())
 }
 
-/// What a cloud's message says before its points.
+/// The part of a cloud's message before its points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct CloudHeader<'a> {
     pub stamp_ns: i64,
     pub frame: &'a str,
-    /// Rows and points of a row.
+    /// Number of rows, and of points per row.
     pub size: [u32; 2],
 }
 
@@ -115,7 +115,7 @@ impl CloudHeader<'_> {
         let rows = match form {
             CloudForm::PointCloud2 => wire.word()?,
             CloudForm::Livox => {
-                // The time that those of the points count from: the header's.
+                // The base of the points' times: the same as the header's.
                 wire.double()?;
                 1
             }
@@ -124,7 +124,7 @@ impl CloudHeader<'_> {
     }
 }
 
-/// Replaces `points` by those of a cloud, in its frame and with times from its stamp; returns
+/// Replaces `points` with those of a cloud, in its frame and with times from its stamp; returns
 /// whether they have times.
 pub(super) fn cloud(
     form: CloudForm,
@@ -139,7 +139,7 @@ pub(super) fn cloud(
     }
 }
 
-/// Numbers of a point of Livox's: tag and line are passed over.
+/// Numbers of a Livox point: tag and line are skipped.
 const LIVOX: [(&str, Number); 5] = [
     ("offset_time", Number::Unsigned(4)),
     ("x", Number::F32),
@@ -151,7 +151,7 @@ const LIVOX: [(&str, Number); 5] = [
 const LIVOX_POINT: usize = 19;
 
 fn livox(header: CloudHeader, mut wire: Wire, points: &mut Vec<Point>) -> Result<bool, String> {
-    // The number of the lidar, and three bytes for later.
+    // The lidar's number, and three reserved bytes.
     (0..4).try_for_each(|_| wire.byte().map(|_| ()))?;
     let count = wire.word()? as usize;
     if count != header.size[1] as usize {
@@ -198,7 +198,7 @@ fn point_cloud(
     Ok(fields.returns(height * width, value, points))
 }
 
-/// Names, kinds and first bytes of the numbers of a point.
+/// Names, types and first bytes of the numbers of a point.
 type NamedFields = (Vec<(String, Number)>, Vec<usize>);
 
 fn fields(wire: &mut Wire) -> Result<NamedFields, String> {
@@ -209,7 +209,7 @@ fn fields(wire: &mut Wire) -> Result<NamedFields, String> {
     let (mut named, mut starts) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let (name, start, kind) = (wire.text()?, wire.word()? as usize, wire.byte()?);
-        // How many numbers it has: the first is taken.
+        // Its count of numbers: only the first is used.
         wire.word()?;
         let number = number(kind).ok_or_else(|| format!("field `{name}` has type {kind}"))?;
         named.push((name.to_owned(), number));
@@ -218,7 +218,7 @@ fn fields(wire: &mut Wire) -> Result<NamedFields, String> {
     Ok((named, starts))
 }
 
-/// How a field's type stores a number.
+/// How a field of this type is stored.
 fn number(kind: u8) -> Option<Number> {
     Some(match kind {
         1 => Number::Signed(1),

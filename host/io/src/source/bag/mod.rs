@@ -1,12 +1,12 @@
-//! Recordings of ROS in MCAP files: a file, or the folder that `ros2 bag` makes of several.
+//! ROS recordings in MCAP files: a single file, or the folder in which `ros2 bag` writes several.
 //!
-//! Sweeps are the clouds of a topic (`sensor_msgs/PointCloud2` or Livox's
-//! `CustomMsg`, of ROS 1 or 2), or of several that
-//! lidars of one vehicle send. The vehicle frame is the one that `/tf_static` fixes the lidar to in
-//! the end, or the cloud's own. Poses are those of the only odometry or transform that tells of it.
+//! Sweeps are the clouds of a topic (`sensor_msgs/PointCloud2` or Livox's `CustomMsg`, of ROS 1 or
+//! 2), or of several topics from lidars of one vehicle. The vehicle frame is the one that
+//! `/tf_static` ultimately fixes the lidar to, or the cloud's own. Poses are those of the only
+//! odometry or transform that gives them.
 //!
-//! Opening walks through every file once and keeps where each cloud is; a cloud is read when it is
-//! asked for. What is held does not grow with the file but by some words a message.
+//! Opening walks through every file once and records where each cloud is; a cloud is read on
+//! demand. Memory grows with the file only by a few words per message.
 
 mod contents;
 mod extrinsics;
@@ -54,16 +54,16 @@ pub(super) struct Bag {
     root: PathBuf,
     files: Vec<BagFile>,
     lidars: Vec<Lidar>,
-    /// Of every sweep the cloud of each lidar; the first lidar's is always there and gives the
+    /// For every sweep, the cloud of each lidar; the first lidar's is always there and gives the
     /// stamp.
     sweeps: Vec<Vec<Option<CloudMessage>>>,
     poses_from: String,
-    /// A cloud that was just read.
+    /// The cloud that was last read.
     cloud: Vec<Point>,
 }
 
 impl Bag {
-    /// Opens a file or a folder of them.
+    /// Opens a file, or a folder of files.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<Bag, Error> {
         let mut files = files(root)?;
         let mut contents = Contents::read(&mut files)?;
@@ -143,7 +143,7 @@ impl Bag {
         self.overview.track.poses = poses.into_iter().flatten().collect();
     }
 
-    /// Learns from the first sweep of all lidars what else there is to know of the rig.
+    /// Learns the rest about the rig from the first sweep that has all lidars.
     fn look_at_returns(&mut self, options: &OpenOptions) -> Result<(), Error> {
         let whole = self.sweeps.iter().position(|sweep| sweep.iter().all(Option::is_some));
         let mut first = SweepData::default();
@@ -153,7 +153,7 @@ impl Bag {
             .map_err(|what| Error::input(&self.root, "", what))
     }
 
-    /// Replaces the points by those of a sweep; returns whether all lidars tell their times.
+    /// Replaces the points with those of a sweep; returns whether all lidars give their times.
     fn read_points(&mut self, index: usize, into: &mut SweepData) -> Result<bool, Error> {
         into.points.clear();
         let mut timed = true;
@@ -208,7 +208,7 @@ impl Source for Bag {
     }
 }
 
-/// The MCAP files at a path, in the order of their names (`..._2` before `..._10`).
+/// The MCAP files at a path, ordered by name (`..._2` before `..._10`).
 fn files(root: &Path) -> Result<Vec<BagFile>, Error> {
     let is_folder = fs::metadata(root).map_err(Error::reading(root))?.is_dir();
     let mut paths = if is_folder { entries(root)? } else { vec![root.to_path_buf()] };
@@ -230,7 +230,7 @@ fn name(root: &Path) -> String {
     name.strip_suffix(&format!(".{MCAP}")).unwrap_or(&name).to_owned()
 }
 
-/// The topics whose clouds are the sweeps: those asked for, the only one, or those of several
+/// The topics whose clouds are the sweeps: those requested, the only one, or those of several
 /// lidars of a vehicle.
 fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<String>, Error> {
     let wrong = |what: String| Err(Error::input(root, "", what));
@@ -266,8 +266,8 @@ fn choose(root: &Path, contents: &Contents, asked: &[String]) -> Result<Vec<Stri
     }
 }
 
-/// Whether all topics of clouds are lidars of one vehicle: in frames of their own that are fixed to
-/// one base, and about as many clouds of each.
+/// Whether all topics of clouds are lidars of one vehicle: in separate frames that are fixed to one
+/// base, with similar numbers of clouds.
 fn is_rig(contents: &Contents) -> bool {
     let topics = || contents.topics.values();
     let mut frames: Vec<&str> = topics().map(|t| t.frame.as_str()).collect();
@@ -310,8 +310,8 @@ fn lidars(
     Ok((base.unwrap_or_default(), lidars))
 }
 
-/// The sweeps of all lidars: with each cloud of the first topic that of every other one that is
-/// nearest in time, if it is within half of the time between two.
+/// The sweeps of all lidars: with each cloud of the first topic, the nearest in time of every other
+/// topic, if it is within half the median time between clouds.
 fn together(contents: &Contents, topics: &[String]) -> Vec<Vec<Option<CloudMessage>>> {
     let clouds = |topic: &String| &contents.topics[topic].clouds;
     let first = clouds(&topics[0]);

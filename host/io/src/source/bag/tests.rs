@@ -1,4 +1,4 @@
-//! Recordings made here, whole, cut and damaged.
+//! Recordings made here, complete, cut and damaged.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -19,7 +19,7 @@ const PERIOD_NS: u64 = 100_000_000;
 /// A message: topic, schema, time, content.
 pub(crate) type Message = (&'static str, &'static str, u64, Vec<u8>);
 
-/// A file of some messages.
+/// A file with these messages.
 pub(crate) fn file(messages: &[Message], options: WriteOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer: Writer<_> = options.create(Cursor::new(&mut bytes)).unwrap();
@@ -40,7 +40,8 @@ pub(crate) fn options() -> WriteOptions {
     WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(50_000))
 }
 
-/// A floor around a sensor `height_m` above it, and a post 5 m ahead; times spread over a turn.
+/// A floor around a sensor `height_m` above it, and a post 5 m ahead; times spread over a
+/// revolution.
 fn cloud(stamp_ns: u64, frame: &str, height_m: f32) -> Vec<u8> {
     let floor = (0..1600).map(|n| [(n / 40) as f32 - 19.5, (n % 40) as f32 - 19.5, -height_m]);
     let post = (0..10).map(|n| [5.0, 0.0, 0.1 * n as f32 - height_m]);
@@ -97,7 +98,7 @@ fn sweeps(sweeps: u64) -> Vec<Message> {
     (0..sweeps).map(cloud).collect()
 }
 
-/// Those and a second lidar behind, 20 ms later, on a vehicle that drives 1 m a sweep.
+/// The same, and a second lidar at the rear, 20 ms later, on a vehicle that moves 1 m per sweep.
 pub(crate) fn rig(count: u64) -> Vec<Message> {
     let mut all = vec![
         ("/tf_static", TF, BEGIN_NS, transform(0, ["base_link", "lidar"], 1.0, 1.8)),
@@ -109,7 +110,7 @@ pub(crate) fn rig(count: u64) -> Vec<Message> {
         all.push(front);
         all.push(("/rear", CLOUD, later, cloud(later, "rear", 0.9)));
     }
-    // Between the sweeps, from before the second one on.
+    // Between the sweeps; the first is before the second sweep.
     let pose = |n: u64| (BEGIN_NS + 50_000_000 * (2 * n + 1), n as f64 + 0.5);
     all.extend(
         (0..count).map(pose).map(|(ns, x)| ("/odom", ODOMETRY, ns, odometry(ns, "lidar", x))),
@@ -164,11 +165,11 @@ fn two_lidars_in_one_vehicle_with_odometry_in_two_files() {
     let temp = Temp::new();
     let all = rig(6);
     let (first, second) = all.split_at(9);
-    // The second by number, not by letters.
+    // Ordered by number, not alphabetically.
     temp.write("drive_2.mcap", file(first, options()));
     temp.write("drive_10.mcap", file(second, options()));
     let mut source = open(temp.path(), &accept()).unwrap();
-    // Before the first pose there is none.
+    // There is no pose before the first one.
     assert_eq!(source.len(), 5, "{:?}", source.notes());
     assert!(
         source.describe().contains("poses from /odom (lidar in odom)"),
@@ -225,7 +226,7 @@ fn what_is_cut_is_read_up_to_there_and_what_is_damaged_is_named() {
     assert!(error.contains("bad.mcap, byte"), "{error}");
     assert!(fails(b"bag").contains("not an MCAP file") && fails(b"").contains("not an MCAP"));
     assert!(fails(&bytes[..8]).contains("no clouds"), "{}", fails(&bytes[..8]));
-    // A chunk in what nobody knows.
+    // A chunk with an unknown compression.
     let at = bytes.windows(4).position(|w| w == b"zstd").unwrap();
     let mut other = bytes.clone();
     other[at..at + 4].copy_from_slice(b"brot");
@@ -235,7 +236,7 @@ fn what_is_cut_is_read_up_to_there_and_what_is_damaged_is_named() {
 #[test]
 fn whatever_byte_is_wrong_nothing_panics() {
     let temp = Temp::new();
-    // Without checksums, which would find all of it.
+    // Without checksums, which would detect all damage.
     let bytes = file(&rig(2), options().compression(None).calculate_chunk_crcs(false));
     let path = temp.path().join("odd.mcap");
     let mut random = raywake_sim::Rng::new(3);
@@ -264,7 +265,7 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
         open(&path, &accept())
     };
     let fails = |messages: &[Message]| open(messages).map(|_| ()).unwrap_err().to_string();
-    // Nothing, twice the same, and back in time.
+    // Empty, repeated, back in time, and in another frame.
     let mut all = sweeps(3);
     let mut none = Cdr::new();
     none.header(stamp(3), "lidar");
@@ -279,7 +280,7 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
     assert!(notes.contains("skipped 1 messages without a point"), "{notes}");
     assert!(notes.contains("skipped 2 messages that are not later"), "{notes}");
     assert!(notes.contains("skipped 1 messages in another frame"), "{notes}");
-    // A driver without a clock: when they were recorded.
+    // A driver without a clock: the recording time is used.
     let at_zero = |n| ("/points", CLOUD, stamp(n), cloud(0, "lidar", 1.8));
     assert_eq!(open(&[at_zero(0), at_zero(1)]).unwrap().frame(1), stamp(1));
     let never = ("/points", CLOUD, u64::MAX, cloud(0, "lidar", 1.8));
@@ -292,7 +293,7 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
         error.contains("choose with --topic: /filtered (1 clouds in `lidar`), /points (2"),
         "{error}"
     );
-    // Cut, with a field beyond the point, of no type.
+    // Cut short; with a field beyond the point; with a field of unknown type.
     let (mut short, long) = (sweeps(2), sweeps(1)[0].3.clone());
     short[0].3.truncate(3000);
     assert!(fails(&short).contains("topic /points: truncated"), "{}", fails(&short));
@@ -303,7 +304,7 @@ fn messages_that_make_no_sense_are_skipped_or_named() {
         let error = fails(&[("/points", CLOUD, BEGIN_NS, odd)]);
         assert!(error.contains(says), "{error}");
     }
-    // Odometry that is none leaves it to registration; links in a circle are an error.
+    // Invalid odometry leaves it to registration; links in a circle are an error.
     let mut sources = sweeps(3);
     let nan = odometry(BEGIN_NS, "lidar", f64::NAN);
     sources.push(("/odom", ODOMETRY, BEGIN_NS, nan));
@@ -330,7 +331,7 @@ fn two_ways_to_say_where_the_vehicle_was_are_one_too_many() {
     let notes = source.notes().join("\n");
     assert!(!source.is_located(), "{notes}");
     assert!(notes.contains("2 sources tell where `base_link` was"), "{notes}");
-    // Without the odometry the transforms do.
+    // Without the odometry, the transforms are used.
     all.retain(|message| message.0 != "/odom");
     let path = temp.write("one.mcap", file(&all, options()));
     assert!(open(&path, &accept()).unwrap().describe().contains("/tf (base_link in map)"));
@@ -357,7 +358,7 @@ fn files_that_are_no_recording_say_what_to_do() {
     assert!(error.contains("--topic"), "{error}");
 }
 
-/// As Livox's drivers put it: petals in place of a sensor's turn, a time for each point.
+/// As sent by Livox drivers: petals instead of a sensor's revolution, a time for each point.
 fn livox(stamp_ns: u64, said: u32) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, "livox_frame");
@@ -390,7 +391,7 @@ fn petals_of_a_livox() {
     let last = sweep.points[1999];
     assert!((last.offset_s - 0.09995).abs() < 1e-6 && last.position[2] == -1.8, "{last:?}");
     assert!((last.intensity - 0.2).abs() < 1e-6);
-    // What says another number than it has, or ends early, is an error.
+    // A message that states another number of points than it has is an error.
     all[1].3 = livox(stamp(1), 1999);
     let path = temp.write("said.mcap", file(&all, options()));
     let e = open(&path, &accept()).unwrap().read(1, &mut sweep).unwrap_err().to_string();

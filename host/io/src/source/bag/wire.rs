@@ -1,25 +1,25 @@
-//! Messages of ROS as bytes: CDR, as ROS 2 sends them, and ROS 1's form, which has no gaps.
+//! ROS messages as bytes: CDR, used by ROS 2, and the packed serialisation of ROS 1.
 
 use crate::source::returns::Number;
 
 /// Length of CDR's own header: the kind of encapsulation and two bytes of options.
 const ENCAPSULATION: usize = 4;
 
-/// A message while it is read, field after field. Every read fails where the message ends early.
+/// A message being read, field by field. Every read fails if the message ends early.
 pub(super) struct Wire<'a> {
     bytes: &'a [u8],
     /// Next byte, counted from the first field.
     at: usize,
-    /// Whether the most significant byte of a number comes first.
+    /// Whether numbers are big-endian.
     big: bool,
-    /// Numbers begin at a multiple of their size, but at most of this.
+    /// Numbers are aligned to their size, but at most to this.
     alignment: usize,
-    /// Whether it is ROS 1's form: headers have a sequence number, strings end without a zero.
+    /// Whether this is ROS 1: headers have a sequence number, strings no terminating zero.
     ros1: bool,
 }
 
 impl<'a> Wire<'a> {
-    /// A message in the encoding that its channel names.
+    /// A message in the encoding given by its channel.
     pub fn new(encoding: &str, bytes: &'a [u8]) -> Result<Wire<'a>, String> {
         if encoding == "ros1" {
             return Ok(Wire { bytes, at: 0, big: false, alignment: 1, ros1: true });
@@ -49,33 +49,34 @@ impl<'a> Wire<'a> {
         Ok(number.read(self.take(number.size())?, big))
     }
 
-    /// An unsigned number of 8 bits.
+    /// An unsigned 8-bit number.
     pub fn byte(&mut self) -> Result<u8, String> {
         Ok(self.take(1)?[0])
     }
 
-    /// An unsigned number of 32 bits.
+    /// An unsigned 32-bit number.
     pub fn word(&mut self) -> Result<u32, String> {
         Ok(self.number(Number::Unsigned(4))? as u32)
     }
 
-    /// A number in double precision.
+    /// A double-precision number.
     pub fn double(&mut self) -> Result<f64, String> {
         self.number(Number::F64)
     }
 
-    /// Bytes after their number.
+    /// Bytes preceded by their count.
     pub fn bytes(&mut self) -> Result<&'a [u8], String> {
         let length = self.word()? as usize;
         self.take(length)
     }
 
-    /// Whether the most significant byte of a number comes first.
+    /// Whether numbers are big-endian.
     pub fn is_big(&self) -> bool {
         self.big
     }
 
-    /// So many records that begin with a number of four bytes, and the bytes from one to the next.
+    /// This many records that begin with a four-byte number, and the distance in bytes from one to
+    /// the next.
     pub fn records(&mut self, count: usize, size: usize) -> Result<(&'a [u8], usize), String> {
         let alignment = self.alignment.min(4);
         self.at = self.at.next_multiple_of(alignment);
@@ -92,11 +93,11 @@ impl<'a> Wire<'a> {
         std::str::from_utf8(bytes).map_err(|_| "a string that is not UTF-8".into())
     }
 
-    /// A header: time, ns, and name of the frame.
+    /// A header: time, ns, and frame name.
     pub fn header(&mut self) -> Result<(i64, &'a str), String> {
-        // ROS 1 counts headers.
+        // ROS 1 headers have a sequence number.
         let _ = self.ros1.then(|| self.word()).transpose()?;
-        // ROS 2 counts seconds with a sign; none is before 1970.
+        // Seconds are signed in ROS 2; none is before 1970.
         let [seconds, ns] = [self.word()?, self.word()?];
         let frame = self.text()?;
         Ok((i64::from(seconds) * 1_000_000_000 + i64::from(ns), frame.trim_start_matches('/')))

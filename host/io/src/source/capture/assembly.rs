@@ -1,4 +1,4 @@
-//! Packets as they come, put together to sweeps. Nothing is allocated.
+//! Assembles packets into sweeps as they arrive, without allocating.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -8,35 +8,35 @@ use super::live::LiveSensor;
 use super::sensor::{Order, SET_NS};
 use crate::source::{SourceGaps, SweepData};
 
-/// Longest time between two turns that is believed, ns: the slowest sensor's, several of which were
-/// lost. After a longer one its clock was set, or it stood still.
+/// Longest accepted time between two revolutions, ns: several lost ones of the slowest sensor.
+/// After a longer one its clock was set, or it stood still.
 const STEP_MAX_NS: i64 = 10_000_000_000;
-/// Packets among which one that comes late is looked for: a copy, or out of order.
+/// Number of recent packets with which a late one is compared: it is a copy, or out of order.
 const RECENT: usize = 64;
-/// Before the first of them.
+/// Stands for the packets before the first.
 const NEVER: u64 = u64::MAX;
-/// Times of a turn that are believed, ns.
+/// Accepted times of a revolution, ns.
 const TURN_NS: Range<f64> = 1e7..1e9;
-/// Share of a new step in the time of a turn: it drifts by parts in a thousand.
+/// Weight of a new measurement in the time of a revolution, which drifts by parts in a thousand.
 const TURN_SHARE: f64 = 0.125;
 
-/// A sweep from packets.
+/// A sweep assembled from packets.
 pub struct LiveSweep {
     /// Its returns; the pose is the identity.
     pub data: SweepData,
-    /// Its stamp since 1970, ns: by the sensor's clock where that is set, else by the arrival of
+    /// Its stamp since 1970, ns: by the sensor's clock if that is set, otherwise by the arrival of
     /// its first packet.
     pub stamp_ns: u64,
     /// When its last packet arrived.
     pub arrived: Instant,
-    /// Packets that are missing in it.
+    /// Packets missing from it.
     pub lost_packets: u64,
-    /// Time of a turn, as far as it is known by then, ns.
+    /// Time of a revolution as estimated by then, ns.
     pub turn_ns: f64,
 }
 
 impl LiveSweep {
-    /// An empty one with room for a turn of a sensor.
+    /// An empty one with room for a revolution of a sensor.
     pub fn of(sensor: &LiveSensor) -> LiveSweep {
         let points = Vec::with_capacity(sensor.returns_max());
         let data = SweepData { points, ..SweepData::default() };
@@ -49,48 +49,49 @@ impl LiveSweep {
 pub struct PacketCounts {
     /// Packets of the sensor.
     pub packets: u64,
-    /// Datagrams that are no packets of the sensor, or of another sender.
+    /// Datagrams that are not packets of the sensor, or are from another sender.
     pub foreign: u64,
-    /// Packets with a wrong check sum: left out.
+    /// Packets with a wrong checksum: left out.
     pub unsound: u64,
-    /// Packets that came again: left out.
+    /// Repeated packets: left out.
     pub duplicates: u64,
-    /// Packets that came after later ones: left out.
+    /// Packets that arrived after later ones: left out.
     pub reordered: u64,
-    /// Packets that are missing between others: lost on the way, or reordered.
+    /// Packets missing between others: lost on the way, or reordered.
     pub missing: u64,
-    /// Returns for which a turn has no room: the sensor stands still, or its clock does.
+    /// Returns that exceed the capacity of a revolution: the sensor stands still, or its clock
+    /// does.
     pub over_capacity: u64,
-    /// Times that the sensor's clock was set, or it paused.
+    /// Number of times that the sensor's clock was set, or the sensor paused.
     pub clock_set: u64,
 }
 
-/// Where the turn in hand began.
+/// Where the current revolution began.
 struct Begun {
     firing: Firing,
-    /// Since the first whole turn began, ns.
+    /// Since the first whole revolution began, ns.
     stamp_ns: i64,
     number: u64,
 }
 
-/// Puts sweeps together.
+/// Assembles sweeps.
 pub struct Assembler {
     sensor: LiveSensor,
     counts: PacketCounts,
-    /// None until a turn begins: the one that is come in upon is left out.
+    /// `None` until a revolution begins: the one in progress at the start is left out.
     begun: Option<Begun>,
     last: Option<Firing>,
-    /// Time of the first firing of the last packets, the newest at `at`, by the sensor's clock, ns.
+    /// Times of the first firing of the last packets by the sensor's clock, ns, the newest at `at`.
     recent: [u64; RECENT],
     at: usize,
-    /// Time of a turn, ns, once one has been seen.
+    /// Time of a revolution, ns, once it is known.
     turn_ns: Option<f64>,
     epoch_ns: u64,
     filling: LiveSweep,
 }
 
 impl Assembler {
-    /// Before the first packet.
+    /// An assembler before its first packet.
     pub fn new(sensor: LiveSensor) -> Assembler {
         Assembler {
             filling: LiveSweep::of(&sensor),
@@ -105,7 +106,7 @@ impl Assembler {
         }
     }
 
-    /// What became of datagrams so far.
+    /// What has become of datagrams so far.
     pub fn counts(&self) -> PacketCounts {
         self.counts
     }
@@ -120,8 +121,8 @@ impl Assembler {
         self.counts.foreign += 1;
     }
 
-    /// Takes a datagram that arrived at a moment, in ns since 1970 `now_ns`. Hands every sweep that
-    /// it ends to `complete`, which leaves an empty one, or any other, in its place.
+    /// Takes a datagram that arrived at a moment, which is `now_ns` since 1970. Passes every sweep
+    /// that it ends to `complete`, which leaves an empty one, or any other, in its place.
     pub fn take(
         &mut self,
         datagram: &[u8],
@@ -160,14 +161,14 @@ impl Assembler {
         }
     }
 
-    /// Whether a packet comes after those before it; counts those that do not, and those that are
-    /// missing before it.
+    /// Whether a packet comes after those before it; counts those that do not, and those missing
+    /// before it.
     fn in_order(&mut self, packet: &[u8]) -> bool {
         let sensor = &self.sensor.0;
         let Some((_, first)) = sensor.firings(packet).next() else { return true };
         let before = Some(self.recent[self.at]).filter(|ns| *ns != NEVER);
         let since_ns = before.map(|before| sensor.since(first.clock_ns, before));
-        // Farther back, or ahead, the clock was set.
+        // Farther back or ahead, the clock was set.
         let since_ns = since_ns.filter(|ns| (-(SET_NS as i64)..STEP_MAX_NS).contains(ns));
         if since_ns.is_some_and(|ns| ns <= 0) {
             let again = self.recent.contains(&first.clock_ns);
@@ -187,14 +188,14 @@ impl Assembler {
         true
     }
 
-    /// Ends the turn in hand and begins another.
+    /// Ends the current revolution and begins another.
     fn begin(
         &mut self,
         firing: Firing,
         (arrived, now_ns): (Instant, u64),
         complete: &mut impl FnMut(&mut LiveSweep),
     ) {
-        // Nothing is known of where the first firing of all lies in its turn.
+        // Where the very first firing lies in its revolution is unknown.
         if self.last.is_none() {
             return;
         }
@@ -222,20 +223,20 @@ impl Assembler {
         self.begun = Some(begun);
     }
 
-    /// Stamp and number of a turn that follows another, and what is then known of the time of one,
-    /// ns.
+    /// Stamp and number of a revolution that follows another, and the resulting estimate of the
+    /// time of one, ns.
     fn after(&mut self, begun: &Begun, firing: Firing) -> (Begun, f64) {
         let mut step_ns = self.sensor.0.since(firing.clock_ns, begun.firing.clock_ns);
         if !(1..=STEP_MAX_NS).contains(&step_ns) {
             self.counts.clock_set += 1;
             step_ns = self.turn_ns.unwrap_or(TURN_NS.start) as i64;
         }
-        // A sweep may begin within a turn, where packets are missing.
+        // A sweep may begin within a revolution if packets are missing.
         let within = (f64::from(firing.angle) - f64::from(begun.firing.angle)) / TURN as f64;
         let turn_ns = self.turn_ns.unwrap_or(step_ns as f64).clamp(TURN_NS.start, TURN_NS.end);
         let turns = (step_ns as f64 / turn_ns - within).round().max(1.0);
         let seen_ns = step_ns as f64 / (turns + within);
-        // Of a turn that lacks most of its packets nothing can be told.
+        // A revolution that lacks most of its packets gives no estimate.
         let likely = (0.5..2.0).contains(&(seen_ns / turn_ns));
         let share = if likely { TURN_SHARE } else { 0.0 };
         let (stamp_ns, number) = (begun.stamp_ns + step_ns, begun.number + turns as u64);

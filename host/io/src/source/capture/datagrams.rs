@@ -1,5 +1,5 @@
-//! UDP datagrams of a capture of network traffic: `.pcap` and `.pcapng`, with fragments put
-//! together again.
+//! UDP datagrams of a capture of network traffic: `.pcap` and `.pcapng`, with fragments
+//! reassembled.
 
 use std::collections::VecDeque;
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -16,19 +16,19 @@ use pcap_parser::{Linktype, PcapBlockOwned, PcapError, create_reader};
 use crate::Error;
 use crate::source::whole;
 
-/// Bytes that are held of a capture: more than a frame has in any.
+/// Bytes of a capture that are held in memory: more than any frame has.
 const BUFFER: usize = 1 << 20;
-/// A datagram whose fragments lie farther apart than this many fragments of others is lost. The
-/// largest of a sensor has 17.
+/// A datagram whose fragments are spread over more than this many fragments is lost. The largest of
+/// a sensor has 17.
 const FRAGMENTS_HELD: usize = 256;
-/// Interfaces that are believed.
+/// Maximum accepted number of interfaces.
 const INTERFACES_MAX: usize = 1 << 10;
 /// Bytes in front of a frame on a loopback interface.
 const LOOPBACK: usize = 4;
 const NS_OF_S: u64 = 1_000_000_000;
 const US_OF_S: u64 = 1_000_000;
 
-/// Who sends: its address, and the port it sends to.
+/// A sender: its address, and the port to which it sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sender {
     pub address: IpAddr,
@@ -45,15 +45,15 @@ impl std::fmt::Display for Sender {
 pub(super) struct Datagram<'a> {
     pub sender: Sender,
     pub payload: &'a [u8],
-    /// Byte of the file at which the last of its frames begins.
+    /// Byte of the file at which its last frame begins.
     pub place: u64,
-    /// Byte from which all of its frames are found.
+    /// Byte from which all of its frames can be found.
     pub from: u64,
-    /// When it was captured, ns since 1970.
+    /// Capture time, ns since 1970.
     pub time_ns: u64,
 }
 
-/// An interface that frames were captured on.
+/// An interface on which frames were captured.
 #[derive(Clone, Copy)]
 struct Interface {
     link: Linktype,
@@ -66,21 +66,21 @@ struct Interface {
 pub(super) struct FrameCounts {
     /// Frames shorter than what was sent, or damaged.
     pub cut: u64,
-    /// Frames of links that are not known.
+    /// Frames of unknown link types.
     pub strange: u64,
     /// The last frame is cut off by the end of the file.
     pub ends_early: bool,
 }
 
-/// A capture that datagrams are read from, from any place on.
+/// A capture from which datagrams are read, starting at any place.
 pub(super) struct Datagrams {
     path: PathBuf,
-    /// What a reader must see before it can go on from any other place.
+    /// What a reader must see before it can continue from any other place.
     preamble: Vec<u8>,
 }
 
 impl Datagrams {
-    /// Opens a file. Fails where it is no capture.
+    /// Opens a file. Fails if it is not a capture.
     pub fn open(path: &Path) -> Result<Datagrams, Error> {
         let mut datagrams = Datagrams { path: path.to_path_buf(), preamble: Vec::new() };
         let mut ranges = Vec::new();
@@ -104,7 +104,7 @@ impl Datagrams {
     }
 
     /// Calls `visit` with the datagrams from a byte of the file on (0, or [`Datagram::from`]) until
-    /// it breaks off.
+    /// it breaks.
     pub fn each(
         &self,
         from: u64,
@@ -119,8 +119,8 @@ impl Datagrams {
         Ok(counts)
     }
 
-    /// Calls `visit` with place, size and content of the blocks from a byte on until it breaks off;
-    /// the preamble comes first. Returns whether the file ends within a block.
+    /// Calls `visit` with place, size and content of the blocks from a byte on until it breaks; the
+    /// preamble comes first. Returns whether the file ends within a block.
     fn blocks(
         &self,
         from: u64,
@@ -133,7 +133,7 @@ impl Datagrams {
             |place: u64, what: String| Error::input(&self.path, format!("byte {place}"), what);
         let mut reader = create_reader(BUFFER, Cursor::new(before).chain(file))
             .map_err(|_| wrong(0, "no pcap or pcapng file begins so".into()))?;
-        // Of the preamble they mean nothing.
+        // Meaningless for blocks of the preamble.
         let mut place = from.wrapping_sub(before.len() as u64);
         loop {
             match reader.next() {
@@ -155,7 +155,7 @@ impl Datagrams {
     }
 }
 
-/// What a reader stumbles over.
+/// Describes what is wrong with a file.
 fn damage(error: &PcapError<&[u8]>) -> String {
     match error {
         PcapError::BufferTooSmall => format!("a frame of more than {BUFFER} bytes"),
@@ -164,7 +164,7 @@ fn damage(error: &PcapError<&[u8]>) -> String {
     }
 }
 
-/// What was captured at once.
+/// A captured frame.
 struct CapturedFrame<'a> {
     link: Linktype,
     /// Since 1970, ns.
@@ -172,18 +172,18 @@ struct CapturedFrame<'a> {
     bytes: &'a [u8],
 }
 
-/// Frames on their way to datagrams.
+/// Turns frames into datagrams.
 #[derive(Default)]
 struct Frames {
     interfaces: Vec<Interface>,
-    /// Fragments, by the place of the last one.
+    /// Incomplete datagrams, with the place of the last fragment of each.
     pool: IpDefragPool<u64>,
-    /// Places of the last fragments.
+    /// Places of the most recent fragments.
     fragments: VecDeque<u64>,
 }
 
 impl Frames {
-    /// The frame of a block; `None` where it has none.
+    /// The frame of a block; `None` if it has none.
     fn open<'a>(&mut self, block: &'a PcapBlockOwned) -> Result<Option<CapturedFrame<'a>>, String> {
         match block {
             PcapBlockOwned::LegacyHeader(header) => {
@@ -232,7 +232,7 @@ impl Frames {
         Ok(CapturedFrame { link, time_ns: time_ns as u64, bytes })
     }
 
-    /// Shows the datagram that a frame at a place holds or completes.
+    /// Passes on the datagram that a frame at a place holds or completes.
     fn datagram(
         &mut self,
         frame: &CapturedFrame,
@@ -265,7 +265,8 @@ impl Frames {
         }
     }
 
-    /// Shows the datagram that a fragment completes, with the place from which all of it is found.
+    /// Passes on the datagram that a fragment completes, with the place from which all of it can be
+    /// found.
     fn fragment(
         &mut self,
         packet: &SlicedPacket,
@@ -290,7 +291,7 @@ impl Frames {
     }
 }
 
-/// The headers of a frame; `None` where the link is not known.
+/// The headers of a frame; `None` if the link type is unknown.
 fn slice(link: Linktype, frame: &[u8]) -> Option<Result<SlicedPacket<'_>, SliceError>> {
     Some(match link {
         Linktype::ETHERNET => SlicedPacket::from_ethernet(frame),

@@ -1,10 +1,10 @@
 //! Packets of Velodyne's HDL-64E, S2 and S3.
 //!
-//! They are laid out as those of its other sensors, but a firing is two blocks: of the 32 upper
-//! lasers (flag `ff ee`) and of the lower (`ff dd`); where a sensor tells two returns of each beam,
-//! two more of the same azimuth follow. Where the lasers look and what their distances lack is
-//! measured for each sensor and comes with it, as `db.xml` (HDL-64E S2 manual, 63-HDL64ES2,
-//! appendix F, whose formulas these are).
+//! They are laid out like those of Velodyne's other sensors, but a firing is two blocks: one of the
+//! 32 upper lasers (flag `ff ee`) and one of the lower (`ff dd`); if a sensor reports two returns
+//! of each beam, two more of the same azimuth follow. The directions of the lasers and the
+//! corrections of their distances are measured for each sensor and come with it, as `db.xml`
+//! (HDL-64E S2 manual, 63-HDL64ES2, appendix F, whose formulas are used here).
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -22,31 +22,31 @@ use crate::source::boost;
 pub(super) const LASERS: usize = 2 * MEASUREMENTS;
 /// Firings of a packet, two blocks each.
 pub(super) const FIRINGS: usize = BLOCKS / 2;
-/// From one firing to the next, ns: 1.33 million returns a second.
+/// Time from one firing to the next, ns: 1.33 million returns a second.
 const FIRING_NS: u64 = 48_000;
-/// m in the file's unit of lengths.
+/// Metres per unit of length of the file.
 const METRES: f64 = 0.01;
-/// Distances along x and y at which the near correction was measured, m; that far is of 25.04 m.
+/// Distances along x and y at which the near correction was measured, m; the far one, at 25.04 m.
 const NEAR_M: [f64; 2] = [2.40, 1.93];
 const FAR_M: f64 = 25.04;
-/// Unit of distances, m, and those that are believed.
+/// Unit of distances, m, and its accepted range.
 const UNIT_M: f64 = 0.002;
 const UNITS_M: std::ops::RangeInclusive<f64> = 0.0005..=0.02;
-/// Corrections that are believed, m.
+/// Largest accepted correction, m.
 const CORRECTION_MAX_M: f64 = 10.0;
 
-/// What was measured of a laser.
+/// The calibration of a laser.
 #[derive(Clone, Copy, Default)]
 struct CalibratedLaser {
-    /// How much farther its azimuth is than the block's, rad, counter-clockwise.
+    /// How far its azimuth is beyond the block's, rad, counter-clockwise.
     azimuth: f64,
     /// Cosine and sine of its elevation.
     elevation: [f64; 2],
-    /// What distances lack far off, m.
+    /// Correction of far distances, m.
     far_m: f64,
-    /// What they lack along x and y near by, m.
+    /// Corrections of near distances along x and y, m.
     near_m: [f64; 2],
-    /// Where it sits above the axis and beside it, m.
+    /// Its position above the axis and beside it, m.
     offset_m: [f64; 2],
 }
 
@@ -57,11 +57,12 @@ pub(super) struct Hdl64 {
 }
 
 impl CalibratedLaser {
-    /// What it sees at a distance, m, with an azimuth of the block, rad: x ahead, y to the left.
+    /// Position of a return at a distance, m, with an azimuth of the block, rad: x ahead, y to the
+    /// left.
     fn place(&self, distance_m: f64, azimuth: f64) -> [f32; 3] {
         let ([cos, sin], [up, beside]) = (self.elevation, self.offset_m);
         let angle = azimuth - self.azimuth;
-        // As the manual has it: x to the right, y ahead.
+        // Axes as in the manual: x to the right, y ahead.
         let (right, ahead) = (libm::sin(angle), libm::cos(angle));
         let along = |distance: f64| {
             let flat = distance * cos - up * sin;
@@ -80,7 +81,7 @@ impl CalibratedLaser {
 impl Hdl64 {
     pub const NAME: &'static str = "HDL-64E";
 
-    /// The sensor that a calibration is of. Fails where it is of another, or makes no sense.
+    /// Reads a sensor from its calibration. Fails if it is another sensor's, or makes no sense.
     pub fn read(path: &Path) -> Result<Hdl64, Error> {
         let wrong = |what: String| Error::input(path, "", what);
         boost::read(path, |document| Hdl64::of(document).map_err(wrong))
@@ -105,23 +106,23 @@ impl Hdl64 {
         Ok(Hdl64 { lasers: lasers.map(Option::unwrap_or_default), unit_m })
     }
 
-    /// Returns of a turn at most: those of the slowest.
+    /// Maximum number of returns in a revolution: at the slowest speed.
     pub fn returns_max(&self) -> usize {
         ((TURN_MAX_NS / FIRING_NS as f64) as usize + FIRINGS) * LASERS
     }
 
-    /// From the first firing of a packet to that of the next, ns.
+    /// Time from the first firing of a packet to that of the next, ns.
     pub fn packet_ns(&self, packet: &[u8]) -> f64 {
         since_first_ns(packet, FIRINGS) as f64
     }
 
-    /// Whether a packet is of such a sensor: it has blocks of lower lasers.
+    /// Whether a packet is from such a sensor: it has blocks of lower lasers.
     pub fn is_mine(&self, packet: &[u8]) -> bool {
         packet.len() == velodyne::PACKET
             && (0..2).any(|n| LaserBlock::of(packet, n).is_some_and(|block| block.is_lower))
     }
 
-    /// Time and azimuth of a firing; `None` where it is damaged, or is there a second time.
+    /// Time and azimuth of a firing; `None` if it is damaged, or the second of a pair.
     pub fn firing(&self, packet: &[u8], firing: usize) -> Option<Firing> {
         let block = LaserBlock::of(packet, 2 * firing)
             .filter(|_| !is_dual(packet) || firing.is_multiple_of(2))?;
@@ -130,7 +131,7 @@ impl Hdl64 {
         Some(Firing { clock_ns: clock_ns % velodyne::CLOCK_NS, angle, frame: None })
     }
 
-    /// Adds the returns of a firing, in the frame of the sensor: x ahead, y to the left, z up.
+    /// Adds the returns of a firing, in the sensor's frame: x ahead, y to the left, z up.
     pub fn returns(&self, packet: &[u8], firing: usize, offset_ns: i64, into: &mut Vec<Point>) {
         for block in (0..2).filter_map(|n| LaserBlock::of(packet, 2 * firing + n)) {
             let azimuth = f64::from(block.azimuth) / f64::from(velodyne::AZIMUTHS) * TAU;
@@ -145,14 +146,14 @@ impl Hdl64 {
     }
 }
 
-/// Whether each firing is there twice: no byte says so, but a turning sensor never has one azimuth
-/// for two of them.
+/// Whether firings come in pairs: no byte says so, but otherwise a rotating sensor never has the
+/// same azimuth for two of them.
 fn is_dual(packet: &[u8]) -> bool {
     let azimuth = |firing: usize| LaserBlock::of(packet, 2 * firing).map(|block| block.azimuth);
     azimuth(0).is_some() && azimuth(0) == azimuth(1)
 }
 
-/// From the first firing to another, ns.
+/// Time from the first firing to another, ns.
 fn since_first_ns(packet: &[u8], firing: usize) -> u64 {
     let before = if is_dual(packet) { firing / 2 } else { firing };
     before as u64 * FIRING_NS
@@ -186,7 +187,7 @@ fn laser(of: Node) -> Result<CalibratedLaser, String> {
     let metres = |name| within(name, CORRECTION_MAX_M / METRES).map(|cm| cm * METRES);
     let elevation = angle("vertCorrection_")?;
     let far_m = metres("distCorrection_")?;
-    // Of the first sensors it was measured far off alone.
+    // For the first sensors it was only measured far off.
     let near = |name| child(of, name).map_or(Ok(far_m), |_| metres(name));
     Ok(CalibratedLaser {
         azimuth: angle("rotCorrection_")?,

@@ -1,4 +1,4 @@
-//! Sensors whose packets are taken as they come.
+//! Sensors whose packets are read as they arrive.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::velodyne::{self, Velodyne};
 use crate::Error;
 use crate::source::{OpenOptions, Overview, SweepData, first_sweep, plausible};
 
-/// Sensors that are known.
+/// Known sensor models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SensorModel {
     /// Velodyne's VLP-16 (Puck)
@@ -37,8 +37,8 @@ pub enum SensorModel {
 pub struct LiveSensor(pub(super) Sensor);
 
 impl LiveSensor {
-    /// A sensor of a model. Fails where metadata that it needs are missing or make no sense, or
-    /// where there are some that it does not need.
+    /// A sensor of a model. Fails if metadata that it needs is missing or makes no sense, or if
+    /// metadata is given that it does not need.
     pub fn of(model: SensorModel, metadata: Option<&Path>) -> Result<LiveSensor, Error> {
         let code = match (model, metadata) {
             (SensorModel::Ouster, Some(path)) => {
@@ -74,18 +74,18 @@ impl LiveSensor {
         self.0.name()
     }
 
-    /// Returns of a turn at most.
+    /// Maximum number of returns in a revolution.
     pub fn returns_max(&self) -> usize {
         self.0.returns_max()
     }
 
-    /// Time of a turn, ns, where the sensor's settings tell it.
+    /// Time of a revolution, ns, if the sensor's settings give it.
     pub(super) fn turn_ns(&self) -> Option<f64> {
         self.0.turn_ns()
     }
 
-    /// What the first sweep tells: when returns were measured, where the ground is. The vehicle's
-    /// frame is that of the sensor. Fails where no ground is found and none is given.
+    /// Learns from the first sweep when returns were measured and where the ground is. The vehicle
+    /// frame is that of the sensor. Fails if no ground is found and none is given.
     pub fn learn(&self, first: &SweepData, options: &OpenOptions) -> Result<LiveRig, Error> {
         let sensors = core::iter::once(Pose::IDENTITY).collect();
         let mut overview = first_sweep::before(String::new(), sensors, Vec::new(), options);
@@ -99,10 +99,10 @@ impl LiveSensor {
     }
 }
 
-/// Where a sensor sits.
+/// The rig of a single sensor.
 pub struct LiveRig {
     /// Sensors, timing and ground.
     pub rig: Rig,
-    /// What the user should know of it.
+    /// Notes on it for the user.
     pub notes: Vec<String>,
 }

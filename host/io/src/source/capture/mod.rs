@@ -1,14 +1,13 @@
 //! Captures of the packets that a sensor sends: `.pcap` and `.pcapng` files of one Ouster or
-//! Velodyne sensor, or of one of several.
+//! Velodyne sensor, or of several of which one is read.
 //!
-//! An Ouster's metadata is the file of its capture's name that ends in `.json`, or the one beside
-//! it whose name begins that name; an HDL-64E's calibration is found in the same way and ends in
-//! `.xml`. The vehicle frame is the sensor's; a sweep begins at the rear and is stamped there, by
-//! the sensor's clock.
+//! An Ouster's metadata is the `.json` file with the capture's name, or with the beginning of that
+//! name; an HDL-64E's calibration, an `.xml` file, is found in the same way. The vehicle frame is
+//! the sensor's; a sweep begins at the rear and is stamped there, by the sensor's clock.
 //!
-//! Opening walks through the file once and keeps where each sweep begins; a sweep is read when it
-//! is asked for. Left out, and told: packets of others, with a wrong check sum or late, and turns
-//! at the ends of which a part is missing.
+//! Opening walks through the file once and records where each sweep begins; a sweep is read on
+//! demand. Packets of others are left out, and so are, with a note, packets with a wrong checksum,
+//! late firings and incomplete revolutions at the ends.
 
 pub mod assembly;
 mod datagrams;
@@ -40,7 +39,7 @@ use firing::TURN;
 use sensor::{Order, Sensor};
 use streams::{Cut, Stream};
 
-/// Longest time between two sweeps that is believed, ns: an hour.
+/// Longest accepted time between two sweeps, ns: an hour.
 const STEP_MAX_NS: i64 = 3_600_000_000_000;
 
 /// An open capture.
@@ -50,7 +49,7 @@ pub(super) struct Capture {
     datagrams: Datagrams,
     sender: Sender,
     sensor: Sensor,
-    /// Where each begins, and where the next one does.
+    /// Where each sweep begins, and where the next one does.
     sweeps: Vec<[Cut; 2]>,
     poses_from: String,
 }
@@ -84,7 +83,7 @@ impl Capture {
         Ok(capture)
     }
 
-    /// Stamps of the sweeps, and their numbers: where a turn is missing, one is passed over.
+    /// Sets the stamps of the sweeps and their numbers, with a gap for each missing revolution.
     fn set_stamps(&mut self) {
         let cuts: Vec<Cut> = self.sweeps.iter().map(|sweep| sweep[0]).collect();
         let step = |pair: &[Cut]| self.sensor.since(pair[1].clock_ns, pair[0].clock_ns);
@@ -104,7 +103,7 @@ impl Capture {
         for (step, pair) in steps.into_iter().zip(cuts.windows(2)) {
             since_ns += step;
             track.stamps_s.push(since_ns as f64 * 1e-9);
-            // A sweep may begin within a turn, where packets are missing.
+            // A sweep may begin within a revolution if packets are missing.
             let within = (f64::from(pair[1].angle) - f64::from(pair[0].angle)) / TURN as f64;
             let turns = libm::round(step as f64 / usual - within).max(1.0);
             frames.push(frames[frames.len() - 1] + turns as u64);
@@ -135,7 +134,7 @@ impl Capture {
         }
     }
 
-    /// Replaces the points by those of a sweep.
+    /// Replaces the points with those of a sweep.
     fn read_points(&self, index: usize, points: &mut Vec<Point>) -> Result<(), Error> {
         points.clear();
         let [cut, next] = &self.sweeps[index];

@@ -1,8 +1,8 @@
-//! Packets of Ouster's OS0, OS1 and OS2, with the metadata that a sensor gives of itself.
+//! Packets of Ouster's OS0, OS1 and OS2, with the metadata that a sensor provides about itself.
 //!
-//! A packet is a head, some columns and a foot; a column is a head, a measurement per beam and a
+//! A packet is a head, some columns and a foot; a column is a head, one measurement per beam and a
 //! foot (Ouster firmware user manual, "LIDAR data packet format"; metadata: "get_sensor_info" and
-//! its like, as one file).
+//! similar, in one file).
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -18,21 +18,21 @@ use super::firing::{Firing, REFLECTIVITY_MAX, TURN};
 use crate::Error;
 use crate::source::whole;
 
-/// Beams, columns of a turn and columns of a packet that are believed.
+/// Accepted numbers of beams, columns of a revolution and columns of a packet.
 const BEAMS: Range<usize> = 1..257;
 const COLUMNS: Range<usize> = 1..8193;
 const PACKET_COLUMNS: Range<usize> = 1..65;
-/// Turns a second that are believed.
+/// Accepted revolutions per second.
 const TURNS_HZ: Range<f64> = 1.0..100.0;
 const M_OF_MM: f64 = 1e-3;
-/// Bytes of the check sum at the end of a packet's foot, and what stands there without one (in
+/// Bytes of the checksum at the end of a packet's foot, and the values there if it has none (in
 /// captures of firmware 2.3).
 const SUM: usize = 8;
 const NO_SUM: [u64; 2] = [0, 0xdead_beef_0000_c0de];
 
 static CHECK: Crc<u64> = Crc::<u64>::new(&CRC_64_XZ);
 
-/// How a profile lays out its packets: bytes, and places in bytes.
+/// How a profile lays out its packets: sizes and offsets in bytes.
 struct Profile {
     name: &'static str,
     packet_head: usize,
@@ -40,17 +40,17 @@ struct Profile {
     column_head: usize,
     column_foot: usize,
     measurement: usize,
-    /// Bits of a range, the least significant first, and mm of its unit.
+    /// Bits of a range, from the least significant on, and mm of its unit.
     range_bits: u32,
     range_mm: u32,
     /// Bytes of a range.
     range_size: usize,
     reflectivity_at: usize,
-    /// Where a packet's head, or each column's where it has none, has the frame's number.
+    /// Offset of the frame number in a packet's head, or in each column's if the packet has none.
     frame_at: usize,
 }
 
-/// The first return of each measurement alone, where there are two.
+/// Only the first return of each measurement is read if there are two.
 static PROFILES: [Profile; 4] = [
     Profile {
         name: "LEGACY",
@@ -110,21 +110,21 @@ static PROFILES: [Profile; 4] = [
 pub(super) struct Ouster {
     name: String,
     profile: &'static Profile,
-    /// Directions of the beams of a column at the angle 0.
+    /// Directions of a column's beams at the angle 0.
     beams: Vec<DVec3>,
-    /// Columns of a turn, and of a packet.
+    /// Columns of a revolution, and of a packet.
     pub columns: usize,
     pub packet_columns: usize,
-    /// Time of a turn, ns.
+    /// Time of a revolution, ns.
     pub turn_ns: f64,
     /// Where beams leave the axis: outwards and up, m.
     origin_m: [f64; 2],
-    /// From the frame of beams to that of the sensor: x ahead, y to the left, z up.
+    /// From the frame of the beams to that of the sensor: x ahead, y to the left, z up.
     sensor_from_lidar: Pose,
 }
 
 impl Ouster {
-    /// The sensor that a file of metadata tells of. Fails where it is none of a known profile.
+    /// Reads a sensor from its metadata file. Fails unless it has a known profile.
     pub fn read(path: &Path) -> Result<Ouster, Error> {
         let wrong = |what: String| Error::input(path, "", what);
         let json = serde_json::from_slice(&whole::read(path)?).map_err(|e| wrong(e.to_string()))?;
@@ -165,20 +165,20 @@ impl Ouster {
         &self.name
     }
 
-    /// Whether a packet may be one of its: by its length.
+    /// Whether a packet may be one of its own, by its length.
     pub fn is_mine(&self, packet: &[u8]) -> bool {
         let Profile { packet_head, packet_foot, .. } = self.profile;
         packet.len() == packet_head + self.packet_columns * self.column() + packet_foot
     }
 
-    /// Whether the check sum of a packet is right, where it has one.
+    /// Whether the checksum of a packet is right, if it has one.
     pub fn is_sound(&self, packet: &[u8]) -> bool {
         let Some((content, sum)) = packet.split_last_chunk::<SUM>() else { return false };
         let sum = u64::from_le_bytes(*sum);
         self.profile.packet_foot == 0 || NO_SUM.contains(&sum) || CHECK.checksum(content) == sum
     }
 
-    /// Time and angle of a column; `None` where it was not measured.
+    /// Time and angle of a column; `None` if it was not measured.
     pub fn firing(&self, packet: &[u8], column: usize) -> Option<Firing> {
         let (start, end) = self.place(column);
         let head = packet.get(start..end)?;
@@ -195,7 +195,7 @@ impl Ouster {
         valid.then_some(Firing { clock_ns, angle, frame })
     }
 
-    /// Adds the returns of a column, in the frame of the sensor.
+    /// Adds the returns of a column, in the sensor's frame.
     pub fn returns(&self, packet: &[u8], column: usize, offset_ns: i64, into: &mut Vec<Point>) {
         let (start, _) = self.place(column);
         let number = short(&packet[start..], 8);
@@ -251,7 +251,7 @@ fn short(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }
 
-/// What a sensor tells of itself: one list of entries, or groups of them since firmware 3.
+/// A sensor's metadata: one list of entries, or groups of them since firmware 3.
 struct Metadata<'a>(&'a Value);
 
 impl Metadata<'_> {
@@ -279,7 +279,7 @@ impl Metadata<'_> {
             .ok_or_else(|| format!("no numbers in `{key}`: not the metadata of an Ouster sensor"))
     }
 
-    /// Columns of a turn, and of a packet.
+    /// Columns of a revolution, and of a packet.
     fn columns(&self) -> Result<[usize; 2], String> {
         let mode = self.text("lidar_mode")?.split('x').next().and_then(|n| n.parse().ok());
         let of_turn = self.count("columns_per_frame")?.or(mode).unwrap_or(0);
@@ -290,7 +290,8 @@ impl Metadata<'_> {
         Ok([of_turn, of_packet])
     }
 
-    /// Time of a turn by the mode, `COLUMNSxHZ`: ten turns a second unless it says otherwise, ns.
+    /// Time of a revolution by the mode, `COLUMNSxHZ`, ns: ten revolutions a second unless it says
+    /// otherwise.
     fn turn_ns(&self) -> f64 {
         let mode = self.text("lidar_mode").ok().and_then(|mode| mode.split('x').nth(1));
         let hz = mode.and_then(|hz| hz.parse().ok()).filter(|hz| TURNS_HZ.contains(hz));

@@ -1,4 +1,4 @@
-//! A capture's packets sent again, as if the sensor were there.
+//! Sends a capture's packets again, as if the sensor were there.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use super::live::LiveSensor;
 use super::streams;
 use crate::Error;
 
-/// The longest pause that is kept: a longer one is a gap of the capture.
+/// Longest pause that is kept: a longer one is a gap in the capture.
 const PAUSE_MAX: Duration = Duration::from_secs(1);
 
 /// A capture that can be sent again.
@@ -23,8 +23,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Opens a capture. Fails as a recording of it does; `topic` is its sensor, as `ADDRESS:PORT`,
-    /// where it has several.
+    /// Opens a capture. Fails in the same cases as opening it as a recording; `topic` is its
+    /// sensor, as `ADDRESS:PORT`, if it has several.
     pub fn open(path: &Path, topic: Option<&str>) -> Result<Replay, Error> {
         let datagrams = Datagrams::open(path)?;
         let (all, _) = streams::streams(path, &datagrams)?;
@@ -39,9 +39,9 @@ impl Replay {
         &self.sensor
     }
 
-    /// Sends all that its sensor sent, at the pace of the capture times `speed`, until `stop` says
-    /// so. Returns how many datagrams were sent. Fails where the capture cannot be read; what the
-    /// system does not send is lost, as on a wire.
+    /// Sends everything that the sensor sent, at the pace of the capture times `speed`, until
+    /// `stop` returns true. Returns the number of datagrams sent. Fails if the capture cannot be
+    /// read; datagrams that the system does not send are lost, as on a wire.
     pub fn send(&self, to: SocketAddr, speed: f64, stop: impl Fn() -> bool) -> Result<u64, Error> {
         let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
         let socket = UdpSocket::bind(any).map_err(Error::reading(&self.path))?;

@@ -1,4 +1,4 @@
-//! Sensors that send packets, and when they measured what is in them.
+//! Sensors that send packets, and when their contents were measured.
 
 use std::sync::Arc;
 
@@ -9,25 +9,25 @@ use super::hdl64::{self, Hdl64};
 use super::ouster::Ouster;
 use super::velodyne::{self, Velodyne};
 
-/// A firing this long after the one before begins another sweep, where the sensor does not count
-/// its turns, ns: a turn of the fastest sensor.
+/// A firing this long after the previous one begins another sweep if the sensor does not count its
+/// revolutions, ns: a revolution of the fastest sensor.
 const PAUSE_NS: i64 = 50_000_000;
-/// A firing not after the one before is late or a copy; this far from it, ns, the clock was set.
+/// A firing not after the previous one is late or a copy; this far from it, ns, the clock was set.
 pub(super) const SET_NS: u64 = 1_000_000_000;
 
-/// Clocks beyond this count from 1970, ns: 2001.
+/// Clocks beyond this count from 1970, ns: this is in 2001.
 const EPOCH_MIN_NS: u64 = 1_000_000_000_000_000_000;
-/// A Velodyne's clock, which counts from the full hour, is set where it differs from that of the
-/// arrival by less, ns: packets come within a second.
+/// A Velodyne's clock, which counts from the full hour, is taken to be set if it differs from the
+/// arrival time by less than this, ns: packets arrive within a second.
 const SYNCHRONISED_NS: i64 = 1_000_000_000;
 
 /// Where a firing belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
-    /// A sweep begins with it.
+    /// Begins a sweep.
     Begins,
     GoesOn,
-    /// It comes after later ones, or again.
+    /// Comes after later ones, or again.
     Late,
 }
 
@@ -63,7 +63,7 @@ impl Sensor {
         }
     }
 
-    /// Numbers and firings of a packet that is its own.
+    /// Numbers and firings of a packet of its own.
     pub fn firings(&self, packet: &[u8]) -> impl Iterator<Item = (usize, Firing)> {
         let count = match self {
             Sensor::Velodyne(_) => velodyne::BLOCKS,
@@ -86,7 +86,7 @@ impl Sensor {
         }
     }
 
-    /// Returns of a firing at most.
+    /// Maximum number of returns of a firing.
     pub fn returns_of_firing(&self) -> usize {
         match self {
             Sensor::Velodyne(_) => velodyne::MEASUREMENTS,
@@ -95,7 +95,7 @@ impl Sensor {
         }
     }
 
-    /// Returns of a turn at most.
+    /// Maximum number of returns in a revolution.
     pub fn returns_max(&self) -> usize {
         match self {
             Sensor::Velodyne(sensor) => sensor.returns_max(),
@@ -104,7 +104,7 @@ impl Sensor {
         }
     }
 
-    /// From the first firing of a packet to that of the next, ns.
+    /// Time from the first firing of a packet to that of the next, ns.
     pub fn packet_ns(&self, packet: &[u8]) -> f64 {
         match self {
             Sensor::Velodyne(sensor) => sensor.packet_ns(packet),
@@ -115,7 +115,7 @@ impl Sensor {
         }
     }
 
-    /// Time of a turn, ns, where its settings tell it.
+    /// Time of a revolution, ns, if the settings give it.
     pub fn turn_ns(&self) -> Option<f64> {
         match self {
             Sensor::Velodyne(_) | Sensor::Hdl64(_) => None,
@@ -123,8 +123,8 @@ impl Sensor {
         }
     }
 
-    /// A time of its clock, ns since 1970, of what arrived at `now_ns`: where its clock is not set,
-    /// the time of the arrival.
+    /// Converts a time of its clock to ns since 1970, for a packet that arrived at `now_ns`; if its
+    /// clock is not set, the result is the arrival time.
     pub fn epoch_ns(&self, clock_ns: u64, now_ns: u64) -> u64 {
         let set = match self {
             Sensor::Ouster(_) => Some(clock_ns).filter(|ns| *ns >= EPOCH_MIN_NS),
@@ -137,7 +137,7 @@ impl Sensor {
         set.unwrap_or(now_ns)
     }
 
-    /// From one time of its clock to another, ns.
+    /// Time from one reading of its clock to another, ns.
     pub fn since(&self, later_ns: u64, earlier_ns: u64) -> i64 {
         match self {
             Sensor::Velodyne(_) | Sensor::Hdl64(_) => {
@@ -149,7 +149,7 @@ impl Sensor {
         }
     }
 
-    /// Where a firing belongs that comes after another one.
+    /// Where a firing belongs, given the one before.
     pub fn order(&self, firing: &Firing, before: Option<&Firing>) -> Order {
         let Some(before) = before else { return Order::Begins };
         let since_ns = self.since(firing.clock_ns, before.clock_ns);

@@ -13,9 +13,10 @@ use super::velodyne::Velodyne;
 use crate::Error;
 use crate::source::recognise::entries;
 
-/// A turn at an end of the capture with a smaller share of the firings of the fullest is left out.
+/// A revolution at an end of the capture is left out if it has a smaller share of the fullest one's
+/// firings.
 const WHOLE_MIN: f64 = 0.9;
-/// Sensors of a capture that are told apart.
+/// Maximum number of sensors distinguished in a capture.
 const SENSORS_TOLD: usize = 16;
 
 /// Where a sweep begins.
@@ -23,14 +24,14 @@ const SENSORS_TOLD: usize = 16;
 pub(super) struct Cut {
     /// Byte from which its first packet can be read.
     pub from: u64,
-    /// Place of that packet, and number of the first firing in it.
+    /// Place of that packet, and number of the sweep's first firing in it.
     pub place: u64,
     pub firing: usize,
     pub clock_ns: u64,
     pub angle: u16,
     /// When that packet was captured.
     pub time_ns: u64,
-    /// Its firings.
+    /// Number of its firings.
     pub firings: u64,
 }
 
@@ -41,7 +42,7 @@ impl Cut {
         Cut { from, place, firing: number, clock_ns, angle, time_ns, firings: 0 }
     }
 
-    /// After every other.
+    /// After all others.
     pub const END: Cut =
         Cut { from: 0, place: u64::MAX, firing: 0, clock_ns: 0, angle: 0, time_ns: 0, firings: 0 };
 }
@@ -53,7 +54,7 @@ pub(super) struct Stream {
     cuts: Vec<Cut>,
     last: Option<Firing>,
     packets: u64,
-    /// Packets with a wrong check sum, and late firings.
+    /// Packets with a wrong checksum, and late firings.
     unsound: u64,
     late: u64,
 }
@@ -86,8 +87,7 @@ impl Stream {
         }
     }
 
-    /// Where each sweep and the next one begin, without turns at the ends of which a part is
-    /// missing.
+    /// Where each sweep and the next one begin, without incomplete revolutions at the ends.
     pub fn sweeps(&mut self, notes: &mut Vec<String>) -> Vec<[Cut; 2]> {
         let most = self.cuts.iter().map(|cut| cut.firings).max().unwrap_or(0) as f64;
         let part = |cut: &&Cut| (cut.firings as f64) < WHOLE_MIN * most;
@@ -108,12 +108,12 @@ impl Stream {
     }
 }
 
-/// Streams of a capture while it is walked through.
+/// Streams of a capture that is being read.
 struct Streams {
     all: Vec<Stream>,
-    /// Those that files beside the capture tell of.
+    /// Sensors described by files next to the capture.
     told: Vec<Sensor>,
-    /// Datagrams, and bytes of the largest one.
+    /// Number of datagrams, and bytes of the largest one.
     seen: u64,
     largest: usize,
 }
@@ -130,7 +130,7 @@ impl Streams {
         }
     }
 
-    /// Begins the stream of a sensor that is met for the first time.
+    /// Begins the stream of a sensor that is seen for the first time.
     fn find(&mut self, sender: Sender, packet: &[u8]) -> Option<usize> {
         let velodyne = Velodyne::of(packet).map(|sensor| Sensor::Velodyne(Arc::new(sensor)));
         let told = || self.told.iter().find(|sensor| sensor.is_mine(packet)).cloned();
@@ -140,7 +140,7 @@ impl Streams {
         Some(self.all.len() - 1)
     }
 
-    /// That nothing of a sensor was found.
+    /// The error that no sensor was found.
     fn none(&self, path: &Path) -> Error {
         let Streams { told, seen, largest, .. } = self;
         let others = match told.first() {
@@ -157,7 +157,7 @@ impl Streams {
     }
 }
 
-/// What all sensors of a capture sent, and what was left out. Fails where none sent anything.
+/// What all sensors of a capture sent, and what was left out. Fails if none sent anything.
 pub(super) fn streams(
     path: &Path,
     datagrams: &Datagrams,
@@ -175,7 +175,7 @@ pub(super) fn streams(
     Ok((streams.all, counts))
 }
 
-/// What the user should know of a stream.
+/// Notes on a stream for the user.
 pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
     let all = [
         (format!("packets with a wrong check sum, of {}", stream.packets), stream.unsound),
@@ -192,7 +192,7 @@ pub(super) fn notes(stream: &Stream, counts: &FrameCounts) -> Vec<String> {
     notes
 }
 
-/// The stream asked for, or the only one.
+/// The requested stream, or the only one.
 pub(super) fn choose(
     path: &Path,
     mut streams: Vec<Stream>,
@@ -213,8 +213,8 @@ pub(super) fn choose(
     }
 }
 
-/// Sensors that files beside a capture tell of, and what is wrong with one of these: of another
-/// Velodyne's capture a file of that name is something else.
+/// Sensors described by files next to a capture, and the error of a file that cannot be read: next
+/// to another Velodyne's capture, a file of that name is something else.
 fn told(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
     let json = beside(path, "json")?.map(|path| Ouster::read(&path).map(Arc::new));
     let xml = beside(path, "xml")?.map(|path| Hdl64::read(&path).map(Arc::new));
@@ -229,8 +229,8 @@ fn told(path: &Path) -> Result<(Vec<Sensor>, Option<Error>), Error> {
     Ok((told, unread))
 }
 
-/// The file that belongs to a capture: the one beside it with this extension and the longest name
-/// that begins its own.
+/// The file that belongs to a capture: the one next to it with this extension and the longest name
+/// that begins the capture's.
 fn beside(path: &Path, extension: &str) -> Result<Option<PathBuf>, Error> {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());

@@ -1,9 +1,9 @@
 //! Packets of Velodyne's VLP-16 (Puck), Puck Hi-Res, VLP-32C and HDL-32E.
 //!
 //! A packet has 1206 bytes: twelve blocks of a flag, an azimuth and 32 measurements of a distance
-//! and a reflectivity, then the time in µs since the full hour, the kind of returns and the model
+//! and a reflectivity, then the time in µs since the full hour, the return mode and the model
 //! (VLP-16 user manual 63-9243, section 9; VLP-32C 63-9325; HDL-32E 63-9113). Azimuths are
-//! clockwise seen from above, from straight ahead.
+//! clockwise seen from above, starting straight ahead.
 
 use std::f64::consts::TAU;
 
@@ -16,44 +16,44 @@ pub(super) const PACKET: usize = 1206;
 /// Blocks of a packet.
 pub(super) const BLOCKS: usize = 12;
 const BLOCK: usize = 100;
-/// Measurements of a block, and bytes before them and of each.
+/// Measurements of a block, the bytes before them and the bytes of each.
 pub(super) const MEASUREMENTS: usize = 32;
 const BLOCK_HEAD: usize = 4;
 const MEASUREMENT: usize = 3;
-/// First bytes of a block, and of one of an HDL-64E's lower lasers.
+/// First bytes of a block, and of a block of an HDL-64E's lower lasers.
 const FLAG: [u8; 2] = [0xff, 0xee];
 const LOWER: [u8; 2] = [0xff, 0xdd];
-/// Where the kind of returns stands, and what it is where each block is there twice: the last
-/// returns, then the strongest.
+/// Offset of the return mode, and its value if blocks come in pairs: the last returns, then the
+/// strongest.
 const RETURNS_AT: usize = 1204;
 const DUAL: u8 = 0x39;
 const MODEL_AT: usize = 1205;
 const TIME_AT: usize = 1200;
-/// Azimuths of a turn: 0.01°.
+/// Azimuths of a revolution, in 0.01°.
 pub(super) const AZIMUTHS: u32 = 36_000;
 const NS_OF_US: u64 = 1000;
-/// Its clock counts to this, ns: an hour.
+/// Its clock wraps at this, ns: an hour.
 pub(super) const CLOCK_NS: u64 = 3_600_000_000_000;
 
-/// Numbers of models in their packets.
+/// Model numbers in packets.
 pub(super) const VLP_16: u8 = 0x22;
 pub(super) const PUCK_HI_RES: u8 = 0x24;
 pub(super) const HDL_32E: u8 = 0x21;
 pub(super) const VLP_32C: u8 = 0x28;
-/// Longest turn, ns: five a second.
+/// Longest revolution, ns: five a second.
 pub(super) const TURN_MAX_NS: f64 = 2e8;
 
-/// What is fixed about a model.
+/// The fixed properties of a model.
 struct Model {
-    /// Number in its packets.
+    /// Its number in packets.
     code: u8,
     name: &'static str,
-    /// Elevation of every laser, and how much farther its azimuth is than the block's, degrees.
+    /// Elevation of every laser, and how far its azimuth is beyond the block's, degrees.
     lasers: &'static [[f64; 2]],
     /// Unit of distances, m.
     unit_m: f64,
-    /// From the axis to the point that all beams go through, m: a beam that looks down leaves the
-    /// axis higher by this times the tangent.
+    /// Distance from the axis to the point through which all beams pass, m: a beam that points down
+    /// leaves the axis higher by this times the tangent.
     focus_m: f64,
     /// Time between firings of all lasers, and between two lasers or pairs of them, ns.
     cycle_ns: f64,
@@ -62,8 +62,8 @@ struct Model {
     together: usize,
 }
 
-/// Angles from the manuals, distances of the focus from the envelope drawings (86-0101, 86-0129,
-/// 86-0106 and that of the VLP-32C).
+/// Angles from the manuals, focus distances from the envelope drawings (86-0101, 86-0129, 86-0106
+/// and that of the VLP-32C).
 static MODELS: [Model; 4] = [
     Model {
         code: VLP_16,
@@ -150,7 +150,7 @@ static MODELS: [Model; 4] = [
     },
 ];
 
-/// Lasers above each other.
+/// Lasers one above another.
 const fn straight<const N: usize>(elevations: [f64; N]) -> [[f64; 2]; N] {
     let mut lasers = [[0.0; 2]; N];
     let mut n = 0;
@@ -165,14 +165,14 @@ const fn straight<const N: usize>(elevations: [f64; N]) -> [[f64; 2]; N] {
 struct Laser {
     /// Cosine and sine of its elevation.
     elevation: [f64; 2],
-    /// Its azimuth after the block's, rad.
+    /// Its azimuth relative to the block's, rad.
     azimuth: f64,
     /// Where its beam leaves the axis, m.
     height_m: f64,
 }
 
 impl Laser {
-    /// What it sees at a range, m, and an azimuth of the block, rad.
+    /// Position of a return at a range, m, and an azimuth of the block, rad.
     fn place(&self, range_m: f64, azimuth: f64) -> [f32; 3] {
         let (angle, [cos, sin]) = (azimuth + self.azimuth, self.elevation);
         let along = range_m * cos;
@@ -188,13 +188,13 @@ pub(super) struct Velodyne {
 }
 
 impl Velodyne {
-    /// The sensor that sent a packet; `None` where it is none of a known model.
+    /// The sensor that sent a packet; `None` if its model is unknown.
     pub fn of(packet: &[u8]) -> Option<Velodyne> {
         let code = *packet.get(MODEL_AT)?;
         Velodyne::coded(code).filter(|sensor| sensor.is_mine(packet))
     }
 
-    /// The sensor whose packets have this number; `None` where no model has.
+    /// The sensor whose packets have this number; `None` if no model has it.
     pub fn coded(code: u8) -> Option<Velodyne> {
         let model = MODELS.iter().find(|model| model.code == code)?;
         let laser = |[elevation, azimuth]: &[f64; 2]| {
@@ -208,13 +208,13 @@ impl Velodyne {
         Some(Velodyne { model, lasers: model.lasers.iter().map(laser).collect() })
     }
 
-    /// Returns of a turn at most: those of the slowest.
+    /// Maximum number of returns in a revolution: at the slowest speed.
     pub fn returns_max(&self) -> usize {
         let cycles = (TURN_MAX_NS / self.model.cycle_ns) as usize;
         cycles * self.lasers.len() + BLOCKS * MEASUREMENTS
     }
 
-    /// From the first firing of a packet to that of the next, ns.
+    /// Time from the first firing of a packet to that of the next, ns.
     pub fn packet_ns(&self, packet: &[u8]) -> f64 {
         let blocks = if is_dual(packet) { BLOCKS / 2 } else { BLOCKS };
         (blocks * MEASUREMENTS / self.lasers.len()) as f64 * self.model.cycle_ns
@@ -235,14 +235,14 @@ impl Velodyne {
         is_of(packet, self.model.code)
     }
 
-    /// Time and azimuth of a block. `None` where the block is damaged, or is there a second time.
+    /// Time and azimuth of a block. `None` if the block is damaged, or the first of a pair.
     pub fn firing(&self, packet: &[u8], block: usize) -> Option<Firing> {
         let azimuth = azimuth(packet, block).filter(|_| !is_dual(packet) || block % 2 == 1)?;
         let clock_ns = clock_ns(packet)? + self.block_ns(packet, block) as u64;
         Some(Firing { clock_ns: clock_ns % CLOCK_NS, angle: angle(azimuth), frame: None })
     }
 
-    /// Adds the returns of a block, in the frame of the sensor: x ahead, y to the left, z up.
+    /// Adds the returns of a block, in the sensor's frame: x ahead, y to the left, z up.
     pub fn returns(&self, packet: &[u8], block: usize, offset_ns: i64, into: &mut Vec<Point>) {
         let Some(block) = LaserBlock::of(packet, block).filter(|b| !b.is_lower) else { return };
         let per_ns = turning(packet, self.block_ns(packet, BLOCKS - 1));
@@ -262,7 +262,7 @@ impl Velodyne {
         }
     }
 
-    /// When a block is fired after the packet's first one, ns.
+    /// Time from the packet's first firing to a block's, ns.
     fn block_ns(&self, packet: &[u8], block: usize) -> f64 {
         let cycles = MEASUREMENTS / self.lasers.len();
         let before = if is_dual(packet) { block / 2 } else { block };
@@ -272,7 +272,7 @@ impl Velodyne {
 
 fn is_of(packet: &[u8], code: u8) -> bool {
     let whole = packet.len() == PACKET && packet.starts_with(&FLAG);
-    // The byte is something else in packets of an HDL-64E.
+    // In packets of an HDL-64E this byte is something else.
     whole && packet[MODEL_AT] == code && !packet[BLOCK..].starts_with(&LOWER)
 }
 
@@ -280,7 +280,7 @@ fn is_dual(packet: &[u8]) -> bool {
     packet[RETURNS_AT] == DUAL
 }
 
-/// The azimuth of a block, where it is one.
+/// The azimuth of a block, unless it is damaged or of lower lasers.
 fn azimuth(packet: &[u8], block: usize) -> Option<u32> {
     let block = LaserBlock::of(packet, block)?;
     (!block.is_lower).then_some(block.azimuth)
@@ -289,13 +289,13 @@ fn azimuth(packet: &[u8], block: usize) -> Option<u32> {
 /// A block of a packet.
 pub(super) struct LaserBlock<'a> {
     pub azimuth: u32,
-    /// Of the lower lasers of an HDL-64E.
+    /// Whether it is of the lower lasers of an HDL-64E.
     pub is_lower: bool,
     bytes: &'a [u8],
 }
 
 impl LaserBlock<'_> {
-    /// `None` where there is none, or a damaged one.
+    /// Reads a block; `None` if there is none, or it is damaged.
     pub fn of(packet: &[u8], block: usize) -> Option<LaserBlock<'_>> {
         let bytes = packet.get(block * BLOCK..)?.get(..BLOCK)?;
         let azimuth = u32::from(u16::from_le_bytes([bytes[2], bytes[3]]));
@@ -304,7 +304,7 @@ impl LaserBlock<'_> {
         sound.then_some(LaserBlock { azimuth, is_lower, bytes })
     }
 
-    /// Distances and reflectivities of its returns, each with its place in the block.
+    /// Distances and reflectivities of its returns, each with its index in the block.
     pub fn measurements(&self) -> impl Iterator<Item = (usize, (u16, u8))> {
         let each = self.bytes[BLOCK_HEAD..].chunks_exact(MEASUREMENT);
         let each = each.map(|m| (u16::from_le_bytes([m[0], m[1]]), m[2]));
@@ -312,20 +312,21 @@ impl LaserBlock<'_> {
     }
 }
 
-/// When a packet's first firing was, by the sensor's clock, ns.
+/// Time of a packet's first firing by the sensor's clock, ns.
 pub(super) fn clock_ns(packet: &[u8]) -> Option<u64> {
     let us = packet.get(TIME_AT..TIME_AT + 4)?.try_into().ok()?;
     Some(u64::from(u32::from_le_bytes(us)) * NS_OF_US)
 }
 
-/// An azimuth since the rear: a turn begins there, so that what is ahead is seen at once.
+/// An azimuth counted from the rear, where a revolution begins, so that the area ahead is seen in
+/// one go.
 pub(super) fn angle(azimuth: u32) -> u16 {
     let turned = (u64::from(azimuth + AZIMUTHS / 2) % u64::from(AZIMUTHS)) * TURN;
     (turned / u64::from(AZIMUTHS)) as u16
 }
 
-/// How fast it turns within a packet, azimuths a ns; `span_ns` is the time from the first block to
-/// the last.
+/// How fast it rotates within a packet, azimuths per ns; `span_ns` is the time from the first block
+/// to the last.
 fn turning(packet: &[u8], span_ns: f64) -> f64 {
     let (Some(first), Some(last)) = (azimuth(packet, 0), azimuth(packet, BLOCKS - 1)) else {
         return 0.0;

@@ -1,4 +1,4 @@
-//! Argoverse 2 logs, made with the Arrow writer.
+//! Argoverse 2 logs, written with the Arrow writer.
 
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ fn poses<'a>(x: Vec<f64>) -> Vec<(&'a str, ArrayRef)> {
     columns
 }
 
-/// A sweep of points with these lasers; x counts up from `first`.
+/// A sweep of points with these lasers; x increases from `first`.
 fn sweep(first: f32, lasers: &[u8]) -> RecordBatch {
     let n = lasers.len();
     let x = (0..n).map(|i| half(first + i as f32)).collect::<Vec<_>>();
@@ -270,7 +270,7 @@ fn own_poses_only() {
 
 #[test]
 fn lasers_are_told_apart_by_their_elevation() {
-    // Lasers 0 and 1 of the lower scanner, 2 m below and behind, at 3 and -2 degrees.
+    // Laser 0 is the lower scanner's, at 3 degrees, laser 33 the upper one's, at -2 degrees.
     let t = log();
     let (mut x, mut y, mut z, mut lasers) = (vec![], vec![], vec![], vec![]);
     for (laser, elevation) in [(0u8, 3.0f32), (33, -2.0)] {

@@ -28,7 +28,7 @@ pub(super) fn compressed_file() -> Vec<u8> {
     compressed(&by_field.concat())
 }
 
-/// As it is, packed without any repetition.
+/// Stored as it is, without any repetition.
 fn compressed(body: &[u8]) -> Vec<u8> {
     let packed: Vec<u8> =
         body.chunks(32).flat_map(|c| [&[c.len() as u8 - 1], c].concat()).collect();
@@ -68,7 +68,7 @@ fn pcd_of_every_kind() {
     assert_eq!(cloud(&t, "a.pcd", text().replace('\n', "\r\n")).unwrap(), expected(true));
     assert_eq!(cloud(&t, "a.pcd", binary()).unwrap(), expected(true));
     assert_eq!(cloud(&t, "a.pcd", compressed_file()).unwrap(), expected(true));
-    // Neither COUNT nor POINTS, no time; NaN stays.
+    // Without COUNT, POINTS and time; NaN stays.
     let old = "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\nnan 2 3\n";
     let (points, timed) = cloud(&t, "a.pcd", old).unwrap();
     assert!(points.len() == 1 && points[0].position[0].is_nan() && !timed);
@@ -147,7 +147,7 @@ pub(super) fn ply(format: &str, body: &[u8]) -> Vec<u8> {
     [PLY.replace("FORMAT", format).as_bytes(), body].concat()
 }
 
-/// The vertices in an order of bytes, the faces cut off.
+/// The vertices in a byte order, with the faces cut off.
 pub(super) fn vertices(big: bool) -> Vec<u8> {
     let order = |mut bytes: Vec<u8>| {
         if big {
@@ -215,7 +215,7 @@ fn folders_of_clouds() {
     let Timing::Offset { from_s, span_s } = source.rig().timing else { panic!() };
     assert!((from_s + 0.05).abs() < 1e-6 && (span_s - 0.09).abs() < 1e-6, "{from_s} {span_s}");
     assert_eq!(read(source.as_mut(), 1).unwrap().points, expected(true).0);
-    // All at one time: as good as none.
+    // All at one time: the same as none.
     t.write("0.pcd", text().replace("-0.05", "0.04"));
     assert!(matches!(open(t.path(), &options).unwrap().rig().timing, Timing::Azimuth { .. }));
     t.write("0.pcd", text().replace("-0.05", "-5"));

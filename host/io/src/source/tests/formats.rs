@@ -1,4 +1,4 @@
-//! Every format as it should be.
+//! Well-formed recordings of every format.
 
 use glam::DVec3;
 use raywake_core::sweep::Timing;
@@ -63,7 +63,7 @@ fn a_sweep_of_many_chunks_and_an_empty_one() {
     assert!(sweep.points.is_empty());
 }
 
-/// A drive with OXTS packets: frames 0, 1, 3 of 5 m north each, heading north.
+/// A drive with OXTS packets: frames 0, 1 and 3, heading north at 5 m per frame.
 pub(super) fn oxts_drive(t: &Temp, folder: &str) {
     let mut stamps = String::new();
     for frame in 0..4 {
@@ -87,7 +87,7 @@ pub(super) fn oxts_drive(t: &Temp, folder: &str) {
 fn drive_with_oxts() {
     let t = Temp::new();
     oxts_drive(&t, "day/drive");
-    // One recording two levels below.
+    // One recording, two levels below.
     let mut source = opened(t.path());
     assert_eq!((source.name(), source.len()), ("drive", 3));
     let notes = source.notes().join("; ");
@@ -112,7 +112,7 @@ fn oxts_beyond_any_drive() {
     fs::write(&path, numbers.join(" ")).unwrap();
     assert!(refused(&t.path().join("day/drive")).contains("the pose of frame 1: "));
     fs::write(&path, packet).unwrap();
-    // Of a single one the products do not overflow.
+    // With a single one, the products do not overflow.
     for place in ["1e308 1e308 0", "1e308 0 0", "0 -1e300 0"] {
         let calibration = format!("R: 1 0 0 0 1 0 0 0 1\nT: {place}\n");
         t.write("day/calib_imu_to_velo.txt", calibration);
@@ -125,7 +125,7 @@ fn oxts_beyond_any_drive() {
 fn oxts_with_calibration_of_the_day() {
     let t = Temp::new();
     oxts_drive(&t, "day/drive");
-    // The Velodyne is mounted turned to the left by 90 degrees: north is to its right.
+    // The Velodyne is mounted rotated to the left by 90 degrees: north is to its right.
     t.write("day/calib_imu_to_velo.txt", "calib_time: x\nR: 0 1 0 -1 0 0 0 0 1\nT: 0 0 0\n");
     let mut source = opened(&t.path().join("day/drive"));
     assert_eq!(source.notes().len(), 1, "{:?}", source.notes());
@@ -182,7 +182,7 @@ fn folder_of_clouds() {
     assert!(near(sweep.twist.linear, [5.0, 0.0, 0.0]));
     let notes = source.notes().join("; ");
     assert!(notes.contains("10 Hz") && notes.contains("not numbers"), "{notes}");
-    // A single sweep stands still.
+    // A single sweep has no motion.
     t.remove("b.bin");
     let poses = t.write("elsewhere/p.txt", row(9.0, 0.0, 0.0));
     let format = Some(Format::Clouds);
@@ -195,7 +195,7 @@ fn folder_of_clouds() {
 fn a_turn_is_the_mean_of_coarse_stamps() {
     let t = Temp::new();
     let mut times = String::new();
-    // Turns of 0.104 s by a clock of 10 ms, a turn missing after the tenth.
+    // Revolutions of 0.104 s by a clock of 10 ms, one missing after the tenth.
     for i in 0..26 {
         t.write(&format!("velodyne_points/data/{i}.bin"), []);
         let turn = if i < 10 { i } else { i + 1 };

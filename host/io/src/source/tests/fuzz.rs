@@ -1,8 +1,8 @@
 //! Recordings of every format, damaged at random: an error or other numbers, never a panic, and
 //! never longer than a second.
 //!
-//! `RAYWAKE_FUZZ` is how many recordings of each format are damaged; what breaks a reader is kept
-//! beside the temporary files, and named.
+//! `RAYWAKE_FUZZ` is the number of damaged recordings per format; what breaks a reader is kept next
+//! to the temporary files, and named.
 
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,13 +15,13 @@ use super::*;
 mod bundle;
 use bundle::Bundle;
 
-/// Damaged recordings of a format where nobody says how many.
+/// Damaged recordings per format, unless specified.
 const USUAL: usize = 200;
-/// Longest that a recording may take.
+/// Longest time that a recording may take.
 const LONGEST: Duration = Duration::from_secs(1);
 /// A folder of recordings for each format.
 const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus/recording");
-/// Sweeps that are read of each.
+/// Maximum number of sweeps read from each recording.
 const SWEEPS: usize = 3;
 /// Numbers that readers have stumbled over.
 const NUMBERS: [&str; 12] = [
@@ -44,7 +44,7 @@ struct Seed {
     folder: Temp,
     options: OpenOptions,
     files: Vec<(PathBuf, Vec<u8>)>,
-    /// Below the folder.
+    /// Path of the recording below the folder.
     root: String,
 }
 
@@ -74,7 +74,7 @@ impl Seed {
         Bundle { root, topics, files: files.collect() }
     }
 
-    /// Opens the recording and reads some of it. Whether that went well.
+    /// Opens the recording and reads some of it. Returns whether that worked.
     fn read(&self) -> bool {
         let Ok(mut source) = open(&self.folder.path().join(&self.root), &self.options) else {
             return false;
@@ -91,7 +91,7 @@ impl Seed {
         })
     }
 
-    /// Damages files of the recording `times` over. Returns how often it could still be read.
+    /// Damages files of the recording `times` times. Returns how often it could still be read.
     fn damage(&self, times: usize, random: &mut Random) -> usize {
         let once = |random: &mut Random| {
             let (path, whole) = &self.files[random.below(self.files.len())];
@@ -102,7 +102,7 @@ impl Seed {
                 (catch_unwind(AssertUnwindSafe(|| self.read())), since.elapsed())
             };
             let (mut read, mut took) = timed();
-            // A machine pauses now and then; a reader that hangs does it again.
+            // A machine pauses now and then; a reader that hangs will hang again.
             if took > LONGEST {
                 (read, took) = timed();
             }
@@ -118,12 +118,12 @@ impl Seed {
     }
 }
 
-/// Numbers that look random and are always the same ones.
+/// Numbers that look random but are always the same.
 pub(crate) struct Random(pub u64);
 
 impl Random {
     pub fn below(&mut self, limit: usize) -> usize {
-        // Knuth's MMIX generator, by its upper half.
+        // Knuth's MMIX generator, its upper half.
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (((self.0 >> 32) * limit as u64) >> 32) as usize
     }
@@ -157,7 +157,7 @@ pub(crate) fn damaged(whole: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// A word of four or eight bytes becomes an extreme one.
+/// Replaces a word of four or eight bytes by an extreme one.
 fn word(bytes: &mut [u8], at: usize, random: &mut Random) {
     let extreme = [0, 1, u64::MAX, 1 << 31, (1 << 31) - 1, 1 << 63, 1 << 40][random.below(7)];
     let word = extreme.to_le_bytes();
@@ -165,7 +165,7 @@ fn word(bytes: &mut [u8], at: usize, random: &mut Random) {
     bytes[at..at + length].copy_from_slice(&word[..length]);
 }
 
-/// The number in a text that follows a place becomes another.
+/// Replaces the next number in a text after a place.
 fn number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     let digit = |byte: &u8| byte.is_ascii_digit() || b"+-.e".contains(byte);
     let Some(from) = bytes[at..].iter().position(digit).map(|n| at + n) else { return };
@@ -174,13 +174,13 @@ fn number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
     bytes.splice(from..from + length, other);
 }
 
-/// How many recordings of each format are damaged.
+/// Number of damaged recordings per format.
 fn times() -> usize {
     let times = std::env::var("RAYWAKE_FUZZ").ok().and_then(|n| n.parse().ok());
     times.unwrap_or(USUAL)
 }
 
-/// Damages a recording that fuzzers start from.
+/// Damages a seed recording of fuzzers, after checking it.
 fn fuzz(name: &str, seed: Seed) {
     start(name, &seed);
     damage(name, seed);
@@ -189,15 +189,15 @@ fn fuzz(name: &str, seed: Seed) {
 /// Damages a recording of a format.
 fn damage(name: &str, seed: Seed) {
     let times = times();
-    // A stream of its own for each format, and another one for another number of recordings.
+    // A separate random stream for each format, and another one for another number of recordings.
     let number = name.bytes().fold(times as u64, |n, byte| n.wrapping_mul(31) + u64::from(byte));
     let read = seed.damage(times, &mut Random(number));
     println!("{name}: {times} damaged, {read} of them read");
-    // Most damage is to numbers of returns, which may be any.
+    // Most damage is to numbers of returns, which may have any value.
     assert!(times < 50 || (1..times).contains(&read), "{name}: {read} of {times} were read");
 }
 
-/// What fuzzers that look at coverage start from; written with `UPDATE=1`.
+/// Checks the seed of coverage-guided fuzzers; written with `UPDATE=1`.
 fn start(name: &str, seed: &Seed) {
     assert!(seed.read(), "{name}: the recording itself");
     let path = Path::new(CORPUS).join(name).join("0");
@@ -208,7 +208,7 @@ fn start(name: &str, seed: &Seed) {
     assert!(path.exists(), "UPDATE=1 writes {}", path.display());
 }
 
-/// Without poses, for what has none.
+/// Without poses, for recordings that have none.
 fn unlocated() -> OpenOptions {
     OpenOptions { unlocated: Unlocated::Accept, ground_m: Some(-1.7), ..OpenOptions::default() }
 }
@@ -271,11 +271,11 @@ fn waymo_segments() {
 #[test]
 fn bags() {
     use crate::source::bag::tests as bag;
-    // Without checksums, which find all damage.
+    // Without checksums, which would detect all damage.
     let of = |sweeps| {
         let t = Temp::new();
         let options = bag::options().compression(None).use_chunks(false);
-        // Images are skipped, and long.
+        // Images are skipped, and large.
         let mut messages = bag::rig(sweeps);
         messages.retain(|(topic, ..)| *topic != "/image");
         t.write("a.mcap", bag::file(&messages, options));
@@ -302,8 +302,8 @@ fn chunks_that_unpack_to_too_much() {
     }
 }
 
-/// What coverage-guided fuzzers start from can be read, and what they broke once is an error. The
-/// other tests here damage their like.
+/// The seeds of coverage-guided fuzzers can be read, and what they once broke is an error. The
+/// other tests here damage similar recordings.
 #[cfg(all(feature = "mcap", feature = "nuscenes", feature = "parquet", feature = "pcap"))]
 #[test]
 fn corpus() {
@@ -342,7 +342,7 @@ fn captures() {
         let [packets, metadata] = capture::published(packets);
         of(packets, "json", metadata)
     };
-    // Small files to start from: few packets of a turn.
+    // Small seeds: a few packets of a revolution.
     [("pcap", vlp(4)), ("db.xml", hdl(4)), ("ouster", ouster(2))]
         .iter()
         .for_each(|(name, seed)| start(name, seed));

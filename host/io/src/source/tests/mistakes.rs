@@ -1,4 +1,4 @@
-//! Every mistake in a folder is named with its file and place.
+//! Every mistake in a folder is reported with its file and place.
 
 use super::super::{PosesFrame, Unlocated};
 use super::*;
@@ -101,7 +101,7 @@ fn oxts() {
     assert!(refused(t.path()).contains("calib_imu_to_velo.txt, line 1: the 3x3 part"));
 }
 
-/// Poses that are left out are not even read.
+/// Ignored poses are not even read.
 #[test]
 fn without_poses() {
     let t = Temp::new();

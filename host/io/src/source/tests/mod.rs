@@ -1,4 +1,4 @@
-//! Sources on small made-up folders, and on real data where it is at hand.
+//! Sources on small synthetic folders, and on real data if available.
 
 #[cfg(feature = "arrow")]
 mod argoverse;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::{OpenOptions, Source, SweepData, open};
 use crate::Error;
 
-/// A folder that goes away with the value.
+/// A folder that is removed with the value.
 pub(crate) struct Temp(PathBuf);
 
 impl Temp {
@@ -36,7 +36,7 @@ impl Temp {
         &self.0
     }
 
-    /// Writes a file and the folders above it.
+    /// Writes a file, creating the folders above it.
     pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -60,7 +60,7 @@ fn bin(points: &[[f32; 4]]) -> Vec<u8> {
     points.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()
 }
 
-/// A row of a pose without rotation.
+/// A pose row without rotation.
 fn row(x: f64, y: f64, z: f64) -> String {
     format!("1 0 0 {x} 0 1 0 {y} 0 0 1 {z}\n")
 }
@@ -69,7 +69,7 @@ fn opened(path: &Path) -> Box<dyn Source> {
     open(path, &OpenOptions::default()).unwrap()
 }
 
-/// The text of the error on opening.
+/// The message of the error on opening.
 fn refused(path: &Path) -> String {
     refused_with(path, &OpenOptions::default())
 }
@@ -90,7 +90,7 @@ fn read(source: &mut dyn Source, index: usize) -> Result<SweepData, Error> {
     Ok(sweep)
 }
 
-/// A drive in KITTI's layout with `poses.txt`: frames 3, 4, 6; a metre forward each 0.1 s.
+/// A drive in KITTI's layout with `poses.txt`: frames 3, 4, 6; a metre forward every 0.1 s.
 fn drive() -> Temp {
     let t = Temp::new();
     for (frame, x) in [(3, 1.0), (4, 2.0), (6, 3.0)] {

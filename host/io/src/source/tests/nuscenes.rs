@@ -1,4 +1,4 @@
-//! A scene of nuScenes, made here.
+//! A synthetic nuScenes scene.
 
 use super::*;
 use crate::source::Unlocated;
@@ -6,8 +6,9 @@ use raywake_core::sweep::Point;
 
 const SWEEPS: usize = 3;
 
-/// A scene of three sweeps, another of one, and a camera; 2 m to the vehicle's right of the origin,
-/// the lidar is turned by a right angle and 1.8 m up. A sweep lies 0.5 m further along +x.
+/// A scene of three sweeps, another one whose files are missing, and a camera. The lidar is 1 m
+/// ahead, 2 m to the right and 1.8 m above the vehicle's origin, turned right by 90 degrees. Each
+/// sweep is 0.5 m further along +x.
 pub(super) fn scenes() -> Temp {
     let t = Temp::new();
     let table = |name: &str, rows: Vec<String>| {
@@ -28,7 +29,7 @@ pub(super) fn scenes() -> Temp {
     };
     table("calibrated_sensor", vec![mounted("mt", "top"), mounted("mc", "cam")]);
     let (mut rows, mut poses) = (Vec::new(), Vec::new());
-    // Not in the order of time.
+    // Not in order of time.
     for n in (0..SWEEPS).rev() {
         let (us, name) =
             (1_532_402_927_000_000 + 50_000 * n, format!("sweeps/LIDAR_TOP/{n}.pcd.bin"));
@@ -72,12 +73,12 @@ fn a_scene_is_read() {
     assert!((sweep.stamp_s - 0.05).abs() < 1e-9);
     assert_eq!(sweep.world_from_vehicle.translation.to_array(), [1000.5, 20.0, 0.0]);
     assert!((sweep.twist.linear.x - 10.0).abs() < 1e-9, "{:?}", sweep.twist);
-    // What lies 3 m along +x and 4 m along +y of the lidar, which looks to the right.
+    // A point 3 m along +x and 4 m along +y of the lidar, which looks to the right.
     let [first, second] = [sweep.points[0], sweep.points[1]];
     let apart = |p: &Point, at: [f32; 3]| (0..3).all(|a| (p.position[a] - at[a]).abs() < 1e-5);
     assert!(apart(&first, [5.0, -5.0, 0.8]) && apart(&second, [1.0, -3.0, 1.8]), "{first:?}");
     assert!((first.intensity - 0.2).abs() < 1e-6 && second.intensity == 1.0);
-    // The folder of tables will do, too.
+    // The folder of tables works too.
     let tables = t.path().join("v1.0-mini");
     assert_eq!(open(&tables, &asked("scene-0061")).unwrap().len(), SWEEPS);
     let unlocated = OpenOptions { unlocated: Unlocated::Always, ..asked("scene-0061") };

@@ -1,4 +1,4 @@
-//! Real recordings, where `RAYWAKE_DATA` names their folder.
+//! Real recordings, if `RAYWAKE_DATA` names their folder.
 
 use raywake_core::sweep::Timing;
 
@@ -15,7 +15,7 @@ fn kitti_city_drive() {
     let mut source = opened(&data("kitti_raw_0005"));
     assert_eq!(source.len(), 154);
     assert!(source.notes().is_empty(), "{:?}", source.notes());
-    // The stamps are those of a clock of 10 ms; the scanner's turn is 0.1035 s.
+    // The stamps are from a clock of 10 ms; the scanner's revolution takes 0.1035 s.
     let turn = source.rig().timing;
     let Timing::Azimuth { span_s } = turn else { panic!("{turn:?}") };
     assert!((span_s - 0.1035).abs() < 3e-4, "{span_s}");

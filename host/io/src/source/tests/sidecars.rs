@@ -1,4 +1,4 @@
-//! Times and sensors beside the clouds.
+//! Times and sensors in files next to the clouds.
 
 use raywake_core::sweep::Timing;
 
@@ -7,7 +7,7 @@ use super::*;
 const SENSORS: &str = "span: -0.05 0.1\nground: -0.3\n\
                        sensor: 1 0 0 1.5 0 1 0 0 0 0 1 1.6\nsensor: 1 0 0 0 0 1 0 0.7 0 0 1 1.5\n";
 
-/// The drive of two returns a sweep, with sidecars.
+/// The drive with two returns per sweep, and sidecars.
 pub(super) fn with_sidecars() -> Temp {
     let t = drive();
     t.write("velodyne_points/sensors.txt", SENSORS);
@@ -19,7 +19,7 @@ pub(super) fn with_sidecars() -> Temp {
     t
 }
 
-/// The text of the error on reading the first sweep, which then holds no points.
+/// The message of the error on reading the first sweep, which then holds no points.
 fn broken(t: &Temp) -> String {
     let mut sweep = SweepData::default();
     let e = opened(t.path()).read(0, &mut sweep).unwrap_err();

@@ -1,4 +1,4 @@
-//! A segment of Waymo's, made here.
+//! A synthetic Waymo segment.
 
 use std::f32::consts::FRAC_PI_4;
 use std::fs::File;
@@ -17,7 +17,7 @@ const TIMES: [i64; 3] = [1_550_000_000_000_000, 1_550_000_000_100_000, 1_550_000
 /// Rows and columns of an image.
 const SIZE: [usize; 2] = [2, 4];
 const PIXELS: usize = SIZE[0] * SIZE[1];
-/// How far a return is, m; -1 where there is none.
+/// Ranges of the returns, m; -1 if there is none.
 const RANGES: [f32; PIXELS] = [10.0, 20.0, -1.0, 10.0, 5.0, -1.0, 5.0, 5.0];
 
 fn list<const N: usize>(values: [f64; N]) -> Option<Vec<Option<f64>>> {
@@ -66,8 +66,8 @@ fn keys(lasers: &[i8]) -> Vec<(String, ArrayRef)> {
     ]
 }
 
-/// Three sweeps of the laser on the roof and one at the left, turned by a right angle; the vehicle
-/// drives 1 m a sweep, and was half a metre further on at every pixel of the one on the roof.
+/// Three sweeps of the roof laser and one at the left, turned by a right angle; the vehicle moves 1
+/// m per sweep, and was half a metre further on at every pixel of the roof laser.
 pub(super) fn segment(channels: usize) -> Temp {
     let t = Temp::new();
     let named = |group: &str, name: &str| format!("[{group}].{name}");
@@ -121,14 +121,14 @@ fn a_segment_is_read() {
     assert!(source.describe().contains("Waymo segment seg") && !source.rig().distorted);
     assert_eq!(source.overview().epoch_ns, TIMES[0] as u64 * 1000);
     let mut sweep = SweepData::default();
-    // Backwards, too.
+    // Backwards too.
     for index in [2, 0, 1] {
         source.read(index, &mut sweep).unwrap();
         assert_eq!(sweep.world_from_vehicle.translation.x, 100.0 + index as f64);
         assert_eq!(sweep.points.len(), 12);
     }
     assert!((sweep.stamp_s - 0.1).abs() < 1e-9);
-    // The first column looks half to the left of the rear, the next half to the left of ahead.
+    // The first column points midway between rear and left, the next midway between left and ahead.
     let directions = [3.0, 1.0, -1.0, -3.0].map(|quarters| quarters * FRAC_PI_4);
     let lasers = [([1.5, 0.0, 2.0], [0.2, -0.1]), ([3.0, 1.0, 1.0], [0.2, -0.2])];
     let expected = lasers.into_iter().enumerate().flat_map(|(sensor, (from, inclinations))| {
@@ -179,7 +179,7 @@ fn what_is_wrong_with_segments_is_told() {
     let t = segment(4);
     let [to, from] =
         ["lidar_calibration", "even"].map(|name| t.path().join(name).join("seg.parquet"));
-    // As the calibration of lasers whose beams are spread evenly, but from where to where is null.
+    // Like the calibration of lasers whose beams are evenly spaced, but with a null as one limit.
     let named = |name: &str| format!("[LiDARCalibrationComponent].{name}");
     table(
         &t,

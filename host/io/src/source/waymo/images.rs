@@ -1,4 +1,4 @@
-//! Images of ranges as returns.
+//! Converts range images to returns.
 
 use std::f64::consts::PI;
 
@@ -6,16 +6,16 @@ use glam::{DQuat, DVec3, EulerRot};
 use raywake_core::pose::Pose;
 use raywake_core::sweep::Point;
 
-/// A laser: a row of its image is a beam, from the highest on, a column a direction.
+/// A laser: a row of its image is a beam, from the highest down, a column a direction.
 pub(super) struct RangeLaser {
     pub vehicle_from_laser: Pose,
-    /// Of its beams, from the lowest on, rad; empty where they are spread evenly.
+    /// Of its beams, from the lowest up, rad; empty if they are evenly spaced.
     pub inclinations: Vec<f64>,
-    /// The least and the largest inclination, rad.
+    /// The smallest and the largest inclination, rad.
     pub range: [f64; 2],
 }
 
-/// Numbers of an image's pixels: `values[(row * columns + column) * channels + channel]`.
+/// Values of an image's pixels: `values[(row * columns + column) * channels + channel]`.
 pub(super) struct Image {
     pub values: Vec<f32>,
     pub rows: usize,
@@ -23,15 +23,15 @@ pub(super) struct Image {
     pub channels: usize,
 }
 
-/// Range (m) and intensity lead a pixel.
+/// A pixel begins with range (m) and intensity.
 const CHANNELS_MIN: usize = 2;
-/// Roll, pitch and yaw (rad) and place (m) of the vehicle in the world.
+/// Roll, pitch and yaw (rad) and position (m) of the vehicle in the world.
 const POSE_CHANNELS: usize = 6;
 
 impl RangeLaser {
-    /// Returns of an image in the vehicle's frame, of this number among the sensors. With the
-    /// poses of the vehicle at the pixels and the world in its frame at the stamp, they are
-    /// compensated for its motion. Fails where the numbers of beams or pixels differ.
+    /// Returns of an image in the vehicle's frame, with this sensor number. Given the vehicle's
+    /// pose at each pixel and the world's pose in its frame at the stamp, they are compensated for
+    /// its motion. Fails if the numbers of beams or pixels differ.
     pub fn points<'a>(
         &'a self,
         image: &'a Image,
@@ -58,7 +58,7 @@ impl RangeLaser {
         let pixel = move |n: usize| {
             let value = |channel: usize| image.values[n * channels + channel];
             let range_m = f64::from(value(0));
-            // Where nothing came back it is -1.
+            // It is -1 if there is no return.
             if range_m.is_nan() || range_m <= 0.0 {
                 return None;
             }
@@ -86,8 +86,8 @@ impl RangeLaser {
         libm::sincos(self.inclinations.get(from_below).copied().unwrap_or_else(even))
     }
 
-    /// Sine and cosine of a column's direction in the laser's frame: the first one looks to the
-    /// rear of the vehicle, those after it further to the right.
+    /// Sine and cosine of a column's direction in the laser's frame: the first one points to the
+    /// rear of the vehicle, each one after it further clockwise.
     fn azimuth(&self, column: usize, columns: usize) -> (f64, f64) {
         let forward = self.vehicle_from_laser.rotation * DVec3::X;
         let turned = libm::atan2(forward.y, forward.x);

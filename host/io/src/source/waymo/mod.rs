@@ -1,15 +1,15 @@
-//! Segments of Waymo's Open Dataset in its Parquet release (version 2).
+//! Segments of the Waymo Open Dataset in its Parquet release (version 2).
 //!
-//! | file | read of it |
+//! | file | read from it |
 //! |---|---|
-//! | `lidar/SEGMENT.parquet` | first returns of all lasers, as images of ranges |
-//! | `lidar_calibration/SEGMENT.parquet` | where lasers sit, inclinations of their beams |
-//! | `lidar_pose/SEGMENT.parquet` | pose of the vehicle at each pixel of the laser on the roof |
+//! | `lidar/SEGMENT.parquet` | first returns of all lasers, as range images |
+//! | `lidar_calibration/SEGMENT.parquet` | mounting poses of lasers, inclinations of their beams |
+//! | `lidar_pose/SEGMENT.parquet` | pose of the vehicle at each pixel of the roof laser |
 //! | `vehicle_pose/SEGMENT.parquet` | pose of the vehicle at each sweep |
 //!
-//! The vehicle frame is theirs: x forward, y left, z up, origin on the ground below the rear axle;
-//! the world is the segment's. With the poses of pixels the returns of the laser on the roof are
-//! compensated for the vehicle's motion; those of the other lasers, which reach 20 m, are taken as
+//! The vehicle frame is the dataset's: x forward, y left, z up, origin on the ground below the rear
+//! axle; the world is the segment's. With the pixel poses, the returns of the roof laser are
+//! compensated for the vehicle's motion; those of the other lasers, which reach 20 m, are used as
 //! they are. Images are decoded row by row, so that memory does not grow with the segment.
 
 mod images;
@@ -29,15 +29,15 @@ use crate::Error;
 use images::RangeLaser;
 use table::{ImageRows, ParquetTable};
 
-/// Number of the laser on the roof.
+/// Number of the roof laser.
 const TOP: i64 = 1;
-/// Lasers that are believed: there are five.
+/// Maximum accepted number of lasers: there are five.
 const LASERS_MAX: usize = 8;
-/// Segments that an error names.
+/// Maximum number of segments named in an error.
 const NAMED: usize = 6;
 
-/// The vehicle around its rear axle with its mirrors, m: a Jaguar I-Pace of 4.68 m, or a Chrysler
-/// Pacifica of 5.18 m.
+/// Extent of the vehicle around its rear axle, with mirrors, m: a Jaguar I-Pace of 4.68 m, or a
+/// Chrysler Pacifica of 5.18 m.
 const OWN_VEHICLE: [[f32; 2]; 2] = [[-1.2, -1.2], [4.2, 1.2]];
 
 const TIME: &str = "key.frame_timestamp_micros";
@@ -48,11 +48,11 @@ const INCLINATION: &str = "[LiDARCalibrationComponent].beam_inclination.";
 const IMAGE: &str = "[LiDARComponent].range_image_return1.";
 const PIXEL_POSES: &str = "[LiDARPoseComponent].range_image_return1.";
 
-/// The rows of a sweep.
+/// The table rows of a sweep.
 struct SweepRows {
-    /// Of its images, with their lasers.
+    /// Rows of its images, with their lasers.
     images: Vec<(usize, i64)>,
-    /// Of the poses of the pixels.
+    /// Row of its pixel poses.
     pixel_poses: Option<usize>,
 }
 
@@ -64,12 +64,12 @@ pub(super) struct Waymo {
     images: ImageRows,
     pixel_poses: ImageRows,
     sweeps: Vec<SweepRows>,
-    /// Poses of the vehicle, which those of pixels refer to.
+    /// Poses of the vehicle, to which those of pixels refer.
     poses: Vec<Pose>,
 }
 
 impl Waymo {
-    /// Opens a segment: that which is named as topic, or the only one.
+    /// Opens a segment: the one named as topic, or the only one.
     pub fn open(root: &Path, options: &OpenOptions) -> Result<Waymo, Error> {
         if options.poses.is_some() || options.poses_frame.is_some() {
             let what = "segments of Waymo's bring their own poses; --poses does not apply";
@@ -166,12 +166,12 @@ impl Source for Waymo {
     }
 }
 
-/// A column's name, of a group of columns.
+/// The name of a column in a group of columns.
 fn of(group: &str, name: &str) -> String {
     format!("{group}{name}")
 }
 
-/// Name of the segment that is asked for, or of the only one.
+/// Name of the requested segment, or of the only one.
 fn segment(root: &Path, topics: &[String]) -> Result<String, Error> {
     let folder = root.join(WAYMO_LASERS);
     let mut names: Vec<String> = entries(&folder)?
@@ -206,7 +206,7 @@ fn keys(table: &ParquetTable) -> Result<Vec<(i64, i64)>, Error> {
     Ok(keys)
 }
 
-/// The lasers by their numbers.
+/// The lasers by number.
 fn lasers(path: &Path) -> Result<BTreeMap<i64, RangeLaser>, Error> {
     let mut lasers = BTreeMap::new();
     let names = ["min", "max", "values"].map(|name| of(INCLINATION, name));
@@ -230,7 +230,7 @@ fn lasers(path: &Path) -> Result<BTreeMap<i64, RangeLaser>, Error> {
     Ok(lasers)
 }
 
-/// `world_from_vehicle` at some times, µs.
+/// `world_from_vehicle` at these times, µs.
 fn vehicle_poses<'a>(
     path: &Path,
     times: impl Iterator<Item = &'a i64>,
@@ -247,7 +247,7 @@ fn vehicle_poses<'a>(
     times.map(at).collect()
 }
 
-/// A pose of 16 numbers, row by row.
+/// A pose from 16 numbers, row by row.
 fn pose(numbers: &[f64], path: &Path) -> Result<Pose, Error> {
     let Some(rows) = numbers.first_chunk::<12>().filter(|_| numbers.len() == 16) else {
         let what = format!("a pose of {} numbers, 16 expected", numbers.len());

@@ -25,16 +25,17 @@ use crate::Error;
 use crate::source::decoder::guarded;
 use crate::source::whole::{self, unpacked_max};
 
-/// Numbers of an image that are believed: six of each of 64 x 2650 pixels are ten times less.
+/// Maximum accepted count of numbers in an image: six for each of 64 x 2650 pixels are less than a
+/// tenth.
 const NUMBERS_MAX: usize = 1 << 24;
-/// Numbers that a column of a group of rows is believed to have, 1 GiB of float32: twice as many as
-/// the images of 200 sweeps. A few bytes may say that one is repeated as often as one likes.
+/// Maximum accepted count of numbers in a column of a row group, 1 GiB of float32: twice that of
+/// the images of 200 sweeps. A few bytes can declare that a number is repeated any number of times.
 const COLUMN_MAX: u64 = 1 << 28;
-/// Rows that are believed. A segment has five a sweep, some 1,000.
+/// Maximum accepted number of rows. A segment has five per sweep, about 1,000.
 const ROWS_MAX: usize = 1 << 20;
-/// Bytes that the header of a page is looked for in at first: most have fewer than 100.
+/// Bytes that are first read for the header of a page: most have fewer than 100.
 const HEADER_BYTES: u64 = 1024;
-/// Rows that are decoded at once where rows are small.
+/// Rows that are decoded at once if rows are small.
 const BATCH: usize = 256;
 
 /// An open file.
@@ -42,7 +43,7 @@ pub(super) struct ParquetTable {
     path: PathBuf,
     file: File,
     metadata: ArrowReaderMetadata,
-    /// Numbers that a column of a group of rows may have.
+    /// Maximum count of numbers in a column of a row group.
     numbers_max: u64,
 }
 
@@ -53,13 +54,13 @@ pub(super) struct TableRow<'a> {
     row: usize,
 }
 
-/// Rows that are decoded one after the other, where they are large.
+/// Large rows, decoded one after another.
 pub(super) struct ImageRows {
     table: ParquetTable,
-    /// Places of the columns that are read.
+    /// Indices of the columns that are read.
     roots: Vec<usize>,
     reader: ParquetRecordBatchReader,
-    /// Number of the row that comes next.
+    /// Index of the next row.
     next: usize,
 }
 
@@ -88,15 +89,15 @@ impl ParquetTable {
         reader.map_err(|e| Error::input(&self.path, "", e.to_string()))
     }
 
-    /// Places of columns by their names. Fails where one is missing, or has more numbers than are
-    /// believed.
+    /// Indices of columns by their names. Fails if one is missing, or has more numbers than
+    /// accepted.
     fn find(&self, columns: &[&str]) -> Result<Vec<usize>, Error> {
         let named = self.metadata.schema().fields();
         let find = |column: &&str| {
             let found = named.iter().position(|field| field.name() == column);
             let at = || format!("column `{column}`");
             let root = found.ok_or_else(|| Error::input(&self.path, at(), "is missing"))?;
-            // A row without a list is filled up, as often as its type says.
+            // A row without a list is padded to the length of its type.
             if fixed_size(named[root].data_type()).saturating_mul(BATCH as u64) > self.numbers_max {
                 return Err(Error::input(&self.path, at(), "has lists of too many numbers"));
             }
@@ -105,8 +106,8 @@ impl ParquetTable {
         columns.iter().map(find).collect()
     }
 
-    /// Whether a column has so many numbers at most in each group of rows, as its pages say, which
-    /// are what is decoded.
+    /// Checks that a column has at most this many numbers in each row group, according to its
+    /// pages, which are what is decoded.
     fn check_size(&self, root: usize, most: usize) -> Result<(), Error> {
         let schema = self.metadata.parquet_schema();
         let groups = self.metadata.metadata().row_groups();
@@ -126,7 +127,7 @@ impl ParquetTable {
         Ok(())
     }
 
-    /// How many numbers the pages of a column have, as far as that is no more than `enough`.
+    /// Counts the numbers in the pages of a column, stopping once there are more than `enough`.
     fn numbers(
         &self,
         chunk: &ColumnChunkMetaData,
@@ -145,7 +146,7 @@ impl ParquetTable {
         Ok(count)
     }
 
-    /// Fails where the header of a page is not what its decoder may be given.
+    /// Fails if the header of a page is not safe to pass to its decoder.
     fn check_pages(&self, chunk: &ColumnChunkMetaData) -> Result<(), ParquetError> {
         let (mut from, length) = chunk.byte_range();
         let end = from.saturating_add(length);
@@ -165,13 +166,13 @@ impl ParquetTable {
             match thrift::page_header(&bytes) {
                 Some(header) => return Ok(header),
                 None if room >= left => return Err(damaged("header of a page")),
-                // Long where it has statistics of long texts.
+                // Long if it has statistics of long strings.
                 None => room *= 16,
             }
         }
     }
 
-    /// Hands out rows with these columns.
+    /// Passes rows with these columns to `see`.
     pub fn each(
         &self,
         columns: &[&str],
@@ -193,7 +194,7 @@ impl ParquetTable {
         Ok(())
     }
 
-    /// Rows with these columns, one after the other.
+    /// Rows with these columns, one after another.
     pub fn rows(self, columns: &[&str]) -> Result<ImageRows, Error> {
         let roots = self.find(columns)?;
         let reader = self.reader(&roots, 1)?;
@@ -201,17 +202,17 @@ impl ParquetTable {
     }
 }
 
-/// Fails where what describes a file is not what its decoder may be given.
+/// Fails if the footer of a file is not safe to pass to its decoder.
 fn check_footer(file: &File, length: u64) -> Result<(), ParquetError> {
     let Some(at) = length.checked_sub(8) else { return Ok(()) };
     let end = read_at(file, at, 8)?;
     let size = u64::from(u32::from_le_bytes([end[0], end[1], end[2], end[3]]));
-    // What is no such file is told so by the decoder.
+    // If it is not such a file, the decoder says so.
     let Some(from) = at.checked_sub(size) else { return Ok(()) };
     if thrift::is_sound(&read_at(file, from, size)?) { Ok(()) } else { Err(damaged("footer")) }
 }
 
-/// Bytes of a file that has so many.
+/// Reads this many bytes of a file, which has them.
 fn read_at(mut file: &File, from: u64, count: u64) -> Result<Vec<u8>, ParquetError> {
     let mut bytes = vec![0; count as usize];
     file.seek(SeekFrom::Start(from))?;
@@ -223,7 +224,7 @@ fn damaged(what: &str) -> ParquetError {
     ParquetError::General(format!("damaged: the {what}"))
 }
 
-/// Numbers that a row of a type has whatever is in it.
+/// Count of numbers in a row of a type, whatever it contains.
 fn fixed_size(kind: &DataType) -> u64 {
     match kind {
         DataType::FixedSizeList(of, count) => {
@@ -244,8 +245,8 @@ impl ImageRows {
         &self.table.path
     }
 
-    /// An image from its columns of numbers and shape. What lies before the last one that was read
-    /// is reached from the file's beginning.
+    /// An image from its columns of numbers and shape. A row before the last one read is reached
+    /// from the beginning of the file.
     pub fn image(&mut self, row: usize, values: &str, shape: &str) -> Result<Image, Error> {
         if row < self.next {
             self.reader = self.table.reader(&self.roots, 1)?;
@@ -286,7 +287,7 @@ impl TableRow<'_> {
         self.batch.column_by_name(name).ok_or_else(|| self.wrong(name, "is missing"))
     }
 
-    /// A whole number.
+    /// An integer.
     pub fn integer(&self, name: &str) -> Result<i64, Error> {
         let column = self.column(name)?;
         let wide = column.as_primitive_opt::<Int64Type>().map(|c| c.value(self.row));
@@ -294,14 +295,14 @@ impl TableRow<'_> {
         wide.or_else(narrow).ok_or_else(|| self.wrong(name, "is neither int64 nor int8"))
     }
 
-    /// A number; NaN where there is none.
+    /// A number; NaN if it is null.
     pub fn number(&self, name: &str) -> Result<f64, Error> {
         let column = self.column(name)?.as_primitive_opt::<Float64Type>();
         let column = column.ok_or_else(|| self.wrong(name, "is not float64"))?;
         Ok(if column.is_null(self.row) { f64::NAN } else { column.value(self.row) })
     }
 
-    /// A list, of any length or a fixed one.
+    /// A list of variable or fixed length.
     fn list(&self, name: &str) -> Result<ArrayRef, Error> {
         let column = self.column(name)?;
         let list = column.as_list_opt::<i32>().map(|c| c.value(self.row));
@@ -309,7 +310,7 @@ impl TableRow<'_> {
         list.or_else(fixed).ok_or_else(|| self.wrong(name, "is no list"))
     }
 
-    /// The numbers of a list; none where it is null.
+    /// The numbers of a list; empty if it is null.
     pub fn numbers(&self, name: &str) -> Result<Vec<f64>, Error> {
         if self.column(name)?.is_null(self.row) {
             return Ok(Vec::new());
@@ -332,7 +333,7 @@ mod tests {
     use arrow_schema::Field;
     use parquet::arrow::ArrowWriter;
 
-    /// Lists of a million numbers, none of which is there: a file of some hundred bytes.
+    /// Lists of a million numbers that are all missing: a file of some hundred bytes.
     #[test]
     fn what_is_filled_up_to_too_much() {
         let t = Temp::new();
@@ -365,7 +366,7 @@ mod tests {
         writer.close().unwrap();
         assert!(path.metadata().unwrap().len() < 10_000);
         let table = ParquetTable::open(&path).unwrap();
-        // The null counts, too.
+        // The null counts too.
         table.check_size(0, MANY + 4).unwrap();
         table.check_size(1, 6).unwrap();
         let e = table.check_size(0, MANY + 3).unwrap_err().to_string();

@@ -1,28 +1,27 @@
-//! What Parquet's headers are written in, Thrift's compact protocol, looked through before they are
-//! decoded. The decoder goes through as many truths of a list as the file says that there are,
-//! though they take no bytes: lists of two thousand million within each other would keep it for
-//! hours.
+//! Scans Thrift's compact protocol, in which Parquet's headers are written, before it is decoded.
+//! The decoder goes through as many booleans of a list as the file states, though they take no
+//! bytes: nested lists of two billion would keep it busy for hours.
 
-/// Structures within each other, at most; Parquet has 8.
+/// Maximum nesting of structures; Parquet has 8.
 const DEPTH_MAX: usize = 32;
-/// The field of a page's header that says how many bytes follow it.
+/// The field of a page's header that gives the number of bytes after it.
 const COMPRESSED_SIZE: i64 = 3;
 
-/// A page's header.
+/// The header of a page.
 #[derive(Debug, PartialEq)]
 pub(super) struct PageHeader {
-    /// Its bytes.
+    /// Its length in bytes.
     pub length: usize,
-    /// Bytes that follow.
+    /// Number of bytes that follow.
     pub compressed: usize,
 }
 
-/// Whether bytes begin with a structure of which every element has bytes of its own.
+/// Whether bytes begin with a structure in which every element takes bytes of its own.
 pub(super) fn is_sound(bytes: &[u8]) -> bool {
     Elements { left: bytes }.fields(0, |_, _| {}).is_some()
 }
 
-/// The header of a page that bytes begin with.
+/// The page header at the start of some bytes.
 pub(super) fn page_header(bytes: &[u8]) -> Option<PageHeader> {
     let (mut elements, mut compressed) = (Elements { left: bytes }, None);
     elements.fields(0, |id, value| {
@@ -34,7 +33,7 @@ pub(super) fn page_header(bytes: &[u8]) -> Option<PageHeader> {
     Some(PageHeader { length: bytes.len() - elements.left.len(), compressed })
 }
 
-/// Bytes that have not been looked at.
+/// Bytes not yet scanned.
 struct Elements<'a> {
     left: &'a [u8],
 }
@@ -62,12 +61,13 @@ impl Elements<'_> {
         None
     }
 
-    /// One with a sign, the lowest bit.
+    /// A signed number: the sign is the lowest bit.
     fn signed(&mut self) -> Option<i64> {
         self.number().map(|n| (n >> 1) as i64 ^ -((n & 1) as i64))
     }
 
-    /// The fields of a structure; whole numbers are shown, with the number of their field.
+    /// Scans the fields of a structure; whole numbers are passed to `see`, with the number of their
+    /// field.
     fn fields(&mut self, depth: usize, mut see: impl FnMut(i64, i64)) -> Option<()> {
         let mut id = 0_i64;
         loop {
@@ -81,7 +81,7 @@ impl Elements<'_> {
                 delta => id.wrapping_add(delta.into()),
             };
             match kind {
-                // A truth of a field is its kind.
+                // The value of a boolean field is in its kind.
                 1 | 2 => {}
                 4..=6 => see(id, self.signed()?),
                 _ => self.value(kind, depth)?,
@@ -89,7 +89,7 @@ impl Elements<'_> {
         }
     }
 
-    /// A value of a kind, which takes at least a byte.
+    /// Scans a value of a kind, which takes at least a byte.
     fn value(&mut self, kind: u8, depth: usize) -> Option<()> {
         match kind {
             3 => self.skip(1),
@@ -131,7 +131,7 @@ impl Elements<'_> {
 mod tests {
     use super::*;
 
-    /// Field 1: 2; field 2: -3; field 3: 300; field 5: a structure of one text; the end.
+    /// Field 1: 2; field 2: -3; field 3: 300; field 5: a structure of one string; the end.
     const PAGE: [u8; 13] = [0x15, 4, 0x15, 5, 0x15, 0xd8, 4, 0x2c, 0x18, 1, b'x', 0, 0];
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
         let long = [&PAGE[..], &[7; 9]].concat();
         assert_eq!(page_header(&long), Some(PageHeader { length: 13, compressed: 300 }));
         assert!(is_sound(&PAGE) && (0..13).all(|end| page_header(&PAGE[..end]).is_none()));
-        // Less than nothing follows, or nobody says how much.
+        // A negative number of bytes follows, or the number is missing.
         assert_eq!(page_header(&[0x35, 1, 0]), None);
         assert_eq!(page_header(&[0x15, 2, 0]), None);
     }
@@ -148,9 +148,9 @@ mod tests {
     fn elements_without_bytes() {
         let list =
             |kind: u8, count: [u8; 2]| [&[0x19, 0xf0 | kind][..], &count, &[1, 2, 0]].concat();
-        // Two numbers of a byte; 3, of which one is missing.
+        // Two one-byte numbers; three, one of which is missing.
         assert!(is_sound(&list(3, [0x82, 0])) && !is_sound(&list(3, [0x83, 0])));
-        // Truths, a map of them, and lists within each other without end.
+        // Booleans, a map of them, and endlessly nested lists.
         assert!(!is_sound(&list(1, [0xff, 0x7f])));
         assert!(!is_sound(&[0x1b, 5, 0x11, 0, 0, 0]));
         assert!(!is_sound(&[&[0x19][..], &[0x19; 1000], &[0; 9]].concat()));

@@ -1,4 +1,4 @@
-//! Packets as they come.
+//! Packets as they arrive.
 
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use crate::source::tests::fuzz::{Random, damaged};
 
 const NOW_NS: u64 = 1_700_000_000_000_000_000;
 
-/// The sweeps of packets that come one after the other, and what became of these.
+/// The sweeps of packets that arrive one after another, and the counts of packets.
 pub(super) fn assembled(
     sensor: &LiveSensor,
     packets: &[Vec<u8>],
@@ -30,7 +30,8 @@ fn vlp() -> LiveSensor {
     LiveSensor::of(SensorModel::Vlp16, None).unwrap()
 }
 
-/// The sweeps of the capture of the same packets, but for a last one that no packet ends.
+/// Compares with the sweeps of a capture of the same packets, except a last one that no packet
+/// ends.
 fn check(live: &[SweepData], recorded: &[SweepData]) {
     assert!(!live.is_empty() && live.len() + 1 >= recorded.len());
     let from = recorded[0].stamp_s;
@@ -49,14 +50,14 @@ fn the_same_sweeps_as_those_of_a_capture() {
     let (live, counts) = assembled(&vlp(), &packets);
     check(&live, &sweeps(&mut capture.unwrap()));
     assert_eq!(counts, PacketCounts { packets: 300, ..PacketCounts::default() });
-    // The first one knows how long a turn takes.
+    // The first sweep already knows how long a revolution takes.
     let mut assembler = Assembler::new(vlp());
     let mut turns_ns = Vec::new();
     for packet in &packets {
         assembler.take(packet, Instant::now(), NOW_NS, |sweep| turns_ns.push(sweep.turn_ns));
     }
     assert_eq!(turns_ns, [75.0 * 1_327_000.0; 3]);
-    // Of a capture that begins with a turn, that one is left out.
+    // If a capture begins with a revolution, that one is left out.
     let name = "OS-1-128_v2.3.0_1024x10_lb_n3";
     let metadata = super::packets("OS-1-128_v2.3.0_1024x10.json");
     let ouster = LiveSensor::of(SensorModel::Ouster, Some(&metadata)).unwrap();
@@ -125,7 +126,7 @@ fn nonsense_is_counted() {
     spoil(&vlp(), &turns(0..4000));
 }
 
-/// Of packets of a sensor every fourth is damaged.
+/// Damages a quarter of the packets of a sensor.
 pub(super) fn spoil(sensor: &LiveSensor, packets: &[Vec<u8>]) {
     let mut random = Random(20);
     let spoil = |packet: &Vec<u8>| match random.below(4) {
@@ -150,7 +151,7 @@ fn a_capture_is_sent_again() {
     std::thread::scope(|scope| {
         let sent = scope.spawn(|| replay.send(to, 5.0, || false).unwrap());
         let (mut datagram, mut next) = ([0; 2000], 0);
-        // On a busy machine the system may throw some away.
+        // On a busy machine the system may drop some.
         while let Ok(length) = socket.recv(&mut datagram) {
             let found = (next..230).find(|n| vlp16(*n) == datagram[..length]);
             next = found.expect("a packet of the capture, after those before it") + 1;

@@ -1,8 +1,8 @@
-//! Captures that are carried otherwise, mixed, cut and damaged.
+//! Captures in other encapsulations, mixed, cut and damaged.
 
 use super::*;
 
-/// The same sweeps, whatever carries them.
+/// The same sweeps in any encapsulation.
 #[test]
 fn fragments_and_pcapng() {
     let packets = turns(0..200);
@@ -16,7 +16,7 @@ fn fragments_and_pcapng() {
     let mut capture = Capture::open(&path, &ground).unwrap();
     assert_eq!(capture.overview.epoch_ns / 1_000_000_000, 1_700_000_000);
     assert_eq!(sweeps(&mut capture)[0].points, expected[0]);
-    // In two parts, those of neighbours mixed, the last part first.
+    // In two parts, mixed with those of neighbours, the last part first.
     let mut parts = Vec::new();
     for (n, frame) in whole.iter().enumerate() {
         let (head, payload) = frame.split_at(34);
@@ -35,7 +35,7 @@ fn fragments_and_pcapng() {
     let (_folder, capture) = made(&parts);
     let mut capture = capture.unwrap();
     assert_eq!(sweeps(&mut capture)[0].points, expected[0]);
-    // Without one part one packet is missing.
+    // If one part is missing, its packet is missing.
     parts.remove(250);
     let (_folder, capture) = made(&parts);
     let found = sweeps(&mut capture.unwrap());
@@ -43,7 +43,7 @@ fn fragments_and_pcapng() {
     assert_eq!(found[1].points.len(), expected[1].len() - 12 * 32);
 }
 
-/// Turns of which packets come twice, late, or not at all, and one of others.
+/// Revolutions with packets that are repeated, late or missing, and one foreign datagram.
 pub(super) fn mixed() -> Vec<Vec<u8>> {
     let mut packets = turns(0..750);
     packets.drain(475..575);
@@ -54,7 +54,7 @@ pub(super) fn mixed() -> Vec<Vec<u8>> {
     packets
 }
 
-/// Packets that come twice, late, or not at all, and those of others.
+/// Packets that are repeated, late or missing, and foreign datagrams.
 #[test]
 fn disorder() {
     let packets = mixed();
@@ -62,8 +62,8 @@ fn disorder() {
     let mut capture = capture.unwrap();
     let notes = capture.notes().join("\n");
     assert!(notes.contains("late firings (24)"), "{notes}");
-    // Turns begin at packets 37.5, 112.5, ...: of those at 262.5 and 337.5 a part is there, of the
-    // one at 487.5 nothing.
+    // Revolutions begin at packets 37.5, 112.5, ...: parts of those at 262.5 and 337.5 are there,
+    // nothing of the one at 487.5.
     assert_eq!(capture.overview.frames, [0, 1, 2, 3, 4, 5, 7, 8]);
     let mut sweep = SweepData::default();
     capture.read(6, &mut sweep).unwrap();
@@ -105,14 +105,14 @@ fn mistakes() {
         folder.write("y.json", json);
         assert!(wrong(&path).contains(expected), "{}", wrong(&path));
     }
-    // Cut: what is whole is read.
+    // Cut off: what is complete is read.
     let own = fs::read_to_string(packets("OS-1-128_v2.3.0_1024x10.json")).unwrap();
     folder.write("y.json", &own);
     folder.write("y.pcap", &capture[..capture.len() * 3 / 4]);
     let source = opened(&path);
     assert_eq!(source.len(), 2);
     assert!(source.notes().join("\n").contains("the file ends within a frame"));
-    // A clock that is set back by 100 s, within a turn.
+    // A clock that is set back by 100 s, within a revolution.
     let mut packets = turns(0..375);
     for packet in &mut packets[..150] {
         let us = u32::from_le_bytes(packet[1200..1204].try_into().unwrap());
@@ -127,7 +127,7 @@ fn mistakes() {
     assert_eq!(Format::Pcap, crate::source::recognise(&path).unwrap().0);
 }
 
-/// Whatever is in a file, there is an error or there are sweeps.
+/// Whatever a file contains, there is an error or there are sweeps.
 #[test]
 fn damaged_captures() {
     let folder = Temp::new();

@@ -1,4 +1,4 @@
-//! Packets of an HDL-64E, made here, and calibrations.
+//! Synthetic packets and calibrations of an HDL-64E.
 
 use super::live::{LiveSensor, SensorModel};
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 /// Elevation of all lasers but the first, degrees.
 const DOWN: f64 = -10.0;
 
-/// What was measured of a laser; the names and units of the file.
+/// The calibration of a laser, with the names and units of the file.
 fn laser(id: usize, values: [f64; 7]) -> String {
     let names = ["rot", "vert", "dist", "dist", "dist", "vertOffset", "horizOffset"];
     let ends = ["", "", "", "X", "Y", "", ""];
@@ -20,7 +20,7 @@ fn laser(id: usize, values: [f64; 7]) -> String {
     format!("<item><px><id_>{id}</id_>{tags}</px></item>")
 }
 
-/// A calibration: the first laser is one of a real sensor, the others lack nothing.
+/// A calibration: the first laser is one of a real sensor, the others need no corrections.
 fn calibration() -> String {
     let first = laser(0, [-4.98, -7.16, 110.0, 113.0, 112.0, 21.5, 2.6]);
     let others: String =
@@ -31,7 +31,7 @@ fn calibration() -> String {
     )
 }
 
-/// A packet that sees something 10 m away all around; `n` counts packets of a turn of 300.
+/// A packet that sees something 10 m away all around; `n` counts packets, 300 per revolution.
 fn packet(n: u32) -> Vec<u8> {
     let mut packet = Vec::new();
     for block in 0..BLOCKS as u32 {
@@ -40,7 +40,7 @@ fn packet(n: u32) -> Vec<u8> {
         (0..32).for_each(|_| packet.extend([0x88, 0x13, 51]));
     }
     packet.extend((n * 288).to_le_bytes());
-    // Something of its settings stands there: it must not be taken for the number of a VLP-16.
+    // This byte is one of its settings: it must not be taken for the number of a VLP-16.
     packet.extend([0x37, 0x22]);
     packet
 }
@@ -54,7 +54,7 @@ fn packets(dual: bool) -> Vec<Vec<u8>> {
     packets
 }
 
-/// The file of some packets, 300 a turn, and what the sensor's calibration is.
+/// A file of packets, 300 per revolution, and the sensor's calibration.
 pub(crate) fn calibrated(count: usize) -> [Vec<u8>; 2] {
     [pcap(&from_one(&packets(false)[..count])), calibration().into_bytes()]
 }
@@ -67,7 +67,7 @@ fn floor() -> OpenOptions {
     OpenOptions { ground_m: Some(-2.0), ..options() }
 }
 
-/// The manual's formulas, worked out by another program.
+/// The manual's formulas, evaluated by another program.
 #[test]
 fn places() {
     let folder = Temp::new();
@@ -97,7 +97,7 @@ fn turns_of_an_hdl_64e() {
     assert!(capture.describe().contains("HDL-64E 10.0.0.9:2368"), "{}", capture.describe());
     let all = sweeps(&mut capture);
     assert_eq!((all.len(), all[0].points.len()), (1, 300 * 6 * 64));
-    // From the rear, clockwise; the second laser lacks nothing.
+    // From the rear, clockwise; the second laser needs no correction.
     let at = |n: usize| all[0].points[64 * n + 1].position.map(f64::from);
     let (along, z) = (10.0 * DOWN.to_radians().cos(), 10.0 * DOWN.to_radians().sin());
     for (n, [x, y]) in [(0, [-along, 0.0]), (450, [0.0, along]), (900, [along, 0.0])] {
@@ -108,7 +108,7 @@ fn turns_of_an_hdl_64e() {
     assert!((last - 1799.0 * 48e-6).abs() < 1e-6, "{last}");
 }
 
-/// Of two returns of a beam the first one told is taken.
+/// Of two returns of a beam, the first one sent is used.
 #[test]
 fn two_returns_of_a_beam() {
     let folder = Temp::new();
@@ -145,7 +145,7 @@ fn calibrations_that_are_none() {
     }
 }
 
-/// Older files know of neither the unit nor distances near by.
+/// Older files have neither the unit nor near distances.
 #[test]
 fn first_sensors() {
     let folder = Temp::new();
@@ -160,7 +160,7 @@ fn first_sensors() {
     let mut points = Vec::new();
     sensor.returns(&packet(0), 0, 0, &mut points);
     let reach = |p: [f32; 3]| p.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-    // What distances lack, 1.10 m, and offsets at right angles to the beam.
+    // The distance correction, 1.10 m, and offsets at right angles to the beam.
     let expected = 11.1_f64.powi(2) + 0.215_f64.powi(2) + 0.026_f64.powi(2);
     assert!((reach(points[0].position) - expected).abs() < 1e-3, "{:?}", points[0]);
 }

@@ -1,4 +1,4 @@
-//! Packets of real sensors, and captures made here.
+//! Packets of real sensors, and synthetic captures.
 
 mod arriving;
 mod disorder;
@@ -46,7 +46,7 @@ fn wrong(path: &Path) -> String {
     open(path, &options()).err().expect("is opened").to_string()
 }
 
-/// The payloads of a capture, of a length.
+/// The payloads of this length in a capture.
 fn payloads(name: &str, length: usize) -> Vec<Vec<u8>> {
     let mut all = every_payload(name);
     all.retain(|payload| payload.len() == length);
@@ -64,7 +64,7 @@ fn every_payload(name: &str) -> Vec<Vec<u8>> {
     all
 }
 
-/// A frame of Ethernet around a datagram.
+/// An Ethernet frame around a datagram.
 fn frame(source: [u8; 4], payload: &[u8]) -> Vec<u8> {
     let builder = PacketBuilder::ethernet2([1; 6], [2; 6]).ipv4(source, [10, 0, 0, 1], 64);
     let mut frame = Vec::new();
@@ -72,7 +72,7 @@ fn frame(source: [u8; 4], payload: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The file of some frames, 1 ms apart.
+/// A file of these frames, 1 ms apart.
 fn pcap(frames: &[Vec<u8>]) -> Vec<u8> {
     let mut file = Vec::new();
     let head = [0xa1b2_c3d4, 0x0004_0002, 0, 0, 1 << 18, 1];
@@ -107,8 +107,8 @@ fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
     file
 }
 
-/// A packet of a VLP-16 that sees something 10 m away all around; `n` counts packets of a turn of
-/// 75.
+/// A packet of a VLP-16 that sees something 10 m away all around; `n` counts packets, 75 per
+/// revolution.
 fn vlp16(n: u32) -> Vec<u8> {
     let mut packet = Vec::new();
     for block in 0..BLOCKS as u32 {
@@ -127,19 +127,19 @@ fn turns(packets: std::ops::Range<u32>) -> Vec<Vec<u8>> {
     packets.map(vlp16).collect()
 }
 
-/// The file of packets of a VLP-16, 75 a turn.
+/// A file of packets of a VLP-16, 75 per revolution.
 pub(crate) fn recording(packets: u32) -> Vec<u8> {
     pcap(&from_one(&turns(0..packets)))
 }
 
-/// A file of the first packets that an Ouster sent, and what it says of itself.
+/// A file of the first packets that an Ouster sent, and its metadata.
 pub(crate) fn published(count: usize) -> [Vec<u8>; 2] {
     let sent = every_payload("crc_test.pcap");
     let metadata = fs::read(packets("crc_test.json")).unwrap();
     [pcap(&from_one(&sent[..count.min(sent.len())])), metadata]
 }
 
-/// A capture of packets of one sensor, with a floor found by the user.
+/// A capture of packets of one sensor, with the ground given by the user.
 fn made(frames: &[Vec<u8>]) -> (Temp, Result<Capture, Error>) {
     let folder = Temp::new();
     let path = folder.write("made.pcap", pcap(frames));
@@ -151,7 +151,7 @@ fn from_one(packets: &[Vec<u8>]) -> Vec<Vec<u8>> {
     packets.iter().map(|packet| frame([10, 0, 0, 9], packet)).collect()
 }
 
-/// What its maker decodes: MD5 of the fields of all packets, each a row per beam.
+/// What the manufacturer decodes: MD5 of the fields of all packets, one row per beam.
 #[test]
 fn fields_of_an_os0() {
     let ouster = Ouster::read(&packets("OS-0-128-U1_v2.3.0_1024x10.json")).unwrap();
@@ -190,7 +190,7 @@ fn fields_of_an_os0() {
     }
 }
 
-/// Three sweeps of a moving OS1, whose way its maker knows.
+/// Three sweeps of a moving OS1 whose trajectory is known to the manufacturer.
 #[test]
 fn way_of_an_os1() {
     let mut source = opened(&packets("OS-1-128_v2.3.0_1024x10_lb_n3.pcap"));
@@ -203,7 +203,7 @@ fn way_of_an_os1() {
     let found: Vec<Pose> = found.map(|l| l.world_from_vehicle).collect();
     let told = pose_files::read(&packets("OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"), &[0; 3]);
     let told: Vec<Pose> = told.unwrap().into_iter().flatten().collect();
-    // The first step is 2.3 cm shorter here than there, the second one the same within 1 mm.
+    // The first step is 2.3 cm shorter here than there, the second one agrees within 1 mm.
     for (found, told) in found.iter().zip(&told) {
         let off = told.inverse() * *found;
         assert!(
@@ -213,7 +213,7 @@ fn way_of_an_os1() {
     }
 }
 
-/// A sweep read alone, or after others, is the same; and its poses may be a file.
+/// A sweep is the same whether read alone or after others; and its poses may be in a file.
 #[test]
 fn any_order_and_poses() {
     let path = packets("OS-1-128_v2.3.0_1024x10_lb_n3.pcap");
@@ -262,7 +262,7 @@ fn cones_of_an_hdl_32e() {
         // The angles of the manual are rounded to 0.01°.
         assert!(off < 1e-3 + 2e-4 * along, "{point:?} is {off} m off");
     }
-    // It turns nine times a second, and most of it sees something.
+    // It makes nine revolutions a second, and most of it sees something.
     let last = all[0].points.iter().map(|p| p.offset_s).fold(0.0, f32::max);
     assert!((0.1..0.12).contains(&last) && all[0].points.len() > 40_000, "{last}");
 }
@@ -272,13 +272,13 @@ fn cones_of_an_hdl_32e() {
 fn returns_of_a_vlp_16() {
     let (_folder, capture) = made(&from_one(&turns(0..300)));
     let mut capture = capture.unwrap();
-    // Turns begin at the rear: half a turn at each end is left out.
+    // Revolutions begin at the rear: half a revolution at each end is left out.
     assert_eq!((capture.len(), capture.notes().len()), (3, 1));
     let all = sweeps(&mut capture);
     for sweep in &all {
         assert!(sweep.points.iter().all(|p| p.intensity == 0.2 && p.position[0].is_finite()));
         let first = &sweep.points[15];
-        // The 16th laser looks up by 15°; it fires 34.56 µs after the first, at 12 mm less.
+        // The 16th laser points up by 15°; it fires 34.56 µs after the first, from 11 mm lower.
         let angle = 15f64.to_radians();
         let z = 10.0 * angle.sin() - 0.04191 * angle.tan();
         assert!((f64::from(first.position[2]) - z).abs() < 1e-6, "{first:?}");
@@ -309,12 +309,12 @@ fn dual_returns() {
     let (_folder, capture) = made(&from_one(&packets));
     let all = sweeps(&mut capture.unwrap());
     assert_eq!(all[1].points.len(), 75 * 6 * 32);
-    // The first of a pair, the last returns, was changed.
+    // The first of each pair, the last returns, was changed.
     assert!(all[1].points.iter().all(|p| p.position.iter().map(|v| v * v).sum::<f32>() > 99.0));
 }
 
-/// The table of the VLP-32C's lasers stands in the simulator, too, where azimuths count the other
-/// way round.
+/// The simulator also has the table of the VLP-32C's lasers, with azimuths in the opposite
+/// direction.
 #[test]
 #[cfg(feature = "simulated")]
 fn lasers_of_a_vlp_32c() {
